@@ -1,0 +1,514 @@
+//! The case file as a user types it: TOML, SI units, unknown keys refused.
+//!
+//! The structs here are the schema (`seixo schema` prints it). `file` reads and overrides, `check` judges what serde cannot.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A three-component vector as written in a case file.
+pub type Vector = [f64; 3];
+
+/// A case: one experiment. All quantities in SI units.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Resolution, time and gravity.
+    pub run: Run,
+    /// The fluid and the scheme that moves it. Leave out for a dry scene.
+    pub fluid: Option<Fluid>,
+    /// A rectangular container.
+    pub tank: Option<Tank>,
+    /// Fixed boxes.
+    #[serde(default)]
+    pub obstacle: Vec<Obstacle>,
+    /// Fixed flat walls at any angle.
+    #[serde(default)]
+    pub plane: Vec<Plane>,
+    /// Walls that follow a table of motion.
+    #[serde(default)]
+    pub moving_wall: Vec<MovingWall>,
+    /// Rigid bodies.
+    #[serde(default)]
+    pub body: Vec<Body>,
+    /// Contact between solids. Needed as soon as a body can move.
+    pub contact: Option<Contact>,
+    /// Measurements over time.
+    #[serde(default)]
+    pub gauge: Gauges,
+    /// Files to write.
+    #[serde(default)]
+    pub output: Output,
+}
+
+/// Resolution, time and gravity.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Initial distance between particles l0 [m].
+    pub spacing: f64,
+    /// Time step [s]; the largest one when `adaptive = true`.
+    pub time_step: f64,
+    /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v and
+    /// dt <= 0.7 l0 / c_s.
+    #[serde(default)]
+    pub adaptive: bool,
+    /// End of the run [s].
+    pub end: f64,
+    /// Gravity [m/s2].
+    #[serde(default = "Run::default_gravity")]
+    pub gravity: Vector,
+    /// 3, or 2 for the plane y = 0 (a slice one spacing wide).
+    #[serde(default = "Run::default_dimensions")]
+    pub dimensions: u32,
+    /// Lower and upper corner of the box that no particle may leave [m]. Derived from the walls if absent.
+    pub domain: Option<[Vector; 2]>,
+    /// Effective radius over the spacing, re / l0 [-].
+    #[serde(default = "Run::default_effective_radius")]
+    pub effective_radius: f64,
+}
+
+impl Run {
+    fn default_gravity() -> Vector {
+        [0.0, 0.0, -9.80665]
+    }
+    fn default_dimensions() -> u32 {
+        3
+    }
+    fn default_effective_radius() -> f64 {
+        2.1
+    }
+}
+
+/// Source term of the pressure Poisson equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// The paper's Eq. (8): deviation of the number density alone.
+    NumberDensity,
+    /// Divergence of the predicted velocity plus gamma times the deviation.
+    Mixed,
+}
+
+/// Pressure gradient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Gradient {
+    /// The paper's Eq. (9): against the smallest pressure in the neighbourhood.
+    Minimum,
+    /// Eq. (9) times the inverse of the particle's moment matrix: exact for linear fields.
+    MinimumCorrected,
+}
+
+/// Which particles lie on the free surface (P = 0).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FreeSurface {
+    /// The paper's: n < beta n0.
+    Threshold,
+    /// n < 0.8 beta n0, or n < beta n0 and the neighbours' centroid lies more than 0.1 l0 away.
+    ThresholdOffset,
+}
+
+/// Sets of scheme switches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    /// The paper's scheme: number_density, minimum, threshold.
+    Paper,
+    /// The more accurate one: mixed, minimum_corrected, threshold_offset.
+    #[default]
+    Accurate,
+}
+
+/// Preconditioner of the conjugate gradients.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preconditioner {
+    /// Chosen by the plan from the number of unknowns.
+    #[default]
+    Auto,
+    /// The diagonal.
+    Jacobi,
+    /// Aggregation multigrid on background buckets.
+    Multigrid,
+}
+
+/// The fluid and its scheme.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fluid {
+    /// Density [kg/m3].
+    #[serde(default = "Fluid::default_density")]
+    pub density: f64,
+    /// Kinematic viscosity [m2/s]; 0 leaves the viscous stage out.
+    #[serde(default = "Fluid::default_viscosity")]
+    pub viscosity: f64,
+    /// Set of scheme switches; the keys below override single ones.
+    #[serde(default)]
+    pub preset: Preset,
+    /// Source term of the pressure Poisson equation.
+    pub source: Option<Source>,
+    /// Pressure gradient.
+    pub gradient: Option<Gradient>,
+    /// Test for the free surface.
+    pub free_surface: Option<FreeSurface>,
+    /// Relaxation gamma of Eq. (8) [-]. Give this or `sound_speed`.
+    pub relaxation: Option<f64>,
+    /// Reference speed c_s [m/s], gamma = (c_s dt / l0)^2. Derived from depth and spacing if neither is given.
+    pub sound_speed: Option<f64>,
+    /// Artificial compressibility alpha of Eq. (8) [1/Pa]. Derived if absent; at least 1e-10.
+    pub compressibility: Option<f64>,
+    /// Free-surface threshold beta [-].
+    #[serde(default = "Fluid::default_beta")]
+    pub free_surface_threshold: f64,
+    /// Distance of the collision model over l0, a [-]; Eq. (18).
+    #[serde(default = "Fluid::default_collision_distance")]
+    pub collision_distance: f64,
+    /// Restitution of the collision model, b [-]; Eq. (18).
+    #[serde(default = "Fluid::default_collision_restitution")]
+    pub collision_restitution: f64,
+    /// Blocks of water at t = 0.
+    #[serde(default)]
+    pub block: Vec<Block>,
+    /// The pressure Poisson equation's solver.
+    #[serde(default)]
+    pub solver: Solver,
+}
+
+impl Fluid {
+    fn default_density() -> f64 {
+        1000.0
+    }
+    fn default_viscosity() -> f64 {
+        1e-6
+    }
+    fn default_beta() -> f64 {
+        0.97
+    }
+    fn default_collision_distance() -> f64 {
+        0.8
+    }
+    fn default_collision_restitution() -> f64 {
+        0.2
+    }
+}
+
+/// Solver of the pressure Poisson equation.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Solver {
+    /// Residual over right side at which the iteration stops, ||r|| / ||b|| [-].
+    pub tolerance: f64,
+    /// Most iterations a step.
+    pub max_iterations: u32,
+    /// Preconditioner.
+    pub preconditioner: Preconditioner,
+    /// Start from the last pressure instead of zero.
+    pub warm_start: bool,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self { tolerance: 1e-3, max_iterations: 1000, preconditioner: Preconditioner::Auto, warm_start: true }
+    }
+}
+
+/// A block of water.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Block {
+    /// Lower corner [m].
+    pub min: Vector,
+    /// Upper corner [m].
+    pub max: Vector,
+    /// Velocity at t = 0 [m/s].
+    #[serde(default)]
+    pub velocity: Vector,
+}
+
+/// A face of a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Face {
+    /// Smallest x.
+    XMin,
+    /// Largest x.
+    XMax,
+    /// Smallest y.
+    YMin,
+    /// Largest y.
+    YMax,
+    /// Smallest z.
+    ZMin,
+    /// Largest z.
+    ZMax,
+}
+
+/// A rectangular container; walls outside of `min`..`max`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tank {
+    /// Lower inner corner [m].
+    pub min: Vector,
+    /// Upper inner corner [m].
+    pub max: Vector,
+    /// Faces without a wall.
+    #[serde(default)]
+    pub open: Vec<Face>,
+}
+
+/// A fixed box.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Obstacle {
+    /// Name, for messages and gauges.
+    pub name: String,
+    /// Lower corner [m].
+    pub min: Vector,
+    /// Upper corner [m].
+    pub max: Vector,
+    /// Faces that need no particles because nothing reaches them.
+    #[serde(default)]
+    pub open: Vec<Face>,
+}
+
+/// A fixed rectangular wall at any angle; its layers lie behind the surface.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// Name, for messages and gauges.
+    pub name: String,
+    /// Centre of the surface [m].
+    pub center: Vector,
+    /// Normal, into the free space (any length).
+    pub normal: Vector,
+    /// Edge lengths [m]: along `along`, and across it.
+    pub size: [f64; 2],
+    /// Direction of the first edge; made orthogonal to the normal.
+    pub along: Vector,
+}
+
+/// A wall that follows a table of motion, e.g. a gate.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MovingWall {
+    /// Name, for messages and gauges.
+    pub name: String,
+    /// Lower corner at t = 0 [m].
+    pub min: Vector,
+    /// Upper corner at t = 0 [m].
+    pub max: Vector,
+    /// Faces that need no particles because nothing reaches them.
+    #[serde(default)]
+    pub open: Vec<Face>,
+    /// Rows of time [s] and displacement x, y, z [m]; linear between rows, constant after the last.
+    pub motion: Vec<[f64; 4]>,
+}
+
+/// Orientation as a turn about an axis.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Turn {
+    /// Axis (any length).
+    pub axis: Vector,
+    /// Angle [degrees].
+    pub angle_deg: f64,
+}
+
+/// A degree of freedom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Freedom {
+    /// Translation along x.
+    X,
+    /// Translation along y.
+    Y,
+    /// Translation along z.
+    Z,
+    /// Rotation about x.
+    RotationX,
+    /// Rotation about y.
+    RotationY,
+    /// Rotation about z.
+    RotationZ,
+}
+
+/// A rigid box.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Name, for messages and tables.
+    pub name: String,
+    /// Edge lengths [m].
+    pub size: Vector,
+    /// Centre of mass at t = 0 [m].
+    pub center: Vector,
+    /// Mass [kg]. Give this or `density`.
+    pub mass: Option<f64>,
+    /// Density [kg/m3].
+    pub density: Option<f64>,
+    /// Principal moments of inertia [kg m2]; those of a uniform box if absent.
+    pub inertia: Option<Vector>,
+    /// Orientation at t = 0.
+    pub orientation: Option<Turn>,
+    /// Velocity at t = 0 [m/s].
+    #[serde(default)]
+    pub velocity: Vector,
+    /// Angular velocity at t = 0 [rad/s].
+    #[serde(default)]
+    pub angular_velocity: Vector,
+    /// Degrees of freedom that are locked.
+    #[serde(default)]
+    pub locked: Vec<Freedom>,
+    /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table instead of forces.
+    pub motion: Option<Vec<[f64; 4]>>,
+    /// Remove the water that the body displaces at t = 0 (otherwise an overlap is an error).
+    #[serde(default)]
+    pub displaces_fluid: bool,
+    /// Lift the body against gravity until it stands free of contact forces on what it overlaps at t = 0.
+    #[serde(default)]
+    pub standing: bool,
+}
+
+/// Contact law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// Eqs. (10) to (14) over particle pairs, averaged over the pairs.
+    Paper,
+    /// True surfaces, constant weights, Coulomb friction with a static branch; conservative.
+    Smooth,
+    /// The paper's baseline: no contact law, solids are kept apart by the collision model, Eq. (18).
+    Pressure,
+}
+
+/// Contact between solids.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// Contact law.
+    #[serde(default = "Contact::default_law")]
+    pub law: Law,
+    /// Spring coefficient K [N/m], Eq. (10).
+    pub spring: f64,
+    /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.
+    pub damping: Option<f64>,
+    /// Damping over the critical one of the lightest body, C / (2 sqrt(K m)) [-], Eq. (15).
+    pub damping_ratio: Option<f64>,
+    /// Normal restitution e of a free impact [-] (law "smooth").
+    pub restitution: Option<f64>,
+    /// Numerical friction eta of Eq. (12) [kg/s] (law "paper").
+    #[serde(default)]
+    pub viscous_friction: f64,
+    /// Coulomb coefficient mu [-], static and kinetic (law "smooth").
+    #[serde(default)]
+    pub friction: f64,
+    /// Let contact forces turn bodies (law "paper"; Eq. (14) says nothing of torque).
+    #[serde(default = "Contact::default_torque")]
+    pub torque: bool,
+    /// Force this many contact sub-steps a step instead of as many as stability asks for.
+    pub substeps: Option<u32>,
+}
+
+impl Contact {
+    fn default_law() -> Law {
+        Law::Smooth
+    }
+    fn default_torque() -> bool {
+        true
+    }
+}
+
+/// Measurements over time; all go to gauges.csv.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Gauges {
+    /// Interval between rows [s]; every step if absent.
+    pub every: Option<f64>,
+    /// Pressure on a wall: mean over the wall particles within half an effective radius of the point.
+    pub pressure: Vec<PressureGauge>,
+    /// Height of the water surface along a vertical line.
+    pub level: Vec<LevelGauge>,
+    /// Force and torque of the fluid on a body or moving wall.
+    pub force: Vec<ForceGauge>,
+}
+
+/// Pressure at a point on a wall.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressureGauge {
+    /// Name, used in the header.
+    pub name: String,
+    /// Point on a wall [m].
+    pub point: Vector,
+}
+
+/// Water level on a line along z.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LevelGauge {
+    /// Name, used in the header.
+    pub name: String,
+    /// x, y of the line [m].
+    pub at: [f64; 2],
+}
+
+/// Force on a solid.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForceGauge {
+    /// Name, used in the header.
+    pub name: String,
+    /// Name of the body or moving wall.
+    pub on: String,
+}
+
+/// Which particles an output holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OutputKind {
+    /// Fluid particles, every frame.
+    Fluid,
+    /// Particles of bodies and moving walls, every frame.
+    Body,
+    /// Fixed walls, once.
+    Wall,
+    /// Dummies of fixed walls, once.
+    Dummy,
+}
+
+/// Encoding of VTU arrays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// Appended base64, zlib: read by ParaView, meshio and splashsurf.
+    #[default]
+    Base64,
+    /// Appended raw: smallest and fastest, read by ParaView.
+    Raw,
+}
+
+/// Files to write.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Interval between frames [s]; 0 writes no frames.
+    pub every: f64,
+    /// Which particles to write.
+    pub kinds: Vec<OutputKind>,
+    /// Encoding of the VTU files.
+    pub encoding: Encoding,
+    /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
+    pub table_every: Option<f64>,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            every: 0.05,
+            kinds: vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall],
+            encoding: Encoding::Base64,
+            table_every: None,
+        }
+    }
+}

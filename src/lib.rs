@@ -1,0 +1,4 @@
+//! seixo: water that carries solids.
+pub mod case;
+pub mod error;
+pub mod scene;

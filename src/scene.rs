@@ -1,0 +1,216 @@
+//! The scene: every particle on its lattice, every solid with its geometry, built from a checked case.
+//!
+//! A scene holds no device data and does no input or output. Particles are stored in five groups, in
+//! this order, and the order never changes (see [`Groups`]):
+//!
+//! | group | kinds | moves | carries pressure |
+//! |---|---|---|---|
+//! | fluid | [`Kind::Fluid`] | yes | yes |
+//! | moving wall | [`Kind::Wall`], [`Kind::BodyWall`] of a moving solid | with its solid | yes |
+//! | static wall | [`Kind::Wall`] | no | yes |
+//! | static dummy | [`Kind::Dummy`] | no | no |
+//! | moving dummy | [`Kind::Dummy`], [`Kind::BodyDummy`] of a moving solid | with its solid | no |
+
+use glam::{DMat3, DQuat, DVec3};
+use std::ops::Range;
+
+/// What a particle is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
+#[repr(u8)]
+pub enum Kind {
+    /// Water.
+    Fluid = 0,
+    /// Outermost layer of a fixed or prescribed wall; carries pressure, Eq. (8).
+    Wall = 1,
+    /// Deeper layers of a wall; complete the number density only (section 2).
+    Dummy = 2,
+    /// Outermost layer of a body; carries pressure and contact.
+    BodyWall = 3,
+    /// Inside of a body.
+    BodyDummy = 4,
+    /// A fluid particle that left the domain or became non-finite; takes part in nothing.
+    Ghost = 5,
+}
+
+/// How many particles each group holds; the groups lie in this order.
+#[derive(Clone, Copy, Default, Debug, PartialEq, Eq)]
+pub struct Groups {
+    /// Fluid particles.
+    pub fluid: usize,
+    /// Wall-layer particles of moving solids.
+    pub moving_wall: usize,
+    /// Wall-layer particles that never move.
+    pub static_wall: usize,
+    /// Dummy particles that never move.
+    pub static_dummy: usize,
+    /// Dummy particles of moving solids.
+    pub moving_dummy: usize,
+}
+
+impl Groups {
+    /// All particles.
+    pub fn total(&self) -> usize {
+        self.fluid + self.moving_wall + self.static_wall + self.static_dummy + self.moving_dummy
+    }
+    /// Particles that carry pressure: the first `pressure()` slots.
+    pub fn pressure(&self) -> usize {
+        self.fluid + self.moving_wall + self.static_wall
+    }
+    /// Slots of the wall layers of moving solids.
+    pub fn moving_wall_range(&self) -> Range<usize> {
+        self.fluid..self.fluid + self.moving_wall
+    }
+    /// Slots of the wall layers that never move.
+    pub fn static_wall_range(&self) -> Range<usize> {
+        self.fluid + self.moving_wall..self.pressure()
+    }
+    /// Slots of everything that never moves.
+    pub fn static_range(&self) -> Range<usize> {
+        self.fluid + self.moving_wall..self.total() - self.moving_dummy
+    }
+    /// Slots of the dummies of moving solids.
+    pub fn moving_dummy_range(&self) -> Range<usize> {
+        self.total() - self.moving_dummy..self.total()
+    }
+}
+
+/// A solid's shape in its own frame, centred on its centre of mass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A box of half edge lengths [m].
+    Box {
+        /// Half of the edge lengths [m].
+        half: DVec3,
+    },
+}
+
+/// Geometry of a fixed wall, for contact and for the checks at t = 0. Surfaces lie where the wall
+/// particles put them (half a spacing outside the wall layer's centres).
+#[derive(Clone, Debug, PartialEq)]
+pub struct WallShape {
+    /// Name of the wall as the case gives it (`tank.z_min`, an obstacle's name ...).
+    pub name: String,
+    /// Centre of the box [m].
+    pub center: DVec3,
+    /// Half of the edge lengths of the box [m].
+    pub half: DVec3,
+    /// Orientation of the box (columns are its axes in the world).
+    pub axes: DMat3,
+}
+
+/// Mass properties and freedom of a body that moves under forces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeBody {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Principal moments of inertia in the body's frame [kg m2].
+    pub inertia: DVec3,
+    /// Initial velocity of the centre of mass [m/s].
+    pub velocity: DVec3,
+    /// Initial angular velocity, world axes [rad/s].
+    pub angular_velocity: DVec3,
+    /// `true` where a translation x, y, z is locked.
+    pub locked_translation: [bool; 3],
+    /// `true` where a rotation about world x, y, z is locked.
+    pub locked_rotation: [bool; 3],
+}
+
+/// A motion given by a table: time [s] against displacement from the start [m]; linear between rows,
+/// constant after the last one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Times [s], increasing.
+    pub time: Vec<f64>,
+    /// Displacement from the starting position [m], one a time.
+    pub displacement: Vec<DVec3>,
+}
+
+impl Motion {
+    /// Displacement [m] at time `t` [s].
+    pub fn displacement(&self, t: f64) -> DVec3 {
+        let n = self.time.len();
+        match self.time.iter().position(|&ti| t < ti) {
+            Some(0) => self.displacement[0],
+            Some(k) => {
+                let s = (t - self.time[k - 1]) / (self.time[k] - self.time[k - 1]);
+                self.displacement[k - 1].lerp(self.displacement[k], s)
+            }
+            None => self.displacement[n - 1],
+        }
+    }
+}
+
+/// How a moving solid moves.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Drive {
+    /// Newton's laws.
+    Free(FreeBody),
+    /// A table of motion (a gate, a wave paddle).
+    Prescribed(Motion),
+}
+
+/// A solid that moves as one: a body or a moving wall. Its particles are listed in the order in which
+/// they stand in the groups, wall layer first.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// Name from the case.
+    pub name: String,
+    /// `true` for a `[[body]]`, `false` for a `[[moving_wall]]`.
+    pub is_body: bool,
+    /// Shape, in the solid's frame.
+    pub shape: Shape,
+    /// Initial position of the centre of mass [m].
+    pub position: DVec3,
+    /// Initial orientation.
+    pub orientation: DQuat,
+    /// How it moves.
+    pub drive: Drive,
+    /// Slots of the wall layer, within the moving-wall group.
+    pub wall_slots: Range<usize>,
+    /// Slots of the inside, within the moving-dummy group.
+    pub dummy_slots: Range<usize>,
+    /// Offsets of the wall-layer particles from the centre of mass, solid's frame [m].
+    pub wall_offset: Vec<DVec3>,
+    /// Offsets of the dummies, solid's frame [m].
+    pub dummy_offset: Vec<DVec3>,
+    /// Outward area vector of each wall-layer particle, solid's frame [m2]: the sum over the faces it
+    /// belongs to of outward normal times face area per particle.
+    pub wall_area: Vec<DVec3>,
+    /// For each wall-layer particle, the vector from its centre to the true surface (to the edge or
+    /// corner where it belongs to two or three faces), solid's frame [m].
+    pub wall_to_surface: Vec<DVec3>,
+}
+
+/// The scene.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// 2 or 3. In two dimensions everything lies in the plane y = 0 and stands for a slice l0 wide.
+    pub dimensions: u32,
+    /// Initial particle spacing l0 [m].
+    pub spacing: f64,
+    /// Gravity [m/s2].
+    pub gravity: DVec3,
+    /// Positions at t = 0 [m], all groups.
+    pub position: Vec<DVec3>,
+    /// Velocities at t = 0 [m/s], all groups.
+    pub velocity: Vec<DVec3>,
+    /// What each particle is.
+    pub kind: Vec<Kind>,
+    /// 0 for what moves freely or never, k + 1 for a particle of `solids[k]`.
+    pub solid: Vec<u32>,
+    /// Sizes of the groups.
+    pub groups: Groups,
+    /// Moving solids: bodies and moving walls.
+    pub solids: Vec<Solid>,
+    /// Geometry of the fixed walls.
+    pub walls: Vec<WallShape>,
+    /// Outward normal (into the free space) of each static wall particle, for contact; one per slot of
+    /// [`Groups::static_wall_range`]. Edge particles hold the sum of their faces' normals, normalised.
+    pub static_wall_normal: Vec<DVec3>,
+    /// Box that no particle may leave [m].
+    pub domain: (DVec3, DVec3),
+    /// Largest depth of water at the start, along gravity [m].
+    pub depth: f64,
+    /// What a user should know that is no error (rounded lengths, removed particles ...).
+    pub notes: Vec<String>,
+}
