@@ -1,0 +1,403 @@
+//! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
+
+use super::{Backend, Counters};
+use crate::body::{Pose, Wrench};
+use crate::cells::Grid;
+use crate::error::Result;
+use crate::fields::{Fields, State};
+use crate::kernels::cell_list::{self, CellList, Scratch};
+use crate::kernels::neighbour_list::{Candidates, Search};
+use crate::kernels::{
+    body_force, collision, correct, monitor, move_solids, number_density, predict, pressure_gradient,
+    pressure_source, viscosity,
+};
+use crate::monitor::FluidMonitor;
+use crate::neighbours::{CAPACITY, CHUNK, Neighbours};
+use crate::params::{Params, Step};
+use crate::plan::{Plan, Stage};
+use crate::pressure::cg::{Jacobi, System, Workspace, solve};
+use crate::pressure::{PressureReport, Settings};
+use crate::scene::{Groups, Kind, Scene, Solid};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+
+/// Particles in f64 on the host.
+pub struct Cpu {
+    params: Params,
+    settings: Settings,
+    groups: Groups,
+    solids: Vec<Solid>,
+    poses: Vec<Pose>,
+    fields: Fields,
+    grid: Grid,
+    fluid_start: Vec<u32>,
+    moving: Option<CellList>,
+    fixed: Option<CellList>,
+    near_fluid: Vec<bool>,
+    /// Keep dry walls in every stage, to show that leaving them out changes nothing.
+    pub active_set: bool,
+    neighbours: Neighbours,
+    scratch: Scratch,
+    work: Workspace,
+    live: usize,
+    counters: Counters,
+    dt: f64,
+}
+
+impl Cpu {
+    /// Particles of `scene`; allocates nothing for a dry one.
+    pub fn new(scene: &Scene, params: &Params, plan: &Plan, settings: Settings) -> Result<Self> {
+        let groups = scene.groups;
+        let wet = plan.wet();
+        let grid =
+            if wet { Grid::new(params)? } else { Grid { origin: DVec3::ZERO, width: 1.0, count: [1; 3] } };
+        let mut scratch = Scratch::default();
+        let fixed = (wet && !groups.static_range().is_empty()).then(|| {
+            let mut list = CellList::default();
+            list.index(&grid, groups.static_range(), &scene.position, &mut scratch);
+            list
+        });
+        Ok(Self {
+            params: params.clone(),
+            settings,
+            groups,
+            solids: scene.solids.clone(),
+            poses: Vec::new(),
+            fields: if wet { Fields::new(scene) } else { Fields::default() },
+            grid,
+            fluid_start: Vec::new(),
+            moving: (wet && groups.moving_wall > 0).then(CellList::default),
+            fixed,
+            near_fluid: Vec::new(),
+            active_set: true,
+            neighbours: Neighbours::new(if wet { groups.pressure() } else { 0 }),
+            scratch,
+            work: Workspace::default(),
+            live: groups.fluid,
+            counters: Counters::default(),
+            dt: 0.0,
+        })
+    }
+
+    fn viscosity(&mut self) {
+        let Self { fields, neighbours, params, groups, .. } = self;
+        let (x, v) = (&fields.position, &fields.velocity);
+        if neighbours.pairs() == 0 {
+            return;
+        }
+        fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
+            let chunk = &neighbours.chunks[i / CHUNK];
+            *a = viscosity::viscosity(i, chunk.pressure(i % CHUNK), params, x, v);
+        });
+        fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
+            let i = groups.fluid + k;
+            let chunk = &neighbours.chunks[i / CHUNK];
+            *f = viscosity::reaction(i, chunk.pressure(i % CHUNK), params, groups.fluid, x, v);
+        });
+    }
+
+    fn predict(&mut self, dt: f64) {
+        let (g, l0, n) = (self.params.gravity, self.params.spacing, self.live);
+        let Fields { position, velocity, acceleration, .. } = &mut self.fields;
+        let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n])
+            .into_par_iter()
+            .map(|(x, v, a)| {
+                let (x1, v1, clamped) = predict::predict(*x, *v, g + *a, dt, l0);
+                (*x, *v, *a) = (x1, v1, DVec3::ZERO);
+                u64::from(clamped)
+            })
+            .sum();
+        self.counters.displacement_clamps += clamps;
+    }
+
+    fn cell_list(&mut self) {
+        let domain = (self.params.domain_min, self.params.domain_max);
+        let Self { fields, grid, params, fluid_start, scratch, groups, .. } = self;
+        self.counters.lost +=
+            cell_list::reorder_fluid(fields, grid, domain, params.dimensions, fluid_start, scratch);
+        self.live = fluid_start[grid.total()] as usize;
+        if let Some(list) = &mut self.moving {
+            let slots = groups.moving_wall_range().chain(groups.moving_dummy_range());
+            list.index(grid, slots, &fields.position, scratch);
+        }
+        if self.active_set {
+            cell_list::mark_near_fluid(grid, fluid_start, &mut self.near_fluid);
+        } else {
+            self.near_fluid.clear();
+            self.near_fluid.resize(grid.total(), true);
+        }
+    }
+
+    fn neighbour_list(&mut self) {
+        let Self { fields, grid, params, groups, near_fluid, live, .. } = self;
+        let (fluid, position, live) = (groups.fluid, &fields.position, *live);
+        let from = Candidates {
+            grid,
+            fluid_start: &self.fluid_start,
+            position,
+            moving: self.moving.as_ref(),
+            fixed: self.fixed.as_ref(),
+            pressure_slots: groups.pressure() as u32,
+        };
+        let largest = AtomicU32::new(0);
+        let overflow = AtomicU64::new(u64::MAX);
+        self.neighbours.chunks.par_iter_mut().enumerate().for_each_init(
+            Search::default,
+            |search, (c, chunk)| {
+                chunk.neighbour.clear();
+                for k in 0..chunk.rows() {
+                    let i = c * CHUNK + k;
+                    let active = if i < fluid {
+                        i < live
+                    } else {
+                        near_fluid[grid.index(grid.coordinates(position[i]))]
+                    };
+                    if active {
+                        let found = search.row(i, params, &from);
+                        largest.fetch_max(found as u32, Relaxed);
+                        if found > CAPACITY {
+                            overflow.fetch_min((i as u64) << 32 | found as u64, Relaxed);
+                        }
+                        search.append(chunk, k, params);
+                    } else {
+                        chunk.dummies[k] = chunk.neighbour.len() as u32;
+                        chunk.start[k + 1] = chunk.dummies[k];
+                        chunk.close[k] = false;
+                    }
+                }
+                chunk.weight.resize(chunk.neighbour.len(), 0.0);
+            },
+        );
+        self.counters.neighbours_max = self.counters.neighbours_max.max(largest.into_inner());
+        let overflow = overflow.into_inner();
+        if overflow != u64::MAX {
+            self.counters.overflow.get_or_insert(((overflow >> 32) as u32, overflow as u32));
+        }
+    }
+
+    fn collision(&mut self, step: &Step) {
+        let Self { fields, neighbours, params, groups, .. } = self;
+        let (x, v) = (&fields.position, &fields.velocity);
+        let close = |i: usize| {
+            let chunk = &neighbours.chunks[i / CHUNK];
+            chunk.close[i % CHUNK].then(|| chunk.all(i % CHUNK))
+        };
+        fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
+            let change = close(i).map(|row| collision::collision(i, row, params, groups.fluid, x, v));
+            *a = change.unwrap_or(DVec3::ZERO) / step.dt;
+        });
+        fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
+            let i = groups.fluid + k;
+            if let Some(row) = close(i) {
+                *f += collision::reaction(i, row, params, groups.fluid, x, v, step.dt);
+            }
+        });
+        self.correct(step.dt);
+    }
+
+    fn number_density(&mut self) {
+        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let (position, fluid, live) = (&fields.position, groups.fluid, *live);
+        (
+            &mut neighbours.chunks,
+            fields.number_density.par_chunks_mut(CHUNK),
+            fields.state.par_chunks_mut(CHUNK),
+        )
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(c, (chunk, n, state))| {
+                for k in 0..n.len() {
+                    let i = c * CHUNK + k;
+                    let range = chunk.range(k);
+                    if range.is_empty() {
+                        (n[k], state[k]) = (0.0, if i < live { State::Surface } else { State::Inactive });
+                        continue;
+                    }
+                    number_density::weights(
+                        i,
+                        &chunk.neighbour[range.clone()],
+                        &mut chunk.weight[range],
+                        params,
+                        position,
+                    );
+                    (n[k], state[k]) =
+                        number_density::number_density(i, chunk.all(k), params, fluid, position);
+                }
+            });
+    }
+
+    fn pressure_source(&mut self, step: &Step) {
+        let Self { fields, neighbours, params, .. } = self;
+        let (position, velocity, density, state) =
+            (&fields.position, &fields.velocity, &fields.number_density, &fields.state);
+        (&neighbours.chunks, fields.source.par_chunks_mut(CHUNK), fields.diagonal.par_chunks_mut(CHUNK))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(c, (chunk, source, diagonal))| {
+                for k in 0..source.len() {
+                    let i = c * CHUNK + k;
+                    (source[k], diagonal[k]) = (0.0, 1.0);
+                    if state[i] == State::Inner {
+                        let rows = (chunk.all(k), chunk.pressure(k));
+                        (source[k], diagonal[k]) = pressure_source::pressure_source(
+                            i, density[i], rows, params, step, position, velocity,
+                        );
+                    }
+                }
+            });
+    }
+
+    fn pressure_gradient(&mut self) {
+        let Self { fields, neighbours, params, live, .. } = self;
+        let (position, pressure, state, live) = (&fields.position, &fields.pressure, &fields.state, *live);
+        fields.acceleration.par_chunks_mut(CHUNK).zip(&neighbours.chunks).enumerate().for_each(
+            |(c, (a, chunk))| {
+                for (k, a) in a.iter_mut().enumerate() {
+                    let i = c * CHUNK + k;
+                    *a = DVec3::ZERO;
+                    if i < live {
+                        let rows = (chunk.all(k), chunk.pressure(k));
+                        *a = pressure_gradient::pressure_gradient(
+                            i, rows, state[i], params, position, pressure,
+                        );
+                    }
+                }
+            },
+        );
+    }
+
+    fn correct(&mut self, dt: f64) {
+        let (l0, n) = (self.params.spacing, self.live);
+        let Fields { position, velocity, acceleration, id, .. } = &mut self.fields;
+        let bad = AtomicU32::new(u32::MAX);
+        let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n], &id[..n])
+            .into_par_iter()
+            .map(|(x, v, a, &id)| {
+                let (x1, v1, clamped) = correct::correct(*x, *v, *a, dt, l0);
+                if !v1.is_finite() {
+                    bad.fetch_min(id, Relaxed);
+                }
+                (*x, *v, *a) = (x1, v1, DVec3::ZERO);
+                u64::from(clamped)
+            })
+            .sum();
+        self.counters.displacement_clamps += clamps;
+        let bad = bad.into_inner();
+        if bad != u32::MAX {
+            self.counters.non_finite.get_or_insert(bad);
+        }
+    }
+}
+
+impl Backend for Cpu {
+    fn description(&self) -> String {
+        format!("CPU, {} threads", rayon::current_num_threads())
+    }
+
+    fn precision(&self) -> &'static str {
+        "f64"
+    }
+
+    fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
+        self.dt = step.dt;
+        match stage {
+            Stage::Viscosity => self.viscosity(),
+            Stage::Predict => self.predict(step.dt),
+            Stage::CellList => self.cell_list(),
+            Stage::NeighbourList => self.neighbour_list(),
+            Stage::Collision => self.collision(step),
+            Stage::NumberDensity => self.number_density(),
+            Stage::PressureSource => self.pressure_source(step),
+            Stage::PressureGradient => self.pressure_gradient(),
+            Stage::Correct => self.correct(step.dt),
+            Stage::ConjugateGradient | Stage::MoveSolids | Stage::BodyForce | Stage::Contact => {
+                unreachable!("{} has a call of its own", stage.name())
+            }
+        }
+        Ok(())
+    }
+
+    fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        let Self { fields, neighbours, params, settings, work, .. } = self;
+        let system = System {
+            neighbours,
+            state: &fields.state,
+            diagonal: &fields.diagonal,
+            coefficient: pressure_source::laplacian_coefficient(params),
+        };
+        let report = solve(&system, &fields.source, &mut fields.pressure, &mut Jacobi, settings, work);
+        let mut clamps = 0;
+        for p in &mut fields.pressure {
+            clamps += u64::from(*p > step.pressure_max);
+            *p = p.clamp(0.0, step.pressure_max);
+        }
+        self.counters.pressure_clamps += clamps;
+        Ok(report)
+    }
+
+    fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
+        self.poses.clear();
+        self.poses.extend_from_slice(poses);
+        for (solid, pose) in self.solids.iter().zip(poses) {
+            for (slots, offsets) in
+                [(&solid.wall_slots, &solid.wall_offset), (&solid.dummy_slots, &solid.dummy_offset)]
+            {
+                for (i, &offset) in slots.clone().zip(offsets) {
+                    (self.fields.position[i], self.fields.velocity[i]) =
+                        move_solids::move_solids(pose, offset);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn body_force(&mut self) -> Result<Vec<Wrench>> {
+        let (fields, fluid) = (&mut self.fields, self.groups.fluid);
+        let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
+            let mut total = Wrench::default();
+            for (k, i) in solid.wall_slots.clone().enumerate() {
+                let area = pose.orientation * solid.wall_area[k];
+                let force = body_force::body_force(fields.pressure[i], area, fields.reaction[i - fluid]);
+                total.force += force;
+                total.torque +=
+                    (pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k])).cross(force);
+            }
+            total
+        });
+        let wrenches = wrenches.collect();
+        fields.reaction.fill(DVec3::ZERO);
+        Ok(wrenches)
+    }
+
+    fn counters(&mut self) -> Result<Counters> {
+        Ok(self.counters.clone())
+    }
+
+    fn monitor(&mut self) -> Result<FluidMonitor> {
+        Ok(monitor::monitor(&self.fields, self.live, &self.params, self.dt))
+    }
+
+    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
+        Ok(slots.iter().map(|&s| self.fields.pressure[s]).collect())
+    }
+
+    fn read(&mut self) -> Result<Fields> {
+        Ok(self.fields.clone())
+    }
+
+    fn write(&mut self, fields: &Fields) -> Result<()> {
+        self.fields = fields.clone();
+        self.live = self.fields.kind[..self.groups.fluid].iter().filter(|&&k| k == Kind::Fluid).count();
+        Ok(())
+    }
+
+    fn bytes(&self) -> u64 {
+        let per_particle = size_of::<DVec3>() * 2 + size_of::<Kind>();
+        let per_pressure = 8 * 8 + 1;
+        let f = &self.fields;
+        (f.position.len() * per_particle + f.pressure.len() * per_pressure + self.neighbours.bytes()) as u64
+            + (self.fluid_start.len() * 4 + self.near_fluid.len()) as u64
+            + self.fixed.as_ref().map_or(0, |l| l.start.len() * 4 + l.slot.len() * 28) as u64
+    }
+}

@@ -1,0 +1,68 @@
+//! The particle arrays of a run.
+//!
+//! Slots follow [`crate::scene::Groups`]. Fluid slots are kept in cell order and so change from step to
+//! step (`id` tells who is who); all other slots stay.
+
+use crate::scene::{Kind, Scene};
+use glam::DVec3;
+
+/// Part of a particle in the pressure Poisson equation.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(u8)]
+pub enum State {
+    /// Takes no part: a dry wall, a ghost.
+    #[default]
+    Inactive = 0,
+    /// On the free surface: P = 0.
+    Surface = 1,
+    /// An unknown.
+    Inner = 2,
+}
+
+/// State of all particles. Arrays marked P hold the pressure-carrying slots only, F the fluid slots only.
+#[derive(Clone, Default, Debug)]
+pub struct Fields {
+    /// Position [m].
+    pub position: Vec<DVec3>,
+    /// Velocity [m/s].
+    pub velocity: Vec<DVec3>,
+    /// What the particle is.
+    pub kind: Vec<Kind>,
+    /// Number of the particle in the scene, F.
+    pub id: Vec<u32>,
+    /// Pressure [Pa], P.
+    pub pressure: Vec<f64>,
+    /// Number density n, Eq. (4) [-], P.
+    pub number_density: Vec<f64>,
+    /// Part in the PPE, P.
+    pub state: Vec<State>,
+    /// Right side of the PPE, Eq. (8), times -1 [Pa/m2], P.
+    pub source: Vec<f64>,
+    /// Diagonal of the PPE [1/m2], P.
+    pub diagonal: Vec<f64>,
+    /// Acceleration of the stage in progress (viscosity, collision, pressure gradient) [m/s2], F.
+    pub acceleration: Vec<DVec3>,
+    /// Force of viscosity and collisions on the wall layer of moving solids [N], moving-wall slots.
+    pub reaction: Vec<DVec3>,
+}
+
+impl Fields {
+    /// The state at t = 0.
+    pub fn new(scene: &Scene) -> Self {
+        let g = scene.groups;
+        let p = g.pressure();
+        Self {
+            position: scene.position.clone(),
+            velocity: scene.velocity.clone(),
+            kind: scene.kind.clone(),
+            id: (0..g.fluid as u32).collect(),
+            pressure: vec![0.0; p],
+            number_density: vec![0.0; p],
+            state: vec![State::Inactive; p],
+            source: vec![0.0; p],
+            diagonal: vec![1.0; p],
+            acceleration: vec![DVec3::ZERO; g.fluid],
+            reaction: vec![DVec3::ZERO; g.moving_wall],
+        }
+    }
+}

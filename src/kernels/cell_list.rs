@@ -1,0 +1,154 @@
+//! Cell list: count, scan, stable scatter. Fluid particles are reordered by cell each step; moving solids
+//! are indexed by cell each step; what never moves is indexed once.
+
+use crate::cells::Grid;
+use crate::fields::Fields;
+use crate::scene::Kind;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Particles by cell: those of cell c are `start[c]..start[c + 1]`.
+#[derive(Clone, Default, Debug)]
+pub struct CellList {
+    /// Start of each cell, and the end of the last one.
+    pub start: Vec<u32>,
+    /// Slots in cell order.
+    pub slot: Vec<u32>,
+    /// Positions in cell order [m].
+    pub position: Vec<DVec3>,
+}
+
+/// Stable counting sort: `start[c]` gets the first place of cell c, `place[k]` the place of particle k.
+/// Particles with cell `cells` (ghosts) come last.
+pub fn counting_sort(cell: &[u32], cells: usize, start: &mut Vec<u32>, place: &mut Vec<u32>) {
+    start.clear();
+    start.resize(cells + 2, 0);
+    for &c in cell {
+        start[c as usize + 1] += 1;
+    }
+    for c in 0..=cells {
+        start[c + 1] += start[c];
+    }
+    place.resize(cell.len(), 0);
+    // `start[c]` serves as the cursor of cell c; afterwards every entry has moved one cell on.
+    for (p, &c) in place.iter_mut().zip(cell) {
+        *p = start[c as usize];
+        start[c as usize] += 1;
+    }
+    for c in (0..=cells).rev() {
+        start[c + 1] = start[c];
+    }
+    start[0] = 0;
+    start.truncate(cells + 1);
+}
+
+impl CellList {
+    /// Index the given slots.
+    pub fn index(
+        &mut self,
+        grid: &Grid,
+        slots: impl Iterator<Item = usize>,
+        position: &[DVec3],
+        scratch: &mut Scratch,
+    ) {
+        scratch.slots.clear();
+        scratch.slots.extend(slots.map(|s| s as u32));
+        scratch.cell.clear();
+        let cell = |&s: &u32| grid.index(grid.coordinates(position[s as usize])) as u32;
+        scratch.cell.extend(scratch.slots.iter().map(cell));
+        counting_sort(&scratch.cell, grid.total(), &mut self.start, &mut scratch.place);
+        self.slot.resize(scratch.slots.len(), 0);
+        self.position.resize(scratch.slots.len(), DVec3::ZERO);
+        for (&s, &p) in scratch.slots.iter().zip(&scratch.place) {
+            self.slot[p as usize] = s;
+            self.position[p as usize] = position[s as usize];
+        }
+    }
+}
+
+/// Buffers kept between steps.
+#[derive(Clone, Default, Debug)]
+pub struct Scratch {
+    slots: Vec<u32>,
+    cell: Vec<u32>,
+    place: Vec<u32>,
+    vector: Vec<DVec3>,
+    scalar: Vec<f64>,
+    number: Vec<u32>,
+    kind: Vec<Kind>,
+}
+
+/// `true` for a particle that may stay in the computation.
+pub fn inside(x: DVec3, v: DVec3, min: DVec3, max: DVec3, dimensions: u32) -> bool {
+    let y = dimensions == 2 || (x.y >= min.y && x.y < max.y);
+    x.is_finite() && v.is_finite() && y && x.x >= min.x && x.x < max.x && x.z >= min.z && x.z < max.z
+}
+
+/// Reorder the fluid by cell, ghosts last; `start` gets the cells. Returns how many became ghosts.
+pub fn reorder_fluid(
+    fields: &mut Fields,
+    grid: &Grid,
+    domain: (DVec3, DVec3),
+    dimensions: u32,
+    start: &mut Vec<u32>,
+    scratch: &mut Scratch,
+) -> u64 {
+    let n = fields.id.len();
+    let ghosts_before = fields.kind[..n].iter().filter(|&&k| k == Kind::Ghost).count();
+    let (position, velocity) = (&fields.position[..n], &fields.velocity[..n]);
+    scratch.cell.resize(n, 0);
+    let ghost = grid.total() as u32;
+    (&mut scratch.cell, position, velocity, &fields.kind[..n]).into_par_iter().for_each(
+        |(c, &x, &v, &kind)| {
+            *c = if kind == Kind::Fluid && inside(x, v, domain.0, domain.1, dimensions) {
+                grid.index(grid.coordinates(x)) as u32
+            } else {
+                ghost
+            }
+        },
+    );
+    counting_sort(&scratch.cell, grid.total(), start, &mut scratch.place);
+    let live = start[grid.total()] as usize;
+    let place = &scratch.place;
+    permute(&mut fields.position[..n], place, &mut scratch.vector);
+    permute(&mut fields.velocity[..n], place, &mut scratch.vector);
+    permute(&mut fields.pressure[..n], place, &mut scratch.scalar);
+    permute(&mut fields.id, place, &mut scratch.number);
+    permute(&mut fields.kind[..n], place, &mut scratch.kind);
+    for i in live..n {
+        fields.kind[i] = Kind::Ghost;
+        fields.position[i] = domain.0;
+        fields.velocity[i] = DVec3::ZERO;
+        fields.pressure[i] = 0.0;
+    }
+    (n - live - ghosts_before) as u64
+}
+
+/// `values[k]` moves to `place[k]`.
+fn permute<T: Copy>(values: &mut [T], place: &[u32], scratch: &mut Vec<T>) {
+    scratch.clear();
+    scratch.extend_from_slice(values);
+    for (&v, &p) in scratch.iter().zip(place) {
+        values[p as usize] = v;
+    }
+}
+
+/// Mark every cell within one cell of a cell that holds fluid: only walls there can feel or be felt.
+pub fn mark_near_fluid(grid: &Grid, start: &[u32], near: &mut Vec<bool>) {
+    near.clear();
+    near.resize(grid.total(), false);
+    let [nx, ny, nz] = grid.count;
+    for x in 0..nx {
+        for y in 0..ny {
+            let column = grid.index([x, y, 0]);
+            for z in 0..nz {
+                let c = column + z as usize;
+                if start[c] < start[c + 1] {
+                    for (a, b) in grid.columns([x, y, z]) {
+                        near[a..=b].fill(true);
+                    }
+                }
+            }
+        }
+    }
+}

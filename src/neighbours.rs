@@ -1,0 +1,118 @@
+//! Neighbour lists of the CPU path, kept in chunks of rows.
+//!
+//! Row i holds the particles within the effective radius of particle i: first those that carry
+//! pressure, then the dummies. A chunk owns the rows of [`CHUNK`] particles; threads work on chunks, and
+//! sums over particles are made per chunk and then in chunk order, so results do not depend on the
+//! number of threads.
+
+/// Rows of a chunk.
+pub const CHUNK: usize = 512;
+
+/// Most neighbours a row may have. The lattice has 32, healthy runs stay below 60; more than this means
+/// that the fluid has collapsed onto itself.
+pub const CAPACITY: usize = 256;
+
+/// Rows of [`CHUNK`] particles.
+#[derive(Clone, Default, Debug)]
+pub struct Chunk {
+    /// Start of each row in `neighbour`, and the end of the last one.
+    pub start: Vec<u32>,
+    /// Where each row's dummies begin.
+    pub dummies: Vec<u32>,
+    /// Slots of the neighbours.
+    pub neighbour: Vec<u32>,
+    /// Weight of each pair, Eq. (3), once positions are final ([`crate::kernels::number_density`]).
+    pub weight: Vec<f64>,
+    /// Rows with a pair closer than the collision distance.
+    pub close: Vec<bool>,
+}
+
+/// A row: neighbours and their weights.
+#[derive(Clone, Copy)]
+pub struct Row<'a> {
+    /// Slots of the neighbours.
+    pub neighbour: &'a [u32],
+    /// Weights, Eq. (3).
+    pub weight: &'a [f64],
+}
+
+impl Row<'_> {
+    /// Neighbours with their weights.
+    #[inline(always)]
+    pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.neighbour.iter().zip(self.weight).map(|(&j, &w)| (j as usize, w))
+    }
+}
+
+impl Chunk {
+    /// All neighbours of row `k` of this chunk.
+    #[inline(always)]
+    pub fn all(&self, k: usize) -> Row<'_> {
+        self.slice(self.start[k] as usize, self.start[k + 1] as usize)
+    }
+
+    /// Those neighbours of row `k` that carry pressure.
+    #[inline(always)]
+    pub fn pressure(&self, k: usize) -> Row<'_> {
+        self.slice(self.start[k] as usize, self.dummies[k] as usize)
+    }
+
+    /// The range of row `k` in `neighbour` and `weight`.
+    #[inline(always)]
+    pub fn range(&self, k: usize) -> std::ops::Range<usize> {
+        self.start[k] as usize..self.start[k + 1] as usize
+    }
+
+    #[inline(always)]
+    fn slice(&self, a: usize, b: usize) -> Row<'_> {
+        Row { neighbour: &self.neighbour[a..b], weight: self.weight.get(a..b).unwrap_or(&[]) }
+    }
+
+    /// Rows of this chunk.
+    pub fn rows(&self) -> usize {
+        self.dummies.len()
+    }
+}
+
+/// Neighbour lists of all pressure-carrying particles.
+#[derive(Clone, Default, Debug)]
+pub struct Neighbours {
+    /// Chunks, in slot order.
+    pub chunks: Vec<Chunk>,
+    /// Most neighbours of a row.
+    pub largest: usize,
+}
+
+impl Neighbours {
+    /// Empty lists for `rows` particles.
+    pub fn new(rows: usize) -> Self {
+        let chunk = |c: usize| {
+            let rows = CHUNK.min(rows - c * CHUNK);
+            Chunk {
+                start: vec![0; rows + 1],
+                dummies: vec![0; rows],
+                close: vec![false; rows],
+                ..Chunk::default()
+            }
+        };
+        Self { chunks: (0..rows.div_ceil(CHUNK)).map(chunk).collect(), largest: 0 }
+    }
+
+    /// All neighbours of particle `i`.
+    pub fn all(&self, i: usize) -> Row<'_> {
+        self.chunks[i / CHUNK].all(i % CHUNK)
+    }
+
+    /// Number of pairs listed.
+    pub fn pairs(&self) -> usize {
+        self.chunks.iter().map(|c| c.neighbour.len()).sum()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.chunks
+            .iter()
+            .map(|c| c.neighbour.capacity() * 4 + c.weight.capacity() * 8 + c.start.len() * 8 + c.close.len())
+            .sum()
+    }
+}

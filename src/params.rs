@@ -1,0 +1,199 @@
+//! Constants of a run: Eqs. (3) to (7) on the initial lattice, the scheme's switches, the step's coefficients.
+
+use crate::case::{Case, FreeSurface, Gradient, Preset, Source};
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use glam::DVec3;
+
+/// Weight function, Eq. (3), for `0 < r < re` [-].
+#[inline(always)]
+pub fn weight(r: f64, re: f64) -> f64 {
+    re / r - 1.0
+}
+
+/// Sums over the full cubic (or square) lattice around one particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    /// Initial number density n0, Eq. (4) [-]; the largest n_i of a full lattice.
+    pub number_density: f64,
+    /// Laplacian correction lambda, Eq. (7), over l0^2 [-].
+    pub laplacian: f64,
+    /// Neighbours closer than the effective radius.
+    pub neighbours: u32,
+}
+
+impl Lattice {
+    /// Sums for an effective radius of `radius` spacings in `dimensions` dimensions.
+    pub fn new(dimensions: u32, radius: f64) -> Self {
+        let m = radius.ceil() as i32;
+        let (mut n, mut s, mut count) = (0.0, 0.0, 0);
+        for x in -m..=m {
+            for y in if dimensions == 3 { -m..=m } else { 0..=0 } {
+                for z in -m..=m {
+                    let r2 = f64::from(x * x + y * y + z * z);
+                    if r2 > 0.0 && r2 < radius * radius {
+                        let w = weight(r2.sqrt(), radius);
+                        n += w;
+                        s += r2 * w;
+                        count += 1;
+                    }
+                }
+            }
+        }
+        Self { number_density: n, laplacian: s / n, neighbours: count }
+    }
+}
+
+/// How gamma of Eq. (8) follows from the time step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Relaxation {
+    /// A typed number [-].
+    Fixed(f64),
+    /// gamma = (c_s dt / l0)^2, at most 0.5, from a reference speed c_s [m/s]. Unlike a fixed gamma it
+    /// leaves the answer nearly independent of the time step.
+    Speed(f64),
+}
+
+/// Largest gamma that [`Relaxation::Speed`] gives. The density error oscillates with
+/// omega dt = sqrt(gamma), unstable from 2 on; noise grows well before.
+pub const RELAXATION_MAX: f64 = 0.5;
+
+/// Constants of a run.
+#[derive(Clone, Debug)]
+pub struct Params {
+    /// 2 or 3, d of Eqs. (5) and (6).
+    pub dimensions: u32,
+    /// Initial spacing l0 [m].
+    pub spacing: f64,
+    /// Effective radius re [m].
+    pub effective_radius: f64,
+    /// Initial number density n0 [-].
+    pub number_density: f64,
+    /// lambda, Eq. (7) [m2].
+    pub laplacian: f64,
+    /// Neighbours of a particle on the full lattice.
+    pub neighbours: u32,
+    /// Gravity [m/s2].
+    pub gravity: DVec3,
+    /// Density of the fluid [kg/m3].
+    pub density: f64,
+    /// Kinematic viscosity [m2/s].
+    pub viscosity: f64,
+    /// Free-surface threshold beta [-].
+    pub free_surface_threshold: f64,
+    /// Source term of the PPE.
+    pub source: Source,
+    /// Pressure gradient.
+    pub gradient: Gradient,
+    /// Free-surface test.
+    pub free_surface: FreeSurface,
+    /// gamma.
+    pub relaxation: Relaxation,
+    /// alpha of Eq. (8) [1/Pa], if typed.
+    pub compressibility: Option<f64>,
+    /// Distance below which approaching particles collide, a l0 [m].
+    pub collision_distance: f64,
+    /// Restitution b of the collision, Eq. (18) [-].
+    pub collision_restitution: f64,
+    /// Depth of the water at the start [m].
+    pub depth: f64,
+    /// Lower corner of the domain [m].
+    pub domain_min: DVec3,
+    /// Upper corner of the domain [m].
+    pub domain_max: DVec3,
+}
+
+/// Coefficients of one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Time at the start of the step [s].
+    pub time: f64,
+    /// Time step [s].
+    pub dt: f64,
+    /// gamma of Eq. (8) [-].
+    pub relaxation: f64,
+    /// alpha of Eq. (8) [1/Pa].
+    pub compressibility: f64,
+    /// Pressure at which the clamp acts [Pa].
+    pub pressure_max: f64,
+}
+
+impl Params {
+    /// Constants of `case` as built into `scene`.
+    pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
+        let run = &case.run;
+        let lattice = Lattice::new(run.dimensions, run.effective_radius);
+        if lattice.number_density == 0.0 {
+            return Err(Error::Case(format!(
+                "run.effective_radius = {}: no lattice neighbour lies inside; use 2.1 to 3.1",
+                run.effective_radius
+            )));
+        }
+        let l0 = run.spacing;
+        let fluid = case.fluid.as_ref();
+        let paper = fluid.is_some_and(|f| f.preset == Preset::Paper);
+        let (source, gradient, free_surface) = if paper {
+            (Source::NumberDensity, Gradient::Minimum, FreeSurface::Threshold)
+        } else {
+            (Source::Mixed, Gradient::MinimumCorrected, FreeSurface::ThresholdOffset)
+        };
+        let g = scene.gravity.length();
+        // 1 % compression of the wall layer in hydrostatics, and well above the speed of the collapse.
+        let derived_speed = (100.0 * g * l0).sqrt().max(2.5 * (g * scene.depth).sqrt()).max(1e-6);
+        let relaxation = match fluid.map(|f| (f.relaxation, f.sound_speed)) {
+            Some((Some(gamma), _)) => Relaxation::Fixed(gamma),
+            Some((None, Some(c))) => Relaxation::Speed(c),
+            _ => Relaxation::Speed(derived_speed),
+        };
+        Ok(Self {
+            dimensions: run.dimensions,
+            spacing: l0,
+            effective_radius: run.effective_radius * l0,
+            number_density: lattice.number_density,
+            laplacian: lattice.laplacian * l0 * l0,
+            neighbours: lattice.neighbours,
+            gravity: scene.gravity,
+            density: fluid.map_or(1000.0, |f| f.density),
+            viscosity: fluid.map_or(0.0, |f| f.viscosity),
+            free_surface_threshold: fluid.map_or(0.97, |f| f.free_surface_threshold),
+            source: fluid.and_then(|f| f.source).unwrap_or(source),
+            gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),
+            free_surface: fluid.and_then(|f| f.free_surface).unwrap_or(free_surface),
+            relaxation,
+            compressibility: fluid.and_then(|f| f.compressibility),
+            collision_distance: fluid.map_or(0.8, |f| f.collision_distance) * l0,
+            collision_restitution: fluid.map_or(0.2, |f| f.collision_restitution),
+            depth: scene.depth,
+            domain_min: scene.domain.0,
+            domain_max: scene.domain.1,
+        })
+    }
+
+    /// Reference speed c_s [m/s] for a time step `dt` [s].
+    pub fn sound_speed(&self, dt: f64) -> f64 {
+        match self.relaxation {
+            Relaxation::Fixed(gamma) => gamma.sqrt() * self.spacing / dt,
+            Relaxation::Speed(c) => c,
+        }
+    }
+
+    /// Mass of a fluid particle [kg]; in two dimensions of a slice l0 wide.
+    pub fn particle_mass(&self) -> f64 {
+        self.density * self.spacing.powi(3)
+    }
+
+    /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected [m/s].
+    pub fn step(&self, time: f64, dt: f64, speed: f64) -> Step {
+        let relaxation = match self.relaxation {
+            Relaxation::Fixed(gamma) => gamma,
+            Relaxation::Speed(c) => (c * dt / self.spacing).powi(2).min(RELAXATION_MAX),
+        };
+        let head = self.gravity.length() * self.depth;
+        // 0.1 % bulk compression; never 0, or the pressure of a closed pocket has no level.
+        let derived = if head > 0.0 { (1e-3 * relaxation / (self.density * head)).max(1e-9) } else { 1e-9 };
+        let compressibility = self.compressibility.unwrap_or(derived).max(1e-10);
+        let c = self.sound_speed(dt);
+        let pressure_max = 5.0 * self.density * (c * c).max(speed * speed).max(head);
+        Step { time, dt, relaxation, compressibility, pressure_max }
+    }
+}

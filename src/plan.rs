@@ -1,0 +1,152 @@
+//! Which stages a scene needs. The only place where that is judged: what is not planned is not compiled,
+//! not allocated and not run.
+
+use crate::case::{Case, Preconditioner, Source};
+use crate::params::Params;
+use crate::scene::{Drive, Scene};
+
+/// A stage of the time step. Its name is the name of the kernel, of the timing and of the test.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Explicit viscosity.
+    Viscosity,
+    /// v*, r*.
+    Predict,
+    /// Moving solids take their pose.
+    MoveSolids,
+    /// Sort by cell.
+    CellList,
+    /// Neighbour search.
+    NeighbourList,
+    /// Particle collisions.
+    Collision,
+    /// Number density and free surface.
+    NumberDensity,
+    /// Right side and diagonal of the PPE.
+    PressureSource,
+    /// The PPE.
+    ConjugateGradient,
+    /// Pressure gradient.
+    PressureGradient,
+    /// v, r.
+    Correct,
+    /// Force of the fluid on solids.
+    BodyForce,
+    /// Contact and motion of the bodies, on the host.
+    Contact,
+}
+
+impl Stage {
+    /// All stages, in the order of the step.
+    pub const ALL: [Self; 13] = [
+        Self::Viscosity,
+        Self::Predict,
+        Self::MoveSolids,
+        Self::CellList,
+        Self::NeighbourList,
+        Self::Collision,
+        Self::NumberDensity,
+        Self::PressureSource,
+        Self::ConjugateGradient,
+        Self::PressureGradient,
+        Self::Correct,
+        Self::BodyForce,
+        Self::Contact,
+    ];
+
+    /// Name, as in the kernel's file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viscosity => "viscosity",
+            Self::Predict => "predict",
+            Self::MoveSolids => "move_solids",
+            Self::CellList => "cell_list",
+            Self::NeighbourList => "neighbour_list",
+            Self::Collision => "collision",
+            Self::NumberDensity => "number_density",
+            Self::PressureSource => "pressure_source",
+            Self::ConjugateGradient => "conjugate_gradient",
+            Self::PressureGradient => "pressure_gradient",
+            Self::Correct => "correct",
+            Self::BodyForce => "body_force",
+            Self::Contact => "contact",
+        }
+    }
+}
+
+/// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
+pub const MULTIGRID_UNKNOWNS: usize = 30_000;
+
+/// What a scene needs.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// For each stage of [`Stage::ALL`]: why it runs (`Ok`) or why it is left out (`Err`).
+    pub reasons: Vec<(Stage, Result<&'static str, &'static str>)>,
+    /// Preconditioner of the PPE: [`Preconditioner::Jacobi`] or [`Preconditioner::Multigrid`].
+    pub preconditioner: Preconditioner,
+    /// Under-relaxation of the fluid's force on bodies: F <- s F + (1 - s) F_old with this s; 1 for none.
+    pub force_relaxation: f64,
+}
+
+impl Plan {
+    /// Judge `scene`.
+    pub fn new(case: &Case, scene: &Scene, params: &Params) -> Self {
+        let fluid = scene.groups.fluid > 0;
+        let moving = !scene.solids.is_empty();
+        let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
+        let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
+        let reasons = Stage::ALL.map(|stage| {
+            let reason = match stage {
+                Stage::Viscosity if params.viscosity == 0.0 => Err("viscosity is zero"),
+                Stage::Viscosity => wet("viscosity is given"),
+                Stage::MoveSolids if !moving => Err("nothing solid moves"),
+                Stage::MoveSolids => wet("solids move in the fluid"),
+                Stage::Collision if params.collision_distance == 0.0 => Err("collision distance is zero"),
+                Stage::Collision => wet("particles may come too close"),
+                Stage::BodyForce if !free && case.gauge.force.is_empty() => {
+                    Err("no body is free and no gauge asks for a force")
+                }
+                Stage::BodyForce if !moving => Err("nothing solid moves"),
+                Stage::BodyForce => wet("the fluid acts on solids"),
+                Stage::Contact if !moving => Err("nothing solid moves"),
+                Stage::Contact if !free => Ok("solids follow their tables of motion"),
+                Stage::Contact => Ok("bodies move"),
+                _ => wet("fluid"),
+            };
+            (stage, reason)
+        });
+        let unknowns = scene.groups.fluid;
+        let asked = case.fluid.as_ref().map_or(Preconditioner::Jacobi, |f| f.solver.preconditioner);
+        let preconditioner = match asked {
+            Preconditioner::Auto if unknowns >= MULTIGRID_UNKNOWNS => Preconditioner::Multigrid,
+            Preconditioner::Auto => Preconditioner::Jacobi,
+            typed => typed,
+        };
+        // With the velocity in the source, a body much lighter than the water it moves is thrown to and fro by
+        // its own added mass; the plain number density source is slow enough not to.
+        let lightest = scene
+            .solids
+            .iter()
+            .filter_map(|s| match (&s.drive, s.shape) {
+                (Drive::Free(b), crate::scene::Shape::Box { half }) => {
+                    let depth = if scene.dimensions == 2 { scene.spacing } else { 2.0 * half.y };
+                    Some(b.mass / (4.0 * half.x * half.z * depth * params.density))
+                }
+                _ => None,
+            })
+            .fold(f64::INFINITY, f64::min);
+        let force_relaxation =
+            if fluid && params.source == Source::Mixed && lightest < 0.4 { 0.2 } else { 1.0 };
+        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation }
+    }
+
+    /// Whether `stage` runs.
+    pub fn has(&self, stage: Stage) -> bool {
+        self.reasons.iter().any(|(s, why)| *s == stage && why.is_ok())
+    }
+
+    /// Whether the scene has fluid to compute.
+    pub fn wet(&self) -> bool {
+        self.has(Stage::Predict)
+    }
+}

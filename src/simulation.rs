@@ -1,0 +1,254 @@
+//! A scene in motion: backend, solids and clock. [`Simulation::step`] is in `step.rs`.
+
+use crate::backend::{Backend, Counters};
+use crate::body::Wrench;
+use crate::case::{Case, Fluid};
+use crate::contact::{ContactReport, Solids};
+use crate::error::Result;
+use crate::monitor::FluidMonitor;
+use crate::params::{Params, Step};
+use crate::plan::{Plan, Stage};
+use crate::pressure::{Outcome, PressureReport, Settings};
+use crate::scene::{Groups, Scene};
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Which backend to use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum BackendChoice {
+    /// A hardware GPU if there is one, else the CPU.
+    #[default]
+    Auto,
+    /// A GPU, or an error.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+/// What a step did.
+#[derive(Clone, Debug, Default)]
+pub struct StepReport {
+    /// Number of the step, from 0.
+    pub step: u64,
+    /// Time at its start [s].
+    pub time: f64,
+    /// Time step [s].
+    pub dt: f64,
+    /// The PPE.
+    pub pressure: PressureReport,
+    /// The solids.
+    pub contact: ContactReport,
+    /// The fluid, every few steps.
+    pub monitor: Option<FluidMonitor>,
+}
+
+/// A scene in motion.
+pub struct Simulation {
+    /// The case.
+    pub case: Case,
+    /// Constants.
+    pub params: Params,
+    /// Stages.
+    pub plan: Plan,
+    /// Particles.
+    pub backend: Box<dyn Backend>,
+    /// Bodies and moving walls.
+    pub solids: Solids,
+    /// Force of the fluid on each moving solid in the last step.
+    pub fluid_force: Vec<Wrench>,
+    /// Time [s].
+    pub time: f64,
+    /// Steps done.
+    pub steps: u64,
+    /// Wall-clock seconds a stage since the start.
+    pub stages: BTreeMap<Stage, f64>,
+    /// Wait for the device after every stage, so that `stages` tells each one's time.
+    pub time_stages: bool,
+    /// Sizes of the particle groups.
+    pub groups: Groups,
+    speed: f64,
+}
+
+/// Displacement of the fastest particles in a step, over l0.
+const COURANT_MAX: f64 = 0.35;
+/// c_s dt / l0 at most.
+const SOUND_MAX: f64 = 0.7;
+/// Steps between looks at the counters and the fastest particles.
+const LOOK_EVERY: u64 = 10;
+/// Part of the fluid that may get lost before the run is stopped.
+const LOST_MAX: f64 = 0.02;
+
+impl Simulation {
+    /// Set up `scene` of `case` on `backend`.
+    pub fn new(
+        case: &Case,
+        scene: &Scene,
+        make: impl FnOnce(&Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
+    ) -> Result<Self> {
+        let params = Params::new(case, scene)?;
+        let plan = Plan::new(case, scene, &params);
+        let solver = case.fluid.as_ref().map(|f: &Fluid| f.solver.clone()).unwrap_or_default();
+        let settings = Settings {
+            tolerance: solver.tolerance,
+            max_iterations: solver.max_iterations,
+            warm_start: solver.warm_start,
+        };
+        Ok(Self {
+            backend: make(scene, &params, &plan, settings)?,
+            solids: Solids::new(scene, case.contact.as_ref())?,
+            fluid_force: vec![Wrench::default(); scene.solids.len()],
+            case: case.clone(),
+            groups: scene.groups,
+            params,
+            plan,
+            time: 0.0,
+            steps: 0,
+            stages: BTreeMap::new(),
+            time_stages: true,
+            speed: 0.0,
+        })
+    }
+
+    /// Largest speed to expect in the fluid [m/s]: of the collapse from rest, or measured.
+    fn expected_speed(&self) -> f64 {
+        self.speed.max(2.0 * (self.params.gravity.length() * self.params.depth).sqrt())
+    }
+
+    /// Coefficients of the next step, with the time step that the case and the flow allow.
+    pub(crate) fn next_step(&mut self) -> Step {
+        let mut dt = self.case.run.time_step;
+        if self.case.run.adaptive && self.plan.wet() {
+            let l0 = self.params.spacing;
+            dt = dt.min(COURANT_MAX * l0 / self.expected_speed().max(1e-9));
+            if let crate::params::Relaxation::Speed(c) = self.params.relaxation {
+                dt = dt.min(SOUND_MAX * l0 / c);
+            }
+        }
+        self.params.step(self.time, dt, self.expected_speed())
+    }
+
+    fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let start = Instant::now();
+        let out = work(self);
+        if self.time_stages {
+            self.backend.wait()?;
+        }
+        *self.stages.entry(stage).or_default() += start.elapsed().as_secs_f64();
+        out
+    }
+
+    pub(crate) fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
+        if !self.plan.has(stage) {
+            return Ok(());
+        }
+        self.timed(stage, |s| s.backend.run(stage, step))
+    }
+
+    /// Solids move as they would without the fluid's force in this step.
+    pub(crate) fn move_solids(&mut self, t: f64, dt: f64) -> Result<()> {
+        if !self.plan.has(Stage::MoveSolids) {
+            return Ok(());
+        }
+        self.timed(Stage::MoveSolids, |s| {
+            let poses = s.solids.predict(t, dt);
+            s.backend.move_solids(poses)
+        })
+    }
+
+    pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        let report = self.timed(Stage::ConjugateGradient, |s| s.backend.solve_pressure(step))?;
+        if report.outcome == Outcome::NonFinite {
+            return Err(self.diverged(step, Stage::ConjugateGradient, "the residual is not a number".into()));
+        }
+        Ok(report)
+    }
+
+    /// Fluid force, contact and motion of the solids; their particles follow.
+    pub(crate) fn advance_solids(&mut self, step: &Step) -> Result<ContactReport> {
+        if !self.plan.has(Stage::Contact) {
+            return Ok(ContactReport::default());
+        }
+        if self.plan.has(Stage::BodyForce) {
+            let force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
+            let share = if self.steps == 0 { 1.0 } else { self.plan.force_relaxation };
+            for (old, new) in self.fluid_force.iter_mut().zip(force) {
+                old.force = old.force.lerp(new.force, share);
+                old.torque = old.torque.lerp(new.torque, share);
+            }
+        }
+        let force = std::mem::take(&mut self.fluid_force);
+        let report = self.timed(Stage::Contact, |s| s.solids.advance(step.time, step.dt, &force));
+        self.fluid_force = force;
+        let report = report?;
+        self.check_bodies(step)?;
+        if self.plan.has(Stage::MoveSolids) {
+            self.timed(Stage::MoveSolids, |s| s.backend.move_solids(s.solids.poses()))?;
+        }
+        Ok(report)
+    }
+
+    fn check_bodies(&self, step: &Step) -> Result<()> {
+        let (min, max) = (self.params.domain_min, self.params.domain_max);
+        for (k, pose) in self.solids.poses().iter().enumerate() {
+            let x = pose.position;
+            let name = self.solids.name(k);
+            if !(x.is_finite() && pose.velocity.is_finite() && pose.angular_velocity.is_finite()) {
+                return Err(self.diverged(
+                    step,
+                    Stage::Contact,
+                    format!("{name}: the motion is not a number"),
+                ));
+            }
+            let outside = x.x < min.x || x.z < min.z || x.x > max.x || x.z > max.z;
+            if outside || (self.params.dimensions == 3 && (x.y < min.y || x.y > max.y)) {
+                let what = format!(
+                    "{name} left the domain at ({:.4}, {:.4}, {:.4}) m; a wall is missing there, or contact.spring is \
+                     too soft for this fall",
+                    x.x, x.y, x.z
+                );
+                return Err(self.diverged(step, Stage::Contact, what));
+            }
+        }
+        Ok(())
+    }
+
+    /// Look at the device's counters and at the speed of the flow, every few steps.
+    pub(crate) fn look(&mut self, step: &Step) -> Result<Option<FluidMonitor>> {
+        if !self.plan.wet() || self.steps % LOOK_EVERY != 0 {
+            return Ok(None);
+        }
+        let counters = self.backend.counters()?;
+        self.check(&counters, step)?;
+        let monitor = self.backend.monitor()?;
+        self.speed = monitor.speed_most;
+        if !monitor.kinetic.is_finite() {
+            return Err(self.diverged(step, Stage::Correct, "the kinetic energy is not a number".into()));
+        }
+        Ok(Some(monitor))
+    }
+
+    /// An error if the guards have seen something that ends a run.
+    pub fn check(&self, counters: &Counters, step: &Step) -> Result<()> {
+        if let Some((slot, neighbours)) = counters.overflow {
+            let what = format!(
+                "particle slot {slot} has {neighbours} neighbours, more than the lists hold (a full lattice has {}): \
+                 the fluid has collapsed onto itself; use a smaller time step or a larger fluid.sound_speed",
+                self.params.neighbours
+            );
+            return Err(self.diverged(step, Stage::NeighbourList, what));
+        }
+        if let Some(particle) = counters.non_finite {
+            let what = format!("the velocity of particle {particle} is not a number");
+            return Err(self.diverged(step, Stage::Correct, what));
+        }
+        let fluid = self.groups.fluid as f64;
+        if counters.lost as f64 > (LOST_MAX * fluid).max(10.0) {
+            let what = format!(
+                "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began",
+                counters.lost, self.groups.fluid
+            );
+            return Err(self.diverged(step, Stage::CellList, what));
+        }
+        Ok(())
+    }
+}
