@@ -2,6 +2,7 @@
 
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
+use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
@@ -15,7 +16,8 @@ use crate::monitor::FluidMonitor;
 use crate::neighbours::{CAPACITY, CHUNK, Neighbours};
 use crate::params::{Params, Step};
 use crate::plan::{Plan, Stage};
-use crate::pressure::cg::{Jacobi, System, Workspace, solve};
+use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
+use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
 use glam::DVec3;
@@ -40,6 +42,7 @@ pub struct Cpu {
     neighbours: Neighbours,
     scratch: Scratch,
     work: Workspace,
+    multigrid: Option<Multigrid>,
     live: usize,
     counters: Counters,
     dt: f64,
@@ -74,6 +77,7 @@ impl Cpu {
             neighbours: Neighbours::new(if wet { groups.pressure() } else { 0 }),
             scratch,
             work: Workspace::default(),
+            multigrid: (wet && plan.preconditioner == Preconditioner::Multigrid).then(Multigrid::default),
             live: groups.fluid,
             counters: Counters::default(),
             dt: 0.0,
@@ -319,14 +323,21 @@ impl Backend for Cpu {
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
-        let Self { fields, neighbours, params, settings, work, .. } = self;
+        let Self { fields, neighbours, params, settings, work, multigrid, grid, .. } = self;
         let system = System {
             neighbours,
             state: &fields.state,
             diagonal: &fields.diagonal,
             coefficient: pressure_source::laplacian_coefficient(params),
         };
-        let report = solve(&system, &fields.source, &mut fields.pressure, &mut Jacobi, settings, work);
+        let preconditioner: &mut dyn Precondition = match multigrid {
+            Some(multigrid) => {
+                multigrid.build(&system, grid, &fields.position);
+                multigrid
+            }
+            None => &mut Jacobi,
+        };
+        let report = solve(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
         let mut clamps = 0;
         for p in &mut fields.pressure {
             clamps += u64::from(*p > step.pressure_max);
