@@ -86,6 +86,21 @@ impl Cpu {
         })
     }
 
+    /// The particles.
+    pub fn fields(&self) -> &Fields {
+        &self.fields
+    }
+
+    /// The neighbour lists.
+    pub fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// Sizes of the particle groups.
+    pub fn groups(&self) -> Groups {
+        self.groups
+    }
+
     fn viscosity(&mut self) {
         let Self { fields, neighbours, params, groups, .. } = self;
         let (x, v) = (&fields.position, &fields.velocity);
