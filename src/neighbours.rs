@@ -79,8 +79,6 @@ impl Chunk {
 pub struct Neighbours {
     /// Chunks, in slot order.
     pub chunks: Vec<Chunk>,
-    /// Most neighbours of a row.
-    pub largest: usize,
 }
 
 impl Neighbours {
@@ -95,12 +93,17 @@ impl Neighbours {
                 ..Chunk::default()
             }
         };
-        Self { chunks: (0..rows.div_ceil(CHUNK)).map(chunk).collect(), largest: 0 }
+        Self { chunks: (0..rows.div_ceil(CHUNK)).map(chunk).collect() }
     }
 
     /// All neighbours of particle `i`.
     pub fn all(&self, i: usize) -> Row<'_> {
         self.chunks[i / CHUNK].all(i % CHUNK)
+    }
+
+    /// Those neighbours of particle `i` that carry pressure.
+    pub fn pressure(&self, i: usize) -> Row<'_> {
+        self.chunks[i / CHUNK].pressure(i % CHUNK)
     }
 
     /// Number of pairs listed.

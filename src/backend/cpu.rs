@@ -7,7 +7,7 @@ use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
-use crate::kernels::neighbour_list::{Candidates, Search};
+use crate::kernels::neighbour_list::{Candidates, Coordinates, Search, neighbour_list};
 use crate::kernels::{
     body_force, collision, correct, monitor, move_solids, number_density, predict, pressure_gradient,
     pressure_source, viscosity,
@@ -22,7 +22,7 @@ use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Particles in f64 on the host.
 pub struct Cpu {
@@ -34,6 +34,7 @@ pub struct Cpu {
     fields: Fields,
     grid: Grid,
     fluid_start: Vec<u32>,
+    coordinates: Coordinates,
     moving: Option<CellList>,
     fixed: Option<CellList>,
     near_fluid: Vec<bool>,
@@ -70,6 +71,7 @@ impl Cpu {
             fields: if wet { Fields::new(scene) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
+            coordinates: Coordinates::default(),
             moving: (wet && groups.moving_wall > 0).then(CellList::default),
             fixed,
             near_fluid: Vec::new(),
@@ -82,6 +84,21 @@ impl Cpu {
             counters: Counters::default(),
             dt: 0.0,
         })
+    }
+
+    /// The particles.
+    pub fn fields(&self) -> &Fields {
+        &self.fields
+    }
+
+    /// The neighbour lists.
+    pub fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// Sizes of the particle groups.
+    pub fn groups(&self) -> Groups {
+        self.groups
     }
 
     fn viscosity(&mut self) {
@@ -136,47 +153,33 @@ impl Cpu {
     fn neighbour_list(&mut self) {
         let Self { fields, grid, params, groups, near_fluid, live, .. } = self;
         let (fluid, position, live) = (groups.fluid, &fields.position, *live);
+        self.coordinates.set(&position[..live]);
         let from = Candidates {
             grid,
             fluid_start: &self.fluid_start,
-            position,
+            fluid: &self.coordinates,
             moving: self.moving.as_ref(),
             fixed: self.fixed.as_ref(),
             pressure_slots: groups.pressure() as u32,
         };
-        let largest = AtomicU32::new(0);
-        let overflow = AtomicU64::new(u64::MAX);
-        self.neighbours.chunks.par_iter_mut().enumerate().for_each_init(
-            Search::default,
-            |search, (c, chunk)| {
-                chunk.neighbour.clear();
-                for k in 0..chunk.rows() {
+        let (largest, slot) = self
+            .neighbours
+            .chunks
+            .par_iter_mut()
+            .enumerate()
+            .map_init(Search::default, |search, (c, chunk)| {
+                let active = |k: usize| {
                     let i = c * CHUNK + k;
-                    let active = if i < fluid {
-                        i < live
-                    } else {
-                        near_fluid[grid.index(grid.coordinates(position[i]))]
-                    };
-                    if active {
-                        let found = search.row(i, params, &from);
-                        largest.fetch_max(found as u32, Relaxed);
-                        if found > CAPACITY {
-                            overflow.fetch_min((i as u64) << 32 | found as u64, Relaxed);
-                        }
-                        search.append(chunk, k, params);
-                    } else {
-                        chunk.dummies[k] = chunk.neighbour.len() as u32;
-                        chunk.start[k + 1] = chunk.dummies[k];
-                        chunk.close[k] = false;
-                    }
-                }
-                chunk.weight.resize(chunk.neighbour.len(), 0.0);
-            },
-        );
-        self.counters.neighbours_max = self.counters.neighbours_max.max(largest.into_inner());
-        let overflow = overflow.into_inner();
-        if overflow != u64::MAX {
-            self.counters.overflow.get_or_insert(((overflow >> 32) as u32, overflow as u32));
+                    let x = position[i];
+                    let near = if i < fluid { i < live } else { near_fluid[grid.index(grid.coordinates(x))] };
+                    near.then_some((i, x))
+                };
+                neighbour_list(chunk, active, params, &from, search)
+            })
+            .reduce(|| (0, 0), |a, b| a.max(b));
+        self.counters.neighbours_max = self.counters.neighbours_max.max(largest as u32);
+        if largest > CAPACITY {
+            self.counters.overflow.get_or_insert((slot as u32, largest as u32));
         }
     }
 

@@ -48,7 +48,7 @@ impl Level {
         let Self { start, column, value, diagonal, x, b, r, .. } = self;
         let row = |(i, r): (usize, &mut f32)| {
             let (a, e) = (start[i] as usize, start[i + 1] as usize);
-            let sum: f32 = column[a..e].iter().zip(&value[a..e]).map(|(&j, &v)| v * x[j as usize]).sum();
+            let sum = gather(&column[a..e], &value[a..e], x);
             *r = update(i, b[i] - diagonal[i] * x[i] - sum);
         };
         if diagonal.len() < PARALLEL {
@@ -71,7 +71,9 @@ impl Level {
 pub struct Multigrid {
     /// Aggregate of each slot, `u32::MAX` where there is no unknown.
     aggregate: Vec<u32>,
-    coordinates: Vec<[i16; 3]>,
+    /// Cell of each slot as 9 x + 3 y + z, [`NOWHERE`] where there is no unknown: the difference of two of them
+    /// is the entry in the stencil.
+    code: Vec<i32>,
     members: Vec<u32>,
     member_start: Vec<u32>,
     cell_aggregate: Vec<u32>,
@@ -86,11 +88,13 @@ pub struct Multigrid {
     factor: Vec<f64>,
 }
 
-/// Number of the stencil entry from cell `a` to cell `b`.
+/// Marks a slot without an unknown.
+const NOWHERE: i32 = i32::MIN;
+
+/// 9 x + 3 y + z.
 #[inline(always)]
-fn entry<T: Into<i32> + Copy>(a: [T; 3], b: [T; 3]) -> usize {
-    let d = |k: usize| (b[k].into() - a[k].into() + 1) as usize;
-    d(0) * 9 + d(1) * 3 + d(2)
+fn code([x, y, z]: [i32; 3]) -> i32 {
+    9 * x + 3 * y + z
 }
 
 impl Multigrid {
@@ -125,15 +129,17 @@ impl Multigrid {
         let n = system.state.len();
         self.aggregate.clear();
         self.aggregate.resize(n, u32::MAX);
-        self.coordinates.resize(n, [0; 3]);
+        self.code.resize(n, NOWHERE);
         self.diagonal.resize(n, 1.0);
         if self.cell_aggregate.len() != grid.total() {
             self.cell_aggregate = vec![u32::MAX; grid.total()];
         }
-        (&mut self.coordinates, &mut self.diagonal, &position[..n], system.diagonal)
+        (&mut self.code, &mut self.diagonal, system.state, system.diagonal, &position[..n])
             .into_par_iter()
-            .for_each(|(c, d, &x, &a)| {
-                *c = grid.coordinates(x).map(|k| k as i16);
+            .with_min_len(CHUNK)
+            .for_each(|(c, d, &state, &a, &x)| {
+                *c =
+                    if state == State::Inner { code(grid.coordinates(x).map(|k| k as i32)) } else { NOWHERE };
                 *d = a as f32;
             });
         let coarse = &mut self.levels[0].coordinates;
@@ -141,15 +147,15 @@ impl Multigrid {
         self.touched.clear();
         self.member_start.clear();
         for i in 0..n {
-            if system.state[i] != State::Inner {
+            if self.code[i] == NOWHERE {
                 continue;
             }
-            let c = self.coordinates[i];
-            let cell = grid.index(c.map(|k| k as u32));
+            let c = grid.coordinates(position[i]);
+            let cell = grid.index(c);
             if self.cell_aggregate[cell] == u32::MAX {
                 self.cell_aggregate[cell] = coarse.len() as u32;
                 self.touched.push(cell as u32);
-                coarse.push(c.map(i32::from));
+                coarse.push(c.map(|k| k as i32));
                 self.member_start.push(0);
             }
             let a = self.cell_aggregate[cell];
@@ -183,7 +189,7 @@ impl Multigrid {
             w32.clear();
             w32.extend(chunk.weight.iter().map(|&w| (c * w) as f32));
         });
-        let (aggregate, coordinates) = (&self.aggregate, &self.coordinates);
+        let codes = &self.code;
         let (members, start) = (&self.members, &self.member_start);
         let level = &mut self.levels[0];
         let rows = level.coordinates.len();
@@ -192,10 +198,11 @@ impl Multigrid {
             for &i in &members[start[a] as usize..start[a + 1] as usize] {
                 let i = i as usize;
                 s[13] += system.diagonal[i];
+                let own = codes[i] - 13;
                 for (j, w) in chunks[i / CHUNK].pressure(i % CHUNK).iter() {
                     // A pair without weight may lie further apart than neighbouring cells.
-                    if aggregate[j] != u32::MAX && w > 0.0 {
-                        s[entry(coordinates[i], coordinates[j])] -= c * w;
+                    if codes[j] != NOWHERE && w > 0.0 {
+                        s[(codes[j] - own) as usize] -= c * w;
                     }
                 }
             }
@@ -300,16 +307,27 @@ impl Multigrid {
                     *t = 0.0;
                     if system.state[i] == State::Inner {
                         let (a, e) = (chunk.start[k] as usize, chunk.dummies[k] as usize);
-                        let sum: f32 = chunk.neighbour[a..e]
-                            .iter()
-                            .zip(&w[a..e])
-                            .map(|(&j, &w)| w * x[j as usize])
-                            .sum();
+                        let sum = gather(&chunk.neighbour[a..e], &w[a..e], x);
                         *t = b[i] - d[i] * x[i] + sum;
                     }
                 }
             });
     }
+}
+
+/// sum w_k x_j(k), in four sums side by side.
+#[inline(always)]
+fn gather(index: &[u32], weight: &[f32], x: &[f32]) -> f32 {
+    let mut sums = [0.0; 4];
+    let (indices, weights) = (index.chunks_exact(4), weight.chunks_exact(4));
+    let rest: f32 =
+        indices.remainder().iter().zip(weights.remainder()).map(|(&j, w)| w * x[j as usize]).sum();
+    for (j, w) in indices.zip(weights) {
+        for k in 0..4 {
+            sums[k] += w[k] * x[j[k] as usize];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// Next coarser level of `fine`; `false` if it did not get smaller.
@@ -343,7 +361,8 @@ fn coarsen(fine: &mut Level, coarse: &mut Level) -> bool {
         s[13] += f64::from(fine.diagonal[i]);
         for k in fine.start[i] as usize..fine.start[i + 1] as usize {
             let q = fine.parent[fine.column[k] as usize] as usize;
-            s[entry(coarse.coordinates[p], coarse.coordinates[q])] += f64::from(fine.value[k]);
+            s[(code(coarse.coordinates[q]) - code(coarse.coordinates[p]) + 13) as usize] +=
+                f64::from(fine.value[k]);
         }
     }
     compress(coarse, &stencil);
