@@ -6,7 +6,14 @@ use glam::DVec3;
 
 /// What the contact did in a step.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ContactReport {}
+pub struct ContactReport {
+    /// Sub-steps.
+    pub substeps: u32,
+    /// omega dt of a sub-step [-].
+    pub omega_dt: f64,
+    /// Deepest penetration over l0 [-].
+    pub penetration_max_over_l0: f64,
+}
 
 /// The moving solids.
 pub struct Solids {
@@ -67,6 +74,6 @@ impl Solids {
     /// Advance.
     pub fn advance(&mut self, t: f64, dt: f64, f: &[Wrench]) -> Result<ContactReport> {
         self.go(t, dt, Some(f));
-        Ok(ContactReport {})
+        Ok(ContactReport::default())
     }
 }
