@@ -117,6 +117,9 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ),
     ("[1, 0, 0, 1]]", "[0, 0, 0, 1]]", &["moving_wall.0.motion.1.0: time 0 does not come after 0"]),
     ("[[0, 0, 0, 0], [1, 0, 0, 1]]", "[]", &["moving_wall.0.motion: the table of motion has no rows"]),
+    ("max = [1.0, 1.0, 1.0]", "max = [1e9, 1e9, 1e9]", &["tank: the tank takes up or lies beyond"]),
+    ("[0.2, 0.2, 0.2]", "[2e5, 2e5, 2e5]", &["body.0.size: body `cube` takes up"]),
+    ("open = [\"z_max\"]", "open = [\"z_max\", \"z_max\"]", &["tank.open.1: `z_max` is listed twice"]),
     // bodies and contact
     ("density = 500.0\n", "density = 500.0\nmass = 4.0\n", &["body.0.density: `mass` and `density` exclude"]),
     ("density = 500.0\n", "", &["body.0: body `cube` has neither mass nor density"]),
@@ -214,6 +217,16 @@ fn overrides_edit_the_text() {
 }
 
 #[test]
+fn a_spacing_that_is_no_number_is_refused_like_any_other() {
+    let path = root().join("cases/hydrostatic.toml");
+    let message = file::load(&path, Some(f64::NAN), &[]).unwrap_err().to_string();
+    assert!(message.contains("run.spacing: NaN is not a finite number"), "{message}");
+    assert!(message.contains("lines are counted with --spacing and --set applied"), "{message}");
+    let loaded = file::load(&path, Some(0.05), &[]).unwrap_or_else(|e| panic!("{e}"));
+    assert!((loaded.case.run.spacing - 0.05).abs() < 1e-15);
+}
+
+#[test]
 fn overrides_that_fit_nothing() {
     for (set, words) in [
         ("body.3.density=1", "index 3 is out of range: `body` has 1 entry"),
@@ -287,8 +300,9 @@ fn alternatives_in_comments_are_right() {
                 }
                 tried += 1;
                 let sets: Vec<&str> = sets.iter().map(|s| s.trim_end_matches([')', ',', ';'])).collect();
-                file::load(&path, None, &strings(&sets))
-                    .unwrap_or_else(|e| panic!("{}: {sets:?}: {e}", path.display()));
+                let loaded = file::load(&path, None, &strings(&sets));
+                let built = loaded.and_then(|l| Scene::build(&l.case));
+                built.map(drop).unwrap_or_else(|e| panic!("{}: {sets:?}: {e}", path.display()));
             }
         }
     }

@@ -367,15 +367,18 @@ impl Backend for Cpu {
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
+        let weight = self.params.density * self.params.gravity;
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
             for (k, i) in solid.wall_slots.clone().enumerate() {
                 let area = pose.orientation * solid.wall_area[k];
-                let force = body_force::body_force(fields.pressure[i], area, fields.reaction[i - fluid]);
+                let to_surface = pose.orientation * solid.wall_to_surface[k];
+                let unknown = fields.state[i] == State::Inner;
+                let pressure = body_force::surface_pressure(fields.pressure[i], unknown, to_surface, weight);
+                let force = body_force::body_force(pressure, area, fields.reaction[i - fluid]);
                 total.force += force;
-                total.torque +=
-                    (pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k])).cross(force);
+                total.torque += (pose.orientation * solid.wall_offset[k] + to_surface).cross(force);
             }
             total
         });

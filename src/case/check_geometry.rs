@@ -3,6 +3,8 @@
 use super::check::{Checker, face, length};
 use super::{Face, Vector};
 
+/// More cells than this do not fit into memory, nor their indices into 32 bits.
+const MOST_CELLS: f64 = 1e9;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl Checker<'_> {
@@ -24,12 +26,19 @@ impl Checker<'_> {
         bad.is_empty() && min.iter().chain(max).all(|x| x.is_finite())
     }
 
-    /// At least one particle across, along every axis.
+    /// At least one particle across along every axis, and no more cells than fit into memory.
     pub(super) fn fits(&mut self, path: &str, what: &str, min: &Vector, max: &Vector) {
         let Some(l0) = self.spacing() else { return };
         let Some(k) = self.axes().min_by(|&a, &b| (max[a] - min[a]).total_cmp(&(max[b] - min[b]))) else {
             return;
         };
+        let cells: f64 = self.axes().map(|k| (max[k] - min[k]) / l0).product();
+        let far = self.axes().map(|k| min[k].abs().max(max[k].abs()) / l0).fold(0.0, f64::max);
+        if cells > MOST_CELLS || far > MOST_CELLS {
+            let message = format!("{what} takes up or lies beyond {:.1e} cells of {l0} m", cells.max(far));
+            self.add(path, message, "use a larger run.spacing, or correct a length that is far too large");
+            return;
+        }
         let across = max[k] - min[k];
         if across < l0 * (1.0 - 1e-6) {
             let message =
@@ -38,7 +47,7 @@ impl Checker<'_> {
         }
     }
 
-    fn open(&mut self, path: &str, open: &[Face], all_is_wrong: bool) {
+    fn open(&mut self, path: &str, open: &[Face]) {
         for (i, &f) in open.iter().enumerate() {
             if open[..i].contains(&f) {
                 self.add(
@@ -48,7 +57,7 @@ impl Checker<'_> {
                 );
             }
         }
-        if all_is_wrong && open.len() >= 6 {
+        if open.len() >= 6 {
             self.add(
                 format!("{path}.open"),
                 "every face is open, so that nothing is left",
@@ -63,21 +72,21 @@ impl Checker<'_> {
             if self.box_edges("tank", "tank.max", &tank.min, &tank.max) {
                 self.fits("tank", "the tank", &tank.min, &tank.max);
             }
-            self.open("tank", &tank.open, true);
+            self.open("tank", &tank.open);
         }
         for (k, o) in case.obstacle.iter().enumerate() {
             let path = format!("obstacle.{k}");
             if self.box_edges(&path, &format!("{path}.max"), &o.min, &o.max) {
                 self.fits(&path, &format!("obstacle `{}`", o.name), &o.min, &o.max);
             }
-            self.open(&path, &o.open, true);
+            self.open(&path, &o.open);
         }
         for (k, w) in case.moving_wall.iter().enumerate() {
             let path = format!("moving_wall.{k}");
             if self.box_edges(&path, &format!("{path}.max"), &w.min, &w.max) {
                 self.fits(&path, &format!("moving wall `{}`", w.name), &w.min, &w.max);
             }
-            self.open(&path, &w.open, true);
+            self.open(&path, &w.open);
             self.motion(&format!("{path}.motion"), &w.motion);
         }
         for (k, plane) in case.plane.iter().enumerate() {
@@ -105,6 +114,15 @@ impl Checker<'_> {
                 format!("{path}.normal"),
                 "in two dimensions a plane stands upright on x, z",
                 "set the y components of `normal` and `along` to 0",
+            );
+        }
+        if let Some(l0) = self.spacing()
+            && plane.size[0] * plane.size[1] > MOST_CELLS * l0 * l0
+        {
+            self.add(
+                format!("{path}.size"),
+                "more particles than fit into memory",
+                "use a larger run.spacing",
             );
         }
         let sizes = if self.flat() { 1 } else { 2 };

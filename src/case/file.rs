@@ -34,7 +34,10 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
         }
         _ => Error::io(path)(source),
     })?;
-    let mut all: Vec<String> = spacing.iter().map(|l0| format!("run.spacing={l0:?}")).collect();
+    let mut all = Vec::new();
+    if let Some(l0) = spacing {
+        all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
+    }
     all.extend_from_slice(sets);
     parse(&path.display().to_string(), text, &all).map(|(case, text, warnings)| Loaded {
         case,

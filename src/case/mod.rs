@@ -4,6 +4,7 @@
 
 pub mod check;
 mod check_geometry;
+mod check_solids;
 pub mod file;
 mod overrides;
 mod report;

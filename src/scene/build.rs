@@ -7,7 +7,7 @@ use super::lattice::{Cells, Grid, Lattice};
 use super::placement::{Surroundings, point};
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::Water;
-use super::{Drive, Groups, Kind, Motion, Scene, Shape, Solid};
+use super::{Scene, Shape, Solid};
 use crate::case::{Case, Law};
 use crate::error::{Error, Result};
 use glam::{DVec3, IVec3};
@@ -24,6 +24,7 @@ impl Scene {
         builder.walls();
         builder.water();
         builder.bodies();
+        builder.gauges();
         let domain = builder.domain();
         if !builder.problems.is_empty() {
             return Err(Error::Case(listed(&builder.problems)));
@@ -40,20 +41,21 @@ fn listed(problems: &[String]) -> String {
     }
 }
 
-struct Builder<'a> {
-    case: &'a Case,
-    lattice: Lattice,
+/// A scene while it grows.
+pub(super) struct Builder<'a> {
+    pub(super) case: &'a Case,
+    pub(super) lattice: Lattice,
     grid: Grid,
     /// Wall layer and dummies: 1 + the most layers that lie strictly within re of the wall layer.
     layers: i32,
-    tank: Option<Cells>,
-    fixed: Fixed,
-    moving_walls: Vec<Solid>,
-    bodies: Vec<Solid>,
-    water: Water,
-    depth: f64,
-    notes: Vec<String>,
-    problems: Vec<String>,
+    pub(super) tank: Option<Cells>,
+    pub(super) fixed: Fixed,
+    pub(super) moving_walls: Vec<Solid>,
+    pub(super) bodies: Vec<Solid>,
+    pub(super) water: Water,
+    pub(super) depth: f64,
+    pub(super) notes: Vec<String>,
+    pub(super) problems: Vec<String>,
 }
 
 impl<'a> Builder<'a> {
@@ -89,7 +91,8 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn gravity(&self) -> DVec3 {
+    /// Gravity [m/s2], in the plane in two dimensions.
+    pub(super) fn gravity(&self) -> DVec3 {
         let mut g: DVec3 = self.case.run.gravity.into();
         if self.lattice.plane {
             g.y = 0.0;
@@ -206,67 +209,29 @@ impl<'a> Builder<'a> {
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }
 
-    /// The case's domain, or one with room around everything; complains of what lies outside.
-    fn domain(&mut self) -> (DVec3, DVec3) {
-        let l0 = self.lattice.spacing;
-        let mut bounds = Bounds::default();
-        for wall in &self.fixed.shapes {
-            let reach = super::oriented::OrientedBox::from(wall).bounds();
-            bounds.add(&format!("wall `{}`", wall.name), wall.center - reach, wall.center + reach);
-        }
-        for solid in self.moving_walls.iter().chain(&self.bodies) {
-            let shape = solid.oriented_box();
-            let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
-            let label = format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name);
-            bounds.add(&label, lo, hi);
-            if let Drive::Prescribed(motion) = &solid.drive {
-                for &d in &motion.displacement {
-                    bounds.add(&label, lo + d, hi + d);
-                }
+    /// A pressure gauge averages over the wall particles near its point: there must be some.
+    fn gauges(&mut self) {
+        let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
+        for gauge in &self.case.gauge.pressure {
+            let mut at: DVec3 = gauge.point.into();
+            if self.lattice.plane {
+                at.y = 0.0;
+            }
+            let solids = self.moving_walls.iter().chain(&self.bodies).flat_map(Solid::wall_positions);
+            let all = self.fixed.wall.iter().copied().chain(solids);
+            let Some(nearest) = all.min_by(|a, b| a.distance(at).total_cmp(&b.distance(at))) else {
+                continue;
+            };
+            if nearest.distance(at) > reach {
+                self.problems.push(format!(
+                    "gauge.pressure `{}` at {}: no wall particle within {reach:.4} m, the nearest stands at {}: move the \
+                     point onto a wall",
+                    gauge.name,
+                    point(at),
+                    point(nearest)
+                ));
             }
         }
-        if !self.water.cell.is_empty() {
-            let (lo, hi) =
-                self.water.cell.iter().fold((IVec3::MAX, IVec3::MIN), |(a, b), &c| (a.min(c), b.max(c)));
-            bounds.add("water", self.lattice.corner(lo), self.lattice.corner(hi + 1));
-        }
-        if let Some(domain) = self.case.run.domain {
-            let (lo, hi) = (DVec3::from(domain[0]), DVec3::from(domain[1]));
-            let slack = 1e-9 * l0;
-            for (label, a, b) in &bounds.items {
-                let outside = |k: usize| a[k] < lo[k] - slack || b[k] > hi[k] + slack;
-                if let Some(k) = (0..3).find(|&k| !(self.lattice.plane && k == 1) && outside(k)) {
-                    self.problems.push(format!(
-                        "run.domain: {label} reaches from {} = {:.4} to {:.4} m, outside of {:.4} to {:.4} m: \
-                         enlarge run.domain or leave it out",
-                        AXES[k], a[k], b[k], lo[k], hi[k]
-                    ));
-                }
-            }
-            return (lo, hi);
-        }
-        let (lo, hi) = bounds.total();
-        let room = 4.0 * l0;
-        // Nothing but walls keeps bodies and free drops in place, and they cost nothing while there are few.
-        let held = self.tank.is_some() && !self.water.cell.is_empty();
-        let around = if held { room } else { (0.5 * (hi - lo).length()).max(room) };
-        let (mut lo, mut hi) = (lo - around, hi + around);
-        let gravity = self.gravity();
-        if gravity.length() > 0.0 {
-            let up = -gravity.normalize();
-            let tank = self
-                .case
-                .tank
-                .as_ref()
-                .map_or(0.0, |t| (DVec3::from(t.max) - DVec3::from(t.min)).dot(up.abs()));
-            let head = up * (4.0 * self.depth).max(tank);
-            lo += head.min(DVec3::ZERO);
-            hi += head.max(DVec3::ZERO);
-        }
-        if self.lattice.plane {
-            (lo.y, hi.y) = (-0.5 * l0, 0.5 * l0);
-        }
-        (lo, hi)
     }
 
     /// Axes along which a length changed by more than 1 % of the spacing.
@@ -294,115 +259,6 @@ impl<'a> Builder<'a> {
             self.notes.push(format!("{label}: {cells} cells left to the walls that already stand there"));
         }
     }
-
-    /// Lays the particles out in their groups.
-    fn assemble(self, domain: (DVec3, DVec3)) -> Scene {
-        let mut solids: Vec<Solid> = self.bodies.into_iter().chain(self.moving_walls).collect();
-        let count = |f: fn(&Solid) -> usize| solids.iter().map(f).sum();
-        let groups = Groups {
-            fluid: self.water.cell.len(),
-            moving_wall: count(|s| s.wall_offset.len()),
-            static_wall: self.fixed.wall.len(),
-            static_dummy: self.fixed.dummy.len(),
-            moving_dummy: count(|s| s.dummy_offset.len()),
-        };
-        let total = groups.total();
-        let mut layout = Layout {
-            position: Vec::with_capacity(total),
-            velocity: Vec::with_capacity(total),
-            kind: Vec::with_capacity(total),
-            solid: Vec::with_capacity(total),
-        };
-        for (&c, &v) in self.water.cell.iter().zip(&self.water.velocity) {
-            layout.push(self.lattice.center(c), v, Kind::Fluid, 0);
-        }
-        for (k, solid) in solids.iter_mut().enumerate() {
-            let kind = if solid.is_body { Kind::BodyWall } else { Kind::Wall };
-            solid.wall_slots = layout.push_offsets(solid, &solid.wall_offset, kind, k);
-        }
-        for &p in &self.fixed.wall {
-            layout.push(p, DVec3::ZERO, Kind::Wall, 0);
-        }
-        for &p in &self.fixed.dummy {
-            layout.push(p, DVec3::ZERO, Kind::Dummy, 0);
-        }
-        for (k, solid) in solids.iter_mut().enumerate() {
-            let kind = if solid.is_body { Kind::BodyDummy } else { Kind::Dummy };
-            solid.dummy_slots = layout.push_offsets(solid, &solid.dummy_offset, kind, k);
-        }
-        let mut gravity: DVec3 = self.case.run.gravity.into();
-        if self.lattice.plane {
-            gravity.y = 0.0;
-        }
-        Scene {
-            dimensions: self.case.run.dimensions,
-            spacing: self.lattice.spacing,
-            gravity,
-            position: layout.position,
-            velocity: layout.velocity,
-            kind: layout.kind,
-            solid: layout.solid,
-            groups,
-            solids,
-            walls: self.fixed.shapes,
-            static_wall_normal: self.fixed.normal,
-            domain,
-            depth: self.depth,
-            notes: self.notes,
-        }
-    }
 }
 
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// The particle arrays while they grow.
-struct Layout {
-    position: Vec<DVec3>,
-    velocity: Vec<DVec3>,
-    kind: Vec<Kind>,
-    solid: Vec<u32>,
-}
-
-impl Layout {
-    fn push(&mut self, position: DVec3, velocity: DVec3, kind: Kind, solid: u32) {
-        self.position.push(position);
-        self.velocity.push(velocity);
-        self.kind.push(kind);
-        self.solid.push(solid);
-    }
-    /// Particles of solid `k`, moving with it; returns their slots.
-    fn push_offsets(
-        &mut self,
-        solid: &Solid,
-        offsets: &[DVec3],
-        kind: Kind,
-        k: usize,
-    ) -> std::ops::Range<usize> {
-        let from = self.position.len();
-        for &offset in offsets {
-            let arm = solid.orientation * offset;
-            let velocity = match &solid.drive {
-                Drive::Free(free) => free.velocity + free.angular_velocity.cross(arm),
-                Drive::Prescribed(motion) => Motion::velocity(motion, 0.0),
-            };
-            self.push(solid.position + arm, velocity, kind, k as u32 + 1);
-        }
-        from..self.position.len()
-    }
-}
-
-/// Labelled boxes and the box around them all.
-#[derive(Default)]
-struct Bounds {
-    items: Vec<(String, DVec3, DVec3)>,
-}
-
-impl Bounds {
-    fn add(&mut self, label: &str, lo: DVec3, hi: DVec3) {
-        self.items.push((label.to_owned(), lo, hi));
-    }
-    fn total(&self) -> (DVec3, DVec3) {
-        let boxes = self.items.iter().map(|(_, lo, hi)| (*lo, *hi));
-        boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default()
-    }
-}
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];

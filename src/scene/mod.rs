@@ -13,7 +13,9 @@
 
 mod bodies;
 mod build;
+mod domain;
 mod lattice;
+mod layout;
 mod oriented;
 mod placement;
 mod walls;

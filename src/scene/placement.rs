@@ -36,38 +36,33 @@ impl Surroundings<'_> {
     /// # Errors
     /// A sentence that names the body, what it overlaps, by how much, and what to do.
     pub fn place(&self, body: &mut Solid, standing: bool) -> Result<Option<String>, String> {
-        if standing && let Some(up) = self.up {
-            let lift = self.lift(body, up);
-            let most = body.oriented_box().reach(up).max(2.0 * self.spacing);
-            if lift > most {
-                let with = self.deepest(body).map_or_else(|| "something".into(), |c| c.with);
-                return Err(format!(
-                    "body `{}`: standing = true would have to lift it by {lift:.6} m, more than half its height, to clear {with}: \
-                     move it sideways or raise its center",
-                    body.name
-                ));
-            }
-            if lift > 0.0 {
-                let from = body.position;
-                body.position += lift * up;
-                return Ok(Some(format!(
-                    "body `{}`: lifted by {lift:.6} m to stand free of contact, center {} becomes {}",
-                    body.name,
-                    point(from),
-                    point(body.position)
-                )));
-            }
-            return Ok(None);
-        }
         let Some(Contact { with, overlap }) = self.deepest(body) else { return Ok(None) };
-        let lift = self.up.map(|up| self.lift(body, up)).filter(|l| l.is_finite());
-        let remedy = match lift {
-            Some(lift) => {
-                format!("set `standing = true`, or raise its center by {:.6} m against gravity", lift + 1e-6)
-            }
-            None => "move them apart".to_owned(),
+        // A lift over the rim of a wall is not what anyone means by standing.
+        let lift = self
+            .up
+            .map(|up| (self.lift(body, up), up))
+            .filter(|(lift, up)| *lift <= body.oriented_box().reach(*up).max(2.0 * self.spacing));
+        let says = format!("body `{}` overlaps {with} by {overlap:.6} m at t = 0", body.name);
+        let Some((lift, up)) = lift else {
+            return Err(format!("{says}: move it away, lifting it would take more than half its height"));
         };
-        Err(format!("body `{}` overlaps {with} by {overlap:.6} m at t = 0: {remedy}", body.name))
+        if !standing {
+            let more = lift + 1e-6;
+            return Err(format!(
+                "{says}: set `standing = true`, or raise its center by {more:.6} m against gravity"
+            ));
+        }
+        let from = body.position;
+        body.position += lift * up;
+        if let Some(Contact { with, .. }) = self.deepest(body) {
+            return Err(format!("{says}: move it away, lifted by {lift:.6} m it would still overlap {with}"));
+        }
+        Ok(Some(format!(
+            "body `{}`: lifted by {lift:.6} m to stand free of contact, center {} becomes {}",
+            body.name,
+            point(from),
+            point(body.position)
+        )))
     }
 
     /// Fixed walls and earlier solids as boxes. Prescribed bodies may reach into what does not move under
