@@ -14,7 +14,8 @@ struct Array {
 }
 
 fn attribute<'a>(tag: &'a str, name: &str) -> &'a str {
-    let start = tag.find(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name} in {tag}")) + name.len() + 3;
+    let start =
+        tag.find(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name} in {tag}")) + name.len() + 3;
     &tag[start..start + tag[start..].find('"').unwrap()]
 }
 
@@ -186,7 +187,10 @@ fn the_list_of_frames_is_whole_after_every_frame() {
         assert!(text.ends_with("</VTKFile>\n") && text.contains("type=\"Collection\""));
     }
     let text = std::fs::read_to_string(&path).unwrap();
-    assert!(text.contains(r#"timestep="0.05" group="" part="1" name="fluid" file="vtu/fluid_0001.vtu""#), "{text}");
+    assert!(
+        text.contains(r#"timestep="0.05" group="" part="1" name="fluid" file="vtu/fluid_0001.vtu""#),
+        "{text}"
+    );
     assert_eq!(text.matches("vtu/walls.vtu").count(), 3, "unchanged parts are named in every frame");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays behind");
 }
