@@ -264,9 +264,9 @@ impl Cpu {
                     let i = c * CHUNK + k;
                     *a = DVec3::ZERO;
                     if i < live {
-                        let rows = (chunk.all(k), chunk.pressure(k));
+                        let row = chunk.parts(k);
                         *a = pressure_gradient::pressure_gradient(
-                            i, rows, state[i], params, position, pressure,
+                            i, row, state[i], params, position, pressure,
                         );
                     }
                 }
