@@ -81,7 +81,7 @@ fn report(setup: &Setup) -> Result<Report> {
     let solids = Solids::new(scene, case.contact.as_ref())?;
     let mut advice =
         if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive) } else { vec![] };
-    advice.extend(contact_advice(&solids, dt));
+    advice.extend(solids.advice(dt).words);
     let stages = plan.reasons.iter().map(|(stage, reason)| StageLine {
         stage: stage.name(),
         planned: reason.is_ok(),
@@ -172,10 +172,6 @@ fn step_advice(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
         ));
     }
     advice
-}
-
-fn contact_advice(_solids: &Solids, _dt: f64) -> Vec<String> {
-    Vec::new()
 }
 
 fn words(report: &Report) -> String {
