@@ -201,6 +201,11 @@ impl Solids {
         &self.poses
     }
 
+    /// Name of solid `k`, as in the case.
+    pub fn name(&self, k: usize) -> &str {
+        &self.names[k]
+    }
+
     /// Mean contact wrench over the last step, one per solid (friction included).
     pub fn contact_wrenches(&self) -> &[Wrench] {
         &self.contact
