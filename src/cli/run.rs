@@ -4,7 +4,7 @@ use super::progress::{Display, clock};
 use super::setup::Setup;
 use super::{CaseArgs, DeviceArgs, Exit, device, say};
 use seixo::error::{Error, Result};
-use seixo::output::result::Summary;
+use seixo::output::result::{Status, Summary};
 use seixo::run::{Options, run as run_simulation};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::path::{Path, PathBuf};
@@ -89,9 +89,15 @@ fn watch_signals() -> Result<Arc<AtomicUsize>> {
 
 fn words(summary: &Summary, out: &Path) -> String {
     let m = &summary.monitors;
+    // Why a run failed is an error, and said as one.
+    let ended = match summary.status {
+        Status::Done | Status::Interrupted => &summary.exit_reason,
+        Status::Diverged => "diverged",
+        Status::Failed => "failed",
+    };
     let mut lines = vec![format!(
-        "{}: {} steps to t = {:.4} s in {} ({:.4} s a step) on {}",
-        summary.exit_reason,
+        "{}: {} steps to t = {:.4} s in {} ({:.3e} s a step) on {}",
+        ended,
         summary.steps,
         summary.time_s,
         clock(Duration::from_secs_f64(summary.wall_s)),
