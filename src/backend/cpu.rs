@@ -80,6 +80,16 @@ impl Cpu {
         })
     }
 
+    /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
+    pub fn neighbours(&self) -> Vec<(Vec<u32>, Vec<u32>)> {
+        let row = |i: usize| {
+            let (chunk, k) = (&self.neighbours.chunks[i / CHUNK], i % CHUNK);
+            let near = chunk.pressure(k).neighbour;
+            (near.to_vec(), chunk.all(k).neighbour[near.len()..].to_vec())
+        };
+        (0..self.neighbours.rows()).map(row).collect()
+    }
+
     fn viscosity(&mut self) {
         let Self { fields, neighbours, params, groups, .. } = self;
         let (x, v) = (&fields.position, &fields.velocity);
@@ -389,6 +399,8 @@ impl Backend for Cpu {
     fn write(&mut self, fields: &Fields) -> Result<()> {
         self.fields = fields.clone();
         self.live = self.fields.kind[..self.groups.fluid].iter().filter(|&&k| k == Kind::Fluid).count();
+        // The lists name the slots of the particles that were here before.
+        self.neighbours = Neighbours::new(self.neighbours.rows());
         Ok(())
     }
 
