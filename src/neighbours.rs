@@ -112,6 +112,11 @@ impl Neighbours {
         self.chunks[i / CHUNK].pressure(i % CHUNK)
     }
 
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.chunks.iter().map(Chunk::rows).sum()
+    }
+
     /// Number of pairs listed.
     pub fn pairs(&self) -> usize {
         self.chunks.iter().map(|c| c.neighbour.len()).sum()
