@@ -1,8 +1,6 @@
 //! The VTU files, read back byte for byte by a reader written for the test, and the list of frames.
 
-mod common;
-
-use seixo::case::Encoding;
+use seixo::case::{Case, Encoding};
 use seixo::fields::Fields;
 use seixo::output::folder::Folder;
 use seixo::output::picture::Picture;
@@ -260,13 +258,14 @@ fn pixels(file: &[u8], fits: impl Fn([u8; 3]) -> bool) -> usize {
 #[test]
 fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
     let scene = |obstacle: &str| {
-        let case = common::case(&format!(
+        let case: Case = toml::from_str(&format!(
             "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\n\
              [tank]\nmin = [0, 0, 0]\nmax = [2, 1, 1]\nopen = [\"z_max\"]\n{obstacle}\
              [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 1, 0.5]\n\
              [[body]]\nname = \"cube\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.5, 0.5]\ndensity = 500\n\
              [contact]\nspring = 1e4\n"
-        ));
+        ))
+        .unwrap();
         Scene::build(&case).unwrap()
     };
     let orange = |[r, g, b]: [u8; 3]| r > 150 && i32::from(r) - i32::from(b) > 60 && g < r;
