@@ -334,7 +334,7 @@ fn hydrostatics(fluid: &str, dt: f64, window: (f64, f64)) -> [f64; 4] {
     let weight = 9.81 * 1000.0;
     while sim.time < window.1 {
         sim.step().unwrap();
-        if sim.time < window.0 || sim.steps % 5 != 0 {
+        if sim.time < window.0 || !sim.steps.is_multiple_of(5) {
             continue;
         }
         let (f, m) = (sim.backend.read().unwrap(), sim.backend.monitor().unwrap());

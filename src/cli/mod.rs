@@ -72,9 +72,9 @@ struct DeviceArgs {
     /// Processor: auto takes a hardware GPU if there is one, else the CPU.
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
-    /// Number of the adapter, as `seixo adapters` lists it; implies --backend gpu.
+    /// Number of the adapter as `seixo adapters` lists it, or a part of its name; implies --backend gpu.
     #[arg(long, value_name = "N")]
-    adapter: Option<usize>,
+    adapter: Option<String>,
     /// Threads of the CPU path; all cores if absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
