@@ -57,6 +57,12 @@ impl Chunk {
         self.slice(self.start[k] as usize, self.dummies[k] as usize)
     }
 
+    /// All neighbours of row `k`, and how many of them carry pressure; they come first.
+    #[inline(always)]
+    pub fn parts(&self, k: usize) -> (Row<'_>, usize) {
+        (self.all(k), (self.dummies[k] - self.start[k]) as usize)
+    }
+
     /// The range of row `k` in `neighbour` and `weight`.
     #[inline(always)]
     pub fn range(&self, k: usize) -> std::ops::Range<usize> {
@@ -79,8 +85,6 @@ impl Chunk {
 pub struct Neighbours {
     /// Chunks, in slot order.
     pub chunks: Vec<Chunk>,
-    /// Most neighbours of a row.
-    pub largest: usize,
 }
 
 impl Neighbours {
@@ -95,7 +99,7 @@ impl Neighbours {
                 ..Chunk::default()
             }
         };
-        Self { chunks: (0..rows.div_ceil(CHUNK)).map(chunk).collect(), largest: 0 }
+        Self { chunks: (0..rows.div_ceil(CHUNK)).map(chunk).collect() }
     }
 
     /// All neighbours of particle `i`.
@@ -106,6 +110,11 @@ impl Neighbours {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.chunks.iter().map(Chunk::rows).sum()
+    }
+
+    /// Those neighbours of particle `i` that carry pressure.
+    pub fn pressure(&self, i: usize) -> Row<'_> {
+        self.chunks[i / CHUNK].pressure(i % CHUNK)
     }
 
     /// Number of pairs listed.

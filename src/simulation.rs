@@ -80,9 +80,9 @@ fn settings(case: &Case) -> Settings {
 }
 
 /// Displacement of the fastest particles in a step, over l0.
-const COURANT_MAX: f64 = 0.35;
+pub const COURANT_MAX: f64 = 0.35;
 /// c_s dt / l0 at most.
-const SOUND_MAX: f64 = 0.7;
+pub const SOUND_MAX: f64 = 0.7;
 /// Steps between looks at the counters and the fastest particles.
 const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.

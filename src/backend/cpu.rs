@@ -2,11 +2,12 @@
 
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
+use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
-use crate::kernels::neighbour_list::{Candidates, Search};
+use crate::kernels::neighbour_list::{Candidates, Coordinates, Search, neighbour_list};
 use crate::kernels::{
     body_force, collision, correct, monitor, move_solids, number_density, predict, pressure_gradient,
     pressure_source, viscosity,
@@ -15,12 +16,13 @@ use crate::monitor::FluidMonitor;
 use crate::neighbours::{CAPACITY, CHUNK, Neighbours};
 use crate::params::{Params, Step};
 use crate::plan::{Plan, Stage};
-use crate::pressure::cg::{Jacobi, System, Workspace, solve};
+use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
+use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Particles in f64 on the host.
 pub struct Cpu {
@@ -32,6 +34,7 @@ pub struct Cpu {
     fields: Fields,
     grid: Grid,
     fluid_start: Vec<u32>,
+    coordinates: Coordinates,
     moving: Option<CellList>,
     fixed: Option<CellList>,
     near_fluid: Vec<bool>,
@@ -40,6 +43,7 @@ pub struct Cpu {
     neighbours: Neighbours,
     scratch: Scratch,
     work: Workspace,
+    multigrid: Option<Multigrid>,
     live: usize,
     counters: Counters,
     dt: f64,
@@ -67,6 +71,7 @@ impl Cpu {
             fields: if wet { Fields::new(scene) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
+            coordinates: Coordinates::default(),
             moving: (wet && groups.moving_wall > 0).then(CellList::default),
             fixed,
             near_fluid: Vec::new(),
@@ -74,20 +79,26 @@ impl Cpu {
             neighbours: Neighbours::new(if wet { groups.pressure() } else { 0 }),
             scratch,
             work: Workspace::default(),
+            multigrid: (wet && plan.preconditioner == Preconditioner::Multigrid).then(Multigrid::default),
             live: groups.fluid,
             counters: Counters::default(),
             dt: 0.0,
         })
     }
 
-    /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
-    pub fn neighbours(&self) -> Vec<(Vec<u32>, Vec<u32>)> {
-        let row = |i: usize| {
-            let (chunk, k) = (&self.neighbours.chunks[i / CHUNK], i % CHUNK);
-            let near = chunk.pressure(k).neighbour;
-            (near.to_vec(), chunk.all(k).neighbour[near.len()..].to_vec())
-        };
-        (0..self.neighbours.rows()).map(row).collect()
+    /// The particles.
+    pub fn fields(&self) -> &Fields {
+        &self.fields
+    }
+
+    /// The neighbour lists.
+    pub fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// Sizes of the particle groups.
+    pub fn groups(&self) -> Groups {
+        self.groups
     }
 
     fn viscosity(&mut self) {
@@ -142,47 +153,33 @@ impl Cpu {
     fn neighbour_list(&mut self) {
         let Self { fields, grid, params, groups, near_fluid, live, .. } = self;
         let (fluid, position, live) = (groups.fluid, &fields.position, *live);
+        self.coordinates.set(&position[..live]);
         let from = Candidates {
             grid,
             fluid_start: &self.fluid_start,
-            position,
+            fluid: &self.coordinates,
             moving: self.moving.as_ref(),
             fixed: self.fixed.as_ref(),
             pressure_slots: groups.pressure() as u32,
         };
-        let largest = AtomicU32::new(0);
-        let overflow = AtomicU64::new(u64::MAX);
-        self.neighbours.chunks.par_iter_mut().enumerate().for_each_init(
-            Search::default,
-            |search, (c, chunk)| {
-                chunk.neighbour.clear();
-                for k in 0..chunk.rows() {
+        let (largest, slot) = self
+            .neighbours
+            .chunks
+            .par_iter_mut()
+            .enumerate()
+            .map_init(Search::default, |search, (c, chunk)| {
+                let active = |k: usize| {
                     let i = c * CHUNK + k;
-                    let active = if i < fluid {
-                        i < live
-                    } else {
-                        near_fluid[grid.index(grid.coordinates(position[i]))]
-                    };
-                    if active {
-                        let found = search.row(i, params, &from);
-                        largest.fetch_max(found as u32, Relaxed);
-                        if found > CAPACITY {
-                            overflow.fetch_min((i as u64) << 32 | found as u64, Relaxed);
-                        }
-                        search.append(chunk, k, params);
-                    } else {
-                        chunk.dummies[k] = chunk.neighbour.len() as u32;
-                        chunk.start[k + 1] = chunk.dummies[k];
-                        chunk.close[k] = false;
-                    }
-                }
-                chunk.weight.resize(chunk.neighbour.len(), 0.0);
-            },
-        );
-        self.counters.neighbours_max = self.counters.neighbours_max.max(largest.into_inner());
-        let overflow = overflow.into_inner();
-        if overflow != u64::MAX {
-            self.counters.overflow.get_or_insert(((overflow >> 32) as u32, overflow as u32));
+                    let x = position[i];
+                    let near = if i < fluid { i < live } else { near_fluid[grid.index(grid.coordinates(x))] };
+                    near.then_some((i, x))
+                };
+                neighbour_list(chunk, active, params, &from, search)
+            })
+            .reduce(|| (0, 0), |a, b| a.max(b));
+        self.counters.neighbours_max = self.counters.neighbours_max.max(largest as u32);
+        if largest > CAPACITY {
+            self.counters.overflow.get_or_insert((slot as u32, largest as u32));
         }
     }
 
@@ -267,9 +264,9 @@ impl Cpu {
                     let i = c * CHUNK + k;
                     *a = DVec3::ZERO;
                     if i < live {
-                        let rows = (chunk.all(k), chunk.pressure(k));
+                        let row = chunk.parts(k);
                         *a = pressure_gradient::pressure_gradient(
-                            i, rows, state[i], params, position, pressure,
+                            i, row, state[i], params, position, pressure,
                         );
                     }
                 }
@@ -329,14 +326,21 @@ impl Backend for Cpu {
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
-        let Self { fields, neighbours, params, settings, work, .. } = self;
+        let Self { fields, neighbours, params, settings, work, multigrid, grid, .. } = self;
         let system = System {
             neighbours,
             state: &fields.state,
             diagonal: &fields.diagonal,
             coefficient: pressure_source::laplacian_coefficient(params),
         };
-        let report = solve(&system, &fields.source, &mut fields.pressure, &mut Jacobi, settings, work);
+        let preconditioner: &mut dyn Precondition = match multigrid {
+            Some(multigrid) => {
+                multigrid.build(&system, grid, &fields.position);
+                multigrid
+            }
+            None => &mut Jacobi,
+        };
+        let report = solve(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
         let mut clamps = 0;
         for p in &mut fields.pressure {
             clamps += u64::from(*p > step.pressure_max);
@@ -363,15 +367,18 @@ impl Backend for Cpu {
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
+        let weight = self.params.density * self.params.gravity;
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
             for (k, i) in solid.wall_slots.clone().enumerate() {
                 let area = pose.orientation * solid.wall_area[k];
-                let force = body_force::body_force(fields.pressure[i], area, fields.reaction[i - fluid]);
+                let to_surface = pose.orientation * solid.wall_to_surface[k];
+                let unknown = fields.state[i] == State::Inner;
+                let pressure = body_force::surface_pressure(fields.pressure[i], unknown, to_surface, weight);
+                let force = body_force::body_force(pressure, area, fields.reaction[i - fluid]);
                 total.force += force;
-                total.torque +=
-                    (pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k])).cross(force);
+                total.torque += (pose.orientation * solid.wall_offset[k] + to_surface).cross(force);
             }
             total
         });

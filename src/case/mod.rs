@@ -2,6 +2,13 @@
 //!
 //! The structs here are the schema (`seixo schema` prints it). `file` reads and overrides, `check` judges what serde cannot.
 
+pub mod check;
+mod check_geometry;
+mod check_solids;
+pub mod file;
+mod overrides;
+mod report;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -343,11 +350,11 @@ pub struct Body {
     pub size: Vector,
     /// Centre of mass at t = 0 [m].
     pub center: Vector,
-    /// Mass [kg]. Give this or `density`.
+    /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share l0 / size y of it.
     pub mass: Option<f64>,
     /// Density [kg/m3].
     pub density: Option<f64>,
-    /// Principal moments of inertia [kg m2]; those of a uniform box if absent.
+    /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform box if absent.
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.
     pub orientation: Option<Turn>,

@@ -1,11 +1,19 @@
-//! Force and torque of the fluid on a moving solid: pressure times area over its wall layer, plus the
-//! reaction of viscosity and collisions.
+//! Force of the fluid on a moving solid: pressure times area over its wall layer, plus the reaction of
+//! viscosity and collisions.
 //! GPU twin: shaders/body_force.wgsl
 
 use glam::DVec3;
 
+/// Pressure on the true surface of the solid [Pa]: a wall-layer particle's centre lies half a spacing inside it
+/// (`to_surface`, world axes [m]), and the hydrostatic part of the difference is known. Without it a floating
+/// body would sink half a spacing too deep. Particles that are no unknown feel no pressure.
+#[inline(always)]
+pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, weight: DVec3) -> f64 {
+    if unknown { (pressure + weight.dot(to_surface)).max(0.0) } else { 0.0 }
+}
+
 /// Force of one wall-layer particle [N]: -P A + reaction, with `area` in world axes [m2].
 #[inline(always)]
-pub fn body_force(pressure: f64, area: DVec3, reaction: DVec3) -> DVec3 {
-    reaction - pressure * area
+pub fn body_force(surface_pressure: f64, area: DVec3, reaction: DVec3) -> DVec3 {
+    reaction - surface_pressure * area
 }

@@ -1,6 +1,7 @@
 //! Cell list: count, scan, stable scatter. Fluid particles are reordered by cell each step; moving solids
 //! are indexed by cell each step; what never moves is indexed once.
 
+use super::neighbour_list::Coordinates;
 use crate::cells::Grid;
 use crate::fields::Fields;
 use crate::scene::Kind;
@@ -14,8 +15,8 @@ pub struct CellList {
     pub start: Vec<u32>,
     /// Slots in cell order.
     pub slot: Vec<u32>,
-    /// Positions in cell order [m].
-    pub position: Vec<DVec3>,
+    /// Coordinates in cell order [m].
+    pub coordinates: Coordinates,
 }
 
 /// Stable counting sort: `start[c]` gets the first place of cell c, `place[k]` the place of particle k.
@@ -58,11 +59,12 @@ impl CellList {
         scratch.cell.extend(scratch.slots.iter().map(cell));
         counting_sort(&scratch.cell, grid.total(), &mut self.start, &mut scratch.place);
         self.slot.resize(scratch.slots.len(), 0);
-        self.position.resize(scratch.slots.len(), DVec3::ZERO);
         for (&s, &p) in scratch.slots.iter().zip(&scratch.place) {
             self.slot[p as usize] = s;
-            self.position[p as usize] = position[s as usize];
         }
+        scratch.vector.clear();
+        scratch.vector.extend(self.slot.iter().map(|&s| position[s as usize]));
+        self.coordinates.set(&scratch.vector);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The pressure Poisson equation, Eq. (8): a symmetric positive definite system over the neighbour lists.
 
 pub mod cg;
+pub mod multigrid;
 
 /// Why the conjugate gradients stopped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Serialize)]

@@ -11,6 +11,16 @@
 //! | static dummy | [`Kind::Dummy`] | no | no |
 //! | moving dummy | [`Kind::Dummy`], [`Kind::BodyDummy`] of a moving solid | with its solid | no |
 
+mod bodies;
+mod build;
+mod domain;
+mod lattice;
+mod layout;
+mod oriented;
+mod placement;
+mod walls;
+mod water;
+
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::Range;
 
@@ -138,6 +148,14 @@ impl Motion {
             None => self.displacement[n - 1],
         }
     }
+
+    /// Velocity [m/s] just after time `t` [s].
+    pub fn velocity(&self, t: f64) -> DVec3 {
+        match self.time.iter().position(|&ti| t < ti) {
+            None | Some(0) => DVec3::ZERO,
+            Some(k) => (self.displacement[k] - self.displacement[k - 1]) / (self.time[k] - self.time[k - 1]),
+        }
+    }
 }
 
 /// How a moving solid moves.
@@ -165,9 +183,9 @@ pub struct Solid {
     pub orientation: DQuat,
     /// How it moves.
     pub drive: Drive,
-    /// Slots of the wall layer, within the moving-wall group.
+    /// Slots of the wall layer, counted from the first particle; they lie within the moving-wall group.
     pub wall_slots: Range<usize>,
-    /// Slots of the inside, within the moving-dummy group.
+    /// Slots of the inside, counted from the first particle; they lie within the moving-dummy group.
     pub dummy_slots: Range<usize>,
     /// Offsets of the wall-layer particles from the centre of mass, solid's frame [m].
     pub wall_offset: Vec<DVec3>,
@@ -200,7 +218,7 @@ pub struct Scene {
     pub solid: Vec<u32>,
     /// Sizes of the groups.
     pub groups: Groups,
-    /// Moving solids: bodies and moving walls.
+    /// Moving solids: the bodies in the case's order, then the moving walls.
     pub solids: Vec<Solid>,
     /// Geometry of the fixed walls.
     pub walls: Vec<WallShape>,

@@ -1,0 +1,324 @@
+//! What serde cannot judge: ranges, keys that exclude or need each other, lengths against the spacing.
+//!
+//! Everything is listed at once; `file` adds line and column from the dotted path of each problem.
+
+use super::{Case, Face, Gauges, Vector};
+use crate::error::{Error, Result};
+
+/// Something wrong, or worth a warning, about a key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// Dotted path of the key, e.g. `body.0.density`.
+    pub path: String,
+    /// What is wrong.
+    pub message: String,
+    /// What to do about it.
+    pub remedy: String,
+    /// A warning: the case runs.
+    pub warning: bool,
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}: {}", self.path, self.message, self.remedy)
+    }
+}
+
+/// All problems and warnings of a case.
+pub fn check(case: &Case) -> Vec<Problem> {
+    let mut c = Checker { case, problems: Vec::new() };
+    c.finite();
+    c.run();
+    c.fluid();
+    c.walls();
+    c.names();
+    for (k, body) in case.body.iter().enumerate() {
+        c.body(k, body);
+    }
+    c.contact();
+    c.gauges(&case.gauge);
+    c.output();
+    c.problems
+}
+
+/// Refuses a case with problems; for callers that have no file to point at.
+///
+/// # Errors
+/// [`Error::Case`] with all problems.
+pub fn refuse(case: &Case) -> Result<()> {
+    let lines: Vec<String> = check(case).iter().filter(|p| !p.warning).map(ToString::to_string).collect();
+    if lines.is_empty() { Ok(()) } else { Err(Error::Case(lines.join("\n"))) }
+}
+
+/// Collects problems.
+pub(super) struct Checker<'a> {
+    pub(super) case: &'a Case,
+    pub(super) problems: Vec<Problem>,
+}
+
+impl Checker<'_> {
+    pub(super) fn add(
+        &mut self,
+        path: impl Into<String>,
+        message: impl Into<String>,
+        remedy: impl Into<String>,
+    ) {
+        self.problems.push(Problem {
+            path: path.into(),
+            message: message.into(),
+            remedy: remedy.into(),
+            warning: false,
+        });
+    }
+    fn warn(&mut self, path: &str, message: String, remedy: &str) {
+        self.add(path, message, remedy);
+        if let Some(last) = self.problems.last_mut() {
+            last.warning = true;
+        }
+    }
+    /// Finite numbers outside of a range; what is not finite has been reported already.
+    pub(super) fn range(&mut self, path: &str, value: f64, fits: bool, allowed: &str) {
+        if value.is_finite() && !fits {
+            self.add(path, format!("{value} is out of range"), format!("allowed: {allowed}"));
+        }
+    }
+    pub(super) fn positive(&mut self, path: &str, value: f64, unit: &str) {
+        self.range(path, value, value > 0.0, &format!("more than 0 {unit}"));
+    }
+    pub(super) fn not_negative(&mut self, path: &str, value: f64, unit: &str) {
+        self.range(path, value, value >= 0.0, &format!("0 {unit} or more"));
+    }
+    /// At most one of some optional keys; returns how many are given.
+    pub(super) fn one_of(&mut self, table: &str, given: &[(&str, bool)]) -> usize {
+        let names: Vec<String> = given.iter().filter(|g| g.1).map(|g| format!("`{}`", g.0)).collect();
+        if names.len() > 1 {
+            let last = given.iter().rfind(|g| g.1).map_or("", |g| g.0);
+            self.add(
+                format!("{table}.{last}"),
+                format!("{} exclude each other", names.join(" and ")),
+                "keep one of them",
+            );
+        }
+        names.len()
+    }
+    pub(super) fn flat(&self) -> bool {
+        self.case.run.dimensions == 2
+    }
+    /// The spacing, where it can be used to judge lengths.
+    pub(super) fn spacing(&self) -> Option<f64> {
+        let l0 = self.case.run.spacing;
+        (l0.is_finite() && l0 > 0.0).then_some(l0)
+    }
+
+    /// Every float of the case, wherever it stands.
+    fn finite(&mut self) {
+        if let Ok(value) = toml::Value::try_from(self.case) {
+            let mut found = Vec::new();
+            not_finite(&value, String::new(), &mut found);
+            for (path, x) in found {
+                self.add(path, format!("{x} is not a finite number"), "write a finite number");
+            }
+        }
+    }
+
+    fn run(&mut self) {
+        let run = &self.case.run;
+        self.positive("run.spacing", run.spacing, "m");
+        self.positive("run.time_step", run.time_step, "s");
+        self.positive("run.end", run.end, "s");
+        let re = run.effective_radius;
+        self.range("run.effective_radius", re, (1.5..=4.1).contains(&re), "1.5 to 4.1 (2.1 in the paper)");
+        if !matches!(run.dimensions, 2 | 3) {
+            self.add(
+                "run.dimensions",
+                format!("{} is not a number of dimensions", run.dimensions),
+                "allowed: 2, 3",
+            );
+        }
+        if let Some([min, max]) = &run.domain {
+            self.box_edges("run.domain", "run.domain", min, max);
+        }
+        if run.spacing > 0.0 && run.time_step > 0.0 && run.end.is_finite() && run.end / run.time_step > 1e9 {
+            let message = format!("{:.1e} steps of {} s", run.end / run.time_step, run.time_step);
+            self.add("run.time_step", message, "shorten run.end or use a larger run.time_step");
+        }
+    }
+
+    fn fluid(&mut self) {
+        let Some(fluid) = &self.case.fluid else { return };
+        self.positive("fluid.density", fluid.density, "kg/m3");
+        self.not_negative("fluid.viscosity", fluid.viscosity, "m2/s");
+        let beta = fluid.free_surface_threshold;
+        self.range(
+            "fluid.free_surface_threshold",
+            beta,
+            beta > 0.0 && beta < 1.0,
+            "between 0 and 1 (0.97 in most work)",
+        );
+        let a = fluid.collision_distance;
+        self.range("fluid.collision_distance", a, (0.0..=1.0).contains(&a), "0 to 1 (0.8 in the paper)");
+        let b = fluid.collision_restitution;
+        self.range("fluid.collision_restitution", b, (0.0..=1.0).contains(&b), "0 to 1 (0.2 in the paper)");
+        if let Some(alpha) = fluid.compressibility {
+            self.range(
+                "fluid.compressibility",
+                alpha,
+                alpha >= 1e-10,
+                "1e-10 1/Pa or more: 0 makes closed cavities singular",
+            );
+        }
+        self.one_of(
+            "fluid",
+            &[("relaxation", fluid.relaxation.is_some()), ("sound_speed", fluid.sound_speed.is_some())],
+        );
+        if let Some(gamma) = fluid.relaxation {
+            self.relaxation("fluid.relaxation", gamma);
+        }
+        if let Some(speed) = fluid.sound_speed {
+            self.positive("fluid.sound_speed", speed, "m/s");
+            // With an adaptive step c_s dt stays below 0.7 l0 and gamma below 0.5.
+            if let Some(l0) = self.spacing().filter(|_| !self.case.run.adaptive && speed > 0.0) {
+                self.relaxation("fluid.sound_speed", (speed * self.case.run.time_step / l0).powi(2));
+            }
+        }
+        if fluid.block.is_empty() {
+            self.add(
+                "fluid",
+                "no water at t = 0",
+                "add a [[fluid.block]], or leave [fluid] out for a dry scene",
+            );
+        }
+        for (k, block) in fluid.block.iter().enumerate() {
+            let path = format!("fluid.block.{k}");
+            if self.box_edges(&path, &format!("{path}.max"), &block.min, &block.max) {
+                self.fits(&path, "the block", &block.min, &block.max);
+            }
+        }
+        let tolerance = fluid.solver.tolerance;
+        self.range(
+            "fluid.solver.tolerance",
+            tolerance,
+            tolerance > 0.0 && tolerance < 1.0,
+            "between 0 and 1 (1e-3 is enough)",
+        );
+        if fluid.solver.max_iterations == 0 {
+            self.add("fluid.solver.max_iterations", "0 iterations solve nothing", "allowed: 1 or more");
+        }
+    }
+
+    /// gamma of Eq. (8): the density error oscillates at sqrt(gamma) / dt and grows from 4 on.
+    fn relaxation(&mut self, path: &str, gamma: f64) {
+        if gamma >= 4.0 {
+            self.add(
+                path,
+                format!("relaxation gamma = {gamma:.3} is unstable"),
+                "allowed: more than 0, less than 4; 0.5 or less is wise",
+            );
+        } else if gamma > 0.5 {
+            self.warn(
+                path,
+                format!("relaxation gamma = {gamma:.3} makes the pressure noisy"),
+                "use 0.5 or less: a smaller run.time_step or sound_speed, or run.adaptive = true",
+            );
+        } else {
+            self.range(path, gamma, gamma > 0.0, "more than 0, at most 0.5");
+        }
+    }
+
+    fn gauges(&mut self, gauges: &Gauges) {
+        if let Some(every) = gauges.every {
+            self.positive("gauge.every", every, "s");
+        }
+        let wet = self.case.fluid.is_some();
+        let kinds = [
+            ("pressure", gauges.pressure.len()),
+            ("level", gauges.level.len()),
+            ("force", gauges.force.len()),
+        ];
+        for (kind, count) in kinds {
+            if count > 0 && !wet {
+                self.add(
+                    format!("gauge.{kind}"),
+                    "there is no [fluid] to measure",
+                    "remove the gauge or add [fluid]",
+                );
+            }
+        }
+        let names: Vec<(String, String)> = (gauges.pressure.iter().enumerate())
+            .map(|(k, g)| (format!("gauge.pressure.{k}.name"), g.name.clone()))
+            .chain(
+                gauges
+                    .level
+                    .iter()
+                    .enumerate()
+                    .map(|(k, g)| (format!("gauge.level.{k}.name"), g.name.clone())),
+            )
+            .chain(
+                gauges
+                    .force
+                    .iter()
+                    .enumerate()
+                    .map(|(k, g)| (format!("gauge.force.{k}.name"), g.name.clone())),
+            )
+            .collect();
+        self.unique(&names, "gauge");
+        let solids: Vec<&str> = (self.case.body.iter().map(|b| b.name.as_str()))
+            .chain(self.case.moving_wall.iter().map(|w| w.name.as_str()))
+            .collect();
+        for (k, gauge) in gauges.force.iter().enumerate() {
+            if !solids.contains(&gauge.on.as_str()) {
+                let message = format!("no body or moving wall is called `{}`", gauge.on);
+                let remedy = match super::report::closest(&gauge.on, &solids) {
+                    Some(name) => format!("did you mean `{name}`?"),
+                    None if solids.is_empty() => "remove the gauge".to_owned(),
+                    None => format!("allowed: {}", solids.join(", ")),
+                };
+                self.add(format!("gauge.force.{k}.on"), message, remedy);
+            }
+        }
+    }
+
+    fn output(&mut self) {
+        let output = &self.case.output;
+        self.not_negative("output.every", output.every, "s (0 writes no frames)");
+        if let Some(every) = output.table_every {
+            self.positive("output.table_every", every, "s");
+        }
+    }
+}
+
+/// Paths of floats that are infinite or not a number.
+fn not_finite(value: &toml::Value, path: String, found: &mut Vec<(String, f64)>) {
+    let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match value {
+        toml::Value::Float(x) if !x.is_finite() => found.push((path, *x)),
+        toml::Value::Array(items) => {
+            for (k, item) in items.iter().enumerate() {
+                not_finite(item, join(&k.to_string()), found);
+            }
+        }
+        toml::Value::Table(table) => {
+            for (key, item) in table {
+                not_finite(item, join(key), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Length of a vector.
+pub(super) fn length(v: &Vector) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Name of a face as it is written.
+pub(super) fn face(face: Face) -> &'static str {
+    match face {
+        Face::XMin => "x_min",
+        Face::XMax => "x_max",
+        Face::YMin => "y_min",
+        Face::YMax => "y_max",
+        Face::ZMin => "z_min",
+        Face::ZMax => "z_max",
+    }
+}

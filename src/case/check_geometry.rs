@@ -1,0 +1,195 @@
+//! The part of the check that judges shapes: edges, lengths against the spacing, motion, names.
+
+use super::check::{Checker, face, length};
+use super::{Face, Vector};
+
+/// More cells than this do not fit into memory, nor their indices into 32 bits.
+const MOST_CELLS: f64 = 1e9;
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+impl Checker<'_> {
+    /// Axes that exist: no y in two dimensions.
+    fn axes(&self) -> impl Iterator<Item = usize> + use<> {
+        let flat = self.flat();
+        (0..3).filter(move |&k| !(flat && k == 1))
+    }
+
+    /// `min` below `max` along every axis; returns whether that holds. `at` is the key to point at.
+    pub(super) fn box_edges(&mut self, path: &str, at: &str, min: &Vector, max: &Vector) -> bool {
+        let bad: Vec<usize> =
+            self.axes().filter(|&k| min[k].is_finite() && max[k].is_finite() && min[k] >= max[k]).collect();
+        for &k in &bad {
+            let message =
+                format!("{path} is empty along {}: min {} is not below max {}", AXES[k], min[k], max[k]);
+            self.add(at, message, "min must be smaller than max along every axis");
+        }
+        bad.is_empty() && min.iter().chain(max).all(|x| x.is_finite())
+    }
+
+    /// At least one particle across along every axis, and no more cells than fit into memory.
+    pub(super) fn fits(&mut self, path: &str, what: &str, min: &Vector, max: &Vector) {
+        let Some(l0) = self.spacing() else { return };
+        let Some(k) = self.axes().min_by(|&a, &b| (max[a] - min[a]).total_cmp(&(max[b] - min[b]))) else {
+            return;
+        };
+        let cells: f64 = self.axes().map(|k| (max[k] - min[k]) / l0).product();
+        let far = self.axes().map(|k| min[k].abs().max(max[k].abs()) / l0).fold(0.0, f64::max);
+        if cells > MOST_CELLS || far > MOST_CELLS {
+            let message = format!("{what} takes up or lies beyond {:.1e} cells of {l0} m", cells.max(far));
+            self.add(path, message, "use a larger run.spacing, or correct a length that is far too large");
+            return;
+        }
+        let across = max[k] - min[k];
+        if across < l0 * (1.0 - 1e-6) {
+            let message =
+                format!("{what} is {across:.4} m across along {}, less than one particle of {l0} m", AXES[k]);
+            self.add(path, message, format!("use run.spacing = {} or less", round_down(across)));
+        }
+    }
+
+    fn open(&mut self, path: &str, open: &[Face]) {
+        for (i, &f) in open.iter().enumerate() {
+            if open[..i].contains(&f) {
+                self.add(
+                    format!("{path}.open.{i}"),
+                    format!("`{}` is listed twice", face(f)),
+                    "remove one of them",
+                );
+            }
+        }
+        if open.len() >= 6 {
+            self.add(
+                format!("{path}.open"),
+                "every face is open, so that nothing is left",
+                "close at least one face",
+            );
+        }
+    }
+
+    pub(super) fn walls(&mut self) {
+        let case = self.case;
+        if let Some(tank) = &case.tank {
+            if self.box_edges("tank", "tank.max", &tank.min, &tank.max) {
+                self.fits("tank", "the tank", &tank.min, &tank.max);
+            }
+            self.open("tank", &tank.open);
+        }
+        for (k, o) in case.obstacle.iter().enumerate() {
+            let path = format!("obstacle.{k}");
+            if self.box_edges(&path, &format!("{path}.max"), &o.min, &o.max) {
+                self.fits(&path, &format!("obstacle `{}`", o.name), &o.min, &o.max);
+            }
+            self.open(&path, &o.open);
+        }
+        for (k, w) in case.moving_wall.iter().enumerate() {
+            let path = format!("moving_wall.{k}");
+            if self.box_edges(&path, &format!("{path}.max"), &w.min, &w.max) {
+                self.fits(&path, &format!("moving wall `{}`", w.name), &w.min, &w.max);
+            }
+            self.open(&path, &w.open);
+            self.motion(&format!("{path}.motion"), &w.motion);
+        }
+        for (k, plane) in case.plane.iter().enumerate() {
+            self.plane(&format!("plane.{k}"), plane);
+        }
+    }
+
+    fn plane(&mut self, path: &str, plane: &super::Plane) {
+        let (n, a) = (plane.normal, plane.along);
+        let cross = [n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0]];
+        if length(&n) == 0.0 {
+            self.add(
+                format!("{path}.normal"),
+                "the normal has no length",
+                "give a direction, e.g. [0, 0, 1]",
+            );
+        } else if length(&cross) <= 1e-6 * length(&n) * length(&a) {
+            self.add(
+                format!("{path}.along"),
+                "`along` has no length or is parallel to the normal",
+                "give a direction in the plane",
+            );
+        } else if self.flat() && (n[1] != 0.0 || a[1] != 0.0) {
+            self.add(
+                format!("{path}.normal"),
+                "in two dimensions a plane stands upright on x, z",
+                "set the y components of `normal` and `along` to 0",
+            );
+        }
+        if let Some(l0) = self.spacing()
+            && plane.size[0] * plane.size[1] > MOST_CELLS * l0 * l0
+        {
+            self.add(
+                format!("{path}.size"),
+                "more particles than fit into memory",
+                "use a larger run.spacing",
+            );
+        }
+        let sizes = if self.flat() { 1 } else { 2 };
+        for (i, &size) in plane.size.iter().enumerate().take(sizes) {
+            let path = format!("{path}.size.{i}");
+            self.positive(&path, size, "m");
+            if let Some(l0) = self.spacing().filter(|&l0| size > 0.0 && size < l0 * (1.0 - 1e-6)) {
+                let message =
+                    format!("plane `{}` is {size:.4} m across, less than one particle of {l0} m", plane.name);
+                self.add(path, message, format!("use run.spacing = {} or less", round_down(size)));
+            }
+        }
+    }
+
+    /// A table of motion: at least one row, times increasing.
+    pub(super) fn motion(&mut self, path: &str, rows: &[[f64; 4]]) {
+        if rows.is_empty() {
+            self.add(
+                path,
+                "the table of motion has no rows",
+                "write rows of time, x, y, z, e.g. [[0, 0, 0, 0], [3, 0, 0, 0.33]]",
+            );
+        }
+        for (k, pair) in rows.windows(2).enumerate() {
+            if pair[1][0] <= pair[0][0] {
+                let message = format!("time {} does not come after {}", pair[1][0], pair[0][0]);
+                self.add(format!("{path}.{}.0", k + 1), message, "times must increase from row to row");
+            }
+        }
+    }
+
+    /// Names of everything that messages and gauges refer to.
+    pub(super) fn names(&mut self) {
+        let case = self.case;
+        let names: Vec<(String, String)> = (case.obstacle.iter().enumerate())
+            .map(|(k, o)| (format!("obstacle.{k}.name"), o.name.clone()))
+            .chain(case.plane.iter().enumerate().map(|(k, p)| (format!("plane.{k}.name"), p.name.clone())))
+            .chain(
+                case.moving_wall
+                    .iter()
+                    .enumerate()
+                    .map(|(k, w)| (format!("moving_wall.{k}.name"), w.name.clone())),
+            )
+            .chain(case.body.iter().enumerate().map(|(k, b)| (format!("body.{k}.name"), b.name.clone())))
+            .collect();
+        self.unique(&names, "solid");
+    }
+
+    /// Names given as (path, name) must be there and differ.
+    pub(super) fn unique(&mut self, names: &[(String, String)], what: &str) {
+        for (k, (path, name)) in names.iter().enumerate() {
+            if name.trim().is_empty() {
+                self.add(path.clone(), "the name is empty", "give it a name");
+            } else if let Some((first, _)) = names[..k].iter().find(|(_, n)| n == name) {
+                self.add(
+                    path.clone(),
+                    format!("the name `{name}` is taken by {}", first.trim_end_matches(".name")),
+                    format!("give each {what} its own name"),
+                );
+            }
+        }
+    }
+}
+
+/// A length rounded down to three digits, for a remedy that works when it is copied.
+fn round_down(x: f64) -> f64 {
+    let digit = 10f64.powi(x.log10().floor() as i32 - 2);
+    let rounded = (x / digit + 1e-9).floor() * digit;
+    format!("{rounded:.3e}").parse().unwrap_or(rounded)
+}

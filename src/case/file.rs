@@ -1,0 +1,111 @@
+//! Reading a case file: text, overrides, parsing, checking; errors that point at file, line and key.
+
+use super::check::{Problem, check};
+use super::report::{Message, closest, explain, render, span_of};
+use super::{Case, overrides};
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+use toml::de::DeTable;
+
+/// A case that was read, and the text that it came from.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The case.
+    pub case: Case,
+    /// The TOML text with overrides applied: what a run should keep beside its results.
+    pub text: String,
+    /// The file.
+    pub path: PathBuf,
+    /// Warnings, ready to print; the case runs all the same.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a case: `spacing` overrides `run.spacing` [m], `sets` are `key=value` pairs such as
+/// `body.0.density=780`.
+///
+/// # Errors
+/// [`Error::Case`] with everything that is wrong with the file or the overrides, [`Error::Io`] when the file
+/// exists but cannot be read.
+pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded> {
+    let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
+        std::io::ErrorKind::NotFound => Error::Case(missing(path)),
+        std::io::ErrorKind::InvalidData => {
+            Error::Case(format!("{}: not a text file in UTF-8", path.display()))
+        }
+        _ => Error::io(path)(source),
+    })?;
+    let mut all = Vec::new();
+    if let Some(l0) = spacing {
+        all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
+    }
+    all.extend_from_slice(sets);
+    parse(&path.display().to_string(), text, &all).map(|(case, text, warnings)| Loaded {
+        case,
+        text,
+        path: path.to_owned(),
+        warnings,
+    })
+}
+
+/// Parses and checks the text of a case; `name` stands for the file in messages. Returns the case, the text
+/// with overrides applied and warnings.
+///
+/// # Errors
+/// [`Error::Case`] with everything that is wrong.
+pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String, Vec<String>)> {
+    let text = text.replace("\r\n", "\n");
+    // Broken TOML is reported on the text as it stands in the file.
+    if let Err(error) = DeTable::parse(&text) {
+        return Err(Error::Case(render(name, &text, &[explain(&error, None)])));
+    }
+    let text = if sets.is_empty() { text } else { overrides::apply(&text, sets)? };
+    let wrong = |messages: &[Message]| {
+        let mut report = render(name, &text, messages);
+        if !sets.is_empty() {
+            report.push_str("\n\nnote: lines are counted with --spacing and --set applied");
+        }
+        report
+    };
+    let table = DeTable::parse(&text).map_err(|e| Error::Case(wrong(&[explain(&e, None)])))?;
+    let case: Case =
+        toml::from_str(&text).map_err(|e| Error::Case(wrong(&[explain(&e, Some(table.get_ref()))])))?;
+    let located = |p: &Problem| Message {
+        span: span_of(&table, &p.path),
+        title: format!("{}: {}", p.path, p.message),
+        label: p.message.clone(),
+        remedy: Some(p.remedy.clone()),
+        warning: p.warning,
+    };
+    let (warnings, errors): (Vec<_>, Vec<_>) = check(&case).into_iter().partition(|p| p.warning);
+    if !errors.is_empty() {
+        return Err(Error::Case(wrong(&errors.iter().map(located).collect::<Vec<_>>())));
+    }
+    let warnings = warnings.iter().map(|p| wrong(&[located(p)])).collect();
+    drop(table);
+    Ok((case, text, warnings))
+}
+
+/// No such file: says so, and which file of the folder has a name like it.
+fn missing(path: &Path) -> String {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let files: Vec<String> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|file| file.ends_with(".toml"))
+        .collect();
+    let names: Vec<&str> = files.iter().map(String::as_str).collect();
+    let wanted = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let hint = closest(&wanted, &names).map(|n| format!("; did you mean `{}`?", folder.join(n).display()));
+    format!("no case file at `{}`{}", path.display(), hint.unwrap_or_default())
+}
+
+impl Case {
+    /// The JSON schema of a case file, for editors (`#:schema` in the first line) and for `seixo schema`.
+    pub fn schema() -> String {
+        let schema = schemars::schema_for!(Case);
+        let mut text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+}

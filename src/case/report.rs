@@ -1,0 +1,134 @@
+//! Messages about a case file: file, line and column, the line itself, what is allowed, a remedy.
+
+use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A message about a stretch of the text.
+pub(super) struct Message {
+    pub span: Range<usize>,
+    pub title: String,
+    pub label: String,
+    pub remedy: Option<String>,
+    pub warning: bool,
+}
+
+/// All messages as one text.
+pub(super) fn render(path: &str, text: &str, messages: &[Message]) -> String {
+    let groups: Vec<_> = messages
+        .iter()
+        .map(|m| {
+            let level = if m.warning { Level::WARNING } else { Level::ERROR };
+            // The renderer wants character boundaries inside of the text.
+            let end = m.span.end.min(text.len()).max(m.span.start.min(text.len()));
+            let span = m.span.start.min(end)..end;
+            let mark = AnnotationKind::Primary.span(span).label(m.label.as_str());
+            let group = level
+                .primary_title(m.title.as_str())
+                .element(Snippet::source(text).path(path).annotation(mark));
+            match &m.remedy {
+                Some(remedy) => group.element(Level::HELP.message(remedy.as_str())),
+                None => group,
+            }
+        })
+        .collect();
+    // Rendered one by one: several reports, not one report with several parts.
+    let texts = groups.into_iter().map(|group| Renderer::plain().render(&[group]));
+    texts.collect::<Vec<_>>().join("\n\n")
+}
+
+/// Turns what the TOML reader says into a message: adds the key's path and a remedy.
+pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> Message {
+    let span = error.span().unwrap_or(0..0);
+    let key = table.and_then(|t| path_at(t, &span));
+    let said = error.message().trim().to_owned();
+    let title = match &key {
+        Some(key) => format!("{key}: {said}"),
+        None => said.clone(),
+    };
+    let quoted: Vec<&str> = said.split('`').skip(1).step_by(2).collect();
+    let remedy = match quoted.as_slice() {
+        [wrong, allowed @ ..] if said.starts_with("unknown") => Some(match closest(wrong, allowed) {
+            Some(name) => format!("did you mean `{name}`? allowed: {}", allowed.join(", ")),
+            None => format!("allowed: {}", allowed.join(", ")),
+        }),
+        [name, ..] if said.starts_with("missing field") => Some(format!("add `{name} = ...` here")),
+        _ => None,
+    };
+    Message { span, title, label: short(&said), remedy, warning: false }
+}
+
+/// The message up to the list of what is allowed, which stands in the remedy.
+fn short(said: &str) -> String {
+    said.lines().next().unwrap_or("").split(", expected one of").next().unwrap_or("").to_owned()
+}
+
+/// The name most like a mistyped one: few slips of the finger, or the same beginning.
+pub(super) fn closest<'a>(wrong: &str, names: &[&'a str]) -> Option<&'a str> {
+    let wrong = wrong.to_lowercase();
+    let slips = |name: &str| strsim::damerau_levenshtein(&wrong, &name.to_lowercase());
+    let alike = |name: &&&str| {
+        slips(name) <= (wrong.chars().count() / 3).max(1)
+            || strsim::jaro_winkler(&wrong, &name.to_lowercase()) > 0.85
+    };
+    names.iter().filter(alike).min_by_key(|name| slips(name)).copied()
+}
+
+/// Where a dotted path stands in the text: the key, or the element of an array; the deepest part that is
+/// written there when the rest is not.
+pub(super) fn span_of(table: &Spanned<DeTable<'_>>, path: &str) -> Range<usize> {
+    let mut found = None;
+    let mut value: Option<&Spanned<DeValue<'_>>> = None;
+    for part in path.split('.') {
+        let table = match value {
+            None => Some(table.get_ref()),
+            Some(v) => v.get_ref().as_table(),
+        };
+        let next = if let Some(table) = table {
+            table.iter().find(|(k, _)| k.get_ref() == part).map(|(k, v)| (k.span(), v))
+        } else {
+            let item = value.and_then(|v| v.get_ref().as_array()).zip(part.parse::<usize>().ok());
+            item.and_then(|(array, k)| array.get(k)).map(|v| (v.span(), v))
+        };
+        let Some((span, v)) = next else { break };
+        (found, value) = (Some(span), Some(v));
+    }
+    found.unwrap_or(0..0)
+}
+
+/// Dotted path of the key or value that a span lies in.
+fn path_at(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
+    let mut best: Option<(usize, String)> = None;
+    visit_table(table, "", span, &mut best);
+    best.map(|(_, path)| path)
+}
+
+fn offer(at: Range<usize>, path: &str, span: &Range<usize>, best: &mut Option<(usize, String)>) {
+    let fits = at.start <= span.start && span.end <= at.end && !at.is_empty();
+    if fits && best.as_ref().is_none_or(|(size, _)| at.len() <= *size) {
+        *best = Some((at.len(), path.to_owned()));
+    }
+}
+
+fn visit_table(table: &DeTable<'_>, prefix: &str, span: &Range<usize>, best: &mut Option<(usize, String)>) {
+    for (key, value) in table {
+        let path =
+            if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
+        offer(key.span(), &path, span, best);
+        visit(value, &path, span, best);
+    }
+}
+
+fn visit(value: &Spanned<DeValue<'_>>, path: &str, span: &Range<usize>, best: &mut Option<(usize, String)>) {
+    offer(value.span(), path, span, best);
+    match value.get_ref() {
+        DeValue::Table(table) => visit_table(table, path, span, best),
+        DeValue::Array(array) => {
+            for (k, item) in array.iter().enumerate() {
+                visit(item, &format!("{path}.{k}"), span, best);
+            }
+        }
+        _ => {}
+    }
+}

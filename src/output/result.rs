@@ -1,0 +1,149 @@
+//! `result.json`: what a run did, for people and for scripts that collect many runs.
+
+use super::write_whole;
+use crate::error::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The end time, or the number of steps asked for, was reached.
+    #[default]
+    Done,
+    /// A guard found that the computation means nothing any more.
+    Diverged,
+    /// A signal asked the run to stop.
+    Interrupted,
+    /// A file could not be written, or the device was lost.
+    Failed,
+}
+
+/// Numbers of particles.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Particles {
+    /// All.
+    pub total: usize,
+    /// Water.
+    pub fluid: usize,
+    /// Wall layers of fixed and moving walls.
+    pub wall: usize,
+    /// Layers behind them.
+    pub dummy: usize,
+    /// Bodies, wall layer and inside.
+    pub body: usize,
+}
+
+/// The pressure Poisson equation over all steps.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Pressure {
+    /// Mean number of unknowns.
+    pub unknowns_mean: f64,
+    /// Mean number of iterations a solve.
+    pub iterations_mean: f64,
+    /// Most iterations of a solve.
+    pub iterations_max: u32,
+    /// Largest ||r|| / ||b|| at the end of a solve [-].
+    pub relative_residual_max: f64,
+    /// Solves that ended without meeting the tolerance.
+    pub failures: u64,
+}
+
+/// Extremes over the run.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Monitors {
+    /// Largest |n / n0 - 1| of an inner fluid particle [-].
+    pub density_error_max: f64,
+    /// Mean over the run of the mean of n / n0 - 1 [-].
+    pub density_error_mean: f64,
+    /// Largest v dt / l0 of the fluid [-].
+    pub courant_max: f64,
+    /// Energy of fluid and free bodies at t = 0: of motion, of height, in contact springs [J].
+    #[serde(rename = "energy_start_J")]
+    pub energy_start: f64,
+    /// The same at the end [J].
+    #[serde(rename = "energy_end_J")]
+    pub energy_end: f64,
+    /// Fluid particles that were taken out.
+    pub lost_particles: u64,
+    /// Most neighbours of a particle.
+    pub neighbours_max: u32,
+    /// Deepest penetration of two solids over l0 [-].
+    pub penetration_max_over_l0: f64,
+    /// Largest dt sqrt(K / m_e) of a whole step, before sub-stepping [-].
+    pub contact_omega_dt: f64,
+    /// Most contact sub-steps of a step.
+    pub contact_substeps_max: u32,
+}
+
+/// A body or moving wall at the end.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Body {
+    /// Name.
+    pub name: String,
+    /// Centre of mass [m].
+    pub position_m: [f64; 3],
+    /// Orientation, unit quaternion w, x, y, z.
+    pub orientation_wxyz: [f64; 4],
+    /// Velocity [m/s].
+    pub velocity_m_s: [f64; 3],
+    /// Angular velocity, world axes [rad/s].
+    pub angular_velocity_rad_s: [f64; 3],
+    /// Force of the fluid in the last step [N].
+    pub fluid_force_n: [f64; 3],
+}
+
+/// The summary of a run.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Summary {
+    /// Name of the case.
+    pub case: String,
+    /// Version of this program.
+    pub version: &'static str,
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// The processor.
+    pub adapter: String,
+    /// `f64` or `f32`.
+    pub precision: String,
+    /// How the run ended.
+    pub status: Status,
+    /// Why, in words.
+    pub exit_reason: String,
+    /// Steps done.
+    pub steps: u64,
+    /// Time reached [s].
+    pub time_s: f64,
+    /// Wall-clock time [s].
+    pub wall_s: f64,
+    /// Frames written.
+    pub frames: u64,
+    /// Numbers of particles.
+    pub particles: Particles,
+    /// Wall-clock seconds of each stage, and of `output`.
+    pub stages: BTreeMap<&'static str, f64>,
+    /// The pressure Poisson equation.
+    pub pressure: Pressure,
+    /// Extremes.
+    pub monitors: Monitors,
+    /// Bodies and moving walls.
+    pub bodies: Vec<Body>,
+}
+
+impl Summary {
+    /// The summary as JSON.
+    pub fn json(&self) -> String {
+        // Numbers that are not finite become null; nothing else in here can fail.
+        serde_json::to_string_pretty(self).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
+    }
+
+    /// Write `result.json`.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`].
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_whole(path, (self.json() + "\n").as_bytes())
+    }
+}

@@ -1,0 +1,105 @@
+//! CSV tables: one header with units, then rows that reach the file whole.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A table on disk.
+#[derive(Debug)]
+pub struct Table {
+    path: PathBuf,
+    file: File,
+    columns: usize,
+    pending: Vec<u8>,
+}
+
+/// A value of a row.
+#[derive(Clone, Debug)]
+pub enum Cell {
+    /// A number; what is not finite becomes an empty cell.
+    Number(f64),
+    /// A count.
+    Count(u64),
+    /// Text.
+    Text(String),
+}
+
+impl From<f64> for Cell {
+    fn from(value: f64) -> Self {
+        Self::Number(value)
+    }
+}
+impl From<u64> for Cell {
+    fn from(value: u64) -> Self {
+        Self::Count(value)
+    }
+}
+impl From<&str> for Cell {
+    fn from(value: &str) -> Self {
+        Self::Text(value.to_string())
+    }
+}
+
+impl std::fmt::Display for Cell {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(x) if !x.is_finite() => Ok(()),
+            // Shortest text that gives the number back; exponents only where digits would pile up.
+            Self::Number(x) if *x != 0.0 && !(1e-4..1e7).contains(&x.abs()) => write!(f, "{x:e}"),
+            Self::Number(x) => write!(f, "{x}"),
+            Self::Count(n) => write!(f, "{n}"),
+            Self::Text(text) => f.write_str(text),
+        }
+    }
+}
+
+impl Table {
+    /// A new table with the columns of `header`, each `name [unit]`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create(path: &Path, header: &[String]) -> Result<Self> {
+        let file = File::create(path).map_err(Error::io(path))?;
+        let mut table = Self { path: path.to_path_buf(), file, columns: header.len(), pending: Vec::new() };
+        table.push(header)?;
+        table.flush()?;
+        Ok(table)
+    }
+
+    /// Add a row; it reaches the file with the next [`Table::flush`].
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a value cannot be written as CSV.
+    pub fn row(&mut self, cells: &[Cell]) -> Result<()> {
+        debug_assert_eq!(cells.len(), self.columns, "{}", self.path.display());
+        let text: Vec<String> = cells.iter().map(Cell::to_string).collect();
+        self.push(&text)
+    }
+
+    fn push(&mut self, text: &[String]) -> Result<()> {
+        let mut writer = csv::Writer::from_writer(&mut self.pending);
+        let written = writer.write_record(text).and_then(|()| writer.flush().map_err(Into::into));
+        written.map_err(|e| Error::io(&self.path)(std::io::Error::other(e)))
+    }
+
+    /// Hand all rows to the system in one go.
+    ///
+    /// # Errors
+    /// [`Error::Io`], e.g. when the disk is full.
+    pub fn flush(&mut self) -> Result<()> {
+        let written = self.file.write_all(&self.pending);
+        self.pending.clear();
+        written.map_err(Error::io(&self.path))
+    }
+}
+
+/// Three columns of a vector: `name_x [unit]`, `name_y [unit]`, `name_z [unit]`.
+pub fn vector_columns(name: &str, unit: &str) -> [String; 3] {
+    ["x", "y", "z"].map(|axis| format!("{name}_{axis} [{unit}]"))
+}
+
+/// Three cells of a vector.
+pub fn vector_cells(v: glam::DVec3) -> [Cell; 3] {
+    v.to_array().map(Cell::Number)
+}

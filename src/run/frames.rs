@@ -1,0 +1,144 @@
+//! Frames: the particles of one moment, in VTU files and pictures.
+
+use crate::case::{Encoding, Output, OutputKind};
+use crate::error::{Error, Result};
+use crate::fields::Fields;
+use crate::output::folder::Folder;
+use crate::output::particles::Particles;
+use crate::output::picture::Picture;
+use crate::output::pvd::Pvd;
+use crate::output::write_whole;
+use crate::scene::Scene;
+use crate::simulation::Simulation;
+use std::path::PathBuf;
+
+/// Writes frames.
+#[derive(Debug)]
+pub struct Frames {
+    folder: Folder,
+    pvd: Pvd,
+    encoding: Encoding,
+    fluid: bool,
+    solids: bool,
+    walls: (bool, bool),
+    every: f64,
+    picture: Option<Picture>,
+    written: u64,
+}
+
+impl Frames {
+    /// Frames of `scene` in `folder`, with the kinds of particles that `output` asks for. `pictures` adds
+    /// a picture of every frame.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the folder of the pictures cannot be made.
+    pub fn new(folder: &Folder, output: &Output, scene: &Scene, pictures: bool) -> Result<Self> {
+        let asked = |kind| output.kinds.contains(&kind);
+        let groups = &scene.groups;
+        let picture = pictures.then(|| Picture::new(scene));
+        if pictures {
+            std::fs::create_dir_all(folder.pictures()).map_err(Error::io(folder.pictures()))?;
+        }
+        Ok(Self {
+            folder: folder.clone(),
+            pvd: Pvd::new(folder.pvd()),
+            encoding: output.encoding,
+            fluid: asked(OutputKind::Fluid) && groups.fluid > 0,
+            solids: asked(OutputKind::Body) && !scene.solids.is_empty(),
+            walls: (
+                asked(OutputKind::Wall) && groups.static_wall > 0,
+                asked(OutputKind::Dummy) && groups.static_dummy > 0,
+            ),
+            every: output.every,
+            picture,
+            written: 0,
+        })
+    }
+
+    /// Frames written so far.
+    pub fn written(&self) -> u64 {
+        self.written
+    }
+
+    /// Write the present state as the next frame, unless the case wants none (`output.every = 0`).
+    ///
+    /// # Errors
+    /// [`Error::Io`], or what the backend says when it is read.
+    pub fn write(&mut self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
+        if self.every <= 0.0 {
+            return Ok(());
+        }
+        let (number, time) = (self.written, simulation.time);
+        let fields = read(simulation)?;
+        let mut parts = Vec::new();
+        if self.walls != (false, false) {
+            let file = "vtu/walls.vtu".to_string();
+            if number == 0 {
+                let walls = Particles::walls(scene, fields.as_ref(), self.walls.0, self.walls.1);
+                self.put(&file, &walls, time)?;
+            }
+            parts.push(("walls", file));
+        }
+        for (name, particles) in self.moving(simulation, scene, fields.as_ref()) {
+            let file = format!("vtu/{name}_{number:04}.vtu");
+            self.put(&file, &particles, time)?;
+            parts.push((name, file));
+        }
+        self.pvd.push(time, &parts)?;
+        if let Some(picture) = &self.picture {
+            let png = picture.draw(scene, simulation.solids.poses(), fields.as_ref());
+            write_whole(&self.folder.pictures().join(format!("frame_{number:04}.png")), &png)?;
+        }
+        self.written += 1;
+        Ok(())
+    }
+
+    /// Write `vtu/last_*.vtu`: the state in which a run was given up. It is no part of the series.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or what the backend says when it is read.
+    pub fn write_last(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
+        let fields = read(simulation)?;
+        for (name, particles) in self.moving(simulation, scene, fields.as_ref()) {
+            self.put(&format!("vtu/last_{name}.vtu"), &particles, simulation.time)?;
+        }
+        Ok(())
+    }
+
+    /// Write `final.png`, if there are pictures.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or what the backend says when it is read.
+    pub fn write_final_picture(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
+        let Some(picture) = &self.picture else { return Ok(()) };
+        let fields = read(simulation)?;
+        let png = picture.draw(scene, simulation.solids.poses(), fields.as_ref());
+        write_whole(&self.folder.file("final.png"), &png)
+    }
+
+    fn moving(
+        &self,
+        simulation: &Simulation,
+        scene: &Scene,
+        fields: Option<&Fields>,
+    ) -> Vec<(&'static str, Particles)> {
+        let mut parts = Vec::new();
+        if let Some(fields) = fields.filter(|_| self.fluid) {
+            parts.push(("fluid", Particles::fluid(scene, fields)));
+        }
+        if self.solids {
+            parts.push(("solids", Particles::solids(scene, simulation.solids.poses(), fields, true)));
+        }
+        parts
+    }
+
+    fn put(&self, file: &str, particles: &Particles, time: f64) -> Result<()> {
+        let path: PathBuf = self.folder.root().join(file);
+        write_whole(&path, &particles.vtu(time, self.encoding))
+    }
+}
+
+/// All fields; a dry scene has none, and its backend is not asked.
+pub(super) fn read(simulation: &mut Simulation) -> Result<Option<Fields>> {
+    if simulation.plan.wet() { simulation.backend.read().map(Some) } else { Ok(None) }
+}

@@ -1,0 +1,234 @@
+//! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
+
+use super::frames::read;
+use crate::case::Case;
+use crate::error::{Error, Result};
+use crate::fields::Fields;
+use crate::output::table::{Cell, vector_cells, vector_columns};
+use crate::scene::{Groups, Kind, Scene};
+use crate::simulation::Simulation;
+use glam::DVec3;
+
+/// The gauges of a case, found in its scene.
+#[derive(Clone, Debug, Default)]
+pub struct Gauges {
+    pressure: Vec<(String, Vec<usize>)>,
+    level: Vec<(String, [f64; 2])>,
+    force: Vec<(String, usize)>,
+}
+
+impl Gauges {
+    /// Find wall particles and solids of the gauges of `case`.
+    ///
+    /// A pressure gauge is the mean over the particles of fixed walls within half an effective radius of its
+    /// point.
+    ///
+    /// # Errors
+    /// [`Error::Case`] for a pressure gauge that is not on a wall and for a force gauge on no solid.
+    pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
+        let reach = 0.5 * case.run.effective_radius * scene.spacing;
+        let mut out = Self::default();
+        for gauge in &case.gauge.pressure {
+            if scene.groups.fluid == 0 {
+                return Err(Error::Case(format!("gauge.pressure {}: there is no fluid", gauge.name)));
+            }
+            let point = DVec3::from(gauge.point);
+            let distance = |&slot: &usize| scene.position[slot].distance(point);
+            let slots: Vec<usize> =
+                scene.groups.static_wall_range().filter(|s| distance(s) <= reach).collect();
+            if slots.is_empty() {
+                let nearest =
+                    scene.groups.static_wall_range().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                let hint = nearest.map_or("there are no walls".to_string(), |slot| {
+                    format!(
+                        "the nearest wall particle is {:.4} m away at {:.4}",
+                        distance(&slot),
+                        scene.position[slot]
+                    )
+                });
+                return Err(Error::Case(format!(
+                    "gauge.pressure {}: no wall particle lies within {reach:.4} m of {point}; {hint}",
+                    gauge.name
+                )));
+            }
+            out.pressure.push((gauge.name.clone(), slots));
+        }
+        out.level.extend(case.gauge.level.iter().map(|g| (g.name.clone(), g.at)));
+        for gauge in &case.gauge.force {
+            let Some(solid) = scene.solids.iter().position(|s| s.name == gauge.on) else {
+                let names: Vec<&str> = scene.solids.iter().map(|s| s.name.as_str()).collect();
+                return Err(Error::Case(format!(
+                    "gauge.force {}: no body or moving wall is called `{}`; there are: {}",
+                    gauge.name,
+                    gauge.on,
+                    names.join(", ")
+                )));
+            };
+            out.force.push((gauge.name.clone(), solid));
+        }
+        Ok(out)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.pressure.is_empty() && self.level.is_empty() && self.force.is_empty()
+    }
+
+    /// Header of gauges.csv.
+    pub fn header(&self) -> Vec<String> {
+        let mut header = vec!["time [s]".to_string()];
+        header.extend(self.pressure.iter().map(|(name, _)| format!("{name} [Pa]")));
+        header.extend(self.level.iter().map(|(name, _)| format!("{name} [m]")));
+        for (name, _) in &self.force {
+            header.extend(vector_columns(&format!("{name}_force"), "N"));
+            header.extend(vector_columns(&format!("{name}_torque"), "N m"));
+        }
+        header
+    }
+
+    /// A row of gauges.csv. Before the first step there is neither pressure nor force: these cells are empty.
+    /// A level gauge reads all particles back, which costs more than the others.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn row(&self, simulation: &mut Simulation) -> Result<Vec<Cell>> {
+        let known = simulation.steps > 0;
+        let mut row = vec![Cell::from(simulation.time)];
+        let slots: Vec<usize> = self.pressure.iter().flat_map(|(_, slots)| slots).copied().collect();
+        let pressures = if slots.is_empty() { Vec::new() } else { simulation.backend.pressures(&slots)? };
+        let mut at = 0;
+        for (_, slots) in &self.pressure {
+            let mean = pressures[at..at + slots.len()].iter().sum::<f64>() / slots.len() as f64;
+            row.push(Cell::from(if known { mean } else { f64::NAN }));
+            at += slots.len();
+        }
+        if !self.level.is_empty() {
+            let fields = read(simulation)?;
+            let params = &simulation.params;
+            for &(_, line) in &self.level {
+                let level = fields.as_ref().and_then(|f| {
+                    let (reach, l0) = (params.effective_radius, params.spacing);
+                    level(f, &simulation.groups, line, params.dimensions, reach, l0)
+                });
+                row.push(Cell::from(level.unwrap_or(f64::NAN)));
+            }
+        }
+        for &(_, solid) in &self.force {
+            let wrench = simulation.fluid_force[solid];
+            let nothing = DVec3::NAN;
+            row.extend(vector_cells(if known { wrench.force } else { nothing }));
+            row.extend(vector_cells(if known { wrench.torque } else { nothing }));
+        }
+        Ok(row)
+    }
+}
+
+/// Height [m] of the highest point of the vertical line through `line` that is in water; `None` if the line is
+/// dry.
+///
+/// "In water" means that the particles within one effective radius `reach` [m], weighted by 1 - r / reach,
+/// amount to half of the largest sum along the line, so that a flat surface is found half a spacing above its
+/// topmost particles, in the open as well as along a wall and in a corner. Spray is passed over: less than half
+/// of what a full corner would give.
+pub fn level(
+    fields: &Fields,
+    groups: &Groups,
+    line: [f64; 2],
+    dimensions: u32,
+    reach: f64,
+    l0: f64,
+) -> Option<f64> {
+    let plane = dimensions == 2;
+    let near: Vec<(f64, f64)> = (0..groups.fluid)
+        .filter(|&i| fields.kind[i] == Kind::Fluid)
+        .map(|i| fields.position[i])
+        .map(|x| ((x.x - line[0]).powi(2) + if plane { 0.0 } else { (x.y - line[1]).powi(2) }, x.z))
+        .filter(|&(d2, _)| d2 < reach * reach)
+        .collect();
+    let sum = |z: f64| -> f64 {
+        near.iter().map(|&(d2, zi)| (1.0 - (d2 + (z - zi).powi(2)).sqrt() / reach).max(0.0)).sum()
+    };
+    let bottom = near.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    let top = near.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max) + reach;
+    if near.is_empty() {
+        return None;
+    }
+    let step = 0.1 * l0;
+    let samples: Vec<(f64, f64)> = (0..=((top - bottom) / step).ceil() as usize)
+        .map(|k| top - k as f64 * step)
+        .map(|z| (z, sum(z)))
+        .collect();
+    let full = full_sum(dimensions, reach / l0);
+    let corner = if plane { 0.5 } else { 0.25 } * full;
+    let largest = samples.iter().map(|s| s.1).fold(0.0, f64::max);
+    let threshold = 0.5 * largest.clamp(corner, full);
+    let below = samples.iter().position(|s| s.1 >= threshold)?;
+    let (z, s) = samples[below];
+    // The topmost sample lies out of everybody's reach: its sum is zero.
+    let (z_above, s_above) = samples[below.checked_sub(1)?];
+    Some(z + (z_above - z) * (s - threshold) / (s - s_above))
+}
+
+/// Sum of 1 - r / re over the full lattice, with its centre; `radius` is re / l0.
+fn full_sum(dimensions: u32, radius: f64) -> f64 {
+    let m = radius.ceil() as i32;
+    let mut total = 0.0;
+    for x in -m..=m {
+        for y in if dimensions == 2 { 0..=0 } else { -m..=m } {
+            for z in -m..=m {
+                total += (1.0 - f64::from(x * x + y * y + z * z).sqrt() / radius).max(0.0);
+            }
+        }
+    }
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::level;
+    use crate::fields::Fields;
+    use crate::scene::{Groups, Kind};
+    use glam::DVec3;
+
+    fn block(n: [i32; 3], l0: f64) -> Fields {
+        let mut fields = Fields::default();
+        for x in 0..n[0] {
+            for y in 0..n[1] {
+                for z in 0..n[2] {
+                    let at = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) + 0.5;
+                    fields.position.push(at * l0);
+                    fields.kind.push(Kind::Fluid);
+                }
+            }
+        }
+        fields
+    }
+
+    fn level_of(fields: &Fields, line: [f64; 2], l0: f64) -> Option<f64> {
+        let groups = Groups { fluid: fields.kind.len(), ..Groups::default() };
+        level(fields, &groups, line, 3, 2.1 * l0, l0)
+    }
+
+    #[test]
+    fn a_flat_surface_is_found_in_the_open_and_at_a_wall() {
+        let l0 = 0.01;
+        let fields = block([12, 12, 8], l0);
+        for line in [[0.06, 0.06], [0.063, 0.058], [0.0, 0.06], [0.0, 0.0]] {
+            let z = level_of(&fields, line, l0).unwrap();
+            assert!((z - 8.0 * l0).abs() < 0.15 * l0, "{line:?}: {z}");
+        }
+        assert!(level_of(&fields, [0.5, 0.06], l0).is_none());
+    }
+
+    #[test]
+    fn spray_above_the_surface_is_passed_over_and_ghosts_are_not_seen() {
+        let l0 = 0.01;
+        let mut fields = block([12, 12, 8], l0);
+        for (z, kind) in [(0.3, Kind::Fluid), (0.101, Kind::Ghost), (0.111, Kind::Ghost)] {
+            fields.position.push(DVec3::new(0.06, 0.06, z));
+            fields.kind.push(kind);
+        }
+        let z = level_of(&fields, [0.06, 0.06], l0).unwrap();
+        assert!((z - 8.0 * l0).abs() < 0.15 * l0, "{z}");
+    }
+}

@@ -1,0 +1,122 @@
+//! Sums over a run, for `result.json`.
+
+use super::tables::solved;
+use crate::backend::Counters;
+use crate::monitor::FluidMonitor;
+use crate::output::result::{Body, Monitors, Particles, Pressure, Summary};
+use crate::scene::{Kind, Scene};
+use crate::simulation::{Simulation, StepReport};
+use std::time::Duration;
+
+/// Sums since the start.
+#[derive(Clone, Debug, Default)]
+pub struct Totals {
+    solves: u64,
+    unknowns: u64,
+    iterations: u64,
+    pressure: Pressure,
+    monitors: Monitors,
+    looks: u64,
+    density_error: f64,
+    /// Largest speed of the fluid when last looked at [m/s].
+    pub speed: f64,
+    /// Wall-clock time spent on files.
+    pub output: Duration,
+}
+
+impl Totals {
+    /// Count a step in.
+    pub fn add(&mut self, report: &StepReport, simulation: &Simulation) {
+        if simulation.plan.wet() {
+            let solve = &report.pressure;
+            self.solves += 1;
+            self.unknowns += solve.unknowns as u64;
+            self.iterations += u64::from(solve.iterations);
+            self.pressure.iterations_max = self.pressure.iterations_max.max(solve.iterations);
+            self.pressure.relative_residual_max = self.pressure.relative_residual_max.max(solve.residual);
+            self.pressure.failures += u64::from(!solved(solve.outcome));
+        }
+        let (monitors, contact) = (&mut self.monitors, &report.contact);
+        monitors.penetration_max_over_l0 =
+            monitors.penetration_max_over_l0.max(contact.penetration_max_over_l0);
+        monitors.contact_omega_dt = monitors.contact_omega_dt.max(contact.omega_dt);
+        monitors.contact_substeps_max = monitors.contact_substeps_max.max(contact.substeps);
+    }
+
+    /// Count in what a table row shows: the fluid, the guards and the bodies' energy [J].
+    pub fn look(&mut self, fluid: &FluidMonitor, counters: &Counters, bodies: f64, dt: f64, l0: f64) {
+        self.speed = fluid.speed_max;
+        self.looks += 1;
+        self.density_error += fluid.density_error_mean;
+        let monitors = &mut self.monitors;
+        monitors.density_error_max = monitors.density_error_max.max(fluid.density_error_max);
+        monitors.courant_max = monitors.courant_max.max(fluid.speed_max * dt / l0);
+        monitors.energy_end = fluid.kinetic + fluid.potential + bodies;
+        monitors.lost_particles = counters.lost;
+        monitors.neighbours_max = counters.neighbours_max;
+    }
+
+    /// The energy seen last is that of the start.
+    pub fn start(&mut self) {
+        self.monitors.energy_start = self.monitors.energy_end;
+        // Before the first step there is no number density to be wrong.
+        (self.looks, self.density_error) = (0, 0.0);
+    }
+
+    /// The summary, but for how the run ended.
+    pub fn summary(&self, simulation: &Simulation, scene: &Scene) -> Summary {
+        let per = |sum: u64, of: u64| sum as f64 / of.max(1) as f64;
+        let mut pressure = self.pressure;
+        pressure.unknowns_mean = per(self.unknowns, self.solves);
+        pressure.iterations_mean = per(self.iterations, self.solves);
+        let mut monitors = self.monitors;
+        monitors.density_error_mean = self.density_error / self.looks.max(1) as f64;
+        let precision = simulation.backend.precision();
+        Summary {
+            version: env!("CARGO_PKG_VERSION"),
+            // The CPU path is the one in double precision.
+            backend: if precision == "f64" { "cpu" } else { "gpu" }.to_string(),
+            adapter: simulation.backend.description(),
+            precision: precision.to_string(),
+            steps: simulation.steps,
+            time_s: simulation.time,
+            particles: particles(scene),
+            stages: simulation.stages.iter().map(|(stage, seconds)| (stage.name(), *seconds)).collect(),
+            pressure,
+            monitors,
+            bodies: bodies(simulation),
+            ..Summary::default()
+        }
+    }
+}
+
+/// Numbers of particles by kind.
+pub fn particles(scene: &Scene) -> Particles {
+    let mut out = Particles { total: scene.kind.len(), ..Particles::default() };
+    for kind in &scene.kind {
+        match kind {
+            Kind::Fluid | Kind::Ghost => out.fluid += 1,
+            Kind::Wall => out.wall += 1,
+            Kind::Dummy => out.dummy += 1,
+            Kind::BodyWall | Kind::BodyDummy => out.body += 1,
+        }
+    }
+    out
+}
+
+fn bodies(simulation: &Simulation) -> Vec<Body> {
+    let poses = simulation.solids.poses().iter().zip(&simulation.fluid_force).enumerate();
+    poses
+        .map(|(k, (pose, wrench))| {
+            let q = pose.orientation;
+            Body {
+                name: simulation.solids.name(k).to_string(),
+                position_m: pose.position.to_array(),
+                orientation_wxyz: [q.w, q.x, q.y, q.z],
+                velocity_m_s: pose.velocity.to_array(),
+                angular_velocity_rad_s: pose.angular_velocity.to_array(),
+                fluid_force_n: wrench.force.to_array(),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,265 @@
+//! The tables over time: monitors.csv, bodies.csv and gauges.csv.
+
+use super::Due;
+use super::gauges::Gauges;
+use super::summary::Totals;
+use crate::backend::Counters;
+use crate::contact::Energy;
+use crate::error::Result;
+use crate::monitor::FluidMonitor;
+use crate::output::folder::Folder;
+use crate::output::table::{Cell, Table, vector_cells, vector_columns};
+use crate::plan::Stage;
+use crate::pressure::Outcome;
+use crate::scene::Scene;
+use crate::simulation::{Simulation, StepReport};
+use std::collections::BTreeMap;
+
+/// The tables of a run.
+#[derive(Debug)]
+pub struct Tables {
+    monitors: Table,
+    bodies: Option<Table>,
+    gauges: Option<(Gauges, Table)>,
+    due: Due,
+    gauges_due: Due,
+    stages: Vec<Stage>,
+    since: Since,
+    /// Step of the last row.
+    last: Option<u64>,
+}
+
+/// What happened since the last row.
+#[derive(Debug, Default)]
+struct Since {
+    iterations: u32,
+    residual: f64,
+    outcome: Option<Outcome>,
+    penetration: f64,
+    omega_dt: f64,
+    substeps: u32,
+    stages: BTreeMap<Stage, f64>,
+}
+
+/// A word for a table.
+pub fn outcome_name(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Converged => "converged",
+        Outcome::ZeroSource => "zero_source",
+        Outcome::MaxIterations => "max_iterations",
+        Outcome::Breakdown => "breakdown",
+        Outcome::NonFinite => "non_finite",
+    }
+}
+
+/// Whether a solve did what it was asked for.
+pub fn solved(outcome: Outcome) -> bool {
+    matches!(outcome, Outcome::Converged | Outcome::ZeroSource)
+}
+
+impl Tables {
+    /// Tables with their headers.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`].
+    pub fn create(folder: &Folder, simulation: &Simulation, scene: &Scene, gauges: Gauges) -> Result<Self> {
+        let stages: Vec<Stage> = Stage::ALL.into_iter().filter(|&s| simulation.plan.has(s)).collect();
+        let every = simulation.case.output.table_every;
+        let gauges = if gauges.is_empty() {
+            None
+        } else {
+            let table = Table::create(&folder.file("gauges.csv"), &gauges.header())?;
+            Some((gauges, table))
+        };
+        let bodies = if scene.solids.is_empty() {
+            None
+        } else {
+            Some(Table::create(&folder.file("bodies.csv"), &body_header())?)
+        };
+        Ok(Self {
+            monitors: Table::create(&folder.file("monitors.csv"), &monitor_header(&stages))?,
+            bodies,
+            gauges,
+            due: Due::new(every),
+            gauges_due: Due::new(simulation.case.gauge.every),
+            stages,
+            since: Since::default(),
+            last: None,
+        })
+    }
+
+    /// Rows at t = 0.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`], or what the backend says.
+    pub fn start(&mut self, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
+        self.write(&StepReport::default(), simulation, totals)?;
+        totals.start();
+        self.write_gauges(simulation)
+    }
+
+    /// Rows that are due after a step.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`], or what the backend says.
+    pub fn step(
+        &mut self,
+        report: &StepReport,
+        simulation: &mut Simulation,
+        totals: &mut Totals,
+    ) -> Result<()> {
+        let since = &mut self.since;
+        since.iterations = since.iterations.max(report.pressure.iterations);
+        since.residual = since.residual.max(report.pressure.residual);
+        if since.outcome.is_none_or(solved) {
+            since.outcome = Some(report.pressure.outcome);
+        }
+        since.penetration = since.penetration.max(report.contact.penetration_max_over_l0);
+        since.omega_dt = since.omega_dt.max(report.contact.omega_dt);
+        since.substeps = since.substeps.max(report.contact.substeps);
+        if self.due.reached(simulation.time) {
+            self.write(report, simulation, totals)?;
+        }
+        if self.gauges_due.reached(simulation.time) {
+            self.write_gauges(simulation)?;
+        }
+        Ok(())
+    }
+
+    /// Rows at the end, if the last step has none yet; the summary's numbers of the end come from here.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`], or what the backend says.
+    pub fn finish(
+        &mut self,
+        report: &StepReport,
+        simulation: &mut Simulation,
+        totals: &mut Totals,
+    ) -> Result<()> {
+        if self.last == Some(simulation.steps) {
+            return Ok(());
+        }
+        self.write(report, simulation, totals)
+    }
+
+    fn write(&mut self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
+        self.last = Some(simulation.steps);
+        let (fluid, counters) = if simulation.plan.wet() {
+            let fluid = match report.monitor {
+                Some(monitor) => monitor,
+                None => simulation.backend.monitor()?,
+            };
+            (fluid, simulation.backend.counters()?)
+        } else {
+            (FluidMonitor::default(), Counters::default())
+        };
+        let bodies = simulation.solids.energy();
+        totals.look(&fluid, &counters, bodies.total(), report.dt, simulation.params.spacing);
+        let since = std::mem::take(&mut self.since);
+        let row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
+        self.since.stages = simulation.stages.clone();
+        self.monitors.row(&row)?;
+        self.monitors.flush()?;
+        if let Some(table) = &mut self.bodies {
+            for (k, pose) in simulation.solids.poses().iter().enumerate() {
+                let q = pose.orientation;
+                let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
+                let mut row = vec![Cell::from(simulation.time), Cell::from(simulation.solids.name(k))];
+                row.extend(vector_cells(pose.position));
+                row.extend([q.w, q.x, q.y, q.z].map(Cell::Number));
+                for vector in [pose.velocity, pose.angular_velocity] {
+                    row.extend(vector_cells(vector));
+                }
+                for wrench in [fluid, contact] {
+                    row.extend(vector_cells(wrench.force));
+                    row.extend(vector_cells(wrench.torque));
+                }
+                table.row(&row)?;
+            }
+            table.flush()?;
+        }
+        Ok(())
+    }
+
+    fn monitor_row(
+        &self,
+        report: &StepReport,
+        simulation: &Simulation,
+        fluid: &FluidMonitor,
+        counters: &Counters,
+        bodies: Energy,
+        since: &Since,
+    ) -> Vec<Cell> {
+        let mut row = vec![Cell::from(simulation.steps), Cell::from(simulation.time), Cell::from(report.dt)];
+        row.extend(
+            [
+                fluid.speed_max * report.dt / simulation.params.spacing,
+                fluid.speed_max,
+                fluid.density_error_mean,
+                fluid.density_error_max,
+                fluid.kinetic,
+                fluid.potential,
+                bodies.kinetic,
+                bodies.gravity,
+                bodies.contact,
+                fluid.kinetic + fluid.potential + bodies.total(),
+            ]
+            .map(Cell::Number),
+        );
+        for vector in [fluid.momentum, fluid.centroid, fluid.extent_max] {
+            row.extend(vector.map(Cell::Number));
+        }
+        row.extend([Cell::from(u64::from(since.iterations)), Cell::from(since.residual)]);
+        row.push(Cell::from(since.outcome.filter(|_| simulation.plan.wet()).map_or("", outcome_name)));
+        row.extend([
+            Cell::from(since.penetration),
+            Cell::from(u64::from(since.substeps)),
+            Cell::from(since.omega_dt),
+            Cell::from(counters.lost),
+            Cell::from(counters.displacement_clamps),
+            Cell::from(counters.pressure_clamps),
+            Cell::from(u64::from(counters.neighbours_max)),
+        ]);
+        let seconds = |of: &BTreeMap<Stage, f64>, stage| of.get(stage).copied().unwrap_or(0.0);
+        row.extend(
+            self.stages
+                .iter()
+                .map(|s| Cell::from(seconds(&simulation.stages, s) - seconds(&since.stages, s))),
+        );
+        row
+    }
+
+    fn write_gauges(&mut self, simulation: &mut Simulation) -> Result<()> {
+        if let Some((gauges, table)) = &mut self.gauges {
+            table.row(&gauges.row(simulation)?)?;
+            table.flush()?;
+        }
+        Ok(())
+    }
+}
+
+fn monitor_header(stages: &[Stage]) -> Vec<String> {
+    let fixed = "step [-],time [s],dt [s],courant [-],speed_max [m/s],density_error_mean [-],density_error_max [-],\
+                 kinetic [J],potential [J],body_kinetic [J],body_potential [J],body_contact [J],energy [J]";
+    let mut header: Vec<String> = fixed.split(',').map(String::from).collect();
+    header.extend(vector_columns("momentum", "kg m/s"));
+    header.extend(vector_columns("centroid", "m"));
+    header.extend(vector_columns("extent_max", "m"));
+    let rest = "iterations [-],residual [-],outcome,penetration_over_l0 [-],contact_substeps [-],\
+                contact_omega_dt [-],fluid_lost [-],displacement_clamps [-],pressure_clamps [-],neighbours_max [-]";
+    header.extend(rest.split(',').map(String::from));
+    header.extend(stages.iter().map(|s| format!("wall_{} [s]", s.name())));
+    header
+}
+
+fn body_header() -> Vec<String> {
+    let mut header: Vec<String> = ["time [s]", "body", "x [m]", "y [m]", "z [m]"].map(String::from).to_vec();
+    header.extend(["w", "x", "y", "z"].map(|axis| format!("q{axis} [-]")));
+    header.extend(vector_columns("velocity", "m/s"));
+    header.extend(vector_columns("angular_velocity", "rad/s"));
+    header.extend(vector_columns("fluid_force", "N"));
+    header.extend(vector_columns("fluid_torque", "N m"));
+    header.extend(vector_columns("contact_force", "N"));
+    header.extend(vector_columns("contact_torque", "N m"));
+    header
+}

@@ -1,0 +1,264 @@
+//! From a case to a scene.
+//!
+//! Order of placement, first come first served: tank, obstacles, moving walls, planes, water, bodies.
+
+use super::bodies;
+use super::lattice::{Cells, Grid, Lattice};
+use super::placement::{Surroundings, point};
+use super::walls::{self, Fixed, PlaneFrame};
+use super::water::Water;
+use super::{Scene, Shape, Solid};
+use crate::case::{Case, Law};
+use crate::error::{Error, Result};
+use glam::{DVec3, IVec3};
+
+impl Scene {
+    /// Builds the scene of a case: particles on their lattices, solids with their geometry, the domain.
+    ///
+    /// # Errors
+    /// [`Error::Case`] with every problem that the case or its geometry at t = 0 has: bodies that overlap
+    /// walls, water or each other, water that would run away, things outside of the domain.
+    pub fn build(case: &Case) -> Result<Self> {
+        crate::case::check::refuse(case)?;
+        let mut builder = Builder::new(case)?;
+        builder.walls();
+        builder.water();
+        builder.bodies();
+        builder.gauges();
+        let domain = builder.domain();
+        if !builder.problems.is_empty() {
+            return Err(Error::Case(listed(&builder.problems)));
+        }
+        Ok(builder.assemble(domain))
+    }
+}
+
+/// Problems of a scene as one text.
+fn listed(problems: &[String]) -> String {
+    match problems {
+        [one] => one.clone(),
+        many => format!("{} problems at t = 0:\n  - {}", many.len(), many.join("\n  - ")),
+    }
+}
+
+/// A scene while it grows.
+pub(super) struct Builder<'a> {
+    pub(super) case: &'a Case,
+    pub(super) lattice: Lattice,
+    grid: Grid,
+    /// Wall layer and dummies: 1 + the most layers that lie strictly within re of the wall layer.
+    layers: i32,
+    pub(super) tank: Option<Cells>,
+    pub(super) fixed: Fixed,
+    pub(super) moving_walls: Vec<Solid>,
+    pub(super) bodies: Vec<Solid>,
+    pub(super) water: Water,
+    pub(super) depth: f64,
+    pub(super) notes: Vec<String>,
+    pub(super) problems: Vec<String>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(case: &'a Case) -> Result<Self> {
+        let run = &case.run;
+        let blocks = case.fluid.as_ref().map_or(&[][..], |f| &f.block);
+        let anchor = case.tank.as_ref().map(|t| t.min).or_else(|| blocks.first().map(|b| b.min));
+        let lattice = Lattice::new(anchor.unwrap_or_default().into(), run.spacing, run.dimensions);
+        let layers = run.effective_radius.ceil() as i32;
+        let tank = case.tank.as_ref().map(|t| lattice.tank_cells(t.min.into(), t.max.into()));
+        let outer = case.tank.as_ref().zip(tank);
+        let outer = outer.map(|(t, c)| walls::outer(c, walls::closed(&t.open, lattice.plane), layers));
+        let boxes = case.obstacle.iter().map(|o| (o.min, o.max));
+        let boxes = boxes.chain(case.moving_wall.iter().map(|w| (w.min, w.max)));
+        let boxes = boxes.chain(blocks.iter().map(|b| (b.min, b.max)));
+        let all = boxes.map(|(min, max)| lattice.cells(min.into(), max.into())).chain(outer);
+        let all = all.reduce(Cells::union).unwrap_or(Cells { lo: IVec3::ZERO, hi: IVec3::ZERO });
+        // One free cell around everything, so that what leaves can be seen to leave.
+        let grid = Grid::new(all.grown(lattice.step(1)), run.spacing)?;
+        Ok(Self {
+            case,
+            lattice,
+            grid,
+            layers,
+            tank,
+            fixed: Fixed::default(),
+            moving_walls: Vec::new(),
+            bodies: Vec::new(),
+            water: Water::default(),
+            depth: 0.0,
+            notes: Vec::new(),
+            problems: Vec::new(),
+        })
+    }
+
+    /// Gravity [m/s2], in the plane in two dimensions.
+    pub(super) fn gravity(&self) -> DVec3 {
+        let mut g: DVec3 = self.case.run.gravity.into();
+        if self.lattice.plane {
+            g.y = 0.0;
+        }
+        g
+    }
+
+    fn walls(&mut self) {
+        let (case, lattice, layers) = (self.case, self.lattice, self.layers);
+        if let Some(tank) = &case.tank {
+            self.fixed.tank(tank, &lattice, &mut self.grid, layers);
+            let (min, max): (DVec3, DVec3) = (tank.min.into(), tank.max.into());
+            let rounded = lattice.corner(lattice.tank_cells(min, max).hi) - lattice.corner(IVec3::ZERO);
+            let off = (rounded - (max - min)).abs();
+            let lines = self
+                .changed(off)
+                .map(|k| format!("length {} {:.4} m becomes {:.4} m", AXES[k], (max - min)[k], rounded[k]));
+            let line = lines.collect::<Vec<_>>().join(", ");
+            if !line.is_empty() {
+                self.notes.push(format!("tank: {line} at spacing {}", lattice.spacing));
+            }
+        }
+        for obstacle in &case.obstacle {
+            let taken = self.fixed.obstacle(obstacle, &lattice, &mut self.grid, layers);
+            let label = format!("obstacle `{}`", obstacle.name);
+            self.rounded(&label, obstacle.min.into(), obstacle.max.into());
+            self.taken(&label, taken);
+        }
+        for wall in &case.moving_wall {
+            let (solid, taken) = walls::moving_wall(wall, &lattice, &mut self.grid, layers);
+            let label = format!("moving wall `{}`", wall.name);
+            self.rounded(&label, wall.min.into(), wall.max.into());
+            self.taken(&label, taken);
+            let Shape::Box { half } = solid.shape;
+            let thin = (0..3).any(|k| 2.0 * half[k] < 1.5 * lattice.spacing && !(lattice.plane && k == 1));
+            if thin {
+                self.notes
+                    .push(format!("{label}: one particle thick, so that its two sides share one pressure"));
+            }
+            self.moving_walls.push(solid);
+        }
+        for plane in &case.plane {
+            let left_out = self.fixed.plane(plane, &lattice, &mut self.grid, layers);
+            let n = PlaneFrame::new(plane, &lattice).n.map(|n| f64::from(n) * lattice.spacing);
+            for (k, length) in n.into_iter().enumerate().filter(|&(k, _)| !(lattice.plane && k == 1)) {
+                if (length - plane.size[k]).abs() > 0.01 * lattice.spacing {
+                    self.notes.push(format!(
+                        "plane `{}`: size {} {:.4} m becomes {length:.4} m at spacing {}",
+                        plane.name,
+                        ["along", "across"][k],
+                        plane.size[k],
+                        lattice.spacing
+                    ));
+                }
+            }
+            if left_out > 0 {
+                self.notes.push(format!(
+                    "plane `{}`: {left_out} particles left out where another wall already stands",
+                    plane.name
+                ));
+            }
+        }
+    }
+
+    fn water(&mut self) {
+        let Some(fluid) = &self.case.fluid else { return };
+        for (k, block) in fluid.block.iter().enumerate() {
+            let filled = self.water.fill(block, &self.lattice, &mut self.grid);
+            if filled == 0 {
+                self.problems.push(format!(
+                    "fluid.block.{k}: no free cell in it at spacing {}: it lies inside walls or other water, \
+                     move it or use a smaller run.spacing",
+                    self.lattice.spacing
+                ));
+            }
+            self.rounded(&format!("fluid.block.{k}"), block.min.into(), block.max.into());
+        }
+        self.depth = self.water.depth(self.gravity(), &self.lattice);
+    }
+
+    fn bodies(&mut self) {
+        let case = self.case;
+        let gravity = self.gravity();
+        let law = case.contact.as_ref().map_or(Law::Smooth, |c| c.law);
+        for body in &case.body {
+            let mut solid = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
+            let earlier: Vec<&Solid> = self.moving_walls.iter().chain(&self.bodies).collect();
+            let surroundings = Surroundings {
+                fixed: &self.fixed,
+                earlier: &earlier,
+                law,
+                spacing: case.run.spacing,
+                up: (gravity.length() > 0.0).then(|| -gravity.normalize()),
+            };
+            match surroundings.place(&mut solid, body.standing) {
+                Ok(note) => self.notes.extend(note),
+                Err(problem) => self.problems.push(problem),
+            }
+            let shape = solid.oriented_box();
+            let wet = self.water.inside(&shape, &self.lattice);
+            if wet > 0 && body.displaces_fluid {
+                self.water.remove(&shape, &self.lattice, &mut self.grid);
+                self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
+            } else if wet > 0 {
+                self.problems.push(format!(
+                    "body `{}` at {} overlaps {wet} fluid particles at t = 0: set `displaces_fluid = true`, or move it \
+                     out of the water",
+                    body.name,
+                    point(solid.position)
+                ));
+            }
+            self.bodies.push(solid);
+        }
+        self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
+    }
+
+    /// A pressure gauge averages over the wall particles near its point: there must be some.
+    fn gauges(&mut self) {
+        let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
+        for gauge in &self.case.gauge.pressure {
+            let mut at: DVec3 = gauge.point.into();
+            if self.lattice.plane {
+                at.y = 0.0;
+            }
+            let solids = self.moving_walls.iter().chain(&self.bodies).flat_map(Solid::wall_positions);
+            let all = self.fixed.wall.iter().copied().chain(solids);
+            let Some(nearest) = all.min_by(|a, b| a.distance(at).total_cmp(&b.distance(at))) else {
+                continue;
+            };
+            if nearest.distance(at) > reach {
+                self.problems.push(format!(
+                    "gauge.pressure `{}` at {}: no wall particle within {reach:.4} m, the nearest stands at {}: move the \
+                     point onto a wall",
+                    gauge.name,
+                    point(at),
+                    point(nearest)
+                ));
+            }
+        }
+    }
+
+    /// Axes along which a length changed by more than 1 % of the spacing.
+    fn changed(&self, off: DVec3) -> impl Iterator<Item = usize> + use<> {
+        let (limit, plane) = (0.01 * self.lattice.spacing, self.lattice.plane);
+        (0..3).filter(move |&k| !(plane && k == 1) && off[k] > limit)
+    }
+
+    /// Notes that a box's faces moved to the lattice.
+    fn rounded(&mut self, label: &str, min: DVec3, max: DVec3) {
+        let cells = self.lattice.cells(min, max);
+        let (lo, hi) = (self.lattice.corner(cells.lo), self.lattice.corner(cells.hi));
+        let off = (lo - min).abs().max((hi - max).abs());
+        let lines = self.changed(off).map(|k| {
+            format!("{} {:.4}..{:.4} m becomes {:.4}..{:.4} m", AXES[k], min[k], max[k], lo[k], hi[k])
+        });
+        let line = lines.collect::<Vec<_>>().join(", ");
+        if !line.is_empty() {
+            self.notes.push(format!("{label}: {line} at spacing {}", self.lattice.spacing));
+        }
+    }
+
+    fn taken(&mut self, label: &str, cells: usize) {
+        if cells > 0 {
+            self.notes.push(format!("{label}: {cells} cells left to the walls that already stand there"));
+        }
+    }
+}
+
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];

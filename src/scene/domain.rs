@@ -1,0 +1,93 @@
+//! The domain: the box that no particle may leave.
+
+use super::Drive;
+use super::build::{AXES, Builder};
+use super::oriented::OrientedBox;
+use glam::{DVec3, IVec3};
+
+impl Builder<'_> {
+    /// The case's domain, or one with room around everything; complains of what lies outside.
+    pub(super) fn domain(&mut self) -> (DVec3, DVec3) {
+        let l0 = self.lattice.spacing;
+        let mut bounds = Bounds::default();
+        for wall in &self.fixed.shapes {
+            let reach = OrientedBox::from(wall).bounds();
+            bounds.add(&format!("wall `{}`", wall.name), wall.center - reach, wall.center + reach);
+        }
+        for solid in self.moving_walls.iter().chain(&self.bodies) {
+            let shape = solid.oriented_box();
+            let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
+            let label = format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name);
+            bounds.add(&label, lo, hi);
+            if let Drive::Prescribed(motion) = &solid.drive {
+                for &d in &motion.displacement {
+                    bounds.add(&label, lo + d, hi + d);
+                }
+            }
+        }
+        if !self.water.cell.is_empty() {
+            let (lo, hi) =
+                self.water.cell.iter().fold((IVec3::MAX, IVec3::MIN), |(a, b), &c| (a.min(c), b.max(c)));
+            bounds.add("water", self.lattice.corner(lo), self.lattice.corner(hi + 1));
+        }
+        if let Some(domain) = self.case.run.domain {
+            let (lo, hi) = (DVec3::from(domain[0]), DVec3::from(domain[1]));
+            let slack = 1e-9 * l0;
+            for (label, a, b) in &bounds.items {
+                let outside = |k: usize| a[k] < lo[k] - slack || b[k] > hi[k] + slack;
+                if let Some(k) = (0..3).find(|&k| !(self.lattice.plane && k == 1) && outside(k)) {
+                    self.problems.push(format!(
+                        "run.domain: {label} reaches from {} = {:.4} to {:.4} m, outside of {:.4} to {:.4} m: \
+                         enlarge run.domain or leave it out",
+                        AXES[k], a[k], b[k], lo[k], hi[k]
+                    ));
+                }
+            }
+            return self.in_plane(lo, hi);
+        }
+        let (lo, hi) = bounds.total();
+        let room = 4.0 * l0;
+        // Nothing but walls keeps bodies and free drops in place, and they cost nothing while there are few.
+        let held = self.tank.is_some() && !self.water.cell.is_empty();
+        let around = if held { room } else { (0.5 * (hi - lo).length()).max(room) };
+        let (mut lo, mut hi) = (lo - around, hi + around);
+        let gravity = self.gravity();
+        if gravity.length() > 0.0 {
+            let up = -gravity.normalize();
+            let tank = self
+                .case
+                .tank
+                .as_ref()
+                .map_or(0.0, |t| (DVec3::from(t.max) - DVec3::from(t.min)).dot(up.abs()));
+            let head = up * (4.0 * self.depth).max(tank);
+            lo += head.min(DVec3::ZERO);
+            hi += head.max(DVec3::ZERO);
+        }
+        self.in_plane(lo, hi)
+    }
+
+    /// In two dimensions a domain is one cell wide.
+    fn in_plane(&self, mut lo: DVec3, mut hi: DVec3) -> (DVec3, DVec3) {
+        if self.lattice.plane {
+            let half = 0.5 * self.lattice.spacing;
+            (lo.y, hi.y) = (-half, half);
+        }
+        (lo, hi)
+    }
+}
+
+/// Labelled boxes and the box around them all.
+#[derive(Default)]
+struct Bounds {
+    items: Vec<(String, DVec3, DVec3)>,
+}
+
+impl Bounds {
+    fn add(&mut self, label: &str, lo: DVec3, hi: DVec3) {
+        self.items.push((label.to_owned(), lo, hi));
+    }
+    fn total(&self) -> (DVec3, DVec3) {
+        let boxes = self.items.iter().map(|(_, lo, hi)| (*lo, *hi));
+        boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default()
+    }
+}

@@ -1,0 +1,159 @@
+//! The background lattice: which cell belongs to which shape, as a dense grid.
+
+use crate::error::{Error, Result};
+use glam::{DVec3, IVec3};
+
+/// What stands in a cell.
+pub(super) const FREE: u8 = 0;
+/// A wall or dummy particle.
+pub(super) const SOLID: u8 = 1;
+/// The inside of a hollow solid, or a cell that a plane covers: no particle, but nothing may enter.
+pub(super) const BLOCKED: u8 = 2;
+/// A fluid particle.
+pub(super) const FLUID: u8 = 3;
+/// A cell that the search for leaks has reached.
+pub(super) const REACHED: u8 = 4;
+
+/// Rounding slack in cells: a face that lies on a cell's centre up to this much counts as on it.
+const SLACK: f64 = 1e-6;
+/// More cells than this do not fit into memory beside the particles.
+const MOST_CELLS: f64 = 1.0e9;
+
+/// A box of cells, `lo` included, `hi` not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cells {
+    pub lo: IVec3,
+    pub hi: IVec3,
+}
+
+impl Cells {
+    pub fn iter(self) -> impl Iterator<Item = IVec3> {
+        let Self { lo, hi } = self;
+        (lo.x..hi.x)
+            .flat_map(move |i| (lo.y..hi.y).flat_map(move |j| (lo.z..hi.z).map(move |k| IVec3::new(i, j, k))))
+    }
+    pub fn grown(self, by: IVec3) -> Self {
+        Self { lo: self.lo - by, hi: self.hi + by }
+    }
+    pub fn union(self, other: Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+    pub fn contains(self, c: IVec3) -> bool {
+        c.cmpge(self.lo).all() && c.cmplt(self.hi).all()
+    }
+}
+
+/// Origin and spacing: cell i spans origin + i l0 .. origin + (i + 1) l0, its particle stands in the middle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lattice {
+    pub origin: DVec3,
+    pub spacing: f64,
+    pub plane: bool,
+}
+
+impl Lattice {
+    /// Lattice with cell edges at `anchor`. In two dimensions the one plane of cells is centred on y = 0.
+    pub fn new(anchor: DVec3, spacing: f64, dimensions: u32) -> Self {
+        let plane = dimensions == 2;
+        let origin = if plane { DVec3::new(anchor.x, -0.5 * spacing, anchor.z) } else { anchor };
+        Self { origin, spacing, plane }
+    }
+    /// Centre of a cell [m]; exactly y = 0 in two dimensions.
+    pub fn center(&self, c: IVec3) -> DVec3 {
+        let mut p = self.origin + (c.as_dvec3() + 0.5) * self.spacing;
+        if self.plane {
+            p.y = 0.0;
+        }
+        p
+    }
+    /// Corner of a cell towards the origin [m].
+    pub fn corner(&self, c: IVec3) -> DVec3 {
+        self.origin + c.as_dvec3() * self.spacing
+    }
+    /// The cell that holds a point.
+    pub fn cell(&self, p: DVec3) -> IVec3 {
+        ((p - self.origin) / self.spacing).floor().as_ivec3()
+    }
+    /// Cells whose centres lie in the box or on its faces.
+    pub fn cells(&self, min: DVec3, max: DVec3) -> Cells {
+        let lo = ((min - self.origin) / self.spacing - 0.5 - SLACK).ceil().as_ivec3();
+        let hi = ((max - self.origin) / self.spacing - 0.5 + SLACK).floor().as_ivec3() + 1;
+        self.flat(Cells { lo, hi })
+    }
+    /// Cells of the tank: round(L / l0) an axis, halves up.
+    pub fn tank_cells(&self, min: DVec3, max: DVec3) -> Cells {
+        let n = ((max - min) / self.spacing + 0.5 + SLACK).floor().as_ivec3();
+        self.flat(Cells { lo: IVec3::ZERO, hi: n })
+    }
+    /// One cell along an axis that exists, none along y in two dimensions.
+    pub fn step(&self, by: i32) -> IVec3 {
+        IVec3::new(by, if self.plane { 0 } else { by }, by)
+    }
+    fn flat(&self, mut cells: Cells) -> Cells {
+        if self.plane {
+            (cells.lo.y, cells.hi.y) = (0, 1);
+        }
+        cells
+    }
+}
+
+/// Dense occupancy of a box of cells.
+#[derive(Debug)]
+pub(super) struct Grid {
+    pub cells: Cells,
+    n: [usize; 3],
+    state: Vec<u8>,
+}
+
+impl Grid {
+    /// An empty grid.
+    ///
+    /// # Errors
+    /// When it would have more cells than memory can be expected to hold.
+    pub fn new(cells: Cells, spacing: f64) -> Result<Self> {
+        let n = (cells.hi.as_dvec3() - cells.lo.as_dvec3()).max(DVec3::ZERO);
+        if n.x * n.y * n.z > MOST_CELLS || n.max_element() > 2e9 {
+            return Err(Error::Case(format!(
+                "the tank, obstacles and water span {:.0} x {:.0} x {:.0} cells of {spacing} m, more than {MOST_CELLS:.0e}: \
+                 use a larger run.spacing, or check for a length that is far too large",
+                n.x, n.y, n.z
+            )));
+        }
+        let n = [n.x as usize, n.y as usize, n.z as usize];
+        Ok(Self { cells, n, state: vec![FREE; n[0] * n[1] * n[2]] })
+    }
+    fn index(&self, c: IVec3) -> usize {
+        let d = c - self.cells.lo;
+        (d.x as usize * self.n[1] + d.y as usize) * self.n[2] + d.z as usize
+    }
+    /// State of a cell; free outside of the grid.
+    pub fn get(&self, c: IVec3) -> u8 {
+        if self.cells.contains(c) { self.state[self.index(c)] } else { FREE }
+    }
+    /// Sets a cell of the grid.
+    pub fn set(&mut self, c: IVec3, state: u8) {
+        let i = self.index(c);
+        self.state[i] = state;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_centre_on_a_face_belongs_to_the_box() {
+        let lattice = Lattice::new(DVec3::ZERO, 0.02, 3);
+        // 0.35 / 0.02 = 17.5 and 2.95 / 0.02 = 147.5: both ends lie on centres.
+        let cells = lattice.cells(DVec3::new(2.95, 0.0, 0.0), DVec3::new(3.10, 0.5, 0.35));
+        assert_eq!(cells, Cells { lo: IVec3::new(147, 0, 0), hi: IVec3::new(155, 25, 18) });
+    }
+
+    #[test]
+    fn two_dimensions_are_one_plane_at_zero() {
+        let lattice = Lattice::new(DVec3::new(0.3, 7.0, -0.1), 0.1, 2);
+        let cells = lattice.cells(DVec3::ZERO, DVec3::ONE);
+        assert_eq!((cells.lo.y, cells.hi.y), (0, 1));
+        assert_eq!(lattice.center(IVec3::new(3, 0, 2)).y, 0.0);
+    }
+}

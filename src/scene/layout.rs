@@ -1,0 +1,97 @@
+//! Laying particles out in groups, see [`Groups`].
+
+use super::build::Builder;
+use super::{Drive, Groups, Kind, Scene, Solid};
+use glam::DVec3;
+
+impl Builder<'_> {
+    /// Lays the particles out in their groups.
+    pub(super) fn assemble(self, domain: (DVec3, DVec3)) -> Scene {
+        let gravity = self.gravity();
+        let mut solids: Vec<Solid> = self.bodies.into_iter().chain(self.moving_walls).collect();
+        let count = |f: fn(&Solid) -> usize| solids.iter().map(f).sum();
+        let groups = Groups {
+            fluid: self.water.cell.len(),
+            moving_wall: count(|s| s.wall_offset.len()),
+            static_wall: self.fixed.wall.len(),
+            static_dummy: self.fixed.dummy.len(),
+            moving_dummy: count(|s| s.dummy_offset.len()),
+        };
+        let total = groups.total();
+        let mut layout = Layout {
+            position: Vec::with_capacity(total),
+            velocity: Vec::with_capacity(total),
+            kind: Vec::with_capacity(total),
+            solid: Vec::with_capacity(total),
+        };
+        for (&c, &v) in self.water.cell.iter().zip(&self.water.velocity) {
+            layout.push(self.lattice.center(c), v, Kind::Fluid, 0);
+        }
+        for (k, solid) in solids.iter_mut().enumerate() {
+            let kind = if solid.is_body { Kind::BodyWall } else { Kind::Wall };
+            solid.wall_slots = layout.push_offsets(solid, &solid.wall_offset, kind, k);
+        }
+        for &p in &self.fixed.wall {
+            layout.push(p, DVec3::ZERO, Kind::Wall, 0);
+        }
+        for &p in &self.fixed.dummy {
+            layout.push(p, DVec3::ZERO, Kind::Dummy, 0);
+        }
+        for (k, solid) in solids.iter_mut().enumerate() {
+            let kind = if solid.is_body { Kind::BodyDummy } else { Kind::Dummy };
+            solid.dummy_slots = layout.push_offsets(solid, &solid.dummy_offset, kind, k);
+        }
+        Scene {
+            dimensions: self.case.run.dimensions,
+            spacing: self.lattice.spacing,
+            gravity,
+            position: layout.position,
+            velocity: layout.velocity,
+            kind: layout.kind,
+            solid: layout.solid,
+            groups,
+            solids,
+            walls: self.fixed.shapes,
+            static_wall_normal: self.fixed.normal,
+            domain,
+            depth: self.depth,
+            notes: self.notes,
+        }
+    }
+}
+
+/// The particle arrays while they grow.
+struct Layout {
+    position: Vec<DVec3>,
+    velocity: Vec<DVec3>,
+    kind: Vec<Kind>,
+    solid: Vec<u32>,
+}
+
+impl Layout {
+    fn push(&mut self, position: DVec3, velocity: DVec3, kind: Kind, solid: u32) {
+        self.position.push(position);
+        self.velocity.push(velocity);
+        self.kind.push(kind);
+        self.solid.push(solid);
+    }
+    /// Particles of solid `k`, moving with it; returns their slots.
+    fn push_offsets(
+        &mut self,
+        solid: &Solid,
+        offsets: &[DVec3],
+        kind: Kind,
+        k: usize,
+    ) -> std::ops::Range<usize> {
+        let from = self.position.len();
+        for &offset in offsets {
+            let arm = solid.orientation * offset;
+            let velocity = match &solid.drive {
+                Drive::Free(free) => free.velocity + free.angular_velocity.cross(arm),
+                Drive::Prescribed(motion) => motion.velocity(0.0),
+            };
+            self.push(solid.position + arm, velocity, kind, k as u32 + 1);
+        }
+        from..self.position.len()
+    }
+}

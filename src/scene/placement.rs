@@ -1,0 +1,229 @@
+//! Where bodies start: lifting a standing body off what it touches, and refusing overlaps.
+//!
+//! What counts as contact depends on the law. With "paper" two wall-layer particles touch when they are
+//! closer than d_c = sqrt(1.5) l0 (section 3 of the paper); otherwise two solids touch when their true
+//! surfaces meet.
+
+use super::oriented::OrientedBox;
+use super::walls::Fixed;
+use super::{Drive, Solid};
+use crate::case::Law;
+use glam::{DMat3, DVec3};
+use std::collections::HashMap;
+
+/// Contact distance over the spacing, d_c / l0, section 3 of the paper.
+pub(super) const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
+
+/// What a body may meet at t = 0: fixed walls, and the solids placed before it.
+pub(super) struct Surroundings<'a> {
+    pub fixed: &'a Fixed,
+    pub earlier: &'a [&'a Solid],
+    pub law: Law,
+    pub spacing: f64,
+    /// Against gravity; `None` without gravity.
+    pub up: Option<DVec3>,
+}
+
+/// The deepest contact of a body at t = 0.
+struct Contact {
+    with: String,
+    overlap: f64,
+}
+
+impl Surroundings<'_> {
+    /// Lifts a standing body; returns a note on how far.
+    ///
+    /// # Errors
+    /// A sentence that names the body, what it overlaps, by how much, and what to do.
+    pub fn place(&self, body: &mut Solid, standing: bool) -> Result<Option<String>, String> {
+        let Some(Contact { with, overlap }) = self.deepest(body) else { return Ok(None) };
+        // A lift over the rim of a wall is not what anyone means by standing.
+        let lift = self
+            .up
+            .map(|up| (self.lift(body, up), up))
+            .filter(|(lift, up)| *lift <= body.oriented_box().reach(*up).max(2.0 * self.spacing));
+        let says = format!("body `{}` overlaps {with} by {overlap:.6} m at t = 0", body.name);
+        let Some((lift, up)) = lift else {
+            return Err(format!("{says}: move it away, lifting it would take more than half its height"));
+        };
+        if !standing {
+            let more = lift + 1e-6;
+            return Err(format!(
+                "{says}: set `standing = true`, or raise its center by {more:.6} m against gravity"
+            ));
+        }
+        let from = body.position;
+        body.position += lift * up;
+        if let Some(Contact { with, .. }) = self.deepest(body) {
+            return Err(format!("{says}: move it away, lifted by {lift:.6} m it would still overlap {with}"));
+        }
+        Ok(Some(format!(
+            "body `{}`: lifted by {lift:.6} m to stand free of contact, center {} becomes {}",
+            body.name,
+            point(from),
+            point(body.position)
+        )))
+    }
+
+    /// Fixed walls and earlier solids as boxes. Prescribed bodies may reach into what does not move under
+    /// forces: a table of motion is the user's word.
+    fn boxes(&self, body: &Solid) -> Vec<(String, OrientedBox)> {
+        let free = |s: &Solid| matches!(s.drive, Drive::Free(_));
+        let mut boxes = Vec::new();
+        if free(body) {
+            boxes.extend(self.fixed.shapes.iter().map(|w| (format!("wall `{}`", w.name), w.into())));
+        }
+        let solids = self.earlier.iter().filter(|s| free(body) || free(s));
+        boxes.extend(solids.map(|s| (solid_name(s), s.oriented_box())));
+        boxes
+    }
+
+    fn deepest(&self, body: &Solid) -> Option<Contact> {
+        let own = body.oriented_box();
+        // Lattices need not be in register, so that "paper" lets true surfaces overlap a little.
+        let tolerance = if self.law == Law::Paper { 0.5 } else { 1e-6 } * self.spacing;
+        let boxes = self.boxes(body);
+        let solid = boxes
+            .into_iter()
+            .map(|(with, b)| Contact { with, overlap: own.overlap(&b) })
+            .filter(|c| c.overlap > tolerance)
+            .max_by(|a, b| a.overlap.total_cmp(&b.overlap));
+        if solid.is_some() || self.law != Law::Paper {
+            return solid;
+        }
+        let d_c = CONTACT_DISTANCE * self.spacing;
+        let up = self.up.unwrap_or(DVec3::Z);
+        self.pairs(body, up, 0.0)
+            .into_iter()
+            .map(|p| (d_c - p.from.length(), p.with))
+            .filter(|(overlap, _)| *overlap > 1e-9 * d_c)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(overlap, with)| Contact {
+                with: format!("{} (particles closer than d_c = {d_c:.6} m)", self.pair_name(with)),
+                overlap,
+            })
+    }
+
+    /// Least distance >= 0 along `up` that ends all contact [m].
+    fn lift(&self, body: &Solid, up: DVec3) -> f64 {
+        if self.law == Law::Paper { self.lift_pairs(body, up) } else { self.lift_surfaces(body, up) }
+    }
+
+    fn lift_surfaces(&self, body: &Solid, up: DVec3) -> f64 {
+        let boxes = self.boxes(body);
+        let start = body.oriented_box();
+        let mut total = 0.0;
+        // Each round clears at least one box for good: `up` never leads back into one.
+        for _ in 0..=boxes.len() {
+            let own = OrientedBox { center: start.center + total * up, ..start };
+            let overlaps = boxes.iter().filter(|(_, b)| own.overlap(b) > 1e-9 * self.spacing);
+            let lift = overlaps.map(|(_, b)| own.lift(b, up)).fold(0.0, f64::max);
+            if lift == 0.0 {
+                break;
+            }
+            total += lift;
+        }
+        total
+    }
+
+    /// Each pair forbids an interval of lifts; the answer is the end of the chain of intervals that holds 0.
+    fn lift_pairs(&self, body: &Solid, up: DVec3) -> f64 {
+        let d_c = CONTACT_DISTANCE * self.spacing;
+        let most = body.oriented_box().reach(up) * 2.0 + 2.0 * self.spacing;
+        let mut forbidden: Vec<(f64, f64)> = self
+            .pairs(body, up, most)
+            .into_iter()
+            .filter_map(|pair| {
+                let along = pair.from.dot(up);
+                let half2 = d_c * d_c - (pair.from.length_squared() - along * along);
+                (half2 > 0.0).then(|| (-along - half2.sqrt(), -along + half2.sqrt()))
+            })
+            .collect();
+        forbidden.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let tolerance = 1e-9 * d_c;
+        let mut lift = 0.0;
+        for (from, to) in forbidden {
+            if from >= lift - tolerance {
+                break;
+            }
+            if to > lift + tolerance {
+                lift = to;
+            }
+        }
+        lift
+    }
+
+    /// Pairs of wall-layer particles that come closer than d_c while the body rises by `most`.
+    fn pairs(&self, body: &Solid, up: DVec3, most: f64) -> Vec<Pair> {
+        let d_c = CONTACT_DISTANCE * self.spacing;
+        let own = body.oriented_box();
+        let (lo, hi) = {
+            let (a, b) = (own.center, own.center + most * up);
+            let reach = own.bounds() + d_c;
+            (a.min(b) - reach, a.max(b) + reach)
+        };
+        let near = |p: &DVec3| p.cmpge(lo).all() && p.cmple(hi).all();
+        let free = matches!(body.drive, Drive::Free(_));
+        let mut others: Vec<(DVec3, Partner)> = Vec::new();
+        if free {
+            let walls = self.fixed.wall.iter().zip(&self.fixed.shape_of);
+            others.extend(walls.filter(|(p, _)| near(p)).map(|(&p, &of)| (p, Partner::Wall(of))));
+        }
+        for (k, solid) in self.earlier.iter().enumerate() {
+            if free || matches!(solid.drive, Drive::Free(_)) {
+                others.extend(solid.wall_positions().filter(|p| near(p)).map(|p| (p, Partner::Solid(k))));
+            }
+        }
+        // Columns along `up`, d_c wide: only neighbouring ones can hold pairs.
+        let across = DMat3::from_cols(up.any_orthonormal_vector(), up.cross(up.any_orthonormal_vector()), up);
+        let column = |p: DVec3| {
+            let q = (across.transpose() * (p - own.center)) / d_c;
+            (q.x.floor() as i32, q.y.floor() as i32)
+        };
+        let mut columns: HashMap<(i32, i32), Vec<usize>> = HashMap::new();
+        for (index, (p, _)) in others.iter().enumerate() {
+            columns.entry(column(*p)).or_default().push(index);
+        }
+        let mut pairs = Vec::new();
+        for p in body.wall_positions() {
+            let (a, b) = column(p);
+            for key in (a - 1..=a + 1).flat_map(|a| (b - 1..=b + 1).map(move |b| (a, b))) {
+                for &index in columns.get(&key).into_iter().flatten() {
+                    let (q, with) = others[index];
+                    pairs.push(Pair { from: p - q, with });
+                }
+            }
+        }
+        pairs
+    }
+
+    fn pair_name(&self, with: Partner) -> String {
+        match with {
+            Partner::Wall(of) => {
+                self.fixed.shapes.get(of as usize).map_or("a wall".into(), |w| format!("wall `{}`", w.name))
+            }
+            Partner::Solid(k) => solid_name(self.earlier[k]),
+        }
+    }
+}
+
+/// A pair of wall-layer particles: from the other one to the body's.
+struct Pair {
+    from: DVec3,
+    with: Partner,
+}
+
+#[derive(Clone, Copy)]
+enum Partner {
+    Wall(u32),
+    Solid(usize),
+}
+
+fn solid_name(solid: &Solid) -> String {
+    format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name)
+}
+
+/// A point for messages.
+pub(super) fn point(p: DVec3) -> String {
+    format!("({:.4}, {:.4}, {:.4})", p.x, p.y, p.z)
+}

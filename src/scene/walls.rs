@@ -1,0 +1,311 @@
+//! Fixed and prescribed walls: the tank, obstacles, moving walls and planes, as particles and as boxes.
+
+use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
+use super::oriented::OrientedBox;
+use super::{Drive, Motion, Shape, Solid, WallShape};
+use crate::case::{self, Face};
+use glam::{DMat3, DQuat, DVec3, IVec3};
+
+/// Particles of the walls that never move.
+#[derive(Default, Debug)]
+pub(super) struct Fixed {
+    pub wall: Vec<DVec3>,
+    /// Unit normals into the free space, one a wall particle.
+    pub normal: Vec<DVec3>,
+    /// Index into `shapes`, one a wall particle.
+    pub shape_of: Vec<u32>,
+    pub dummy: Vec<DVec3>,
+    pub shapes: Vec<WallShape>,
+}
+
+/// Names of the tank's faces, in the order of [`Face`].
+const FACES: [(Face, &str); 6] = [
+    (Face::XMin, "tank.x_min"),
+    (Face::XMax, "tank.x_max"),
+    (Face::YMin, "tank.y_min"),
+    (Face::YMax, "tank.y_max"),
+    (Face::ZMin, "tank.z_min"),
+    (Face::ZMax, "tank.z_max"),
+];
+
+/// Name of the tank's face `2 axis + side`.
+pub(super) fn face_name(face: usize) -> &'static str {
+    FACES[face].1
+}
+
+/// Which faces carry a wall: `[min, max]` an axis. No y faces in two dimensions.
+pub(super) fn closed(open: &[Face], plane: bool) -> [[bool; 2]; 3] {
+    let wall = |axis: usize, side: usize| (axis != 1 || !plane) && !open.contains(&FACES[2 * axis + side].0);
+    std::array::from_fn(|axis| std::array::from_fn(|side| wall(axis, side)))
+}
+
+/// The tank with its layers: interior grown by `layers` on the closed faces.
+pub(super) fn outer(interior: Cells, closed: [[bool; 2]; 3], layers: i32) -> Cells {
+    let side = |s: usize| IVec3::from_array(std::array::from_fn(|k| if closed[k][s] { layers } else { 0 }));
+    Cells { lo: interior.lo - side(0), hi: interior.hi + side(1) }
+}
+
+impl Fixed {
+    /// Walls of the tank: everything outside of the interior, `layers` deep (largest distance along an
+    /// axis, so corners are filled).
+    pub fn tank(&mut self, tank: &case::Tank, lattice: &Lattice, grid: &mut Grid, layers: i32) {
+        let interior = lattice.tank_cells(tank.min.into(), tank.max.into());
+        let closed = closed(&tank.open, lattice.plane);
+        let outer = outer(interior, closed, layers);
+        let mut shape = [[u32::MAX; 2]; 3];
+        for axis in 0..3 {
+            for side in 0..2 {
+                if closed[axis][side] {
+                    let mut slab = outer;
+                    if side == 0 {
+                        slab.hi[axis] = interior.lo[axis];
+                    } else {
+                        slab.lo[axis] = interior.hi[axis];
+                    }
+                    shape[axis][side] = self.add_shape(face_name(2 * axis + side), lattice, slab);
+                }
+            }
+        }
+        for c in outer.iter() {
+            let below = interior.lo - c;
+            let above = c - interior.hi + 1;
+            let depth = below.max(above).max_element();
+            if depth <= 0 {
+                continue;
+            }
+            grid.set(c, SOLID);
+            if depth > 1 {
+                self.dummy.push(lattice.center(c));
+                continue;
+            }
+            let (mut normal, mut of) = (DVec3::ZERO, u32::MAX);
+            for axis in 0..3 {
+                let side = if below[axis] > 0 {
+                    0
+                } else if above[axis] > 0 {
+                    1
+                } else {
+                    continue;
+                };
+                normal[axis] = if side == 0 { 1.0 } else { -1.0 };
+                of = shape[axis][side];
+            }
+            self.push_wall(lattice.center(c), normal, of);
+        }
+    }
+
+    /// A fixed box: a shell of `layers` inside of it, hollow beyond. Cells that are taken stay as they are;
+    /// their number is returned.
+    pub fn obstacle(
+        &mut self,
+        obstacle: &case::Obstacle,
+        lattice: &Lattice,
+        grid: &mut Grid,
+        layers: i32,
+    ) -> usize {
+        let cells = lattice.cells(obstacle.min.into(), obstacle.max.into());
+        let of = self.add_shape(&obstacle.name, lattice, cells);
+        let (shell, taken) = shell(cells, closed(&obstacle.open, lattice.plane), grid, layers);
+        for cell in shell {
+            let p = lattice.center(cell.at);
+            if cell.depth > 0 {
+                self.dummy.push(p);
+            } else {
+                self.push_wall(p, cell.outward, of);
+            }
+        }
+        taken
+    }
+
+    /// A plane: a patch of its own lattice, wall layer l0/2 behind the surface, dummies deeper. Returns how
+    /// many particles were left out because another wall already stands there.
+    pub fn plane(&mut self, plane: &case::Plane, lattice: &Lattice, grid: &mut Grid, layers: i32) -> usize {
+        let frame = PlaneFrame::new(plane, lattice);
+        let slab = frame.slab(layers);
+        let l0 = lattice.spacing;
+        let earlier: Vec<OrientedBox> = self.shapes[..].iter().map(OrientedBox::from).collect();
+        let on_lattice: Vec<bool> = self.shapes.iter().map(|s| s.axes == DMat3::IDENTITY).collect();
+        let of = self.shapes.len() as u32;
+        self.shapes.push(WallShape {
+            name: plane.name.clone(),
+            center: slab.center,
+            half: slab.half,
+            axes: slab.axes,
+        });
+        let mut left_out = 0;
+        for depth in 0..layers {
+            for i in 0..frame.n[0] {
+                for j in 0..frame.n[1] {
+                    let u = (f64::from(i) + 0.5 - 0.5 * f64::from(frame.n[0])) * l0;
+                    let v = (f64::from(j) + 0.5 - 0.5 * f64::from(frame.n[1])) * l0;
+                    let w = -(f64::from(depth) + 0.5) * l0;
+                    let mut p = frame.center + frame.axes * DVec3::new(u, v, w);
+                    if lattice.plane {
+                        p.y = 0.0;
+                    }
+                    let in_plane =
+                        earlier.iter().zip(&on_lattice).any(|(b, &on)| !on && b.holds(p, 1e-6 * l0));
+                    if in_plane || near_solid(lattice, grid, p) {
+                        left_out += 1;
+                    } else if depth > 0 {
+                        self.dummy.push(p);
+                    } else {
+                        self.push_wall(p, frame.axes.z_axis, of);
+                    }
+                }
+            }
+        }
+        // Water keeps out of the layers, and no closer than about 3/4 l0 to the wall layer's centres.
+        let grown = OrientedBox { half: slab.half + 0.25 * l0, ..slab };
+        let reach = grown.bounds();
+        let range = lattice.cells(slab.center - reach, slab.center + reach);
+        let range = Cells { lo: range.lo.max(grid.cells.lo), hi: range.hi.min(grid.cells.hi) };
+        for c in range.iter() {
+            if grid.get(c) == FREE && grown.holds(lattice.center(c), 0.0) {
+                grid.set(c, BLOCKED);
+            }
+        }
+        left_out
+    }
+
+    fn add_shape(&mut self, name: &str, lattice: &Lattice, cells: Cells) -> u32 {
+        let (lo, hi) = (lattice.corner(cells.lo), lattice.corner(cells.hi));
+        self.shapes.push(WallShape {
+            name: name.to_owned(),
+            center: 0.5 * (lo + hi),
+            half: 0.5 * (hi - lo),
+            axes: DMat3::IDENTITY,
+        });
+        self.shapes.len() as u32 - 1
+    }
+
+    fn push_wall(&mut self, p: DVec3, normal: DVec3, of: u32) {
+        self.wall.push(p);
+        self.normal.push(normal.normalize_or_zero());
+        self.shape_of.push(of);
+    }
+}
+
+/// A cell of a shell: its layer and the sum of the outward normals of the faces that it lies on.
+struct ShellCell {
+    at: IVec3,
+    depth: i32,
+    outward: DVec3,
+}
+
+/// Cells of a hollow box, `layers` deep from its closed faces. Marks the whole box in the grid; also returns
+/// how many cells were taken before.
+fn shell(cells: Cells, closed: [[bool; 2]; 3], grid: &mut Grid, layers: i32) -> (Vec<ShellCell>, usize) {
+    let (mut shell, mut taken) = (Vec::new(), 0);
+    for c in cells.iter() {
+        if grid.get(c) != FREE {
+            taken += 1;
+            continue;
+        }
+        let (mut depth, mut outward) = (i32::MAX, DVec3::ZERO);
+        for axis in 0..3 {
+            let distance = [c[axis] - cells.lo[axis], cells.hi[axis] - 1 - c[axis]];
+            for side in 0..2 {
+                if closed[axis][side] {
+                    depth = depth.min(distance[side]);
+                    if distance[side] == 0 {
+                        outward[axis] += if side == 0 { -1.0 } else { 1.0 };
+                    }
+                }
+            }
+        }
+        grid.set(c, if depth < layers { SOLID } else { BLOCKED });
+        if depth < layers {
+            shell.push(ShellCell { at: c, depth, outward });
+        }
+    }
+    (shell, taken)
+}
+
+/// A wall that follows a table, without slots yet; and how many of its cells were taken before.
+pub(super) fn moving_wall(
+    wall: &case::MovingWall,
+    lattice: &Lattice,
+    grid: &mut Grid,
+    layers: i32,
+) -> (Solid, usize) {
+    let cells = lattice.cells(wall.min.into(), wall.max.into());
+    let (lo, hi) = (lattice.corner(cells.lo), lattice.corner(cells.hi));
+    let position = 0.5 * (lo + hi);
+    let l0 = lattice.spacing;
+    let mut solid = Solid {
+        name: wall.name.clone(),
+        is_body: false,
+        shape: Shape::Box { half: 0.5 * (hi - lo) },
+        position,
+        orientation: DQuat::IDENTITY,
+        drive: Drive::Prescribed(motion(&wall.motion, lattice.plane)),
+        wall_slots: 0..0,
+        dummy_slots: 0..0,
+        wall_offset: Vec::new(),
+        dummy_offset: Vec::new(),
+        wall_area: Vec::new(),
+        wall_to_surface: Vec::new(),
+    };
+    let (shell, taken) = shell(cells, closed(&wall.open, lattice.plane), grid, layers);
+    for cell in shell {
+        let offset = lattice.center(cell.at) - position;
+        if cell.depth > 0 {
+            solid.dummy_offset.push(offset);
+        } else {
+            solid.wall_offset.push(offset);
+            solid.wall_area.push(cell.outward * l0 * l0);
+            solid.wall_to_surface.push(cell.outward * 0.5 * l0);
+        }
+    }
+    (solid, taken)
+}
+
+/// A table of motion from rows of a case.
+pub(super) fn motion(rows: &[[f64; 4]], plane: bool) -> Motion {
+    Motion {
+        time: rows.iter().map(|r| r[0]).collect(),
+        displacement: rows.iter().map(|r| DVec3::new(r[1], if plane { 0.0 } else { r[2] }, r[3])).collect(),
+    }
+}
+
+/// Frame and size in particles of a plane.
+pub(super) struct PlaneFrame {
+    pub center: DVec3,
+    /// Columns: along, across, normal.
+    pub axes: DMat3,
+    pub n: [i32; 2],
+    spacing: f64,
+}
+
+impl PlaneFrame {
+    pub fn new(plane: &case::Plane, lattice: &Lattice) -> Self {
+        let (mut center, mut normal): (DVec3, DVec3) = (plane.center.into(), plane.normal.into());
+        let mut along: DVec3 = plane.along.into();
+        let cells = |length: f64| (length / lattice.spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
+        let mut n = [cells(plane.size[0]), cells(plane.size[1])];
+        if lattice.plane {
+            (center.y, normal.y, along.y, n[1]) = (0.0, 0.0, 0.0, 1);
+        }
+        let normal = normal.normalize();
+        let along = (along - along.dot(normal) * normal).normalize();
+        Self {
+            center,
+            axes: DMat3::from_cols(along, normal.cross(along), normal),
+            n,
+            spacing: lattice.spacing,
+        }
+    }
+    /// The layers as a box.
+    pub fn slab(&self, layers: i32) -> OrientedBox {
+        let half = 0.5 * self.spacing * DVec3::new(self.n[0].into(), self.n[1].into(), layers.into());
+        OrientedBox { center: self.center - self.axes.z_axis * half.z, half, axes: self.axes }
+    }
+}
+
+/// Whether a lattice particle of a wall stands closer than l0/2.
+fn near_solid(lattice: &Lattice, grid: &Grid, p: DVec3) -> bool {
+    let at = lattice.cell(p);
+    let near = Cells { lo: at, hi: at + 1 }.grown(lattice.step(1));
+    near.iter().any(|c| grid.get(c) == SOLID && lattice.center(c).distance(p) < 0.5 * lattice.spacing)
+}

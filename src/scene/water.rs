@@ -1,0 +1,155 @@
+//! Water at t = 0: filling the free cells, making room for bodies, and looking for leaks.
+
+use super::lattice::{Cells, FLUID, FREE, Grid, Lattice, REACHED};
+use super::oriented::OrientedBox;
+use super::placement::point;
+use super::walls::face_name;
+use crate::case;
+use glam::{DVec3, IVec3};
+
+/// The cells that hold water, with the velocity at t = 0.
+#[derive(Default, Debug)]
+pub(super) struct Water {
+    pub cell: Vec<IVec3>,
+    pub velocity: Vec<DVec3>,
+}
+
+impl Water {
+    /// Fills the free cells of a block; returns how many.
+    pub fn fill(&mut self, block: &case::Block, lattice: &Lattice, grid: &mut Grid) -> usize {
+        let before = self.cell.len();
+        let mut velocity: DVec3 = block.velocity.into();
+        if lattice.plane {
+            velocity.y = 0.0;
+        }
+        for c in lattice.cells(block.min.into(), block.max.into()).iter() {
+            if grid.get(c) == FREE {
+                grid.set(c, FLUID);
+                self.cell.push(c);
+                self.velocity.push(velocity);
+            }
+        }
+        self.cell.len() - before
+    }
+
+    /// Number of particles whose centres lie inside a box or on its faces.
+    pub fn inside(&self, body: &OrientedBox, lattice: &Lattice) -> usize {
+        let margin = -1e-6 * lattice.spacing;
+        self.cell.iter().filter(|&&c| body.holds(lattice.center(c), margin)).count()
+    }
+
+    /// Removes the particles whose centres lie inside a box or on its faces.
+    pub fn remove(&mut self, body: &OrientedBox, lattice: &Lattice, grid: &mut Grid) {
+        let margin = -1e-6 * lattice.spacing;
+        let keep: Vec<bool> = self.cell.iter().map(|&c| !body.holds(lattice.center(c), margin)).collect();
+        for (&c, _) in self.cell.iter().zip(&keep).filter(|(_, keep)| !**keep) {
+            grid.set(c, FREE);
+        }
+        let mut kept = keep.iter();
+        self.cell.retain(|_| kept.next().copied().unwrap_or(true));
+        let mut kept = keep.iter();
+        self.velocity.retain(|_| kept.next().copied().unwrap_or(true));
+    }
+
+    /// Largest depth along gravity [m]: the highest column of cells where gravity follows an axis of the
+    /// lattice (air in between not counted), else the extent of all water.
+    pub fn depth(&self, gravity: DVec3, lattice: &Lattice) -> f64 {
+        if self.cell.is_empty() {
+            return 0.0;
+        }
+        let axis = (0..3).find(|&k| gravity[k].abs() >= (1.0 - 1e-9) * gravity.length());
+        if let Some(axis) = axis {
+            let mut columns = std::collections::HashMap::new();
+            for c in &self.cell {
+                let mut foot = *c;
+                foot[axis] = 0;
+                *columns.entry(foot).or_insert(0u32) += 1;
+            }
+            return f64::from(columns.into_values().max().unwrap_or(0)) * lattice.spacing;
+        }
+        let down = gravity.normalize();
+        let (low, high) = self.cell.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &c| {
+            let s = lattice.center(c).dot(down);
+            (a.min(s), b.max(s))
+        });
+        high - low + lattice.spacing
+    }
+
+    /// Whether water at rest would run away: spreads it sideways and down through free cells (gates and
+    /// moving walls are closed) and complains when it gets out of everything there is.
+    ///
+    /// Without gravity water has no reason to run, so a free drop is no leak.
+    pub fn leak(
+        &self,
+        gravity: DVec3,
+        lattice: &Lattice,
+        grid: &mut Grid,
+        tank: Option<Cells>,
+    ) -> Option<String> {
+        let g = gravity.length();
+        if g == 0.0 || self.cell.is_empty() {
+            return None;
+        }
+        // Half a turn's worth of directions: what rises by more than 30 degrees does not count.
+        let ways: Vec<IVec3> = (0..6)
+            .filter(|way| !(lattice.plane && way / 2 == 1))
+            .map(|way| {
+                IVec3::from_array(std::array::from_fn(|k| {
+                    if k == way / 2 { 2 * (way as i32 % 2) - 1 } else { 0 }
+                }))
+            })
+            .filter(|way| way.as_dvec3().dot(gravity) >= -0.5 * g)
+            .collect();
+        let mut queue: Vec<(IVec3, usize)> = self.cell.iter().map(|&c| (c, usize::MAX)).collect();
+        let mut next = 0;
+        while next < queue.len() {
+            let (c, _) = queue[next];
+            for &way in &ways {
+                let to = c + way;
+                if !grid.cells.contains(to) {
+                    return Some(describe(&queue, next, lattice, tank));
+                }
+                if grid.get(to) == FREE {
+                    grid.set(to, REACHED);
+                    queue.push((to, next));
+                }
+            }
+            next += 1;
+        }
+        None
+    }
+}
+
+/// The message of a leak: where the path crosses the tank's interior, if there is one.
+fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Option<Cells>) -> String {
+    let mut at = end;
+    let mut path = vec![queue[at].0];
+    while queue[at].1 != usize::MAX {
+        at = queue[at].1;
+        path.push(queue[at].0);
+    }
+    let start = *path.last().unwrap_or(&queue[end].0);
+    let Some(tank) = tank else {
+        return format!(
+            "water at {} has nothing that holds it: give a [tank], or set run.gravity to zero for a free drop",
+            point(lattice.center(start))
+        );
+    };
+    if !tank.contains(start) {
+        return format!(
+            "water at {} lies outside of the tank: make the block smaller or the tank larger",
+            point(lattice.center(start))
+        );
+    }
+    // The path runs from its end back to the water.
+    let out = path.iter().rev().find(|&&c| !tank.contains(c)).copied();
+    let face = (0..6).find(|&f| {
+        let (axis, c) = (f / 2, out.unwrap_or(queue[end].0));
+        if f % 2 == 0 { c[axis] < tank.lo[axis] } else { c[axis] >= tank.hi[axis] }
+    });
+    format!(
+        "water can leave through {} at {}: remove that face from tank.open, or put a wall in front of it",
+        face.map_or("the tank's side", face_name),
+        point(lattice.center(out.unwrap_or(queue[end].0)))
+    )
+}

@@ -1,0 +1,325 @@
+//! Case files: every kind of error points at its key and says what to do; the cases that come with seixo build.
+
+use seixo::case::{Case, file};
+use seixo::scene::Scene;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn strings(sets: &[&str]) -> Vec<String> {
+    sets.iter().map(|s| (*s).to_owned()).collect()
+}
+
+/// A small sound case: one key a line, so that a test can replace one.
+const SOUND: &str = r#"[run]
+spacing = 0.1
+time_step = 1e-3
+end = 1.0
+
+[tank]
+min = [0.0, 0.0, 0.0]
+max = [1.0, 1.0, 1.0]
+open = ["z_max"]
+
+[fluid]
+density = 1000.0
+sound_speed = 5.0
+[[fluid.block]]
+min = [0.0, 0.0, 0.0]
+max = [0.5, 1.0, 0.5]
+
+[[moving_wall]]
+name = "gate"
+min = [0.5, 0.0, 0.0]
+max = [0.6, 1.0, 1.0]
+open = ["y_min", "y_max"]
+motion = [[0, 0, 0, 0], [1, 0, 0, 1]]
+
+[[body]]
+name = "cube"
+size = [0.2, 0.2, 0.2]
+center = [0.8, 0.5, 0.1]
+density = 500.0
+locked = ["y"]
+
+[contact]
+law = "smooth"
+spring = 1e4
+damping = 10.0
+
+[[gauge.force]]
+name = "force"
+on = "cube"
+"#;
+
+/// What to replace, by what, and what the message must hold.
+const WRONG: &[(&str, &str, &[&str])] = &[
+    // what serde and the TOML reader find
+    (
+        "end = 1.0",
+        "edn = 1.0",
+        &["test.toml:4:1", "run.edn: unknown field `edn`", "did you mean `end`?", "time_step"],
+    ),
+    ("end = 1.0", "end = \"soon\"", &["test.toml:4:7", "run.end: invalid type", "expected f64"]),
+    ("end = 1.0\n", "", &["test.toml:1:1", "run: missing field `end`", "add `end = ...`"]),
+    ("end = 1.0", "end = 1.0\nend = 2.0", &["test.toml:5:1", "duplicate key"]),
+    ("[tank]", "[tank", &["test.toml:6:6"]),
+    ("\"smooth\"", "\"smoth\"", &["contact.law: unknown variant `smoth`", "did you mean `smooth`?", "paper"]),
+    ("[\"z_max\"]", "[\"top\"]", &["tank.open.0: unknown variant `top`", "allowed: x_min", "z_max"]),
+    ("[0.2, 0.2, 0.2]", "[0.2, 0.2]", &["body.0.size", "length 2"]),
+    ("[contact]", "[contcat]", &["unknown field `contcat`", "did you mean `contact`?"]),
+    // numbers
+    ("spacing = 0.1", "spacing = nan", &["test.toml:2:1", "run.spacing: NaN is not a finite number"]),
+    (
+        "spacing = 0.1",
+        "spacing = -0.1",
+        &["test.toml:2:1", "run.spacing: -0.1 is out of range", "more than 0 m"],
+    ),
+    ("end = 1.0", "end = inf", &["run.end: inf is not a finite number"]),
+    ("[0.8, 0.5, 0.1]", "[0.8, nan, 0.1]", &["test.toml:28:16", "body.0.center.1: NaN"]),
+    ("time_step = 1e-3", "time_step = 0", &["run.time_step: 0 is out of range"]),
+    ("end = 1.0", "end = 1.0\ndimensions = 4", &["run.dimensions: 4", "allowed: 2, 3"]),
+    ("end = 1.0", "end = 1.0\neffective_radius = 0.9", &["run.effective_radius: 0.9"]),
+    (
+        "sound_speed = 5.0",
+        "sound_speed = 250.0",
+        &["fluid.sound_speed: relaxation gamma = 6.250 is unstable"],
+    ),
+    ("sound_speed = 5.0", "relaxation = 4.0", &["fluid.relaxation: relaxation gamma = 4.000 is unstable"]),
+    ("sound_speed = 5.0", "relaxation = 0.0", &["fluid.relaxation: 0 is out of range"]),
+    (
+        "sound_speed = 5.0",
+        "sound_speed = 5.0\nrelaxation = 0.1",
+        &["`relaxation` and `sound_speed` exclude each other"],
+    ),
+    (
+        "sound_speed = 5.0",
+        "free_surface_threshold = 1.0",
+        &["fluid.free_surface_threshold: 1 is out of range"],
+    ),
+    ("sound_speed = 5.0", "compressibility = 0.0", &["fluid.compressibility: 0 is out of range", "1e-10"]),
+    ("sound_speed = 5.0", "solver.tolerance = 1.0", &["fluid.solver.tolerance: 1 is out of range"]),
+    ("sound_speed = 5.0", "solver.max_iterations = 0", &["fluid.solver.max_iterations"]),
+    // shapes
+    ("max = [1.0, 1.0, 1.0]", "max = [1.0, 0.0, 1.0]", &["test.toml:8:1", "tank is empty along y"]),
+    (
+        "max = [0.5, 1.0, 0.5]",
+        "max = [0.05, 1.0, 0.5]",
+        &["fluid.block.0: the block is 0.0500 m", "run.spacing = 0.05 or less"],
+    ),
+    ("spacing = 0.1", "spacing = 0.11", &["moving wall `gate` is 0.1000 m across along x", "0.1 or less"]),
+    (
+        "[0.2, 0.2, 0.2]",
+        "[0.2, 0.07, 0.2]",
+        &["body.0.size: body `cube` is 0.0700 m across along y", "0.07 or less"],
+    ),
+    ("[1, 0, 0, 1]]", "[0, 0, 0, 1]]", &["moving_wall.0.motion.1.0: time 0 does not come after 0"]),
+    ("[[0, 0, 0, 0], [1, 0, 0, 1]]", "[]", &["moving_wall.0.motion: the table of motion has no rows"]),
+    ("max = [1.0, 1.0, 1.0]", "max = [1e9, 1e9, 1e9]", &["tank: the tank takes up or lies beyond"]),
+    ("[0.2, 0.2, 0.2]", "[2e5, 2e5, 2e5]", &["body.0.size: body `cube` takes up"]),
+    ("open = [\"z_max\"]", "open = [\"z_max\", \"z_max\"]", &["tank.open.1: `z_max` is listed twice"]),
+    // bodies and contact
+    ("density = 500.0\n", "density = 500.0\nmass = 4.0\n", &["body.0.density: `mass` and `density` exclude"]),
+    ("density = 500.0\n", "", &["body.0: body `cube` has neither mass nor density"]),
+    ("density = 500.0", "density = -500.0", &["body.0.density: -500 is out of range"]),
+    ("locked = [\"y\"]", "locked = [\"y\", \"y\"]", &["body.0.locked.1: listed twice"]),
+    ("locked = [\"y\"]", "inertia = [1, 1, 3]", &["body.0.inertia: one moment exceeds"]),
+    ("locked = [\"y\"]", "orientation = { axis = [0, 0, 0], angle_deg = 10 }", &["body.0.orientation.axis"]),
+    (
+        "damping = 10.0",
+        "damping = 10.0\nrestitution = 0.5",
+        &["`damping` and `restitution` exclude each other", "keep one"],
+    ),
+    ("damping = 10.0", "viscous_friction = 1.0", &["contact.viscous_friction", "belongs to law = \"paper\""]),
+    (
+        "law = \"smooth\"",
+        "law = \"paper\"\nfriction = 0.3",
+        &["contact.friction", "belongs to law = \"smooth\""],
+    ),
+    (
+        "[contact]\nlaw = \"smooth\"\nspring = 1e4\ndamping = 10.0\n",
+        "",
+        &["body `cube` can move, but there is no [contact]"],
+    ),
+    ("damping = 10.0", "substeps = 0", &["contact.substeps: 0 sub-steps"]),
+    // names and gauges
+    ("name = \"cube\"", "name = \"gate\"", &["body.0.name: the name `gate` is taken by moving_wall.0"]),
+    (
+        "on = \"cube\"",
+        "on = \"cub\"",
+        &["gauge.force.0.on: no body or moving wall is called `cub`", "did you mean `cube`?"],
+    ),
+];
+
+#[test]
+fn errors_point_at_the_key_and_say_what_to_do() {
+    file::parse("test.toml", SOUND.into(), &[]).unwrap_or_else(|e| panic!("the sound case: {e}"));
+    for (from, to, words) in WRONG {
+        assert!(SOUND.contains(from), "`{from}` is not in the sound case");
+        let message = match file::parse("test.toml", SOUND.replacen(from, to, 1), &[]) {
+            Ok(_) => panic!("`{to}` was accepted"),
+            Err(error) => {
+                assert_eq!(error.exit_code(), 2);
+                error.to_string()
+            }
+        };
+        for word in *words {
+            assert!(message.contains(word), "`{to}`: `{word}` is not in:\n{message}");
+        }
+        assert!(message.contains("test.toml:"), "`{to}`: no line in:\n{message}");
+    }
+}
+
+#[test]
+fn all_problems_are_listed_at_once() {
+    let text = SOUND
+        .replace("end = 1.0", "end = -1.0")
+        .replace("spring = 1e4", "spring = 0")
+        .replace("on = \"cube\"", "on = \"x\"");
+    let message = file::parse("test.toml", text, &[]).unwrap_err().to_string();
+    for word in ["run.end", "contact.spring", "gauge.force.0.on", "test.toml:4:1"] {
+        assert!(message.contains(word), "{message}");
+    }
+}
+
+#[test]
+fn large_relaxation_warns() {
+    let text = SOUND.replace("sound_speed = 5.0", "relaxation = 0.8");
+    let (_, _, warnings) = file::parse("test.toml", text, &[]).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(warnings.len(), 1);
+    assert!(
+        warnings[0].contains("makes the pressure noisy") && warnings[0].contains("test.toml:"),
+        "{}",
+        warnings[0]
+    );
+}
+
+#[test]
+fn overrides_edit_the_text() {
+    let sets = strings(&[
+        "body.0.density=780 ",
+        "body.0.center.2=0.3",
+        "contact.law=paper",
+        "run.adaptive=true",
+        "fluid.solver.tolerance=1e-4",
+        "output.every=0.5",
+    ]);
+    let text = SOUND.replace("density = 500.0", "density = 500.0 # pine");
+    let (case, text, _) = file::parse("test.toml", text, &sets).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(case.body[0].density, Some(780.0));
+    assert_eq!(case.body[0].center, [0.8, 0.5, 0.3]);
+    assert!(case.run.adaptive);
+    assert_eq!(case.fluid.map(|f| f.solver.tolerance), Some(1e-4));
+    assert!((case.output.every - 0.5).abs() < 1e-12);
+    assert!(text.contains("density = 780 # pine"), "{text}");
+}
+
+#[test]
+fn a_spacing_that_is_no_number_is_refused_like_any_other() {
+    let path = root().join("cases/hydrostatic.toml");
+    let message = file::load(&path, Some(f64::NAN), &[]).unwrap_err().to_string();
+    assert!(message.contains("run.spacing: NaN is not a finite number"), "{message}");
+    assert!(message.contains("lines are counted with --spacing and --set applied"), "{message}");
+    let loaded = file::load(&path, Some(0.05), &[]).unwrap_or_else(|e| panic!("{e}"));
+    assert!((loaded.case.run.spacing - 0.05).abs() < 1e-15);
+}
+
+#[test]
+fn overrides_that_fit_nothing() {
+    for (set, words) in [
+        ("body.3.density=1", "index 3 is out of range: `body` has 1 entry"),
+        ("body.cube.density=1", "`cube` should be an index"),
+        ("run.spacing.x=1", "`run.spacing` is a float"),
+        ("run.spacing", "expected key=value"),
+        ("body.0.center.7=1", "index 7 is out of range"),
+        ("run.0=1", "unknown field `0`"),
+        ("run.sapcing=1", "did you mean `spacing`?"),
+        ("run..end=1", "empty part"),
+    ] {
+        let message = file::parse("test.toml", SOUND.into(), &strings(&[set])).unwrap_err().to_string();
+        assert!(message.contains(words), "`{set}`: {message}");
+    }
+}
+
+#[test]
+fn a_missing_file_names_its_neighbour() {
+    let message = file::load(&root().join("cases/dam_brake.toml"), None, &[]).unwrap_err().to_string();
+    assert!(message.contains("no case file at") && message.contains("did you mean"), "{message}");
+    assert!(message.contains("dam_break.toml"), "{message}");
+}
+
+/// Coarse spacings for the cases that come along; each divides what it must.
+#[test]
+fn all_cases_parse_and_build() {
+    let coarse = [("dam_break_transport.toml", 0.03), ("dam_break.toml", 0.05), ("falling_cube.toml", 0.05)];
+    let mut seen = 0;
+    for entry in std::fs::read_dir(root().join("cases")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        seen += 1;
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let spacing = coarse.iter().find(|c| c.0 == name).map(|c| c.1);
+        let loaded = file::load(&path, spacing, &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert!(loaded.warnings.is_empty(), "{name}: {:?}", loaded.warnings);
+        assert!(
+            loaded.text.starts_with("#:schema ../schema/case.schema.json\n#"),
+            "{name} has no head comment"
+        );
+        let scene = Scene::build(&loaded.case).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(scene.groups.total() > 100, "{name}");
+        for (p, v) in scene.position.iter().zip(&scene.velocity) {
+            assert!(p.is_finite() && v.is_finite());
+            assert!(p.cmpge(scene.domain.0).all() && p.cmple(scene.domain.1).all(), "{name}: {p} outside");
+        }
+    }
+    assert!(seen >= 8, "{seen} cases");
+}
+
+/// The alternatives that the cases' comments name.
+#[test]
+fn alternatives_in_comments_are_right() {
+    let mut tried = 0;
+    for entry in std::fs::read_dir(root().join("cases")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        for line in text.lines().filter(|l| l.starts_with('#')) {
+            // Columns of a table of rows are separate alternatives.
+            for part in line.split("   ").flat_map(|p| p.split(" CL")) {
+                let words: Vec<&str> = part.split_whitespace().collect();
+                let sets: Vec<&str> =
+                    words.windows(2).filter(|w| w[0].ends_with("--set")).map(|w| w[1]).collect();
+                if sets.is_empty() || (sets.len() == 1 && sets[0].starts_with("contact.viscous")) {
+                    continue;
+                }
+                tried += 1;
+                let sets: Vec<&str> = sets.iter().map(|s| s.trim_end_matches([')', ',', ';'])).collect();
+                let loaded = file::load(&path, None, &strings(&sets));
+                let built = loaded.and_then(|l| Scene::build(&l.case));
+                built.map(drop).unwrap_or_else(|e| panic!("{}: {sets:?}: {e}", path.display()));
+            }
+        }
+    }
+    assert!(tried > 10, "{tried}");
+}
+
+/// `seixo schema > schema/case.schema.json` after a change of the case's structs (or SEIXO_WRITE_SCHEMA=1 here).
+#[test]
+fn the_committed_schema_is_current() {
+    let path = root().join("schema/case.schema.json");
+    if std::env::var_os("SEIXO_WRITE_SCHEMA").is_some() {
+        std::fs::write(&path, Case::schema()).unwrap();
+    }
+    let committed = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(committed == Case::schema(), "{} is out of date", shown(&path));
+}
+
+fn shown(path: &Path) -> String {
+    path.strip_prefix(root()).unwrap_or(path).display().to_string()
+}

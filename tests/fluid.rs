@@ -1,0 +1,421 @@
+//! The fluid against analytic answers, brute force and measured figures of the scheme.
+#![allow(missing_docs)]
+
+mod common;
+use common::*;
+use glam::{DMat3, DVec3};
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
+use seixo::fields::State;
+use seixo::kernels::pressure_source::laplacian_coefficient;
+use seixo::params::{Lattice, Params, Step};
+use seixo::plan::{Plan, Stage};
+use seixo::pressure::cg::{Jacobi, System, Workspace, dot, solve};
+use seixo::pressure::multigrid::Multigrid;
+use seixo::pressure::{Outcome, Settings};
+use seixo::scene::Scene;
+
+const TIGHT: Settings = Settings { tolerance: 1e-10, max_iterations: 2000, warm_start: false };
+
+/// A backend stopped after the right side of the PPE, with positions shaken by up to `shake` spacings.
+fn prepared(text: &seixo::case::Case, shake: f64) -> (Cpu, Params, Step) {
+    let mut scene = Scene::build(text).unwrap();
+    let mut seed = 1_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 40) as f64 / (1_u64 << 23) as f64 - 1.0
+    };
+    for i in 0..scene.groups.fluid {
+        let mut r = || DVec3::new(random(), random(), random());
+        scene.position[i] += shake * scene.spacing * r();
+        scene.velocity[i] += 0.1 * r();
+    }
+    let params = Params::new(text, &scene).unwrap();
+    let plan = Plan::new(text, &scene, &params);
+    let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
+    let step = params.step(0.0, text.run.time_step, 1.0);
+    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+        cpu.run(stage, &step).unwrap();
+    }
+    (cpu, params, step)
+}
+
+#[test]
+fn lattice_sums() {
+    let l = Lattice::new(3, 2.1);
+    assert!((l.number_density - 14.41858).abs() < 1e-5);
+    assert!((l.laplacian - 1.70174).abs() < 1e-5);
+    assert_eq!(l.neighbours, 32);
+}
+
+#[test]
+fn the_neighbour_list_is_what_brute_force_finds() {
+    let (cpu, params, _) = prepared(&hydrostatic_of_depth(0.2, 0.025, 1e-3, ""), 0.3);
+    let x = &cpu.fields().position;
+    let mut pairs = 0;
+    for i in 0..cpu.groups().fluid {
+        let mut found: Vec<u32> = cpu.neighbours().all(i).neighbour.to_vec();
+        found.sort_unstable();
+        let expected: Vec<u32> = (0..x.len())
+            .filter(|&j| j != i && x[i].distance_squared(x[j]) < params.effective_radius.powi(2))
+            .map(|j| j as u32)
+            .collect();
+        assert_eq!(found, expected, "particle {i}");
+        pairs += found.len();
+    }
+    assert!(pairs > 25 * cpu.groups().fluid, "too few pairs to mean anything: {pairs}");
+}
+
+#[test]
+fn the_static_lattice_has_the_initial_number_density() {
+    let (cpu, params, _) = prepared(&hydrostatic(0.025, 1e-3, ""), 0.0);
+    let fields = cpu.fields();
+    let (mut inner, mut walls) = (0, 0);
+    for i in 0..cpu.groups().pressure() {
+        let (low, high) = (fields.position[i].z < 0.5 - 3.0 * 0.025, fields.state[i] == State::Inner);
+        if low && high {
+            assert!((fields.number_density[i] / params.number_density - 1.0).abs() < 1e-5, "slot {i}");
+            inner += 1;
+            walls += usize::from(i >= cpu.groups().fluid);
+        }
+    }
+    assert!(inner > 2000 && walls > 400, "{inner} inner, {walls} of them walls");
+}
+
+#[test]
+fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pressure_are_exact() {
+    let text = hydrostatic(0.05, 1e-3, "relaxation = 1e-12");
+    let (mut cpu, params, step) = prepared(&text, 0.0);
+    // On the lattice, div of v = B x is tr B; away from walls, where the neighbours' velocity is linear too.
+    let b =
+        DMat3::from_cols(DVec3::new(0.3, 0.7, -0.2), DVec3::new(0.1, 0.5, 0.9), DVec3::new(0.4, -0.6, 1.1));
+    let mut fields = cpu.fields().clone();
+    for i in 0..fields.velocity.len() {
+        fields.velocity[i] = b * fields.position[i];
+    }
+    let gradient = DVec3::new(120.0, -340.0, 560.0);
+    for i in 0..fields.pressure.len() {
+        fields.pressure[i] = 1e4 + gradient.dot(fields.position[i]);
+    }
+    cpu.write(&fields).unwrap();
+    cpu.run(Stage::PressureSource, &step).unwrap();
+    cpu.run(Stage::PressureGradient, &step).unwrap();
+    let expected = -(0.3 + 0.5 + 1.1) * params.density / step.dt;
+    let mut checked = 0;
+    for i in 0..cpu.groups().fluid {
+        let x = cpu.fields().position[i];
+        let clear = |a: f64, top: f64| a > 0.06 && a < top - 0.06;
+        if clear(x.x, 0.25) && clear(x.y, 0.25) && clear(x.z, 0.45) {
+            let source = cpu.fields().source[i];
+            assert!((source / expected - 1.0).abs() < 1e-6, "{source} for {expected}");
+            let a = cpu.fields().acceleration[i];
+            assert!((a + gradient / params.density).length() < 1e-9, "{a}");
+            checked += 1;
+        }
+    }
+    assert!(checked >= 12, "{checked}");
+}
+
+#[test]
+fn the_corrected_gradient_stays_exact_on_shaken_positions() {
+    let text = hydrostatic(0.025, 1e-3, "");
+    let (mut cpu, params, step) = prepared(&text, 0.2);
+    let gradient = DVec3::new(120.0, -340.0, 560.0);
+    let mut fields = cpu.fields().clone();
+    let l0 = params.spacing;
+    let mut checked = 0;
+    for i in 0..cpu.groups().fluid {
+        let x = fields.position[i];
+        let row = cpu.neighbours().pressure(i);
+        let inside = cpu.neighbours().all(i).neighbour.len() == row.neighbour.len();
+        if !inside || fields.state[i] != State::Inner || x.z > 0.5 - 2.5 * l0 {
+            continue;
+        }
+        // Measured from this particle's own smallest pressure the field is linear in the offset, and Eq. (9)
+        // adds (P_i - P_min) sum w r / r^2: choose P_i as the minimum so that only the gradient is left.
+        for j in fields.pressure.iter_mut() {
+            *j = 1e9;
+        }
+        for &j in row.neighbour {
+            fields.pressure[j as usize] = 1e4 + gradient.dot(fields.position[j as usize] - x);
+        }
+        fields.pressure[i] = 1e4;
+        cpu.write(&fields).unwrap();
+        cpu.run(Stage::PressureGradient, &step).unwrap();
+        let minimum = row_minimum(&fields.pressure, i, &cpu);
+        let m = moment(&fields.position, i, &cpu, &params);
+        let shift = (1e4 - minimum) * (m.1.inverse() * m.0);
+        let expected = -(gradient + shift) / params.density;
+        let a = cpu.fields().acceleration[i];
+        assert!((a - expected).length() < 1e-9 * expected.length().max(1.0), "{a} for {expected}");
+        checked += 1;
+        if checked == 20 {
+            break;
+        }
+    }
+    assert_eq!(checked, 20);
+}
+
+fn row_minimum(pressure: &[f64], i: usize, cpu: &Cpu) -> f64 {
+    cpu.neighbours().pressure(i).neighbour.iter().fold(pressure[i], |m, &j| m.min(pressure[j as usize]))
+}
+
+/// (d / n0) sum w r / r^2 and the moment matrix.
+fn moment(x: &[DVec3], i: usize, cpu: &Cpu, params: &Params) -> (DVec3, DMat3) {
+    let (mut first, mut second) = (DVec3::ZERO, DMat3::ZERO);
+    for &j in cpu.neighbours().all(i).neighbour {
+        let r = x[j as usize] - x[i];
+        let w = params.effective_radius / r.length() - 1.0;
+        let s = 3.0 / params.number_density * w / r.length_squared();
+        first += s * r;
+        second += s * DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+    }
+    (first, second)
+}
+
+fn random_vector(n: usize, state: &[State], seed: u64) -> Vec<f64> {
+    let mut s = seed;
+    (0..n)
+        .map(|i| {
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            if state[i] == State::Inner { (s >> 40) as f64 / (1_u64 << 23) as f64 - 1.0 } else { 0.0 }
+        })
+        .collect()
+}
+
+fn system<'a>(cpu: &'a Cpu, params: &Params) -> System<'a> {
+    System {
+        neighbours: cpu.neighbours(),
+        state: &cpu.fields().state,
+        diagonal: &cpu.fields().diagonal,
+        coefficient: laplacian_coefficient(params),
+    }
+}
+
+#[test]
+fn the_operator_is_symmetric_positive_definite_and_its_spectrum_is_known() {
+    let (cpu, params, _) = prepared(&hydrostatic(0.025, 1e-3, ""), 0.25);
+    let a = system(&cpu, &params);
+    let n = a.state.len();
+    let (mut sums, mut q) = (Vec::new(), vec![0.0; n]);
+    for seed in 1..4 {
+        let (x, y) = (random_vector(n, a.state, seed), random_vector(n, a.state, seed + 100));
+        let xx = a.multiply(&x, &mut q, &mut sums);
+        assert!(xx > 0.0);
+        let yax = dot(&y, &q, &mut sums);
+        a.multiply(&y, &mut q, &mut sums);
+        let xay = dot(&x, &q, &mut sums);
+        assert!((yax - xay).abs() < 1e-12 * xx, "{yax} {xay}");
+    }
+    // Power iteration for the largest eigenvalue of D^-1 A.
+    let mut x = random_vector(n, a.state, 7);
+    let mut eigenvalue = 0.0;
+    for _ in 0..300 {
+        a.multiply(&x, &mut q, &mut sums);
+        q.iter_mut().zip(a.diagonal).for_each(|(q, d)| *q /= d);
+        eigenvalue = dot(&q, &q, &mut sums).sqrt();
+        x.iter_mut().zip(&q).for_each(|(x, q)| *x = q / eigenvalue);
+    }
+    assert!(eigenvalue > 1.2 && eigenvalue < 1.4, "{eigenvalue}");
+}
+
+#[test]
+fn conjugate_gradient() {
+    let (cpu, params, _) = prepared(&hydrostatic_of_depth(0.2, 0.05, 1e-3, ""), 0.2);
+    let a = system(&cpu, &params);
+    let n = a.state.len();
+    let unknown: Vec<usize> = (0..n).filter(|&i| a.state[i] == State::Inner).collect();
+    let m = unknown.len();
+    assert!(m > 100, "{m} unknowns");
+    let (mut x, mut sums) = (vec![0.0; n], Vec::new());
+    let report = solve(&a, &cpu.fields().source, &mut x, &mut Jacobi, &TIGHT, &mut Workspace::default());
+    assert_eq!(report.outcome, Outcome::Converged);
+    // Against elimination on the dense matrix.
+    let mut dense = vec![vec![0.0; m + 1]; m];
+    let (mut e, mut q) = (vec![0.0; n], vec![0.0; n]);
+    for (k, &j) in unknown.iter().enumerate() {
+        e[j] = 1.0;
+        a.multiply(&e, &mut q, &mut sums);
+        e[j] = 0.0;
+        for (row, &i) in dense.iter_mut().zip(&unknown) {
+            row[k] = q[i];
+        }
+    }
+    for (row, &i) in dense.iter_mut().zip(&unknown) {
+        row[m] = cpu.fields().source[i];
+    }
+    for k in 0..m {
+        let pivot = dense[k].clone();
+        for row in &mut dense[k + 1..] {
+            let f = row[k] / pivot[k];
+            row.iter_mut().zip(&pivot).for_each(|(r, p)| *r -= f * p);
+        }
+    }
+    let mut exact = vec![0.0; m];
+    for k in (0..m).rev() {
+        let s: f64 = (k + 1..m).map(|j| dense[k][j] * exact[j]).sum();
+        exact[k] = (dense[k][m] - s) / dense[k][k];
+    }
+    let scale = exact.iter().fold(0.0_f64, |s, p| s.max(p.abs()));
+    assert!(scale > 100.0, "pressures are too small to mean anything: {scale}");
+    for (k, &i) in unknown.iter().enumerate() {
+        assert!((x[i] - exact[k]).abs() < 1e-7 * scale, "{} for {}", x[i], exact[k]);
+    }
+}
+
+#[test]
+fn multigrid_gives_the_same_pressure_in_a_few_iterations() {
+    let text = dam_break(0.03, 1.8e-3, "");
+    let (cpu, params, _) = prepared(&text, 0.1);
+    let a = system(&cpu, &params);
+    let grid = seixo::cells::Grid::new(&params).unwrap();
+    let mut multigrid = Multigrid::default();
+    multigrid.build(&a, &grid, &cpu.fields().position);
+    assert!(multigrid.sizes().len() >= 3, "{:?}", multigrid.sizes());
+    let n = a.state.len();
+    let (mut x, mut y) = (vec![0.0; n], vec![0.0; n]);
+    let settings = Settings { tolerance: 1e-6, ..TIGHT };
+    let b = &cpu.fields().source;
+    let jacobi = solve(&a, b, &mut x, &mut Jacobi, &settings, &mut Workspace::default());
+    let bucket = solve(&a, b, &mut y, &mut multigrid, &settings, &mut Workspace::default());
+    assert_eq!((jacobi.outcome, bucket.outcome), (Outcome::Converged, Outcome::Converged));
+    assert!(bucket.iterations <= 14 && jacobi.iterations > 3 * bucket.iterations, "{bucket:?} {jacobi:?}");
+    let scale = x.iter().fold(0.0_f64, |s, p| s.max(p.abs()));
+    let worst = x.iter().zip(&y).fold(0.0_f64, |s, (a, b)| s.max((a - b).abs()));
+    assert!(worst < 1e-4 * scale, "{worst} of {scale}");
+    // The preconditioner is symmetric (to f32) and positive.
+    use seixo::pressure::cg::Precondition;
+    let (r, s) = (random_vector(n, a.state, 3), random_vector(n, a.state, 4));
+    let (mut br, mut bs, mut sums) = (vec![0.0; n], vec![0.0; n], Vec::new());
+    multigrid.apply(&a, &r, &mut br);
+    multigrid.apply(&a, &s, &mut bs);
+    let (rr, rs, sr) = (dot(&r, &br, &mut sums), dot(&r, &bs, &mut sums), dot(&s, &br, &mut sums));
+    assert!(rr > 0.0 && (rs - sr).abs() < 1e-5 * rr, "{rr} {rs} {sr}");
+}
+
+/// State after `steps` steps, as bits.
+fn bits_after(case: &seixo::case::Case, steps: usize, threads: usize, active_set: bool) -> Vec<u64> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let scene = Scene::build(case).unwrap();
+        let mut sim = seixo::simulation::Simulation::new(case, &scene, |s, p, plan, settings| {
+            let mut cpu = Cpu::new(s, p, plan, settings)?;
+            cpu.active_set = active_set;
+            Ok(Box::new(cpu) as Box<dyn Backend>)
+        })
+        .unwrap();
+        for _ in 0..steps {
+            sim.step().unwrap();
+        }
+        let f = sim.backend.read().unwrap();
+        let fluid = f.id.len();
+        let vectors = f.position[..fluid].iter().chain(&f.velocity[..fluid]);
+        vectors.flat_map(|v| v.to_array()).chain(f.pressure.iter().copied()).map(f64::to_bits).collect()
+    })
+}
+
+#[test]
+fn leaving_dry_walls_out_and_adding_threads_change_no_bit() {
+    for preconditioner in ["jacobi", "multigrid"] {
+        let case = dam_break(0.04, 2e-3, &format!("solver = {{ preconditioner = \"{preconditioner}\" }}"));
+        let reference = bits_after(&case, 60, 2, true);
+        assert!(reference == bits_after(&case, 60, 2, false), "dry walls matter ({preconditioner})");
+        assert!(reference == bits_after(&case, 60, 1, true), "threads matter ({preconditioner})");
+        assert!(reference == bits_after(&case, 60, 3, true), "threads matter ({preconditioner})");
+        assert!(reference != bits_after(&case, 59, 2, true), "nothing moves");
+    }
+}
+
+/// Field rms of the pressure error over rho g H, slope of P(z), kinetic energy and settled depth, means over
+/// `window` [s] of a still tank.
+fn hydrostatics(fluid: &str, dt: f64, window: (f64, f64)) -> [f64; 4] {
+    let mut sim = simulation(&hydrostatic(0.025, dt, fluid));
+    let (mut sums, mut count) = ([0.0; 4], 0.0);
+    let weight = 9.81 * 1000.0;
+    while sim.time < window.1 {
+        sim.step().unwrap();
+        if sim.time < window.0 || sim.steps % 5 != 0 {
+            continue;
+        }
+        let (f, m) = (sim.backend.read().unwrap(), sim.backend.monitor().unwrap());
+        let surface = 2.0 * m.centroid[2] - 0.5 * 0.025;
+        let (mut e, mut n, mut z, mut p, mut zz, mut zp) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        for i in (0..sim.groups.fluid).filter(|&i| f.state[i] == State::Inner) {
+            let (zi, pi) = (f.position[i].z, f.pressure[i]);
+            e += (pi - weight * (surface - zi).max(0.0)).powi(2);
+            n += 1.0;
+            z += zi;
+            p += pi;
+            zz += zi * zi;
+            zp += zi * pi;
+        }
+        let slope = -(zp / n - z / n * p / n) / (zz / n - (z / n) * (z / n)) / weight;
+        let now = [(e / n).sqrt() / (weight * 0.5), slope, m.kinetic, 2.0 * m.centroid[2] / 0.5];
+        sums.iter_mut().zip(now).for_each(|(s, v)| *s += v);
+        count += 1.0;
+    }
+    assert_eq!(sim.backend.counters().unwrap().lost, 0);
+    assert!(sim.backend.counters().unwrap().neighbours_max <= 60);
+    sums.map(|s| s / count)
+}
+
+#[test]
+fn hydrostatic_accurate() {
+    let [rms, slope, kinetic, depth] = hydrostatics("sound_speed = 5", 1e-3, (1.0, 2.0));
+    println!("accurate: rms {rms:.4} slope {slope:.4} KE {kinetic:.4} J depth {depth:.4}");
+    assert!(rms < 0.025 && (slope - 1.0).abs() < 0.02 && kinetic < 0.12 && depth > 0.975);
+}
+
+#[test]
+fn hydrostatic_paper() {
+    let [rms, slope, kinetic, depth] = hydrostatics("preset = \"paper\"\nsound_speed = 5", 1e-3, (1.0, 3.0));
+    println!("paper: rms {rms:.4} slope {slope:.4} KE {kinetic:.4} J depth {depth:.4}");
+    assert!(rms < 0.12 && (slope - 1.0).abs() < 0.06 && kinetic < 0.45 && depth > 0.975);
+}
+
+/// Front (99.9 percentile), potential and kinetic energy at `times`; checks that energy never rises.
+fn collapse(fluid: &str, dt: f64, times: &[f64]) -> Vec<[f64; 3]> {
+    let mut sim = simulation(&dam_break(0.03, dt, fluid));
+    let start = sim.backend.monitor().unwrap().potential;
+    let mut rows = Vec::new();
+    for &t in times {
+        while sim.time < t - 0.5 * dt {
+            sim.step().unwrap();
+            let m = sim.backend.monitor().unwrap();
+            assert!(m.kinetic + m.potential < 1.001 * start, "energy rose at t = {}", sim.time);
+        }
+        let (f, m) = (sim.backend.read().unwrap(), sim.backend.monitor().unwrap());
+        let mut x: Vec<f64> = f.position[..sim.groups.fluid].iter().map(|p| p.x).collect();
+        x.sort_by(f64::total_cmp);
+        rows.push([x[(0.999 * x.len() as f64) as usize], m.potential, m.kinetic]);
+    }
+    println!("{fluid:?}: {rows:.4?}");
+    assert_eq!(sim.backend.counters().unwrap().lost, 0);
+    rows
+}
+
+#[test]
+fn dam_break_accurate() {
+    let rows = collapse("sound_speed = 6", 1.8e-3, &[0.3, 0.5]);
+    let near = |value: f64, expected: f64, part: f64| {
+        assert!((value / expected - 1.0).abs() < part, "{value} for {expected}");
+    };
+    near(rows[0][0], 1.105, 0.02);
+    near(rows[0][1], 100.6, 0.02);
+    near(rows[0][2], 59.7, 0.02);
+    near(rows[1][0], 1.727, 0.03);
+    let left = (rows[1][1] + rows[1][2]) / 165.3;
+    assert!((left - 0.910).abs() < 0.02, "{left}");
+}
+
+#[test]
+fn dam_break_paper() {
+    let rows = collapse("preset = \"paper\"\nsound_speed = 3", 1e-3, &[0.3, 0.5, 1.0]);
+    let expected = [[1.059, 102.64, 49.9], [1.61, 71.0, 65.0], [2.63, 35.95, 60.5]];
+    let part = [[0.01, 0.003, 0.02], [0.03, 0.006, 0.03], [0.07, 0.015, 0.04]];
+    for ((row, expected), part) in rows.iter().zip(expected).zip(part) {
+        for k in 0..3 {
+            assert!((row[k] / expected[k] - 1.0).abs() < part[k], "{row:?} for {expected:?}");
+        }
+    }
+}

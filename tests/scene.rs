@@ -1,0 +1,322 @@
+//! The scene: particle counts, geometry of solids, checks at t = 0.
+
+use glam::DVec3;
+use seixo::case::{Case, file};
+use seixo::scene::{Drive, Kind, Scene, Shape};
+use std::path::Path;
+
+fn case(name: &str, sets: &[&str]) -> Case {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("cases").join(name).with_extension("toml");
+    let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
+    file::load(&path, None, &sets).unwrap_or_else(|e| panic!("{e}")).case
+}
+
+fn build(text: &str) -> Result<Scene, String> {
+    let (case, _, _) = file::parse("test.toml", text.to_owned(), &[]).unwrap_or_else(|e| panic!("{e}"));
+    Scene::build(&case).map_err(|e| e.to_string())
+}
+
+fn count(scene: &Scene, kind: Kind) -> usize {
+    scene.kind.iter().filter(|&&k| k == kind).count()
+}
+
+/// The counts of case 4.3 at four spacings; 0.0075 m is the paper's "about 580 thousand".
+#[test]
+fn counts_of_the_dam_break() {
+    // spacing, fluid, static wall, static dummy, gate
+    let rows = [
+        ("0.03", 3_468, 7_429, 16_188, 221),
+        ("0.02", 11_250, 16_279, 34_454, 1_000),
+        ("0.015", 25_047, 28_289, 59_074, 2_673),
+    ];
+    for (spacing, fluid, wall, dummy, gate) in rows {
+        let scene = Scene::build(&case("dam_break_transport", &[&format!("run.spacing={spacing}")])).unwrap();
+        let g = scene.groups;
+        assert_eq!((g.fluid, g.static_wall, g.static_dummy), (fluid, wall, dummy), "l0 = {spacing}");
+        let s = &scene.solids[1];
+        assert_eq!(s.wall_slots.len() + s.dummy_slots.len(), gate, "gate at l0 = {spacing}");
+    }
+}
+
+#[test]
+fn counts_of_the_dam_break_at_the_papers_spacing() {
+    let start = std::time::Instant::now();
+    let scene = Scene::build(&case("dam_break_transport", &[])).unwrap();
+    println!("built in {:?}", start.elapsed());
+    for note in &scene.notes {
+        println!("{note}");
+    }
+    let g = scene.groups;
+    assert_eq!(g.fluid, 210_983);
+    assert_eq!(g.total(), 577_084);
+    assert_eq!(count(&scene, Kind::BodyWall) + count(&scene, Kind::BodyDummy), 343);
+    assert_eq!(count(&scene, Kind::Wall), 121_873);
+    assert_eq!(count(&scene, Kind::Dummy), 243_885);
+    assert_eq!(scene.position.len(), g.total());
+    // 47 layers of 0.0075 m.
+    assert!((scene.depth - 0.3525).abs() < 1e-12);
+    // The gate moves from the first step on.
+    let gate = &scene.solids[1];
+    assert!(scene.velocity[gate.wall_slots.start].distance(DVec3::new(0.0, 0.0, 0.11)) < 1e-12);
+}
+
+/// Groups, slots and offsets agree with each other.
+#[test]
+fn slots_hold_their_solids() {
+    let scene = Scene::build(&case("dam_break_transport", &["run.spacing=0.03"])).unwrap();
+    for (k, solid) in scene.solids.iter().enumerate() {
+        let wall = solid.wall_slots.clone().zip(&solid.wall_offset);
+        for (slot, &offset) in wall.chain(solid.dummy_slots.clone().zip(&solid.dummy_offset)) {
+            assert_eq!(scene.solid[slot], k as u32 + 1);
+            assert!(scene.position[slot].distance(solid.position + solid.orientation * offset) < 1e-12);
+        }
+        assert!(scene.groups.moving_wall_range().contains(&solid.wall_slots.start));
+        assert_eq!(solid.wall_area.len(), solid.wall_offset.len());
+        assert_eq!(solid.wall_to_surface.len(), solid.wall_offset.len());
+    }
+    assert_eq!(scene.static_wall_normal.len(), scene.groups.static_wall);
+    for (slot, normal) in scene.groups.static_wall_range().zip(&scene.static_wall_normal) {
+        assert_eq!(scene.kind[slot], Kind::Wall);
+        assert!((normal.length() - 1.0).abs() < 1e-12 || *normal == DVec3::ZERO);
+    }
+    // No two particles of the lattice in one place.
+    let mut keys: Vec<[i64; 3]> = scene.position[..scene.groups.fluid]
+        .iter()
+        .chain(&scene.position[scene.groups.static_range()])
+        .map(|p| p.to_array().map(|x| (x / 0.03 * 100.0).round() as i64))
+        .collect();
+    let all = keys.len();
+    keys.sort_unstable();
+    keys.dedup();
+    assert_eq!(keys.len(), all);
+}
+
+/// A cube's faces: area vectors close and sum to the true faces, corners point to the true corners.
+#[test]
+fn area_and_surface_of_a_cube() {
+    let scene = Scene::build(&case("resting_cube", &[])).unwrap();
+    let cube = &scene.solids[0];
+    assert_eq!((cube.wall_offset.len(), cube.dummy_offset.len()), (296, 208)); // 8^3 - 2^3 hollow
+    let total: DVec3 = cube.wall_area.iter().copied().sum();
+    assert!(total.length() < 1e-14);
+    let up: f64 = cube.wall_area.iter().map(|a| a.z.max(0.0)).sum();
+    assert!((up - 0.04).abs() < 1e-12);
+    let Shape::Box { half } = cube.shape;
+    for (&offset, &to) in cube.wall_offset.iter().zip(&cube.wall_to_surface) {
+        let on = (offset + to).abs();
+        assert!((on - half).abs().min_element() < 1e-12 && (on - half).max_element() < 1e-12);
+    }
+    let Drive::Free(free) = &cube.drive else { panic!("a cube is free") };
+    assert!((free.mass - 21.28).abs() < 1e-12);
+    assert!((free.inertia - DVec3::splat(21.28 * 0.04 / 6.0)).length() < 1e-12);
+}
+
+/// `standing` with the law "paper": aligned lattices end exactly d_c apart.
+#[test]
+fn a_standing_cube_starts_at_the_contact_distance() {
+    let scene = Scene::build(&case("resting_cube", &[])).unwrap();
+    let d_c = 1.5f64.sqrt() * 0.025;
+    let lowest =
+        scene.solids[0].wall_slots.clone().map(|i| scene.position[i].z).fold(f64::INFINITY, f64::min);
+    // The floor's wall layer lies at -l0/2.
+    assert!((lowest + 0.0125 - d_c).abs() < 1e-14, "{lowest}");
+    assert!(scene.notes.iter().any(|n| n.contains("lifted by 0.00561")), "{:?}", scene.notes);
+}
+
+/// `standing` with the law "smooth": surfaces touch, also on an incline.
+#[test]
+fn a_standing_block_touches_the_incline() {
+    let scene = Scene::build(&case("sliding_block", &["body.0.center=[-0.68, 0.0, 0.70]"])).unwrap();
+    let n = DVec3::new(1.0, 0.0, 1.0).normalize();
+    let block = &scene.solids[0];
+    assert!((block.position.dot(n) - 0.05).abs() < 1e-9);
+    assert!((block.position.x + 0.68).abs() < 1e-12, "lifted against gravity only");
+    let wall = &scene.walls[0];
+    assert!((wall.axes.z_axis - n).length() < 1e-12);
+    assert!(
+        ((wall.center + wall.axes.z_axis * wall.half.z).dot(n)).abs() < 1e-12,
+        "surface through the origin"
+    );
+    for (slot, normal) in scene.groups.static_wall_range().zip(&scene.static_wall_normal) {
+        assert!((scene.position[slot].dot(n) + 0.0125).abs() < 1e-12);
+        assert!((*normal - n).length() < 1e-12);
+    }
+}
+
+#[test]
+fn tank_faces_as_boxes() {
+    let scene = Scene::build(&case("hydrostatic", &[])).unwrap();
+    let names: Vec<&str> = scene.walls.iter().map(|w| w.name.as_str()).collect();
+    assert_eq!(names, ["tank.x_min", "tank.x_max", "tank.y_min", "tank.y_max", "tank.z_min"]);
+    let floor = &scene.walls[4];
+    assert!((floor.center + floor.half - DVec3::new(0.325, 0.325, 0.0)).length() < 1e-12);
+    assert!((floor.center - floor.half - DVec3::new(-0.075, -0.075, -0.075)).length() < 1e-12);
+    assert_eq!(scene.groups.fluid, 2000);
+    assert!((scene.depth - 0.5).abs() < 1e-12);
+    // Headroom of four depths over the rim.
+    assert!(scene.domain.1.z > 2.5);
+}
+
+#[test]
+fn two_dimensions_lie_in_one_plane() {
+    let scene = Scene::build(&case("dam_break_2d", &[])).unwrap();
+    assert!(scene.position.iter().all(|p| p.y == 0.0));
+    assert_eq!(scene.groups.fluid, 20 * 40);
+    // Floor and two sides, one layer: 80 + 2 + 2 x 80.
+    assert_eq!(scene.groups.static_wall, 242);
+}
+
+const POOL: &str = "
+[run]
+spacing = 0.1
+time_step = 1e-3
+end = 1.0
+[tank]
+min = [0, 0, 0]
+max = [1, 1, 1]
+OPEN
+[fluid]
+[[fluid.block]]
+min = [0, 0, 0]
+max = [1, 1, 0.5]
+[contact]
+spring = 1e4
+";
+
+fn pool(open: &str, more: &str) -> Result<Scene, String> {
+    build(&(POOL.replace("OPEN", &format!("open = {open}")) + more))
+}
+
+#[test]
+fn problems_at_the_start_name_who_and_what_to_do() {
+    let body = |center: &str, more: &str| {
+        format!("[[body]]\nname = \"b\"\nsize = [0.3, 0.3, 0.3]\ndensity = 500\ncenter = {center}\n{more}\n")
+    };
+    let two = body("[0.5, 0.5, 0.75]", "") + &body("[0.6, 0.5, 1.0]", "").replace("\"b\"", "\"c\"");
+    let table = [
+        (
+            pool("[\"z_max\"]", &body("[0.5, 0.5, 0.5]", "")),
+            &["body `b`", "32 fluid particles", "displaces_fluid = true"][..],
+        ),
+        (pool("[\"z_max\"]", &body("[0.1, 0.5, 0.8]", "")), &["body `b` overlaps wall `tank.x_min` by 0.05"]),
+        (
+            pool("[\"z_max\"]", &two),
+            &["body `c` overlaps body `b` by 0.05", "standing = true", "raise its center by 0.05"],
+        ),
+        (pool("[\"z_max\"]", &body("[0.5, 0.5, 9.0]", "")), &[]),
+        (pool("[\"z_max\"]", &body("[0.1, 0.5, 0.8]", "standing = true")), &["`tank.x_min`", "move it away"]),
+        (
+            pool("[\"z_max\"]", "[[gauge.pressure]]\nname = \"p\"\npoint = [0.5, 0.5, 0.5]"),
+            &["gauge.pressure `p`", "nearest stands at"],
+        ),
+        (pool("[\"x_max\"]", ""), &["water can leave through tank.x_max"]),
+        (pool("[\"z_min\"]", ""), &["water can leave through tank.z_min"]),
+        (
+            build(
+                &POOL.replace("max = [1, 1, 0.5]", "max = [1, 1, 1.5]").replace("OPEN", "open = [\"z_max\"]"),
+            ),
+            &["outside of the tank"],
+        ),
+    ];
+    for (result, words) in table {
+        match result {
+            Ok(_) => assert!(words.is_empty(), "no error with {words:?}"),
+            Err(message) => {
+                assert!(!words.is_empty(), "{message}");
+                for word in words {
+                    assert!(message.contains(word), "`{word}` is not in: {message}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn water_without_walls_needs_weightlessness() {
+    let text = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\nGRAVITY\n[fluid]\n[[fluid.block]]\nmin = [0,0,0]\nmax = [1,1,1]\n";
+    let message = build(&text.replace("GRAVITY", "")).unwrap_err();
+    assert!(message.contains("nothing that holds it"), "{message}");
+    let drop = build(&text.replace("GRAVITY", "gravity = [0, 0, 0]")).unwrap();
+    assert_eq!(drop.groups.fluid, 1000);
+}
+
+#[test]
+fn a_floating_body_makes_room() {
+    let scene = Scene::build(&case("floating_cube", &[])).unwrap();
+    // 30 x 30 x 15 less three layers of 6 x 6.
+    assert_eq!(scene.groups.fluid, 13_500 - 108);
+    assert!(scene.notes.iter().any(|n| n.contains("displaces 108")), "{:?}", scene.notes);
+}
+
+#[test]
+fn a_beach_gives_way_to_the_tank() {
+    let beach = "[[plane]]\nname = \"beach\"\ncenter = [0.9, 0.5, 0.1]\nnormal = [-1, 0, 1]\nalong = [1, 0, 1]\nsize = [0.6, 1.0]\n";
+    let scene = pool("[\"z_max\"]", beach).unwrap();
+    assert!(
+        scene.notes.iter().any(|n| n.starts_with("plane `beach`") && n.contains("left out")),
+        "{:?}",
+        scene.notes
+    );
+    assert!(scene.groups.fluid < 500);
+    // Nothing stands closer than half a spacing to anything else.
+    for (i, p) in scene.position.iter().enumerate() {
+        for q in &scene.position[..i] {
+            assert!(p.distance(*q) > 0.049, "{p} and {q}");
+        }
+    }
+}
+
+#[test]
+fn user_domains_must_hold_everything() {
+    let domain = POOL
+        .replace("OPEN", "open = [\"z_max\"]")
+        .replace("end = 1.0", "end = 1.0\ndomain = [[0, 0, 0], [1, 1, 2]]");
+    let message = build(&domain).unwrap_err();
+    assert!(message.contains("run.domain: wall `tank.x_min` reaches from x = -0.3"), "{message}");
+}
+
+#[test]
+fn rounded_lengths_are_noted() {
+    let scene = Scene::build(&case("dam_break_transport", &[])).unwrap();
+    assert!(
+        scene.notes.iter().any(
+            |n| n.contains("tank: length x 3.5000 m becomes 3.5025 m") && n.contains("at spacing 0.0075")
+        ),
+        "{:?}",
+        scene.notes
+    );
+}
+
+/// With the law "paper" a cube set down naturally, one spacing above the floor's particles, would be thrown up.
+#[test]
+fn contact_at_the_start_is_refused() {
+    let message = Scene::build(&case("resting_cube", &["body.0.standing=false"])).unwrap_err().to_string();
+    for word in [
+        "body `cube` overlaps wall `tank.z_min`",
+        "closer than d_c",
+        "by 0.005619 m",
+        "standing = true",
+        "0.005620 m",
+    ] {
+        assert!(message.contains(word), "`{word}` is not in: {message}");
+    }
+    let raised = case("resting_cube", &["body.0.standing=false", "body.0.center=[0.4, 0.4, 0.10562]"]);
+    assert!(Scene::build(&raised).is_ok());
+}
+
+/// Bodies stand on bodies, whatever the law.
+#[test]
+fn bodies_stand_on_bodies() {
+    let second = "[[body]]\nname = \"upper\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.4, 0.4, 0.3]\ndensity = 1000\nstanding = true\n";
+    for (law, gap) in [("paper", 1.5f64.sqrt() * 0.025 - 0.025), ("smooth", 0.0)] {
+        let text =
+            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("cases/resting_cube.toml"))
+                .unwrap();
+        let text = text
+            .replace("law = \"paper\"", &format!("law = \"{law}\""))
+            .replace("[contact]", &format!("{second}\n[contact]"));
+        let scene = build(&text).unwrap_or_else(|e| panic!("{law}: {e}"));
+        let z = [scene.solids[0].position.z, scene.solids[1].position.z];
+        assert!((z[0] - 0.1 - gap).abs() < 1e-9 && (z[1] - 0.3 - 2.0 * gap).abs() < 1e-9, "{law}: {z:?}");
+    }
+}
