@@ -107,16 +107,6 @@ impl Cpu {
         self.groups
     }
 
-    /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
-    pub fn neighbour_rows(&self) -> Vec<(Vec<u32>, Vec<u32>)> {
-        let row = |i: usize| {
-            let (chunk, k) = (&self.neighbours.chunks[i / CHUNK], i % CHUNK);
-            let near = chunk.pressure(k).neighbour;
-            (near.to_vec(), chunk.all(k).neighbour[near.len()..].to_vec())
-        };
-        (0..self.neighbours.rows()).map(row).collect()
-    }
-
     fn viscosity(&mut self) {
         let Self { fields, neighbours, params, groups, .. } = self;
         let (x, v) = (&fields.position, &fields.velocity);

@@ -173,14 +173,14 @@ impl Gpu {
             self.context.upload("solid_offset", &offset)?;
         }
         if self.context.has("wrench") {
-            let mut geometry = vec![[[0.0; 4]; 3]; g.moving_wall];
+            let mut layer = vec![[[0.0; 4]; 3]; g.moving_wall];
             let mut chunks: Vec<[u32; 4]> = Vec::new();
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
-                    let vectors = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface];
-                    geometry[first + p] = vectors.map(|v| four(v, 0.0));
+                    layer[first + p] = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface]
+                        .map(|v| four(v, 0.0));
                 }
                 for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {
                     let count = (solid.wall_slots.len() - p).min(WORKGROUP as usize);
@@ -188,7 +188,7 @@ impl Gpu {
                 }
             }
             self.chunk_solid = chunks.iter().map(|c| c[2] as usize).collect();
-            self.context.upload("wall_geometry", &geometry)?;
+            self.context.upload("wall_layer", &layer)?;
             self.context.upload("force_chunk", &chunks)?;
         }
         Ok(())
