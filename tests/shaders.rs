@@ -1,5 +1,6 @@
 //! Checks of every WGSL file, with no device.
 
+#[path = "common/moving.rs"]
 mod common;
 
 use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, counter};

@@ -13,7 +13,7 @@ mod transfer;
 
 pub use adapter::{AdapterInfo, adapters};
 
-use super::{Backend, Counters};
+use super::{Backend, Counters, traffic};
 use crate::body::{Pose, Wrench};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
@@ -173,14 +173,14 @@ impl Gpu {
             self.context.upload("solid_offset", &offset)?;
         }
         if self.context.has("wrench") {
-            let mut geometry = vec![[[0.0; 4]; 3]; g.moving_wall];
+            let mut layer = vec![[[0.0; 4]; 3]; g.moving_wall];
             let mut chunks: Vec<[u32; 4]> = Vec::new();
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
-                    let vectors = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface];
-                    geometry[first + p] = vectors.map(|v| four(v, 0.0));
+                    layer[first + p] = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface]
+                        .map(|v| four(v, 0.0));
                 }
                 for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {
                     let count = (solid.wall_slots.len() - p).min(WORKGROUP as usize);
@@ -188,7 +188,7 @@ impl Gpu {
                 }
             }
             self.chunk_solid = chunks.iter().map(|c| c[2] as usize).collect();
-            self.context.upload("wall_geometry", &geometry)?;
+            self.context.upload("wall_layer", &layer)?;
             self.context.upload("force_chunk", &chunks)?;
         }
         Ok(())
@@ -378,6 +378,24 @@ impl Backend for Gpu {
 
     fn bytes(&self) -> u64 {
         self.context.bytes
+    }
+
+    fn sizes(&mut self) -> Result<traffic::Sizes> {
+        let rows = self.neighbours()?;
+        let sum = |part: fn(&(Vec<u32>, Vec<u32>)) -> usize| rows.iter().map(part).sum::<usize>() as u64;
+        let pressure_pairs = sum(|r| r.0.len());
+        Ok(traffic::Sizes {
+            fluid: self.groups.fluid as u64 - self.counters.lost,
+            rows: sum(|r| usize::from(!r.0.is_empty())),
+            cells: self.grid.total() as u64,
+            pairs: pressure_pairs + sum(|r| r.1.len()),
+            pressure_pairs,
+            pressure: self.groups.pressure() as u64,
+            number: 4,
+            vector: 16,
+            weight: 0,
+            preconditioner_weight: 0,
+        })
     }
 
     fn dispatches(&self) -> u64 {
