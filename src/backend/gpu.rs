@@ -13,7 +13,7 @@ mod transfer;
 
 pub use adapter::{AdapterInfo, adapters};
 
-use super::{Backend, Counters};
+use super::{Backend, Counters, traffic};
 use crate::body::{Pose, Wrench};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
@@ -381,6 +381,24 @@ impl Backend for Gpu {
 
     fn bytes(&self) -> u64 {
         self.context.bytes
+    }
+
+    fn sizes(&mut self) -> Result<traffic::Sizes> {
+        let rows = self.neighbours()?;
+        let sum = |part: fn(&(Vec<u32>, Vec<u32>)) -> usize| rows.iter().map(part).sum::<usize>() as u64;
+        let pressure_pairs = sum(|r| r.0.len());
+        Ok(traffic::Sizes {
+            fluid: self.groups.fluid as u64 - self.counters.lost,
+            rows: sum(|r| usize::from(!r.0.is_empty())),
+            cells: self.grid.total() as u64,
+            pairs: pressure_pairs + sum(|r| r.1.len()),
+            pressure_pairs,
+            pressure: self.groups.pressure() as u64,
+            number: 4,
+            vector: 16,
+            weight: 0,
+            preconditioner_weight: 0,
+        })
     }
 
     fn dispatches(&self) -> u64 {

@@ -1,6 +1,7 @@
 //! What can be typed, and what the program answers with: results on stdout, progress and remarks on stderr,
 //! and an exit code.
 
+mod bench;
 mod compare;
 mod device;
 mod plan;
@@ -40,6 +41,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
     Compare(compare::CompareArgs),
+    /// Time a step by stage, against the bytes that must move.
+    Bench(bench::BenchArgs),
     /// List the adapters that can be used.
     Adapters {
         /// Print JSON.
@@ -67,14 +70,14 @@ struct CaseArgs {
 }
 
 /// Where to compute.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 struct DeviceArgs {
     /// Processor: auto takes a hardware GPU if there is one, else the CPU.
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
-    /// Number of the adapter, as `seixo adapters` lists it; implies --backend gpu.
+    /// Number of the adapter as `seixo adapters` lists it, or a part of its name; implies --backend gpu.
     #[arg(long, value_name = "N")]
-    adapter: Option<usize>,
+    adapter: Option<String>,
     /// Threads of the CPU path; all cores if absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -95,6 +98,7 @@ pub fn main() -> ExitCode {
     let exit = match args.command {
         Command::Run(args) => run::run(&args),
         Command::Plan(args) => plan::plan(&args),
+        Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Adapters { json } => device::list(json),
         Command::Schema => {

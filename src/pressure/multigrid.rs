@@ -146,11 +146,11 @@ impl Multigrid {
         coarse.clear();
         self.touched.clear();
         self.member_start.clear();
-        for i in 0..n {
+        for (i, &x) in position.iter().enumerate().take(n) {
             if self.code[i] == NOWHERE {
                 continue;
             }
-            let c = grid.coordinates(position[i]);
+            let c = grid.coordinates(x);
             let cell = grid.index(c);
             if self.cell_aggregate[cell] == u32::MAX {
                 self.cell_aggregate[cell] = coarse.len() as u32;
