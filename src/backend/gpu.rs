@@ -125,7 +125,10 @@ impl Gpu {
             )));
         }
         let grid = grid(params, plan)?;
-        let sizes = Sizes::new(scene, params, &grid);
+        let mut sizes = Sizes::new(scene, params, &grid);
+        if info.device_type == "cpu" {
+            sizes.rows_per_thread = 4;
+        }
         let memory = Memory::new(&sizes, plan);
         let switches = shader::switches(params, &groups, plan);
         let mut gpu = Self {
@@ -400,5 +403,30 @@ impl Backend for Gpu {
 
     fn dispatches(&self) -> u64 {
         self.context.dispatches
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+
+    #[test]
+    fn a_lost_device_is_an_error_and_no_panic() {
+        let text = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\n\
+                    max = [0.5, 0.5, 0.5]\n[tank]\nmin = [0, 0, 0]\nmax = [1.0, 0.5, 1.0]\n";
+        let case: Case = toml::from_str(text).expect("a valid case");
+        let scene = Scene::build(&case).expect("a valid scene");
+        let params = Params::new(&case, &scene).expect("valid constants");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
+        let mut gpu = Gpu::dry_run(&scene, &params, &plan, settings).expect("it can be built");
+        let step = params.step(0.0, 1e-3, 1.0);
+        gpu.run(Stage::CellList, &step).expect("a step can be recorded");
+        gpu.read().expect("the device is there");
+        gpu.context.destroy();
+        let lost = gpu.run(Stage::CellList, &step).and_then(|()| gpu.read().map(|_| ()));
+        let text = lost.expect_err("the device is gone").to_string();
+        assert!(text.starts_with("noop: "), "{text}");
     }
 }
