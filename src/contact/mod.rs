@@ -121,6 +121,8 @@ struct Limits {
     friction: f64,
     forced: Option<u32>,
     lambda: Vec<stiffness::Lambda>,
+    /// Mass of the lightest free body [kg].
+    lightest: f64,
     /// Fastest speed that the case's heights and starting velocities allow [m/s].
     fastest: f64,
     /// Largest time step so far [s]: softened contacts are never stiffened again, which would add energy.
@@ -150,6 +152,7 @@ impl Solids {
             friction: contact.map_or(0.0, |c| c.friction),
             forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
             lambda: vec![stiffness::Lambda::default(); bodies.len()],
+            lightest,
             fastest,
             longest_step: 0.0,
         };

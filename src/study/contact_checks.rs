@@ -140,11 +140,11 @@ pub struct CollisionRow {
     pub spin: f64,
 }
 
-/// Collides two cubes of 0.2 m at 2 m/s, one tilted, off-centre, elastically, without gravity.
+/// Collides two cubes of 0.2 m at 2 m/s with K = `spring` [N/m], one tilted, off-centre, elastically, without gravity.
 ///
 /// # Errors
 /// Those of [`Solids::advance`].
-pub fn collide(mass_ratio: f64, friction: f64, dt: f64, seed: u64) -> Result<CollisionRow> {
+pub fn collide(mass_ratio: f64, friction: f64, spring: f64, dt: f64, seed: u64) -> Result<CollisionRow> {
     let mut random = Random::new(seed);
     let size = DVec3::splat(0.2);
     let density = 800.0;
@@ -157,7 +157,7 @@ pub fn collide(mass_ratio: f64, friction: f64, dt: f64, seed: u64) -> Result<Col
     let mass = first.mass();
     let scene = DryScene::new(0.025, DVec3::splat(-1.0), DVec3::splat(1.0)).gravity(DVec3::ZERO);
     let scene = scene.body(&first).body(&second).build();
-    let mut solids = Solids::new(&scene, Some(&smooth(2e5, 0.0, friction)))?;
+    let mut solids = Solids::new(&scene, Some(&smooth(spring, 0.0, friction)))?;
     let (momentum, angular) = solids.momentum();
     let energy = solids.energy().total();
     let (mut done, mut touched) = (0, false);
@@ -186,25 +186,26 @@ pub struct RestitutionRow {
     pub asked: f64,
     /// e measured [-].
     pub measured: f64,
-    /// Whether on a wall or between two cubes of mass ratio 3.
+    /// Whether on a wall or of a cube 1.5 times as long.
     pub on_wall: bool,
     /// Sub-steps a step.
     pub substeps: u32,
 }
 
-/// A flat impact at `speed` [m/s] without gravity, on a wall or on another cube.
+/// A flat impact at 1 m/s after `gap` [m], without gravity, on a wall or on another cube.
 ///
 /// # Errors
 /// Those of [`Solids::advance`].
-pub fn restitution(asked: f64, on_wall: bool, spring: f64, speed: f64, dt: f64) -> Result<RestitutionRow> {
+pub fn restitution(asked: f64, on_wall: bool, spring: f64, gap: f64, dt: f64) -> Result<RestitutionRow> {
     let size = DVec3::splat(0.2);
-    let mut first = FreeBox::new(size, 2660.0, DVec3::new(0.0, 0.0, 0.1 + 3.7e-3));
+    let mut first = FreeBox::new(size, 2660.0, DVec3::new(0.0, 0.0, 0.1 + gap));
+    let speed = 1.0;
     first.velocity = -speed * DVec3::Z;
     let dry = DryScene::new(0.025, DVec3::splat(-1.0), DVec3::splat(1.0)).gravity(DVec3::ZERO).body(&first);
     let dry = if on_wall {
         dry.floor()
     } else {
-        dry.body(&FreeBox::new(size, 3.0 * 2660.0, DVec3::new(0.011, 0.007, -0.1)))
+        dry.body(&FreeBox::new(1.5 * size, 2660.0, DVec3::new(0.0, 0.0, -0.15)))
     };
     let mut solids = Solids::new(&dry.build(), Some(&restituting(spring, asked, 0.0)))?;
     let bodies = solids.poses().len();
@@ -248,15 +249,17 @@ pub fn stack(count: usize, seconds: f64) -> Result<RestRow> {
         dry = dry.body(&FreeBox::new(size, mass / edge.powi(3), center));
     }
     let mut solids = Solids::new(&dry.build(), Some(&smooth(spring, damping, friction)))?;
-    rest(&mut solids, seconds, dt, l0)
+    rest(&mut solids, seconds, dt)
 }
 
-/// A wall of `columns` x 10 cubes of 54 mm hit by a cube of 20 kg at 3 m/s, after `seconds`.
+/// A wall of `columns` x 10 cubes of 54 mm hit by a cube of 20 kg at 3 m/s, K = `spring` [N/m] at the
+/// dam-break cube's damping ratio, after `seconds`.
 ///
 /// # Errors
 /// Those of [`Solids::advance`].
-pub fn demolish(columns: usize, seconds: f64) -> Result<RestRow> {
-    let (edge, mass, l0, spring, damping, friction, dt) = DAM_BREAK_CUBE;
+pub fn demolish(columns: usize, spring: f64, seconds: f64) -> Result<RestRow> {
+    let (edge, mass, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
+    let damping = c * (spring / k).sqrt();
     let mut dry = DryScene::new(l0, DVec3::new(-5.0, -5.0, 0.0), DVec3::new(9.0, 5.0, 1.0)).floor();
     for row in 0..10 {
         for column in 0..columns {
@@ -269,10 +272,10 @@ pub fn demolish(columns: usize, seconds: f64) -> Result<RestRow> {
     let mut ram = FreeBox::new(size, 20.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
     ram.velocity = DVec3::new(3.0, 0.0, 0.0);
     let mut solids = Solids::new(&dry.body(&ram).build(), Some(&smooth(spring, damping, friction)))?;
-    rest(&mut solids, seconds, dt, l0)
+    rest(&mut solids, seconds, dt)
 }
 
-fn rest(solids: &mut Solids, seconds: f64, dt: f64, l0: f64) -> Result<RestRow> {
+fn rest(solids: &mut Solids, seconds: f64, dt: f64) -> Result<RestRow> {
     let start: Vec<DVec3> = solids.poses().iter().map(|p| p.position).collect();
     let fluid = none(start.len());
     let clock = Instant::now();
@@ -287,7 +290,6 @@ fn rest(solids: &mut Solids, seconds: f64, dt: f64, l0: f64) -> Result<RestRow> 
         substeps = report.substeps;
     }
     let moved = solids.poses().iter().zip(&start).map(|(p, s)| (p.position - *s).length());
-    let _ = l0;
     Ok(RestRow {
         bodies: start.len(),
         drift: moved.fold(0.0, f64::max),
