@@ -171,12 +171,16 @@ impl Solids {
         ));
         if spring < 0.1 * spring_recommended {
             words.push(match smooth {
-                Some(_) => "contact: the spring is soft: hard impacts reach a quarter of the spacing, where a \
+                Some(_) => {
+                    "contact: the spring is soft: hard impacts reach a quarter of the spacing, where a \
                             stiffer stop takes over"
-                    .to_string(),
-                None => "contact: the spring is too soft to stop the heaviest body at its fastest; it may pass \
+                        .to_string()
+                }
+                None => {
+                    "contact: the spring is too soft to stop the heaviest body at its fastest; it may pass \
                          through a wall"
-                    .to_string(),
+                        .to_string()
+                }
             });
         }
         if worst.softest < 0.999 * spring {

@@ -233,9 +233,8 @@ impl Limits {
         spacing: f64,
     ) -> smooth::Constants {
         let mass = reduced_mass(bodies, a, b);
-        let both = |of: fn(&stiffness::Lambda) -> f64| {
-            of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]))
-        };
+        let both =
+            |of: fn(&stiffness::Lambda) -> f64| of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]));
         let shortest = self.longest_step / f64::from(self.forced.unwrap_or(MOST_SUBSTEPS));
         let carried = (self.omega_step() / shortest).powi(2) / both(|l| l.spring);
         let spring = if self.forced.is_some() { self.spring } else { self.spring.min(carried) };

@@ -23,9 +23,8 @@ pub(crate) fn collide(
 ) -> usize {
     let mut count = 0;
     for &(i, j) in &pair.candidates {
-        let at = |k: usize, n: u32| {
-            bodies[k].pose.position + bodies[k].rotation * layers[k].offsets[n as usize]
-        };
+        let at =
+            |k: usize, n: u32| bodies[k].pose.position + bodies[k].rotation * layers[k].offsets[n as usize];
         let x_i = at(pair.a, i);
         let x_j = pair.b.map_or_else(|| walls.grid.point(j), |b| at(b, j));
         let r = x_j - x_i;

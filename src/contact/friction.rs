@@ -86,11 +86,9 @@ impl Slip {
             let turning = [arm.cross(tangent[0]), arm.cross(tangent[1]), spin];
             for column in 0..3 {
                 let turned = body.inverse_inertia * turning[column];
-                let moved =
-                    if column < 2 { body.inverse_mass * tangent[column] } else { DVec3::ZERO };
+                let moved = if column < 2 { body.inverse_mass * tangent[column] } else { DVec3::ZERO };
                 let slip = DVec3::new(moved.dot(tangent[0]), moved.dot(tangent[1]), 0.0);
-                let spun =
-                    DVec3::new(turned.dot(turning[0]), turned.dot(turning[1]), turned.dot(turning[2]));
+                let spun = DVec3::new(turned.dot(turning[0]), turned.dot(turning[1]), turned.dot(turning[2]));
                 *response.col_mut(column) += slip + spun;
             }
         }
@@ -152,11 +150,8 @@ mod tests {
 
     #[test]
     fn an_impulse_inside_the_limit_stops_the_slip_and_one_outside_opposes_what_remains() {
-        let response = DMat3::from_cols(
-            DVec3::new(2.0, 0.3, 0.1),
-            DVec3::new(0.3, 1.0, 0.2),
-            DVec3::new(0.1, 0.2, 4.0),
-        );
+        let response =
+            DMat3::from_cols(DVec3::new(2.0, 0.3, 0.1), DVec3::new(0.3, 1.0, 0.2), DVec3::new(0.1, 0.2, 4.0));
         let wanted = DVec3::new(-1.0, 0.5, 0.25);
         let free = within(response, wanted, 10.0, &mut 0.0);
         assert!((response * free - wanted).length() < 1e-12);

@@ -30,9 +30,30 @@ pub(crate) struct Inside {
 #[inline]
 pub(crate) fn depth(q: DVec3, half: DVec3, faces: Faces) -> Option<Inside> {
     let over = half - q.abs();
-    if over.x <= 0.0 || over.y <= 0.0 || over.z <= 0.0 {
+    let smallest = over.min_element();
+    if smallest <= 0.0 {
         return None;
     }
+    if faces == ALL_FACES {
+        let near = over.cmplt(DVec3::splat(2.0 * smallest)).bitmask();
+        if near.is_power_of_two() {
+            let axis = near.trailing_zeros() as u8;
+            let face = 2 * axis + u8::from(q[usize::from(axis)] > 0.0);
+            return Some(Inside { depth: smallest, outward: face_normal(face), face });
+        }
+    } else if faces.is_power_of_two() {
+        // a floor or the side of a tank
+        let face = faces.trailing_zeros() as u8;
+        let outward = face_normal(face);
+        let depth = half[usize::from(face / 2)] - q.dot(outward);
+        return Some(Inside { depth, outward, face });
+    }
+    blended(q, half, faces)
+}
+
+/// [`depth`] of a point inside, where more than one face may count.
+fn blended(q: DVec3, half: DVec3, faces: Faces) -> Option<Inside> {
+    let over = half - q.abs();
     let mut sign = [false; 3];
     let mut near = over;
     for k in 0..3 {
@@ -53,8 +74,9 @@ pub(crate) fn depth(q: DVec3, half: DVec3, faces: Faces) -> Option<Inside> {
     if a == f64::INFINITY {
         return None;
     }
-    let toward = |k: usize| if sign[k] { DVec3::AXES[k] } else { -DVec3::AXES[k] };
-    let mut found = Inside { depth: a, outward: toward(first), face: 2 * first as u8 + u8::from(sign[first]) };
+    let toward = |k: usize| face_normal(2 * k as u8 + u8::from(sign[k]));
+    let mut found =
+        Inside { depth: a, outward: toward(first), face: 2 * first as u8 + u8::from(sign[first]) };
     for k in [second, third] {
         let (a, b) = (found.depth, near[k]);
         if b < 2.0 * a {
@@ -68,8 +90,8 @@ pub(crate) fn depth(q: DVec3, half: DVec3, faces: Faces) -> Option<Inside> {
 /// Outward normal of a face in the box's frame.
 #[inline]
 pub(crate) fn face_normal(face: u8) -> DVec3 {
-    let sign = if face & 1 == 1 { 1.0 } else { -1.0 };
-    DVec3::AXES[usize::from(face / 2)] * sign
+    const NORMALS: [DVec3; 6] = [DVec3::NEG_X, DVec3::X, DVec3::NEG_Y, DVec3::Y, DVec3::NEG_Z, DVec3::Z];
+    NORMALS[usize::from(face)]
 }
 
 /// Largest distance of `q` beyond a face plane of the box [m]: a lower bound of its distance.
@@ -236,7 +258,6 @@ impl Surface {
         let smallest_weight = weights.iter().copied().fold(1.0, f64::min);
         Self { points, weights, faces, all_faces, smallest_weight }
     }
-
 }
 
 #[cfg(test)]
@@ -250,7 +271,8 @@ mod tests {
         let (h, mut blended) = (1e-6, 0);
         for k in 0..2000 {
             let f = |n: f64| (f64::from(k) * n).fract();
-            let q = DVec3::new(1.0 - 0.3 * f(0.618_034), 0.7 - 0.3 * f(0.754_877), -0.5 + 0.2 * f(0.569_84));
+            let q =
+                DVec3::new(0.99 - 0.3 * f(0.618_034), 0.69 - 0.3 * f(0.754_877), -0.49 + 0.2 * f(0.569_84));
             let here = at(q);
             blended += usize::from(here.outward.abs().max_element() < 0.99);
             let slope = DVec3::AXES.map(|e| (at(q - h * e).depth - at(q + h * e).depth) / (2.0 * h));

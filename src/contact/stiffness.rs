@@ -67,7 +67,8 @@ pub(crate) fn smooth(body: &Body, surface: &Surface) -> Lambda {
             }
             let center = on(other).map(|(p, w)| p * w).sum::<DVec3>() / sum;
             let arm = if other == face { 0.0 } else { center.length_squared() };
-            let spread = |axis: usize| on(other).map(|(p, w)| w * (p[axis] - center[axis]).powi(2)).sum::<f64>();
+            let spread =
+                |axis: usize| on(other).map(|(p, w)| w * (p[axis] - center[axis]).powi(2)).sum::<f64>();
             let (u, v) = ((usize::from(face / 2) + 1) % 3, (usize::from(face / 2) + 2) % 3);
             let rocking = (spread(u) / body.principal[v]).max(spread(v) / body.principal[u]) / sum;
             let bounce = mass + arm * turn;
@@ -181,7 +182,12 @@ mod tests {
     #[test]
     fn restitution_follows_from_the_damping_ratio() {
         for z in [0.05, 0.3, 0.7, 0.99, 1.5, 2.5] {
-            assert!((restitution(z) - integrated(z)).abs() < 1e-3, "{z}: {} {}", restitution(z), integrated(z));
+            assert!(
+                (restitution(z) - integrated(z)).abs() < 1e-3,
+                "{z}: {} {}",
+                restitution(z),
+                integrated(z)
+            );
         }
         for e in [0.1, 0.2, 0.5, 0.8, 1.0] {
             assert!((restitution(damping_ratio(e)) - e).abs() < 1e-6);

@@ -203,9 +203,7 @@ pub fn calibrate(slide: Slide, friction: f64) -> Result<SlideRow> {
 /// # Errors
 /// Those of [`calibrate`].
 pub fn eta_curve(slide: Slide) -> Result<Vec<SlideRow>> {
-    (0..10)
-        .map(|k| if k == 0 { slide.run(5.0) } else { calibrate(slide, f64::from(k) * 0.1) })
-        .collect()
+    (0..10).map(|k| if k == 0 { slide.run(5.0) } else { calibrate(slide, f64::from(k) * 0.1) }).collect()
 }
 
 /// Travel times of the smooth law for mu = 0 ... 0.9 on the slope.
@@ -216,8 +214,6 @@ pub fn coulomb_curve(slide: Slide) -> Result<Vec<SlideRow>> {
     let friction = (0..10).map(|k| f64::from(k) * 0.1);
     friction
         .filter(|mu| *mu < 0.99 * slide.slope.tan())
-        .map(|friction| {
-            Slide { friction, ..slide }.run(1.5 * travel_time(slide.slope, friction, LENGTH))
-        })
+        .map(|friction| Slide { friction, ..slide }.run(1.5 * travel_time(slide.slope, friction, LENGTH)))
         .collect()
 }

@@ -168,7 +168,8 @@ impl Drop {
         let mut previous = f64::INFINITY;
         let mut held = true;
         for step in 0..(2.5 / self.time_step).round() as usize {
-            let report = solids.advance(step as f64 * self.time_step, self.time_step, &[Wrench::default()])?;
+            let report =
+                solids.advance(step as f64 * self.time_step, self.time_step, &[Wrench::default()])?;
             let z = solids.poses()[0].position.z - standing;
             if report.pairs > 0 {
                 collisions += u32::from(apart);
@@ -246,8 +247,7 @@ pub fn ideal_spring(
         }
     };
     let runs: Vec<(f64, usize)> = factors.iter().flat_map(|&f| (0..phases).map(move |p| (f, p))).collect();
-    let rows: Vec<Option<DropRow>> =
-        runs.par_iter().map(|&(f, p)| fall(f, p)).collect::<Result<Vec<_>>>()?;
+    let rows: Vec<Option<DropRow>> = runs.par_iter().map(|&(f, p)| fall(f, p)).collect::<Result<Vec<_>>>()?;
     let of = |k: usize| &rows[k * phases..(k + 1) * phases];
     let all = |k: usize, test: fn(&DropRow) -> bool| of(k).iter().all(|r| r.as_ref().is_some_and(test));
     let ideal = (0..factors.len()).find(|&k| all(k, |r| r.returns)).map_or(f64::NAN, |k| factors[k]);

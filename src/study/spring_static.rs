@@ -93,13 +93,7 @@ pub fn scene(law: Law) -> Scene {
 ///
 /// # Errors
 /// Those of [`Solids::new`] and [`Solids::advance`].
-pub fn amplitude(
-    law: Law,
-    spring: f64,
-    damping_ratio: f64,
-    dt: f64,
-    seconds: f64,
-) -> Result<AmplitudeRow> {
+pub fn amplitude(law: Law, spring: f64, damping_ratio: f64, dt: f64, seconds: f64) -> Result<AmplitudeRow> {
     let clock = Instant::now();
     let scene = scene(law);
     let mut solids = Solids::new(&scene, Some(&contact(law, spring, damping_ratio, law == Law::Paper)))?;
