@@ -17,3 +17,4 @@ pub mod run;
 pub mod scene;
 pub mod simulation;
 mod step;
+pub mod study;

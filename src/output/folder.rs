@@ -4,16 +4,8 @@ use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// Files of an earlier run that a new one replaces; anything else in the folder is left alone.
-const OURS: [&str; 8] = [
-    "case.toml",
-    "result.json",
-    "monitors.csv",
-    "bodies.csv",
-    "gauges.csv",
-    "final.png",
-    "vtu",
-    "pictures",
-];
+const OURS: [&str; 8] =
+    ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", "vtu", "pictures"];
 
 /// The folder of a run.
 #[derive(Clone, Debug)]
@@ -53,7 +45,8 @@ impl Folder {
 
     fn clear(&self) -> Result<()> {
         for path in OURS.map(|f| self.root.join(f)).into_iter().chain([self.pvd()]) {
-            let gone = if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
+            let gone =
+                if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
             match gone {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path)(e)),
                 _ => {}

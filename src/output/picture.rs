@@ -31,10 +31,10 @@ impl Picture {
         let flat = scene.dimensions == 2;
         let groups = &scene.groups;
         let drawn = (0..groups.pressure()).chain(groups.moving_dummy_range());
-        let (min, max) = drawn.map(|slot| scene.position[slot]).filter(|x| x.is_finite()).fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(min, max), x| (min.min(x), max.max(x)),
-        );
+        let (min, max) = drawn
+            .map(|slot| scene.position[slot])
+            .filter(|x| x.is_finite())
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), x| (min.min(x), max.max(x)));
         let (min, max) = if min.x <= max.x { (min, max) } else { (DVec3::ZERO, DVec3::ONE) };
         let (azimuth, elevation) = if flat { (0.0, 0.0) } else { (0.42, 0.4) };
         let camera = Camera::new(azimuth, elevation, min - scene.spacing, max + scene.spacing);

@@ -25,8 +25,9 @@ impl Pvd {
     /// [`crate::error::Error::Io`].
     pub fn push(&mut self, time: f64, parts: &[(&str, String)]) -> Result<()> {
         for (part, (name, file)) in parts.iter().enumerate() {
-            let line =
-                format!(r#"    <DataSet timestep="{time}" group="" part="{part}" name="{name}" file="{file}"/>"#);
+            let line = format!(
+                r#"    <DataSet timestep="{time}" group="" part="{part}" name="{name}" file="{file}"/>"#
+            );
             writeln!(self.entries, "{line}").expect("a String takes everything");
         }
         let text = format!(

@@ -34,9 +34,11 @@ impl Gauges {
             }
             let point = DVec3::from(gauge.point);
             let distance = |&slot: &usize| scene.position[slot].distance(point);
-            let slots: Vec<usize> = scene.groups.static_wall_range().filter(|s| distance(s) <= reach).collect();
+            let slots: Vec<usize> =
+                scene.groups.static_wall_range().filter(|s| distance(s) <= reach).collect();
             if slots.is_empty() {
-                let nearest = scene.groups.static_wall_range().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                let nearest =
+                    scene.groups.static_wall_range().min_by(|a, b| distance(a).total_cmp(&distance(b)));
                 let hint = nearest.map_or("there are no walls".to_string(), |slot| {
                     format!(
                         "the nearest wall particle is {:.4} m away at {:.4}",
@@ -128,7 +130,14 @@ impl Gauges {
 /// amount to half of the largest sum along the line, so that a flat surface is found half a spacing above its
 /// topmost particles, in the open as well as along a wall and in a corner. Spray is passed over: less than half
 /// of what a full corner would give.
-pub fn level(fields: &Fields, groups: &Groups, line: [f64; 2], dimensions: u32, reach: f64, l0: f64) -> Option<f64> {
+pub fn level(
+    fields: &Fields,
+    groups: &Groups,
+    line: [f64; 2],
+    dimensions: u32,
+    reach: f64,
+    l0: f64,
+) -> Option<f64> {
     let plane = dimensions == 2;
     let near: Vec<(f64, f64)> = (0..groups.fluid)
         .filter(|&i| fields.kind[i] == Kind::Fluid)

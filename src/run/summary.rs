@@ -37,7 +37,8 @@ impl Totals {
             self.pressure.failures += u64::from(!solved(solve.outcome));
         }
         let (monitors, contact) = (&mut self.monitors, &report.contact);
-        monitors.penetration_max_over_l0 = monitors.penetration_max_over_l0.max(contact.penetration_max_over_l0);
+        monitors.penetration_max_over_l0 =
+            monitors.penetration_max_over_l0.max(contact.penetration_max_over_l0);
         monitors.contact_omega_dt = monitors.contact_omega_dt.max(contact.omega_dt);
         monitors.contact_substeps_max = monitors.contact_substeps_max.max(contact.substeps);
     }

@@ -46,7 +46,8 @@ pub fn body_energy(simulation: &Simulation, scene: &Scene) -> (f64, f64) {
     for (solid, pose) in scene.solids.iter().zip(simulation.solids.poses()) {
         if let Drive::Free(body) = &solid.drive {
             let spin = pose.orientation.inverse() * pose.angular_velocity;
-            kinetic += 0.5 * body.mass * pose.velocity.length_squared() + 0.5 * (spin * body.inertia).dot(spin);
+            kinetic +=
+                0.5 * body.mass * pose.velocity.length_squared() + 0.5 * (spin * body.inertia).dot(spin);
             potential -= body.mass * scene.gravity.dot(pose.position);
         }
     }
@@ -237,7 +238,9 @@ impl Tables {
         ]);
         let seconds = |of: &BTreeMap<Stage, f64>, stage| of.get(stage).copied().unwrap_or(0.0);
         row.extend(
-            self.stages.iter().map(|s| Cell::from(seconds(&simulation.stages, s) - seconds(&since.stages, s))),
+            self.stages
+                .iter()
+                .map(|s| Cell::from(seconds(&simulation.stages, s) - seconds(&since.stages, s))),
         );
         row
     }
