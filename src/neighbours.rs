@@ -57,6 +57,12 @@ impl Chunk {
         self.slice(self.start[k] as usize, self.dummies[k] as usize)
     }
 
+    /// All neighbours of row `k`, and how many of them carry pressure; they come first.
+    #[inline(always)]
+    pub fn parts(&self, k: usize) -> (Row<'_>, usize) {
+        (self.all(k), (self.dummies[k] - self.start[k]) as usize)
+    }
+
     /// The range of row `k` in `neighbour` and `weight`.
     #[inline(always)]
     pub fn range(&self, k: usize) -> std::ops::Range<usize> {
@@ -104,6 +110,11 @@ impl Neighbours {
     /// Those neighbours of particle `i` that carry pressure.
     pub fn pressure(&self, i: usize) -> Row<'_> {
         self.chunks[i / CHUNK].pressure(i % CHUNK)
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.chunks.iter().map(Chunk::rows).sum()
     }
 
     /// Number of pairs listed.

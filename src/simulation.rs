@@ -69,10 +69,20 @@ pub struct Simulation {
     speed: f64,
 }
 
+/// When the PPE's solver stops.
+fn settings(case: &Case) -> Settings {
+    let solver = case.fluid.as_ref().map(|f: &Fluid| f.solver.clone()).unwrap_or_default();
+    Settings {
+        tolerance: solver.tolerance,
+        max_iterations: solver.max_iterations,
+        warm_start: solver.warm_start,
+    }
+}
+
 /// Displacement of the fastest particles in a step, over l0.
-const COURANT_MAX: f64 = 0.35;
+pub const COURANT_MAX: f64 = 0.35;
 /// c_s dt / l0 at most.
-const SOUND_MAX: f64 = 0.7;
+pub const SOUND_MAX: f64 = 0.7;
 /// Steps between looks at the counters and the fastest particles.
 const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.
@@ -87,12 +97,7 @@ impl Simulation {
     ) -> Result<Self> {
         let params = Params::new(case, scene)?;
         let plan = Plan::new(case, scene, &params);
-        let solver = case.fluid.as_ref().map(|f: &Fluid| f.solver.clone()).unwrap_or_default();
-        let settings = Settings {
-            tolerance: solver.tolerance,
-            max_iterations: solver.max_iterations,
-            warm_start: solver.warm_start,
-        };
+        let settings = settings(case);
         Ok(Self {
             backend: make(scene, &params, &plan, settings)?,
             solids: Solids::new(scene, case.contact.as_ref())?,
@@ -107,6 +112,11 @@ impl Simulation {
             time_stages: true,
             speed: 0.0,
         })
+    }
+
+    /// When the PPE's solver stops.
+    pub fn settings(&self) -> Settings {
+        settings(&self.case)
     }
 
     /// Largest speed to expect in the fluid [m/s]: of the collapse from rest, or measured.

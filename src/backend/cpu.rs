@@ -91,6 +91,11 @@ impl Cpu {
         &self.fields
     }
 
+    /// The particles, to try single stages on; the neighbour lists stay as they are.
+    pub fn fields_mut(&mut self) -> &mut Fields {
+        &mut self.fields
+    }
+
     /// The neighbour lists.
     pub fn neighbours(&self) -> &Neighbours {
         &self.neighbours
@@ -99,6 +104,16 @@ impl Cpu {
     /// Sizes of the particle groups.
     pub fn groups(&self) -> Groups {
         self.groups
+    }
+
+    /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
+    pub fn neighbour_rows(&self) -> Vec<(Vec<u32>, Vec<u32>)> {
+        let row = |i: usize| {
+            let (chunk, k) = (&self.neighbours.chunks[i / CHUNK], i % CHUNK);
+            let near = chunk.pressure(k).neighbour;
+            (near.to_vec(), chunk.all(k).neighbour[near.len()..].to_vec())
+        };
+        (0..self.neighbours.rows()).map(row).collect()
     }
 
     fn viscosity(&mut self) {
@@ -264,9 +279,9 @@ impl Cpu {
                     let i = c * CHUNK + k;
                     *a = DVec3::ZERO;
                     if i < live {
-                        let rows = (chunk.all(k), chunk.pressure(k));
+                        let row = chunk.parts(k);
                         *a = pressure_gradient::pressure_gradient(
-                            i, rows, state[i], params, position, pressure,
+                            i, row, state[i], params, position, pressure,
                         );
                     }
                 }
@@ -406,6 +421,8 @@ impl Backend for Cpu {
     fn write(&mut self, fields: &Fields) -> Result<()> {
         self.fields = fields.clone();
         self.live = self.fields.kind[..self.groups.fluid].iter().filter(|&&k| k == Kind::Fluid).count();
+        // The lists name the slots of the particles that were here before.
+        self.neighbours = Neighbours::new(self.neighbours.rows());
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! Where the particle stages run: the CPU in f64 ([`cpu`]) or a device in f32 ([`gpu`]).
 
 pub mod cpu;
+pub mod gpu;
 
 use crate::body::{Pose, Wrench};
 use crate::error::Result;
@@ -58,4 +59,8 @@ pub trait Backend: Send {
     }
     /// Bytes that the backend holds for particles.
     fn bytes(&self) -> u64;
+    /// Kernels started on a device so far; 0 for a backend without one.
+    fn dispatches(&self) -> u64 {
+        0
+    }
 }

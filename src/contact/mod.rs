@@ -1,79 +1,414 @@
-//! Contact.
-use crate::body::{Pose, Wrench};
-use crate::error::Result;
-use crate::scene::{Drive, Scene};
+//! Contact between solids: the bodies of a scene, their motion over a step, sub-stepped on the host.
+//!
+//! Everything here is f64 on the host, the same for every backend: a contact is thousands of points at
+//! most, forces from positions in f32 carry 1 to 10 % of noise, and a round trip to a device for every
+//! sub-step would cost more than the work.
+
+mod advice;
+mod broad;
+mod candidates;
+mod collision;
+mod friction;
+mod geometry;
+mod paper;
+mod smooth;
+mod stiffness;
+
+pub use advice::ContactAdvice;
+pub use stiffness::{damping_ratio, restitution};
+
+use crate::body::{Body, Pose, Wrench};
+use crate::case;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use candidates::Candidates;
 use glam::DVec3;
+use stiffness::Damping;
 
-/// What the contact did in a step.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ContactReport {
-    /// Sub-steps.
-    pub substeps: u32,
-    /// omega dt of a sub-step [-].
-    pub omega_dt: f64,
-    /// Deepest penetration over l0 [-].
-    pub penetration_max_over_l0: f64,
-}
+/// Restitution b of the collision model of the law `pressure`, Eq. (18) [-].
+const COLLISION_RESTITUTION: f64 = 0.2;
+/// Distance of the collision model over the spacing, a [-].
+const COLLISION_DISTANCE: f64 = 0.8;
 
-/// The moving solids.
-pub struct Solids {
-    poses: Vec<Pose>,
-    guess: Vec<Pose>,
-    scene: Scene,
-}
-impl Solids {
-    /// From a scene.
-    pub fn new(scene: &Scene, _: Option<&crate::case::Contact>) -> Result<Self> {
-        let poses: Vec<Pose> = scene
-            .solids
-            .iter()
-            .map(|s| Pose {
-                position: s.position,
-                orientation: s.orientation,
-                velocity: match &s.drive {
-                    Drive::Free(b) => b.velocity,
-                    _ => DVec3::ZERO,
-                },
-                angular_velocity: DVec3::ZERO,
-            })
-            .collect();
-        Ok(Self { guess: poses.clone(), poses, scene: scene.clone() })
+/// Gap between two facing surfaces at which a law's contact begins [m]: d_c - l0 for the paper's,
+/// 0 for the smooth one. A body stands free of forces, and so starts without a jump, at this gap.
+pub fn standing_gap(law: case::Law, spacing: f64) -> f64 {
+    match law {
+        case::Law::Paper => (1.5_f64.sqrt() - 1.0) * spacing,
+        case::Law::Smooth | case::Law::Pressure => 0.0,
     }
-    /// Poses.
+}
+
+/// What a step of contact did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactReport {
+    /// Contact sub-steps of the step.
+    pub substeps: u32,
+    /// dt sqrt(K / m_e) of the whole step [-], before sub-stepping.
+    pub omega_dt: f64,
+    /// Deepest contact over the spacing [-]: of true surfaces ("smooth"), d_c - d ("paper").
+    pub penetration_max_over_l0: f64,
+    /// Particle pairs ("paper") or surface points ("smooth") in contact in the last sub-step.
+    pub pairs: usize,
+    /// Pairs of solids in contact in the last sub-step.
+    pub solid_pairs: usize,
+    /// Energy in the contact springs at the last sub-step [J].
+    pub potential_energy: f64,
+}
+
+/// Energy of all free bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of motion [J].
+    pub kinetic: f64,
+    /// Of height [J], zero at the origin.
+    pub gravity: f64,
+    /// In contact springs [J].
+    pub contact: f64,
+}
+
+impl Energy {
+    /// Sum [J].
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.gravity + self.contact
+    }
+}
+
+/// State of a solid, for checkpoints: what `restore` needs to go on to the last bit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidState {
+    /// Pose and velocity.
+    pub pose: Pose,
+    /// Angular momentum about the centre of mass [kg m2/s].
+    pub angular_momentum: DVec3,
+    /// Mean contact wrench of the last step.
+    pub contact: Wrench,
+}
+
+/// The contact law with its working memory.
+enum Model {
+    /// No solid moves freely, or nothing to touch.
+    None,
+    Smooth(candidates::Smooth),
+    Paper(candidates::Paper, paper::Law),
+    /// Baseline: impulses, no forces.
+    Collision(candidates::Paper),
+}
+
+/// The moving solids of a scene and the contact between them and with the walls.
+pub struct Solids {
+    names: Vec<String>,
+    bodies: Vec<Body>,
+    poses: Vec<Pose>,
+    predicted: Vec<Pose>,
+    contact: Vec<Wrench>,
+    gravity: DVec3,
+    spacing: f64,
+    candidates: Candidates,
+    model: Model,
+    limits: Limits,
+    load: Vec<Wrench>,
+    /// Time step, its dt sqrt(K / m_e) and its sub-steps, as last planned.
+    planned: Option<(f64, f64, u32)>,
+}
+
+/// What the case asks of contact, and the stiffness of each body.
+#[derive(Clone)]
+struct Limits {
+    spring: f64,
+    damping: Damping,
+    viscous_friction: f64,
+    friction: f64,
+    forced: Option<u32>,
+    lambda: Vec<stiffness::Lambda>,
+    /// Fastest speed that the case's heights and starting velocities allow [m/s].
+    fastest: f64,
+    /// Largest time step so far [s]: softened contacts are never stiffened again, which would add energy.
+    longest_step: f64,
+}
+
+impl Solids {
+    /// The solids of `scene` at t = 0. `contact` may be absent only if no solid moves freely.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if a free body has no contact law, or if the law's numbers contradict each other.
+    pub fn new(scene: &Scene, contact: Option<&case::Contact>) -> Result<Self> {
+        let bodies: Vec<Body> = scene.solids.iter().map(|s| Body::new(s, scene.dimensions)).collect();
+        let free = || bodies.iter().filter(|b| b.is_free());
+        if let (None, Some(k)) = (contact, bodies.iter().position(Body::is_free)) {
+            let name = &scene.solids[k].name;
+            return Err(Error::Case(format!(
+                "body \"{name}\" moves freely, so the case needs [contact] with law and spring"
+            )));
+        }
+        let lightest = free().map(|b| b.mass).fold(f64::INFINITY, f64::min);
+        let fastest = advice::fastest_speed(scene);
+        let mut limits = Limits {
+            spring: contact.map_or(0.0, |c| c.spring),
+            damping: contact.map_or(Ok(Damping::Coefficient(0.0)), |c| Damping::new(c, lightest))?,
+            viscous_friction: contact.map_or(0.0, |c| c.viscous_friction),
+            friction: contact.map_or(0.0, |c| c.friction),
+            forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
+            lambda: vec![stiffness::Lambda::default(); bodies.len()],
+            fastest,
+            longest_step: 0.0,
+        };
+        let model = match contact {
+            Some(c) if free().next().is_some() => match c.law {
+                case::Law::Smooth => {
+                    let model = candidates::Smooth::new(scene);
+                    limits.lambda =
+                        bodies.iter().zip(&model.surfaces).map(|(b, s)| stiffness::smooth(b, s)).collect();
+                    Model::Smooth(model)
+                }
+                case::Law::Paper => {
+                    let model = candidates::Paper::new(scene);
+                    let layers = bodies.iter().zip(&model.layers);
+                    limits.lambda = layers.map(|(b, l)| stiffness::paper(b, &l.offsets, c.torque)).collect();
+                    let Damping::Coefficient(damping) = limits.damping else { unreachable!() };
+                    let law = paper::Law {
+                        spring: c.spring,
+                        damping,
+                        viscous_friction: c.viscous_friction,
+                        distance: 1.5_f64.sqrt() * scene.spacing,
+                        torque: c.torque,
+                    };
+                    Model::Paper(model, law)
+                }
+                case::Law::Pressure => Model::Collision(candidates::Paper::new(scene)),
+            },
+            _ => Model::None,
+        };
+        let poses: Vec<Pose> = bodies.iter().map(|b| b.pose).collect();
+        Ok(Self {
+            names: scene.solids.iter().map(|s| s.name.clone()).collect(),
+            predicted: poses.clone(),
+            poses,
+            contact: vec![Wrench::default(); bodies.len()],
+            load: vec![Wrench::default(); bodies.len()],
+            gravity: scene.gravity,
+            spacing: scene.spacing,
+            candidates: Candidates::new(bodies.len()),
+            bodies,
+            model,
+            limits,
+            planned: None,
+        })
+    }
+
+    /// Poses now, one per `scene.solids`.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
-    /// Name.
+
+    /// Name of solid `k`, as in the case.
     pub fn name(&self, k: usize) -> &str {
-        &self.scene.solids[k].name
+        &self.names[k]
     }
-    /// Predict.
+
+    /// Mean contact wrench over the last step, one per solid (friction included).
+    pub fn contact_wrenches(&self) -> &[Wrench] {
+        &self.contact
+    }
+
+    /// Poses at `t + dt` for the explicit stage of the fluid: V* = V + dt (g + contact acceleration of
+    /// the last step), X* = X + dt V*, the same for the angular momentum; prescribed solids by their table.
     pub fn predict(&mut self, t: f64, dt: f64) -> &[Pose] {
-        self.guess = self.poses.clone();
-        self.go(t, dt, None);
-        std::mem::swap(&mut self.guess, &mut self.poses);
-        &self.guess
-    }
-    fn go(&mut self, t: f64, dt: f64, f: Option<&[Wrench]>) {
-        for (k, s) in self.scene.solids.iter().enumerate() {
-            let p = &mut self.poses[k];
-            match &s.drive {
-                Drive::Prescribed(m) => {
-                    let (a, b) = (m.displacement(t), m.displacement(t + dt));
-                    p.position = s.position + b;
-                    p.velocity = (b - a) / dt;
+        for (k, body) in self.bodies.iter().enumerate() {
+            self.predicted[k] = match (body.prescribed_velocity(t, dt), body.prescribed_position(t + dt)) {
+                (Some(velocity), Some(position)) => Pose { position, velocity, ..body.pose },
+                _ => {
+                    let mut body = body.clone();
+                    let contact = self.contact[k];
+                    body.kick(dt * (body.mass * self.gravity + contact.force), dt * contact.torque);
+                    body.drift(dt);
+                    body.pose
                 }
-                Drive::Free(b) => {
-                    let a = self.scene.gravity + f.map_or(DVec3::ZERO, |f| f[k].force / b.mass);
-                    p.velocity += dt * a;
-                    p.position += dt * p.velocity;
+            };
+        }
+        &self.predicted
+    }
+
+    /// Moves the solids from `t` to `t + dt` under gravity, the fluid's wrenches (one per solid, held
+    /// over the step) and contact in sub-steps.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if a forced number of sub-steps is unstable; [`Error::Diverged`] (step left at 0)
+    /// if a body's state is no longer finite.
+    pub fn advance(&mut self, t: f64, dt: f64, fluid: &[Wrench]) -> Result<ContactReport> {
+        let mut report = self.prepare(dt)?;
+        let h = dt / f64::from(report.substeps);
+        let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
+        for body in &mut self.bodies {
+            if let Some(velocity) = body.prescribed_velocity(t, dt) {
+                body.pose.velocity = velocity;
+            }
+        }
+        for step in 0..report.substeps {
+            self.substep(h, dt, fluid, &mut report);
+            let now = t + dt * f64::from(step + 1) / f64::from(report.substeps);
+            for (k, body) in self.bodies.iter_mut().enumerate() {
+                if body.is_free() {
+                    body.drift(h);
+                } else if step + 1 == report.substeps {
+                    body.pose.position = body.prescribed_position(now).unwrap_or(body.pose.position);
+                } else {
+                    body.pose.position += h * body.pose.velocity;
+                }
+                self.candidates.travelled(k, body, h);
+            }
+        }
+        report.penetration_max_over_l0 /= self.spacing;
+        for (k, body) in self.bodies.iter().enumerate() {
+            self.poses[k] = body.pose;
+            if !body.is_free() {
+                continue;
+            }
+            if !body.pose.is_finite() {
+                let what = format!("body \"{}\" has a position or velocity that is no number", self.names[k]);
+                return Err(Error::Diverged { step: 0, time: t, stage: "contact", what });
+            }
+            let (velocity, momentum) = before[k];
+            self.contact[k] = Wrench {
+                force: body.mass * ((body.pose.velocity - velocity) / dt - self.gravity) - fluid[k].force,
+                torque: (body.momentum - momentum) / dt - fluid[k].torque,
+            };
+        }
+        Ok(report)
+    }
+
+    /// Forces, impulses and friction of one sub-step; positions stay.
+    fn substep(&mut self, h: f64, dt: f64, fluid: &[Wrench], report: &mut ContactReport) {
+        let bodies = &mut self.bodies;
+        self.load.copy_from_slice(fluid);
+        (report.pairs, report.solid_pairs, report.potential_energy) = (0, 0, 0.0);
+        let deepest = &mut report.penetration_max_over_l0;
+        match &mut self.model {
+            Model::None => {}
+            Model::Smooth(model) => {
+                if self.candidates.refresh(bodies, self.spacing, dt) {
+                    model.collect(&self.candidates, bodies, self.spacing);
+                    model.set_constants(&self.limits, bodies, self.spacing, h);
+                }
+                model.evaluate(bodies);
+                for pair in &model.pairs {
+                    self.load[pair.a] += pair.wrench[0];
+                    if let smooth::Other::Solid(b) = pair.b {
+                        self.load[b] += pair.wrench[1];
+                    }
+                    report.pairs += pair.contact_count();
+                    report.solid_pairs += usize::from(pair.contact_count() > 0);
+                    report.potential_energy += pair.energy;
+                    *deepest = deepest.max(pair.depth);
+                }
+            }
+            Model::Paper(model, law) => {
+                if self.candidates.refresh(bodies, self.spacing, dt) {
+                    model.collect(&self.candidates, bodies, law.distance);
+                }
+                model.evaluate(law, bodies);
+                for pair in &model.pairs {
+                    self.load[pair.a] += pair.wrench[0];
+                    if let Some(b) = pair.b {
+                        self.load[b] += pair.wrench[1];
+                    }
+                    report.pairs += pair.count;
+                    report.solid_pairs += usize::from(pair.count > 0);
+                    report.potential_energy += pair.energy;
+                    *deepest = deepest.max(law.distance - pair.closest);
+                }
+            }
+            Model::Collision(model) => {
+                if self.candidates.refresh(bodies, self.spacing, dt) {
+                    model.collect(&self.candidates, bodies, self.spacing);
                 }
             }
         }
+        for (body, load) in bodies.iter_mut().zip(&self.load) {
+            if body.is_free() {
+                body.kick(h * (body.mass * self.gravity + load.force), h * load.torque);
+            }
+        }
+        match &mut self.model {
+            Model::Smooth(model) => model.friction.apply(&model.pairs, bodies, self.limits.friction, h),
+            Model::Collision(model) => {
+                for pair in &model.pairs {
+                    let distance = COLLISION_DISTANCE * self.spacing;
+                    let hits = collision::collide(
+                        pair,
+                        bodies,
+                        &model.layers,
+                        &model.walls,
+                        distance,
+                        COLLISION_RESTITUTION,
+                    );
+                    report.pairs += hits;
+                    report.solid_pairs += usize::from(hits > 0);
+                }
+            }
+            Model::None | Model::Paper(..) => {}
+        }
     }
-    /// Advance.
-    pub fn advance(&mut self, t: f64, dt: f64, f: &[Wrench]) -> Result<ContactReport> {
-        self.go(t, dt, Some(f));
-        Ok(ContactReport::default())
+
+    /// Energy of the free bodies now.
+    pub fn energy(&mut self) -> Energy {
+        let mut energy = Energy::default();
+        for body in self.bodies.iter().filter(|b| b.is_free()) {
+            energy.kinetic += body.kinetic_energy();
+            energy.gravity -= body.mass * self.gravity.dot(body.pose.position);
+        }
+        let stale = self.candidates.refresh(&self.bodies, self.spacing, 0.0);
+        match &mut self.model {
+            Model::Smooth(model) => {
+                if stale {
+                    model.collect(&self.candidates, &self.bodies, self.spacing);
+                    let h = self.limits.longest_step;
+                    model.set_constants(&self.limits, &self.bodies, self.spacing, h.max(f64::MIN_POSITIVE));
+                }
+                model.evaluate(&self.bodies);
+                energy.contact = model.pairs.iter().map(|p| p.energy).sum();
+            }
+            Model::Paper(model, law) => {
+                if stale {
+                    model.collect(&self.candidates, &self.bodies, law.distance);
+                }
+                model.evaluate(law, &self.bodies);
+                energy.contact = model.pairs.iter().map(|p| p.energy).sum();
+            }
+            Model::None | Model::Collision(_) => {}
+        }
+        energy
+    }
+
+    /// Momentum [kg m/s] of the free bodies, and angular momentum about the origin [kg m2/s].
+    pub fn momentum(&self) -> (DVec3, DVec3) {
+        self.bodies.iter().filter(|b| b.is_free()).fold((DVec3::ZERO, DVec3::ZERO), |(p, l), b| {
+            let own = b.mass * b.pose.velocity;
+            (p + own, l + b.pose.position.cross(own) + b.momentum)
+        })
+    }
+
+    /// State for a checkpoint, one per solid.
+    pub fn states(&self) -> Vec<SolidState> {
+        let both = self.bodies.iter().zip(&self.contact);
+        both.map(|(b, c)| SolidState { pose: b.pose, angular_momentum: b.momentum, contact: *c }).collect()
+    }
+
+    /// Continues from the states of a checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if the number of solids differs.
+    pub fn restore(&mut self, states: &[SolidState]) -> Result<()> {
+        if states.len() != self.bodies.len() {
+            let (have, want) = (states.len(), self.bodies.len());
+            return Err(Error::Case(format!("the checkpoint holds {have} solids, the case {want}")));
+        }
+        for (k, state) in states.iter().enumerate() {
+            self.bodies[k].restore(state.pose, state.angular_momentum);
+            self.poses[k] = self.bodies[k].pose;
+            self.contact[k] = state.contact;
+        }
+        self.candidates.forget();
+        Ok(())
     }
 }

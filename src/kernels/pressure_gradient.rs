@@ -11,55 +11,71 @@ use glam::{DMat3, DVec3};
 /// too one-sided for a linear fit.
 const DETERMINANT_MIN: f64 = 0.05;
 
-/// -grad P / rho at fluid slot `i` [m/s2]. `all` holds every neighbour, `row` those that carry pressure.
+/// -grad P / rho at fluid slot `i` [m/s2]. `all` holds every neighbour, of which the first `carry` carry pressure.
 #[inline(always)]
 pub fn pressure_gradient(
     i: usize,
-    (all, row): (Row, Row),
+    (all, carry): (Row, usize),
     state: State,
     params: &Params,
     position: &[DVec3],
     pressure: &[f64],
 ) -> DVec3 {
     let x = position[i];
-    let minimum = row.neighbour.iter().fold(pressure[i], |m, &j| m.min(pressure[j as usize]));
+    let minimum = all.neighbour[..carry].iter().fold(pressure[i], |m, &j| m.min(pressure[j as usize]));
+    let correct = params.gradient == Gradient::MinimumCorrected && state == State::Inner;
     let mut sum = DVec3::ZERO;
-    for (j, w) in row.iter() {
+    let mut moment = Moment::default();
+    for (k, (j, w)) in all.iter().enumerate().take(if correct { usize::MAX } else { carry }) {
         let r = position[j] - x;
         let r2 = r.length_squared();
         if r2 > 0.0 {
-            sum += (pressure[j] - minimum) * w / r2 * r;
+            let s = w / r2;
+            if k < carry {
+                sum += (pressure[j] - minimum) * s * r;
+            }
+            if correct {
+                moment.add(s, r);
+            }
         }
     }
     let scale = f64::from(params.dimensions) / params.number_density;
     let mut gradient = scale * sum;
-    if params.gradient == Gradient::MinimumCorrected && state == State::Inner {
-        gradient = corrected(gradient, all, x, scale, params, position);
+    if correct {
+        let m = moment.matrix(scale, params.dimensions);
+        if m.determinant() > DETERMINANT_MIN {
+            gradient = m.inverse() * gradient;
+        }
     }
     -gradient / params.density
 }
 
-/// `gradient` times the inverse of M = (d / n0) sum w r r^T / r^2 over all neighbours, which makes the
-/// gradient of a linear field exact.
-#[inline(always)]
-fn corrected(gradient: DVec3, all: Row, x: DVec3, scale: f64, params: &Params, position: &[DVec3]) -> DVec3 {
-    let (mut xx, mut xy, mut xz, mut yy, mut yz, mut zz) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (j, w) in all.iter() {
-        let r = position[j] - x;
-        let r2 = r.length_squared();
-        if r2 > 0.0 {
-            let s = scale * w / r2;
-            xx += s * r.x * r.x;
-            xy += s * r.x * r.y;
-            xz += s * r.x * r.z;
-            yy += s * r.y * r.y;
-            yz += s * r.y * r.z;
-            zz += s * r.z * r.z;
-        }
+/// M = (d / n0) sum w r r^T / r^2 over all neighbours; its inverse makes the gradient of a linear field exact.
+#[derive(Default)]
+struct Moment {
+    xx: f64,
+    xy: f64,
+    xz: f64,
+    yy: f64,
+    yz: f64,
+    zz: f64,
+}
+
+impl Moment {
+    #[inline(always)]
+    fn add(&mut self, s: f64, r: DVec3) {
+        self.xx += s * r.x * r.x;
+        self.xy += s * r.x * r.y;
+        self.xz += s * r.x * r.z;
+        self.yy += s * r.y * r.y;
+        self.yz += s * r.y * r.z;
+        self.zz += s * r.z * r.z;
     }
-    if params.dimensions == 2 {
-        yy = 1.0;
+
+    fn matrix(&self, scale: f64, dimensions: u32) -> DMat3 {
+        // The plane y = 0 has no moment across it.
+        let yy = if dimensions == 2 { 1.0 / scale } else { self.yy };
+        let columns = [[self.xx, self.xy, self.xz], [self.xy, yy, self.yz], [self.xz, self.yz, self.zz]];
+        DMat3::from_cols_array_2d(&columns) * scale
     }
-    let m = DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
-    if m.determinant() > DETERMINANT_MIN { m.inverse() * gradient } else { gradient }
 }

@@ -58,7 +58,6 @@ impl Particles {
     /// the pressures, if the scene is wet.
     pub fn solids(scene: &Scene, poses: &[Pose], fields: Option<&Fields>, inside: bool) -> Self {
         let mut out = Self::default();
-        let groups = &scene.groups;
         for (k, (solid, pose)) in scene.solids.iter().zip(poses).enumerate() {
             let mut push = |offset: DVec3, slot: usize| {
                 let arm = pose.orientation * offset;
@@ -66,11 +65,13 @@ impl Particles {
                 let of = fields.map_or((0.0, 0.0), |f| carried(f, slot));
                 out.push(at, of, scene.kind[slot], k as u32 + 1, slot);
             };
-            let first = groups.moving_wall_range().start + solid.wall_slots.start;
-            solid.wall_offset.iter().enumerate().for_each(|(j, &offset)| push(offset, first + j));
+            solid.wall_slots.clone().zip(&solid.wall_offset).for_each(|(slot, &offset)| push(offset, slot));
             if inside {
-                let first = groups.moving_dummy_range().start + solid.dummy_slots.start;
-                solid.dummy_offset.iter().enumerate().for_each(|(j, &offset)| push(offset, first + j));
+                solid
+                    .dummy_slots
+                    .clone()
+                    .zip(&solid.dummy_offset)
+                    .for_each(|(slot, &offset)| push(offset, slot));
             }
         }
         out

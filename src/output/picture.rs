@@ -8,7 +8,7 @@ use crate::fields::Fields;
 use crate::scene::{Kind, Scene};
 use glam::{DVec3, Vec3};
 
-const WALL: Vec3 = Vec3::new(0.80, 0.81, 0.83);
+const WALL: Vec3 = Vec3::new(0.86, 0.87, 0.885);
 const MOVING_WALL: Vec3 = Vec3::new(0.55, 0.57, 0.62);
 const BODY: Vec3 = Vec3::new(0.93, 0.45, 0.13);
 /// Radius of a ball over l0: a little more than half a spacing closes the surface.
@@ -36,14 +36,17 @@ impl Picture {
             .filter(|x| x.is_finite())
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), x| (min.min(x), max.max(x)));
         let (min, max) = if min.x <= max.x { (min, max) } else { (DVec3::ZERO, DVec3::ONE) };
-        let (azimuth, elevation) = if flat { (0.0, 0.0) } else { (0.42, 0.4) };
+        let (azimuth, elevation) = if flat { (0.0, 0.0) } else { (0.38, 0.42) };
         let camera = Camera::new(azimuth, elevation, min - scene.spacing, max + scene.spacing);
         let mut walls = Canvas::default();
         for (k, slot) in groups.static_wall_range().enumerate() {
             // Walls between the viewer and the water are left out.
             let normal = scene.static_wall_normal.get(k).copied().unwrap_or(DVec3::ZERO);
             if flat || normal.dot(camera.forward) < -0.05 {
-                walls.ball(&camera, scene.position[slot], RADIUS * scene.spacing, WALL);
+                // Set back a little, so that the wall does not cut into the balls that lie on it.
+                let x = scene.position[slot] + 0.5 * scene.spacing * camera.forward;
+                let tone = 0.94 + 0.06 * normal.z - 0.07 * normal.x.abs();
+                walls.disc(&camera, x, 0.8 * scene.spacing, WALL * tone as f32);
             }
         }
         // The speed of a fall from the surface to the floor; in a dry scene nothing is coloured by it.
@@ -53,7 +56,7 @@ impl Picture {
 
     /// The picture as PNG, with solids in `poses` and the water of `fields`.
     pub fn draw(&self, scene: &Scene, poses: &[Pose], fields: Option<&Fields>) -> Vec<u8> {
-        let mut canvas = self.walls.clone();
+        let mut canvas = Canvas::default();
         let radius = RADIUS * scene.spacing;
         let solids = Particles::solids(scene, poses, None, self.flat);
         for (x, &kind) in solids.position.iter().zip(&solids.kind) {
@@ -69,6 +72,6 @@ impl Picture {
                 }
             }
         }
-        canvas.png(2.0 * scene.spacing)
+        canvas.png(&self.walls, 2.0 * scene.spacing)
     }
 }

@@ -10,6 +10,8 @@ pub const HEIGHT: usize = 480;
 const SAMPLES: usize = 2;
 /// Part of the picture's edge that is left free.
 const MARGIN: f64 = 0.03;
+/// Part of a wall's own colour where something lies behind it.
+const GLASS: f32 = 0.5;
 const BACKGROUND: Vec3 = Vec3::new(0.965, 0.97, 0.975);
 /// Direction to the light: from the upper left, before the picture (right, up, out of the picture).
 const LIGHT: Vec3 = Vec3::new(-0.42, 0.6, 0.68);
@@ -79,6 +81,18 @@ impl Default for Canvas {
 impl Canvas {
     /// Draw a ball at `x` of `radius` [m] in `color` (sRGB, 0 to 1). What is not finite is left out.
     pub fn ball(&mut self, camera: &Camera, x: DVec3, radius: f64, color: Vec3) {
+        self.splat(camera, x, radius, |normal| {
+            (color * (0.62 + 0.38 * normal.dot(LIGHT).max(0.0)), radius * f64::from(normal.z))
+        });
+    }
+
+    /// Draw a disc that faces the viewer, in one tone: many of them make a smooth wall.
+    pub fn disc(&mut self, camera: &Camera, x: DVec3, radius: f64, color: Vec3) {
+        self.splat(camera, x, radius, |_| (color, 0.0));
+    }
+
+    /// Draw a ball's outline; `paint` tells colour and height [m] from the normal.
+    fn splat(&mut self, camera: &Camera, x: DVec3, radius: f64, paint: impl Fn(Vec3) -> (Vec3, f64)) {
         let (column, row, depth) = camera.project(x);
         if !(column.is_finite() && row.is_finite() && depth.is_finite()) {
             return;
@@ -98,26 +112,40 @@ impl Canvas {
                     continue;
                 }
                 let normal = Vec3::new(dx as f32, dy as f32, rest.sqrt() as f32);
-                let z = (depth - radius * f64::from(normal.z)) as f32;
+                let (color, height) = paint(normal);
+                let z = (depth - height) as f32;
                 let at = j * WIDTH * SAMPLES + i;
                 if z < self.depth[at] {
                     self.depth[at] = z;
-                    self.color[at] = color * (0.62 + 0.38 * normal.dot(LIGHT).max(0.0));
+                    self.color[at] = color;
                 }
             }
         }
     }
 
-    /// The picture as PNG. Places that lie more than about `length` [m] behind what is beside them are
-    /// darkened, which sets heaps of balls off from each other.
-    pub fn png(&self, length: f64) -> Vec<u8> {
+    /// The picture as PNG, before and behind the `walls`, which are seen through where they stand in front.
+    /// Places that lie more than about `length` [m] behind what is beside them are darkened, which sets heaps
+    /// of balls off from each other.
+    pub fn png(&self, walls: &Self, length: f64) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(WIDTH * HEIGHT * 3);
         for row in 0..HEIGHT {
             for column in 0..WIDTH {
                 let mut sum = Vec3::ZERO;
                 for s in 0..SAMPLES * SAMPLES {
                     let (i, j) = (column * SAMPLES + s % SAMPLES, row * SAMPLES + s / SAMPLES);
-                    sum += self.color[j * WIDTH * SAMPLES + i] * self.shade(i, j, length as f32);
+                    let at = j * WIDTH * SAMPLES + i;
+                    let wall = || walls.color[at] * walls.shade(i, j, length as f32);
+                    let glass = match (self.depth[at], walls.depth[at]) {
+                        (f32::INFINITY, _) => 1.0,
+                        (own, wall) if wall < own => GLASS,
+                        _ => 0.0,
+                    };
+                    sum += if glass == 1.0 {
+                        wall()
+                    } else {
+                        let own = self.color[at] * self.shade(i, j, length as f32);
+                        if glass > 0.0 { own.lerp(wall(), glass) } else { own }
+                    };
                 }
                 let mean = sum / (SAMPLES * SAMPLES) as f32;
                 bytes.extend(mean.to_array().map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));

@@ -60,7 +60,7 @@ pub struct Monitors {
     pub density_error_mean: f64,
     /// Largest v dt / l0 of the fluid [-].
     pub courant_max: f64,
-    /// Kinetic and potential energy of fluid and free bodies at t = 0 [J].
+    /// Energy of fluid and free bodies at t = 0: of motion, of height, in contact springs [J].
     #[serde(rename = "energy_start_J")]
     pub energy_start: f64,
     /// The same at the end [J].
@@ -72,7 +72,7 @@ pub struct Monitors {
     pub neighbours_max: u32,
     /// Deepest penetration of two solids over l0 [-].
     pub penetration_max_over_l0: f64,
-    /// Largest stability number omega dt of a contact sub-step [-].
+    /// Largest dt sqrt(K / m_e) of a whole step, before sub-stepping [-].
     pub contact_omega_dt: f64,
     /// Most contact sub-steps of a step.
     pub contact_substeps_max: u32,

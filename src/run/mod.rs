@@ -178,7 +178,7 @@ impl Run {
         let end = simulation.case.run.end;
         let mut due = Due::new(Some(simulation.case.output.every));
         let writing = Instant::now();
-        self.tables.start(simulation, scene, &mut self.totals)?;
+        self.tables.start(simulation, &mut self.totals)?;
         self.frames.write(simulation, scene)?;
         self.totals.output += writing.elapsed();
         let mut dt = simulation.case.run.time_step;
@@ -199,7 +199,7 @@ impl Run {
             dt = report.dt;
             let writing = Instant::now();
             self.totals.add(&report, simulation);
-            self.tables.step(&report, simulation, scene, &mut self.totals)?;
+            self.tables.step(&report, simulation, &mut self.totals)?;
             progress.frame = due.reached(simulation.time);
             if progress.frame {
                 self.frames.write(simulation, scene)?;
@@ -215,7 +215,7 @@ impl Run {
         if !progress.frame && simulation.steps > 0 {
             self.frames.write(simulation, scene)?;
         }
-        self.tables.finish(&progress.report, simulation, scene, &mut self.totals)?;
+        self.tables.finish(&progress.report, simulation, &mut self.totals)?;
         self.frames.write_final_picture(simulation, scene)?;
         self.totals.output += writing.elapsed();
         Ok(ended)

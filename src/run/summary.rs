@@ -44,14 +44,14 @@ impl Totals {
     }
 
     /// Count in what a table row shows: the fluid, the guards and the bodies' energy [J].
-    pub fn look(&mut self, fluid: &FluidMonitor, counters: &Counters, bodies: (f64, f64), dt: f64, l0: f64) {
+    pub fn look(&mut self, fluid: &FluidMonitor, counters: &Counters, bodies: f64, dt: f64, l0: f64) {
         self.speed = fluid.speed_max;
         self.looks += 1;
         self.density_error += fluid.density_error_mean;
         let monitors = &mut self.monitors;
         monitors.density_error_max = monitors.density_error_max.max(fluid.density_error_max);
         monitors.courant_max = monitors.courant_max.max(fluid.speed_max * dt / l0);
-        monitors.energy_end = fluid.kinetic + fluid.potential + bodies.0 + bodies.1;
+        monitors.energy_end = fluid.kinetic + fluid.potential + bodies;
         monitors.lost_particles = counters.lost;
         monitors.neighbours_max = counters.neighbours_max;
     }

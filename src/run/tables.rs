@@ -4,13 +4,14 @@ use super::Due;
 use super::gauges::Gauges;
 use super::summary::Totals;
 use crate::backend::Counters;
+use crate::contact::Energy;
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
 use crate::output::folder::Folder;
 use crate::output::table::{Cell, Table, vector_cells, vector_columns};
 use crate::plan::Stage;
 use crate::pressure::Outcome;
-use crate::scene::{Drive, Scene};
+use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 use std::collections::BTreeMap;
 
@@ -38,20 +39,6 @@ struct Since {
     omega_dt: f64,
     substeps: u32,
     stages: BTreeMap<Stage, f64>,
-}
-
-/// Kinetic and potential energy of the free bodies [J].
-pub fn body_energy(simulation: &Simulation, scene: &Scene) -> (f64, f64) {
-    let (mut kinetic, mut potential) = (0.0, 0.0);
-    for (solid, pose) in scene.solids.iter().zip(simulation.solids.poses()) {
-        if let Drive::Free(body) = &solid.drive {
-            let spin = pose.orientation.inverse() * pose.angular_velocity;
-            kinetic +=
-                0.5 * body.mass * pose.velocity.length_squared() + 0.5 * (spin * body.inertia).dot(spin);
-            potential -= body.mass * scene.gravity.dot(pose.position);
-        }
-    }
-    (kinetic, potential)
 }
 
 /// A word for a table.
@@ -105,8 +92,8 @@ impl Tables {
     ///
     /// # Errors
     /// [`crate::error::Error::Io`], or what the backend says.
-    pub fn start(&mut self, simulation: &mut Simulation, scene: &Scene, totals: &mut Totals) -> Result<()> {
-        self.write(&StepReport::default(), simulation, scene, totals)?;
+    pub fn start(&mut self, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
+        self.write(&StepReport::default(), simulation, totals)?;
         totals.start();
         self.write_gauges(simulation)
     }
@@ -119,7 +106,6 @@ impl Tables {
         &mut self,
         report: &StepReport,
         simulation: &mut Simulation,
-        scene: &Scene,
         totals: &mut Totals,
     ) -> Result<()> {
         let since = &mut self.since;
@@ -132,7 +118,7 @@ impl Tables {
         since.omega_dt = since.omega_dt.max(report.contact.omega_dt);
         since.substeps = since.substeps.max(report.contact.substeps);
         if self.due.reached(simulation.time) {
-            self.write(report, simulation, scene, totals)?;
+            self.write(report, simulation, totals)?;
         }
         if self.gauges_due.reached(simulation.time) {
             self.write_gauges(simulation)?;
@@ -148,22 +134,15 @@ impl Tables {
         &mut self,
         report: &StepReport,
         simulation: &mut Simulation,
-        scene: &Scene,
         totals: &mut Totals,
     ) -> Result<()> {
         if self.last == Some(simulation.steps) {
             return Ok(());
         }
-        self.write(report, simulation, scene, totals)
+        self.write(report, simulation, totals)
     }
 
-    fn write(
-        &mut self,
-        report: &StepReport,
-        simulation: &mut Simulation,
-        scene: &Scene,
-        totals: &mut Totals,
-    ) -> Result<()> {
+    fn write(&mut self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
         self.last = Some(simulation.steps);
         let (fluid, counters) = if simulation.plan.wet() {
             let fluid = match report.monitor {
@@ -174,8 +153,8 @@ impl Tables {
         } else {
             (FluidMonitor::default(), Counters::default())
         };
-        let bodies = body_energy(simulation, scene);
-        totals.look(&fluid, &counters, bodies, report.dt, simulation.params.spacing);
+        let bodies = simulation.solids.energy();
+        totals.look(&fluid, &counters, bodies.total(), report.dt, simulation.params.spacing);
         let since = std::mem::take(&mut self.since);
         let row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
         self.since.stages = simulation.stages.clone();
@@ -184,12 +163,16 @@ impl Tables {
         if let Some(table) = &mut self.bodies {
             for (k, pose) in simulation.solids.poses().iter().enumerate() {
                 let q = pose.orientation;
-                let wrench = simulation.fluid_force[k];
+                let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
                 let mut row = vec![Cell::from(simulation.time), Cell::from(simulation.solids.name(k))];
                 row.extend(vector_cells(pose.position));
                 row.extend([q.w, q.x, q.y, q.z].map(Cell::Number));
-                for vector in [pose.velocity, pose.angular_velocity, wrench.force, wrench.torque] {
+                for vector in [pose.velocity, pose.angular_velocity] {
                     row.extend(vector_cells(vector));
+                }
+                for wrench in [fluid, contact] {
+                    row.extend(vector_cells(wrench.force));
+                    row.extend(vector_cells(wrench.torque));
                 }
                 table.row(&row)?;
             }
@@ -204,7 +187,7 @@ impl Tables {
         simulation: &Simulation,
         fluid: &FluidMonitor,
         counters: &Counters,
-        (body_kinetic, body_potential): (f64, f64),
+        bodies: Energy,
         since: &Since,
     ) -> Vec<Cell> {
         let mut row = vec![Cell::from(simulation.steps), Cell::from(simulation.time), Cell::from(report.dt)];
@@ -216,9 +199,10 @@ impl Tables {
                 fluid.density_error_max,
                 fluid.kinetic,
                 fluid.potential,
-                body_kinetic,
-                body_potential,
-                fluid.kinetic + fluid.potential + body_kinetic + body_potential,
+                bodies.kinetic,
+                bodies.gravity,
+                bodies.contact,
+                fluid.kinetic + fluid.potential + bodies.total(),
             ]
             .map(Cell::Number),
         );
@@ -256,7 +240,7 @@ impl Tables {
 
 fn monitor_header(stages: &[Stage]) -> Vec<String> {
     let fixed = "step [-],time [s],dt [s],courant [-],speed_max [m/s],density_error_mean [-],density_error_max [-],\
-                 kinetic [J],potential [J],body_kinetic [J],body_potential [J],energy [J]";
+                 kinetic [J],potential [J],body_kinetic [J],body_potential [J],body_contact [J],energy [J]";
     let mut header: Vec<String> = fixed.split(',').map(String::from).collect();
     header.extend(vector_columns("momentum", "kg m/s"));
     header.extend(vector_columns("centroid", "m"));
@@ -275,5 +259,7 @@ fn body_header() -> Vec<String> {
     header.extend(vector_columns("angular_velocity", "rad/s"));
     header.extend(vector_columns("fluid_force", "N"));
     header.extend(vector_columns("fluid_torque", "N m"));
+    header.extend(vector_columns("contact_force", "N"));
+    header.extend(vector_columns("contact_torque", "N m"));
     header
 }

@@ -1,7 +1,7 @@
 //! The studies that come with the program.
 
-use super::definition::{Definition, Files};
-use super::{Study, compare, work_precision};
+use super::definition::{Definition, Files, Setup};
+use super::{Study, compare, dry_studies, gallery, needs, pressure_solve, stability, work_precision};
 use crate::error::{Error, Result};
 
 /// A built-in study: name, what it asks, in one line.
@@ -16,6 +16,8 @@ pub struct Entry {
 enum Maker {
     /// A study file.
     File(&'static str),
+    /// A function.
+    Function(fn(&Setup) -> Study),
 }
 
 /// All built-in studies.
@@ -45,6 +47,51 @@ pub const ENTRIES: &[Entry] = &[
         about: "GPU in f32 against CPU in f64",
         make: Maker::File(include_str!("../../cases/study/precision.toml")),
     },
+    Entry {
+        name: "pressure-solve",
+        about: "the pressure equation alone: residual and pressure error against iterations and time",
+        make: Maker::Function(pressure_solve::study),
+    },
+    Entry {
+        name: "stability",
+        about: "maps of what is stable: gamma x CFL, contact stiffness x damping, alpha, density ratio, tolerance",
+        make: Maker::Function(stability::study),
+    },
+    Entry {
+        name: "gallery",
+        about: "extreme scenes: what must happen and what does",
+        make: Maker::Function(gallery::study),
+    },
+    Entry {
+        name: "needs",
+        about: "what a scene does not need: stages left out, bytes and time saved, identical results",
+        make: Maker::Function(needs::study),
+    },
+    Entry {
+        name: "free-fall",
+        about: "a cube falls and bounces: height of return against the time step",
+        make: Maker::Function(dry_studies::free_fall),
+    },
+    Entry {
+        name: "oscillator",
+        about: "a cube on its contact spring against the damped oscillator",
+        make: Maker::Function(dry_studies::oscillator),
+    },
+    Entry {
+        name: "incline",
+        about: "a block on a slope against Eq. (21); eta(mu) of the paper's law",
+        make: Maker::Function(dry_studies::incline),
+    },
+    Entry {
+        name: "spring-static",
+        about: "section 4.1: amplitude of a resting cube against K",
+        make: Maker::Function(dry_studies::spring_static),
+    },
+    Entry {
+        name: "spring-drop",
+        about: "section 4.1: K_ideal of Table 1, and the three models of Fig. 6",
+        make: Maker::Function(dry_studies::spring_drop),
+    },
 ];
 
 /// Files that the built-in study files refer to, as they stood when the program was built.
@@ -68,11 +115,11 @@ fn embedded(name: &str) -> Result<String> {
     Ok(text.to_owned())
 }
 
-/// The built-in study `name`; `sets` are overrides of its case.
+/// The built-in study `name`; with what the command line adds.
 ///
 /// # Errors
 /// [`Error::Case`] if there is none of that name, or for an override that fits nothing.
-pub fn find(name: &str, full: bool, sets: &[String]) -> Result<Study> {
+pub fn find(name: &str, setup: &Setup) -> Result<Study> {
     let Some(entry) = ENTRIES.iter().find(|e| e.name == name) else {
         let mut names: Vec<&str> = ENTRIES.iter().map(|e| e.name).collect();
         names.sort_by_key(|n| std::cmp::Reverse((strsim::jaro_winkler(n, name) * 1e6) as u64));
@@ -85,7 +132,9 @@ pub fn find(name: &str, full: bool, sets: &[String]) -> Result<Study> {
         )));
     };
     match entry.make {
-        Maker::File(text) => from_file(name, text, &embedded, full, sets),
+        Maker::File(text) => from_file(name, text, &embedded, setup),
+        Maker::Function(make) if setup.sets.is_empty() => Ok(make(setup)),
+        Maker::Function(_) => Err(Error::Case(format!("`{name}` sets up its own scenes: --set does not apply"))),
     }
 }
 
@@ -93,9 +142,9 @@ pub fn find(name: &str, full: bool, sets: &[String]) -> Result<Study> {
 ///
 /// # Errors
 /// [`Error::Case`] for what is wrong with it.
-pub fn from_file(name: &str, text: &str, files: &Files, full: bool, sets: &[String]) -> Result<Study> {
+pub fn from_file(name: &str, text: &str, files: &Files, setup: &Setup) -> Result<Study> {
     let definition = Definition::parse(name, text)?;
-    let jobs = definition.jobs(files, full, sets)?;
+    let jobs = definition.jobs(files, setup)?;
     // References are read before anything runs: a sweep must not end in a missing file.
     let mut references = std::collections::BTreeMap::new();
     for against in definition.error.iter().filter_map(|e| e.against.as_ref()).filter(|a| *a != "finest") {
@@ -122,7 +171,7 @@ mod tests {
     fn every_built_in_study_can_be_set_up_quick_and_full() {
         for entry in ENTRIES {
             for full in [false, true] {
-                let study = find(entry.name, full, &[]).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+                let study = find(entry.name, &Setup { full, ..Setup::default() }).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
                 assert!(!study.jobs.is_empty(), "{}", entry.name);
                 let mut hashes: Vec<String> = study.jobs.iter().map(|j| j.hash(entry.name)).collect();
                 hashes.sort();
@@ -130,7 +179,7 @@ mod tests {
                 assert_eq!(hashes.len(), study.jobs.len(), "{}: points that are the same", entry.name);
             }
         }
-        let error = find("hydrostatics", false, &[]).err().unwrap().to_string();
+        let error = find("hydrostatics", &Setup::default()).err().unwrap().to_string();
         assert!(error.contains("did you mean `hydrostatic`"), "{error}");
     }
 }

@@ -2,8 +2,11 @@
 
 use super::Study;
 use super::builtin::{self, ENTRIES};
-use super::definition::files_of;
-use super::engine::{Context, Make, Options, Shard};
+use super::definition::{Setup, files_of};
+use super::engine::{Context, Make, Options, Processor, Shard};
+use crate::backend::Backend;
+use crate::backend::cpu::Cpu;
+use crate::backend::gpu::Gpu;
 use crate::error::{Error, Result};
 use crate::output::write_whole;
 use serde::{Deserialize, Serialize};
@@ -34,12 +37,30 @@ pub struct StudyArgs {
     /// Runs of each point, for the median time.
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub repetitions: u32,
+    /// Where points compute that do not say: cpu or gpu.
+    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor)]
+    pub backend: Processor,
+    /// Adapter of the GPU's points, a number or a part of a name as `seixo adapters` lists them. Without it a
+    /// hardware GPU is taken, and no software one.
+    #[arg(long, value_name = "N")]
+    pub adapter: Option<String>,
+    /// Threads of the CPU's points; all cores if absent.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
     /// List the points and compute nothing.
     #[arg(long)]
     pub dry_run: bool,
     /// No progress on stderr.
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+fn processor(text: &str) -> std::result::Result<Processor, String> {
+    match text {
+        "cpu" => Ok(Processor::Cpu),
+        "gpu" => Ok(Processor::Gpu),
+        _ => Err("expected cpu or gpu".into()),
+    }
 }
 
 /// What `collect` needs to know of a study: `study.json` in its folder.
@@ -50,6 +71,7 @@ struct Manifest {
     file: Option<(String, PathBuf)>,
     full: bool,
     sets: Vec<String>,
+    gpu: bool,
 }
 
 impl Manifest {
@@ -66,7 +88,7 @@ impl Manifest {
         } else {
             None
         };
-        Ok(Self { what: args.what.clone(), file, full: args.full, sets: args.sets.clone() })
+        Ok(Self { what: args.what.clone(), file, full: args.full, sets: args.sets.clone(), gpu: args.backend == Processor::Gpu })
     }
 
     fn read(folder: &Path) -> Result<Self> {
@@ -83,20 +105,32 @@ impl Manifest {
     }
 
     fn study(&self) -> Result<Study> {
+        let processor = if self.gpu { Processor::Gpu } else { Processor::Cpu };
+        let setup = Setup { full: self.full, sets: self.sets.clone(), processor };
         match &self.file {
-            Some((text, folder)) => {
-                builtin::from_file(&self.what, text, &files_of(folder), self.full, &self.sets)
-            }
-            None => builtin::find(&self.what, self.full, &self.sets),
+            Some((text, folder)) => builtin::from_file(&self.what, text, &files_of(folder), &setup),
+            None => builtin::find(&self.what, &setup),
         }
     }
 }
 
-/// Run `args`; `make` makes backends. Findings go to stdout, progress to stderr.
+/// Run `args`. Findings go to stdout, progress to stderr.
 ///
 /// # Errors
 /// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
-pub fn command(args: &StudyArgs, make: &Make) -> Result<()> {
+pub fn command(args: &StudyArgs) -> Result<()> {
+    if let Some(threads) = args.threads {
+        // Fails only if the pool exists already, and nothing parallel has run yet.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+    }
+    let hardware = args.adapter.is_some() || Gpu::hardware_available();
+    let make: &Make = &|processor, scene, params, plan, settings| match processor {
+        Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?) as Box<dyn Backend>),
+        Processor::Gpu if !hardware => Err(Error::Gpu(
+            "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
+        )),
+        Processor::Gpu => Ok(Box::new(Gpu::new(scene, params, plan, settings, args.adapter.as_deref())?)),
+    };
     if args.what == "list" {
         for entry in ENTRIES {
             println!("{:16} {}", entry.name, entry.about);

@@ -139,6 +139,17 @@ pub struct ErrorMeasure {
     pub name: Option<String>,
 }
 
+/// What the command line adds to a study.
+#[derive(Clone, Debug, Default)]
+pub struct Setup {
+    /// Also the costly points.
+    pub full: bool,
+    /// Overrides of the case, `key=value`.
+    pub sets: Vec<String>,
+    /// Where points compute that do not say.
+    pub processor: Processor,
+}
+
 /// A file that a study refers to.
 pub type Files<'a> = dyn Fn(&str) -> Result<String> + 'a;
 
@@ -217,12 +228,13 @@ impl Definition {
         }
     }
 
-    /// The points. `sets` of the command line come after those of the study and before those of the axes. A point
-    /// whose case is refused is a point that fails.
+    /// The points. Overrides of the command line come after those of the study and before those of the axes. A
+    /// point whose case is refused is a point that fails.
     ///
     /// # Errors
     /// [`Error::Case`] for a case that cannot be read, or an axis without values.
-    pub fn jobs(&self, files: &Files, full: bool, sets: &[String]) -> Result<Vec<Job>> {
+    pub fn jobs(&self, files: &Files, setup: &Setup) -> Result<Vec<Job>> {
+        let full = setup.full;
         let text = self.case_text(files)?;
         let mut jobs: Vec<Job> = Vec::new();
         let main = Grid { method: None, full: false, axis: self.axis.clone() };
@@ -241,20 +253,20 @@ impl Definition {
                 points = points.iter().flat_map(with).collect();
             }
             for picks in points {
-                jobs.push(self.job(&text, method, &picks, sets));
+                jobs.push(self.job(&text, method, &picks, setup));
             }
         }
         Ok(jobs)
     }
 
-    fn job(&self, text: &str, method: &str, picks: &[Pick], sets: &[String]) -> Job {
-        let all = self.set.iter().chain(sets).chain(picks.iter().flat_map(|p| &p.set));
+    fn job(&self, text: &str, method: &str, picks: &[Pick], setup: &Setup) -> Job {
+        let all = self.set.iter().chain(&setup.sets).chain(picks.iter().flat_map(|p| &p.set));
         let all: Vec<String> = all.cloned().collect();
         let mut method = method.to_owned();
         for pick in picks {
             method = method.replace(&format!("{{{}}}", pick.axis), &pick.name);
         }
-        let processor = picks.iter().find_map(|p| p.processor).unwrap_or_default();
+        let processor = picks.iter().find_map(|p| p.processor).unwrap_or(setup.processor);
         let parsed = parse(&self.name, text.to_owned(), &all);
         // Particles go with the spacing to the power of the dimensions; steps with the end over the time step.
         let weight = parsed.as_ref().map_or(0.0, |(case, _, _)| {
@@ -289,7 +301,7 @@ impl Definition {
 
 #[cfg(test)]
 mod tests {
-    use super::Definition;
+    use super::{Definition, Setup};
 
     const STUDY: &str = r#"
 name = "s"
@@ -314,17 +326,17 @@ value = "e [-]"
     fn the_grid_is_the_product_of_the_axes_and_each_point_has_its_own_hash() {
         let study = Definition::parse("s.toml", STUDY).unwrap();
         let none = |_: &str| unreachable!();
-        let quick = study.jobs(&none, false, &[]).unwrap();
+        let quick = study.jobs(&none, &Setup::default()).unwrap();
         let methods: Vec<&str> = quick.iter().map(|j| j.method.as_str()).collect();
         assert_eq!(methods, ["1.0 at x", "2.0 at x"]);
-        let full = study.jobs(&none, true, &[]).unwrap();
+        let full = study.jobs(&none, &Setup { full: true, ..Setup::default() }).unwrap();
         assert_eq!(full.len(), 6);
         let mut hashes: Vec<String> = full.iter().map(|j| j.hash("s")).collect();
         assert!(hashes.contains(&quick[0].hash("s")), "--full computes the quick points again");
         hashes.sort();
         hashes.dedup();
         assert_eq!(hashes.len(), 6);
-        let other = study.jobs(&none, false, &["run.gravity=[0,0,0]".into()]).unwrap();
+        let other = study.jobs(&none, &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() }).unwrap();
         assert_ne!(other[0].hash("s"), quick[0].hash("s"));
     }
 
@@ -337,6 +349,6 @@ value = "e [-]"
         }
         let text = STUDY.replace("key = \"run.end\"\nvalues = [1.0, 2.0]\nfull_values = [3.0]\n", "");
         let study = Definition::parse("s.toml", &text).unwrap();
-        assert!(study.jobs(&|_| unreachable!(), false, &[]).is_err());
+        assert!(study.jobs(&|_| unreachable!(), &Setup::default()).is_err());
     }
 }

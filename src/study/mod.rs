@@ -14,13 +14,27 @@
 pub mod builtin;
 pub mod command;
 pub mod compare;
+pub mod contact_checks;
 pub mod definition;
+pub mod dry;
+pub mod dry_studies;
 pub mod engine;
+pub mod gallery;
+pub mod gallery_scenes;
+pub mod incline;
 pub mod measure;
+pub mod needs;
 pub mod pareto;
+pub mod pressure_solve;
 pub mod report;
 pub mod row;
 pub mod run_point;
+pub mod single;
+pub mod spring_drop;
+pub mod spring_static;
+pub mod stability;
+pub mod stability_contact;
+pub mod stability_fluid;
 pub mod work_precision;
 
 use crate::error::Result;

@@ -1,0 +1,61 @@
+// Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer, with
+// P and the arm on the true surface: P = max(P_i + rho g.(surface - centre), 0). A workgroup sums up to 256 particles of one solid; the host finishes in f64.
+// Twin: src/kernels/body_force.rs
+
+@group(0) @binding(2) var<storage, read> pressure: array<f32>;
+@group(0) @binding(3) var<storage, read_write> reaction: array<vec4f>;
+@group(0) @binding(4) var<storage, read> wall_geometry: array<vec4f>; // area, arm, centre to surface, solid's frame
+@group(0) @binding(5) var<storage, read> state: array<u32>;
+@group(0) @binding(6) var<storage, read> poses: array<Pose>;
+@group(0) @binding(7) var<storage, read> force_chunk: array<vec4u>; // first of the moving-wall slots, how many, solid
+@group(0) @binding(8) var<storage, read_write> wrench: array<vec4f>; // force and torque of each chunk
+
+var<workgroup> force_of: array<vec3f, 256>;
+var<workgroup> torque_of: array<vec3f, 256>;
+var<workgroup> force_row: array<vec3f, 16>;
+var<workgroup> torque_row: array<vec3f, 16>;
+
+@compute @workgroup_size(WORKGROUP)
+fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let chunk = force_chunk[group.x];
+    var force = vec3f(0.0);
+    var torque = vec3f(0.0);
+    if t < chunk.y {
+        let k = chunk.x + t;
+        let orientation = poses[chunk.z].orientation;
+        if state[params.fluid + k] == INNER {
+            let head = dot(params.gravity, rotate(orientation, wall_geometry[3u * k + 2u].xyz));
+            let p = max(pressure[params.fluid + k] + params.density * head, 0.0);
+            force = -p * rotate(orientation, wall_geometry[3u * k].xyz);
+        }
+//#if REACTION
+        force += reaction[k].xyz;
+        reaction[k] = vec4f(0.0);
+//#endif
+        torque = cross(rotate(orientation, wall_geometry[3u * k + 1u].xyz), force);
+    }
+    force_of[t] = force;
+    torque_of[t] = torque;
+    workgroupBarrier();
+    if t < 16u {
+        force = vec3f(0.0);
+        torque = vec3f(0.0);
+        for (var k = 0u; k < 16u; k++) {
+            force += force_of[k * 16u + t];
+            torque += torque_of[k * 16u + t];
+        }
+        force_row[t] = force;
+        torque_row[t] = torque;
+    }
+    workgroupBarrier();
+    if t == 0u {
+        force = vec3f(0.0);
+        torque = vec3f(0.0);
+        for (var k = 0u; k < 16u; k++) {
+            force += force_row[k];
+            torque += torque_row[k];
+        }
+        wrench[2u * group.x] = vec4f(force, 0.0);
+        wrench[2u * group.x + 1u] = vec4f(torque, 0.0);
+    }
+}

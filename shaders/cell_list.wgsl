@@ -1,0 +1,194 @@
+// Cell list: count, scan, stable scatter. The fluid is reordered by cell, ghosts last; moving solids are indexed by cell.
+// Twin: src/kernels/cell_list.rs
+//
+// One counting sort serves both. Its keys are the cell of a fluid particle, then one key for ghosts, then the cells once
+// more for the particles of moving solids. Atomic arrival order decides where a particle of a cell lands in `unsorted`;
+// `place` then ranks each within its cell by slot, so the final order is the twin's and the same in every run.
+
+@group(0) @binding(2) var<storage, read> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(4) var<storage, read> pressure: array<f32>;
+@group(0) @binding(5) var<storage, read_write> cell_of: array<vec2u>; // key, arrival in the key
+@group(0) @binding(6) var<storage, read_write> cell_count: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> cell_start: array<u32>;
+@group(0) @binding(8) var<storage, read_write> block_sum: array<u32>;
+@group(0) @binding(9) var<storage, read_write> unsorted: array<u32>;
+// Positions, velocities and pressures of the fluid in the new order, one after the other; copied back afterwards.
+@group(0) @binding(10) var<storage, read_write> sorted: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> moving_slot: array<u32>;
+@group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
+
+fn particles() -> u32 {
+    return params.fluid + params.moving;
+}
+
+fn keys() -> u32 {
+//#if MOVING
+    return 2u * params.cell_total + 1u;
+//#else
+    return params.cell_total + 1u;
+//#endif
+}
+
+fn slot_of(k: u32) -> u32 {
+//#if MOVING
+    if k >= params.fluid {
+        return moving_slot_of(k - params.fluid);
+    }
+//#endif
+    return k;
+}
+
+fn inside(x: vec3f, v: vec3f) -> bool {
+//#if TWO_DIMENSIONS
+    let y = true;
+//#else
+    let y = x.y >= params.lower.y && x.y < params.upper.y;
+//#endif
+    return finite_vector(x) && finite_vector(v) && y && x.x >= params.lower.x && x.x < params.upper.x
+        && x.z >= params.lower.z && x.z < params.upper.z;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn count(@builtin(global_invocation_id) id: vec3u) {
+    let k = id.x;
+    if k >= particles() {
+        return;
+    }
+    let x = position[slot_of(k)];
+    var key = params.cell_total;
+    if k >= params.fluid {
+        key += 1u + cell_index(cell_coordinates(x.xyz));
+    } else if x.w == FLUID {
+        if inside(x.xyz, velocity[k].xyz) {
+            key = cell_index(cell_coordinates(x.xyz));
+        } else {
+            atomicAdd(&counters[LOST], 1u);
+        }
+    }
+    cell_of[k] = vec2u(key, atomicAdd(&cell_count[key], 1u));
+}
+
+var<workgroup> lane: array<u32, 256>;
+var<workgroup> row: array<u32, 16>;
+
+// Sum of the values of lower threads, and of all.
+fn exclusive_scan(value: u32, t: u32) -> vec2u {
+    workgroupBarrier();
+    lane[t] = value;
+    workgroupBarrier();
+    if t < 16u {
+        var sum = 0u;
+        for (var k = 0u; k < 16u; k++) {
+            let v = lane[t * 16u + k];
+            lane[t * 16u + k] = sum;
+            sum += v;
+        }
+        row[t] = sum;
+    }
+    workgroupBarrier();
+    var before = 0u;
+    var total = 0u;
+    for (var k = 0u; k < 16u; k++) {
+        if k < t / 16u {
+            before += row[k];
+        }
+        total += row[k];
+    }
+    return vec2u(before + lane[t], total);
+}
+
+// Scan within blocks of four keys a thread.
+@compute @workgroup_size(WORKGROUP)
+fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let first = (group.x * WORKGROUP + t) * 4u;
+    var before: vec4u;
+    var sum = 0u;
+    for (var k = 0u; k < 4u; k++) {
+        before[k] = sum;
+        if first + k < keys() {
+            sum += atomicLoad(&cell_count[first + k]);
+        }
+    }
+    let scan = exclusive_scan(sum, t);
+    for (var k = 0u; k < 4u; k++) {
+        if first + k < keys() {
+            cell_start[first + k] = scan.x + before[k];
+        }
+    }
+    if t == 0u {
+        block_sum[group.x] = scan.y;
+    }
+}
+
+// One workgroup scans the sums of the blocks.
+@compute @workgroup_size(WORKGROUP)
+fn scan_sums(@builtin(local_invocation_index) t: u32) {
+    let blocks = (keys() + 4u * WORKGROUP - 1u) / (4u * WORKGROUP);
+    var carry = 0u;
+    for (var first = 0u; first < blocks; first += WORKGROUP) {
+        var value = 0u;
+        if first + t < blocks {
+            value = block_sum[first + t];
+        }
+        let scan = exclusive_scan(value, t);
+        if first + t < blocks {
+            block_sum[first + t] = carry + scan.x;
+        }
+        carry += scan.y;
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn scan_add(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let first = (group.x * WORKGROUP + t) * 4u;
+    for (var k = 0u; k < 4u; k++) {
+        if first + k < keys() {
+            cell_start[first + k] += block_sum[group.x];
+        }
+    }
+    if group.x == 0u && t == 0u {
+        cell_start[keys()] = particles();
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn scatter(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= particles() {
+        return;
+    }
+    let cell = cell_of[id.x];
+    unsorted[cell_start[cell.x] + cell.y] = id.x;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn place(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= particles() {
+        return;
+    }
+    let me = unsorted[id.x];
+    let key = cell_of[me].x;
+    let first = cell_start[key];
+    let end = cell_start[key + 1u];
+    var rank = 0u;
+    for (var k = first; k < end; k++) {
+        rank += u32(unsorted[k] < me);
+    }
+    let to = first + rank;
+//#if MOVING
+    if me >= params.fluid {
+        moving_slot[to - params.fluid] = slot_of(me);
+        return;
+    }
+//#endif
+    let pressures = 2u * params.fluid + to / 4u;
+    if key < params.cell_total {
+        sorted[to] = position[me];
+        sorted[params.fluid + to] = velocity[me];
+        sorted[pressures][to % 4u] = pressure[me];
+    } else {
+        sorted[to] = vec4f(params.lower, GHOST);
+        sorted[params.fluid + to] = vec4f(0.0, 0.0, 0.0, velocity[me].w);
+        sorted[pressures][to % 4u] = 0.0;
+    }
+}

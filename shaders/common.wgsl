@@ -1,0 +1,131 @@
+// What the kernels share: the constants of a run, the coefficients of a step, the slots of the particle groups and the
+// functions of a pair. Appended to every kernel's file, so that line numbers in messages stay those of the file.
+//
+// Positions are relative to the middle of the domain: f32 then resolves them to half the spacing of numbers that
+// absolute ones would have. Sums over neighbours take r_j - r_i first.
+
+const WORKGROUP: u32 = 256u;
+
+// Kind of a particle, in position.w; as crate::scene::Kind.
+const FLUID: f32 = 0.0;
+const GHOST: f32 = 5.0;
+
+// Part in the PPE, as crate::fields::State.
+const INACTIVE: u32 = 0u;
+const SURFACE: u32 = 1u;
+const INNER: u32 = 2u;
+
+// As crate::kernels::predict::DISPLACEMENT_MAX and crate::kernels::number_density::CLOSEST.
+const DISPLACEMENT_MAX: f32 = 0.5;
+const CLOSEST: f32 = 0.1;
+
+// Places in `counters`, as crate::backend::gpu::layout::counter.
+const LOST: u32 = 0u;
+const DISPLACEMENT_CLAMPS: u32 = 1u;
+const PRESSURE_CLAMPS: u32 = 2u;
+const NEIGHBOURS_MAX: u32 = 3u;
+const NON_FINITE: u32 = 4u;
+const OVERFLOW: u32 = 5u;
+
+struct Constants {
+    gravity: vec3f,
+    spacing: f32,
+    lower: vec3f, // corner of the domain, relative to its middle
+    effective_radius: f32,
+    upper: vec3f,
+    collision_distance: f32,
+    cells: vec3u,
+    cell_total: u32,
+    fluid: u32,          // fluid slots
+    moving_wall: u32,    // wall-layer slots of moving solids; they follow the fluid
+    moving: u32,         // all particles of moving solids
+    moving_dummy: u32,   // first slot of their dummies
+    pressure_slots: u32, // slots below carry pressure: the rows of the neighbour lists and of the PPE
+    capacity: u32,       // neighbours of a row at most
+    reduction_groups: u32,
+    max_iterations: u32,
+    number_density: f32,   // n0
+    surface_below: f32,    // beta n0
+    restitution: f32,      // b of Eq. (18)
+    viscosity: f32,        // nu 2 d / (lambda n0)
+    particle_mass: f32,
+    gradient_scale: f32,   // d / n0
+    density: f32,
+    tolerance_squared: f32,
+}
+
+// The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
+// largest f32, and a product with the matrix needs no factor.
+struct Coefficients {
+    dt: f32,
+    source_density: f32,    // gamma rho / dt^2 / c
+    source_divergence: f32, // (1 - gamma) rho / dt (d / n0) / c
+    compressibility: f32,   // alpha rho / dt^2 / c
+    pressure_max: f32,
+    speed_per_bin: f32,     // of the monitor's histogram
+    pad: vec2f,
+}
+
+// Of a moving solid; its position relative to the middle of the domain.
+struct Pose {
+    position: vec4f,
+    orientation: vec4f,
+    velocity: vec4f,
+    angular_velocity: vec4f,
+}
+
+@group(0) @binding(0) var<uniform> params: Constants;
+@group(0) @binding(1) var<uniform> now: Coefficients;
+
+// By bits: a compiler may assume that there are no NaNs and drop a comparison.
+fn finite(x: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
+}
+
+fn finite_vector(v: vec3f) -> bool {
+    return finite(v.x) && finite(v.y) && finite(v.z);
+}
+
+// Eq. (3) for a squared distance: no infinities for coincident particles, 0 beyond the effective radius.
+fn weight(distance_squared: f32) -> f32 {
+    let closest = CLOSEST * params.spacing;
+    return max(params.effective_radius * inverseSqrt(max(distance_squared, closest * closest)) - 1.0, 0.0);
+}
+
+// A word of `neighbour_count`: 12 bits neighbours that carry pressure, 12 bits dummies, 1 bit "a pair is close".
+fn near_of(word: u32) -> u32 {
+    return word & 0xfffu;
+}
+
+fn dummies_of(word: u32) -> u32 {
+    return (word >> 12u) & 0xfffu;
+}
+
+// Places in `neighbour_list`, column after column so that neighbouring threads read neighbouring words: those that carry
+// pressure from the front, dummies from the back.
+fn near_place(i: u32, k: u32) -> u32 {
+    return k * params.pressure_slots + i;
+}
+
+fn dummy_place(i: u32, k: u32) -> u32 {
+    return (params.capacity - 1u - k) * params.pressure_slots + i;
+}
+
+fn cell_coordinates(x: vec3f) -> vec3u {
+    return min(vec3u(max((x - params.lower) / params.effective_radius, vec3f(0.0))), params.cells - 1u);
+}
+
+// z runs fastest, so that three cells above each other are one range.
+fn cell_index(c: vec3u) -> u32 {
+    return (c.x * params.cells.y + c.y) * params.cells.z + c.z;
+}
+
+// Slot of the k-th particle of moving solids.
+fn moving_slot_of(k: u32) -> u32 {
+    return select(params.moving_dummy + k - params.moving_wall, params.fluid + k, k < params.moving_wall);
+}
+
+fn rotate(q: vec4f, v: vec3f) -> vec3f {
+    let t = 2.0 * cross(q.xyz, v);
+    return v + q.w * t + cross(q.xyz, t);
+}

@@ -1,0 +1,306 @@
+// Pressure Poisson equation by conjugate gradients with the diagonal as preconditioner, matrix-free over the neighbour
+// lists: (A p)_i = D_i p_i - sum w_ij p_j.
+// Twin: src/kernels/conjugate_gradient.rs (the operator) and src/pressure/cg.rs (the iteration)
+//
+// Two dispatches an iteration. With z = r / D of the last residual,
+//   multiply:  beta = rz / rz_old,  p = z + beta p,  q = A z + beta q (so q = A p),  partial sums of p.q
+//   advance:   alpha = rz / p.q,  x += alpha p,  r -= alpha q,  z = r / D,  partial sums of r.z and r.r
+// z lies next to the positions (one load a neighbour). Sums are trees of fixed shape: 16 x 16 in a workgroup, then every
+// workgroup of the next dispatch adds the workgroups' sums in the same order, so all come to the same scalars and the same
+// verdict without another dispatch. Scalars and verdict stay here; the host looks at `solve` every few iterations.
+// Words of `solve` that a dispatch writes are read by later dispatches only; `done` is the exception and atomic, and who
+// sees it early stops for the same reason a moment sooner.
+
+@group(0) @binding(2) var<storage, read> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> neighbour_list: array<u32>;
+@group(0) @binding(4) var<storage, read> neighbour_count: array<u32>;
+@group(0) @binding(5) var<storage, read> source_diagonal: array<vec2f>;
+@group(0) @binding(6) var<storage, read_write> pressure: array<f32>;
+@group(0) @binding(7) var<storage, read_write> preconditioned: array<vec4f>; // position, z
+@group(0) @binding(8) var<storage, read_write> residual: array<f32>;
+@group(0) @binding(9) var<storage, read_write> search: array<vec2f>; // p, q
+// Sums of the workgroups: [0, groups) of `start_residual` and `multiply`, [groups, 2 groups) of `start` and `advance`.
+@group(0) @binding(10) var<storage, read_write> partial_sum: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> solve: Solve;
+@group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
+
+// As crate::backend::gpu::layout::Solve.
+struct Solve {
+    done: atomic<u32>,
+    outcome: u32,
+    iterations: u32,
+    unknowns: u32,
+    source_squared: f32,
+    residual_squared: f32,
+    true_residual_squared: f32,
+    rz: f32,
+    rz_old: f32,
+}
+
+// As crate::pressure::Outcome.
+const CONVERGED: u32 = 0u;
+const ZERO_SOURCE: u32 = 1u;
+const MAX_ITERATIONS: u32 = 2u;
+const BREAKDOWN: u32 = 3u;
+const NOT_FINITE: u32 = 4u;
+const GO_ON: u32 = 5u;
+
+var<workgroup> lane: array<vec4f, 256>;
+var<workgroup> row: array<vec4f, 16>;
+var<workgroup> stop: u32;
+
+// Sum over the workgroup, the same on every thread and in a fixed order.
+fn workgroup_sum(value: vec4f, t: u32) -> vec4f {
+    lane[t] = value;
+    workgroupBarrier();
+    if t < 16u {
+        var sum = vec4f(0.0);
+        for (var k = 0u; k < 16u; k++) {
+            sum += lane[k * 16u + t];
+        }
+        row[t] = sum;
+    }
+    workgroupBarrier();
+    var sum = vec4f(0.0);
+    for (var k = 0u; k < 16u; k++) {
+        sum += row[k];
+    }
+    return sum;
+}
+
+fn sum_of_partials(first: u32, t: u32) -> vec4f {
+    var sum = vec4f(0.0);
+    for (var k = t; k < params.reduction_groups; k += WORKGROUP) {
+        sum += partial_sum[first + k];
+    }
+    return workgroup_sum(sum, t);
+}
+
+fn done(t: u32) -> bool {
+    if t == 0u {
+        stop = atomicLoad(&solve.done);
+    }
+    return workgroupUniformLoad(&stop) != 0u;
+}
+
+fn finish(outcome: u32) {
+    solve.outcome = outcome;
+    atomicStore(&solve.done, 1u);
+}
+
+fn stride() -> u32 {
+    return params.reduction_groups * WORKGROUP;
+}
+
+// sum w_ij z_j. Rows whose pressure is no unknown hold z = 0, which makes surface particles Dirichlet points.
+fn neighbours(i: u32, x: vec3f) -> f32 {
+    let near = near_of(neighbour_count[i]);
+    var sum = 0.0;
+    for (var k = 0u; k < near; k++) {
+        let other = preconditioned[neighbour_list[near_place(i, k)]];
+        let r = other.xyz - x;
+        sum += weight(dot(r, r)) * other.w;
+    }
+    return sum;
+}
+
+// x next to the positions, 0 where it is no unknown.
+@compute @workgroup_size(WORKGROUP)
+fn pack(@builtin(global_invocation_id) id: vec3u) {
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let x = select(0.0, pressure[i], source_diagonal[i].y > 0.0);
+        pressure[i] = x;
+        preconditioned[i] = vec4f(position[i].xyz, x);
+    }
+}
+
+fn residuals(id: u32, t: u32) -> vec4f {
+    var sum = vec4f(0.0);
+    for (var i = id; i < params.pressure_slots; i += stride()) {
+        let equation = source_diagonal[i];
+        var r = 0.0;
+        if equation.y > 0.0 {
+            let me = preconditioned[i];
+            r = equation.x - (equation.y * me.w - neighbours(i, me.xyz));
+            sum += vec4f(equation.x * equation.x, r * r, 1.0, 0.0);
+        }
+        residual[i] = r;
+    }
+    return workgroup_sum(sum, t);
+}
+
+// r = b - A x; sums of b.b, r.r and the number of unknowns.
+@compute @workgroup_size(WORKGROUP)
+fn start_residual(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+                  @builtin(workgroup_id) group: vec3u) {
+    let sum = residuals(id.x, t);
+    if t == 0u {
+        partial_sum[group.x] = sum;
+    }
+}
+
+// Start from zero if the last pressure is worse than none; z = r / D; sums of r.z and r.r.
+@compute @workgroup_size(WORKGROUP)
+fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+         @builtin(workgroup_id) group: vec3u) {
+    let first = sum_of_partials(0u, t);
+    let zero = first.x == 0.0 || first.z == 0.0;
+    let restart = first.y > first.x || zero;
+    var sum = vec4f(0.0);
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let equation = source_diagonal[i];
+        if equation.y > 0.0 {
+            if restart {
+                pressure[i] = 0.0;
+                residual[i] = equation.x;
+            }
+            let r = residual[i];
+            let z = r / equation.y;
+            preconditioned[i].w = z;
+            sum += vec4f(r * z, r * r, 0.0, 0.0);
+        }
+    }
+    // `lane` is free again: every thread has passed the second barrier of the sum above.
+    sum = workgroup_sum(sum, t);
+    if t == 0u {
+        partial_sum[params.reduction_groups + group.x] = sum;
+        if group.x == 0u {
+            solve.source_squared = first.x;
+            solve.unknowns = u32(first.z);
+            if zero {
+                finish(ZERO_SOURCE);
+            }
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+            @builtin(workgroup_id) group: vec3u) {
+    if done(t) {
+        return;
+    }
+    let total = sum_of_partials(params.reduction_groups, t);
+    let rz = total.x;
+    var verdict = GO_ON;
+    if !finite(total.y) {
+        verdict = NOT_FINITE;
+    } else if total.y <= params.tolerance_squared * solve.source_squared {
+        verdict = CONVERGED;
+    } else if solve.iterations >= params.max_iterations {
+        verdict = MAX_ITERATIONS;
+    } else if !(rz > 0.0) {
+        verdict = BREAKDOWN;
+    }
+    if group.x == 0u && t == 0u {
+        solve.rz = rz;
+        solve.residual_squared = total.y;
+        if verdict != GO_ON {
+            finish(verdict);
+        }
+    }
+    if verdict != GO_ON {
+        return;
+    }
+    let first = solve.iterations == 0u;
+    let beta = rz / solve.rz_old;
+    var sum = 0.0;
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let diagonal = source_diagonal[i].y;
+        if diagonal > 0.0 {
+            let me = preconditioned[i];
+            var p = vec2f(me.w, diagonal * me.w - neighbours(i, me.xyz));
+            if !first {
+                p += beta * search[i];
+            }
+            search[i] = p;
+            sum += p.x * p.y;
+        }
+    }
+    let all = workgroup_sum(vec4f(sum, 0.0, 0.0, 0.0), t);
+    if t == 0u {
+        partial_sum[group.x] = all;
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn advance(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+           @builtin(workgroup_id) group: vec3u) {
+    if done(t) {
+        return;
+    }
+    let pq = sum_of_partials(0u, t).x;
+    if !(pq > 0.0) {
+        if group.x == 0u && t == 0u {
+            finish(BREAKDOWN);
+        }
+        return;
+    }
+    let alpha = solve.rz / pq;
+    var sum = vec4f(0.0);
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let diagonal = source_diagonal[i].y;
+        if diagonal > 0.0 {
+            let p = search[i];
+            pressure[i] += alpha * p.x;
+            let r = residual[i] - alpha * p.y;
+            residual[i] = r;
+            let z = r / diagonal;
+            preconditioned[i].w = z;
+            sum += vec4f(r * z, r * r, 0.0, 0.0);
+        }
+    }
+    sum = workgroup_sum(sum, t);
+    if t == 0u {
+        partial_sum[params.reduction_groups + group.x] = sum;
+        if group.x == 0u {
+            solve.rz_old = solve.rz;
+            solve.iterations += 1u;
+        }
+    }
+}
+
+// What follows runs once the iteration is done: the true residual of x, which in f32 stays above the one that the
+// iteration carries on, and the bounds of the pressure.
+@compute @workgroup_size(WORKGROUP)
+fn end_pack(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32) {
+    if !done(t) {
+        return;
+    }
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        preconditioned[i].w = pressure[i];
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn end_residual(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+                @builtin(workgroup_id) group: vec3u) {
+    if !done(t) {
+        return;
+    }
+    let sum = residuals(id.x, t);
+    if t == 0u {
+        partial_sum[group.x] = sum;
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn end(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+       @builtin(workgroup_id) group: vec3u) {
+    if !done(t) {
+        return;
+    }
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let p = pressure[i];
+        if p > now.pressure_max {
+            atomicAdd(&counters[PRESSURE_CLAMPS], 1u);
+        }
+        pressure[i] = clamp(p, 0.0, now.pressure_max);
+    }
+    if group.x == 0u {
+        let sum = sum_of_partials(0u, t);
+        if t == 0u {
+            solve.true_residual_squared = sum.y;
+        }
+    }
+}

@@ -1,0 +1,20 @@
+// Particles of moving solids follow the pose of their solid: r = r_c + R o, v = v_c + w x R o.
+// Twin: src/kernels/move_solids.rs
+
+@group(0) @binding(2) var<storage, read> solid_offset: array<vec4f>; // xyz in the solid's frame, w its number
+@group(0) @binding(3) var<storage, read> poses: array<Pose>;
+@group(0) @binding(4) var<storage, read_write> position: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> velocity: array<vec4f>;
+
+@compute @workgroup_size(WORKGROUP)
+fn move_solids(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= params.moving {
+        return;
+    }
+    let offset = solid_offset[id.x];
+    let pose = poses[u32(offset.w)];
+    let arm = rotate(pose.orientation, offset.xyz);
+    let i = moving_slot_of(id.x);
+    position[i] = vec4f(pose.position.xyz + arm, position[i].w);
+    velocity[i] = vec4f(pose.velocity.xyz + cross(pose.angular_velocity.xyz, arm), 0.0);
+}

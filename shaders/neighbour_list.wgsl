@@ -1,0 +1,110 @@
+// Neighbour list: all particles within the effective radius.
+// Twin: src/kernels/neighbour_list.rs
+//
+// A thread finds the row of one pressure-carrying particle. Rows of ghosts, and of walls with no fluid within one cell,
+// stay empty. A row that is full counts on and reports itself; nothing is dropped unseen.
+
+@group(0) @binding(2) var<storage, read> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> cell_start: array<u32>;
+@group(0) @binding(4) var<storage, read> moving_slot: array<u32>;
+@group(0) @binding(5) var<storage, read> static_start: array<u32>;
+// Bits of x, y, z, and the slot, in cell order: one load a candidate.
+@group(0) @binding(6) var<storage, read> static_particle: array<vec4u>;
+@group(0) @binding(7) var<storage, read_write> neighbour_list: array<u32>;
+@group(0) @binding(8) var<storage, read_write> neighbour_count: array<u32>;
+@group(0) @binding(9) var<storage, read_write> counters: array<atomic<u32>>;
+
+var<private> near: u32;
+var<private> dummies: u32;
+var<private> smallest: f32;
+
+fn see(i: u32, j: u32, r: vec3f) {
+    let distance_squared = dot(r, r);
+    if distance_squared >= params.effective_radius * params.effective_radius || j == i {
+        return;
+    }
+    smallest = min(smallest, distance_squared);
+    let room = near + dummies < params.capacity;
+    if j < params.pressure_slots {
+        if room {
+            neighbour_list[near_place(i, near)] = j;
+        }
+        near += 1u;
+    } else {
+        if room {
+            neighbour_list[dummy_place(i, dummies)] = j;
+        }
+        dummies += 1u;
+    }
+}
+
+fn near_fluid(low: vec3u, high: vec3u) -> bool {
+    for (var x = low.x; x <= high.x; x++) {
+        for (var y = low.y; y <= high.y; y++) {
+            if cell_start[cell_index(vec3u(x, y, low.z))] < cell_start[cell_index(vec3u(x, y, high.z)) + 1u] {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if i >= params.pressure_slots {
+        return;
+    }
+    let me = position[i];
+    let cell = cell_coordinates(me.xyz);
+    let low = max(cell, vec3u(1u)) - 1u;
+    let high = min(cell + 1u, params.cells - 1u);
+    var searched = me.w == FLUID;
+    if i >= params.fluid {
+        searched = near_fluid(low, high);
+    }
+    if !searched {
+        neighbour_count[i] = 0u;
+        return;
+    }
+    near = 0u;
+    dummies = 0u;
+    smallest = params.effective_radius * params.effective_radius;
+    for (var x = low.x; x <= high.x; x++) {
+        for (var y = low.y; y <= high.y; y++) {
+            let first = cell_index(vec3u(x, y, low.z));
+            let last = cell_index(vec3u(x, y, high.z)) + 1u;
+            let fluid_end = cell_start[last];
+            for (var j = cell_start[first]; j < fluid_end; j++) {
+                see(i, j, position[j].xyz - me.xyz);
+            }
+//#if MOVING
+            let moving = params.cell_total + 1u;
+            let moving_end = cell_start[moving + last] - params.fluid;
+            for (var k = cell_start[moving + first] - params.fluid; k < moving_end; k++) {
+                let j = moving_slot[k];
+                see(i, j, position[j].xyz - me.xyz);
+            }
+//#endif
+//#if STATIC
+            let static_end = static_start[last];
+            for (var k = static_start[first]; k < static_end; k++) {
+                let other = static_particle[k];
+                see(i, other.w, bitcast<vec3f>(other.xyz) - me.xyz);
+            }
+//#endif
+        }
+    }
+    let found = near + dummies;
+    // A look before the atomic: after the first steps hardly a row is longer than the longest so far.
+    if found > atomicLoad(&counters[NEIGHBOURS_MAX]) {
+        atomicMax(&counters[NEIGHBOURS_MAX], found);
+    }
+    if found > params.capacity {
+        atomicMin(&counters[OVERFLOW], i);
+        near = min(near, params.capacity);
+        dummies = min(dummies, params.capacity - near);
+    }
+    let close = smallest < params.collision_distance * params.collision_distance;
+    neighbour_count[i] = near | (dummies << 12u) | (u32(close) << 24u);
+}

@@ -1,0 +1,35 @@
+// Explicit part of the step: v* = v + dt (g + nu lap v), r* = r + dt v*; Eq. (2) without pressure.
+// Twin: src/kernels/predict.rs
+
+@group(0) @binding(2) var<storage, read_write> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> acceleration: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
+
+@compute @workgroup_size(WORKGROUP)
+fn predict(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if i >= params.fluid {
+        return;
+    }
+    let x = position[i];
+    if x.w != FLUID {
+        return;
+    }
+    var a = params.gravity;
+//#if VISCOSITY
+    a += acceleration[i].xyz;
+    acceleration[i] = vec4f(0.0);
+//#endif
+    let old = velocity[i];
+    let v = old.xyz + now.dt * a;
+    var way = now.dt * v;
+    let longest = DISPLACEMENT_MAX * params.spacing;
+    let squared = dot(way, way);
+    if squared > longest * longest {
+        way *= longest * inverseSqrt(squared);
+        atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
+    }
+    position[i] = vec4f(x.xyz + way, x.w);
+    velocity[i] = vec4f(v, old.w);
+}

@@ -1,0 +1,41 @@
+// Viscous acceleration, Eqs. (2) and (6), a_i = nu 2 d / (lambda n0) sum w_ij (v_j - v_i), and its reaction on the wall
+// layers of moving solids. Positions and neighbours are those of the last step.
+// Twin: src/kernels/viscosity.rs
+
+@group(0) @binding(2) var<storage, read> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(4) var<storage, read> neighbour_list: array<u32>;
+@group(0) @binding(5) var<storage, read> neighbour_count: array<u32>;
+@group(0) @binding(6) var<storage, read_write> acceleration: array<vec4f>;
+@group(0) @binding(7) var<storage, read_write> reaction: array<vec4f>;
+
+fn shear(i: u32, below: u32) -> vec3f {
+    let x = position[i].xyz;
+    let v = velocity[i].xyz;
+    let neighbours = near_of(neighbour_count[i]);
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < neighbours; k++) {
+        let j = neighbour_list[near_place(i, k)];
+        let r = position[j].xyz - x;
+        let distance_squared = dot(r, r);
+        // The particles have moved since the list was made.
+        if j < below && distance_squared > 0.0
+            && distance_squared < params.effective_radius * params.effective_radius {
+            sum += (velocity[j].xyz - v) * (params.effective_radius * inverseSqrt(distance_squared) - 1.0);
+        }
+    }
+    return params.viscosity * sum;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn viscosity(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if i < params.fluid {
+        acceleration[i] = vec4f(shear(i, params.pressure_slots), 0.0);
+    }
+//#if REACTION
+    else if i < params.fluid + params.moving_wall {
+        reaction[i - params.fluid] = vec4f(params.particle_mass * shear(i, params.fluid), 0.0);
+    }
+//#endif
+}

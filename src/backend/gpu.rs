@@ -1,0 +1,386 @@
+//! The GPU backend: the kernels of `shaders/` in f32 on any device that wgpu drives.
+//!
+//! No particle data crosses to the host in a step but the state of the pressure solver and the force on
+//! bodies. Work is recorded and handed to the device only when the host needs an answer. Only what the plan
+//! names is compiled and allocated. Nothing outside this module names wgpu.
+
+mod adapter;
+mod context;
+pub mod layout;
+pub mod shader;
+mod solve;
+mod transfer;
+
+pub use adapter::{AdapterInfo, adapters};
+
+use super::{Backend, Counters};
+use crate::body::{Pose, Wrench};
+use crate::cells::Grid;
+use crate::error::{Error, Result};
+use crate::fields::Fields;
+use crate::kernels::monitor::{speed_most, speed_range};
+use crate::monitor::{FluidMonitor, SPEED_BINS};
+use crate::params::{Params, Step};
+use crate::plan::{Plan, Stage};
+use crate::pressure::{PressureReport, Settings};
+use crate::scene::{Groups, Scene};
+use context::Context;
+use glam::{DVec3, Vec3};
+use layout::{Coefficients, Constants, Memory, MonitorSum, Sizes, WORKGROUP, counter};
+
+/// Particles in f32 on a device.
+pub struct Gpu {
+    context: Context,
+    params: Params,
+    settings: Settings,
+    groups: Groups,
+    grid: Grid,
+    sizes: Sizes,
+    middle: DVec3,
+    wet: bool,
+    /// Solid of each chunk of wall-layer particles.
+    chunk_solid: Vec<usize>,
+    solids: usize,
+    counters: Counters,
+    coefficients: Coefficients,
+    dt: f64,
+    last_iterations: u32,
+}
+
+/// What `scene` takes on a device, without one.
+pub fn memory(scene: &Scene, params: &Params, plan: &Plan) -> Result<Memory> {
+    Ok(Memory::new(&Sizes::new(scene, params, &grid(params, plan)?), plan))
+}
+
+/// Bytes that `scene` takes on a device, without one.
+pub fn bytes_needed(scene: &Scene, params: &Params, plan: &Plan) -> Result<u64> {
+    Ok(memory(scene, params, plan)?.total())
+}
+
+fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
+    if plan.wet() {
+        return Grid::new(params);
+    }
+    Ok(Grid { origin: DVec3::ZERO, width: 1.0, count: [1; 3] })
+}
+
+impl Gpu {
+    /// `true` if the machine has a GPU, as opposed to software that acts as one.
+    pub fn hardware_available() -> bool {
+        adapters().iter().any(AdapterInfo::is_hardware)
+    }
+
+    /// Particles of `scene` on `adapter` (a number in [`adapters`] or a part of a name; the best one if
+    /// `None`, which is a software one where there is no other).
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if there is no such adapter or the scene does not fit it; nothing is allocated then.
+    pub fn new(
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+        adapter: Option<&str>,
+    ) -> Result<Self> {
+        let (adapter, info) = adapter::choose(adapter)?;
+        let limits = adapter::limits(&memory(scene, params, plan)?, &adapter.limits(), &info.name)?;
+        let descriptor =
+            wgpu::DeviceDescriptor { label: Some("seixo"), required_limits: limits, ..Default::default() };
+        let device = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| Error::Gpu(format!("{}: {e}", info.name)))?;
+        Self::on(device, info, scene, params, plan, settings)
+    }
+
+    /// Build everything on a device that computes nothing: pipelines, bindings and limits are checked with
+    /// no driver.
+    pub fn dry_run(scene: &Scene, params: &Params, plan: &Plan, settings: Settings) -> Result<Self> {
+        let have = wgpu::Limits { max_storage_buffer_binding_size: 1 << 30, ..Default::default() };
+        let limits = adapter::limits(&memory(scene, params, plan)?, &have, "noop")?;
+        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        let text = |s: &str| s.to_owned();
+        let info = AdapterInfo {
+            name: text("noop"),
+            backend: text("noop"),
+            device_type: text("other"),
+            driver: text(""),
+        };
+        Self::on(wgpu::Device::noop(&descriptor), info, scene, params, plan, settings)
+    }
+
+    fn on(
+        device: (wgpu::Device, wgpu::Queue),
+        info: AdapterInfo,
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+    ) -> Result<Self> {
+        let groups = scene.groups;
+        if groups.fluid > layout::FLUID_MAX {
+            return Err(Error::Gpu(format!(
+                "{} fluid particles are more than the GPU path numbers ({}); use a larger run.spacing or \
+                 --backend cpu",
+                groups.fluid,
+                layout::FLUID_MAX
+            )));
+        }
+        let grid = grid(params, plan)?;
+        let sizes = Sizes::new(scene, params, &grid);
+        let memory = Memory::new(&sizes, plan);
+        let switches = shader::switches(params, &groups, plan);
+        let mut gpu = Self {
+            context: Context::new(device, info, &memory, shader::kernels(plan), &switches)?,
+            params: params.clone(),
+            settings,
+            groups,
+            grid,
+            sizes,
+            middle: layout::middle(params),
+            wet: plan.wet(),
+            chunk_solid: Vec::new(),
+            solids: scene.solids.len(),
+            counters: Counters::default(),
+            coefficients: Coefficients::default(),
+            dt: 0.0,
+            last_iterations: 30,
+        };
+        if gpu.wet {
+            let constants = Constants::new(params, &groups, &gpu.grid, &gpu.settings, &gpu.sizes);
+            gpu.context.upload("params", &[constants])?;
+            gpu.write_fields(&Fields::new(scene))?;
+            gpu.write_solids(scene)?;
+        }
+        Ok(gpu)
+    }
+
+    /// What never changes about moving solids.
+    fn write_solids(&mut self, scene: &Scene) -> Result<()> {
+        let four = |v: DVec3, w: f32| {
+            let Vec3 { x, y, z } = v.as_vec3();
+            [x, y, z, w]
+        };
+        let g = self.groups;
+        if self.context.has("solid_offset") {
+            let mut offset = vec![[0.0; 4]; g.moving_wall + g.moving_dummy];
+            for (k, solid) in scene.solids.iter().enumerate() {
+                let first_dummy = g.moving_dummy_range().start;
+                let walls = solid.wall_slots.clone().map(|s| s - g.fluid).zip(&solid.wall_offset);
+                let dummies = solid.dummy_slots.clone().map(|s| s - first_dummy + g.moving_wall);
+                for (p, &o) in walls.chain(dummies.zip(&solid.dummy_offset)) {
+                    offset[p] = four(o, k as f32);
+                }
+            }
+            self.context.upload("solid_offset", &offset)?;
+        }
+        if self.context.has("wrench") {
+            let mut geometry = vec![[[0.0; 4]; 3]; g.moving_wall];
+            let mut chunks: Vec<[u32; 4]> = Vec::new();
+            for (k, solid) in scene.solids.iter().enumerate() {
+                let first = solid.wall_slots.start - g.fluid;
+                for p in 0..solid.wall_slots.len() {
+                    let to_surface = solid.wall_to_surface[p];
+                    let vectors = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface];
+                    geometry[first + p] = vectors.map(|v| four(v, 0.0));
+                }
+                for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {
+                    let count = (solid.wall_slots.len() - p).min(WORKGROUP as usize);
+                    chunks.push([(first + p) as u32, count as u32, k as u32, 0]);
+                }
+            }
+            self.chunk_solid = chunks.iter().map(|c| c[2] as usize).collect();
+            self.context.upload("wall_geometry", &geometry)?;
+            self.context.upload("force_chunk", &chunks)?;
+        }
+        Ok(())
+    }
+
+    fn set_step(&mut self, step: &Step) -> Result<()> {
+        self.dt = step.dt;
+        let coefficients = Coefficients::new(&self.params, step);
+        if coefficients != self.coefficients {
+            self.coefficients = coefficients;
+            self.context.upload("now", &[coefficients])?;
+        }
+        Ok(())
+    }
+
+    fn cell_list(&mut self) -> Result<()> {
+        let Sizes { fluid, moving, .. } = self.sizes;
+        let (particles, blocks) = (groups(fluid + moving), self.sizes.keys().div_ceil(4 * WORKGROUP));
+        self.context.clear("cell_count")?;
+        self.context.pass([
+            ("cell_list.count", particles),
+            ("cell_list.scan_blocks", blocks),
+            ("cell_list.scan_sums", 1),
+            ("cell_list.scan_add", blocks),
+            ("cell_list.scatter", particles),
+            ("cell_list.place", particles),
+        ])?;
+        self.context.copy(("sorted", 0), "position", 16 * fluid)?;
+        self.context.copy(("sorted", 16 * fluid), "velocity", 16 * fluid)?;
+        self.context.copy(("sorted", 32 * fluid), "pressure", 4 * fluid)
+    }
+}
+
+/// Workgroups for as many threads.
+fn groups(threads: u64) -> u64 {
+    threads.div_ceil(WORKGROUP)
+}
+
+impl Backend for Gpu {
+    fn description(&self) -> String {
+        let info = &self.context.info;
+        format!("{} ({}, {})", info.name, info.backend, info.device_type)
+    }
+
+    fn precision(&self) -> &'static str {
+        "f32"
+    }
+
+    fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
+        self.set_step(step)?;
+        let (fluid, rows) = (groups(self.sizes.fluid), groups(self.sizes.pressure));
+        let felt = if self.context.has("reaction") { self.sizes.moving_wall } else { 0 };
+        let and_walls = groups(self.sizes.fluid + felt);
+        match stage {
+            Stage::Viscosity => self.context.pass([("viscosity.viscosity", and_walls)]),
+            Stage::Predict => self.context.pass([("predict.predict", fluid)]),
+            Stage::CellList => self.cell_list(),
+            Stage::NeighbourList => self.context.pass([("neighbour_list.neighbour_list_main", rows)]),
+            Stage::Collision => {
+                self.context.pass([("collision.collision", and_walls), ("correct.correct", fluid)])
+            }
+            Stage::NumberDensity => self.context.pass([("number_density.number_density_main", rows)]),
+            Stage::PressureSource => self.context.pass([("pressure_source.pressure_source", rows)]),
+            Stage::PressureGradient => self.context.pass([("pressure_gradient.pressure_gradient", fluid)]),
+            Stage::Correct => self.context.pass([("correct.correct", fluid)]),
+            Stage::ConjugateGradient | Stage::MoveSolids | Stage::BodyForce | Stage::Contact => {
+                unreachable!("{} has a call of its own", stage.name())
+            }
+        }
+    }
+
+    fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        self.set_step(step)?;
+        let report = self.conjugate_gradient()?;
+        Ok(report)
+    }
+
+    fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
+        if !self.context.has("poses") {
+            return Ok(());
+        }
+        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        let device = |p: &Pose| layout::Pose {
+            position: four(p.position - self.middle),
+            orientation: p.orientation.as_quat().to_array(),
+            velocity: four(p.velocity),
+            angular_velocity: four(p.angular_velocity),
+        };
+        let poses: Vec<_> = poses.iter().map(device).collect();
+        self.context.upload("poses", &poses)?;
+        self.context.pass([("move_solids.move_solids", groups(self.sizes.moving))])
+    }
+
+    fn body_force(&mut self) -> Result<Vec<Wrench>> {
+        let mut total = vec![Wrench::default(); self.solids];
+        if self.chunk_solid.is_empty() {
+            return Ok(total);
+        }
+        let chunks = self.chunk_solid.len();
+        self.context.pass([("body_force.body_force", chunks as u64)])?;
+        let parts = self.context.download::<[f32; 4]>("wrench", 2 * chunks)?;
+        let vector = |v: &[f32; 4]| Vec3::new(v[0], v[1], v[2]).as_dvec3();
+        for (&solid, part) in self.chunk_solid.iter().zip(parts.chunks_exact(2)) {
+            total[solid].force += vector(&part[0]);
+            total[solid].torque += vector(&part[1]);
+        }
+        Ok(total)
+    }
+
+    fn counters(&mut self) -> Result<Counters> {
+        if !self.wet {
+            return Ok(Counters::default());
+        }
+        let seen = self.context.download::<u32>("counters", counter::WORDS)?;
+        let c = &mut self.counters;
+        c.lost += u64::from(seen[counter::LOST]);
+        c.displacement_clamps += u64::from(seen[counter::DISPLACEMENT_CLAMPS]);
+        c.pressure_clamps += u64::from(seen[counter::PRESSURE_CLAMPS]);
+        c.neighbours_max = c.neighbours_max.max(seen[counter::NEIGHBOURS_MAX]);
+        let first = |k: usize| Some(seen[k]).filter(|&n| n != u32::MAX);
+        c.non_finite = c.non_finite.or(first(counter::NON_FINITE));
+        c.overflow = c.overflow.or(first(counter::OVERFLOW).map(|slot| (slot, c.neighbours_max)));
+        if seen[..counter::NEIGHBOURS_MAX].iter().any(|&n| n > 0) {
+            // Counted from here on, so that 32 bits last for any run.
+            let mut reset = seen;
+            reset[..counter::NEIGHBOURS_MAX].fill(0);
+            self.context.upload("counters", &reset)?;
+        }
+        Ok(self.counters.clone())
+    }
+
+    fn monitor(&mut self) -> Result<FluidMonitor> {
+        if !self.wet {
+            return Ok(FluidMonitor::default());
+        }
+        let groups = self.sizes.monitor_groups();
+        self.context.clear("speed_bin")?;
+        self.context.pass([("monitor.monitor", groups)])?;
+        let sums = self.context.download::<MonitorSum>("monitor_sum", groups as usize)?;
+        let bins = self.context.download::<u32>("speed_bin", SPEED_BINS)?;
+        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let mass = self.params.particle_mass();
+        let mut out = FluidMonitor::default();
+        let (mut momentum, mut position, mut extent) = (DVec3::ZERO, DVec3::ZERO, DVec3::MIN);
+        for s in &sums {
+            out.particles += u64::from(s.particles);
+            out.kinetic += mass * f64::from(s.kinetic);
+            momentum += mass * vector(s.momentum);
+            position += vector(s.position);
+            out.speed_max = out.speed_max.max(f64::from(s.speed_squared_max).sqrt());
+            extent = extent.max(vector(s.extent_max));
+            out.density_error_mean += f64::from(s.density_error);
+            out.density_error_max = out.density_error_max.max(f64::from(s.density_error_max));
+            out.inner += u64::from(s.inner);
+        }
+        let count = out.particles as f64;
+        position += count * self.middle;
+        out.potential = -mass * self.params.gravity.dot(position);
+        out.momentum = momentum.to_array();
+        out.centroid = (position / count.max(1.0)).to_array();
+        out.extent_max = if out.particles > 0 { (extent + self.middle).to_array() } else { [0.0; 3] };
+        out.density_error_mean /= out.inner.max(1) as f64;
+        let per_bin = speed_range(&self.params, self.dt) / SPEED_BINS as f64;
+        let mut histogram = [0_u64; SPEED_BINS];
+        histogram.iter_mut().zip(&bins).for_each(|(h, &b)| *h = u64::from(b));
+        out.speed_most = speed_most(&histogram, out.particles, per_bin);
+        Ok(out)
+    }
+
+    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
+        let parts: Vec<_> = slots.iter().map(|&s| (s, 1)).collect();
+        let pressures = self.context.download_parts::<f32>("pressure", &parts)?;
+        Ok(pressures.into_iter().map(f64::from).collect())
+    }
+
+    fn read(&mut self) -> Result<Fields> {
+        if self.wet { self.read_fields() } else { Ok(Fields::default()) }
+    }
+
+    fn write(&mut self, fields: &Fields) -> Result<()> {
+        if self.wet { self.write_fields(fields) } else { Ok(()) }
+    }
+
+    fn wait(&mut self) -> Result<()> {
+        self.context.wait()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.context.bytes
+    }
+
+    fn dispatches(&self) -> u64 {
+        self.context.dispatches
+    }
+}

@@ -1,0 +1,135 @@
+//! Adapters: what the machine has, which one a run takes, what is asked of it.
+
+use super::layout::Memory;
+use crate::error::{Error, Result};
+use serde::Serialize;
+
+/// A device that wgpu can drive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct AdapterInfo {
+    /// Name, as the driver gives it.
+    pub name: String,
+    /// Programming interface: `vulkan`, `metal` or `dx12`.
+    pub backend: String,
+    /// `discrete`, `integrated`, `virtual`, `cpu` (software) or `other`.
+    pub device_type: String,
+    /// Driver and its version.
+    pub driver: String,
+}
+
+impl AdapterInfo {
+    fn new(info: &wgpu::AdapterInfo) -> Self {
+        let device_type = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "cpu",
+            wgpu::DeviceType::Other => "other",
+        };
+        Self {
+            name: info.name.clone(),
+            backend: info.backend.to_str().to_owned(),
+            device_type: device_type.to_owned(),
+            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        }
+    }
+
+    /// `true` for a GPU, `false` for software that acts as one: that is slower than the CPU backend.
+    pub fn is_hardware(&self) -> bool {
+        matches!(self.device_type.as_str(), "discrete" | "integrated")
+    }
+
+    /// Place in the order in which adapters are offered: discrete GPUs first, software last.
+    fn rank(&self) -> u8 {
+        ["discrete", "integrated", "virtual", "other"]
+            .iter()
+            .position(|&t| t == self.device_type)
+            .map_or(4, |k| k as u8)
+    }
+}
+
+/// What to do where there is no adapter.
+const NO_ADAPTER: &str = "no GPU adapter found: no driver, or on Linux no Vulkan loader (libvulkan1 and the GPU's \
+                          driver, or mesa-vulkan-drivers for a software one); --backend cpu needs neither";
+
+fn enumerate() -> Vec<(wgpu::Adapter, AdapterInfo)> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+    // Validation layers are for work on the backend and need an installation of their own.
+    descriptor.flags = wgpu::InstanceFlags::empty();
+    let backends = descriptor.backends;
+    let instance = wgpu::Instance::new(descriptor);
+    let mut found: Vec<_> = pollster::block_on(instance.enumerate_adapters(backends))
+        .into_iter()
+        .map(|a| {
+            let info = AdapterInfo::new(&a.get_info());
+            (a, info)
+        })
+        .collect();
+    found.sort_by_key(|(_, info)| info.rank());
+    found
+}
+
+/// The machine's adapters, the one taken by default first. Empty without a driver or loader.
+pub fn adapters() -> Vec<AdapterInfo> {
+    enumerate().into_iter().map(|(_, info)| info).collect()
+}
+
+/// The adapter that `asked` names: a number in [`adapters`] or a part of a name; the first one if `None`.
+pub(super) fn choose(asked: Option<&str>) -> Result<(wgpu::Adapter, AdapterInfo)> {
+    let mut found = enumerate();
+    if found.is_empty() {
+        return Err(Error::Gpu(NO_ADAPTER.into()));
+    }
+    let k = match asked {
+        None => 0,
+        Some(asked) => {
+            let number = asked.parse().ok().filter(|&k: &usize| k < found.len());
+            let part = asked.to_lowercase();
+            let named = || found.iter().position(|(_, info)| info.name.to_lowercase().contains(&part));
+            number.or_else(named).ok_or_else(|| {
+                let names: Vec<_> =
+                    found.iter().enumerate().map(|(k, (_, i))| format!("{k}: {}", i.name)).collect();
+                Error::Gpu(format!("no adapter is called \"{asked}\"; there is {}", names.join(", ")))
+            })?
+        }
+    };
+    Ok(found.swap_remove(k))
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.0} MB", bytes as f64 / 1e6)
+}
+
+/// Limits to ask of an adapter with limits `have`, or what it lacks. Nothing is allocated before this.
+pub(super) fn limits(memory: &Memory, have: &wgpu::Limits, name: &str) -> Result<wgpu::Limits> {
+    let mut ask = wgpu::Limits::default();
+    let (largest, bytes) = memory.largest();
+    for (what, limit, available) in [
+        (
+            "max_storage_buffer_binding_size",
+            &mut ask.max_storage_buffer_binding_size,
+            have.max_storage_buffer_binding_size,
+        ),
+        ("max_buffer_size", &mut ask.max_buffer_size, have.max_buffer_size),
+    ] {
+        if bytes > available {
+            return Err(Error::Gpu(format!(
+                "{largest} needs a buffer of {}, but {name} allows {} ({what}); use a larger run.spacing, another \
+                 adapter or --backend cpu",
+                megabytes(bytes),
+                megabytes(available)
+            )));
+        }
+        *limit = (*limit).max(bytes).min(available);
+    }
+    let groups = u64::from(have.max_compute_workgroups_per_dimension);
+    if memory.workgroups > groups {
+        return Err(Error::Gpu(format!(
+            "a kernel needs {} workgroups, but {name} allows {groups} (max_compute_workgroups_per_dimension); use a \
+             larger run.spacing, a smaller run.domain or --backend cpu",
+            memory.workgroups
+        )));
+    }
+    Ok(ask)
+}

@@ -1,0 +1,297 @@
+//! A device with its buffers and pipelines: recording, submitting, moving data.
+
+use super::adapter::AdapterInfo;
+use super::layout::{Host, Memory};
+use super::shader;
+use crate::error::{Error, Result};
+use bytemuck::Pod;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, mpsc};
+
+/// Bytes that travel to the host at a time.
+const STAGING: u64 = 16 << 20;
+
+struct Pipeline {
+    pipeline: wgpu::ComputePipeline,
+    group: wgpu::BindGroup,
+}
+
+/// A device at work.
+pub(super) struct Context {
+    pub info: AdapterInfo,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    buffers: HashMap<&'static str, wgpu::Buffer>,
+    pipelines: HashMap<String, Pipeline>,
+    staging: wgpu::Buffer,
+    encoder: Option<wgpu::CommandEncoder>,
+    /// What the driver complained of, from a callback.
+    fault: Arc<Mutex<Option<String>>>,
+    pub dispatches: u64,
+    pub bytes: u64,
+}
+
+impl Context {
+    /// Allocate `memory` and build the pipelines of `kernels` with `switches` on.
+    pub fn new<'a>(
+        (device, queue): (wgpu::Device, wgpu::Queue),
+        info: AdapterInfo,
+        memory: &Memory,
+        kernels: impl Iterator<Item = (&'a str, &'a str)>,
+        switches: &[&str],
+    ) -> Result<Self> {
+        let fault = Arc::new(Mutex::new(None));
+        let note = |fault: &Arc<Mutex<Option<String>>>, what: String| {
+            // The first complaint is the cause; a poisoned lock means that one is being reported.
+            if let Ok(mut fault) = fault.lock() {
+                fault.get_or_insert(what);
+            }
+        };
+        let seen = fault.clone();
+        device.on_uncaptured_error(Arc::new(move |e| note(&seen, e.to_string())));
+        let seen = fault.clone();
+        device.set_device_lost_callback(move |reason, what| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note(&seen, format!("the device was lost: {what}"));
+            }
+        });
+
+        let full = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let wrong = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let create = |label, size, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        use wgpu::BufferUsages as Usage;
+        let buffers = memory.buffers.iter().map(|b| {
+            let usage = match b.host {
+                Host::None => Usage::STORAGE,
+                Host::Writes => Usage::STORAGE | Usage::COPY_DST,
+                Host::Reads => Usage::STORAGE | Usage::COPY_SRC,
+                Host::Both => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
+                Host::Uniform => Usage::UNIFORM | Usage::COPY_DST,
+            };
+            (b.name, create(b.name, b.bytes, usage))
+        });
+        let buffers: HashMap<_, _> = buffers.collect();
+        let readable = |b: &&super::layout::Buffer| matches!(b.host, Host::Reads | Host::Both);
+        let largest = memory.buffers.iter().filter(readable).map(|b| b.bytes).max().unwrap_or(16);
+        let staging_bytes = largest.min(STAGING);
+        let staging = create("staging", staging_bytes, Usage::MAP_READ | Usage::COPY_DST);
+        let invalid = pollster::block_on(wrong.pop());
+        if let Some(e) = pollster::block_on(full.pop()) {
+            return Err(Error::Gpu(format!(
+                "{} has no {:.0} MB left for this scene ({e}); use a larger run.spacing or --backend cpu",
+                info.name,
+                memory.total() as f64 / 1e6
+            )));
+        }
+        if let Some(e) = invalid {
+            return Err(Error::Gpu(format!("buffers: {e}")));
+        }
+
+        let mut context = Self {
+            bytes: memory.total() + staging_bytes,
+            info,
+            device,
+            queue,
+            buffers,
+            pipelines: HashMap::new(),
+            staging,
+            encoder: None,
+            fault,
+            dispatches: 0,
+        };
+        for (file, text) in kernels {
+            context.compile(file, &shader::source(text, switches))?;
+        }
+        context.check()?;
+        Ok(context)
+    }
+
+    fn compile(&mut self, file: &str, source: &str) -> Result<()> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(file),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        let module = if self.info.is_hardware() {
+            let mut checks = wgpu::ShaderRuntimeChecks::checked();
+            checks.force_loop_bounding = false;
+            // SAFETY: only the counter that would end an endless loop is left out; indices stay checked. Every
+            // loop of our shaders runs over a range of numbers fixed before it starts: neighbours of a row (at
+            // most its capacity), particles of a cell, cells around a cell, a stride over slots.
+            unsafe { self.device.create_shader_module_trusted(descriptor, checks) }
+        } else {
+            // Software is there to find mistakes, not to be fast.
+            self.device.create_shader_module(descriptor)
+        };
+        for entry in shader::entries(file, source)? {
+            let name = format!("{file}.{}", entry.name);
+            let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(&name),
+                layout: None,
+                module: &module,
+                entry_point: Some(&entry.name),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // No kernel reads workgroup memory that it has not written.
+                    zero_initialize_workgroup_memory: false,
+                    ..Default::default()
+                },
+                cache: None,
+            });
+            let mut bound = Vec::with_capacity(entry.bindings.len());
+            for (binding, field, _) in &entry.bindings {
+                let buffer = self
+                    .buffers
+                    .get(field.as_str())
+                    .ok_or_else(|| Error::Gpu(format!("{name} binds {field}, which the plan leaves out")))?;
+                bound.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
+            }
+            let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(&name),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &bound,
+            });
+            self.pipelines.insert(name, Pipeline { pipeline, group });
+        }
+        match pollster::block_on(scope.pop()) {
+            Some(e) => Err(Error::Gpu(format!("shaders/{file}.wgsl on {}: {e}", self.info.name))),
+            None => Ok(()),
+        }
+    }
+
+    /// An error if the driver has complained.
+    pub fn check(&self) -> Result<()> {
+        let fault = self.fault.lock().ok().and_then(|f| f.clone());
+        fault.map_or(Ok(()), |what| Err(Error::Gpu(format!("{}: {what}", self.info.name))))
+    }
+
+    pub fn has(&self, buffer: &str) -> bool {
+        self.buffers.contains_key(buffer)
+    }
+
+    fn buffer(&self, name: &str) -> Result<&wgpu::Buffer> {
+        self.buffers.get(name).ok_or_else(|| Error::Gpu(format!("there is no buffer {name}")))
+    }
+
+    fn record(&mut self) -> &mut wgpu::CommandEncoder {
+        self.encoder.get_or_insert_with(|| self.device.create_command_encoder(&Default::default()))
+    }
+
+    /// Record a pass over kernels, each with its number of workgroups.
+    pub fn pass<'a>(&mut self, kernels: impl IntoIterator<Item = (&'a str, u64)>) -> Result<()> {
+        let Self { encoder, device, pipelines, dispatches, .. } = self;
+        let encoder = encoder.get_or_insert_with(|| device.create_command_encoder(&Default::default()));
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for (name, groups) in kernels {
+            let kernel = pipelines
+                .get(name)
+                .ok_or_else(|| Error::Gpu(format!("there is no kernel {name}: the plan leaves it out")))?;
+            pass.set_pipeline(&kernel.pipeline);
+            pass.set_bind_group(0, &kernel.group, &[]);
+            pass.dispatch_workgroups(groups as u32, 1, 1);
+            *dispatches += 1;
+        }
+        Ok(())
+    }
+
+    pub fn clear(&mut self, name: &str) -> Result<()> {
+        let buffer = self.buffer(name)?.clone();
+        self.record().clear_buffer(&buffer, 0, None);
+        Ok(())
+    }
+
+    pub fn copy(&mut self, from: (&str, u64), to: &str, bytes: u64) -> Result<()> {
+        let (source, target) = (self.buffer(from.0)?.clone(), self.buffer(to)?.clone());
+        self.record().copy_buffer_to_buffer(&source, from.1, &target, 0, bytes);
+        Ok(())
+    }
+
+    /// Hand what is recorded to the device.
+    pub fn submit(&mut self) {
+        if let Some(encoder) = self.encoder.take() {
+            self.queue.submit([encoder.finish()]);
+        }
+    }
+
+    /// Write to the start of a buffer. What is recorded goes first: it still sees the old content.
+    pub fn upload<T: Pod>(&mut self, name: &str, data: &[T]) -> Result<()> {
+        self.submit();
+        self.queue.write_buffer(self.buffer(name)?, 0, bytemuck::cast_slice(data));
+        Ok(())
+    }
+
+    /// Read parts of a buffer, given as offset and length in elements, one after the other.
+    pub fn download_parts<T: Pod>(&mut self, name: &str, parts: &[(usize, usize)]) -> Result<Vec<T>> {
+        let size = size_of::<T>() as u64;
+        let buffer = self.buffer(name)?.clone();
+        let mut out: Vec<T> = Vec::with_capacity(parts.iter().map(|p| p.1).sum());
+        let mut pending = Vec::new();
+        for &(first, count) in parts {
+            let (mut at, end) = (first as u64 * size, (first + count) as u64 * size);
+            while at < end {
+                let filled: u64 = pending.iter().map(|&(_, bytes)| bytes).sum();
+                // Whole elements only; their sizes divide the staging buffer's.
+                let bytes = (end - at).min(self.staging.size() / size * size - filled);
+                if bytes == 0 {
+                    self.fetch(&buffer, &mut pending, &mut out)?;
+                    continue;
+                }
+                pending.push((at, bytes));
+                at += bytes;
+            }
+        }
+        self.fetch(&buffer, &mut pending, &mut out)?;
+        Ok(out)
+    }
+
+    /// Read the first `count` elements of a buffer.
+    pub fn download<T: Pod>(&mut self, name: &str, count: usize) -> Result<Vec<T>> {
+        self.download_parts(name, &[(0, count)])
+    }
+
+    fn fetch<T: Pod>(
+        &mut self,
+        buffer: &wgpu::Buffer,
+        parts: &mut Vec<(u64, u64)>,
+        out: &mut Vec<T>,
+    ) -> Result<()> {
+        let staging = self.staging.clone();
+        let mut filled = 0;
+        for (at, bytes) in parts.drain(..) {
+            self.record().copy_buffer_to_buffer(buffer, at, &staging, filled, bytes);
+            filled += bytes;
+        }
+        self.submit();
+        if filled == 0 {
+            return Ok(());
+        }
+        let (send, receive) = mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, ..filled, move |done| {
+            // The receiver is gone only if waiting has failed, which is reported there.
+            let _ = send.send(done);
+        });
+        self.wait()?;
+        let lost = |e: String| Error::Gpu(format!("{}: reading back failed: {e}", self.info.name));
+        receive.try_recv().map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
+        let view = staging.get_mapped_range(..filled).map_err(|e| lost(e.to_string()))?;
+        out.extend_from_slice(&bytemuck::pod_collect_to_vec::<u8, T>(&view));
+        drop(view);
+        staging.unmap();
+        Ok(())
+    }
+
+    /// Wait until the device has done what was submitted.
+    pub fn wait(&mut self) -> Result<()> {
+        self.submit();
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        polled.map_err(|e| Error::Gpu(format!("{}: {e}", self.info.name)))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,360 @@
+//! What the device holds: the structs shared with the shaders and the one table of buffers.
+
+use crate::cells::Grid;
+use crate::monitor::SPEED_BINS;
+use crate::params::{Params, Step};
+use crate::plan::{Plan, Stage};
+use crate::pressure::Settings;
+use crate::scene::{Groups, Scene};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+/// Threads of a workgroup; `WORKGROUP` in shaders/common.wgsl.
+pub const WORKGROUP: u64 = 256;
+/// Threads of a workgroup of the monitor; `WIDTH` in shaders/monitor.wgsl.
+pub const MONITOR_WIDTH: u64 = 128;
+/// Workgroups that share a reduction at most: every one of them adds the sums of all others.
+const REDUCTION_GROUPS_MAX: u64 = 1024;
+/// Fluid particles at most: numbers travel in an f32.
+pub const FLUID_MAX: usize = 1 << 24;
+
+/// Places in the buffer of counters.
+pub mod counter {
+    /// Particles lost since the last look.
+    pub const LOST: usize = 0;
+    /// Displacements clamped since the last look.
+    pub const DISPLACEMENT_CLAMPS: usize = 1;
+    /// Pressures clamped since the last look.
+    pub const PRESSURE_CLAMPS: usize = 2;
+    /// Most neighbours of a row.
+    pub const NEIGHBOURS_MAX: usize = 3;
+    /// Smallest number of a particle that became non-finite, or `u32::MAX`.
+    pub const NON_FINITE: usize = 4;
+    /// Smallest slot with more neighbours than a row holds, or `u32::MAX`.
+    pub const OVERFLOW: usize = 5;
+    /// Words in the buffer.
+    pub const WORDS: usize = 8;
+    /// Their start values.
+    pub const START: [u32; WORDS] = [0, 0, 0, 0, u32::MAX, u32::MAX, 0, 0];
+}
+
+/// Constants of a run; see `Constants` in shaders/common.wgsl for the units.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Constants {
+    pub gravity: [f32; 3],
+    pub spacing: f32,
+    pub lower: [f32; 3],
+    pub effective_radius: f32,
+    pub upper: [f32; 3],
+    pub collision_distance: f32,
+    pub cells: [u32; 3],
+    pub cell_total: u32,
+    pub fluid: u32,
+    pub moving_wall: u32,
+    pub moving: u32,
+    pub moving_dummy: u32,
+    pub pressure_slots: u32,
+    pub capacity: u32,
+    pub reduction_groups: u32,
+    pub max_iterations: u32,
+    pub number_density: f32,
+    pub surface_below: f32,
+    pub restitution: f32,
+    pub viscosity: f32,
+    pub particle_mass: f32,
+    pub gradient_scale: f32,
+    pub density: f32,
+    pub tolerance_squared: f32,
+}
+
+/// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Coefficients {
+    pub dt: f32,
+    pub source_density: f32,
+    pub source_divergence: f32,
+    pub compressibility: f32,
+    pub pressure_max: f32,
+    pub speed_per_bin: f32,
+    pub pad: [f32; 2],
+}
+
+/// State of the conjugate gradients; see `Solve` in shaders/conjugate_gradient.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Solve {
+    pub done: u32,
+    pub outcome: u32,
+    pub iterations: u32,
+    pub unknowns: u32,
+    pub source_squared: f32,
+    pub residual_squared: f32,
+    pub true_residual_squared: f32,
+    pub rz: f32,
+    pub rz_old: f32,
+}
+
+/// Pose of a moving solid; see `Pose` in shaders/common.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Pose {
+    pub position: [f32; 4],
+    pub orientation: [f32; 4],
+    pub velocity: [f32; 4],
+    pub angular_velocity: [f32; 4],
+}
+
+/// Sums of one workgroup of the monitor; see `MonitorSum` in shaders/monitor.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct MonitorSum {
+    pub momentum: [f32; 3],
+    pub kinetic: f32,
+    pub position: [f32; 3],
+    pub density_error: f32,
+    pub extent_max: [f32; 3],
+    pub density_error_max: f32,
+    pub particles: u32,
+    pub inner: u32,
+    pub speed_squared_max: f32,
+    pub pad: u32,
+}
+
+/// Coefficient c of the Laplacian, by which the device's PPE is divided [1/m2].
+pub fn laplacian_coefficient(params: &Params) -> f64 {
+    crate::kernels::pressure_source::laplacian_coefficient(params)
+}
+
+/// Origin of the device's positions [m]: the middle of the domain, where f32 is finest. In two dimensions
+/// the plane y = 0 stays in place.
+pub fn middle(params: &Params) -> DVec3 {
+    let m = 0.5 * (params.domain_min + params.domain_max);
+    if params.dimensions == 2 { DVec3::new(m.x, 0.0, m.z) } else { m }
+}
+
+/// Neighbours that a row holds at most: twice the full lattice's, 64 for the usual one in three dimensions.
+/// Healthy runs stay below 1.6 times; more means that the fluid has collapsed onto itself.
+pub fn capacity(params: &Params) -> u32 {
+    (2 * params.neighbours).next_multiple_of(8).max(24)
+}
+
+impl Constants {
+    /// In f64 as far as possible, rounded once.
+    pub fn new(params: &Params, groups: &Groups, grid: &Grid, settings: &Settings, sizes: &Sizes) -> Self {
+        let middle = middle(params);
+        let laplacian = laplacian_coefficient(params);
+        Self {
+            gravity: params.gravity.as_vec3().to_array(),
+            spacing: params.spacing as f32,
+            lower: (params.domain_min - middle).as_vec3().to_array(),
+            effective_radius: params.effective_radius as f32,
+            upper: (params.domain_max - middle).as_vec3().to_array(),
+            collision_distance: params.collision_distance as f32,
+            cells: grid.count,
+            cell_total: grid.total() as u32,
+            fluid: groups.fluid as u32,
+            moving_wall: groups.moving_wall as u32,
+            moving: (groups.moving_wall + groups.moving_dummy) as u32,
+            moving_dummy: groups.moving_dummy_range().start as u32,
+            pressure_slots: groups.pressure() as u32,
+            capacity: sizes.capacity as u32,
+            reduction_groups: sizes.reduction_groups() as u32,
+            max_iterations: settings.max_iterations,
+            number_density: params.number_density as f32,
+            surface_below: (params.free_surface_threshold * params.number_density) as f32,
+            restitution: params.collision_restitution as f32,
+            viscosity: (params.viscosity * laplacian) as f32,
+            particle_mass: params.particle_mass() as f32,
+            gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
+            density: params.density as f32,
+            tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
+        }
+    }
+}
+
+impl Coefficients {
+    /// In f64 as far as possible, rounded once.
+    pub fn new(params: &Params, step: &Step) -> Self {
+        let per_time = params.density / step.dt;
+        let c = laplacian_coefficient(params);
+        let divergence = f64::from(params.dimensions) / params.number_density;
+        let range = crate::kernels::monitor::speed_range(params, step.dt);
+        Self {
+            dt: step.dt as f32,
+            source_density: (step.relaxation * per_time / step.dt / c) as f32,
+            source_divergence: ((1.0 - step.relaxation) * per_time * divergence / c) as f32,
+            compressibility: (step.compressibility * per_time / step.dt / c) as f32,
+            pressure_max: step.pressure_max as f32,
+            speed_per_bin: (range / SPEED_BINS as f64) as f32,
+            pad: [0.0; 2],
+        }
+    }
+}
+
+/// Numbers of things that buffers hold.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sizes {
+    /// All particles.
+    pub total: u64,
+    /// Fluid particles.
+    pub fluid: u64,
+    /// Wall-layer particles of moving solids.
+    pub moving_wall: u64,
+    /// All particles of moving solids.
+    pub moving: u64,
+    /// Particles that never move.
+    pub fixed: u64,
+    /// Particles that carry pressure.
+    pub pressure: u64,
+    /// Cells of the grid.
+    pub cells: u64,
+    /// Moving solids.
+    pub solids: u64,
+    /// Neighbours of a row at most.
+    pub capacity: u64,
+}
+
+impl Sizes {
+    /// Of `scene`.
+    pub fn new(scene: &Scene, params: &Params, grid: &Grid) -> Self {
+        let g = scene.groups;
+        Self {
+            total: g.total() as u64,
+            fluid: g.fluid as u64,
+            moving_wall: g.moving_wall as u64,
+            moving: (g.moving_wall + g.moving_dummy) as u64,
+            fixed: g.static_range().len() as u64,
+            pressure: g.pressure() as u64,
+            cells: grid.total() as u64,
+            solids: scene.solids.len() as u64,
+            capacity: u64::from(capacity(params)),
+        }
+    }
+
+    /// Keys of the counting sort.
+    pub fn keys(&self) -> u64 {
+        self.cells + 1 + if self.moving > 0 { self.cells } else { 0 }
+    }
+
+    /// Workgroups of the conjugate gradients.
+    pub fn reduction_groups(&self) -> u64 {
+        self.pressure.div_ceil(WORKGROUP).clamp(1, REDUCTION_GROUPS_MAX)
+    }
+
+    /// Workgroups of the monitor: a few particles a thread.
+    pub fn monitor_groups(&self) -> u64 {
+        self.fluid.div_ceil(8 * MONITOR_WIDTH).clamp(1, 512)
+    }
+
+    /// Chunks of up to [`WORKGROUP`] wall-layer particles of one solid, at most.
+    fn force_chunks(&self) -> u64 {
+        self.moving_wall.div_ceil(WORKGROUP) + self.solids
+    }
+}
+
+/// A buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Buffer {
+    /// Name, as in the shaders.
+    pub name: &'static str,
+    /// Size.
+    pub bytes: u64,
+    /// Who else than the shaders touches it.
+    pub host: Host,
+}
+
+/// Who else than the shaders touches a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Host {
+    /// Nobody.
+    None,
+    /// The host writes it, or it is cleared.
+    Writes,
+    /// The host reads it, or it is copied from.
+    Reads,
+    /// Both.
+    Both,
+    /// A uniform that the host writes.
+    Uniform,
+}
+
+/// What a scene takes on a device.
+#[derive(Clone, Debug, Default)]
+pub struct Memory {
+    /// Every buffer.
+    pub buffers: Vec<Buffer>,
+    /// Workgroups of the largest dispatch.
+    pub workgroups: u64,
+}
+
+impl Memory {
+    /// The buffers of `sizes` for the planned stages; none for a dry scene.
+    pub fn new(s: &Sizes, plan: &Plan) -> Self {
+        if !plan.wet() {
+            return Self::default();
+        }
+        let (moving, force) = (s.moving > 0, plan.has(Stage::BodyForce) && s.moving_wall > 0);
+        let reaction = force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision));
+        let sorted = s.fluid + s.moving;
+        let blocks = s.keys().div_ceil(4 * WORKGROUP);
+        let table = [
+            ("params", size_of::<Constants>() as u64, Host::Uniform, true),
+            ("now", size_of::<Coefficients>() as u64, Host::Uniform, true),
+            ("position", 16 * s.total, Host::Both, true),
+            ("velocity", 16 * s.total, Host::Both, true),
+            ("pressure", 4 * s.pressure, Host::Both, true),
+            ("number_density", 4 * s.pressure, Host::Both, true),
+            ("state", 4 * s.pressure, Host::Both, true),
+            ("source_diagonal", 8 * s.pressure, Host::Both, true),
+            ("acceleration", 16 * s.fluid, Host::Both, true),
+            ("reaction", 16 * s.moving_wall, Host::Both, reaction),
+            ("counters", 4 * counter::WORDS as u64, Host::Both, true),
+            ("cell_of", 8 * sorted, Host::None, true),
+            ("cell_count", 4 * s.keys(), Host::Writes, true),
+            ("cell_start", 4 * (s.keys() + 1), Host::None, true),
+            ("block_sum", 4 * blocks, Host::None, true),
+            ("unsorted", 4 * sorted, Host::None, true),
+            ("sorted", 32 * s.fluid + 16 * s.fluid.div_ceil(4), Host::Reads, true),
+            ("moving_slot", 4 * s.moving, Host::None, moving),
+            ("static_start", 4 * (s.cells + 1), Host::Writes, s.fixed > 0),
+            ("static_particle", 16 * s.fixed, Host::Writes, s.fixed > 0),
+            ("neighbour_list", 4 * s.capacity * s.pressure, Host::Reads, true),
+            ("neighbour_count", 4 * s.pressure, Host::Both, true),
+            ("preconditioned", 16 * s.pressure, Host::None, true),
+            ("residual", 4 * s.pressure, Host::None, true),
+            ("search", 8 * s.pressure, Host::None, true),
+            ("partial_sum", 32 * s.reduction_groups(), Host::None, true),
+            ("solve", size_of::<Solve>() as u64, Host::Both, true),
+            ("solid_offset", 16 * s.moving, Host::Writes, moving),
+            ("poses", size_of::<Pose>() as u64 * s.solids, Host::Writes, moving),
+            ("wall_geometry", 48 * s.moving_wall, Host::Writes, force),
+            ("force_chunk", 16 * s.force_chunks(), Host::Writes, force),
+            ("wrench", 32 * s.force_chunks(), Host::Reads, force),
+            ("monitor_sum", size_of::<MonitorSum>() as u64 * s.monitor_groups(), Host::Reads, true),
+            ("speed_bin", 4 * SPEED_BINS as u64, Host::Both, true),
+        ];
+        let buffers = table
+            .into_iter()
+            .filter(|&(.., needed)| needed)
+            .map(|(name, bytes, host, _)| Buffer { name, bytes: bytes.max(16), host })
+            .collect();
+        Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP).max(blocks) }
+    }
+
+    /// All bytes.
+    pub fn total(&self) -> u64 {
+        self.buffers.iter().map(|b| b.bytes).sum()
+    }
+
+    /// Name and bytes of the largest buffer.
+    pub fn largest(&self) -> (&'static str, u64) {
+        self.buffers.iter().max_by_key(|b| b.bytes).map_or(("nothing", 0), |b| (b.name, b.bytes))
+    }
+}

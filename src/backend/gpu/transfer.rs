@@ -1,0 +1,159 @@
+//! Fields between host (f64, absolute) and device (f32, relative to the middle of the domain).
+
+use super::Gpu;
+use super::layout::{counter, laplacian_coefficient};
+use crate::cells::Grid;
+use crate::error::{Error, Result};
+use crate::fields::{Fields, State};
+use crate::kernels::cell_list::counting_sort;
+use crate::scene::Kind;
+use glam::{DVec3, Vec3};
+
+/// Vectors with a fourth component.
+fn packed(values: &[DVec3], offset: DVec3, fourth: impl Fn(usize) -> f32) -> Vec<[f32; 4]> {
+    values
+        .iter()
+        .enumerate()
+        .map(|(i, &v)| {
+            let v = (v - offset).as_vec3();
+            [v.x, v.y, v.z, fourth(i)]
+        })
+        .collect()
+}
+
+fn vector(v: &[f32; 4]) -> DVec3 {
+    DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
+}
+
+fn kind(code: f32) -> Kind {
+    match code as u8 {
+        0 => Kind::Fluid,
+        1 => Kind::Wall,
+        2 => Kind::Dummy,
+        3 => Kind::BodyWall,
+        4 => Kind::BodyDummy,
+        _ => Kind::Ghost,
+    }
+}
+
+/// Start of each cell and particles in cell order, as bits of x, y, z and the slot. Cells are found in f32
+/// as the shaders find them.
+fn index(
+    grid: &Grid,
+    lower: Vec3,
+    width: f32,
+    first: usize,
+    position: &[[f32; 4]],
+) -> (Vec<u32>, Vec<[u32; 4]>) {
+    let cell = |x: &[f32; 4]| {
+        let c = ((Vec3::new(x[0], x[1], x[2]) - lower) / width).max(Vec3::ZERO);
+        let along = |c: f32, count: u32| (c as u32).min(count - 1);
+        grid.index([along(c.x, grid.count[0]), along(c.y, grid.count[1]), along(c.z, grid.count[2])]) as u32
+    };
+    let cells: Vec<u32> = position.iter().map(cell).collect();
+    let (mut start, mut place) = (Vec::new(), Vec::new());
+    counting_sort(&cells, grid.total(), &mut start, &mut place);
+    let mut particle = vec![[0; 4]; position.len()];
+    for (k, (x, &p)) in position.iter().zip(&place).enumerate() {
+        particle[p as usize] = [x[0].to_bits(), x[1].to_bits(), x[2].to_bits(), (first + k) as u32];
+    }
+    (start, particle)
+}
+
+impl Gpu {
+    /// Overwrite all fields on the device. The neighbour lists, made for the old slots, are emptied.
+    pub(super) fn write_fields(&mut self, fields: &Fields) -> Result<()> {
+        let g = self.groups;
+        if fields.position.len() != g.total() || fields.pressure.len() != g.pressure() {
+            return Err(Error::Gpu("the fields are those of another scene".into()));
+        }
+        let position = packed(&fields.position, self.middle, |i| f32::from(fields.kind[i] as u8));
+        let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| id as f32);
+        let velocity = packed(&fields.velocity, DVec3::ZERO, number);
+        let c = laplacian_coefficient(&self.params);
+        let equation = |i: usize| {
+            let inner = fields.state[i] == State::Inner;
+            [(fields.source[i] / c) as f32, if inner { (fields.diagonal[i] / c) as f32 } else { 0.0 }]
+        };
+        let equations: Vec<[f32; 2]> = (0..g.pressure()).map(equation).collect();
+        let scalar = |v: &[f64]| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();
+        let state: Vec<u32> = fields.state.iter().map(|&s| s as u32).collect();
+        let fixed = g.static_range();
+        let context = &mut self.context;
+        if !fixed.is_empty() {
+            let lower = (self.params.domain_min - self.middle).as_vec3();
+            let width = self.params.effective_radius as f32;
+            let (start, particle) = index(&self.grid, lower, width, fixed.start, &position[fixed.clone()]);
+            context.upload("static_start", &start)?;
+            context.upload("static_particle", &particle)?;
+        }
+        context.upload("position", &position)?;
+        context.upload("velocity", &velocity)?;
+        context.upload("pressure", &scalar(&fields.pressure))?;
+        context.upload("number_density", &scalar(&fields.number_density))?;
+        context.upload("state", &state)?;
+        context.upload("source_diagonal", &equations)?;
+        context.upload("acceleration", &packed(&fields.acceleration, DVec3::ZERO, |_| 0.0))?;
+        if context.has("reaction") {
+            context.upload("reaction", &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
+        }
+        context.upload("counters", &counter::START)?;
+        context.clear("neighbour_count")
+    }
+
+    /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
+    pub fn neighbours(&mut self) -> Result<Vec<(Vec<u32>, Vec<u32>)>> {
+        let rows = self.groups.pressure();
+        let capacity = self.sizes.capacity as usize;
+        let count = self.context.download::<u32>("neighbour_count", rows)?;
+        let list = self.context.download::<u32>("neighbour_list", capacity * rows)?;
+        let row = |i: usize| {
+            let (near, dummies) = ((count[i] & 0xfff) as usize, (count[i] >> 12 & 0xfff) as usize);
+            let at = |k: usize| list[k * rows + i];
+            ((0..near).map(at).collect(), (0..dummies).map(|k| at(capacity - 1 - k)).collect())
+        };
+        Ok((0..rows).map(row).collect())
+    }
+
+    /// All fields of the device.
+    pub(super) fn read_fields(&mut self) -> Result<Fields> {
+        let g = self.groups;
+        let context = &mut self.context;
+        let position = context.download::<[f32; 4]>("position", g.total())?;
+        let velocity = context.download::<[f32; 4]>("velocity", g.total())?;
+        let equations = context.download::<[f32; 2]>("source_diagonal", g.pressure())?;
+        let state: Vec<State> = context
+            .download::<u32>("state", g.pressure())?
+            .into_iter()
+            .map(|s| match s {
+                0 => State::Inactive,
+                1 => State::Surface,
+                _ => State::Inner,
+            })
+            .collect();
+        let wide = |v: Vec<f32>| v.into_iter().map(f64::from).collect::<Vec<f64>>();
+        let pressure = wide(context.download("pressure", g.pressure())?);
+        let number_density = wide(context.download("number_density", g.pressure())?);
+        let acceleration = context.download::<[f32; 4]>("acceleration", g.fluid)?;
+        let reaction = if context.has("reaction") {
+            context.download::<[f32; 4]>("reaction", g.moving_wall)?
+        } else {
+            vec![[0.0; 4]; g.moving_wall]
+        };
+        let c = laplacian_coefficient(&self.params);
+        let diagonal = |e: &[f32; 2]| if e[1] > 0.0 { f64::from(e[1]) * c } else { 1.0 };
+        Ok(Fields {
+            kind: position.iter().map(|x| kind(x[3])).collect(),
+            position: position.iter().map(|x| vector(x) + self.middle).collect(),
+            id: velocity[..g.fluid].iter().map(|v| v[3] as u32).collect(),
+            velocity: velocity.iter().map(vector).collect(),
+            pressure,
+            number_density,
+            state,
+            source: equations.iter().map(|e| f64::from(e[0]) * c).collect(),
+            diagonal: equations.iter().map(diagonal).collect(),
+            acceleration: acceleration.iter().map(vector).collect(),
+            reaction: reaction.iter().map(vector).collect(),
+        })
+    }
+}

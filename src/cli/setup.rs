@@ -1,0 +1,46 @@
+//! From what was typed to a simulation.
+
+use super::{CaseArgs, DeviceArgs, device};
+use seixo::case::file::{Loaded, load};
+use seixo::error::Result;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+
+/// A case, read and built.
+pub struct Setup {
+    /// Name of the case: its file without the extension.
+    pub name: String,
+    /// The case.
+    pub loaded: Loaded,
+    /// Its particles.
+    pub scene: Scene,
+}
+
+impl Setup {
+    /// Read the case and build its scene; warnings and notes go to stderr unless `quiet`.
+    ///
+    /// # Errors
+    /// What is wrong with the case.
+    pub fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
+        let mut sets = args.sets.clone();
+        sets.extend(args.until.map(|end| format!("run.end={end:?}")));
+        let loaded = load(&args.case, args.spacing, &sets)?;
+        let scene = Scene::build(&loaded.case)?;
+        if !quiet {
+            loaded.warnings.iter().for_each(|w| eprintln!("{w}"));
+            scene.notes.iter().for_each(|n| eprintln!("note: {n}"));
+        }
+        let name = args.case.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned());
+        Ok(Self { name, loaded, scene })
+    }
+
+    /// The simulation, on the processor that `args` ask for.
+    ///
+    /// # Errors
+    /// No suitable device, or a scene that does not fit it.
+    pub fn simulation(&self, args: &DeviceArgs) -> Result<Simulation> {
+        Simulation::new(&self.loaded.case, &self.scene, |scene, params, plan, settings| {
+            device::backend(args, scene, params, plan, settings)
+        })
+    }
+}

@@ -1,0 +1,339 @@
+//! The device against the CPU: the error of every field after every stage of a step that starts from the
+//! same state, and how far integral quantities drift apart over many steps.
+
+use crate::backend::Backend;
+use crate::backend::cpu::Cpu;
+use crate::backend::gpu::Gpu;
+use crate::body::{Pose, Wrench};
+use crate::case::Case;
+use crate::error::Result;
+use crate::fields::Fields;
+use crate::params::Params;
+use crate::plan::Stage;
+use crate::scene::Scene;
+use crate::simulation::Simulation;
+use glam::DVec3;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Error of a field after a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StageError {
+    /// Stage that has written it.
+    pub stage: &'static str,
+    /// Field.
+    pub field: &'static str,
+    /// Largest difference over the largest value; for positions over l0; for states and neighbours the part
+    /// that differs.
+    pub max_relative: f64,
+    /// Root mean square of the difference over that of the field (over l0 for positions; as above for the
+    /// others).
+    pub l2_relative: f64,
+}
+
+/// Neighbours of a row: those that carry pressure, and dummies.
+pub type Neighbourhood = (Vec<u32>, Vec<u32>);
+
+/// How far two sets of neighbour lists agree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct NeighbourDifference {
+    /// Pairs in the second one.
+    pub pairs: usize,
+    /// Pairs in one but not the other.
+    pub differing: usize,
+}
+
+/// `fields` with the fluid in the order of the particles' numbers.
+pub fn by_number(fields: &Fields) -> Fields {
+    let mut slot = vec![0; fields.id.len()];
+    for (i, &id) in fields.id.iter().enumerate() {
+        slot[id as usize] = i;
+    }
+    fn sort<T: Copy>(values: &[T], slot: &[usize]) -> Vec<T> {
+        let rest = values.get(slot.len()..).unwrap_or(&[]);
+        slot.iter().map(|&i| values[i]).chain(rest.iter().copied()).collect()
+    }
+    Fields {
+        position: sort(&fields.position, &slot),
+        velocity: sort(&fields.velocity, &slot),
+        kind: sort(&fields.kind, &slot),
+        id: sort(&fields.id, &slot),
+        pressure: sort(&fields.pressure, &slot),
+        number_density: sort(&fields.number_density, &slot),
+        state: sort(&fields.state, &slot),
+        source: sort(&fields.source, &slot),
+        diagonal: sort(&fields.diagonal, &slot),
+        acceleration: sort(&fields.acceleration, &slot),
+        reaction: fields.reaction.clone(),
+    }
+}
+
+fn error(stage: Stage, field: &'static str, pairs: &[(DVec3, DVec3)], scale: Option<f64>) -> StageError {
+    let (mut most, mut largest, mut square, mut reference) = (0.0_f64, 0.0_f64, 0.0, 0.0);
+    for &(a, b) in pairs {
+        // What is broken on both sides in the same way (a velocity that is no number) is no difference.
+        let difference = if a.is_nan() && b.is_nan() { 0.0 } else { (a - b).length() };
+        most = if difference.is_nan() { f64::INFINITY } else { most.max(difference) };
+        square += difference * difference;
+        if b.is_finite() {
+            largest = largest.max(b.length());
+            reference += b.length_squared();
+        }
+    }
+    let (largest, reference) = match scale {
+        Some(s) => (s, s * (pairs.len().max(1) as f64).sqrt()),
+        None => (largest, reference.sqrt()),
+    };
+    let over = |a: f64, b: f64| if a == 0.0 { 0.0 } else { a / b };
+    StageError {
+        stage: stage.name(),
+        field,
+        max_relative: over(most, largest),
+        l2_relative: over(square.sqrt(), reference),
+    }
+}
+
+fn vectors(a: &[DVec3], b: &[DVec3]) -> Vec<(DVec3, DVec3)> {
+    a.iter().copied().zip(b.iter().copied()).collect()
+}
+
+fn scalars(a: &[f64], b: &[f64]) -> Vec<(DVec3, DVec3)> {
+    a.iter().zip(b).map(|(&a, &b)| (DVec3::X * a, DVec3::X * b)).collect()
+}
+
+/// Part of two lists that differs.
+fn share<T: PartialEq>(stage: Stage, field: &'static str, a: &[T], b: &[T]) -> StageError {
+    let differing = a.iter().zip(b).filter(|(a, b)| a != b).count();
+    let part = differing as f64 / a.len().max(1) as f64;
+    StageError { stage: stage.name(), field, max_relative: part, l2_relative: part }
+}
+
+/// Errors of the fields that `stage` writes; both with the fluid [`by_number`].
+pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) -> Vec<StageError> {
+    let position = || error(stage, "position", &vectors(&gpu.position, &cpu.position), Some(params.spacing));
+    let velocity = || error(stage, "velocity", &vectors(&gpu.velocity, &cpu.velocity), None);
+    let acceleration = || error(stage, "acceleration", &vectors(&gpu.acceleration, &cpu.acceleration), None);
+    let reaction = || error(stage, "reaction", &vectors(&gpu.reaction, &cpu.reaction), None);
+    let scalar = |name, a: &[f64], b: &[f64]| error(stage, name, &scalars(a, b), None);
+    match stage {
+        Stage::Viscosity => vec![acceleration(), reaction()],
+        Stage::Predict | Stage::MoveSolids | Stage::Correct => vec![position(), velocity()],
+        Stage::CellList => vec![position(), velocity(), share(stage, "kind", &gpu.kind, &cpu.kind)],
+        Stage::Collision => vec![position(), velocity(), reaction()],
+        Stage::NumberDensity => vec![
+            scalar("number_density", &gpu.number_density, &cpu.number_density),
+            share(stage, "state", &gpu.state, &cpu.state),
+        ],
+        Stage::PressureSource => {
+            vec![scalar("source", &gpu.source, &cpu.source), scalar("diagonal", &gpu.diagonal, &cpu.diagonal)]
+        }
+        Stage::ConjugateGradient => vec![scalar("pressure", &gpu.pressure, &cpu.pressure)],
+        Stage::PressureGradient => vec![acceleration()],
+        Stage::NeighbourList | Stage::BodyForce | Stage::Contact => Vec::new(),
+    }
+}
+
+/// Compare neighbour lists of the same slots; the order within a row does not matter.
+pub fn neighbour_differences(gpu: &[Neighbourhood], cpu: &[Neighbourhood]) -> NeighbourDifference {
+    let mut out = NeighbourDifference::default();
+    for (a, b) in gpu.iter().zip(cpu) {
+        for (a, b) in [(&a.0, &b.0), (&a.1, &b.1)] {
+            let common = a.iter().filter(|j| b.contains(j)).count();
+            out.pairs += b.len();
+            out.differing += a.len() + b.len() - 2 * common;
+        }
+    }
+    out
+}
+
+/// Rows in the order of the particles' numbers, with numbers in place of fluid slots.
+fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
+    let mut out = vec![Neighbourhood::default(); rows.len()];
+    let number = |j: u32| id.get(j as usize).copied().unwrap_or(j);
+    for (i, (near, dummies)) in rows.into_iter().enumerate() {
+        out[number(i as u32) as usize] = (near.into_iter().map(number).collect(), dummies);
+    }
+    out
+}
+
+fn wrenches(gpu: &[Wrench], cpu: &[Wrench]) -> Vec<StageError> {
+    let part = |name, f: fn(&Wrench) -> DVec3| {
+        let pairs: Vec<_> = gpu.iter().zip(cpu).map(|(a, b)| (f(a), f(b))).collect();
+        error(Stage::BodyForce, name, &pairs, None)
+    };
+    vec![part("force", |w| w.force), part("torque", |w| w.torque)]
+}
+
+/// The two backends in the same state.
+struct Pair {
+    cpu: Cpu,
+    gpu: Gpu,
+    params: Params,
+}
+
+impl Pair {
+    fn errors(&mut self, stage: Stage) -> Result<Vec<StageError>> {
+        let (gpu, cpu) = (self.gpu.read()?, self.cpu.read()?);
+        if stage == Stage::NeighbourList {
+            let a = rows_by_number(self.gpu.neighbours()?, &gpu.id);
+            let b = rows_by_number(self.cpu.neighbour_rows(), &cpu.id);
+            let d = neighbour_differences(&a, &b);
+            let part = d.differing as f64 / d.pairs.max(1) as f64;
+            let (max_relative, l2_relative) = (part, part);
+            return Ok(vec![StageError { stage: stage.name(), field: "pairs", max_relative, l2_relative }]);
+        }
+        Ok(differences(stage, &by_number(&gpu), &by_number(&cpu), &self.params))
+    }
+}
+
+/// Error of every field after every stage of one step, device (`adapter` as in [`Gpu::new`]) against CPU.
+/// The step starts from the state that `warmup` steps on the CPU lead to, rounded to f32 for both. Errors
+/// pass from stage to stage, as they do in a run.
+pub fn compare_stages(
+    case: &Case,
+    scene: &Scene,
+    adapter: Option<&str>,
+    warmup: u64,
+) -> Result<Vec<StageError>> {
+    let mut simulation = Simulation::new(case, scene, |s, p, plan, settings| {
+        Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
+    })?;
+    for _ in 0..warmup {
+        simulation.step()?;
+    }
+    let (plan, params) = (simulation.plan.clone(), simulation.params.clone());
+    if !plan.wet() {
+        return Ok(Vec::new());
+    }
+    let settings = simulation.settings();
+    let cpu = Cpu::new(scene, &params, &plan, settings)?;
+    let gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
+    let mut pair = Pair { cpu, gpu, params };
+    pair.gpu.write(&simulation.backend.read()?)?;
+    let start = pair.gpu.read()?;
+    pair.cpu.write(&start)?;
+    let step = simulation.next_step();
+    let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt).to_vec();
+    // Viscosity takes the neighbours of the step before.
+    for stage in [Stage::CellList, Stage::NeighbourList] {
+        pair.cpu.run(stage, &step)?;
+        pair.gpu.run(stage, &step)?;
+    }
+    let mut out = Vec::new();
+    for stage in Stage::ALL.into_iter().filter(|&s| plan.has(s)) {
+        match stage {
+            Stage::Contact => continue,
+            Stage::MoveSolids => {
+                pair.cpu.move_solids(&poses)?;
+                pair.gpu.move_solids(&poses)?;
+            }
+            Stage::ConjugateGradient => {
+                pair.cpu.solve_pressure(&step)?;
+                pair.gpu.solve_pressure(&step)?;
+            }
+            Stage::BodyForce => {
+                out.extend(wrenches(&pair.gpu.body_force()?, &pair.cpu.body_force()?));
+                continue;
+            }
+            _ => {
+                pair.cpu.run(stage, &step)?;
+                pair.gpu.run(stage, &step)?;
+            }
+        }
+        out.extend(pair.errors(stage)?);
+    }
+    Ok(out)
+}
+
+/// An integral quantity at the end of two runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Quantity {
+    /// What it is, with its unit.
+    pub name: String,
+    /// On the CPU.
+    pub cpu: f64,
+    /// On the device.
+    pub gpu: f64,
+    /// Difference over the scale of the quantity (see [`drift`]).
+    pub relative: f64,
+}
+
+/// How far two runs have drifted apart.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Drift {
+    /// Steps done.
+    pub steps: u64,
+    /// Time reached on the CPU and on the device [s].
+    pub time: [f64; 2],
+    /// Wall-clock seconds of the CPU and of the device, without setting up.
+    pub seconds: [f64; 2],
+    /// Description of the CPU and of the device.
+    pub backends: [String; 2],
+    /// Iterations of the PPE in the mean, CPU and device.
+    pub iterations: [f64; 2],
+    /// Integral quantities.
+    pub quantities: Vec<Quantity>,
+}
+
+/// Run `steps` steps on the CPU and on the device, from the start of the case. Energies are compared to the
+/// largest energy at the end, momenta to mass times the root mean square speed, positions to the depth.
+pub fn drift(case: &Case, scene: &Scene, adapter: Option<&str>, steps: u64) -> Result<Drift> {
+    let run = |mut simulation: Simulation| -> Result<(Simulation, f64, f64)> {
+        simulation.time_stages = false;
+        let start = Instant::now();
+        let mut iterations = 0.0;
+        for _ in 0..steps {
+            iterations += f64::from(simulation.step()?.pressure.iterations);
+        }
+        simulation.backend.wait()?;
+        Ok((simulation, start.elapsed().as_secs_f64(), iterations / steps.max(1) as f64))
+    };
+    let (mut cpu, cpu_seconds, cpu_iterations) =
+        run(Simulation::new(case, scene, |s, p, plan, settings| {
+            Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
+        })?)?;
+    let (mut gpu, gpu_seconds, gpu_iterations) =
+        run(Simulation::new(case, scene, |s, p, plan, settings| {
+            Ok(Box::new(Gpu::new(s, p, plan, settings, adapter)?) as Box<dyn Backend>)
+        })?)?;
+    let (c, g) = (cpu.backend.monitor()?, gpu.backend.monitor()?);
+    let mut quantities = Vec::new();
+    let mut add = |name: String, cpu: f64, gpu: f64, scale: f64| {
+        let relative = if cpu == gpu { 0.0 } else { (gpu - cpu).abs() / scale };
+        quantities.push(Quantity { name, cpu, gpu, relative });
+    };
+    if cpu.plan.wet() {
+        let mass = cpu.params.particle_mass() * c.particles as f64;
+        let energy = c.kinetic.abs().max(c.potential.abs());
+        let momentum = (2.0 * mass * c.kinetic).sqrt();
+        let length = cpu.params.depth.max(cpu.params.spacing);
+        add("particles".into(), c.particles as f64, g.particles as f64, c.particles as f64);
+        add("kinetic_J".into(), c.kinetic, g.kinetic, energy);
+        add("potential_J".into(), c.potential, g.potential, energy);
+        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            add(format!("momentum_{axis}_kg_m_s"), c.momentum[k], g.momentum[k], momentum);
+            add(format!("centroid_{axis}_m"), c.centroid[k], g.centroid[k], length);
+            add(format!("extent_max_{axis}_m"), c.extent_max[k], g.extent_max[k], length);
+        }
+        add("speed_max_m_s".into(), c.speed_max, g.speed_max, c.speed_max);
+        add("density_error_mean".into(), c.density_error_mean, g.density_error_mean, 1.0);
+        add("density_error_max".into(), c.density_error_max, g.density_error_max, 1.0);
+    }
+    let length = cpu.params.depth.max(cpu.params.spacing);
+    for (k, (a, b)) in cpu.solids.poses().iter().zip(gpu.solids.poses()).enumerate() {
+        let name = cpu.solids.name(k);
+        for (axis, (a, b)) in
+            ["x", "y", "z"].into_iter().zip(a.position.to_array().into_iter().zip(b.position.to_array()))
+        {
+            add(format!("{name}_{axis}_m"), a, b, length);
+        }
+    }
+    Ok(Drift {
+        steps,
+        time: [cpu.time, gpu.time],
+        seconds: [cpu_seconds, gpu_seconds],
+        backends: [cpu.backend.description(), gpu.backend.description()],
+        iterations: [cpu_iterations, gpu_iterations],
+        quantities,
+    })
+}

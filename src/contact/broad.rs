@@ -1,0 +1,163 @@
+//! Broad phase: which bounding boxes meet, and which fixed particles lie near a point.
+
+use glam::{DVec3, IVec3};
+use std::collections::HashMap;
+
+/// An axis-aligned box, lower and upper corner [m].
+pub(crate) type Bounds = (DVec3, DVec3);
+
+/// A box that spans more cells than this is compared with all others instead of entered in the grid.
+const MANY_CELLS: i32 = 64;
+/// Up to this many boxes, comparing all of them is cheaper than a grid.
+const FEW: usize = 24;
+
+fn meet(a: &Bounds, b: &Bounds) -> bool {
+    a.0.cmple(b.1).all() && b.0.cmple(a.1).all()
+}
+
+/// Pairs (i < j) of boxes that meet, sorted. Linear in the number of boxes as long as most of them are
+/// of similar size: a uniform grid of twice the mean edge; the few that are much larger are compared
+/// with all.
+pub(crate) fn meeting(boxes: &[Bounds]) -> Vec<(usize, usize)> {
+    let mut pairs = vec![];
+    if boxes.len() <= FEW {
+        for j in 1..boxes.len() {
+            pairs.extend((0..j).filter(|&i| meet(&boxes[i], &boxes[j])).map(|i| (i, j)));
+        }
+        pairs.sort_unstable();
+        return pairs;
+    }
+    let edge: f64 = boxes.iter().map(|b| (b.1 - b.0).max_element()).sum::<f64>() / boxes.len() as f64;
+    let cell = |x: DVec3| (x / (2.0 * edge)).floor().as_ivec3();
+    let mut entries: Vec<(IVec3, usize)> = vec![];
+    let mut large = vec![];
+    for (k, b) in boxes.iter().enumerate() {
+        let (low, high) = (cell(b.0), cell(b.1));
+        let span = high.saturating_sub(low).saturating_add(IVec3::ONE);
+        if span.x.saturating_mul(span.y).saturating_mul(span.z) > MANY_CELLS {
+            large.push(k);
+            continue;
+        }
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                entries.extend((low.z..=high.z).map(|z| (IVec3::new(x, y, z), k)));
+            }
+        }
+    }
+    entries.sort_unstable_by_key(|(c, k)| (c.x, c.y, c.z, *k));
+    for group in entries.chunk_by(|a, b| a.0 == b.0) {
+        for (n, &(here, j)) in group.iter().enumerate() {
+            for &(_, i) in &group[..n] {
+                // two boxes may share several cells; the first one they share reports them
+                if meet(&boxes[i], &boxes[j]) && cell(boxes[i].0.max(boxes[j].0)) == here {
+                    pairs.push((i, j));
+                }
+            }
+        }
+    }
+    for (n, &l) in large.iter().enumerate() {
+        for k in 0..boxes.len() {
+            if k != l && !large[..n].contains(&k) && meet(&boxes[l], &boxes[k]) {
+                pairs.push((l.min(k), l.max(k)));
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Fixed points in cells.
+#[derive(Clone, Debug)]
+pub(crate) struct PointGrid {
+    cell: f64,
+    points: Vec<DVec3>,
+    cells: HashMap<IVec3, Vec<u32>>,
+    bounds: Bounds,
+}
+
+impl PointGrid {
+    /// The grid of `points` with cells of edge `cell` [m].
+    pub fn new(points: Vec<DVec3>, cell: f64) -> Self {
+        let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
+        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for (k, x) in points.iter().enumerate() {
+            cells.entry((*x / cell).floor().as_ivec3()).or_default().push(k as u32);
+            bounds = (bounds.0.min(*x), bounds.1.max(*x));
+        }
+        Self { cell, points, cells, bounds }
+    }
+
+    /// Position of point `k` [m].
+    pub fn point(&self, k: u32) -> DVec3 {
+        self.points[k as usize]
+    }
+
+    /// Whether any point may lie in `bounds`.
+    pub fn meets(&self, bounds: &Bounds) -> bool {
+        meet(&self.bounds, bounds)
+    }
+
+    /// Calls `visit` with every point within `radius` [m] of `x`, in a fixed order.
+    pub fn near(&self, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
+        if !self.meets(&(x - radius, x + radius)) {
+            return;
+        }
+        let low = ((x - radius).max(self.bounds.0) / self.cell).floor().as_ivec3();
+        let high = ((x + radius).min(self.bounds.1) / self.cell).floor().as_ivec3();
+        for i in low.x..=high.x {
+            for j in low.y..=high.y {
+                for k in low.z..=high.z {
+                    for &n in self.cells.get(&IVec3::new(i, j, k)).into_iter().flatten() {
+                        if self.points[n as usize].distance_squared(x) < radius * radius {
+                            visit(n);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grid_finds_the_pairs_that_comparing_all_finds() {
+        let mut state = 7_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut boxes: Vec<Bounds> = (0..400)
+            .map(|_| {
+                let x = DVec3::new(random(), random(), random()) * 3.0;
+                (x, x + DVec3::new(random(), random(), random()) * 0.4)
+            })
+            .collect();
+        boxes.push((DVec3::splat(-9.0), DVec3::splat(9.0)));
+        boxes.push((DVec3::splat(0.5), DVec3::splat(9.0)));
+        let mut all = vec![];
+        for j in 0..boxes.len() {
+            all.extend((0..j).filter(|&i| meet(&boxes[i], &boxes[j])).map(|i| (i, j)));
+        }
+        all.sort_unstable();
+        assert!(all.len() > 1000);
+        assert_eq!(meeting(&boxes), all);
+    }
+
+    #[test]
+    fn the_point_grid_finds_all_points_within_a_radius() {
+        let points: Vec<DVec3> = (0..1000)
+            .map(|k| DVec3::new((k % 10) as f64, (k / 10 % 10) as f64, (k / 100) as f64) * 0.1 - 0.45)
+            .collect();
+        let grid = PointGrid::new(points.clone(), 0.23);
+        let x = DVec3::new(0.07, -0.11, 0.02);
+        let mut found = vec![];
+        grid.near(x, 0.31, |k| found.push(k));
+        found.sort_unstable();
+        let all: Vec<u32> = (0..1000).filter(|&k| points[k as usize].distance(x) < 0.31).collect();
+        assert!(all.len() > 50);
+        assert_eq!(found, all);
+    }
+}

@@ -1,0 +1,203 @@
+//! Geometry of contact: oriented boxes seen from a point, surface points of bodies, edges of walls.
+
+use crate::scene::{Scene, Solid};
+use glam::{DMat3, DVec3};
+
+/// Faces of a box: bit 2 k for the lower face of axis k, bit 2 k + 1 for the upper one.
+pub(crate) type Faces = u8;
+/// All six faces.
+pub(crate) const ALL_FACES: Faces = 0b11_1111;
+
+/// Depth below the nearest face among `faces`, and that face, of a point `q` in the frame of a box
+/// [m]; `None` outside. A point under a face that is not in `faces` is still inside: it is pushed out
+/// through the faces that bodies can reach.
+#[inline]
+pub(crate) fn depth(q: DVec3, half: DVec3, faces: Faces) -> Option<(f64, u8)> {
+    let over = half - q.abs();
+    if over.x <= 0.0 || over.y <= 0.0 || over.z <= 0.0 {
+        return None;
+    }
+    let mut best = (f64::INFINITY, 0);
+    for axis in 0..3_u8 {
+        let k = usize::from(axis);
+        for (face, d) in [(2 * axis, half[k] + q[k]), (2 * axis + 1, half[k] - q[k])] {
+            if faces & (1 << face) != 0 && d < best.0 {
+                best = (d, face);
+            }
+        }
+    }
+    best.0.is_finite().then_some(best)
+}
+
+/// Outward normal of a face in the box's frame.
+#[inline]
+pub(crate) fn face_normal(face: u8) -> DVec3 {
+    let sign = if face & 1 == 1 { 1.0 } else { -1.0 };
+    DVec3::AXES[usize::from(face / 2)] * sign
+}
+
+/// Largest distance of `q` beyond a face plane of the box [m]: a lower bound of its distance.
+#[inline]
+pub(crate) fn outside(q: DVec3, half: DVec3) -> f64 {
+    (q.abs() - half).max_element()
+}
+
+/// A fixed wall as contact sees it.
+#[derive(Clone, Debug)]
+pub(crate) struct WallBox {
+    pub center: DVec3,
+    pub axes: DMat3,
+    pub half: DVec3,
+    /// Faces that bodies can reach.
+    pub faces: Faces,
+    /// Edges that bodies can reach.
+    pub edges: Vec<Edge>,
+}
+
+/// An edge of a wall, sampled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge {
+    /// First sample, world [m].
+    pub start: DVec3,
+    /// From one sample to the next, world [m].
+    pub step: DVec3,
+    /// Samples.
+    pub count: usize,
+}
+
+/// The walls of a scene. A face can be reached if wall particles that face the free space lie under
+/// it; a box without any wall particle (hand-built scenes) shows all its faces.
+pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
+    let spacing = scene.spacing;
+    let range = scene.groups.static_wall_range();
+    let particles = || scene.position[range.clone()].iter().zip(&scene.static_wall_normal);
+    let flat: Faces = if scene.dimensions == 2 { 0b11_0011 } else { ALL_FACES };
+    let mut walls: Vec<WallBox> = scene
+        .walls
+        .iter()
+        .map(|wall| {
+            let to_box = wall.axes.transpose();
+            let mut faces: Faces = 0;
+            let mut found = false;
+            for (&x, &n) in particles() {
+                let q = to_box * (x - wall.center);
+                if outside(q, wall.half) > -0.25 * spacing {
+                    continue;
+                }
+                found = true;
+                let n = to_box * n;
+                for face in 0..6 {
+                    let outward = face_normal(face);
+                    let below = wall.half[usize::from(face / 2)] - q.dot(outward);
+                    if below < 0.75 * spacing && n.dot(outward) > 0.5 {
+                        faces |= 1 << face;
+                    }
+                }
+            }
+            let faces = if found { faces } else { ALL_FACES } & flat;
+            WallBox { center: wall.center, axes: wall.axes, half: wall.half, faces, edges: vec![] }
+        })
+        .collect();
+    for k in 0..walls.len() {
+        let edges = wall_edges(&walls, k, spacing, scene.dimensions == 2);
+        walls[k].edges = edges;
+    }
+    walls
+}
+
+/// Edges between two reachable faces of wall `k`, sampled at the spacing, unless another wall covers
+/// them. A body's face has points every spacing, so it could sink on an edge that lies between them.
+fn wall_edges(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<Edge> {
+    let wall = &walls[k];
+    let mut edges = vec![];
+    for along in 0..3_usize {
+        let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+        for (su, sv) in [(0_u8, 0_u8), (0, 1), (1, 0), (1, 1)] {
+            let bit = |axis: usize, side: u8| 1 << (2 * axis as u8 + side);
+            if wall.faces & bit(u, su) == 0 || wall.faces & bit(v, sv) == 0 || flat && along != 1 {
+                continue;
+            }
+            let sign = |side: u8| if side == 1 { 1.0 } else { -1.0 };
+            let mut middle = DVec3::ZERO;
+            middle[u] = sign(su) * wall.half[u];
+            middle[v] = sign(sv) * wall.half[v];
+            let length = 2.0 * wall.half[along];
+            let count = if flat { 1 } else { (length / spacing).round().max(1.0) as usize + 1 };
+            let step = if flat { 0.0 } else { length / (count - 1) as f64 };
+            let mut start = middle;
+            start[along] = if flat { 0.0 } else { -wall.half[along] };
+            // an edge that leans on another wall is no edge of the union
+            let out = middle + 1e-3 * spacing * middle.signum() * (DVec3::ONE - DVec3::AXES[along]);
+            let world = wall.center + wall.axes * out;
+            let covered = walls.iter().enumerate().any(|(other, w)| {
+                other != k && outside(w.axes.transpose() * (world - w.center), w.half) < 2e-3 * spacing
+            });
+            if !covered {
+                edges.push(Edge {
+                    start: wall.center + wall.axes * start,
+                    step: wall.axes * (DVec3::AXES[along] * step),
+                    count,
+                });
+            }
+        }
+    }
+    edges
+}
+
+/// The surface of a body as contact sees it: points on the true surface with constant weights.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Surface {
+    /// Points in the body's frame [m].
+    pub points: Vec<DVec3>,
+    /// Weight of each point [-]; those of a face sum to 1 (exactly for a cube).
+    pub weights: Vec<f64>,
+    /// For each point, the faces it lies on.
+    pub faces: Vec<Faces>,
+    /// Faces of the body that others can touch.
+    pub all_faces: Faces,
+    /// Smallest weight of a single point [-].
+    pub smallest_weight: f64,
+}
+
+impl Surface {
+    /// The surface of `solid`. A point on several faces gets the mean of its shares of them: constant
+    /// weights are what makes the law conservative, so they may not depend on the face that touches.
+    pub fn new(solid: &Solid, dimensions: u32) -> Self {
+        let points: Vec<DVec3> =
+            solid.wall_offset.iter().zip(&solid.wall_to_surface).map(|(o, s)| *o + *s).collect();
+        let faces: Vec<Faces> = solid
+            .wall_to_surface
+            .iter()
+            .map(|s| {
+                (0..3).fold(0, |bits, k| match s[k] {
+                    c if c > 0.0 => bits | 1 << (2 * k + 1),
+                    c if c < 0.0 => bits | 1 << (2 * k),
+                    _ => bits,
+                })
+            })
+            .collect();
+        let on = |face: u8| faces.iter().filter(|f| *f & (1 << face) != 0).count();
+        let share: Vec<f64> = (0..6).map(|face| 1.0 / on(face).max(1) as f64).collect();
+        let mut weights: Vec<f64> = faces
+            .iter()
+            .map(|f| {
+                let mine: Vec<f64> = (0..6).filter(|k| f & (1 << k) != 0).map(|k| share[k]).collect();
+                mine.iter().sum::<f64>() / mine.len().max(1) as f64
+            })
+            .collect();
+        // bring the mean over the faces back to 1 (it is off for boxes that are no cubes)
+        let sums: Vec<f64> = (0..6_u8)
+            .filter(|&face| on(face) > 0)
+            .map(|face| {
+                weights.iter().zip(&faces).filter(|(_, f)| *f & (1 << face) != 0).map(|(w, _)| w).sum()
+            })
+            .collect();
+        let mean = sums.iter().sum::<f64>() / sums.len().max(1) as f64;
+        if mean > 0.0 {
+            weights.iter_mut().for_each(|w| *w /= mean);
+        }
+        let all_faces = if dimensions == 2 { 0b11_0011 } else { ALL_FACES };
+        let smallest_weight = weights.iter().copied().fold(1.0, f64::min);
+        Self { points, weights, faces, all_faces, smallest_weight }
+    }
+}

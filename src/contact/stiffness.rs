@@ -1,0 +1,189 @@
+//! How stiff contact is for a body, and what follows: sub-steps, the stiffness a step can carry, the
+//! stiffness a case needs, damping from restitution.
+//!
+//! lambda [1/kg] is the largest eigenvalue of M^-1 H for a unit spring over the ways a body's surface
+//! can touch (a corner, an edge, a face that bounces or rocks): omega^2 = lambda K, so 1 / lambda is the
+//! effective mass m_e.
+
+use super::geometry::Surface;
+use crate::body::Body;
+use crate::case;
+use crate::error::{Error, Result};
+use glam::DVec3;
+
+/// Exponent p of the effective depth of the smooth law.
+pub(crate) const EXPONENT: f64 = 8.0;
+/// Largest dt sqrt(K / m_e) of a sub-step; 2 is the limit of stability, energy errors grow as its square.
+pub(crate) const OMEGA_STEP: f64 = 0.5;
+/// Largest C dt / m_e of a sub-step.
+pub(crate) const DAMPING_STEP: f64 = 0.8;
+/// Most sub-steps of the smooth law. What would need more is softened: at 64 sub-steps a body still
+/// stops within v dt / 32, so a larger K changes nothing that a fluid step could resolve.
+pub(crate) const MOST_SUBSTEPS: u32 = 64;
+/// Sub-steps at which the paper's law, which is never softened, is refused.
+pub(crate) const ABSURD_SUBSTEPS: u32 = 10_000;
+
+/// Largest eigenvalues of a body's contact, unit spring and unit dashpot [1/kg].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Lambda {
+    pub spring: f64,
+    pub damping: f64,
+}
+
+/// Eigenvalues of the smooth law. Zero for prescribed solids.
+pub(crate) fn smooth(body: &Body, surface: &Surface) -> Lambda {
+    if !body.is_free() {
+        return Lambda::default();
+    }
+    let share = |sum: f64| sum.powf(2.0 / EXPONENT);
+    let turn = 1.0 / body.principal.min_element();
+    let mass = 1.0 / body.mass;
+    let turns = body.locked_rotation != [true; 3];
+    let mut lambda = Lambda { spring: mass, damping: mass };
+    let mut take = |spring: f64, damping: f64| {
+        lambda.spring = lambda.spring.max(spring);
+        lambda.damping = lambda.damping.max(damping);
+    };
+    if !turns {
+        return lambda;
+    }
+    for (p, w) in surface.points.iter().zip(&surface.weights) {
+        let give = mass + p.length_squared() * turn;
+        take(share(*w) * give, share(*w).sqrt() * give);
+    }
+    for face in 0..6_u8 {
+        let on = |other: u8| {
+            let both = 1 << face | 1 << other;
+            let points = surface.points.iter().zip(&surface.weights).zip(&surface.faces);
+            points.filter(move |(_, f)| *f & both == both).map(|((p, w), _)| (*p, *w))
+        };
+        for other in 0..6_u8 {
+            // `face` alone when both are the same, else the edge between them
+            let sum: f64 = on(other).map(|(_, w)| w).sum();
+            if sum == 0.0 {
+                continue;
+            }
+            let center = on(other).map(|(p, w)| p * w).sum::<DVec3>() / sum;
+            let arm = if other == face { 0.0 } else { center.length_squared() };
+            let spread =
+                |axis: usize| on(other).map(|(p, w)| w * (p[axis] - center[axis]).powi(2)).sum::<f64>();
+            let (u, v) = ((usize::from(face / 2) + 1) % 3, (usize::from(face / 2) + 2) % 3);
+            let rocking = (spread(u) / body.principal[v]).max(spread(v) / body.principal[u]) / sum;
+            let bounce = mass + arm * turn;
+            take(share(sum) * bounce, share(sum).sqrt() * bounce);
+            take(share(sum) * (EXPONENT - 1.0) * rocking, share(sum).sqrt() * rocking);
+        }
+    }
+    lambda
+}
+
+/// Eigenvalue of the paper's law: the worst particle of the wall layer pushed along an axis.
+pub(crate) fn paper(body: &Body, offsets: &[DVec3], torque: bool) -> Lambda {
+    if !body.is_free() {
+        return Lambda::default();
+    }
+    let turns = torque && body.locked_rotation != [true; 3];
+    let worst = offsets.iter().flat_map(|r| DVec3::AXES.map(|n| r.cross(n)));
+    let turning = worst.map(|t| t.dot(t / body.principal)).fold(0.0, f64::max);
+    let lambda = 1.0 / body.mass + if turns { turning } else { 0.0 };
+    Lambda { spring: lambda, damping: lambda }
+}
+
+/// How the case gives the damping.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Damping {
+    /// C [kg/s].
+    Coefficient(f64),
+    /// Damping ratio of every single contact [-].
+    Ratio(f64),
+}
+
+impl Damping {
+    /// Reads the case; `lightest` is the mass of the lightest free body [kg].
+    pub fn new(contact: &case::Contact, lightest: f64) -> Result<Self> {
+        match (contact.damping, contact.damping_ratio, contact.restitution) {
+            (None, None, None) => Ok(Self::Coefficient(0.0)),
+            (Some(c), None, None) => Ok(Self::Coefficient(c)),
+            (None, Some(ratio), None) => {
+                Ok(Self::Coefficient(ratio * 2.0 * (contact.spring * lightest).sqrt()))
+            }
+            (None, None, Some(e)) if contact.law == case::Law::Smooth => Ok(Self::Ratio(damping_ratio(e))),
+            (None, None, Some(_)) => {
+                let text = "contact.restitution: needs law = \"smooth\"; give damping or damping_ratio";
+                Err(Error::Case(text.into()))
+            }
+            _ => Err(Error::Case(
+                "contact: give one of damping, damping_ratio and restitution, not several".into(),
+            )),
+        }
+    }
+
+    /// C [kg/s] of a contact of stiffness `spring` [N/m], instead of `asked` [N/m], and reduced mass
+    /// `mass` [kg]. A softened contact keeps its damping ratio.
+    pub fn coefficient(self, spring: f64, asked: f64, mass: f64) -> f64 {
+        match self {
+            Self::Coefficient(c) => c * (spring / asked).sqrt(),
+            Self::Ratio(ratio) => 2.0 * ratio * (spring * mass).sqrt(),
+        }
+    }
+}
+
+/// Restitution of a linear spring and dashpot that part when the force, not the depth, reaches zero:
+/// e = exp(-tan(phi) (pi - 2 phi)), sin(phi) the damping ratio; beyond 1 its continuation
+/// exp(-2 u / tanh(u)), cosh(u) the damping ratio.
+pub fn restitution(damping_ratio: f64) -> f64 {
+    let z = damping_ratio;
+    if (z - 1.0).abs() < 1e-9 {
+        (-2.0_f64).exp()
+    } else if z < 1.0 {
+        let phi = z.asin();
+        (-phi.tan() * (std::f64::consts::PI - 2.0 * phi)).exp()
+    } else {
+        let u = z.acosh();
+        (-2.0 * u / u.tanh()).exp()
+    }
+}
+
+/// Damping ratio [-] that gives the restitution `e`; e below 1e-3 counts as 1e-3.
+pub fn damping_ratio(e: f64) -> f64 {
+    let e = e.clamp(1e-3, 1.0);
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if restitution(middle) > e { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Restitution by integrating the impact of a unit mass on a unit spring.
+    fn integrated(z: f64) -> f64 {
+        let (mut x, mut v, h) = (0.0_f64, -1.0_f64, 1e-5);
+        loop {
+            let force = |x: f64, v: f64| -x - 2.0 * z * v;
+            let (xm, vm) = (x + 0.5 * h * v, v + 0.5 * h * force(x, v));
+            if x < 0.0 && force(x, v) <= 0.0 {
+                return v;
+            }
+            (x, v) = (x + h * vm, v + h * force(xm, vm));
+        }
+    }
+
+    #[test]
+    fn restitution_follows_from_the_damping_ratio() {
+        for z in [0.05, 0.3, 0.7, 0.99, 1.5, 2.5] {
+            assert!(
+                (restitution(z) - integrated(z)).abs() < 1e-3,
+                "{z}: {} {}",
+                restitution(z),
+                integrated(z)
+            );
+        }
+        for e in [0.1, 0.2, 0.5, 0.8, 1.0] {
+            assert!((restitution(damping_ratio(e)) - e).abs() < 1e-6);
+        }
+    }
+}

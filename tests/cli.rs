@@ -1,0 +1,335 @@
+//! The command line as a user meets it: messages, exit codes, files.
+
+use assert_cmd::Command;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+fn seixo() -> Command {
+    let mut command = Command::cargo_bin("seixo").unwrap();
+    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+struct Ran {
+    code: i32,
+    out: String,
+    err: String,
+}
+
+fn ran(args: &[&str]) -> Ran {
+    let output = seixo().args(args).output().unwrap();
+    Ran {
+        code: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// A small case with water, a gate, a free body and gauges, in `folder`.
+fn small_case(folder: &Path) -> String {
+    let path = folder.join("small.toml");
+    std::fs::write(
+        &path,
+        r#"
+[run]
+spacing = 0.05
+time_step = 1e-3
+end = 0.05
+dimensions = 2
+
+[tank]
+min = [0, 0, 0]
+max = [2, 0, 1]
+open = ["z_max"]
+
+[fluid]
+[[fluid.block]]
+min = [0, 0, 0]
+max = [0.5, 0, 0.5]
+
+[[moving_wall]]
+name = "gate"
+min = [0.6, 0, 0]
+max = [0.8, 0, 0.8]
+motion = [[0, 0, 0, 0], [1, 0, 0, 0.5]]
+
+[[gauge.pressure]]
+name = "p floor"
+point = [0.2, 0, 0]
+
+[[gauge.level]]
+name = "h"
+at = [0.25, 0]
+
+[[gauge.force]]
+name = "on gate"
+on = "gate"
+
+[output]
+every = 0.02
+"#,
+    )
+    .unwrap();
+    path.display().to_string()
+}
+
+fn assert_whole(root: &Path) {
+    for entry in std::fs::read_dir(root).unwrap().chain(std::fs::read_dir(root.join("vtu")).unwrap()) {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            continue;
+        }
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let bytes = std::fs::read(&path).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("vtu" | "pvd") => assert!(text.ends_with("</VTKFile>\n"), "{name}"),
+            Some("csv") => {
+                let columns = text.lines().next().unwrap().split(',').count();
+                assert!(text.ends_with('\n'), "{name}");
+                assert!(text.lines().all(|l| l.split(',').count() == columns), "{name}");
+            }
+            Some("json") => drop(json(&text)),
+            Some("toml" | "png") => assert!(!text.is_empty()),
+            _ => assert!(name.starts_with(".writing-"), "{name}"),
+        }
+    }
+}
+
+fn files_named_in_pvd_exist(root: &Path, name: &str) -> usize {
+    let pvd = std::fs::read_to_string(root.join(format!("{name}.pvd"))).unwrap();
+    let files: Vec<&str> = pvd.split("file=\"").skip(1).map(|f| f.split('"').next().unwrap()).collect();
+    assert!(files.iter().all(|f| root.join(f).exists()), "{files:?}");
+    files.len()
+}
+
+#[test]
+fn a_run_writes_everything_it_promises() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("results");
+    let out = root.display().to_string();
+    let run =
+        ran(&["run", &case, "-o", &out, "--backend", "cpu", "--json", "--picture", "--set", "run.end=0.045"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    assert_eq!(json(&run.out), json(&std::fs::read_to_string(root.join("result.json")).unwrap()));
+    assert_whole(&root);
+    // Frames at 0, 0.02, 0.04 and the end, each with walls, fluid and the gate.
+    assert_eq!(files_named_in_pvd_exist(&root, "small"), 4 * 3);
+    for file in ["pictures/frame_0003.png", "final.png"] {
+        assert!(std::fs::read(root.join(file)).unwrap().starts_with(b"\x89PNG"), "{file}");
+    }
+    let text = std::fs::read_to_string(root.join("case.toml")).unwrap();
+    assert!(text.contains("end = 0.045"), "the case with overrides is kept: {text}");
+
+    let result = json(&run.out);
+    assert_eq!(result["status"], "done");
+    assert_eq!(result["steps"], 45);
+    assert_eq!(result["particles"]["fluid"], 100);
+    assert!(result["stages"]["conjugate_gradient"].as_f64().unwrap() > 0.0);
+    assert!(result["pressure"]["iterations_mean"].as_f64().unwrap() > 0.0);
+    assert!(result["bodies"][0]["name"] == "gate", "{}", result["bodies"]);
+
+    let gauges = std::fs::read_to_string(root.join("gauges.csv")).unwrap();
+    let header = gauges.lines().next().unwrap();
+    assert!(header.starts_with("time [s],p floor [Pa],h [m],on gate_force_x [N]"), "{header}");
+    let row: Vec<f64> = gauges.lines().last().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    assert!((row[0] - 0.045).abs() < 1e-9 && row[1] > 100.0 && (row[2] - 0.5).abs() < 0.05, "{row:?}");
+    let bodies = std::fs::read_to_string(root.join("bodies.csv")).unwrap();
+    let last: Vec<&str> = bodies.lines().last().unwrap().split(',').collect();
+    let z: f64 = last[4].parse().unwrap();
+    assert!(last[1] == "gate" && (z - (0.4 + 0.5 * 0.045)).abs() < 1e-9, "{last:?}");
+    assert_eq!(std::fs::read_to_string(root.join("monitors.csv")).unwrap().lines().count(), 1 + 46);
+}
+
+#[test]
+fn result_json_has_the_agreed_keys_whatever_happened() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results").display().to_string();
+    let run = ran(&["run", &case, "-o", &out, "--backend", "cpu", "--json", "--steps", "2"]);
+    let result = json(&run.out);
+    for key in
+        "case backend adapter precision status exit_reason steps time_s wall_s particles stages pressure \
+                monitors bodies"
+            .split(' ')
+    {
+        assert!(result.get(key).is_some(), "{key}");
+    }
+    for (table, keys) in [
+        ("particles", "total fluid wall dummy body"),
+        ("pressure", "unknowns_mean iterations_mean iterations_max relative_residual_max failures"),
+        (
+            "monitors",
+            "density_error_max density_error_mean courant_max energy_start_J energy_end_J lost_particles \
+             neighbours_max penetration_max_over_l0 contact_omega_dt contact_substeps_max",
+        ),
+    ] {
+        for key in keys.split_whitespace() {
+            assert!(result[table].get(key).is_some_and(|v| !v.is_null()), "{table}.{key}");
+        }
+    }
+    for key in ["name", "position_m", "velocity_m_s"] {
+        assert!(result["bodies"][0].get(key).is_some(), "{key}");
+    }
+}
+
+#[test]
+fn wrong_input_is_named_with_exit_code_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results").display().to_string();
+    for (args, expected) in [
+        (vec!["run", "no/such.toml"], vec!["no/such.toml"]),
+        (vec!["run", &case, "--set", "run.spacin=1"], vec!["spacin", "spacing"]),
+        (vec!["run", &case, "--set", "run.time_step=\"x\""], vec!["time_step"]),
+        (vec!["run", &case, "--spacing", "-0.01"], vec!["run.spacing"]),
+        (vec!["run", &case, "--set", "gauge.force.0.on=\"door\""], vec!["door", "gate"]),
+        (vec!["run", &case, "--backend", "cpu", "--adapter", "0"], vec!["--adapter"]),
+        (vec!["run", &case, "--backend", "tpu"], vec!["tpu", "cpu"]),
+        (vec!["plan", "no/such.toml"], vec!["no/such.toml"]),
+    ] {
+        let rest: &[&str] = if args[0] == "run" { &["--out", &out] } else { &[] };
+        let run = ran(&[&args[..], rest].concat());
+        assert_eq!(run.code, 2, "{args:?}: {}", run.err);
+        assert!(run.out.is_empty(), "{args:?}: {}", run.out);
+        assert_eq!(run.err.matches("error").count(), 1, "one error, said once: {}", run.err);
+        assert!(expected.iter().all(|word| run.err.contains(word)), "{args:?}: {}", run.err);
+    }
+    assert!(!Path::new(&out).exists(), "nothing is written for a case that is refused");
+}
+
+#[test]
+fn earlier_results_are_not_overwritten_without_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results").display().to_string();
+    let args = ["run", &case, "-o", &out, "--backend", "cpu", "--steps", "1", "-q"];
+    let first = ran(&args);
+    assert_eq!((first.code, first.err.as_str(), first.out.as_str()), (0, "", ""));
+    let second = ran(&args);
+    assert_eq!(second.code, 2);
+    assert!(second.err.contains("not empty") && second.err.contains("--force"), "{}", second.err);
+    assert_eq!(ran(&[&args[..], &["--force"]].concat()).code, 0);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_an_input_output_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let run = ran(&["run", &case, "-o", &format!("{case}/results"), "--backend", "cpu", "--steps", "1"]);
+    assert_eq!(run.code, 5, "{}", run.err);
+    assert!(run.err.contains("small.toml/results"), "{}", run.err);
+}
+
+#[test]
+fn a_run_that_diverges_keeps_what_it_wrote_and_the_last_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("results");
+    let out = root.display().to_string();
+    // The water shoots out of the open top.
+    let jet = "fluid.block.0.velocity=[0,0,500]";
+    let run = ran(&["run", &case, "-o", &out, "--backend", "cpu", "--json", "--until", "10", "--set", jet]);
+    assert_eq!(run.code, 4, "{}", run.err);
+    for word in ["step ", "t = 0.", "stage cell_list", "fluid particles have left"] {
+        assert!(run.err.contains(word), "{word}: {}", run.err);
+    }
+    let result = json(&run.out);
+    assert_eq!(result["status"], "diverged");
+    assert!(result["exit_reason"].as_str().unwrap().contains("last_*.vtu"));
+    assert!(root.join("vtu/last_fluid.vtu").exists() && root.join("vtu/last_solids.vtu").exists());
+    assert!(files_named_in_pvd_exist(&root, "small") >= 2 * 3, "earlier frames are kept");
+    assert_whole(&root);
+}
+
+#[test]
+fn plan_tells_what_is_left_out_and_why() {
+    let dry = ran(&["plan", "cases/resting_cube.toml", "--json"]);
+    assert_eq!(dry.code, 0, "{}", dry.err);
+    let plan = json(&dry.out);
+    for stage in plan["stages"].as_array().unwrap() {
+        let planned = stage["stage"] == "contact";
+        assert_eq!(stage["planned"], planned, "{stage}");
+        assert!(!stage["reason"].as_str().unwrap().is_empty());
+    }
+    let wet = ran(&["plan", "cases/dam_break_transport.toml", "--spacing", "0.03"]);
+    assert_eq!(wet.code, 0, "{}", wet.err);
+    for word in
+        ["n0 14.41858", "lambda 1.70174", "32 neighbours", "conjugate_gradient", "memory", "time step"]
+    {
+        assert!(wet.out.contains(word), "{word}: {}", wet.out);
+    }
+}
+
+#[test]
+fn schema_and_adapters_answer_on_stdout() {
+    let schema = ran(&["schema"]);
+    assert_eq!(schema.code, 0);
+    assert!(json(&schema.out)["properties"]["run"].is_object());
+    let adapters = ran(&["adapters", "--json"]);
+    assert_eq!(adapters.code, 0, "{}", adapters.err);
+    assert!(json(&adapters.out).is_array());
+}
+
+/// Start a long run and wait until it has written a frame.
+#[cfg(unix)]
+fn long_run(case: &str, root: &Path) -> std::process::Child {
+    let child = std::process::Command::new(env!("CARGO_BIN_EXE_seixo"))
+        .args(["run", case, "--backend", "cpu", "--json", "--until", "1e6", "-o"])
+        .arg(root)
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while !root.join("vtu/fluid_0002.vtu").exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "no frame after a minute");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child
+}
+
+#[cfg(unix)]
+fn send(child: &std::process::Child, signal: &str) {
+    let sent = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_end_a_run_with_everything_written() {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        let folder = tempfile::tempdir().unwrap();
+        let case = small_case(folder.path());
+        let root = folder.path().join("results");
+        let child = long_run(&case, &root);
+        send(&child, signal);
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(code));
+        let result = json(&String::from_utf8(output.stdout).unwrap());
+        assert_eq!(result["status"], "interrupted");
+        assert_whole(&root);
+        files_named_in_pvd_exist(&root, "small");
+        let frames = result["frames"].as_u64().unwrap();
+        assert!(root.join(format!("vtu/fluid_{:04}.vtu", frames - 1)).exists());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_killed_run_leaves_only_whole_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("results");
+    let mut child = long_run(&case, &root);
+    send(&child, "-KILL");
+    assert!(!child.wait().unwrap().success());
+    assert_whole(&root);
+    files_named_in_pvd_exist(&root, "small");
+    assert!(!root.join("result.json").exists());
+}

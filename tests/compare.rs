@@ -1,0 +1,57 @@
+//! The library's own comparison of device and CPU, as `seixo compare` runs it.
+
+mod common;
+
+use seixo::backend::gpu;
+use seixo::compare;
+use seixo::plan::Stage;
+
+fn device() -> bool {
+    let found = !gpu::adapters().is_empty();
+    assert!(found || std::env::var_os("CI").is_none(), "NO GPU ADAPTER");
+    if !found {
+        eprintln!("SKIPPED, NO GPU ADAPTER: device and CPU are not compared");
+    }
+    found
+}
+
+#[test]
+fn one_step_agrees_stage_by_stage() {
+    if !device() {
+        return;
+    }
+    let (case, scene) = (common::case(3, ""), common::scene(3, 1));
+    let errors = compare::compare_stages(&case, &scene, None, 5).expect("both run");
+    for e in &errors {
+        println!("{:20} {:16} max {:.1e}  l2 {:.1e}", e.stage, e.field, e.max_relative, e.l2_relative);
+    }
+    for stage in Stage::ALL.into_iter().filter(|&s| s != Stage::Contact) {
+        assert!(errors.iter().any(|e| e.stage == stage.name()), "{} is missing", stage.name());
+    }
+    assert!(errors.iter().any(|e| e.max_relative > 0.0), "f32 cannot agree with f64 to the last bit");
+    for e in &errors {
+        // From the solve on, its tolerance is in the error.
+        let solved = ["conjugate_gradient", "pressure_gradient", "correct", "body_force"].contains(&e.stage);
+        let bound = if solved { 5e-3 } else { 2e-5 };
+        assert!(e.l2_relative < bound, "{e:?}");
+    }
+}
+
+#[test]
+fn runs_stay_together() {
+    if !device() {
+        return;
+    }
+    let (case, scene) = (common::case(3, ""), common::scene(3, 1));
+    let drift = compare::drift(&case, &scene, None, 20).expect("both run");
+    println!("{:?} {:?} s", drift.backends, drift.seconds);
+    for q in &drift.quantities {
+        println!("{:24} {:12.6} {:12.6} {:.1e}", q.name, q.cpu, q.gpu, q.relative);
+    }
+    assert!((drift.time[0] - drift.time[1]).abs() < 1e-3 * drift.time[0] && drift.time[0] > 0.0);
+    let kinetic = drift.quantities.iter().find(|q| q.name == "kinetic_J").expect("listed");
+    assert!(kinetic.cpu > 1e-4);
+    for q in drift.quantities.iter().filter(|q| q.name.starts_with("centroid") || q.name.ends_with("_J")) {
+        assert!(q.relative < 1e-3, "{q:?}");
+    }
+}

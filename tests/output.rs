@@ -1,0 +1,212 @@
+//! The VTU files, read back byte for byte by a reader written for the test, and the list of frames.
+
+use seixo::case::Encoding;
+use seixo::output::folder::Folder;
+use seixo::output::pvd::Pvd;
+use seixo::output::vtu::{BLOCK, Values, vtu};
+use std::io::Read;
+
+/// An array of a VTU file: declared type, name and bytes.
+struct Array {
+    type_name: String,
+    name: String,
+    bytes: Vec<u8>,
+}
+
+fn attribute<'a>(tag: &'a str, name: &str) -> &'a str {
+    let start =
+        tag.find(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name} in {tag}")) + name.len() + 3;
+    &tag[start..start + tag[start..].find('"').unwrap()]
+}
+
+/// Base64 without line breaks; stops at the padding.
+fn decode(text: &[u8]) -> Vec<u8> {
+    let digit = |c: u8| match c {
+        b'A'..=b'Z' => c - b'A',
+        b'a'..=b'z' => c - b'a' + 26,
+        b'0'..=b'9' => c - b'0' + 52,
+        b'+' => 62,
+        b'/' => 63,
+        _ => panic!("{c} is no base64"),
+    };
+    let (mut out, mut word, mut bits) = (Vec::new(), 0_u32, 0);
+    for &c in text.iter().take_while(|&&c| c != b'=') {
+        (word, bits) = (word << 6 | u32::from(digit(c)), bits + 6);
+        if bits >= 8 {
+            bits -= 8;
+            out.push((word >> bits) as u8);
+            word &= (1 << bits) - 1;
+        }
+    }
+    out
+}
+
+fn numbers(bytes: &[u8]) -> Vec<usize> {
+    bytes.chunks_exact(8).map(|b| u64::from_ne_bytes(b.try_into().unwrap()) as usize).collect()
+}
+
+/// `bytes` of data as base64 text take this many characters.
+fn characters(bytes: usize) -> usize {
+    bytes.div_ceil(3) * 4
+}
+
+/// One array from the appended data; a compressed one also tells its header.
+fn array_at(data: &[u8], raw: bool, compressed: bool) -> (Vec<u8>, Vec<usize>) {
+    if raw {
+        let n = numbers(&data[..8])[0];
+        return (data[8..8 + n].to_vec(), vec![]);
+    }
+    if !compressed {
+        let n = numbers(&decode(&data[..characters(8)])[..8])[0];
+        return (decode(&data[..characters(8 + n)])[8..].to_vec(), vec![]);
+    }
+    // Enough characters for three numbers; 32 hold 24 bytes.
+    let blocks = numbers(&decode(&data[..32]))[0];
+    let length = characters(8 * (3 + blocks));
+    let header = numbers(&decode(&data[..length]));
+    let packed: usize = header[3..].iter().sum();
+    let packed = decode(&data[length..length + characters(packed)]);
+    let (mut bytes, mut at) = (Vec::new(), 0);
+    for (k, size) in header[3..].iter().enumerate() {
+        let before = bytes.len();
+        flate2::read::ZlibDecoder::new(&packed[at..at + size]).read_to_end(&mut bytes).unwrap();
+        let expected = if k + 1 == blocks { header[2] } else { header[1] };
+        assert_eq!(bytes.len() - before, expected, "block {k}");
+        at += size;
+    }
+    (bytes, header)
+}
+
+/// All arrays of a file, in the order of the tags, and the headers of the compressed ones.
+fn read(file: &[u8]) -> (String, Vec<Array>, Vec<Vec<usize>>) {
+    let mark = file.windows(20).position(|w| w.starts_with(b"<AppendedData")).unwrap();
+    let head = std::str::from_utf8(&file[..mark]).unwrap().to_string();
+    let data = mark + file[mark..].iter().position(|&c| c == b'_').unwrap() + 1;
+    let raw = file[mark..data].windows(14).any(|w| w == b"encoding=\"raw\"");
+    let compressed = head.contains("vtkZLibDataCompressor");
+    assert_eq!(attribute(&head, "header_type"), "UInt64");
+    let mut arrays = Vec::new();
+    let mut headers = Vec::new();
+    for tag in head.split('<').filter(|t| t.starts_with("DataArray") && t.contains("appended")) {
+        let offset: usize = attribute(tag, "offset").parse().unwrap();
+        let (bytes, header) = array_at(&file[data + offset..], raw, compressed);
+        let (type_name, name) = (attribute(tag, "type").to_string(), attribute(tag, "Name").to_string());
+        arrays.push(Array { type_name, name, bytes });
+        headers.push(header);
+    }
+    (head, arrays, headers)
+}
+
+/// Values without a pattern that a compressor or a shifted reader could hide.
+fn scrambled(n: usize) -> (Vec<[f32; 3]>, Vec<f32>, Vec<u8>, Vec<u32>) {
+    let mut state = 0x2545_f491_u32;
+    let mut next = move || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state
+    };
+    let mut real = || next() as f32 / u32::MAX as f32 - 0.5;
+    let points = (0..n).map(|_| [real(), real(), real()]).collect();
+    let scalars = (0..n).map(|_| real()).collect();
+    let kinds = (0..n).map(|k| (k * 7 % 5) as u8).collect();
+    let ids = (0..n as u32).map(|k| k.wrapping_mul(2_654_435_761)).collect();
+    (points, scalars, kinds, ids)
+}
+
+fn round_trip(n: usize, encoding: Encoding) -> Vec<Vec<usize>> {
+    let (points, scalars, kinds, ids) = scrambled(n);
+    let fields = [
+        ("Velocity", Values::Vector(&points)),
+        ("Pressure", Values::Scalar(&scalars)),
+        ("Kind", Values::Byte(&kinds)),
+        ("Id", Values::Number(&ids)),
+    ];
+    let file = vtu(&points, &fields, 0.125, encoding);
+    let (head, arrays, headers) = read(&file);
+    assert!(head.contains("Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">0.125<"), "{head}");
+    assert!(head.contains(&format!("NumberOfPoints=\"{n}\" NumberOfCells=\"{n}\"")), "{head}");
+    let connectivity: Vec<i32> = (0..n as i32).collect();
+    let offsets: Vec<i32> = (1..=n as i32).collect();
+    let expected: [(&str, &str, &[u8]); 8] = [
+        ("Float32", "Velocity", bytemuck::cast_slice(&points)),
+        ("Float32", "Pressure", bytemuck::cast_slice(&scalars)),
+        ("UInt8", "Kind", &kinds),
+        ("UInt32", "Id", bytemuck::cast_slice(&ids)),
+        ("Float32", "Points", bytemuck::cast_slice(&points)),
+        ("Int32", "connectivity", bytemuck::cast_slice(&connectivity)),
+        ("Int32", "offsets", bytemuck::cast_slice(&offsets)),
+        ("UInt8", "types", &vec![1; n]),
+    ];
+    assert_eq!(arrays.len(), expected.len());
+    for (array, (type_name, name, bytes)) in arrays.iter().zip(expected) {
+        assert_eq!((array.type_name.as_str(), array.name.as_str()), (type_name, name));
+        assert!(array.bytes == bytes, "{name}: {} bytes read, {} written", array.bytes.len(), bytes.len());
+    }
+    headers
+}
+
+#[test]
+fn every_array_comes_back_bit_for_bit() {
+    for encoding in [Encoding::Base64, Encoding::Raw] {
+        for n in [1, 2, 3, 1000, 16_384, 70_001] {
+            round_trip(n, encoding);
+        }
+    }
+}
+
+/// Some readers take the format's "0: the last block is full" for an empty block.
+#[test]
+fn a_full_last_block_says_its_size() {
+    let headers = round_trip(65_536, Encoding::Base64);
+    let sizes: Vec<usize> = headers.iter().map(|h| h[0] * BLOCK).collect();
+    assert_eq!(sizes, [12, 4, 1, 4, 12, 4, 4, 1].map(|bytes| bytes * 65_536), "all arrays fill their blocks");
+    assert!(headers.iter().all(|h| h[1] == BLOCK && h[2] == BLOCK), "{headers:?}");
+}
+
+/// Readers stumble over compressed arrays without blocks.
+#[test]
+fn a_file_without_points_is_not_compressed() {
+    for encoding in [Encoding::Base64, Encoding::Raw] {
+        round_trip(0, encoding);
+        let file = vtu(&[], &[("Pressure", Values::Scalar(&[]))], 0.0, encoding);
+        assert!(!String::from_utf8_lossy(&file).contains("compressor"));
+    }
+}
+
+#[test]
+fn the_list_of_frames_is_whole_after_every_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("case.pvd");
+    let mut pvd = Pvd::new(path.clone());
+    for (k, time) in [0.0, 0.05, 0.1].into_iter().enumerate() {
+        let parts = [("walls", "vtu/walls.vtu".to_string()), ("fluid", format!("vtu/fluid_{k:04}.vtu"))];
+        pvd.push(time, &parts).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches("<DataSet ").count(), 2 * (k + 1));
+        assert!(text.ends_with("</VTKFile>\n") && text.contains("type=\"Collection\""));
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        text.contains(r#"timestep="0.05" group="" part="1" name="fluid" file="vtu/fluid_0001.vtu""#),
+        "{text}"
+    );
+    assert_eq!(text.matches("vtu/walls.vtu").count(), 3, "unchanged parts are named in every frame");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays behind");
+}
+
+#[test]
+fn a_folder_with_something_in_it_is_refused_and_force_removes_only_earlier_results() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join("a/b");
+    let first = Folder::create(&root, "case", false).unwrap();
+    std::fs::write(first.vtu().join("fluid_0007.vtu"), "old").unwrap();
+    std::fs::write(first.pvd(), "old").unwrap();
+    std::fs::write(first.file("notes.txt"), "mine").unwrap();
+    let refused = Folder::create(&root, "case", false).unwrap_err();
+    assert_eq!(refused.exit_code(), 2);
+    assert!(refused.to_string().contains("--force"), "{refused}");
+    Folder::create(&root, "case", true).unwrap();
+    assert!(!first.vtu().join("fluid_0007.vtu").exists() && !first.pvd().exists());
+    assert!(first.file("notes.txt").exists() && first.vtu().is_dir());
+}

@@ -1,0 +1,254 @@
+//! Checks of every WGSL file, with no device.
+
+mod common;
+
+use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, counter};
+use seixo::backend::gpu::{Gpu, shader};
+use seixo::params::Params;
+use seixo::plan::Plan;
+use seixo::pressure::Settings;
+use std::collections::BTreeSet;
+use std::mem::offset_of;
+use wgpu::naga;
+
+/// Names of the files in `folder` that end in `extension`, but for `except`.
+fn files(folder: &str, extension: &str, except: &str) -> BTreeSet<String> {
+    let root = env!("CARGO_MANIFEST_DIR");
+    std::fs::read_dir(format!("{root}/{folder}"))
+        .expect("the folder exists")
+        .filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(extension)?.to_owned()))
+        .filter(|name| name != except)
+        .collect()
+}
+
+#[test]
+fn every_shader_has_a_twin_and_every_twin_a_shader() {
+    let shaders = files("shaders", ".wgsl", "common");
+    assert_eq!(shaders, files("src/kernels", ".rs", "mod"));
+    let listed: BTreeSet<String> = shader::KERNELS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    assert_eq!(shaders, listed);
+    for (name, text) in shader::KERNELS {
+        assert!(
+            text.contains(&format!("// Twin: src/kernels/{name}.rs")),
+            "{name}: head comment names no twin"
+        );
+        assert!(text.starts_with("// "), "{name}: no head comment");
+        let twin = std::fs::read_to_string(format!("{}/src/kernels/{name}.rs", env!("CARGO_MANIFEST_DIR")));
+        assert!(twin.is_ok_and(|t| t.starts_with("//! ")), "{name}: the twin has no head comment");
+    }
+}
+
+/// The switches that a file asks for.
+fn asked(text: &str) -> Vec<&'static str> {
+    shader::SWITCHES.into_iter().filter(|s| text.contains(&format!("//#if {s}\n"))).collect()
+}
+
+/// Every combination of the switches that a file asks for.
+fn combinations(text: &str) -> impl Iterator<Item = Vec<&'static str>> {
+    let names = asked(text);
+    (0..1_u32 << names.len())
+        .map(move |k| names.iter().enumerate().filter(|(i, _)| k >> i & 1 == 1).map(|(_, &n)| n).collect())
+}
+
+#[test]
+fn every_shader_is_valid_with_every_switch_and_binds_what_every_device_allows() {
+    let allowed = wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize;
+    for (name, text) in shader::KERNELS {
+        let directives = text.lines().filter(|l| l.trim().starts_with("//#if ")).count();
+        let known = asked(text).iter().map(|s| text.matches(&format!("//#if {s}\n")).count()).sum::<usize>();
+        assert_eq!(directives, known, "{name}: a switch is not in the list");
+        for switches in combinations(text) {
+            let source = shader::source(text, &switches);
+            assert_eq!(source.lines().count(), text.lines().count() + shader::COMMON.lines().count());
+            let entries =
+                shader::entries(name, &source).unwrap_or_else(|e| panic!("{name} {switches:?}: {e}"));
+            assert!(!entries.is_empty(), "{name} {switches:?}: no entry point");
+            for entry in entries {
+                let storage = entry.bindings.iter().filter(|(.., storage)| *storage).count();
+                assert!(storage <= allowed, "{name}.{}: {storage} storage buffers", entry.name);
+            }
+        }
+    }
+}
+
+/// Name and offset of the members of a struct of a shader, and its size.
+fn members(text: &str, name: &str) -> (Vec<(String, usize)>, usize) {
+    let module = naga::front::wgsl::parse_str(&shader::source(text, &[])).expect("valid");
+    let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+    let (_, ty) = found.unwrap_or_else(|| panic!("no struct {name}"));
+    let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
+    let list = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize)).collect();
+    (list, *span as usize)
+}
+
+macro_rules! same_layout {
+    ($file:literal, $rust:ident { $($field:ident),* $(,)? }) => {{
+        let text = shader::KERNELS.iter().find(|(n, _)| *n == $file).expect("listed").1;
+        let rust = vec![$((stringify!($field).to_owned(), offset_of!($rust, $field))),*];
+        let (wgsl, span) = members(text, stringify!($rust));
+        assert_eq!(wgsl, rust);
+        assert_eq!(span, size_of::<$rust>());
+    }};
+}
+
+#[test]
+fn structs_lie_the_same_on_both_sides() {
+    same_layout!(
+        "predict",
+        Constants {
+            gravity,
+            spacing,
+            lower,
+            effective_radius,
+            upper,
+            collision_distance,
+            cells,
+            cell_total,
+            fluid,
+            moving_wall,
+            moving,
+            moving_dummy,
+            pressure_slots,
+            capacity,
+            reduction_groups,
+            max_iterations,
+            number_density,
+            surface_below,
+            restitution,
+            viscosity,
+            particle_mass,
+            gradient_scale,
+            density,
+            tolerance_squared,
+        }
+    );
+    same_layout!(
+        "predict",
+        Coefficients {
+            dt,
+            source_density,
+            source_divergence,
+            compressibility,
+            pressure_max,
+            speed_per_bin,
+            pad,
+        }
+    );
+    same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
+    same_layout!(
+        "conjugate_gradient",
+        Solve {
+            done,
+            outcome,
+            iterations,
+            unknowns,
+            source_squared,
+            residual_squared,
+            true_residual_squared,
+            rz,
+            rz_old,
+        }
+    );
+    same_layout!(
+        "monitor",
+        MonitorSum {
+            momentum,
+            kinetic,
+            position,
+            density_error,
+            extent_max,
+            density_error_max,
+            particles,
+            inner,
+            speed_squared_max,
+            pad,
+        }
+    );
+}
+
+/// Value of a constant of the shaders.
+fn constant(text: &str, name: &str) -> f64 {
+    let line = text.lines().find(|l| l.starts_with(&format!("const {name}:"))).expect("the constant exists");
+    let value = line.split('=').nth(1).expect("it has a value").trim().trim_end_matches(';');
+    value.trim_end_matches('u').parse().expect("it is a number")
+}
+
+#[test]
+fn constants_are_the_same_on_both_sides() {
+    use seixo::backend::gpu::layout::{MONITOR_WIDTH, WORKGROUP};
+    use seixo::fields::State;
+    use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::pressure::Outcome;
+    use seixo::scene::Kind;
+    let text = |name: &str| shader::KERNELS.iter().find(|(n, _)| *n == name).expect("listed").1;
+    let common = |name: &str| constant(shader::COMMON, name);
+    assert_eq!(common("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(common("FLUID"), f64::from(Kind::Fluid as u8));
+    assert_eq!(common("GHOST"), f64::from(Kind::Ghost as u8));
+    assert_eq!(common("INACTIVE"), f64::from(State::Inactive as u8));
+    assert_eq!(common("SURFACE"), f64::from(State::Surface as u8));
+    assert_eq!(common("INNER"), f64::from(State::Inner as u8));
+    assert_eq!(common("DISPLACEMENT_MAX"), DISPLACEMENT_MAX);
+    assert_eq!(common("CLOSEST"), CLOSEST);
+    for (name, place) in [
+        ("LOST", counter::LOST),
+        ("DISPLACEMENT_CLAMPS", counter::DISPLACEMENT_CLAMPS),
+        ("PRESSURE_CLAMPS", counter::PRESSURE_CLAMPS),
+        ("NEIGHBOURS_MAX", counter::NEIGHBOURS_MAX),
+        ("NON_FINITE", counter::NON_FINITE),
+        ("OVERFLOW", counter::OVERFLOW),
+    ] {
+        assert_eq!(common(name), place as f64, "{name}");
+    }
+    assert_eq!(constant(text("monitor"), "WIDTH"), MONITOR_WIDTH as f64);
+    assert_eq!(constant(text("monitor"), "SPEED_BINS"), seixo::monitor::SPEED_BINS as f64);
+    for (name, outcome) in [
+        ("CONVERGED", Outcome::Converged),
+        ("ZERO_SOURCE", Outcome::ZeroSource),
+        ("MAX_ITERATIONS", Outcome::MaxIterations),
+        ("BREAKDOWN", Outcome::Breakdown),
+        ("NOT_FINITE", Outcome::NonFinite),
+    ] {
+        assert_eq!(constant(text("conjugate_gradient"), name), f64::from(outcome as u8), "{name}");
+    }
+}
+
+#[test]
+fn pipelines_and_bindings_fit_together_for_every_kind_of_scene() {
+    for dimensions in [2, 3] {
+        for fluid in [
+            "preset = \"paper\"",
+            "preset = \"accurate\"",
+            "viscosity = 0.0",
+            "collision_distance = 0.0",
+            "viscosity = 0.0\ncollision_distance = 0.0",
+        ] {
+            let fluid = fluid.replace("viscosity = 0.0", "");
+            let mut case = common::case(dimensions, &fluid);
+            if !fluid.contains("preset") {
+                case.fluid.as_mut().expect("it has fluid").viscosity = 0.0;
+            }
+            for moving in [true, false] {
+                let mut scene = common::scene(dimensions, 1);
+                if !moving {
+                    let g = scene.groups;
+                    let solid =
+                        |i: &usize| g.moving_wall_range().contains(i) || g.moving_dummy_range().contains(i);
+                    let stay: Vec<usize> = (0..g.total()).filter(|i| !solid(i)).collect();
+                    scene.position = stay.iter().map(|&i| scene.position[i]).collect();
+                    scene.velocity = stay.iter().map(|&i| scene.velocity[i]).collect();
+                    scene.kind = stay.iter().map(|&i| scene.kind[i]).collect();
+                    (scene.groups.moving_wall, scene.groups.moving_dummy) = (0, 0);
+                    scene.solids.clear();
+                }
+                let params = Params::new(&case, &scene).expect("valid");
+                let plan = Plan::new(&case, &scene, &params);
+                let settings = Settings { tolerance: 1e-3, max_iterations: 100, warm_start: true };
+                let built = Gpu::dry_run(&scene, &params, &plan, settings);
+                if let Err(e) = built {
+                    panic!("{dimensions}D, {fluid:?}, moving {moving}: {e}");
+                }
+            }
+        }
+    }
+}

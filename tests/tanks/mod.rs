@@ -1,0 +1,48 @@
+//! Scenes for the tests, written as a user would write them.
+#![allow(dead_code, missing_docs)]
+
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
+use seixo::case::Case;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+
+pub fn case(text: &str) -> Case {
+    toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+pub fn simulation(case: &Case) -> Simulation {
+    let scene = Scene::build(case).expect("the scene builds");
+    cpu_simulation(case, &scene)
+}
+
+pub fn cpu_simulation(case: &Case, scene: &Scene) -> Simulation {
+    let make =
+        |s: &_, p: &_, plan: &_, settings| Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>);
+    Simulation::new(case, scene, make).expect("the simulation starts")
+}
+
+/// Still water 0.25 x 0.25 x `depth` m in a tank 0.2 m higher.
+pub fn hydrostatic(spacing: f64, dt: f64, fluid: &str) -> Case {
+    hydrostatic_of_depth(0.5, spacing, dt, fluid)
+}
+
+pub fn hydrostatic_of_depth(depth: f64, spacing: f64, dt: f64, fluid: &str) -> Case {
+    let top = depth + 0.2;
+    case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = {dt}\nend = 3.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, {depth}]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, {top}]\nopen = [\"z_max\"]\n"
+    ))
+}
+
+/// The tank of the paper's section 4.3 without gate and solid.
+pub fn dam_break(spacing: f64, dt: f64, fluid: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = {dt}\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.35]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [3.5, 0.5, 0.5]\nopen = [\"z_max\"]\n\
+         [[obstacle]]\nname = \"first\"\nmin = [2.5, 0.06, 0]\nmax = [2.65, 0.21, 0.5]\nopen = [\"z_max\"]\n\
+         [[obstacle]]\nname = \"second\"\nmin = [2.95, 0.29, 0]\nmax = [3.1, 0.44, 0.5]\nopen = [\"z_max\"]\n"
+    ))
+}

@@ -1,0 +1,513 @@
+//! Every shader against its twin: the same state on the device (f32) and on the CPU (f64), one stage run on
+//! both, everything it writes compared particle by particle.
+//!
+//! Each test asks that its stage did something and bounds the error. States come from the device, so both
+//! sides start from the same numbers.
+
+mod common;
+
+use glam::DVec3;
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
+use seixo::backend::gpu::{self, Gpu};
+use seixo::body::Pose;
+use seixo::compare::{self, StageError};
+use seixo::fields::{Fields, State};
+use seixo::params::{Params, Step};
+use seixo::plan::{Plan, Stage};
+use seixo::pressure::{Outcome, Settings};
+use seixo::scene::{Kind, Scene};
+
+/// Largest error of a particle stage, relative to the largest value (to l0 for positions).
+const PARTICLE: f64 = 1e-5;
+/// Error of one solve at tolerance 1e-4, in the mean square.
+const SOLVE: f64 = 5e-3;
+
+/// The two backends with the same particles.
+struct Pair {
+    scene: Scene,
+    params: Params,
+    plan: Plan,
+    settings: Settings,
+    step: Step,
+    poses: Vec<Pose>,
+    cpu: Cpu,
+    gpu: Gpu,
+}
+
+/// Whether there is a device to test; loud if not, and a failure where one is expected.
+fn device() -> bool {
+    if !gpu::adapters().is_empty() {
+        return true;
+    }
+    let text = "NO GPU ADAPTER: the shaders are not compared with their twins (libvulkan1 and mesa-vulkan-drivers \
+                give a software one)";
+    assert!(std::env::var_os("CI").is_none(), "{text}");
+    eprintln!("SKIPPED, {text}");
+    false
+}
+
+impl Pair {
+    /// A state in motion: some steps on the CPU, then a push that makes particles collide.
+    fn new(dimensions: u32, fluid: &str) -> Option<Self> {
+        if !device() {
+            return None;
+        }
+        let case = common::case(dimensions, fluid);
+        let scene = common::scene(dimensions, if dimensions == 2 { 3 } else { 1 });
+        let params = Params::new(&case, &scene).expect("valid");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
+        let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+        let gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+        let (dt, steps) = (1e-3, 12);
+        for k in 0..steps {
+            let t = f64::from(k) * dt;
+            let step = params.step(t, dt, 2.0);
+            for stage in Stage::ALL {
+                let done = match stage {
+                    _ if !plan.has(stage) => Ok(()),
+                    Stage::MoveSolids => cpu.move_solids(&common::poses(&scene, t + dt)),
+                    Stage::ConjugateGradient => cpu.solve_pressure(&step).map(|_| ()),
+                    Stage::BodyForce | Stage::Contact => Ok(()),
+                    other => cpu.run(other, &step),
+                };
+                done.expect("the warm-up runs");
+            }
+        }
+        let t = f64::from(steps) * dt;
+        let mut fields = cpu.read().expect("the CPU can be read");
+        for i in 0..scene.groups.fluid {
+            fields.position[i] += 0.2 * params.spacing * common::noise_vector(i, dimensions);
+            fields.velocity[i] += 0.4 * common::noise_vector(i + 100_000, dimensions);
+        }
+        // One that flies out, one that is broken.
+        fields.position[3].z = params.domain_max.z + 0.1;
+        fields.velocity[7].x = f64::NAN;
+        // One that hits the body.
+        let body = &scene.solids[1];
+        let (wall, out) = (body.wall_slots.start, body.wall_area[0].normalize());
+        fields.position[20] = fields.position[wall] + 0.6 * params.spacing * out;
+        fields.velocity[20] = fields.velocity[wall] - out;
+        let poses = common::poses(&scene, t);
+        let step = params.step(t, dt, 2.0);
+        let mut pair = Self { scene, params, plan, settings, step, poses, cpu, gpu };
+        pair.gpu.write(&fields).expect("the device can be written");
+        pair.sync();
+        pair.move_solids();
+        pair.sync();
+        Some(pair)
+    }
+
+    /// Give the CPU the device's state.
+    fn sync(&mut self) {
+        let fields = self.gpu.read().expect("the device can be read");
+        self.cpu.write(&fields).expect("the CPU can be written");
+    }
+
+    fn run(&mut self, stage: Stage) {
+        self.cpu.run(stage, &self.step).expect("the CPU runs");
+        self.gpu.run(stage, &self.step).expect("the device runs");
+    }
+
+    fn run_all(&mut self, stages: &[Stage]) {
+        stages.iter().for_each(|&s| self.run(s));
+    }
+
+    fn move_solids(&mut self) {
+        self.cpu.move_solids(&self.poses).expect("the CPU moves solids");
+        self.gpu.move_solids(&self.poses).expect("the device moves solids");
+    }
+
+    /// Fields of device and CPU, the fluid ordered by number.
+    fn fields(&mut self) -> (Fields, Fields) {
+        let (gpu, cpu) = (self.gpu.read().expect("readable"), self.cpu.read().expect("readable"));
+        (compare::by_number(&gpu), compare::by_number(&cpu))
+    }
+
+    /// Errors of what `stage` has written.
+    fn errors(&mut self, stage: Stage) -> Vec<StageError> {
+        let (gpu, cpu) = self.fields();
+        let errors = compare::differences(stage, &gpu, &cpu, &self.params);
+        for e in &errors {
+            println!("{:20} {:16} max {:.1e}  l2 {:.1e}", e.stage, e.field, e.max_relative, e.l2_relative);
+        }
+        errors
+    }
+
+    /// Every field that `stage` has written is within [`PARTICLE`].
+    fn check(&mut self, stage: Stage) {
+        for e in self.errors(stage) {
+            assert!(e.max_relative < PARTICLE, "{} {}: {:e}", e.stage, e.field, e.max_relative);
+        }
+    }
+}
+
+/// Largest change of `f` of the fields between two states.
+fn moved(before: &Fields, after: &Fields, f: impl Fn(&Fields) -> Vec<f64>) -> f64 {
+    f(before).iter().zip(f(after)).map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).fold(0.0, f64::max)
+}
+
+fn flat(v: &[DVec3]) -> Vec<f64> {
+    v.iter().flat_map(|v| v.to_array()).collect()
+}
+
+/// The kinds of scheme and dimension that shape the shaders.
+const SCHEMES: [(u32, &str); 3] =
+    [(3, "preset = \"accurate\""), (3, "preset = \"paper\""), (2, "preset = \"accurate\"")];
+
+fn each(test: impl Fn(&mut Pair)) {
+    for (dimensions, fluid) in SCHEMES {
+        if let Some(mut pair) = Pair::new(dimensions, fluid) {
+            println!("{dimensions}D, {fluid}");
+            test(&mut pair);
+        }
+    }
+}
+
+const LISTS: [Stage; 2] = [Stage::CellList, Stage::NeighbourList];
+
+#[test]
+fn viscosity() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        let (before, _) = pair.fields();
+        pair.run(Stage::Viscosity);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.acceleration)) > 1e-2);
+        assert!(moved(&before, &after, |f| flat(&f.reaction)) > 1e-6);
+        pair.check(Stage::Viscosity);
+    });
+}
+
+#[test]
+fn predict() {
+    each(|pair| {
+        // One that is too fast.
+        let mut fields = pair.gpu.read().expect("readable");
+        fields.velocity[11] = DVec3::new(60.0, 0.0, 5.0);
+        pair.gpu.write(&fields).expect("writable");
+        pair.sync();
+        pair.run_all(&LISTS);
+        pair.run(Stage::Viscosity);
+        let (before, _) = pair.fields();
+        let clamps = pair.gpu.counters().expect("readable").displacement_clamps;
+        pair.run(Stage::Predict);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.position)) > 1e-3 * pair.params.spacing);
+        assert!(moved(&before, &after, |f| flat(&f.velocity)) > 1e-3);
+        pair.check(Stage::Predict);
+        let after = pair.gpu.counters().expect("readable").displacement_clamps;
+        assert_eq!(after, pair.cpu.counters().expect("readable").displacement_clamps);
+        assert!(after > clamps, "no displacement was clamped");
+    });
+}
+
+#[test]
+fn move_solids() {
+    each(|pair| {
+        let (before, _) = pair.fields();
+        pair.poses = common::poses(&pair.scene, 0.1);
+        pair.move_solids();
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.position)) > 1e-2);
+        assert!(moved(&before, &after, |f| flat(&f.velocity)) > 1e-3);
+        pair.check(Stage::MoveSolids);
+    });
+}
+
+#[test]
+fn cell_list() {
+    each(|pair| {
+        let before = pair.gpu.read().expect("readable");
+        pair.run(Stage::CellList);
+        let (gpu, cpu) = (pair.gpu.read().expect("readable"), pair.cpu.read().expect("readable"));
+        assert_ne!(gpu.id, before.id, "nothing was reordered");
+        let n = gpu.id.len();
+        assert_eq!(gpu.id, cpu.id, "the orders differ");
+        assert_eq!(gpu.kind, cpu.kind);
+        assert_eq!(gpu.kind[n - 2..n], [Kind::Ghost; 2]);
+        pair.check(Stage::CellList);
+        let (g, c) = (pair.gpu.counters().expect("readable"), pair.cpu.counters().expect("readable"));
+        assert_eq!((g.lost, c.lost), (2, 2));
+        // Ghosts stay ghosts and are counted once.
+        pair.run(Stage::CellList);
+        assert_eq!(pair.gpu.counters().expect("readable").lost, 2);
+    });
+}
+
+#[test]
+fn neighbour_list() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        let (gpu, cpu) = (pair.gpu.neighbours().expect("readable"), pair.cpu.neighbour_rows());
+        let errors = compare::neighbour_differences(&gpu, &cpu);
+        println!("{} of {} pairs differ", errors.differing, errors.pairs);
+        assert!(errors.pairs > 2000 && errors.differing == 0);
+        let g = pair.scene.groups;
+        let walls = g.static_wall_range();
+        let dry = walls.clone().filter(|&i| gpu[i].0.is_empty()).count();
+        assert!(dry > 0 && dry < walls.len(), "{dry} of {} walls are dry", walls.len());
+        let (g, c) = (pair.gpu.counters().expect("readable"), pair.cpu.counters().expect("readable"));
+        assert!(g.neighbours_max > 10 && g.overflow.is_none());
+        // The CPU has more behind it, the warm-up.
+        assert!(g.neighbours_max <= c.neighbours_max);
+    });
+}
+
+#[test]
+fn collision() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        let (before, _) = pair.fields();
+        pair.run(Stage::Collision);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.velocity)) > 0.1);
+        assert!(moved(&before, &after, |f| flat(&f.reaction)) > 1e-3);
+        pair.check(Stage::Collision);
+    });
+}
+
+#[test]
+fn number_density() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        let (before, _) = pair.fields();
+        pair.run(Stage::NumberDensity);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| f.number_density.clone()) > 0.1);
+        for state in [State::Inactive, State::Surface, State::Inner] {
+            assert!(after.state.iter().filter(|&&s| s == state).count() > 20, "{state:?}");
+        }
+        pair.check(Stage::NumberDensity);
+    });
+}
+
+#[test]
+fn pressure_source() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+        let (gpu, _) = pair.fields();
+        assert!(gpu.source.iter().any(|&b| b > 0.0) && gpu.source.iter().any(|&b| b < 0.0));
+        pair.check(Stage::PressureSource);
+    });
+}
+
+#[test]
+fn conjugate_gradient() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+        let (before, _) = pair.fields();
+        let g = pair.gpu.solve_pressure(&pair.step).expect("the device solves");
+        let c = pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
+        println!("device {g:?}\nCPU    {c:?}");
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| f.pressure.clone()) > 10.0);
+        assert_eq!((g.outcome, g.unknowns), (Outcome::Converged, c.unknowns));
+        assert!(g.iterations > 5 && g.iterations.abs_diff(c.iterations) <= 2);
+        assert!(g.residual > 0.0 && g.residual < 2e-4, "true residual {:e}", g.residual);
+        for e in pair.errors(Stage::ConjugateGradient) {
+            assert!(e.l2_relative < SOLVE, "{:e}", e.l2_relative);
+        }
+    });
+}
+
+#[test]
+fn conjugate_gradient_from_zero_and_from_a_bad_start() {
+    let Some(mut pair) = Pair::new(3, "preset = \"accurate\"") else { return };
+    pair.run_all(&LISTS);
+    pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+    pair.gpu.solve_pressure(&pair.step).expect("solves");
+    let (good, _) = pair.fields();
+    // A start whose residual exceeds the right side is thrown away.
+    let mut bad = pair.gpu.read().expect("readable");
+    bad.pressure.iter_mut().enumerate().for_each(|(i, p)| *p = 1e7 * common::noise(i));
+    pair.gpu.write(&bad).expect("writable");
+    pair.sync();
+    pair.run_all(&LISTS);
+    pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+    let g = pair.gpu.solve_pressure(&pair.step).expect("solves");
+    let c = pair.cpu.solve_pressure(&pair.step).expect("solves");
+    assert_eq!(g.outcome, Outcome::Converged);
+    assert!(g.iterations.abs_diff(c.iterations) <= 2, "{g:?} {c:?}");
+    let (again, _) = pair.fields();
+    let errors = compare::differences(Stage::ConjugateGradient, &again, &good, &pair.params);
+    assert!(errors.iter().all(|e| e.l2_relative < SOLVE));
+    // Too few iterations allowed: the last iterate is kept and said to be no solution.
+    let few = Settings { max_iterations: 3, ..pair.settings };
+    let mut gpu = Gpu::new(&pair.scene, &pair.params, &pair.plan, few, None).expect("the device can");
+    gpu.write(&bad).expect("writable");
+    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+        gpu.run(stage, &pair.step).expect("runs");
+    }
+    let report = gpu.solve_pressure(&pair.step).expect("solves");
+    assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, 3));
+    assert!(report.residual > 1e-3);
+    // No source: no pressure, no iteration.
+    let mut nothing = gpu.read().expect("readable");
+    nothing.source.fill(0.0);
+    gpu.write(&nothing).expect("writable");
+    let report = gpu.solve_pressure(&pair.step).expect("solves");
+    assert_eq!((report.outcome, report.iterations), (Outcome::ZeroSource, 0));
+    assert!(gpu.read().expect("readable").pressure.iter().all(|&p| p == 0.0));
+    // A right side that is not a number.
+    nothing.source.fill(f64::NAN);
+    gpu.write(&nothing).expect("writable");
+    assert_eq!(gpu.solve_pressure(&pair.step).expect("solves").outcome, Outcome::NonFinite);
+}
+
+#[test]
+fn pressure_gradient() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        // With the pressure of the warm-up, so that the solver's tolerance does not enter.
+        pair.run(Stage::NumberDensity);
+        let (before, _) = pair.fields();
+        assert!(before.pressure.iter().any(|&p| p > 100.0));
+        pair.run(Stage::PressureGradient);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.acceleration)) > 1.0);
+        pair.check(Stage::PressureGradient);
+    });
+}
+
+#[test]
+fn correct() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run(Stage::NumberDensity);
+        pair.run(Stage::PressureGradient);
+        let (before, _) = pair.fields();
+        pair.run(Stage::Correct);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.velocity)) > 1e-2);
+        assert!(moved(&before, &after, |f| flat(&f.position)) > 1e-5);
+        pair.check(Stage::Correct);
+        // A particle whose velocity is not a number is named.
+        let mut broken = pair.gpu.read().expect("readable");
+        broken.velocity[5].y = f64::NAN;
+        pair.gpu.write(&broken).expect("writable");
+        pair.sync();
+        pair.run(Stage::Correct);
+        let named = pair.gpu.counters().expect("readable").non_finite;
+        assert_eq!(named, Some(broken.id[5]));
+        assert_eq!(pair.cpu.counters().expect("readable").non_finite, named);
+    });
+}
+
+#[test]
+fn body_force() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run_all(&[Stage::Viscosity, Stage::Collision]);
+        let gpu = pair.gpu.body_force().expect("the device sums");
+        let cpu = pair.cpu.body_force().expect("the CPU sums");
+        assert_eq!(gpu.len(), 2);
+        for (g, c) in gpu.iter().zip(&cpu) {
+            println!("force {:.4} torque {:.6}", c.force, c.torque);
+            let arm = 0.1;
+            assert!(c.force.length() > 0.1 && c.torque.length() > 1e-4);
+            assert!((g.force - c.force).length() < PARTICLE * c.force.length().max(1.0));
+            assert!((g.torque - c.torque).length() < PARTICLE * arm * c.force.length().max(1.0));
+        }
+        // The reaction is spent.
+        assert!(pair.gpu.read().expect("readable").reaction.iter().all(|&f| f == DVec3::ZERO));
+    });
+}
+
+#[test]
+fn monitor() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run(Stage::NumberDensity);
+        let (g, c) = (pair.gpu.monitor().expect("sums"), pair.cpu.monitor().expect("sums"));
+        println!("{g:?}\n{c:?}");
+        let near = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < PARTICLE * scale, "{a} {b}");
+        assert_eq!((g.particles, g.inner), (c.particles, c.inner));
+        assert!(g.kinetic > 1e-3 && g.inner > 20);
+        near(g.kinetic, c.kinetic, c.kinetic);
+        near(g.potential, c.potential, c.potential);
+        let mass = pair.params.particle_mass() * c.particles as f64;
+        for k in 0..3 {
+            near(g.momentum[k], c.momentum[k], mass * c.speed_max);
+            near(g.centroid[k], c.centroid[k], 0.1);
+            near(g.extent_max[k], c.extent_max[k], 0.1);
+        }
+        near(g.speed_max, c.speed_max, c.speed_max);
+        assert!(g.speed_max > 0.4);
+        near(g.density_error_mean, c.density_error_mean, 1.0);
+        near(g.density_error_max, c.density_error_max, 1.0);
+        assert_eq!(g.speed_most, c.speed_most);
+    });
+}
+
+#[test]
+fn pressures_of_single_slots() {
+    let Some(mut pair) = Pair::new(3, "preset = \"accurate\"") else { return };
+    let slots: Vec<usize> = (0..pair.scene.groups.pressure()).step_by(7).collect();
+    let all = pair.gpu.read().expect("readable").pressure;
+    let some = pair.gpu.pressures(&slots).expect("readable");
+    assert!(some.iter().any(|&p| p > 0.0));
+    assert_eq!(some, slots.iter().map(|&s| all[s]).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_collapsed_neighbourhood_is_reported() {
+    let Some(mut pair) = Pair::new(3, "preset = \"accurate\"") else { return };
+    let mut fields = pair.gpu.read().expect("readable");
+    let (at, n) = (fields.position[40], 150);
+    for i in 40..40 + n {
+        fields.position[i] = at + 0.2 * pair.params.spacing * common::noise_vector(i, 3);
+    }
+    pair.gpu.write(&fields).expect("writable");
+    pair.sync();
+    pair.run_all(&LISTS);
+    let seen = pair.gpu.counters().expect("readable");
+    let (slot, neighbours) = seen.overflow.expect("an overflow is seen");
+    assert!(
+        (slot as usize) < pair.scene.groups.pressure() && neighbours as usize >= n - 1,
+        "{slot} {neighbours}"
+    );
+}
+
+/// Some whole steps on a new device; the bytes of what they leave.
+fn bytes(scheme: &str) -> Vec<u64> {
+    let mut pair = Pair::new(3, scheme).expect("asked for only with a device");
+    for _ in 0..4 {
+        for stage in Stage::ALL {
+            let (gpu, step) = (&mut pair.gpu, &pair.step);
+            let done = match stage {
+                Stage::MoveSolids => gpu.move_solids(&pair.poses),
+                Stage::ConjugateGradient => gpu.solve_pressure(step).map(|_| ()),
+                Stage::BodyForce => gpu.body_force().map(|_| ()),
+                Stage::Contact => Ok(()),
+                other => gpu.run(other, step),
+            };
+            done.expect("the step runs");
+        }
+    }
+    let f = pair.gpu.read().expect("readable");
+    let numbers = [flat(&f.position), flat(&f.velocity), f.pressure, f.number_density].concat();
+    numbers.iter().map(|x| x.to_bits()).chain(f.id.iter().map(|&i| u64::from(i))).collect()
+}
+
+#[test]
+fn two_runs_give_the_same_bytes() {
+    if device() {
+        let scheme = "preset = \"accurate\"";
+        let first = bytes(scheme);
+        for _ in 0..3 {
+            assert!(first == bytes(scheme), "two runs differ");
+        }
+    }
+}
+
+#[test]
+fn every_stage_has_a_test() {
+    let text = include_str!("twins.rs");
+    for (name, _) in gpu::shader::KERNELS {
+        assert!(text.contains(&format!("#[test]\nfn {name}()")), "no test is called {name}");
+    }
+}
