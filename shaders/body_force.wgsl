@@ -1,14 +1,22 @@
-// Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer, with
-// P and the arm on the true surface: P = max(P_i + rho g.(surface - centre), 0). A workgroup sums up to 256 particles of one solid; the host finishes in f64.
+// Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer. P is
+// the pressure on the true surface, half a spacing outside of the particles' centres: the hydrostatic part of the
+// difference, rho g.s, is known. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
 // Twin: src/kernels/body_force.rs
 
 @group(0) @binding(2) var<storage, read> pressure: array<f32>;
 @group(0) @binding(3) var<storage, read_write> reaction: array<vec4f>;
-@group(0) @binding(4) var<storage, read> wall_geometry: array<vec4f>; // area, arm, centre to surface, solid's frame
-@group(0) @binding(5) var<storage, read> state: array<u32>;
+@group(0) @binding(4) var<storage, read> state: array<u32>;
+@group(0) @binding(5) var<storage, read> wall_layer: array<WallParticle>;
 @group(0) @binding(6) var<storage, read> poses: array<Pose>;
 @group(0) @binding(7) var<storage, read> force_chunk: array<vec4u>; // first of the moving-wall slots, how many, solid
 @group(0) @binding(8) var<storage, read_write> wrench: array<vec4f>; // force and torque of each chunk
+
+// In the solid's frame: outward area, from the centre of mass to the surface, from the particle to the surface.
+struct WallParticle {
+    area: vec4f,
+    arm: vec4f,
+    to_surface: vec4f,
+}
 
 var<workgroup> force_of: array<vec3f, 256>;
 var<workgroup> torque_of: array<vec3f, 256>;
@@ -23,16 +31,17 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     if t < chunk.y {
         let k = chunk.x + t;
         let orientation = poses[chunk.z].orientation;
+        let wall = wall_layer[k];
         if state[params.fluid + k] == INNER {
-            let head = dot(params.gravity, rotate(orientation, wall_geometry[3u * k + 2u].xyz));
-            let p = max(pressure[params.fluid + k] + params.density * head, 0.0);
-            force = -p * rotate(orientation, wall_geometry[3u * k].xyz);
+            let difference = params.density * dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
+            let surface_pressure = max(pressure[params.fluid + k] + difference, 0.0);
+            force = -surface_pressure * rotate(orientation, wall.area.xyz);
         }
 //#if REACTION
         force += reaction[k].xyz;
         reaction[k] = vec4f(0.0);
 //#endif
-        torque = cross(rotate(orientation, wall_geometry[3u * k + 1u].xyz), force);
+        torque = cross(rotate(orientation, wall.arm.xyz), force);
     }
     force_of[t] = force;
     torque_of[t] = torque;

@@ -68,8 +68,13 @@ fn workgroup_sum(value: vec4f, t: u32) -> vec4f {
     return sum;
 }
 
+// Sum of the workgroups' sums; in w whether the iteration is done, which so reaches every thread without a barrier of
+// its own.
 fn sum_of_partials(first: u32, t: u32) -> vec4f {
     var sum = vec4f(0.0);
+    if t == 0u {
+        sum.w = f32(atomicLoad(&solve.done));
+    }
     for (var k = t; k < params.reduction_groups; k += WORKGROUP) {
         sum += partial_sum[first + k];
     }
@@ -177,10 +182,10 @@ fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
 @compute @workgroup_size(WORKGROUP)
 fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
             @builtin(workgroup_id) group: vec3u) {
-    if done(t) {
+    let total = sum_of_partials(params.reduction_groups, t);
+    if total.w != 0.0 {
         return;
     }
-    let total = sum_of_partials(params.reduction_groups, t);
     let rz = total.x;
     var verdict = GO_ON;
     if !finite(total.y) {
@@ -226,10 +231,11 @@ fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
 @compute @workgroup_size(WORKGROUP)
 fn advance(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
            @builtin(workgroup_id) group: vec3u) {
-    if done(t) {
+    let total = sum_of_partials(0u, t);
+    if total.w != 0.0 {
         return;
     }
-    let pq = sum_of_partials(0u, t).x;
+    let pq = total.x;
     if !(pq > 0.0) {
         if group.x == 0u && t == 0u {
             finish(BREAKDOWN);

@@ -24,7 +24,7 @@ impl Grid {
         let cells = |length: f64| (length / width).floor() + 1.0;
         let along_y = if params.dimensions == 2 { 1.0 } else { cells(extent.y) };
         let total = cells(extent.x) * along_y * cells(extent.z);
-        if !(total < 2e9) {
+        if total.is_nan() || total >= 2e9 {
             return Err(Error::Case(format!(
                 "the domain of {:.3} x {:.3} x {:.3} m holds {total:.2e} cells of the neighbour search, more than \
                  can be numbered; give run.domain or enlarge run.spacing",

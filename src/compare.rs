@@ -8,6 +8,7 @@ use crate::body::{Pose, Wrench};
 use crate::case::Case;
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::neighbours::Neighbours;
 use crate::params::Params;
 use crate::plan::Stage;
 use crate::scene::Scene;
@@ -33,6 +34,15 @@ pub struct StageError {
 
 /// Neighbours of a row: those that carry pressure, and dummies.
 pub type Neighbourhood = (Vec<u32>, Vec<u32>);
+
+/// The CPU's lists, row by row.
+pub fn neighbourhoods(lists: &Neighbours) -> Vec<Neighbourhood> {
+    let row = |i: usize| {
+        let near = lists.pressure(i).neighbour;
+        (near.to_vec(), lists.all(i).neighbour[near.len()..].to_vec())
+    };
+    (0..lists.rows()).map(row).collect()
+}
 
 /// How far two sets of neighbour lists agree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -176,7 +186,7 @@ impl Pair {
         let (gpu, cpu) = (self.gpu.read()?, self.cpu.read()?);
         if stage == Stage::NeighbourList {
             let a = rows_by_number(self.gpu.neighbours()?, &gpu.id);
-            let b = rows_by_number(self.cpu.neighbour_rows(), &cpu.id);
+            let b = rows_by_number(neighbourhoods(self.cpu.neighbours()), &cpu.id);
             let d = neighbour_differences(&a, &b);
             let part = d.differing as f64 / d.pairs.max(1) as f64;
             let (max_relative, l2_relative) = (part, part);

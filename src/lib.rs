@@ -1,5 +1,6 @@
 //! seixo: water that carries solids.
 pub mod backend;
+pub mod bench;
 pub mod body;
 pub mod case;
 pub mod cells;

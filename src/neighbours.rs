@@ -107,14 +107,14 @@ impl Neighbours {
         self.chunks[i / CHUNK].all(i % CHUNK)
     }
 
-    /// Those neighbours of particle `i` that carry pressure.
-    pub fn pressure(&self, i: usize) -> Row<'_> {
-        self.chunks[i / CHUNK].pressure(i % CHUNK)
-    }
-
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.chunks.iter().map(Chunk::rows).sum()
+    }
+
+    /// Those neighbours of particle `i` that carry pressure.
+    pub fn pressure(&self, i: usize) -> Row<'_> {
+        self.chunks[i / CHUNK].pressure(i % CHUNK)
     }
 
     /// Number of pairs listed.

@@ -224,7 +224,7 @@ impl Simulation {
 
     /// Look at the device's counters and at the speed of the flow, every few steps.
     pub(crate) fn look(&mut self, step: &Step) -> Result<Option<FluidMonitor>> {
-        if !self.plan.wet() || self.steps % LOOK_EVERY != 0 {
+        if !self.plan.wet() || !self.steps.is_multiple_of(LOOK_EVERY) {
             return Ok(None);
         }
         let counters = self.backend.counters()?;

@@ -266,6 +266,57 @@ fn plan_tells_what_is_left_out_and_why() {
     }
 }
 
+/// Without a driver a GPU that is asked for is refused, and `auto` takes the CPU and says so.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_missing_gpu_is_an_error_only_if_it_was_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let without_driver = |args: &[&str]| {
+        let mut command = seixo();
+        command.env("VK_DRIVER_FILES", "/dev/null").env("VK_ICD_FILENAMES", "/dev/null");
+        command.args(args).output().unwrap()
+    };
+    let out = folder.path().join("results").display().to_string();
+    let run = ["run", &case, "-o", &out, "--steps", "1"];
+    for asked in [["--backend", "gpu"], ["--adapter", "0"]] {
+        let output = without_driver(&[&run[..], &asked].concat());
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{err}");
+        assert!(err.contains("no GPU adapter") && err.contains("--backend cpu"), "{err}");
+    }
+    assert_eq!(without_driver(&["compare", &case]).status.code(), Some(3));
+    let output = without_driver(&run);
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{err}");
+    assert!(err.contains("on CPU"), "{err}");
+    assert_eq!(without_driver(&["adapters"]).status.code(), Some(0));
+}
+
+#[test]
+fn the_gpu_path_runs_and_compares_with_the_cpu() {
+    if json(&ran(&["adapters", "--json"]).out).as_array().unwrap().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "no adapter: the GPU path is not tested");
+        eprintln!("SKIPPED: no adapter");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("results");
+    let run = ran(&["run", &case, "-o", &root.display().to_string(), "--backend", "gpu", "--json"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let result = json(&run.out);
+    assert_eq!((result["backend"].as_str(), result["precision"].as_str()), (Some("gpu"), Some("f32")));
+    assert_eq!((result["status"].as_str(), result["steps"].as_u64()), (Some("done"), Some(50)));
+    assert_whole(&root);
+    files_named_in_pvd_exist(&root, "small");
+    let compared = json(&ran(&["compare", &case, "--steps", "5", "--warmup", "10", "--json"]).out);
+    let stages = compared["stages"].as_array().unwrap();
+    assert!(stages.iter().any(|s| s["stage"] == "conjugate_gradient"));
+    assert!(stages.iter().all(|s| s["l2_relative"].as_f64().unwrap() < 5e-3), "{compared:#}");
+    assert_eq!(compared["drift"]["steps"], 5);
+}
+
 #[test]
 fn schema_and_adapters_answer_on_stdout() {
     let schema = ran(&["schema"]);

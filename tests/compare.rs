@@ -1,10 +1,21 @@
 //! The library's own comparison of device and CPU, as `seixo compare` runs it.
 
-mod common;
-
 use seixo::backend::gpu;
+use seixo::case::Case;
+use seixo::case::file::load;
 use seixo::compare;
 use seixo::plan::Stage;
+use seixo::scene::Scene;
+use std::path::Path;
+
+/// The paper's main experiment, coarse: a gate, a cube, two columns.
+fn transport() -> (Case, Scene) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("cases/dam_break_transport.toml");
+    let sets = ["fluid.solver.tolerance=1e-4".to_owned()];
+    let case = load(&path, Some(0.03), &sets).expect("the case is valid").case;
+    let scene = Scene::build(&case).expect("the scene builds");
+    (case, scene)
+}
 
 fn device() -> bool {
     let found = !gpu::adapters().is_empty();
@@ -20,7 +31,7 @@ fn one_step_agrees_stage_by_stage() {
     if !device() {
         return;
     }
-    let (case, scene) = (common::case(3, ""), common::scene(3, 1));
+    let (case, scene) = transport();
     let errors = compare::compare_stages(&case, &scene, None, 5).expect("both run");
     for e in &errors {
         println!("{:20} {:16} max {:.1e}  l2 {:.1e}", e.stage, e.field, e.max_relative, e.l2_relative);
@@ -30,9 +41,13 @@ fn one_step_agrees_stage_by_stage() {
     }
     assert!(errors.iter().any(|e| e.max_relative > 0.0), "f32 cannot agree with f64 to the last bit");
     for e in &errors {
-        // From the solve on, its tolerance is in the error.
-        let solved = ["conjugate_gradient", "pressure_gradient", "correct", "body_force"].contains(&e.stage);
-        let bound = if solved { 5e-3 } else { 2e-5 };
+        let bound = match e.stage {
+            // From the solve on, its tolerance is in the error.
+            "conjugate_gradient" | "pressure_gradient" | "correct" | "body_force" => 5e-3,
+            // Hardly compressed water: the deviation of n from n0 is some hundred times smaller than n.
+            "pressure_source" => 1e-4,
+            _ => 1e-5,
+        };
         assert!(e.l2_relative < bound, "{e:?}");
     }
 }
@@ -42,7 +57,7 @@ fn runs_stay_together() {
     if !device() {
         return;
     }
-    let (case, scene) = (common::case(3, ""), common::scene(3, 1));
+    let (case, scene) = transport();
     let drift = compare::drift(&case, &scene, None, 20).expect("both run");
     println!("{:?} {:?} s", drift.backends, drift.seconds);
     for q in &drift.quantities {

@@ -1,7 +1,8 @@
 //! The fluid against analytic answers, brute force and measured figures of the scheme.
 #![allow(missing_docs)]
 
-mod tanks;
+mod common;
+use common::*;
 use glam::{DMat3, DVec3};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -13,7 +14,6 @@ use seixo::pressure::cg::{Jacobi, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::Scene;
-use tanks::*;
 
 const TIGHT: Settings = Settings { tolerance: 1e-10, max_iterations: 2000, warm_start: false };
 
@@ -334,7 +334,7 @@ fn hydrostatics(fluid: &str, dt: f64, window: (f64, f64)) -> [f64; 4] {
     let weight = 9.81 * 1000.0;
     while sim.time < window.1 {
         sim.step().unwrap();
-        if sim.time < window.0 || sim.steps % 5 != 0 {
+        if sim.time < window.0 || !sim.steps.is_multiple_of(5) {
             continue;
         }
         let (f, m) = (sim.backend.read().unwrap(), sim.backend.monitor().unwrap());

@@ -1,9 +1,13 @@
 //! The VTU files, read back byte for byte by a reader written for the test, and the list of frames.
 
-use seixo::case::Encoding;
+use seixo::case::{Case, Encoding};
+use seixo::fields::Fields;
 use seixo::output::folder::Folder;
+use seixo::output::picture::Picture;
 use seixo::output::pvd::Pvd;
+use seixo::output::table::{Cell, Table};
 use seixo::output::vtu::{BLOCK, Values, vtu};
+use seixo::scene::Scene;
 use std::io::Read;
 
 /// An array of a VTU file: declared type, name and bytes.
@@ -209,4 +213,78 @@ fn a_folder_with_something_in_it_is_refused_and_force_removes_only_earlier_resul
     Folder::create(&root, "case", true).unwrap();
     assert!(!first.vtu().join("fluid_0007.vtu").exists() && !first.pvd().exists());
     assert!(first.file("notes.txt").exists() && first.vtu().is_dir());
+}
+
+#[test]
+fn tables_hold_numbers_that_come_back_exactly() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("table.csv");
+    let header = ["time [s]", "body", "count [-]"].map(String::from);
+    let mut table = Table::create(&path, &header).unwrap();
+    let values = [0.0, -0.1, 1.0 / 3.0, 6.02e23, 1e-9, 123_456.789, f64::MIN_POSITIVE];
+    for x in values {
+        table.row(&[Cell::from(x), Cell::from("a, \"b\""), Cell::from(7_u64)]).unwrap();
+    }
+    table.row(&[Cell::from(f64::NAN), Cell::from(""), Cell::from(0_u64)]).unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 1, "rows wait for the flush");
+    table.flush().unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let rows: Vec<&str> = text.lines().skip(1).collect();
+    for (row, x) in rows.iter().zip(values) {
+        let (number, rest) = row.split_once(',').unwrap();
+        assert_eq!(number.parse::<f64>().unwrap(), x);
+        assert_eq!(rest, "\"a, \"\"b\"\"\",7");
+    }
+    assert_eq!(*rows.last().unwrap(), ",,0", "what is not finite is an empty cell");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_input_output_error_that_names_the_file() {
+    let error = Table::create(std::path::Path::new("/dev/full"), &["time [s]".to_string()]).unwrap_err();
+    assert_eq!(error.exit_code(), 5);
+    assert!(error.to_string().starts_with("/dev/full: "), "{error}");
+}
+
+/// Pixels of a picture whose colour fits.
+fn pixels(file: &[u8], fits: impl Fn([u8; 3]) -> bool) -> usize {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    assert_eq!((info.width, info.height, info.color_type), (960, 480, png::ColorType::Rgb));
+    bytes.chunks_exact(3).filter(|p| fits([p[0], p[1], p[2]])).count()
+}
+
+#[test]
+fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
+    let scene = |obstacle: &str| {
+        let case: Case = toml::from_str(&format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [2, 1, 1]\nopen = [\"z_max\"]\n{obstacle}\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 1, 0.5]\n\
+             [[body]]\nname = \"cube\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.5, 0.5]\ndensity = 500\n\
+             [contact]\nspring = 1e4\n"
+        ))
+        .unwrap();
+        Scene::build(&case).unwrap()
+    };
+    let orange = |[r, g, b]: [u8; 3]| r > 150 && i32::from(r) - i32::from(b) > 60 && g < r;
+    let blue = |[r, g, b]: [u8; 3]| b > r && b > g && b - g > 20;
+    let draw = |scene: &Scene| {
+        let poses = seixo::contact::Solids::new(scene, Some(&contact())).unwrap();
+        Picture::new(scene).draw(scene, poses.poses(), Some(&Fields::new(scene)))
+    };
+    let open = scene("");
+    let picture = draw(&open);
+    assert_eq!(picture, draw(&open), "the same state gives the same picture");
+    let (cube, water) = (pixels(&picture, orange), pixels(&picture, blue));
+    assert!((1000..20_000).contains(&cube) && (10_000..200_000).contains(&water), "{cube} {water}");
+    // An obstacle in front of the cube tints it but does not hide it.
+    let hidden = scene("[[obstacle]]\nname = \"o\"\nmin = [0.9, 0.1, 0]\nmax = [1.6, 0.3, 1]\n");
+    let tinted = pixels(&draw(&hidden), |[r, _, b]| r > b.saturating_add(25));
+    assert!(tinted > cube / 2, "{tinted} of {cube}");
+}
+
+fn contact() -> seixo::case::Contact {
+    toml::from_str("spring = 1e4").unwrap()
 }

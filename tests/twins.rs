@@ -4,6 +4,7 @@
 //! Each test asks that its stage did something and bounds the error. States come from the device, so both
 //! sides start from the same numbers.
 
+#[path = "common/moving.rs"]
 mod common;
 
 use glam::DVec3;
@@ -240,7 +241,8 @@ fn cell_list() {
 fn neighbour_list() {
     each(|pair| {
         pair.run_all(&LISTS);
-        let (gpu, cpu) = (pair.gpu.neighbours().expect("readable"), pair.cpu.neighbour_rows());
+        let (gpu, cpu) =
+            (pair.gpu.neighbours().expect("readable"), compare::neighbourhoods(pair.cpu.neighbours()));
         let errors = compare::neighbour_differences(&gpu, &cpu);
         println!("{} of {} pairs differ", errors.differing, errors.pairs);
         assert!(errors.pairs > 2000 && errors.differing == 0);
@@ -401,7 +403,7 @@ fn correct() {
 fn body_force() {
     each(|pair| {
         pair.run_all(&LISTS);
-        pair.run_all(&[Stage::Viscosity, Stage::Collision]);
+        pair.run_all(&[Stage::Viscosity, Stage::Collision, Stage::NumberDensity]);
         let gpu = pair.gpu.body_force().expect("the device sums");
         let cpu = pair.cpu.body_force().expect("the CPU sums");
         assert_eq!(gpu.len(), 2);

@@ -1,5 +1,6 @@
 //! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
 
+use super::traffic::Sizes;
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
@@ -13,7 +14,7 @@ use crate::kernels::{
     pressure_source, viscosity,
 };
 use crate::monitor::FluidMonitor;
-use crate::neighbours::{CAPACITY, CHUNK, Neighbours};
+use crate::neighbours::{CAPACITY, CHUNK, Chunk, Neighbours};
 use crate::params::{Params, Step};
 use crate::plan::{Plan, Stage};
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
@@ -104,16 +105,6 @@ impl Cpu {
     /// Sizes of the particle groups.
     pub fn groups(&self) -> Groups {
         self.groups
-    }
-
-    /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
-    pub fn neighbour_rows(&self) -> Vec<(Vec<u32>, Vec<u32>)> {
-        let row = |i: usize| {
-            let (chunk, k) = (&self.neighbours.chunks[i / CHUNK], i % CHUNK);
-            let near = chunk.pressure(k).neighbour;
-            (near.to_vec(), chunk.all(k).neighbour[near.len()..].to_vec())
-        };
-        (0..self.neighbours.rows()).map(row).collect()
     }
 
     fn viscosity(&mut self) {
@@ -424,6 +415,25 @@ impl Backend for Cpu {
         // The lists name the slots of the particles that were here before.
         self.neighbours = Neighbours::new(self.neighbours.rows());
         Ok(())
+    }
+
+    fn sizes(&mut self) -> Result<Sizes> {
+        let rows =
+            self.neighbours.chunks.iter().flat_map(|c| c.start.windows(2)).filter(|w| w[0] < w[1]).count();
+        let carrying = |c: &Chunk| (0..c.rows()).map(|k| c.pressure(k).neighbour.len()).sum::<usize>();
+        let pressure_pairs: usize = self.neighbours.chunks.iter().map(carrying).sum();
+        Ok(Sizes {
+            fluid: self.live as u64,
+            rows: rows as u64,
+            cells: self.grid.total() as u64,
+            pairs: self.neighbours.pairs() as u64,
+            pressure_pairs: pressure_pairs as u64,
+            pressure: self.groups.pressure() as u64,
+            number: 8,
+            vector: 24,
+            weight: 8,
+            preconditioner_weight: if self.multigrid.is_some() { 4 } else { 0 },
+        })
     }
 
     fn bytes(&self) -> u64 {

@@ -13,7 +13,7 @@ mod transfer;
 
 pub use adapter::{AdapterInfo, adapters};
 
-use super::{Backend, Counters};
+use super::{Backend, Counters, traffic};
 use crate::body::{Pose, Wrench};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
@@ -125,7 +125,10 @@ impl Gpu {
             )));
         }
         let grid = grid(params, plan)?;
-        let sizes = Sizes::new(scene, params, &grid);
+        let mut sizes = Sizes::new(scene, params, &grid);
+        if info.device_type == "cpu" {
+            sizes.rows_per_thread = 4;
+        }
         let memory = Memory::new(&sizes, plan);
         let switches = shader::switches(params, &groups, plan);
         let mut gpu = Self {
@@ -173,14 +176,14 @@ impl Gpu {
             self.context.upload("solid_offset", &offset)?;
         }
         if self.context.has("wrench") {
-            let mut geometry = vec![[[0.0; 4]; 3]; g.moving_wall];
+            let mut layer = vec![[[0.0; 4]; 3]; g.moving_wall];
             let mut chunks: Vec<[u32; 4]> = Vec::new();
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
-                    let vectors = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface];
-                    geometry[first + p] = vectors.map(|v| four(v, 0.0));
+                    layer[first + p] = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface]
+                        .map(|v| four(v, 0.0));
                 }
                 for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {
                     let count = (solid.wall_slots.len() - p).min(WORKGROUP as usize);
@@ -188,7 +191,7 @@ impl Gpu {
                 }
             }
             self.chunk_solid = chunks.iter().map(|c| c[2] as usize).collect();
-            self.context.upload("wall_geometry", &geometry)?;
+            self.context.upload("wall_layer", &layer)?;
             self.context.upload("force_chunk", &chunks)?;
         }
         Ok(())
@@ -380,7 +383,50 @@ impl Backend for Gpu {
         self.context.bytes
     }
 
+    fn sizes(&mut self) -> Result<traffic::Sizes> {
+        let rows = self.neighbours()?;
+        let sum = |part: fn(&(Vec<u32>, Vec<u32>)) -> usize| rows.iter().map(part).sum::<usize>() as u64;
+        let pressure_pairs = sum(|r| r.0.len());
+        Ok(traffic::Sizes {
+            fluid: self.groups.fluid as u64 - self.counters.lost,
+            rows: sum(|r| usize::from(!r.0.is_empty())),
+            cells: self.grid.total() as u64,
+            pairs: pressure_pairs + sum(|r| r.1.len()),
+            pressure_pairs,
+            pressure: self.groups.pressure() as u64,
+            number: 4,
+            vector: 16,
+            weight: 0,
+            preconditioner_weight: 0,
+        })
+    }
+
     fn dispatches(&self) -> u64 {
         self.context.dispatches
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+
+    #[test]
+    fn a_lost_device_is_an_error_and_no_panic() {
+        let text = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\n\
+                    max = [0.5, 0.5, 0.5]\n[tank]\nmin = [0, 0, 0]\nmax = [1.0, 0.5, 1.0]\n";
+        let case: Case = toml::from_str(text).expect("a valid case");
+        let scene = Scene::build(&case).expect("a valid scene");
+        let params = Params::new(&case, &scene).expect("valid constants");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
+        let mut gpu = Gpu::dry_run(&scene, &params, &plan, settings).expect("it can be built");
+        let step = params.step(0.0, 1e-3, 1.0);
+        gpu.run(Stage::CellList, &step).expect("a step can be recorded");
+        gpu.read().expect("the device is there");
+        gpu.context.destroy();
+        let lost = gpu.run(Stage::CellList, &step).and_then(|()| gpu.read().map(|_| ()));
+        let text = lost.expect_err("the device is gone").to_string();
+        assert!(text.starts_with("noop: "), "{text}");
     }
 }

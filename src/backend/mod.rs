@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod gpu;
+pub mod traffic;
 
 use crate::body::{Pose, Wrench};
 use crate::error::Result;
@@ -59,6 +60,8 @@ pub trait Backend: Send {
     }
     /// Bytes that the backend holds for particles.
     fn bytes(&self) -> u64;
+    /// Sizes that the counted traffic follows from.
+    fn sizes(&mut self) -> Result<traffic::Sizes>;
     /// Kernels started on a device so far; 0 for a backend without one.
     fn dispatches(&self) -> u64 {
         0

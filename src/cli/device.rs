@@ -3,6 +3,7 @@
 use super::{BackendName, DeviceArgs, Exit, say, say_json};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
+use seixo::backend::gpu::{AdapterInfo, Gpu, adapters};
 use seixo::error::{Error, Result};
 use seixo::params::Params;
 use seixo::plan::Plan;
@@ -17,30 +18,10 @@ pub fn set_threads(args: &DeviceArgs) {
     }
 }
 
-/// An adapter, for the list.
-#[derive(serde::Serialize)]
-struct Adapter {
-    index: usize,
-    name: String,
-    kind: String,
-    hardware: bool,
-}
-
-fn adapters() -> Vec<Adapter> {
-    Vec::new()
-}
-
-fn gpu(
-    _adapter: Option<usize>,
-    _scene: &Scene,
-    _params: &Params,
-    _plan: &Plan,
-    _settings: Settings,
-) -> Result<Box<dyn Backend>> {
-    Err(Error::Gpu("no GPU adapter was found; use --backend cpu, or see `seixo adapters`".into()))
-}
-
 /// The backend that `args` ask for. A GPU that was asked for and is not there is an error, never replaced.
+///
+/// # Errors
+/// No such adapter, or one that the scene does not fit.
 pub fn backend(
     args: &DeviceArgs,
     scene: &Scene,
@@ -49,18 +30,19 @@ pub fn backend(
     settings: Settings,
 ) -> Result<Box<dyn Backend>> {
     let cpu = || Ok(Box::new(Cpu::new(scene, params, plan, settings)?) as Box<dyn Backend>);
-    match (args.backend, args.adapter) {
+    let gpu = |adapter: Option<&str>| {
+        Ok(Box::new(Gpu::new(scene, params, plan, settings, adapter)?) as Box<dyn Backend>)
+    };
+    match (args.backend, args.adapter.as_deref()) {
         (BackendName::Cpu, Some(_)) => {
             Err(Error::Case("--adapter chooses a GPU; it does not go with --backend cpu".into()))
         }
         (BackendName::Cpu, None) => cpu(),
-        (BackendName::Gpu, _) | (BackendName::Auto, Some(_)) => {
-            gpu(args.adapter, scene, params, plan, settings)
-        }
+        (BackendName::Gpu, adapter) | (BackendName::Auto, adapter @ Some(_)) => gpu(adapter),
         // A dry scene has no particle stages: nothing that a GPU could do.
         (BackendName::Auto, None) if !plan.wet() => cpu(),
-        (BackendName::Auto, None) => match adapters().iter().find(|a| a.hardware) {
-            Some(a) => gpu(Some(a.index), scene, params, plan, settings),
+        (BackendName::Auto, None) => match adapters().iter().position(AdapterInfo::is_hardware) {
+            Some(k) => gpu(Some(&k.to_string())),
             None => cpu(),
         },
     }
@@ -73,12 +55,12 @@ pub fn list(json: bool) -> Exit {
         say_json(&adapters);
     } else if adapters.is_empty() {
         eprintln!(
-            "no adapter was found (is a Vulkan loader with a driver installed?); --backend cpu works without"
+            "no adapter was found: no driver, or on Linux no Vulkan loader (libvulkan1); --backend cpu needs neither"
         );
     }
-    for a in adapters.iter().filter(|_| !json) {
-        let software = if a.hardware { "" } else { ", software" };
-        say(&format!("{:>3}  {} ({}{software})", a.index, a.name, a.kind));
+    for (k, a) in adapters.iter().enumerate().filter(|_| !json) {
+        let software = if a.is_hardware() { "" } else { ", not taken by --backend auto" };
+        say(&format!("{k:>3}  {} ({}, {}, {}{software})", a.name, a.device_type, a.backend, a.driver));
     }
     Ok(0)
 }

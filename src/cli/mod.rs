@@ -1,6 +1,7 @@
 //! What can be typed, and what the program answers with: results on stdout, progress and remarks on stderr,
 //! and an exit code.
 
+mod bench;
 mod compare;
 mod device;
 mod plan;
@@ -42,6 +43,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Run a study: error against run time, limits of stability, what a scene does not need.
     Study(seixo::study::command::StudyArgs),
+    /// Time a step by stage, against the bytes that must move.
+    Bench(bench::BenchArgs),
     /// List the adapters that can be used.
     Adapters {
         /// Print JSON.
@@ -69,14 +72,14 @@ struct CaseArgs {
 }
 
 /// Where to compute.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 struct DeviceArgs {
     /// Processor: auto takes a hardware GPU if there is one, else the CPU.
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
-    /// Number of the adapter, as `seixo adapters` lists it; implies --backend gpu.
+    /// Number of the adapter as `seixo adapters` lists it, or a part of its name; implies --backend gpu.
     #[arg(long, value_name = "N")]
-    adapter: Option<usize>,
+    adapter: Option<String>,
     /// Threads of the CPU path; all cores if absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -97,6 +100,7 @@ pub fn main() -> ExitCode {
     let exit = match args.command {
         Command::Run(args) => run::run(&args),
         Command::Plan(args) => plan::plan(&args),
+        Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Study(args) => seixo::study::command::command(&args).map(|()| 0),
         Command::Adapters { json } => device::list(json),

@@ -4,6 +4,7 @@ use super::setup::Setup;
 use super::{CaseArgs, Exit, say, say_json};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
+use seixo::backend::gpu::bytes_needed;
 use seixo::cells::Grid;
 use seixo::contact::Solids;
 use seixo::error::Result;
@@ -44,6 +45,7 @@ struct Scheme {
     cells: usize,
     neighbours_max: u32,
     cpu_bytes: u64,
+    gpu_bytes: u64,
 }
 
 /// What `plan` tells.
@@ -121,6 +123,7 @@ fn scheme(setup: &Setup, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme
         cells: Grid::new(params)?.total(),
         neighbours_max: cpu.counters()?.neighbours_max,
         cpu_bytes: cpu.bytes(),
+        gpu_bytes: bytes_needed(&setup.scene, params, plan)?,
     })
 }
 
@@ -216,7 +219,11 @@ fn words(report: &Report) -> String {
                 "  preconditioner {}; {} cells; at most {} neighbours at t = 0",
                 s.preconditioner, s.cells, s.neighbours_max
             ),
-            format!("  memory on the CPU {:.1} MB at t = 0", s.cpu_bytes as f64 / 1e6),
+            format!(
+                "  memory: CPU {:.1} MB at t = 0, GPU {:.1} MB",
+                s.cpu_bytes as f64 / 1e6,
+                s.gpu_bytes as f64 / 1e6
+            ),
         ]);
     }
     if !report.advice.is_empty() {

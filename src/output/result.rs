@@ -120,6 +120,8 @@ pub struct Summary {
     pub wall_s: f64,
     /// Frames written.
     pub frames: u64,
+    /// Most memory that the process has held so far [bytes], where the system tells it (Linux).
+    pub memory_peak_bytes: Option<u64>,
     /// Numbers of particles.
     pub particles: Particles,
     /// Wall-clock seconds of each stage, and of `output`.
@@ -130,6 +132,13 @@ pub struct Summary {
     pub monitors: Monitors,
     /// Bodies and moving walls.
     pub bodies: Vec<Body>,
+}
+
+/// Most memory that this process has held [bytes].
+pub fn memory_peak() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
 impl Summary {

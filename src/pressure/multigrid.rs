@@ -86,6 +86,25 @@ pub struct Multigrid {
     levels: Vec<Level>,
     used: usize,
     factor: Vec<f64>,
+    solution: Vec<f64>,
+    scratch: Scratch,
+}
+
+/// Buffers of the construction.
+#[derive(Default, Debug)]
+struct Scratch {
+    stencil: Vec<[f64; 27]>,
+    map: Vec<u32>,
+    cursor: Vec<u32>,
+}
+
+impl Scratch {
+    /// Zero stencils for `rows` cells.
+    fn stencils(&mut self, rows: usize) -> &mut Vec<[f64; 27]> {
+        self.stencil.clear();
+        self.stencil.resize(rows, [0.0; 27]);
+        &mut self.stencil
+    }
 }
 
 /// Marks a slot without an unknown.
@@ -111,7 +130,7 @@ impl Multigrid {
                 self.levels.push(Level::default());
             }
             let (fine, coarse) = self.levels.split_at_mut(self.used);
-            let shrunk = coarsen(&mut fine[self.used - 1], &mut coarse[0]);
+            let shrunk = coarsen(&mut fine[self.used - 1], &mut coarse[0], &mut self.scratch);
             self.used += 1;
             if !shrunk {
                 break;
@@ -146,11 +165,11 @@ impl Multigrid {
         coarse.clear();
         self.touched.clear();
         self.member_start.clear();
-        for i in 0..n {
+        for (i, &x) in position.iter().enumerate().take(n) {
             if self.code[i] == NOWHERE {
                 continue;
             }
-            let c = grid.coordinates(position[i]);
+            let c = grid.coordinates(x);
             let cell = grid.index(c);
             if self.cell_aggregate[cell] == u32::MAX {
                 self.cell_aggregate[cell] = coarse.len() as u32;
@@ -168,7 +187,8 @@ impl Multigrid {
         }
         self.member_start.push(sum);
         self.members.resize(sum as usize, 0);
-        let mut cursor = self.member_start.clone();
+        let cursor = &mut self.scratch.cursor;
+        cursor.clone_from(&self.member_start);
         for (i, &a) in self.aggregate.iter().enumerate() {
             if a != u32::MAX {
                 self.members[cursor[a as usize] as usize] = i as u32;
@@ -193,8 +213,7 @@ impl Multigrid {
         let (members, start) = (&self.members, &self.member_start);
         let level = &mut self.levels[0];
         let rows = level.coordinates.len();
-        let mut stencil = vec![[0.0_f64; 27]; rows];
-        stencil.par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
+        self.scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
             for &i in &members[start[a] as usize..start[a + 1] as usize] {
                 let i = i as usize;
                 s[13] += system.diagonal[i];
@@ -207,7 +226,7 @@ impl Multigrid {
                 }
             }
         });
-        compress(level, &stencil);
+        compress(level, &mut self.scratch);
     }
 
     fn factorise(&mut self) {
@@ -254,7 +273,9 @@ impl Multigrid {
             (0..8).for_each(|_| level.smooth());
             return;
         }
-        let mut y: Vec<f64> = level.b.iter().map(|&b| f64::from(b)).collect();
+        let y = &mut self.solution;
+        y.clear();
+        y.extend(level.b.iter().map(|&b| f64::from(b)));
         for i in 0..n {
             let s: f64 = (0..i).map(|k| a[i * n + k] * y[k]).sum();
             y[i] = (y[i] - s) / a[i * n + i];
@@ -263,7 +284,7 @@ impl Multigrid {
             let s: f64 = (i + 1..n).map(|k| a[k * n + i] * y[k]).sum();
             y[i] = (y[i] - s) / a[i * n + i];
         }
-        level.x.iter_mut().zip(y).for_each(|(x, y)| *x = y as f32);
+        level.x.iter_mut().zip(y).for_each(|(x, y)| *x = *y as f32);
     }
 
     /// x <- B b on level `l` (0 is the first coarse one).
@@ -331,7 +352,7 @@ fn gather(index: &[u32], weight: &[f32], x: &[f32]) -> f32 {
 }
 
 /// Next coarser level of `fine`; `false` if it did not get smaller.
-fn coarsen(fine: &mut Level, coarse: &mut Level) -> bool {
+fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) -> bool {
     let mut low = [i32::MAX; 3];
     let mut high = [i32::MIN; 3];
     for c in &fine.coordinates {
@@ -341,7 +362,9 @@ fn coarsen(fine: &mut Level, coarse: &mut Level) -> bool {
         }
     }
     let size = [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize);
-    let mut map = vec![u32::MAX; size.iter().product()];
+    let map = &mut scratch.map;
+    map.clear();
+    map.resize(size.iter().product(), u32::MAX);
     coarse.coordinates.clear();
     fine.parent.clear();
     for c in &fine.coordinates {
@@ -354,7 +377,7 @@ fn coarsen(fine: &mut Level, coarse: &mut Level) -> bool {
         }
         fine.parent.push(*slot);
     }
-    let mut stencil = vec![[0.0_f64; 27]; coarse.coordinates.len()];
+    let stencil = scratch.stencils(coarse.coordinates.len());
     for i in 0..fine.rows() {
         let p = fine.parent[i] as usize;
         let s = &mut stencil[p];
@@ -365,12 +388,13 @@ fn coarsen(fine: &mut Level, coarse: &mut Level) -> bool {
                 f64::from(fine.value[k]);
         }
     }
-    compress(coarse, &stencil);
+    compress(coarse, scratch);
     coarse.rows() < fine.rows()
 }
 
 /// Rows of `level` from the stencils of its cells.
-fn compress(level: &mut Level, stencil: &[[f64; 27]]) {
+fn compress(level: &mut Level, scratch: &mut Scratch) {
+    let Scratch { stencil, map, .. } = scratch;
     let n = stencil.len();
     let mut low = [i32::MAX; 3];
     let mut high = [i32::MIN; 3];
@@ -385,7 +409,8 @@ fn compress(level: &mut Level, stencil: &[[f64; 27]]) {
         let at = [0, 1, 2].map(|k| (c[k] - low[k]) as usize);
         (at[0] * size[1] + at[1]) * size[2] + at[2]
     };
-    let mut map = vec![u32::MAX; size.iter().product()];
+    map.clear();
+    map.resize(size.iter().product(), u32::MAX);
     for (i, &c) in level.coordinates.iter().enumerate() {
         map[place(c)] = i as u32;
     }
@@ -394,7 +419,7 @@ fn compress(level: &mut Level, stencil: &[[f64; 27]]) {
     level.value.clear();
     level.diagonal.clear();
     level.start.push(0);
-    for (c, s) in level.coordinates.iter().zip(stencil) {
+    for (c, s) in level.coordinates.iter().zip(&*stencil) {
         for (k, &v) in s.iter().enumerate() {
             if k != 13 && v != 0.0 {
                 let d = [k as i32 / 9 - 1, k as i32 / 3 % 3 - 1, k as i32 % 3 - 1];

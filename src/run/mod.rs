@@ -11,7 +11,7 @@ pub mod tables;
 
 use crate::error::{Error, Result};
 use crate::output::folder::Folder;
-use crate::output::result::{Status, Summary};
+use crate::output::result::{Status, Summary, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
@@ -148,6 +148,7 @@ pub fn run(
     summary.exit_reason = reason;
     summary.wall_s = run.start.elapsed().as_secs_f64();
     summary.frames = run.frames.written();
+    summary.memory_peak_bytes = memory_peak();
     summary.stages.insert("output", run.totals.output.as_secs_f64());
     let written = summary.write(&folder.file("result.json"));
     Ok(Finished { summary, error: error.or(written.err()), signal })

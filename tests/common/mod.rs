@@ -1,218 +1,48 @@
-//! A small scene that uses every kernel: water in a box with an obstacle, a gate that moves, a body that
-//! moves and turns under water. Built by hand, so that a fault of the scene builder cannot hide one here.
-#![allow(dead_code)] // each test file uses a part
+//! Scenes for the tests, written as a user would write them.
+#![allow(dead_code, missing_docs)]
 
-use glam::{DQuat, DVec3};
-use seixo::body::Pose;
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
 use seixo::case::Case;
-use seixo::plan::Stage;
-use seixo::scene::{Drive, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid};
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
 
-/// Spacing of the scene [m].
-pub const SPACING: f64 = 0.02;
-
-/// Numbers in -1..1 that depend on `k` alone.
-pub fn noise(k: usize) -> f64 {
-    let x = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03;
-    let x = (x ^ (x >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    ((x ^ (x >> 32)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+pub fn case(text: &str) -> Case {
+    toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// A vector of such numbers; y is 0 in two dimensions.
-pub fn noise_vector(k: usize, dimensions: u32) -> DVec3 {
-    DVec3::new(noise(3 * k), if dimensions == 2 { 0.0 } else { noise(3 * k + 1) }, noise(3 * k + 2))
+pub fn simulation(case: &Case) -> Simulation {
+    let scene = Scene::build(case).expect("the scene builds");
+    cpu_simulation(case, &scene)
 }
 
-/// The case of [`scene`], with further lines for `[fluid]`.
-pub fn case(dimensions: u32, fluid: &str) -> Case {
-    let text = format!(
-        "[run]\nspacing = {SPACING}\ntime_step = 1e-3\nend = 1.0\ndimensions = {dimensions}\n\
-         [fluid]\nviscosity = 1e-3\nsolver = {{ tolerance = 1e-4, preconditioner = \"jacobi\" }}\n{fluid}\n\
-         [contact]\nspring = 1e4\ndamping_ratio = 0.1\n"
-    );
-    toml::from_str(&text).expect("the case of the tests is valid")
+pub fn cpu_simulation(case: &Case, scene: &Scene) -> Simulation {
+    let make =
+        |s: &_, p: &_, plan: &_, settings| Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>);
+    Simulation::new(case, scene, make).expect("the simulation starts")
 }
 
-/// A box of lattice cells, upper corner excluded.
-#[derive(Clone, Copy)]
-struct Cells {
-    min: [i32; 3],
-    max: [i32; 3],
+/// Still water 0.25 x 0.25 x `depth` m in a tank 0.2 m higher.
+pub fn hydrostatic(spacing: f64, dt: f64, fluid: &str) -> Case {
+    hydrostatic_of_depth(0.5, spacing, dt, fluid)
 }
 
-impl Cells {
-    fn contains(&self, c: [i32; 3]) -> bool {
-        (0..3).all(|k| c[k] >= self.min[k] && c[k] < self.max[k])
-    }
-    fn all(&self) -> impl Iterator<Item = [i32; 3]> + use<> {
-        let (a, b) = (self.min, self.max);
-        (a[0]..b[0]).flat_map(move |x| (a[1]..b[1]).flat_map(move |y| (a[2]..b[2]).map(move |z| [x, y, z])))
-    }
-    /// Outward normals of the faces that the cell touches, summed.
-    fn normals(&self, c: [i32; 3], dimensions: u32) -> DVec3 {
-        let along = |k: usize| f64::from(i32::from(c[k] == self.max[k] - 1) - i32::from(c[k] == self.min[k]));
-        DVec3::new(along(0), if dimensions == 2 { 0.0 } else { along(1) }, along(2))
-    }
-    /// Whether the cell belongs to the outermost layer.
-    fn outermost(&self, c: [i32; 3], dimensions: u32) -> bool {
-        [0, 1, 2]
-            .into_iter()
-            .any(|k| (k != 1 || dimensions == 3) && (c[k] == self.min[k] || c[k] == self.max[k] - 1))
-    }
+pub fn hydrostatic_of_depth(depth: f64, spacing: f64, dt: f64, fluid: &str) -> Case {
+    let top = depth + 0.2;
+    case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = {dt}\nend = 3.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, {depth}]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, {top}]\nopen = [\"z_max\"]\n"
+    ))
 }
 
-/// The scene, `scale` times 16 cells long. The tank is open at the top.
-pub fn scene(dimensions: u32, scale: i32) -> Scene {
-    let d3 = dimensions == 3;
-    let (nx, ny, nz) = (16 * scale, if d3 { 9 * scale } else { 1 }, 10 * scale);
-    let layers = 3;
-    let y = |a: i32, b: i32| if d3 { (a, b) } else { (0, 1) };
-    let block =
-        |x: (i32, i32), y: (i32, i32), z: (i32, i32)| Cells { min: [x.0, y.0, z.0], max: [x.1, y.1, z.1] };
-    let tank = block((0, nx), (0, ny), (0, nz));
-    let water = block((0, 9 * scale), (0, ny), (0, 7 * scale));
-    let obstacle = block((nx - 4, nx - 1), y(2, 7), (0, 5));
-    let gate = block((9 * scale, 9 * scale + 1), y(0, ny), (0, 8 * scale));
-    let body = block((3, 6), y(3, 6), (2, 5));
-    let center = |c: [i32; 3]| {
-        let at = |k: usize| (f64::from(c[k]) + 0.5) * SPACING;
-        DVec3::new(at(0), if d3 { at(1) } else { 0.0 }, at(2))
-    };
-    let (mut fluid, mut wall, mut dummy) = (Vec::new(), Vec::new(), Vec::new());
-    let around = |c: i32, n: i32| (-c).max(c - n + 1).max(0);
-    let (from, to) = if d3 { (-layers, ny + layers) } else { (0, 1) };
-    for c in block((-layers, nx + layers), (from, to), (-layers, nz)).all() {
-        let depth = around(c[0], nx).max(if d3 { around(c[1], ny) } else { 0 }).max((-c[2]).max(0));
-        if depth == 1 {
-            wall.push(center(c));
-        } else if depth > 1 {
-            dummy.push(center(c));
-        } else if obstacle.contains(c) {
-            if obstacle.outermost(c, dimensions) { wall.push(center(c)) } else { dummy.push(center(c)) }
-        } else if water.contains(c) && !body.contains(c) {
-            fluid.push(center(c));
-        }
-    }
-    assert!(tank.contains([0, 0, 0]) && !fluid.is_empty());
-
-    let (mut solids, mut moving_wall, mut moving_dummy) = (Vec::new(), Vec::new(), Vec::new());
-    for (cells, is_body) in [(gate, false), (body, true)] {
-        let (low, high) = (center(cells.min), center(cells.max.map(|m| m - 1)));
-        let middle = 0.5 * (low + high);
-        let start = (fluid.len() + moving_wall.len(), moving_dummy.len());
-        let (mut wall_offset, mut dummy_offset) = (Vec::new(), Vec::new());
-        let (mut wall_area, mut wall_to_surface) = (Vec::new(), Vec::new());
-        for c in cells.all() {
-            if cells.outermost(c, dimensions) {
-                let normals = cells.normals(c, dimensions);
-                moving_wall.push(center(c));
-                wall_offset.push(center(c) - middle);
-                wall_area.push(SPACING * SPACING * normals);
-                wall_to_surface.push(0.5 * SPACING * normals);
-            } else {
-                moving_dummy.push(center(c));
-                dummy_offset.push(center(c) - middle);
-            }
-        }
-        let drive = if is_body {
-            Drive::Free(FreeBody {
-                mass: 0.1,
-                inertia: DVec3::splat(1e-4),
-                velocity: DVec3::ZERO,
-                angular_velocity: DVec3::ZERO,
-                locked_translation: [false; 3],
-                locked_rotation: [false; 3],
-            })
-        } else {
-            Drive::Prescribed(Motion { time: vec![0.0, 1.0], displacement: vec![DVec3::ZERO, DVec3::Z] })
-        };
-        solids.push(Solid {
-            name: if is_body { "body" } else { "gate" }.into(),
-            is_body,
-            shape: Shape::Box { half: 0.5 * (high - low) + 0.5 * SPACING },
-            position: middle,
-            orientation: DQuat::IDENTITY,
-            drive,
-            wall_slots: start.0..fluid.len() + moving_wall.len(),
-            // Moved behind the other groups below.
-            dummy_slots: start.1..moving_dummy.len(),
-            wall_offset,
-            dummy_offset,
-            wall_area,
-            wall_to_surface,
-        });
-    }
-    let groups = Groups {
-        fluid: fluid.len(),
-        moving_wall: moving_wall.len(),
-        static_wall: wall.len(),
-        static_dummy: dummy.len(),
-        moving_dummy: moving_dummy.len(),
-    };
-    let first = groups.moving_dummy_range().start;
-    for s in &mut solids {
-        s.dummy_slots = s.dummy_slots.start + first..s.dummy_slots.end + first;
-    }
-    let mut kind = Vec::new();
-    let mut solid = Vec::new();
-    for i in 0..groups.total() {
-        let of = solids.iter().position(|s| s.wall_slots.contains(&i) || s.dummy_slots.contains(&i));
-        let is_body = of.is_some_and(|k| solids[k].is_body);
-        kind.push(match (i < groups.fluid, i < groups.pressure(), is_body) {
-            (true, ..) => Kind::Fluid,
-            (_, true, true) => Kind::BodyWall,
-            (_, true, false) => Kind::Wall,
-            (_, false, true) => Kind::BodyDummy,
-            (_, false, false) => Kind::Dummy,
-        });
-        solid.push(of.map_or(0, |k| k as u32 + 1));
-    }
-    let margin = f64::from(layers) * SPACING;
-    let inner = DVec3::new(f64::from(nx), f64::from(ny), f64::from(2 * nz)) * SPACING;
-    let low = DVec3::new(-margin, if d3 { -margin } else { -0.5 * SPACING }, -margin);
-    let high = inner + DVec3::new(margin, if d3 { margin } else { 0.0 }, 0.0);
-    let normal = DVec3::Z;
-    let position = [fluid, moving_wall, wall, dummy, moving_dummy].concat();
-    Scene {
-        dimensions,
-        spacing: SPACING,
-        gravity: DVec3::new(0.0, 0.0, -9.806_65),
-        velocity: vec![DVec3::ZERO; position.len()],
-        position,
-        kind,
-        solid,
-        static_wall_normal: vec![normal; groups.static_wall],
-        groups,
-        solids,
-        walls: Vec::new(),
-        domain: (low, high),
-        depth: f64::from(7 * scale) * SPACING,
-        notes: Vec::new(),
-    }
-}
-
-/// Poses of the two solids at time `t`: the gate rises, the body drifts and turns.
-pub fn poses(scene: &Scene, t: f64) -> Vec<Pose> {
-    let d3 = scene.dimensions == 3;
-    let spin = if d3 { DVec3::new(0.5, 1.0, -0.7) } else { DVec3::Y };
-    scene
-        .solids
-        .iter()
-        .map(|s| {
-            let velocity = if s.is_body { DVec3::new(0.3, 0.0, 0.15) } else { DVec3::Z };
-            let angular_velocity = if s.is_body { 3.0 * spin } else { DVec3::ZERO };
-            let turn = angular_velocity * t;
-            Pose {
-                position: s.position + velocity * t,
-                orientation: DQuat::from_scaled_axis(turn),
-                velocity,
-                angular_velocity,
-            }
-        })
-        .collect()
-}
-
-/// The stages of a step up to, and not including, `end`, in order.
-pub fn stages_before(end: Stage) -> impl Iterator<Item = Stage> {
-    Stage::ALL.into_iter().take_while(move |&s| s != end)
+/// The tank of the paper's section 4.3 without gate and solid.
+pub fn dam_break(spacing: f64, dt: f64, fluid: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = {dt}\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.35]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [3.5, 0.5, 0.5]\nopen = [\"z_max\"]\n\
+         [[obstacle]]\nname = \"first\"\nmin = [2.5, 0.06, 0]\nmax = [2.65, 0.21, 0.5]\nopen = [\"z_max\"]\n\
+         [[obstacle]]\nname = \"second\"\nmin = [2.95, 0.29, 0]\nmax = [3.1, 0.44, 0.5]\nopen = [\"z_max\"]\n"
+    ))
 }

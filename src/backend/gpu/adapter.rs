@@ -133,3 +133,53 @@ pub(super) fn limits(memory: &Memory, have: &wgpu::Limits, name: &str) -> Result
     }
     Ok(ask)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::{Buffer, Host};
+    use super::*;
+
+    fn memory(bytes: u64, workgroups: u64) -> Memory {
+        Memory { buffers: vec![Buffer { name: "neighbour_list", bytes, host: Host::None }], workgroups }
+    }
+
+    #[test]
+    fn what_an_adapter_lacks_is_named() {
+        let have = wgpu::Limits::default();
+        let text = |m: &Memory| limits(m, &have, "small").expect_err("too large").to_string();
+        let large = text(&memory(300 << 20, 1));
+        for part in ["neighbour_list", "315 MB", "134 MB", "max_storage_buffer_binding_size", "--backend cpu"]
+        {
+            assert!(large.contains(part), "{large}");
+        }
+        let many = text(&memory(1 << 20, 70_000));
+        assert!(many.contains("70000 workgroups") && many.contains("65535"), "{many}");
+    }
+
+    #[test]
+    fn limits_are_raised_no_further_than_needed() {
+        let have = wgpu::Limits {
+            max_storage_buffer_binding_size: 1 << 30,
+            max_buffer_size: 1 << 31,
+            ..Default::default()
+        };
+        let asked = limits(&memory(300 << 20, 1), &have, "large").expect("fits");
+        assert_eq!((asked.max_storage_buffer_binding_size, asked.max_buffer_size), (300 << 20, 300 << 20));
+        let asked = limits(&memory(1 << 20, 1), &have, "large").expect("fits");
+        let usual = wgpu::Limits::default();
+        assert_eq!(asked.max_storage_buffer_binding_size, usual.max_storage_buffer_binding_size);
+    }
+
+    #[test]
+    fn hardware_comes_first() {
+        let info = |t: &str| AdapterInfo {
+            name: String::new(),
+            backend: String::new(),
+            device_type: t.into(),
+            driver: String::new(),
+        };
+        let ranks = ["discrete", "integrated", "virtual", "other", "cpu"].map(|t| info(t).rank());
+        assert!(ranks.is_sorted());
+        assert!(info("discrete").is_hardware() && !info("cpu").is_hardware());
+    }
+}

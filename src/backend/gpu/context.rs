@@ -165,6 +165,12 @@ impl Context {
         }
     }
 
+    /// Lose the device.
+    #[cfg(test)]
+    pub fn destroy(&self) {
+        self.device.destroy();
+    }
+
     /// An error if the driver has complained.
     pub fn check(&self) -> Result<()> {
         let fault = self.fault.lock().ok().and_then(|f| f.clone());

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::pressure::{Outcome, PressureReport};
 
 /// Iterations between looks once the last solve's number is used up.
-const CHUNK: u32 = 16;
+const CHUNK: u32 = 8;
 
 impl Gpu {
     /// Conjugate gradients with the diagonal. The residual reported is the true one, ||b - A x|| / ||b||.
@@ -23,7 +23,7 @@ impl Gpu {
                 .map(name),
         )?;
         // An iteration too many costs an empty dispatch, one too few a round trip to the device.
-        let mut chunk = self.last_iterations + self.last_iterations / 16 + 2;
+        let mut chunk = self.last_iterations + self.last_iterations / 8 + 2;
         loop {
             let iteration = ["conjugate_gradient.multiply", "conjugate_gradient.advance"].map(name);
             let end =

@@ -1,0 +1,214 @@
+//! How fast: seconds per step by stage, against the bytes that each stage must move.
+//!
+//! Timings of different machines do not compare; what compares is the fraction of the memory floor, which is
+//! measured in the same process, and the counts of bytes, dispatches and iterations.
+
+use crate::backend::Backend;
+use crate::case::{Case, Preconditioner};
+use crate::error::Result;
+use crate::params::Params;
+use crate::plan::{Plan, Stage};
+use crate::pressure::{PressureReport, Settings};
+use crate::scene::Scene;
+use crate::simulation::Simulation;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Makes a backend for a scene.
+pub type Make<'a> = dyn Fn(&Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>> + 'a;
+
+/// One stage of one run.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageRow {
+    /// Name.
+    pub stage: &'static str,
+    /// Mean time a step [s].
+    pub seconds: f64,
+    /// Bytes that it must move a step.
+    pub bytes: u64,
+    /// Time that the bytes take at the measured bandwidth over the time it took [-].
+    pub floor_fraction: f64,
+}
+
+/// One spacing on one backend.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Processor.
+    pub adapter: String,
+    /// `f64` or `f32`.
+    pub precision: &'static str,
+    /// Spacing l0 [m].
+    pub spacing: f64,
+    /// All particles.
+    pub particles: usize,
+    /// Fluid particles.
+    pub fluid: usize,
+    /// Unknowns of the last solve.
+    pub unknowns: usize,
+    /// Neighbour pairs listed.
+    pub pairs: u64,
+    /// Steps timed, after the warm-up.
+    pub steps: u64,
+    /// Mean time a step [s], with no wait between stages.
+    pub seconds_per_step: f64,
+    /// Middle half of the single steps [s]: 25th and 75th percentile.
+    pub quartiles: [f64; 2],
+    /// All particles over `seconds_per_step` [1/s].
+    pub particles_per_second: f64,
+    /// `jacobi` or `multigrid`.
+    pub preconditioner: &'static str,
+    /// Tolerance of the PPE [-].
+    pub tolerance: f64,
+    /// Mean iterations a solve.
+    pub iterations: f64,
+    /// Largest |n / n0 - 1| at the end [-].
+    pub density_error_max: f64,
+    /// Mean of n / n0 - 1 at the end [-].
+    pub density_error_mean: f64,
+    /// Copy bandwidth measured in this process, reads and writes counted [bytes/s].
+    pub bandwidth: f64,
+    /// Bytes that the particles take.
+    pub bytes_held: u64,
+    /// Most memory that the process has held so far [bytes], where the system tells.
+    pub peak_memory: Option<u64>,
+    /// Kernels started a step; 0 on the CPU.
+    pub dispatches: f64,
+    /// By stage, each waited for.
+    pub stages: Vec<StageRow>,
+}
+
+/// Copy bandwidth of the host's memory, reads and writes counted [bytes/s]: best of five copies of 256 MB.
+pub fn host_bandwidth() -> f64 {
+    let a = vec![1.0_f64; 32 << 20];
+    let mut b = vec![0.0_f64; a.len()];
+    let copy = |_| {
+        let start = Instant::now();
+        b.par_chunks_mut(1 << 16).zip(a.par_chunks(1 << 16)).for_each(|(b, a)| b.copy_from_slice(a));
+        16.0 * a.len() as f64 / start.elapsed().as_secs_f64()
+    };
+    (0..5).map(copy).fold(0.0, f64::max)
+}
+
+/// Most memory that this process has held [bytes], on Linux.
+pub fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}
+
+/// Steps before the clock runs.
+const WARM_UP: u64 = 3;
+
+/// Time `steps` steps of `case` from its start.
+pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
+    let scene = Scene::build(case)?;
+    let mut sim = Simulation::new(case, &scene, make)?;
+    sim.time_stages = false;
+    let mut times = Vec::new();
+    let (mut iterations, mut last) = (0.0, PressureReport::default());
+    for k in 0..WARM_UP + steps {
+        let start = Instant::now();
+        last = sim.step()?.pressure;
+        sim.backend.wait()?;
+        if k >= WARM_UP {
+            times.push(start.elapsed().as_secs_f64());
+            iterations += f64::from(last.iterations);
+        }
+    }
+    let monitor = sim.backend.monitor()?;
+    // The stages by themselves, each waited for.
+    sim.time_stages = true;
+    sim.stages.clear();
+    let staged = (steps / 4).max(2);
+    let before = sim.backend.dispatches();
+    for _ in 0..staged {
+        last = sim.step()?.pressure;
+    }
+    let dispatches = (sim.backend.dispatches() - before) as f64 / staged as f64;
+    let sizes = sim.backend.sizes()?;
+    let per_step: BTreeMap<Stage, f64> = sim.stages.iter().map(|(&s, t)| (s, t / staged as f64)).collect();
+    let stages = per_step.iter().map(|(&stage, &seconds)| {
+        let bytes = sizes.bytes(stage, &last);
+        StageRow { stage: stage.name(), seconds, bytes, floor_fraction: bytes as f64 / bandwidth / seconds }
+    });
+    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+    times.sort_by(f64::total_cmp);
+    let quartile = |q: f64| times.get((q * times.len() as f64) as usize).copied().unwrap_or(mean);
+    let total = scene.groups.total();
+    Ok(Row {
+        adapter: sim.backend.description(),
+        precision: sim.backend.precision(),
+        spacing: case.run.spacing,
+        particles: total,
+        fluid: scene.groups.fluid,
+        unknowns: last.unknowns,
+        pairs: sizes.pairs,
+        steps,
+        seconds_per_step: mean,
+        quartiles: [quartile(0.25), quartile(0.75)],
+        particles_per_second: total as f64 / mean,
+        preconditioner: if sim.plan.preconditioner == Preconditioner::Multigrid {
+            "multigrid"
+        } else {
+            "jacobi"
+        },
+        tolerance: sim.settings().tolerance,
+        iterations: iterations / steps.max(1) as f64,
+        density_error_max: monitor.density_error_max,
+        density_error_mean: monitor.density_error_mean,
+        bandwidth,
+        bytes_held: sim.backend.bytes(),
+        peak_memory: peak_memory(),
+        dispatches,
+        stages: stages.collect(),
+    })
+}
+
+/// Exponent e of time ~ particles^e, by least squares over `rows`; nothing for fewer than two.
+pub fn exponent(rows: &[&Row]) -> Option<f64> {
+    let points: Vec<(f64, f64)> =
+        rows.iter().map(|r| ((r.particles as f64).ln(), r.seconds_per_step.ln())).collect();
+    let n = points.len() as f64;
+    let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let variance: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
+    (variance > 0.0).then(|| points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / variance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponent_of_a_power_law_is_found() {
+        let row = |particles: usize| Row {
+            adapter: String::new(),
+            precision: "f64",
+            spacing: 1.0,
+            particles,
+            fluid: 0,
+            unknowns: 0,
+            pairs: 0,
+            steps: 1,
+            seconds_per_step: 3e-7 * (particles as f64).powf(1.25),
+            quartiles: [0.0; 2],
+            particles_per_second: 0.0,
+            preconditioner: "jacobi",
+            tolerance: 1e-3,
+            iterations: 0.0,
+            density_error_max: 0.0,
+            density_error_mean: 0.0,
+            bandwidth: 1.0,
+            bytes_held: 0,
+            peak_memory: None,
+            dispatches: 0.0,
+            stages: Vec::new(),
+        };
+        let rows = [row(1000), row(30_000), row(700_000)];
+        let all: Vec<&Row> = rows.iter().collect();
+        assert!((exponent(&all).expect("three points") - 1.25).abs() < 1e-12);
+        assert!(exponent(&all[..1]).is_none());
+    }
+}

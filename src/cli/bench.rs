@@ -1,0 +1,160 @@
+//! `seixo bench`.
+
+use super::setup::Setup;
+use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
+use seixo::backend::gpu::adapters;
+use seixo::bench::{Row, exponent, host_bandwidth, measure};
+use seixo::error::{Error, Result};
+use serde::Serialize;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct BenchArgs {
+    /// The case; cases/dam_break_transport.toml if absent.
+    #[arg(default_value = "cases/dam_break_transport.toml")]
+    case: PathBuf,
+    /// Spacings l0 [m] to time.
+    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.0075])]
+    spacings: Vec<f64>,
+    /// Change a value of the case; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Steps to time at each spacing.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    steps: u64,
+    /// Spacings with more particles than this are left out on a software GPU [thousands].
+    #[arg(long, value_name = "K", default_value_t = 150)]
+    software_limit: usize,
+    /// Also write the results as JSON to this file.
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print JSON instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    version: &'static str,
+    commit: Option<String>,
+    cores: usize,
+    case: String,
+    sets: Vec<String>,
+    rows: Vec<Row>,
+    /// Exponent of time against particles, by backend.
+    exponents: Vec<(String, Option<f64>)>,
+}
+
+/// The commit of the checkout that the program runs in, if it is one.
+fn commit() -> Option<String> {
+    let out = std::process::Command::new("git").args(["rev-parse", "--short", "HEAD"]).output().ok()?;
+    out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_owned())
+}
+
+/// Backends to time: both unless one was asked for.
+fn choices(args: &DeviceArgs) -> Vec<BackendName> {
+    match (args.backend, args.adapter.is_some()) {
+        (BackendName::Cpu, _) => vec![BackendName::Cpu],
+        (BackendName::Gpu, _) | (_, true) => vec![BackendName::Gpu],
+        (BackendName::Auto, false) if adapters().is_empty() => vec![BackendName::Cpu],
+        (BackendName::Auto, false) => vec![BackendName::Cpu, BackendName::Gpu],
+    }
+}
+
+fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -> Result<Option<Row>> {
+    let case =
+        CaseArgs { case: args.case.clone(), spacing: Some(spacing), sets: args.sets.clone(), until: None };
+    let setup = Setup::new(&case, true)?;
+    let particles = setup.scene.groups.total();
+    let device = DeviceArgs { backend, ..args.device.clone() };
+    let software = backend == BackendName::Gpu && !adapters().iter().any(|a| a.is_hardware());
+    if software && particles > 1000 * args.software_limit {
+        eprintln!("l0 = {spacing}: {particles} particles left out on a software GPU (--software-limit)");
+        return Ok(None);
+    }
+    eprintln!("l0 = {spacing}: {particles} particles, {backend:?} ...");
+    // Software acts as a GPU for correctness, not speed: a tenth of the steps will do.
+    let steps = if software { (args.steps / 10).max(3) } else { args.steps };
+    let make = |s: &_, p: &_, plan: &_, settings| device::backend(&device, s, p, plan, settings);
+    measure(&setup.loaded.case, steps, bandwidth, &make).map(Some)
+}
+
+pub fn bench(args: &BenchArgs) -> Exit {
+    device::set_threads(&args.device);
+    let bandwidth = host_bandwidth();
+    let (mut rows, mut exponents) = (Vec::new(), Vec::new());
+    for backend in choices(&args.device) {
+        let mut own = Vec::new();
+        for &spacing in &args.spacings {
+            own.extend(timed(args, backend, spacing, bandwidth)?);
+        }
+        let name = own.first().map_or_else(|| format!("{backend:?}"), |r: &Row| r.adapter.clone());
+        exponents.push((name, exponent(&own.iter().collect::<Vec<_>>())));
+        rows.append(&mut own);
+    }
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        commit: commit(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        case: args.case.display().to_string(),
+        sets: args.sets.clone(),
+        rows,
+        exponents,
+    };
+    if let Some(path) = &args.out {
+        let text = serde_json::to_string_pretty(&report).unwrap_or_default() + "\n";
+        std::fs::write(path, text).map_err(Error::io(path))?;
+    }
+    if args.json {
+        say_json(&report);
+    } else {
+        table(&report, bandwidth);
+    }
+    Ok(0)
+}
+
+fn table(report: &Report, bandwidth: f64) {
+    say(&format!("copy bandwidth of the host {:.1} GB/s, {} cores", bandwidth / 1e9, report.cores));
+    for r in &report.rows {
+        say(&format!(
+            "\n{} ({}), l0 = {} m: {} particles, {} of them fluid, {} unknowns\n\
+             {:.4} s a step (middle half {:.4} to {:.4}), {:.2e} particles a second, {} {:.1} iterations to {:.0e}, \
+             {:.0} MB held, density error at most {:.3}",
+            r.adapter,
+            r.precision,
+            r.spacing,
+            r.particles,
+            r.fluid,
+            r.unknowns,
+            r.seconds_per_step,
+            r.quartiles[0],
+            r.quartiles[1],
+            r.particles_per_second,
+            r.preconditioner,
+            r.iterations,
+            r.tolerance,
+            r.bytes_held as f64 / 1e6,
+            r.density_error_max
+        ));
+        if r.dispatches > 0.0 {
+            say(&format!("{:.0} dispatches a step", r.dispatches));
+        }
+        say(&format!("  {:<20} {:>10} {:>10} {:>14}", "stage", "ms", "MB", "of the floor"));
+        for s in &r.stages {
+            say(&format!(
+                "  {:<20} {:>10.3} {:>10.2} {:>13.0} %",
+                s.stage,
+                1e3 * s.seconds,
+                s.bytes as f64 / 1e6,
+                100.0 * s.floor_fraction
+            ));
+        }
+    }
+    for (name, exponent) in &report.exponents {
+        if let Some(e) = exponent {
+            say(&format!("\n{name}: time a step grows with particles to the power {e:.3}"));
+        }
+    }
+}
