@@ -6,7 +6,7 @@ use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::plot::{LegendPosition, LinePlot, LineStyle};
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// An axis.
 #[derive(Clone, Debug, Default)]
@@ -174,17 +174,41 @@ impl Chart {
         plots
     }
 
+    /// Range of axis `k` with a margin; `None` without points.
+    fn range(&self, k: usize) -> Option<(f64, f64)> {
+        let shown = self.series.iter().flat_map(|s| &s.points);
+        let shown = shown.filter(|p| self.x.takes(p[0]) && self.y.takes(p[1])).map(|p| p[k]);
+        let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        let log = if k == 0 { self.x.log } else { self.y.log };
+        if low > high {
+            None
+        } else if log {
+            let margin = (high / low).powf(0.06).max(1.25);
+            Some((low / margin, high * margin))
+        } else {
+            let margin = (0.05 * (high - low)).max(1e-9 * high.abs()).max(f64::MIN_POSITIVE);
+            Some((low - margin, high + margin))
+        }
+    }
+
     fn layout(&self, plots: &[Plot]) -> Layout {
         let mut layout = Layout::auto_from_plots(plots)
             .with_width(900.0)
             .with_height(520.0)
             .with_title(self.title.as_str())
             .with_title_size(17)
-            .with_title_wrap(80)
+            .with_title_wrap(64)
             .with_subtitle(self.subtitle.as_str())
             .with_x_label(self.x.label.as_str())
             .with_y_label(self.y.label.as_str())
             .with_legend_position(LegendPosition::OutsideRightTop);
+        // A little air, so that no mark is cut by the frame.
+        if let Some((low, high)) = self.range(0) {
+            layout = layout.with_x_axis_min(low).with_x_axis_max(high);
+        }
+        if let Some((low, high)) = self.range(1) {
+            layout = layout.with_y_axis_min(low).with_y_axis_max(high);
+        }
         if self.x.log {
             layout = layout.with_log_x();
         }
@@ -209,10 +233,12 @@ impl Chart {
     /// [`Error::Io`].
     pub fn write(&self, stem: &Path) -> Result<bool> {
         let Some(svg) = self.svg() else { return Ok(false) };
-        write_whole(&stem.with_extension("svg"), svg.as_bytes())?;
+        // Names may have dots in them, so that the extension is added, not replaced.
+        let with = |extension: &str| PathBuf::from(format!("{}.{extension}", stem.display()));
+        write_whole(&with("svg"), svg.as_bytes())?;
         let plots = self.plots();
         let layout = self.layout(&plots);
-        let path = stem.with_extension("png");
+        let path = with("png");
         let png = kuva::render_to_png(plots, layout, 1.5)
             .map_err(|e| Error::io(&path)(std::io::Error::other(e.to_string())))?;
         write_whole(&path, &png)?;

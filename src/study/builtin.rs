@@ -158,7 +158,9 @@ pub fn from_file(name: &str, text: &str, files: &Files, setup: &Setup) -> Result
         };
         compare::curves(&definition, rows, &read)?;
         let errors: Vec<String> = definition.error.iter().map(|e| e.name()).collect();
-        Ok(work_precision::report(&definition.name, &definition.title, rows, &errors, wanted))
+        let mut report = work_precision::report(&definition.name, &definition.title, rows, &errors, wanted);
+        report.charts.extend(compare::charts(&definition, rows, &read)?);
+        Ok(report)
     });
     Ok(Study { name, title, question, jobs, finish })
 }

@@ -123,10 +123,11 @@ pub fn command(args: &StudyArgs) -> Result<()> {
         // Fails only if the pool exists already, and nothing parallel has run yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
     }
-    let hardware = args.adapter.is_some() || Gpu::hardware_available();
+    // Drivers are asked only when the first point wants one.
+    let hardware = std::sync::LazyLock::new(|| args.adapter.is_some() || Gpu::hardware_available());
     let make: &Make = &|processor, scene, params, plan, settings| match processor {
         Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?) as Box<dyn Backend>),
-        Processor::Gpu if !hardware => Err(Error::Gpu(
+        Processor::Gpu if !*hardware => Err(Error::Gpu(
             "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
         )),
         Processor::Gpu => Ok(Box::new(Gpu::new(scene, params, plan, settings, args.adapter.as_deref())?)),

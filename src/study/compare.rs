@@ -3,6 +3,7 @@
 use super::definition::{Definition, ErrorMeasure, Files};
 use super::row::{Class, Row};
 use crate::error::{Error, Result};
+use crate::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 
 impl ErrorMeasure {
     /// Name of the error, as in the tables.
@@ -58,6 +59,54 @@ pub fn finest<'a>(rows: &'a [Row], curve: &str) -> Option<&'a Row> {
     let usable = |r: &&Row| r.measured.class <= Class::Degraded && r.measured.curves.contains_key(curve);
     let key = |r: &Row| (r.measured.work.particles, r.measured.work.steps);
     rows.iter().filter(usable).max_by_key(|r| key(r))
+}
+
+/// A chart of the curves themselves for each one that is compared, with everything it is compared with.
+///
+/// # Errors
+/// A reference file that cannot be read.
+pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(String, Chart)>> {
+    let mut charts: Vec<(String, Chart)> = Vec::new();
+    let mut names: Vec<&String> = study.error.iter().filter_map(|e| e.curve.as_ref()).collect();
+    names.dedup();
+    for name in names {
+        let with = rows.iter().filter(|r| r.measured.class <= Class::Degraded);
+        let with: Vec<&Row> = with.filter(|r| r.measured.curves.contains_key(name)).collect();
+        let mut series = Vec::new();
+        for (k, row) in with.iter().enumerate() {
+            let label = format!("{} ({})", row.method, row.setting());
+            let stroke = if k < COLORS.len() { Stroke::Solid } else { Stroke::Dashed };
+            let points = row.measured.curves[name].clone();
+            series.push(Series::line(&label, COLORS[k % COLORS.len()], stroke, points));
+        }
+        let marks = [Mark::Circle, Mark::Square, Mark::Triangle, Mark::Star];
+        let references = study.error.iter().filter(|e| e.curve.as_ref() == Some(name));
+        let references = references.filter_map(|e| e.against.as_ref().filter(|a| *a != "finest").map(|a| (e, a)));
+        for (k, (error, against)) in references.enumerate() {
+            let most = with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
+            let points = table(against, &files(against)?)?.into_iter().filter(|p| p[0] <= most).collect();
+            let label = error.name().replace("front against ", "experiment: ").replace(" [-]", "");
+            series.push(Series::marks(&label, "#000000", marks[k % marks.len()], 4.5, points));
+        }
+        let (x, y) = match name.as_str() {
+            "front scaled" => ("T = t sqrt(2 g / L) [-]", "Z = x / L [-]"),
+            "front" => ("time [s]", "front, 99.9th percentile of x [m]"),
+            "energy" => ("time [s]", "energy over its start [-]"),
+            _ => ("time [s]", name.as_str()),
+        };
+        let owned: Vec<Row> = with.iter().map(|r| (*r).clone()).collect();
+        charts.push((
+            super::work_precision::file_name(&study.name, name, "curve"),
+            Chart {
+                title: format!("{}: {name}", study.title),
+                subtitle: super::work_precision::machines(&owned),
+                x: Axis::linear(x),
+                y: Axis::linear(y),
+                series,
+            },
+        ));
+    }
+    Ok(charts)
 }
 
 /// Put the errors of all curves into `rows`.

@@ -77,7 +77,7 @@ fn pool(n: [u32; 2], l0: f64, at: [f64; 2]) -> String {
     let speed = (100.0 * 9.80665 * l0).sqrt().max(2.5 * (9.80665 * depth).sqrt());
     let [x, z] = at;
     format!(
-        "[run]\nspacing = {l0:?}\ntime_step = {dt:?}\nend = 1e9\ndimensions = 2\n\
+        "[run]\nspacing = {l0:?}\ntime_step = {dt:?}\nend = 10\ndimensions = 2\n\
          [tank]\nmin = [{x:?}, 0, {z:?}]\nmax = [{right:?}, {l0:?}, {top:?}]\nopen = [\"z_max\"]\n\
          [fluid]\n[[fluid.block]]\nmin = [{x:?}, 0, {z:?}]\nmax = [{right:?}, {l0:?}, {surface:?}]\n\
          [output]\nevery = 0\n",
@@ -92,7 +92,7 @@ fn pool(n: [u32; 2], l0: f64, at: [f64; 2]) -> String {
 fn full_box(n: u32, dimensions: u32) -> String {
     let (l0, a) = (0.025, 0.025 * f64::from(n));
     format!(
-        "[run]\nspacing = {l0}\ntime_step = 5e-4\nend = 1e9\ndimensions = {dimensions}\n\
+        "[run]\nspacing = {l0}\ntime_step = 5e-4\nend = 10\ndimensions = {dimensions}\n\
          [tank]\nmin = [0, 0, 0]\nmax = [{a}, {a}, {a}]\n\
          [fluid]\nrelaxation = 0.01\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{a}, {a}, {a}]\n[output]\nevery = 0\n"
     )
@@ -101,7 +101,7 @@ fn full_box(n: u32, dimensions: u32) -> String {
 /// A dry cube of 0.1 m above a floor.
 fn cube(height: f64, contact: &str) -> String {
     format!(
-        "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 1e9\n\
+        "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 10\n\
          [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.8, 2.0]\n\
          [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.4, 0.4, {}]\ndensity = 1000.0\n\
          [contact]\nlaw = \"smooth\"\nspring = 1e6\nrestitution = 0.3\nfriction = 0.3\n{contact}[output]\nevery = 0\n",
@@ -112,7 +112,7 @@ fn cube(height: f64, contact: &str) -> String {
 /// `count` cubes of 0.05 m in layers of 5 x 5, half a cube apart, that fall into a heap.
 fn heap(count: u32) -> String {
     let mut text = String::from(
-        "[run]\nspacing = 0.0125\ntime_step = 1e-3\nend = 1e9\n\
+        "[run]\nspacing = 0.0125\ntime_step = 1e-3\nend = 10\n\
          [tank]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 6.0]\nopen = [\"z_max\"]\n\
          [contact]\nlaw = \"smooth\"\nspring = 1e5\nrestitution = 0.2\nfriction = 0.3\n[output]\nevery = 0\n",
     );
@@ -132,13 +132,13 @@ fn heap(count: u32) -> String {
 }
 
 /// A gate that comes down onto standing water and reaches the floor.
-const GATE: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1e9\ndimensions = 2\n\
+const GATE: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 10\ndimensions = 2\n\
     [tank]\nmin = [0, 0, 0]\nmax = [0.8, 1, 0.8]\nopen = [\"z_max\"]\n\
     [[moving_wall]]\nname = \"gate\"\nmin = [0.36, 0, 0.3]\nmax = [0.44, 1, 0.7]\nmotion = [[0, 0, 0, 0], [0.5, 0, 0, -0.3]]\n\
     [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 1, 0.2]\n[output]\nevery = 0\n";
 
 /// The dam break of the paper's tank, coarse and in two dimensions.
-const COLLAPSE: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1e9\ndimensions = 2\n\
+const COLLAPSE: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 10\ndimensions = 2\n\
     [tank]\nmin = [0, 0, 0]\nmax = [0.8, 1, 0.6]\nopen = [\"z_max\"]\n\
     [fluid]\nsound_speed = 6.0\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 1, 0.4]\n[output]\nevery = 0\n";
 
@@ -183,7 +183,7 @@ pub fn scenes(full: bool) -> Vec<Scene> {
         Scene::new("a closed box full to the lid", full_box(8, 3), 200, still(1.0)),
         Scene::new("a pocket without a free surface", full_box(4, 2), 400, still(1.0)).set(&["fluid.compressibility=1e-10"]),
         Scene::new("one particle", pool([1, 1], 0.02, [0.0; 2]), 300, still(2.0)),
-        Scene::new("an empty scene", "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1e9\n".into(), 10, Expect::Refuse),
+        Scene::new("an empty scene", "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 10\n".into(), 10, Expect::Refuse),
         Scene::new("l0 of 10 micrometres", pool([20, 10], 1e-5, [0.0; 2]), 300, still(1.0)),
         Scene::new("l0 of 100 m", pool([20, 10], 100.0, [0.0; 2]), 300, still(200.0)),
         Scene::new("1 km from the origin", pool([20, 10], 0.02, [1000.0, 1000.0]), 300, still(3.0)),
