@@ -1,6 +1,6 @@
 // Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer. P is
-// the pressure on the true surface, half a spacing outside of the particles' centres: the hydrostatic part of the
-// difference, rho g.s, is known. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
+// the pressure on the true surface, half a spacing outside of the particles' centres: the hydrostatic parts of the
+// difference are known. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
 // Twin: src/kernels/body_force.rs
 
 @group(0) @binding(2) var<storage, read> pressure: array<f32>;
@@ -33,8 +33,10 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let orientation = poses[chunk.z].orientation;
         let wall = wall_layer[k];
         if state[params.fluid + k] == INNER {
-            let difference = params.density * dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
-            let surface_pressure = max(pressure[params.fluid + k] + difference, 0.0);
+            // Inside the surface by to_surface, and below the water's surface by half a spacing.
+            let inside = dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
+            let head = inside + 0.5 * params.spacing * length(params.gravity);
+            let surface_pressure = max(pressure[params.fluid + k] + params.density * head, 0.0);
             force = -surface_pressure * rotate(orientation, wall.area.xyz);
         }
 //#if REACTION

@@ -243,10 +243,10 @@ fn neighbour_list() {
         pair.run_all(&LISTS);
         let (gpu, cpu) =
             (pair.gpu.neighbours().expect("readable"), compare::neighbourhoods(pair.cpu.neighbours()));
-        let errors = compare::neighbour_differences(&gpu, &cpu);
+        let g = pair.scene.groups;
+        let errors = compare::neighbour_differences(&gpu, &cpu, g.fluid);
         println!("{} of {} pairs differ", errors.differing, errors.pairs);
         assert!(errors.pairs > 2000 && errors.differing == 0);
-        let g = pair.scene.groups;
         let walls = g.static_wall_range();
         let dry = walls.clone().filter(|&i| gpu[i].0.is_empty()).count();
         assert!(dry > 0 && dry < walls.len(), "{dry} of {} walls are dry", walls.len());

@@ -81,7 +81,7 @@ impl Solids {
                 let weight = model.surfaces[a].smallest_weight;
                 let c = limits.constants(&self.bodies, a, b, weight, self.spacing);
                 let stopping = c.damping * (c.stop / c.spring).sqrt();
-                let for_spring = dt * (c.stop * spring).sqrt() / OMEGA_STEP;
+                let for_spring = dt * (c.stop * spring).sqrt() / limits.omega_step();
                 worst.wanted = worst.wanted.max(for_spring).max(dt * stopping * damping / DAMPING_STEP);
                 worst.softest = worst.softest.min(c.spring);
             }

@@ -142,7 +142,7 @@ mod tests {
             all.extend((0..j).filter(|&i| meet(&boxes[i], &boxes[j])).map(|i| (i, j)));
         }
         all.sort_unstable();
-        assert!(all.len() > 1000);
+        assert!(all.len() > 500, "{}", all.len());
         assert_eq!(meeting(&boxes), all);
     }
 

@@ -6,7 +6,7 @@
 use super::broad::{Bounds, PointGrid, meeting};
 use super::friction::Friction;
 use super::geometry::{self, Surface, WallBox};
-use super::stiffness::{self, MOST_SUBSTEPS, OMEGA_STEP};
+use super::stiffness::{self, Damping, MOST_SUBSTEPS};
 use super::{Limits, paper, smooth};
 use crate::body::Body;
 use crate::scene::Scene;
@@ -134,9 +134,7 @@ impl Smooth {
             };
             let weight = self.surfaces[pair.a].smallest_weight;
             pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
-            // the explicit dashpot takes C h / m of the speed, the exact one 1 - exp(-C h / m)
-            let mass = reduced_mass(bodies, pair.a, b);
-            pair.constants.damping = mass / h * -(-pair.constants.damping * h / mass).exp_m1();
+            pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());
         }
     }
 
@@ -214,6 +212,16 @@ pub(crate) fn reduced_mass(bodies: &[Body], a: usize, b: Option<usize>) -> f64 {
 }
 
 impl Limits {
+    /// dt sqrt(K / m_e) of a sub-step: smaller where the energy of an impact is what the case is about,
+    /// because it gives a restitution or has next to no damping to take an error away.
+    pub fn omega_step(&self) -> f64 {
+        let elastic = match self.damping {
+            Damping::Ratio(_) => true,
+            Damping::Coefficient(c) => c < 0.02 * (self.spring * self.lightest).sqrt(),
+        };
+        if elastic { stiffness::ELASTIC_OMEGA_STEP } else { stiffness::OMEGA_STEP }
+    }
+
     /// Constants of the contact of `a` with `b` as the smooth law uses them: what the case asks for, as
     /// far as the sub-steps of the longest step so far can carry it.
     pub fn constants(
@@ -228,7 +236,7 @@ impl Limits {
         let both =
             |of: fn(&stiffness::Lambda) -> f64| of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]));
         let shortest = self.longest_step / f64::from(self.forced.unwrap_or(MOST_SUBSTEPS));
-        let carried = (OMEGA_STEP / shortest).powi(2) / both(|l| l.spring);
+        let carried = (self.omega_step() / shortest).powi(2) / both(|l| l.spring);
         let spring = if self.forced.is_some() { self.spring } else { self.spring.min(carried) };
         let closing = if b.is_some() { 2.0 } else { 1.0 } * self.fastest;
         let corner = weight.powf(2.0 / stiffness::EXPONENT);
@@ -239,6 +247,7 @@ impl Limits {
             spring,
             stop: stop.min(carried).max(spring),
             stop_depth: 0.25 * spacing,
+            step: shortest,
             damping: if self.forced.is_some() { damping } else { damping.min(carried_damping) },
         }
     }

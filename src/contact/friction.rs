@@ -15,6 +15,9 @@ use glam::{DMat3, DVec3};
 /// Most sweeps over the patches of a sub-step. What one sub-step leaves, the next one stops.
 const SWEEPS: usize = 8;
 
+/// Change of an impulse over its limit at which the sweeps stop.
+const TOLERANCE: f64 = 1e-3;
+
 /// A patch as the sweeps see it.
 #[derive(Clone, Debug)]
 struct Slip {
@@ -31,6 +34,8 @@ struct Slip {
     response: DMat3,
     /// Impulse so far [N s].
     impulse: DVec3,
+    /// s of the last visit [1/kg]: 0 while the patch sticks.
+    remaining: f64,
 }
 
 /// Working memory of the friction solve.
@@ -90,7 +95,7 @@ impl Slip {
         // a point has no arm and a locked axis no response: keep the system regular
         let trace = response.x_axis.x + response.y_axis.y + response.z_axis.z;
         response += DMat3::IDENTITY * (1e-12 * trace);
-        Self { a, b, arm_a, arm_b, tangent, spin, cap, response, impulse: DVec3::ZERO }
+        Self { a, b, arm_a, arm_b, tangent, spin, cap, response, impulse: DVec3::ZERO, remaining: 0.0 }
     }
 
     /// Slip of `a` against `b`: two velocities and the spin times the mean arm [m/s].
@@ -106,7 +111,7 @@ impl Slip {
     /// One visit: the patch's impulse for the velocities as they are. Whether it changed.
     fn solve(&mut self, bodies: &mut [Body]) -> bool {
         let wanted = self.response * self.impulse - self.velocity(bodies);
-        let impulse = within(self.response, wanted, self.cap);
+        let impulse = within(self.response, wanted, self.cap, &mut self.remaining);
         if !impulse.is_finite() {
             return false;
         }
@@ -118,25 +123,23 @@ impl Slip {
         if let Some(b) = self.b {
             bodies[b].kick(-push, -self.arm_b.cross(push) - twist);
         }
-        change.length() > 1e-6 * self.cap
+        change.length() > TOLERANCE * self.cap
     }
 }
 
 /// The j with (A + s 1) j = `wanted` and either s = 0, |j| <= cap or s > 0, |j| = cap: the same
-/// system as a trust-region step, solved by its Newton iteration, which climbs from below.
-fn within(response: DMat3, wanted: DVec3, cap: f64) -> DVec3 {
-    let trace = response.x_axis.x + response.y_axis.y + response.z_axis.z;
-    let mut s = (wanted.length() / cap - trace).max(0.0);
+/// system as a trust-region step, solved by its Newton iteration from the last `s`.
+fn within(response: DMat3, wanted: DVec3, cap: f64, s: &mut f64) -> DVec3 {
     let mut j = DVec3::ZERO;
     for _ in 0..30 {
-        let inverse = (response + DMat3::IDENTITY * s).inverse();
+        let inverse = (response + DMat3::from_diagonal(DVec3::splat(*s))).inverse();
         j = inverse * wanted;
         let length = j.length();
         let excess = length / cap - 1.0;
-        if excess <= 1e-13 {
+        if excess.abs() < 1e-12 || excess < 0.0 && *s == 0.0 {
             return j;
         }
-        s += length * length / j.dot(inverse * j) * excess;
+        *s = (*s + length * length / j.dot(inverse * j) * excess).max(0.0);
     }
     j * (cap / j.length()).min(1.0)
 }
@@ -150,10 +153,11 @@ mod tests {
         let response =
             DMat3::from_cols(DVec3::new(2.0, 0.3, 0.1), DVec3::new(0.3, 1.0, 0.2), DVec3::new(0.1, 0.2, 4.0));
         let wanted = DVec3::new(-1.0, 0.5, 0.25);
-        let free = within(response, wanted, 10.0);
+        let free = within(response, wanted, 10.0, &mut 0.0);
         assert!((response * free - wanted).length() < 1e-12);
-        let capped = within(response, wanted, 0.2);
+        let capped = within(response, wanted, 0.2, &mut 0.0);
         assert!((capped.length() - 0.2).abs() < 1e-10);
+        assert!((within(response, wanted, 0.2, &mut 50.0) - capped).length() < 1e-10);
         let remains = response * capped - wanted;
         assert!(remains.length() > 0.1);
         assert!((remains.normalize() + capped.normalize()).length() < 1e-9);

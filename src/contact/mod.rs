@@ -11,10 +11,13 @@ mod collision;
 mod friction;
 mod geometry;
 mod paper;
+mod report;
 mod smooth;
+mod state;
 mod stiffness;
 
 pub use advice::ContactAdvice;
+pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 
 use crate::body::{Body, Pose, Wrench};
@@ -37,52 +40,6 @@ pub fn standing_gap(law: case::Law, spacing: f64) -> f64 {
         case::Law::Paper => (1.5_f64.sqrt() - 1.0) * spacing,
         case::Law::Smooth | case::Law::Pressure => 0.0,
     }
-}
-
-/// What a step of contact did.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactReport {
-    /// Contact sub-steps of the step.
-    pub substeps: u32,
-    /// dt sqrt(K / m_e) of the whole step [-], before sub-stepping.
-    pub omega_dt: f64,
-    /// Deepest contact over the spacing [-]: of true surfaces ("smooth"), d_c - d ("paper").
-    pub penetration_max_over_l0: f64,
-    /// Particle pairs ("paper") or surface points ("smooth") in contact in the last sub-step.
-    pub pairs: usize,
-    /// Pairs of solids in contact in the last sub-step.
-    pub solid_pairs: usize,
-    /// Energy in the contact springs at the last sub-step [J].
-    pub potential_energy: f64,
-}
-
-/// Energy of all free bodies.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Energy {
-    /// Of motion [J].
-    pub kinetic: f64,
-    /// Of height [J], zero at the origin.
-    pub gravity: f64,
-    /// In contact springs [J].
-    pub contact: f64,
-}
-
-impl Energy {
-    /// Sum [J].
-    pub fn total(&self) -> f64 {
-        self.kinetic + self.gravity + self.contact
-    }
-}
-
-/// State of a solid, for checkpoints: what `restore` needs to go on to the last bit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolidState {
-    /// Pose and velocity.
-    pub pose: Pose,
-    /// Angular momentum about the centre of mass [kg m2/s].
-    pub angular_momentum: DVec3,
-    /// Mean contact wrench of the last step.
-    pub contact: Wrench,
 }
 
 /// The contact law with its working memory.
@@ -121,6 +78,8 @@ struct Limits {
     friction: f64,
     forced: Option<u32>,
     lambda: Vec<stiffness::Lambda>,
+    /// Mass of the lightest free body [kg].
+    lightest: f64,
     /// Fastest speed that the case's heights and starting velocities allow [m/s].
     fastest: f64,
     /// Largest time step so far [s]: softened contacts are never stiffened again, which would add energy.
@@ -150,6 +109,7 @@ impl Solids {
             friction: contact.map_or(0.0, |c| c.friction),
             forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
             lambda: vec![stiffness::Lambda::default(); bodies.len()],
+            lightest,
             fastest,
             longest_step: 0.0,
         };
@@ -348,67 +308,5 @@ impl Solids {
             }
             Model::None | Model::Paper(..) => {}
         }
-    }
-
-    /// Energy of the free bodies now.
-    pub fn energy(&mut self) -> Energy {
-        let mut energy = Energy::default();
-        for body in self.bodies.iter().filter(|b| b.is_free()) {
-            energy.kinetic += body.kinetic_energy();
-            energy.gravity -= body.mass * self.gravity.dot(body.pose.position);
-        }
-        let stale = self.candidates.refresh(&self.bodies, self.spacing, 0.0);
-        match &mut self.model {
-            Model::Smooth(model) => {
-                if stale {
-                    model.collect(&self.candidates, &self.bodies, self.spacing);
-                    let h = self.limits.longest_step;
-                    model.set_constants(&self.limits, &self.bodies, self.spacing, h.max(f64::MIN_POSITIVE));
-                }
-                model.evaluate(&self.bodies);
-                energy.contact = model.pairs.iter().map(|p| p.energy).sum();
-            }
-            Model::Paper(model, law) => {
-                if stale {
-                    model.collect(&self.candidates, &self.bodies, law.distance);
-                }
-                model.evaluate(law, &self.bodies);
-                energy.contact = model.pairs.iter().map(|p| p.energy).sum();
-            }
-            Model::None | Model::Collision(_) => {}
-        }
-        energy
-    }
-
-    /// Momentum [kg m/s] of the free bodies, and angular momentum about the origin [kg m2/s].
-    pub fn momentum(&self) -> (DVec3, DVec3) {
-        self.bodies.iter().filter(|b| b.is_free()).fold((DVec3::ZERO, DVec3::ZERO), |(p, l), b| {
-            let own = b.mass * b.pose.velocity;
-            (p + own, l + b.pose.position.cross(own) + b.momentum)
-        })
-    }
-
-    /// State for a checkpoint, one per solid.
-    pub fn states(&self) -> Vec<SolidState> {
-        let both = self.bodies.iter().zip(&self.contact);
-        both.map(|(b, c)| SolidState { pose: b.pose, angular_momentum: b.momentum, contact: *c }).collect()
-    }
-
-    /// Continues from the states of a checkpoint.
-    ///
-    /// # Errors
-    /// [`Error::Case`] if the number of solids differs.
-    pub fn restore(&mut self, states: &[SolidState]) -> Result<()> {
-        if states.len() != self.bodies.len() {
-            let (have, want) = (states.len(), self.bodies.len());
-            return Err(Error::Case(format!("the checkpoint holds {have} solids, the case {want}")));
-        }
-        for (k, state) in states.iter().enumerate() {
-            self.bodies[k].restore(state.pose, state.angular_momentum);
-            self.poses[k] = self.bodies[k].pose;
-            self.contact[k] = state.contact;
-        }
-        self.candidates.forget();
-        Ok(())
     }
 }

@@ -15,6 +15,8 @@ use glam::DVec3;
 pub(crate) const EXPONENT: f64 = 8.0;
 /// Largest dt sqrt(K / m_e) of a sub-step; 2 is the limit of stability, energy errors grow as its square.
 pub(crate) const OMEGA_STEP: f64 = 0.5;
+/// The same where energy must come back: the law `smooth` undamped, or with a restitution.
+pub(crate) const ELASTIC_OMEGA_STEP: f64 = 0.2;
 /// Largest C dt / m_e of a sub-step.
 pub(crate) const DAMPING_STEP: f64 = 0.8;
 /// Most sub-steps of the smooth law. What would need more is softened: at 64 sub-steps a body still
@@ -116,6 +118,11 @@ impl Damping {
                 "contact: give one of damping, damping_ratio and restitution, not several".into(),
             )),
         }
+    }
+
+    /// Whether the case gives a damping ratio (a restitution).
+    pub fn is_ratio(self) -> bool {
+        matches!(self, Self::Ratio(_))
     }
 
     /// C [kg/s] of a contact of stiffness `spring` [N/m], instead of `asked` [N/m], and reduced mass

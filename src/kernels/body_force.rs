@@ -4,12 +4,14 @@
 
 use glam::DVec3;
 
-/// Pressure on the true surface of the solid [Pa]: a wall-layer particle's centre lies half a spacing inside it
-/// (`to_surface`, world axes [m]), and the hydrostatic part of the difference is known. Without it a floating
-/// body would sink half a spacing too deep. Particles that are no unknown feel no pressure.
+/// Pressure on the true surface of the solid [Pa], with `weight` = rho g [N/m3]. Two heads are known to be
+/// missing: a wall-layer particle's centre lies half a spacing inside the surface (`to_surface`, world axes [m]),
+/// and P = 0 holds at the centres of the water's surface particles, half a spacing below the surface. Without
+/// them a floating body would sink a whole spacing too deep. Particles that are no unknown feel no pressure.
 #[inline(always)]
-pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, weight: DVec3) -> f64 {
-    if unknown { (pressure + weight.dot(to_surface)).max(0.0) } else { 0.0 }
+pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, weight: DVec3, spacing: f64) -> f64 {
+    let head = weight.dot(to_surface) + 0.5 * spacing * weight.length();
+    if unknown { (pressure + head).max(0.0) } else { 0.0 }
 }
 
 /// Force of one wall-layer particle [N]: -P A + reaction, with `area` in world axes [m2].

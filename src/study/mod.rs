@@ -16,6 +16,7 @@ pub mod command;
 pub mod compare;
 pub mod contact_checks;
 pub mod definition;
+pub mod contact_rest;
 pub mod dry;
 pub mod dry_studies;
 pub mod engine;
