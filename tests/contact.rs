@@ -369,3 +369,32 @@ fn a_state_that_is_no_number_is_reported_with_the_body() {
     let error = solids.advance(0.5, dt, &[bad]).unwrap_err();
     assert!(matches!(&error, Error::Diverged { stage: "contact", what, .. } if what.contains("body 0")));
 }
+
+#[test]
+fn a_wall_of_cubes_hit_by_a_heavy_one_comes_to_rest() {
+    let row = demolish(3, 5.6e5, 6.0).unwrap();
+    assert!(row.drift > 0.5, "it was hit: {row:?}");
+    assert!(row.penetration_end < 0.1 && row.speed < 0.05, "{row:?}");
+}
+
+#[test]
+fn in_two_dimensions_a_tilted_square_falls_flat_in_its_plane() {
+    let l0 = 0.025;
+    let mut square = FreeBox::new(DVec3::new(0.2, l0, 0.2), 800.0, DVec3::new(0.0, 0.0, 0.25));
+    square.orientation = DQuat::from_rotation_y(0.5);
+    square.angular_velocity = DVec3::new(1.0, 2.0, 3.0);
+    square.velocity = DVec3::Y;
+    let dry = DryScene::new(l0, DVec3::splat(-1.0), DVec3::splat(1.0));
+    let mut scene = dry.floor().body(&square).build();
+    scene.dimensions = 2;
+    let mut solids = Solids::new(&scene, Some(&smooth(1e6, 500.0, 0.3))).unwrap();
+    assert_eq!(solids.poses()[0].angular_velocity, 2.0 * DVec3::Y);
+    for step in 0..3000 {
+        solids.advance(f64::from(step) * 1e-3, 1e-3, &[Wrench::default()]).unwrap();
+    }
+    let pose = solids.poses()[0];
+    assert_eq!(pose.position.y, 0.0);
+    assert!((pose.position.z - 0.1).abs() < 1e-4 && pose.velocity.length() < 1e-9, "{pose:?}");
+    let up = pose.orientation.inverse() * DVec3::Z;
+    assert!(up.abs().max_element() > 1.0 - 1e-9, "flat: {up}");
+}

@@ -2,8 +2,8 @@
 //!
 //! The paper calls K_ideal "the K that minimises the deviation" of Eq. (17). That is ill-posed: the
 //! deviation crosses zero tens of times as K grows, so the minimiser depends on the last digit of the
-//! starting height. The well-posed form used here is the smallest K above which no K of the sweep fails
-//! Eq. (17) at any entry phase; the paper's argmin stands beside it.
+//! starting height. The well-posed form used here is the smallest K of the sweep that meets Eq. (17) at
+//! every entry phase; the paper's argmin stands beside it.
 
 use super::dry::{DryScene, FreeBox, GRAVITY};
 use super::spring_static::contact;
