@@ -44,6 +44,17 @@ impl Lattice {
     }
 }
 
+/// Largest eigenvalue of the Laplacian's matrix over its diagonal, as measured (1.30 to 1.33).
+pub const LAPLACIAN_EIGENVALUE: f64 = 1.33;
+
+impl Lattice {
+    /// Largest nu dt / l0^2 at which explicit viscosity in `dimensions` dimensions damps instead of growing [-]:
+    /// 2 over the largest eigenvalue of Eq. (6), with its diagonal 2 d / lambda.
+    pub fn viscous_limit(&self, dimensions: u32) -> f64 {
+        self.laplacian / (LAPLACIAN_EIGENVALUE * f64::from(dimensions))
+    }
+}
+
 /// How gamma of Eq. (8) follows from the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Relaxation {

@@ -6,7 +6,7 @@ use crate::case::{Case, Fluid};
 use crate::contact::{ContactReport, Solids};
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
-use crate::params::{Params, Step};
+use crate::params::{Lattice, Params, Step};
 use crate::plan::{Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
@@ -83,6 +83,8 @@ fn settings(case: &Case) -> Settings {
 pub const COURANT_MAX: f64 = 0.35;
 /// c_s dt / l0 at most.
 pub const SOUND_MAX: f64 = 0.7;
+/// nu dt / l0^2 at most, as a part of the limit of explicit viscosity.
+pub const VISCOUS_MAX: f64 = 0.5;
 /// Steps between looks at the counters and the fastest particles.
 const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.
@@ -132,6 +134,11 @@ impl Simulation {
             dt = dt.min(COURANT_MAX * l0 / self.expected_speed().max(1e-9));
             if let crate::params::Relaxation::Speed(c) = self.params.relaxation {
                 dt = dt.min(SOUND_MAX * l0 / c);
+            }
+            if self.params.viscosity > 0.0 {
+                let lattice = Lattice::new(self.params.dimensions, self.params.effective_radius / l0);
+                let most = VISCOUS_MAX * lattice.viscous_limit(self.params.dimensions);
+                dt = dt.min(most * l0 * l0 / self.params.viscosity);
             }
         }
         self.params.step(self.time, dt, self.expected_speed())

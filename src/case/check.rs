@@ -4,6 +4,7 @@
 
 use super::{Case, Face, Gauges, Vector};
 use crate::error::{Error, Result};
+use crate::params::Lattice;
 
 /// Something wrong, or worth a warning, about a key.
 #[derive(Clone, Debug, PartialEq)]
@@ -148,6 +149,7 @@ impl Checker<'_> {
         let Some(fluid) = &self.case.fluid else { return };
         self.positive("fluid.density", fluid.density, "kg/m3");
         self.not_negative("fluid.viscosity", fluid.viscosity, "m2/s");
+        self.viscosity(fluid.viscosity);
         let beta = fluid.free_surface_threshold;
         self.range(
             "fluid.free_surface_threshold",
@@ -203,6 +205,23 @@ impl Checker<'_> {
         );
         if fluid.solver.max_iterations == 0 {
             self.add("fluid.solver.max_iterations", "0 iterations solve nothing", "allowed: 1 or more");
+        }
+    }
+
+    /// Viscosity is explicit: beyond a number of diffusion it grows instead of damping. An adaptive step keeps off.
+    fn viscosity(&mut self, viscosity: f64) {
+        let run = &self.case.run;
+        let fits = matches!(run.dimensions, 2 | 3) && (1.5..=4.1).contains(&run.effective_radius);
+        let Some(l0) = self.spacing().filter(|_| fits && !run.adaptive && run.time_step > 0.0) else { return };
+        let limit = Lattice::new(run.dimensions, run.effective_radius).viscous_limit(run.dimensions);
+        let number = viscosity * run.time_step / (l0 * l0);
+        if number > limit {
+            let dt = 0.5 * limit * l0 * l0 / viscosity;
+            self.add(
+                "fluid.viscosity",
+                format!("nu dt / l0^2 = {number:.3} is unstable, the limit is {limit:.3}"),
+                format!("use run.time_step = {dt:.1e} or less, or run.adaptive = true"),
+            );
         }
     }
 

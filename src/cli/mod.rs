@@ -41,6 +41,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
     Compare(compare::CompareArgs),
+    /// Run a study: error against run time, limits of stability, what a scene does not need.
+    Study(seixo::study::command::StudyArgs),
     /// Time a step by stage, against the bytes that must move.
     Bench(bench::BenchArgs),
     /// List the adapters that can be used.
@@ -100,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::Study(args) => seixo::study::command::command(&args).map(|()| 0),
         Command::Adapters { json } => device::list(json),
         Command::Schema => {
             say(seixo::case::Case::schema().trim_end());
