@@ -31,7 +31,8 @@
 @group(0) @binding(13) var<storage, read_write> smoothed: array<f32>; // r - A z after the first sweep
 @group(0) @binding(14) var<storage, read> corrected: array<vec4f>; // position, z with the cells' correction
 
-const DAMPING: f32 = 0.9; // as crate::kernels::multigrid
+// As crate::kernels::multigrid.
+const DAMPING: f32 = 0.9;
 //#else
 const DAMPING: f32 = 1.0;
 //#endif

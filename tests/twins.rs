@@ -63,7 +63,9 @@ impl Pair {
             return None;
         }
         let case = common::case(dimensions, fluid);
-        let scene = common::scene(dimensions, scale);
+        let mut scene = common::scene(dimensions, scale);
+        // No lattice plane on a border of cells: f32 and f64 would disagree about the side.
+        scene.domain.0 -= 0.003 * DVec3::new(1.0, if dimensions == 2 { 0.0 } else { 1.0 }, 1.0);
         let params = Params::new(&case, &scene).expect("valid");
         let plan = Plan { preconditioner, ..Plan::new(&case, &scene, &params) };
         let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
@@ -434,16 +436,17 @@ fn multigrid() {
             cpu.write(&fields).expect("writable");
             cpu.run(Stage::CellList, &pair.step).expect("runs");
             cpu.run(Stage::NeighbourList, &pair.step).expect("runs");
+            cpu.run(Stage::NumberDensity, &pair.step).expect("runs"); // makes the weights
             cpu.solve_pressure(&pair.step).expect("solves");
             (gpu.read().expect("readable").pressure, cpu.fields().pressure.clone())
         };
         let [plus, minus] = [1.0, -1.0].map(|sign| solved(pair, 0, sign));
-        for (gpu, cpu) in [&plus, &minus] {
-            let scale = cpu.iter().fold(0.0_f64, |s, p| s.max(*p));
+        let scale = plus.1.iter().chain(&minus.1).fold(0.0_f64, |s, p| s.max(*p));
+        for ((gpu, cpu), least) in [(&plus, 300), (&minus, 0)] {
             let positive = cpu.iter().filter(|&&p| p > 1e-3 * scale).count();
             let worst = gpu.iter().zip(cpu).fold(0.0_f64, |s, (a, b)| s.max((a - b).abs()));
             println!("{positive} positive of {}, worst {:.1e}", cpu.len(), worst / scale);
-            assert!(positive > 100 && worst < PARTICLE * scale);
+            assert!(positive >= least && worst < PARTICLE * scale);
         }
         // Who works a level does not matter, to the bit.
         for large in 1..=2 {
@@ -583,8 +586,8 @@ fn a_collapsed_neighbourhood_is_reported() {
 }
 
 /// Some whole steps on a new device; the bytes of what they leave.
-fn bytes(scheme: &str) -> Vec<u64> {
-    let mut pair = Pair::new(3, scheme).expect("asked for only with a device");
+fn bytes(scheme: &str, preconditioner: Preconditioner) -> Vec<u64> {
+    let mut pair = Pair::of_size(3, scheme, 1, preconditioner).expect("asked for only with a device");
     for _ in 0..4 {
         for stage in Stage::ALL {
             let (gpu, step) = (&mut pair.gpu, &pair.step);
@@ -607,9 +610,11 @@ fn bytes(scheme: &str) -> Vec<u64> {
 fn two_runs_give_the_same_bytes() {
     if device() {
         let scheme = "preset = \"accurate\"";
-        let first = bytes(scheme);
-        for _ in 0..3 {
-            assert!(first == bytes(scheme), "two runs differ");
+        for preconditioner in [Preconditioner::Jacobi, Preconditioner::Multigrid] {
+            let first = bytes(scheme, preconditioner);
+            for _ in 0..3 {
+                assert!(first == bytes(scheme, preconditioner), "two runs differ ({preconditioner:?})");
+            }
         }
     }
 }

@@ -27,8 +27,8 @@ use crate::plan::{Plan, Stage};
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use context::Context;
-use hierarchy::Levels;
 use glam::{DVec3, Vec3};
+use hierarchy::Levels;
 use layout::{Coefficients, Constants, Memory, MonitorSum, Sizes, WORKGROUP, counter};
 
 /// Particles in f32 on a device.

@@ -150,8 +150,11 @@ impl Multigrid {
             .into_par_iter()
             .with_min_len(CHUNK)
             .for_each(|(c, d, &state, &a, &x)| {
-                *c =
-                    if state == State::Inner { place_of(grid.coordinates(x).map(|k| k as i32)) } else { NOWHERE };
+                *c = if state == State::Inner {
+                    place_of(grid.coordinates(x).map(|k| k as i32))
+                } else {
+                    NOWHERE
+                };
                 *d = a as f32;
             });
         let coarse = &mut self.levels[0].coordinates;

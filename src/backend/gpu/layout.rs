@@ -410,10 +410,8 @@ mod tests {
             rows_per_thread: 1,
         };
         let reasons = Stage::ALL.map(|s| (s, Ok("planned"))).to_vec();
-        let plan =
-            Plan { reasons, preconditioner: Preconditioner::Multigrid, force_relaxation: 1.0 };
+        let plan = Plan { reasons, preconditioner: Preconditioner::Multigrid, force_relaxation: 1.0 };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
-        println!("{:?}", middle.buffers);
         assert!(middle.total() < 200_000_000, "{}", middle.total());
         // What wgpu binds on any adapter, software included.
         assert!(middle.largest().1 <= 128 << 20, "{:?}", middle.largest());

@@ -27,7 +27,8 @@ impl Gpu {
             judge = Some(descend);
         }
         iteration.extend(["conjugate_gradient.multiply", "conjugate_gradient.advance"].map(name));
-        let end = ["conjugate_gradient.end_pack", "conjugate_gradient.end_residual", "conjugate_gradient.end"];
+        let end =
+            ["conjugate_gradient.end_pack", "conjugate_gradient.end_residual", "conjugate_gradient.end"];
 
         let context = &mut self.context;
         context.clear("solve")?;
