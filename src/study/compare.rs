@@ -81,9 +81,11 @@ pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(St
         }
         let marks = [Mark::Circle, Mark::Square, Mark::Triangle, Mark::Star];
         let references = study.error.iter().filter(|e| e.curve.as_ref() == Some(name));
-        let references = references.filter_map(|e| e.against.as_ref().filter(|a| *a != "finest").map(|a| (e, a)));
+        let references =
+            references.filter_map(|e| e.against.as_ref().filter(|a| *a != "finest").map(|a| (e, a)));
         for (k, (error, against)) in references.enumerate() {
-            let most = with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
+            let most =
+                with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
             let points = table(against, &files(against)?)?.into_iter().filter(|p| p[0] <= most).collect();
             let label = error.name().replace("front against ", "experiment: ").replace(" [-]", "");
             series.push(Series::marks(&label, "#000000", marks[k % marks.len()], 4.5, points));
