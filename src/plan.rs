@@ -77,6 +77,19 @@ impl Stage {
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
 pub const MULTIGRID_UNKNOWNS: usize = 30_000;
 
+/// Density ratio of body to water below which the fluid's force is relaxed, in three dimensions [-].
+pub const LIGHT_3D: f64 = 0.4;
+/// The same in two dimensions, where a body drags more water along: unrelaxed, 0.5 swings and 0.7 does not.
+pub const LIGHT_2D: f64 = 0.7;
+/// Water that a body drags along over the water that it displaces [-]; rather too much.
+const ADDED_MASS: f64 = 0.7;
+
+/// Share s of the new force for a body of density ratio `ratio`. The force alternates by 1 - s - s C / ratio a step,
+/// C the added mass: s (1 + C / ratio) must stay below 2, and is 1 here or less.
+fn relaxation(ratio: f64) -> f64 {
+    (1.0 / (1.0 + ADDED_MASS / ratio)).min(0.2)
+}
+
 /// What a scene needs.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -135,8 +148,12 @@ impl Plan {
                 _ => None,
             })
             .fold(f64::INFINITY, f64::min);
-        let force_relaxation =
-            if fluid && params.source == Source::Mixed && lightest < 0.4 { 0.2 } else { 1.0 };
+        let light = if scene.dimensions == 2 { LIGHT_2D } else { LIGHT_3D };
+        let force_relaxation = if fluid && params.source == Source::Mixed && lightest < light {
+            relaxation(lightest)
+        } else {
+            1.0
+        };
         Self { reasons: reasons.to_vec(), preconditioner, force_relaxation }
     }
 

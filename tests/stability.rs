@@ -51,7 +51,8 @@ fn the_bare_contact_step_ends_where_theory_says() {
 #[test]
 fn a_contact_step_is_stable_or_refused() {
     for row in rows("stability", |method| method == "contact") {
-        let (omega_dt, zeta) = (row.number("omega_dt").expect("a number"), row.number("zeta").expect("a number"));
+        let (omega_dt, zeta) =
+            (row.number("omega_dt").expect("a number"), row.number("zeta").expect("a number"));
         let allowed = omega_dt <= 1.0 && omega_dt < stability_contact::theory(zeta);
         let expected = if allowed { Class::Ok } else { Class::Failed };
         assert_eq!(row.measured.class, expected, "{}: {}", row.setting(), row.measured.reason);

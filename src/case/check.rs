@@ -212,7 +212,9 @@ impl Checker<'_> {
     fn viscosity(&mut self, viscosity: f64) {
         let run = &self.case.run;
         let fits = matches!(run.dimensions, 2 | 3) && (1.5..=4.1).contains(&run.effective_radius);
-        let Some(l0) = self.spacing().filter(|_| fits && !run.adaptive && run.time_step > 0.0) else { return };
+        let Some(l0) = self.spacing().filter(|_| fits && !run.adaptive && run.time_step > 0.0) else {
+            return;
+        };
         let limit = Lattice::new(run.dimensions, run.effective_radius).viscous_limit(run.dimensions);
         let number = viscosity * run.time_step / (l0 * l0);
         if number > limit {

@@ -134,7 +134,9 @@ pub fn find(name: &str, setup: &Setup) -> Result<Study> {
     match entry.make {
         Maker::File(text) => from_file(name, text, &embedded, setup),
         Maker::Function(make) if setup.sets.is_empty() => Ok(make(setup)),
-        Maker::Function(_) => Err(Error::Case(format!("`{name}` sets up its own scenes: --set does not apply"))),
+        Maker::Function(_) => {
+            Err(Error::Case(format!("`{name}` sets up its own scenes: --set does not apply")))
+        }
     }
 }
 
@@ -173,7 +175,8 @@ mod tests {
     fn every_built_in_study_can_be_set_up_quick_and_full() {
         for entry in ENTRIES {
             for full in [false, true] {
-                let study = find(entry.name, &Setup { full, ..Setup::default() }).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+                let study = find(entry.name, &Setup { full, ..Setup::default() })
+                    .unwrap_or_else(|e| panic!("{}: {e}", entry.name));
                 assert!(!study.jobs.is_empty(), "{}", entry.name);
                 let mut hashes: Vec<String> = study.jobs.iter().map(|j| j.hash(entry.name)).collect();
                 hashes.sort();

@@ -88,7 +88,13 @@ impl Manifest {
         } else {
             None
         };
-        Ok(Self { what: args.what.clone(), file, full: args.full, sets: args.sets.clone(), gpu: args.backend == Processor::Gpu })
+        Ok(Self {
+            what: args.what.clone(),
+            file,
+            full: args.full,
+            sets: args.sets.clone(),
+            gpu: args.backend == Processor::Gpu,
+        })
     }
 
     fn read(folder: &Path) -> Result<Self> {

@@ -74,17 +74,22 @@ pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(St
         let with: Vec<&Row> = with.filter(|r| r.measured.curves.contains_key(name)).collect();
         let mut series = Vec::new();
         for (k, row) in with.iter().enumerate() {
-            let label = format!("{} ({})", row.method, row.setting());
+            let label = row.label();
             let stroke = if k < COLORS.len() { Stroke::Solid } else { Stroke::Dashed };
             let points = row.measured.curves[name].clone();
             series.push(Series::line(&label, COLORS[k % COLORS.len()], stroke, points));
         }
         let marks = [Mark::Circle, Mark::Square, Mark::Triangle, Mark::Star];
         let references = study.error.iter().filter(|e| e.curve.as_ref() == Some(name));
-        let references = references.filter_map(|e| e.against.as_ref().filter(|a| *a != "finest").map(|a| (e, a)));
+        let references =
+            references.filter_map(|e| e.against.as_ref().filter(|a| *a != "finest").map(|a| (e, a)));
         for (k, (error, against)) in references.enumerate() {
-            let most = with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
-            let points = table(against, &files(against)?)?.into_iter().filter(|p| p[0] <= most).collect();
+            let most =
+                with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
+            let all = with.iter().flat_map(|r| &r.measured.curves[name]);
+            let high = all.map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+            let reached = |p: &[f64; 2]| p[0] <= most && p[1] <= high;
+            let points = table(against, &files(against)?)?.into_iter().filter(reached).collect();
             let label = error.name().replace("front against ", "experiment: ").replace(" [-]", "");
             series.push(Series::marks(&label, "#000000", marks[k % marks.len()], 4.5, points));
         }

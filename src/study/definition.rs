@@ -336,7 +336,9 @@ value = "e [-]"
         hashes.sort();
         hashes.dedup();
         assert_eq!(hashes.len(), 6);
-        let other = study.jobs(&none, &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() }).unwrap();
+        let other = study
+            .jobs(&none, &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() })
+            .unwrap();
         assert_ne!(other[0].hash("s"), quick[0].hash("s"));
     }
 

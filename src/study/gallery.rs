@@ -3,12 +3,12 @@
 //! Whatever the scene, a run may end right or in a typed error; it may not hang, panic, keep a number that is
 //! none, or lose a particle without counting it.
 
+use super::Study;
 use super::definition::Setup;
 use super::engine::{Context, Job, Processor, first_line};
 use super::gallery_scenes::{Expect, Scene as Extreme, scenes};
 use super::report::Report;
 use super::row::{Class, Measured, Row};
-use super::Study;
 use crate::case::file::parse;
 use crate::error::{Error, Result};
 use crate::scene::{Kind, Scene};
@@ -41,7 +41,8 @@ pub fn faults(simulation: &mut Simulation) -> Result<Vec<String>> {
     let (fields, counters) = (simulation.backend.read()?, simulation.backend.counters()?);
     let fluid = simulation.groups.fluid;
     let live: Vec<usize> = (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid).collect();
-    let bad = live.iter().filter(|&&i| !(fields.position[i].is_finite() && fields.velocity[i].is_finite())).count();
+    let bad =
+        live.iter().filter(|&&i| !(fields.position[i].is_finite() && fields.velocity[i].is_finite())).count();
     if bad > 0 {
         faults.push(format!("{bad} live particles have a position or velocity that is not a number"));
     }
@@ -69,9 +70,8 @@ fn play(extreme: &Extreme, processor: Processor, context: &Context) -> Result<(E
         Error::Case(text) => Ok((End::Refused(text), out)),
         other => Err(other),
     };
-    let scene = parse(extreme.name, extreme.text.clone(), &extreme.sets).and_then(|(case, _, _)| {
-        Scene::build(&case).map(|scene| (case, scene))
-    });
+    let scene = parse(extreme.name, extreme.text.clone(), &extreme.sets)
+        .and_then(|(case, _, _)| Scene::build(&case).map(|scene| (case, scene)));
     let (case, scene) = match scene {
         Ok(found) => found,
         Err(error) => return refused(error, out),
@@ -151,7 +151,11 @@ fn finish(rows: &mut [Row], _: Option<f64>) -> Result<Report> {
     report.findings.push(format!("{right} of {} scenes end as they must.", rows.len()));
     for row in rows.iter() {
         let verdict = if row.measured.class == Class::Ok { "as it must" } else { "NOT as it must" };
-        report.findings.push(format!("{}: {} ({verdict})", row.method, row.measured.reason.replace('\n', " ")));
+        report.findings.push(format!(
+            "{}: {} ({verdict})",
+            row.method,
+            row.measured.reason.replace('\n', " ")
+        ));
     }
     Ok(report)
 }
@@ -162,7 +166,8 @@ pub fn study(setup: &Setup) -> Study {
     let jobs = scenes(setup.full).into_iter().map(|extreme| {
         let backend = if processor == Processor::Gpu { "gpu" } else { "cpu" };
         let weight = extreme.steps as f64;
-        let mut job = Job::new(extreme.name, &[("backend", backend.into())], weight, |_| Ok(Measured::default()));
+        let mut job =
+            Job::new(extreme.name, &[("backend", backend.into())], weight, |_| Ok(Measured::default()));
         job.identity = format!("{:?} {processor:?}", extreme);
         job.task = Box::new(move |context| {
             let (end, mut out) = play(&extreme, processor, context)?;
@@ -174,7 +179,8 @@ pub fn study(setup: &Setup) -> Study {
     Study {
         name: "gallery".into(),
         title: "Extreme scenes".into(),
-        question: "Does any scene hang, panic, keep a number that is none, or lose particles uncounted?".into(),
+        question: "Does any scene hang, panic, keep a number that is none, or lose particles uncounted?"
+            .into(),
         jobs: jobs.collect(),
         finish: Box::new(finish),
     }

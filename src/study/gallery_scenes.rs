@@ -158,56 +158,118 @@ fn squeeze(fields: &mut Fields, groups: &Groups, part: f64) {
 pub fn scenes(full: bool) -> Vec<Scene> {
     let still = |speed| Expect::Finish { lost: 0, speed };
     let shot = |speed: f64| {
-        let block = format!("[[fluid.block]]\nmin = [0.2, 0, 0.5]\nmax = [0.22, 0.02, 0.52]\nvelocity = [0, 0, -{speed:?}]\n");
-        pool([20, 15], 0.02, [0.0, 0.0]).replace("max = [0.4, 0.02, 0.6]", "max = [0.4, 0.02, 1.0]").replace("[output]", &format!("{block}[output]"))
+        let block = format!(
+            "[[fluid.block]]\nmin = [0.2, 0, 0.5]\nmax = [0.22, 0.02, 0.52]\nvelocity = [0, 0, -{speed:?}]\n"
+        );
+        pool([20, 15], 0.02, [0.0, 0.0])
+            .replace("max = [0.4, 0.02, 0.6]", "max = [0.4, 0.02, 1.0]")
+            .replace("[output]", &format!("{block}[output]"))
     };
     let mut all = vec![
         Scene::new("a column 10 m deep", pool([5, 100], 0.1, [0.0; 2]), 600, still(14.0)),
         Scene::new("a column 100 m deep", pool([5, 100], 1.0, [0.0; 2]), 600, still(44.0)),
         Scene::new("a drop at 50 m/s", shot(50.0), 300, Expect::Finish { lost: 2, speed: 50.0 }),
         Scene::new("a drop at 500 m/s", shot(500.0), 300, Expect::Finish { lost: 2, speed: 500.0 }),
-        Scene::new("a velocity that is not a number", pool([20, 10], 0.02, [0.0; 2]), 100, Expect::FinishOrGuard)
-            .change(|f, g| { let i = middle(f, g); f.velocity[i].x = f64::NAN; }),
+        Scene::new(
+            "a velocity that is not a number",
+            pool([20, 10], 0.02, [0.0; 2]),
+            100,
+            Expect::FinishOrGuard,
+        )
+        .change(|f, g| {
+            let i = middle(f, g);
+            f.velocity[i].x = f64::NAN;
+        }),
         Scene::new("an infinite velocity", pool([20, 10], 0.02, [0.0; 2]), 100, Expect::FinishOrGuard)
-            .change(|f, g| { let i = middle(f, g); f.velocity[i].z = f64::INFINITY; }),
-        Scene::new("a position that is not a number", pool([20, 10], 0.02, [0.0; 2]), 100, Expect::Finish { lost: 1, speed: 3.0 })
-            .change(|f, g| { let i = middle(f, g); f.position[i].x = f64::NAN; }),
-        Scene::new("an infinite position", pool([20, 10], 0.02, [0.0; 2]), 100, Expect::Finish { lost: 1, speed: 3.0 })
-            .change(|f, g| { let i = middle(f, g); f.position[i].z = f64::INFINITY; }),
-        Scene::new("two particles in one place", pool([20, 10], 0.02, [0.0; 2]), 100, still(3.0))
-            .change(|f, g| { let i = middle(f, g); let j = if i == 0 { 1 } else { 0 }; f.position[j] = f.position[i]; }),
-        Scene::new("water squeezed to 0.9", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard).change(|f, g| squeeze(f, g, 0.9)),
-        Scene::new("water squeezed to 0.7", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard).change(|f, g| squeeze(f, g, 0.7)),
-        Scene::new("water squeezed to 0.3", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard).change(|f, g| squeeze(f, g, 0.3)),
-        Scene::new("water squeezed to nothing", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard).change(|f, g| squeeze(f, g, 0.0)),
+            .change(|f, g| {
+                let i = middle(f, g);
+                f.velocity[i].z = f64::INFINITY;
+            }),
+        Scene::new(
+            "a position that is not a number",
+            pool([20, 10], 0.02, [0.0; 2]),
+            100,
+            Expect::Finish { lost: 1, speed: 3.0 },
+        )
+        .change(|f, g| {
+            let i = middle(f, g);
+            f.position[i].x = f64::NAN;
+        }),
+        Scene::new(
+            "an infinite position",
+            pool([20, 10], 0.02, [0.0; 2]),
+            100,
+            Expect::Finish { lost: 1, speed: 3.0 },
+        )
+        .change(|f, g| {
+            let i = middle(f, g);
+            f.position[i].z = f64::INFINITY;
+        }),
+        Scene::new("two particles in one place", pool([20, 10], 0.02, [0.0; 2]), 100, still(3.0)).change(
+            |f, g| {
+                let i = middle(f, g);
+                let j = if i == 0 { 1 } else { 0 };
+                f.position[j] = f.position[i];
+            },
+        ),
+        Scene::new("water squeezed to 0.9", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.9)),
+        Scene::new("water squeezed to 0.7", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.7)),
+        Scene::new("water squeezed to 0.3", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.3)),
+        Scene::new("water squeezed to nothing", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.0)),
         Scene::new("a closed box full to the lid", full_box(8, 3), 200, still(1.0)),
-        Scene::new("a pocket without a free surface", full_box(4, 2), 400, still(1.0)).set(&["fluid.compressibility=1e-10"]),
+        Scene::new("a pocket without a free surface", full_box(4, 2), 400, still(1.0))
+            .set(&["fluid.compressibility=1e-10"]),
         Scene::new("one particle", pool([1, 1], 0.02, [0.0; 2]), 300, still(2.0)),
-        Scene::new("an empty scene", "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 10\n".into(), 10, still(0.0)),
+        Scene::new(
+            "an empty scene",
+            "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 10\n".into(),
+            10,
+            still(0.0),
+        ),
         Scene::new("l0 of 10 micrometres", pool([20, 10], 1e-5, [0.0; 2]), 300, still(1.0)),
         Scene::new("l0 of 100 m", pool([20, 10], 100.0, [0.0; 2]), 300, still(200.0)),
         Scene::new("1 km from the origin", pool([20, 10], 0.02, [1000.0, 1000.0]), 300, still(3.0)),
-        Scene::new("no gravity", pool([20, 10], 0.02, [0.0; 2]), 300, still(0.1)).set(&["run.gravity=[0,0,0]"]),
-        Scene::new("gravity sideways", pool([20, 10], 0.02, [0.0; 2]), 300, still(4.0)).set(&["run.gravity=[9.81,0,0]", "tank.open=[]"]),
-        Scene::new("gravity upwards, out of the tank", pool([20, 10], 0.02, [0.0; 2]), 10, Expect::Refuse).set(&["run.gravity=[0,0,9.81]"]),
+        Scene::new("no gravity", pool([20, 10], 0.02, [0.0; 2]), 300, still(0.1))
+            .set(&["run.gravity=[0,0,0]"]),
+        Scene::new("gravity sideways", pool([20, 10], 0.02, [0.0; 2]), 300, still(4.0))
+            .set(&["run.gravity=[9.81,0,0]", "tank.open=[]"]),
+        Scene::new("gravity upwards, out of the tank", pool([20, 10], 0.02, [0.0; 2]), 10, Expect::Refuse)
+            .set(&["run.gravity=[0,0,9.81]"]),
         Scene::new("viscosity 1e-6", COLLAPSE.into(), 300, still(5.0)).set(&["fluid.viscosity=1e-6"]),
         Scene::new("viscosity 1e-2", COLLAPSE.into(), 300, still(5.0)).set(&["fluid.viscosity=1e-2"]),
         Scene::new("viscosity 1", COLLAPSE.into(), 300, Expect::Refuse).set(&["fluid.viscosity=1"]),
         Scene::new("viscosity 10", COLLAPSE.into(), 300, Expect::Refuse).set(&["fluid.viscosity=10"]),
-        Scene::new("viscosity 10, with the step adapted", COLLAPSE.into(), 300, still(5.0)).set(&["fluid.viscosity=10", "run.adaptive=true"]),
-        Scene::new("a wall is missing and a body falls out", cube(0.2, ""), 3000, Expect::Guard).set(&["tank.open=[\"z_min\"]"]),
+        Scene::new("viscosity 10, with the step adapted", COLLAPSE.into(), 300, still(5.0))
+            .set(&["fluid.viscosity=10", "run.adaptive=true"]),
+        Scene::new("a wall is missing and a body falls out", cube(0.2, ""), 3000, Expect::Guard)
+            .set(&["tank.open=[\"z_min\"]"]),
         Scene::new("spring 1e4 N/m", cube(0.2, ""), 1000, still(0.0)).set(&["contact.spring=1e4"]),
         Scene::new("spring 1e9 N/m", cube(0.2, ""), 1000, still(0.0)).set(&["contact.spring=1e9"]),
         Scene::new("a body of 1 g", cube(0.2, ""), 1000, still(0.0)).set(&["body.0.density=1.0"]),
-        Scene::new("a body of 100 t", cube(0.2, ""), 1000, still(0.0)).set(&["body.0.density=1e8", "contact.spring=1e11"]),
-        Scene::new("a body that spins at 1000 rad/s", cube(0.0, ""), 1000, Expect::FinishOrGuard).set(&["body.0.angular_velocity=[1000,300,0]", "body.0.center=[0.4,0.4,0.3]"]),
+        Scene::new("a body of 100 t", cube(0.2, ""), 1000, still(0.0))
+            .set(&["body.0.density=1e8", "contact.spring=1e11"]),
+        Scene::new("a body that spins at 1000 rad/s", cube(0.0, ""), 1000, Expect::FinishOrGuard)
+            .set(&["body.0.angular_velocity=[1000,300,0]", "body.0.center=[0.4,0.4,0.3]"]),
         Scene::new("a heap of 100 bodies", heap(100), 500, still(0.0)),
         Scene::new("a gate that shuts onto water", GATE.into(), 700, Expect::FinishOrGuard),
-        Scene::new("a time step ten times too long", COLLAPSE.into(), 200, Expect::FinishOrGuard).set(&["run.time_step=1e-2", "fluid.sound_speed=2"]),
-        Scene::new("the same, with the step adapted", COLLAPSE.into(), 300, still(5.0)).set(&["run.time_step=1e-2", "run.adaptive=true"]),
-        Scene::new("gamma of 4.5", COLLAPSE.replace("sound_speed = 6.0", "relaxation = 4.5"), 10, Expect::Refuse),
-        Scene::new("a spacing that is not a number", COLLAPSE.into(), 10, Expect::Refuse).set(&["run.spacing=nan"]),
-        Scene::new("a tank of 1e12 cells", COLLAPSE.into(), 10, Expect::Refuse).set(&["tank.max=[2e4,1,2e4]"]),
+        Scene::new("a time step ten times too long", COLLAPSE.into(), 200, Expect::FinishOrGuard)
+            .set(&["run.time_step=1e-2", "fluid.sound_speed=2"]),
+        Scene::new("the same, with the step adapted", COLLAPSE.into(), 300, still(5.0))
+            .set(&["run.time_step=1e-2", "run.adaptive=true"]),
+        Scene::new(
+            "gamma of 4.5",
+            COLLAPSE.replace("sound_speed = 6.0", "relaxation = 4.5"),
+            10,
+            Expect::Refuse,
+        ),
+        Scene::new("a spacing that is not a number", COLLAPSE.into(), 10, Expect::Refuse)
+            .set(&["run.spacing=nan"]),
+        Scene::new("a tank of 1e12 cells", COLLAPSE.into(), 10, Expect::Refuse)
+            .set(&["tank.max=[2e4,1,2e4]"]),
         Scene::new("a body in the water that does not displace it", COLLAPSE.into(), 10, Expect::Refuse)
             .set(&[]),
     ];
@@ -217,7 +279,12 @@ pub fn scenes(full: bool) -> Vec<Scene> {
     }
     if full {
         all.push(Scene::new("a heap of 1000 bodies", heap(1000), 500, still(0.0)));
-        all.push(Scene::new("a closed box full to the lid, 8000 particles", full_box(20, 3), 400, still(1.0)));
+        all.push(Scene::new(
+            "a closed box full to the lid, 8000 particles",
+            full_box(20, 3),
+            400,
+            still(1.0),
+        ));
     }
     all
 }

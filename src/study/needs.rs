@@ -1,11 +1,11 @@
 //! What a scene does not need: each kind of scene as planned, against the same scene with every stage forced, dry
 //! walls in, nothing left out. The results must be the same to the last bit.
 
+use super::Study;
 use super::definition::Setup;
 use super::engine::{Context, Job};
 use super::report::{Report, short};
 use super::row::{Measured, Row, Timing};
-use super::Study;
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::case::file::parse;
@@ -39,7 +39,12 @@ const SORTS: [Sort; 7] = [
     Sort { name: "dry: a cube on a floor", text: RESTING, sets: &[], steps: 400 },
     Sort { name: "fixed walls only, still water", text: HYDROSTATIC, sets: &[], steps: 60 },
     Sort { name: "fixed walls only, inviscid", text: HYDROSTATIC, sets: &["fluid.viscosity=0"], steps: 60 },
-    Sort { name: "a dam break before the water spreads", text: DAM_BREAK, sets: &["run.spacing=0.04"], steps: 40 },
+    Sort {
+        name: "a dam break before the water spreads",
+        text: DAM_BREAK,
+        sets: &["run.spacing=0.04"],
+        steps: 40,
+    },
     Sort {
         name: "no collisions of particles",
         text: HYDROSTATIC,
@@ -110,7 +115,10 @@ fn play(sort: &Sort, all: bool) -> Result<(Ran, Plan, Scene)> {
 }
 
 fn measure(sort: &Sort, repetitions: u32) -> Result<Measured> {
-    let mut out = Measured { machine: format!("CPU, {} threads, f64", rayon::current_num_threads()), ..Measured::default() };
+    let mut out = Measured {
+        machine: format!("CPU, {} threads, f64", rayon::current_num_threads()),
+        ..Measured::default()
+    };
     let (mut planned, mut forced) = (Vec::new(), Vec::new());
     for k in 0..repetitions.max(1) {
         let (lean, plan, scene) = play(sort, false)?;
@@ -122,7 +130,10 @@ fn measure(sort: &Sort, repetitions: u32) -> Result<Measured> {
         }
         if lean.bits != whole.bits {
             let different = lean.bits.iter().zip(&whole.bits).filter(|(a, b)| a != b).count();
-            out.degrade(&format!("{different} of {} numbers differ from those with everything run", lean.bits.len()));
+            out.degrade(&format!(
+                "{different} of {} numbers differ from those with everything run",
+                lean.bits.len()
+            ));
         }
         let left: Vec<&str> =
             plan.reasons.iter().filter(|(_, why)| why.is_err()).map(|(stage, _)| stage.name()).collect();
@@ -139,7 +150,11 @@ fn measure(sort: &Sort, repetitions: u32) -> Result<Measured> {
             .filter_map(|(stage, why)| why.err().map(|why| format!("{} ({why})", stage.name())))
             .collect();
         if out.reason.is_empty() {
-            out.reason = if why.is_empty() { "left out: dry walls only".into() } else { format!("left out: {}", why.join(", ")) };
+            out.reason = if why.is_empty() {
+                "left out: dry walls only".into()
+            } else {
+                format!("left out: {}", why.join(", "))
+            };
         }
     }
     out.timing = Timing::of(planned);
@@ -155,7 +170,8 @@ fn finish(rows: &mut [Row], _: Option<f64>) -> Result<Report> {
     let mut report = Report::default();
     for row in rows.iter() {
         let value = |name: &str| row.measured.value(name).map_or_else(|| "?".into(), short);
-        let same = if row.measured.reason.contains("differ") { "NOT the same" } else { "the same to the last bit" };
+        let same =
+            if row.measured.reason.contains("differ") { "NOT the same" } else { "the same to the last bit" };
         report.findings.push(format!(
             "{}: {} of {} stages, {} instead of {} MB, {} instead of {} ms a step ({} % saved), results {same}; {}.",
             row.method,

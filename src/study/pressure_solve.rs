@@ -1,6 +1,7 @@
 //! The pressure equation alone, on one state of a water column: residual and pressure error against iterations,
 //! matrix products and time, for every solver and precision.
 
+use super::Study;
 use super::definition::Setup;
 use super::engine::{Context, Job, Processor};
 use super::report::{Report, short};
@@ -8,7 +9,6 @@ use super::row::{Measured, Row, Timing, Work};
 use super::run_point::products;
 use super::single::Matrix;
 use super::work_precision::{Cost, chart, machines, words};
-use super::Study;
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::case::Preconditioner;
@@ -74,7 +74,8 @@ impl Column {
             (seed >> 40) as f64 / f64::from(1_u32 << 23) - 1.0
         };
         for i in 0..scene.groups.fluid {
-            let mut r = || DVec3::new(random(), if case.run.dimensions == 2 { 0.0 } else { random() }, random());
+            let mut r =
+                || DVec3::new(random(), if case.run.dimensions == 2 { 0.0 } else { random() }, random());
             scene.position[i] += shake * scene.spacing * r();
             scene.velocity[i] += 0.1 * r();
         }
@@ -136,7 +137,10 @@ fn sets(spacing: f64, method: Method, tolerance: f64) -> Vec<String> {
         format!("fluid.solver.tolerance={tolerance:?}"),
         "fluid.solver.warm_start=false".into(),
         // On the device the choice is its own.
-        format!("fluid.solver.preconditioner={}", if method == Method::Device { "auto" } else { preconditioner }),
+        format!(
+            "fluid.solver.preconditioner={}",
+            if method == Method::Device { "auto" } else { preconditioner }
+        ),
     ]
 }
 
@@ -252,7 +256,8 @@ fn device(column: &Column, cpu: &Cpu, exact: &[f64], tolerance: f64, context: &C
 fn finish(rows: &mut [Row], wanted: Option<f64>) -> Result<Report> {
     let mut report = Report::default();
     let error = "pressure error [-]";
-    let mut spacings: Vec<String> = rows.iter().filter_map(|r| r.parameters.get("spacing").cloned()).collect();
+    let mut spacings: Vec<String> =
+        rows.iter().filter_map(|r| r.parameters.get("spacing").cloned()).collect();
     spacings.dedup();
     spacings.sort();
     spacings.dedup();
@@ -262,9 +267,9 @@ fn finish(rows: &mut [Row], wanted: Option<f64>) -> Result<Report> {
         let unknowns = own.iter().find_map(|r| r.measured.value("unknowns [-]")).unwrap_or(0.0);
         let title = format!("Pressure equation, {} unknowns", short(unknowns));
         for (cost, what) in [(Cost::WallTime, "time"), (Cost::Products, "products")] {
-            report
-                .charts
-                .extend(chart(&title, &own, error, cost).map(|c| (format!("pressure-solve-{spacing}-{what}"), c)));
+            report.charts.extend(
+                chart(&title, &own, error, cost).map(|c| (format!("pressure-solve-{spacing}-{what}"), c)),
+            );
         }
         report.charts.push((format!("pressure-solve-{spacing}-residual"), residuals(&title, &own)));
         report.findings.push(format!("{title}. {}", words(&own, error, wanted.unwrap_or(1e-3))));
@@ -312,7 +317,8 @@ pub fn study(setup: &Setup) -> Study {
                 if method == Method::Device && tolerance < 1e-5 {
                     continue;
                 }
-                let parameters = [("spacing", format!("{spacing:.6}")), ("tolerance", format!("{tolerance:e}"))];
+                let parameters =
+                    [("spacing", format!("{spacing:.6}")), ("tolerance", format!("{tolerance:e}"))];
                 jobs.push(Job::new(method.name(), &parameters, spacing.powi(-4), move |context| {
                     measure(spacing, method, tolerance, context)
                 }));

@@ -165,6 +165,13 @@ impl Row {
         let parts: Vec<String> = self.parameters.iter().map(|(k, v)| format!("{k} = {v}")).collect();
         parts.join(", ")
     }
+
+    /// Method and parameters in words, without what the method says already.
+    pub fn label(&self) -> String {
+        let more = self.parameters.iter().filter(|(_, v)| !self.method.contains(v.as_str()));
+        let parts: Vec<String> = more.map(|(k, v)| format!("{k} = {v}")).collect();
+        if parts.is_empty() { self.method.clone() } else { format!("{}, {}", self.method, parts.join(", ")) }
+    }
 }
 
 /// 64-bit FNV-1a, as 16 hexadecimal digits: the same on every machine and in every version of the compiler.

@@ -49,7 +49,9 @@ impl Matrix {
     /// that the recursion believes in, ||r|| / ||b||.
     pub fn solve(&self, b: &[f64], tolerance: f64, most: u32) -> (Vec<f64>, u32, f64) {
         let n = self.slot.len();
-        let dot = |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum() };
+        let dot = |a: &[f32], b: &[f32]| -> f64 {
+            a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        };
         // Scaled to unit size: squares of small numbers must not leave the range.
         let scale = b.iter().fold(0.0_f64, |m, b| m.max(b.abs())).max(f64::MIN_POSITIVE);
         let mut r: Vec<f32> = self.slot.iter().map(|&i| (b[i] / scale) as f32).collect();

@@ -83,8 +83,11 @@ pub fn maps() -> Vec<Map> {
 /// The points.
 pub fn jobs(full: bool) -> Vec<Job> {
     let mut jobs = Vec::new();
-    let zetas: &[f64] =
-        if full { &[0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0] } else { &[0.001, 0.01, 0.1, 0.3, 0.5, 1.0, 2.0] };
+    let zetas: &[f64] = if full {
+        &[0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0]
+    } else {
+        &[0.001, 0.01, 0.1, 0.3, 0.5, 1.0, 2.0]
+    };
     for &zeta in zetas {
         for omega_dt in [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.6, 1.9, 2.1] {
             let parameters = [("omega_dt", f64::to_string(&omega_dt)), ("zeta", zeta.to_string())];

@@ -134,9 +134,8 @@ pub fn words(rows: &[Row], error: &str, wanted: f64) -> String {
             String::new()
         };
         format!(
-            "{} with {}: error {}{time}, {} particle-steps, on {}{degraded}",
-            row.method,
-            row.setting(),
+            "{}: error {}{time}, {} particle-steps, on {}{degraded}",
+            row.label(),
             short(c.error),
             short(row.measured.work.particle_steps as f64),
             row.measured.machine
@@ -170,10 +169,7 @@ pub fn report(name: &str, title: &str, rows: &[Row], errors: &[String], wanted: 
             .fold((f64::INFINITY, 0.0_f64), |(a, b), c| (a.min(c.error), b.max(c.error)));
         let middle = if most > 0.0 { (least * most).sqrt() } else { 0.0 };
         report.findings.push(words(rows, error, wanted.unwrap_or(middle)));
-        let best: Vec<String> = front(&all)
-            .iter()
-            .map(|c| format!("{} ({})", rows[c.row].method, rows[c.row].setting()))
-            .collect();
+        let best: Vec<String> = front(&all).iter().map(|c| rows[c.row].label()).collect();
         if best.len() > 1 {
             report.findings.push(format!("Pareto front of {error}, cheapest first: {}.", best.join(" -> ")));
         }
@@ -213,12 +209,10 @@ mod tests {
         let rows = rows();
         let text = words(&rows, "e [-]", 0.06);
         assert!(
-            text.starts_with(
-                "For a e [-] of at most 0.06 take accurate with spacing = 0.05: error 0.05; 1.1 s"
-            ),
+            text.starts_with("For a e [-] of at most 0.06 take accurate, spacing = 0.05: error 0.05; 1.1 s"),
             "{text}"
         );
-        assert!(words(&rows, "e [-]", 1e-9).contains("closest is accurate with spacing = 0.025"));
+        assert!(words(&rows, "e [-]", 1e-9).contains("closest is accurate, spacing = 0.025"));
         assert!(words(&rows, "f [-]", 0.1).starts_with("No point"));
     }
 

@@ -1,0 +1,138 @@
+//! The study command: resumed after a kill, split into shards, failures as rows, mistakes told.
+#![allow(missing_docs)]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Four small tanks, one of which is refused.
+const STUDY: &str = r#"
+name = "small"
+title = "Small tanks"
+method = "{preset}"
+repetitions = 1
+text = """
+[run]
+spacing = 0.02
+time_step = 1e-3
+end = 0.3
+dimensions = 2
+[tank]
+min = [0, 0, 0]
+max = [0.2, 1, 0.4]
+open = ["z_max"]
+[fluid]
+sound_speed = 4.0
+[[fluid.block]]
+min = [0, 0, 0]
+max = [0.2, 1, 0.2]
+"""
+[measure]
+of = ["hydrostatic_pressure", "volume", "front"]
+from = 0.1
+every = 0.01
+[[axis]]
+name = "preset"
+key = "fluid.preset"
+values = ["paper", "accurate"]
+[[axis]]
+name = "spacing"
+key = "run.spacing"
+values = [0.02, 0.01, 0.005]
+[[axis]]
+name = "tolerance"
+key = "fluid.solver.tolerance"
+values = [1e-3, 7.0]
+[[error]]
+value = "pressure error [-]"
+[[error]]
+curve = "front"
+against = "finest"
+"#;
+
+fn seixo(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_seixo"));
+    command.current_dir(folder).args(["study"]).args(arguments);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let out = seixo(folder, arguments).output().expect("the program starts");
+    let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+    (out.status.code().unwrap_or(-1), text)
+}
+
+/// results.csv without the columns that tell times.
+fn table(folder: &Path) -> Vec<Vec<String>> {
+    let mut reader = csv::Reader::from_path(folder.join("results.csv")).expect("a table");
+    let head = reader.headers().expect("a header").clone();
+    let kept: Vec<usize> = (0..head.len()).filter(|&k| !head[k].starts_with("wall")).collect();
+    let pick = |row: &csv::StringRecord| kept.iter().map(|&k| row[k].to_string()).collect();
+    std::iter::once(pick(&head)).chain(reader.records().map(|r| pick(&r.expect("a row")))).collect()
+}
+
+#[test]
+fn a_killed_sweep_goes_on_and_shards_join_to_the_same_table() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::write(folder.join("small.toml"), STUDY).expect("a file");
+    assert_eq!(run(folder, &["small.toml", "-o", "whole"]).0, 0);
+    let whole = table(&folder.join("whole"));
+    assert_eq!(whole.len(), 1 + 12);
+    let classes = |class: &str| whole.iter().filter(|row| row.iter().any(|c| c == class)).count();
+    assert_eq!((classes("ok"), classes("failed")), (6, 6), "{whole:?}");
+
+    // Killed, with no chance to tidy up, as soon as some points are there.
+    let mut child = seixo(folder, &["small.toml", "-o", "killed"]).spawn().expect("the program starts");
+    let points = || std::fs::read_dir(folder.join("killed/points")).map_or(0, Iterator::count);
+    let start = Instant::now();
+    while points() < 3 && start.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().expect("a kill");
+    child.wait().expect("an end");
+    assert!(!folder.join("killed/results.csv").exists(), "it was killed too late to show anything");
+    let (code, text) = run(folder, &["small.toml", "-o", "killed"]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("are finished already"), "{text}");
+    assert_eq!(table(&folder.join("killed")), whole);
+
+    assert_eq!(run(folder, &["small.toml", "-o", "one", "--shard", "1/2"]).0, 0);
+    assert_eq!(run(folder, &["small.toml", "-o", "two", "--shard", "2/2"]).0, 0);
+    assert!(table(&folder.join("one")).len() < whole.len());
+    assert_eq!(run(folder, &["collect", "one", "two", "-o", "joined"]).0, 0);
+    assert_eq!(table(&folder.join("joined")), whole);
+    for file in
+        ["report.md", "results.json", "small-pressure_error-time.svg", "small-pressure_error-time.png"]
+    {
+        assert!(folder.join("joined").join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_wanted_error_is_answered_in_words() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("small.toml"), STUDY).expect("a file");
+    let (code, text) = run(folder.path(), &["small.toml", "--error", "0.5", "-q"]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("For a pressure error [-] of at most 0.5 take"), "{text}");
+}
+
+#[test]
+fn mistakes_are_told_before_anything_runs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("bad.toml"), STUDY.replace("finest", "nowhere.csv")).expect("a file");
+    for (arguments, expected) in [
+        (&["hydrostatik"][..], "did you mean `hydrostatic`"),
+        (&["none.toml"][..], "no study file"),
+        (&["bad.toml"][..], "nowhere.csv"),
+        (&["collect"][..], "name the folders"),
+        (&["collect", "."][..], "holds no study"),
+        (&["gallery", "--set", "run.end=1"][..], "--set does not apply"),
+    ] {
+        let (code, text) = run(folder.path(), arguments);
+        assert_eq!(code, 2, "{arguments:?}: {text}");
+        assert!(text.contains(expected), "{arguments:?}: {text}");
+    }
+}
