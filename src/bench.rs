@@ -4,7 +4,7 @@
 //! measured in the same process, and the counts of bytes, dispatches and iterations.
 
 use crate::backend::Backend;
-use crate::case::{Case, Preconditioner};
+use crate::case::Case;
 use crate::error::Result;
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
@@ -149,11 +149,7 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         seconds_per_step: mean,
         quartiles: [quartile(0.25), quartile(0.75)],
         particles_per_second: total as f64 / mean,
-        preconditioner: if sim.plan.preconditioner == Preconditioner::Multigrid {
-            "multigrid"
-        } else {
-            "jacobi"
-        },
+        preconditioner: sim.plan.preconditioner_name(),
         tolerance: sim.settings().tolerance,
         iterations: iterations / steps.max(1) as f64,
         density_error_max: monitor.density_error_max,

@@ -162,6 +162,11 @@ impl Plan {
         self.reasons.iter().any(|(s, why)| *s == stage && why.is_ok())
     }
 
+    /// `jacobi` or `multigrid`.
+    pub fn preconditioner_name(&self) -> &'static str {
+        if self.preconditioner == Preconditioner::Multigrid { "multigrid" } else { "jacobi" }
+    }
+
     /// Whether the scene has fluid to compute.
     pub fn wet(&self) -> bool {
         self.has(Stage::Predict)

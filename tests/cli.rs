@@ -162,7 +162,10 @@ fn result_json_has_the_agreed_keys_whatever_happened() {
     }
     for (table, keys) in [
         ("particles", "total fluid wall dummy body"),
-        ("pressure", "unknowns_mean iterations_mean iterations_max relative_residual_max failures"),
+        (
+            "pressure",
+            "preconditioner unknowns_mean iterations_mean iterations_max relative_residual_max failures",
+        ),
         (
             "monitors",
             "density_error_max density_error_mean courant_max energy_start_J energy_end_J lost_particles \

@@ -22,6 +22,7 @@ use seixo::pressure::cg::System;
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::{Kind, Scene};
+use seixo::simulation::Simulation;
 
 /// Largest error of a particle stage, relative to the largest value (to l0 for positions).
 const PARTICLE: f64 = 1e-5;
@@ -469,6 +470,38 @@ fn multigrid() {
         let errors = compare::differences(Stage::ConjugateGradient, &got, &want, &pair.params);
         assert!(errors.iter().all(|e| e.l2_relative < SOLVE), "{errors:?}");
     });
+}
+
+#[test]
+fn multigrid_needs_few_iterations_at_any_spacing() {
+    if !device() {
+        return;
+    }
+    let mut case: seixo::case::Case =
+        toml::from_str(include_str!("../cases/dam_break.toml")).expect("a valid case");
+    for spacing in [0.03, 0.02] {
+        case.run.spacing = spacing;
+        let scene = Scene::build(&case).expect("a valid scene");
+        let mut iterations = |preconditioner, on_device: bool| {
+            case.fluid.as_mut().expect("it has fluid").solver.preconditioner = preconditioner;
+            let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
+                Ok(if on_device {
+                    Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>
+                } else {
+                    Box::new(Cpu::new(s, p, plan, settings)?)
+                })
+            })
+            .expect("the simulation starts");
+            (0..4).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
+        };
+        let gpu = iterations(Preconditioner::Multigrid, true);
+        let cpu = iterations(Preconditioner::Multigrid, false);
+        let diagonal = iterations(Preconditioner::Jacobi, true);
+        println!(
+            "l0 = {spacing}: at most {gpu} on the device, {cpu} on the CPU, {diagonal} with the diagonal"
+        );
+        assert!(gpu > 1 && gpu <= 8 && gpu.abs_diff(cpu) <= 1 && diagonal > 2 * gpu);
+    }
 }
 
 #[test]

@@ -107,8 +107,8 @@ fn words(summary: &Summary, out: &Path) -> String {
     if summary.particles.fluid > 0 {
         let p = &summary.pressure;
         lines.push(format!(
-            "pressure: {:.1} iterations a solve (at most {}), {} failures; density error {:.2e} mean, {:.2e} max",
-            p.iterations_mean, p.iterations_max, p.failures, m.density_error_mean, m.density_error_max
+            "pressure: {:.1} iterations a solve (at most {}) with {}, {} failures; density error {:.2e} mean, {:.2e} max",
+            p.iterations_mean, p.iterations_max, p.preconditioner.unwrap_or("nothing"), p.failures, m.density_error_mean, m.density_error_max
         ));
         let (lost, fluid) = (m.lost_particles, summary.particles.fluid);
         lines.push(format!(

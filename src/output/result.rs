@@ -39,6 +39,8 @@ pub struct Particles {
 /// The pressure Poisson equation over all steps.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Pressure {
+    /// Preconditioner that ran: `jacobi` or `multigrid`; nothing for a scene without fluid.
+    pub preconditioner: Option<&'static str>,
     /// Mean number of unknowns.
     pub unknowns_mean: f64,
     /// Mean number of iterations a solve.
