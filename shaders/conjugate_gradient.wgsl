@@ -1,10 +1,14 @@
-// Pressure Poisson equation by conjugate gradients with the diagonal as preconditioner, matrix-free over the neighbour
-// lists: (A p)_i = D_i p_i - sum w_ij p_j.
+// Pressure Poisson equation by preconditioned conjugate gradients, matrix-free over the neighbour lists:
+// (A p)_i = D_i p_i - sum w_ij p_j.
 // Twin: src/kernels/conjugate_gradient.rs (the operator) and src/pressure/cg.rs (the iteration)
 //
-// Two dispatches an iteration. With z = r / D of the last residual,
+// Two dispatches an iteration with the diagonal as preconditioner. With z = r / D of the last residual,
 //   multiply:  beta = rz / rz_old,  p = z + beta p,  q = A z + beta q (so q = A p),  partial sums of p.q
 //   advance:   alpha = rz / p.q,  x += alpha p,  r -= alpha q,  z = r / D,  partial sums of r.z and r.r
+// With multigrid `advance` leaves z = w r / D, the first sweep from zero, and a cycle follows it that makes a better z:
+//   descend:   its residual r - A z goes to the cells; the verdict of the iteration falls here
+//   (shaders/multigrid.wgsl adds the correction of the cells)
+//   ascend:    z = one more sweep from there, partial sums of r.z
 // z lies next to the positions (one load a neighbour). Sums are trees of fixed shape: 16 x 16 in a workgroup, then every
 // workgroup of the next dispatch adds the workgroups' sums in the same order, so all come to the same scalars and the same
 // verdict without another dispatch. Scalars and verdict stay here; the host looks at `solve` every few iterations.
@@ -23,6 +27,15 @@
 @group(0) @binding(10) var<storage, read_write> partial_sum: array<vec4f>;
 @group(0) @binding(11) var<storage, read_write> solve: Solve;
 @group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
+//#if MULTIGRID
+@group(0) @binding(13) var<storage, read_write> smoothed: array<f32>; // r - A z after the first sweep
+@group(0) @binding(14) var<storage, read> corrected: array<vec4f>; // position, z with the cells' correction
+
+// As crate::kernels::multigrid.
+const DAMPING: f32 = 0.9;
+//#else
+const DAMPING: f32 = 1.0;
+//#endif
 
 // As crate::backend::gpu::layout::Solve.
 struct Solve {
@@ -144,7 +157,7 @@ fn start_residual(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoc
     }
 }
 
-// Start from zero if the last pressure is worse than none; z = r / D; sums of r.z and r.r.
+// Start from zero if the last pressure is worse than none; z as in `advance`; sums of r.z and r.r.
 @compute @workgroup_size(WORKGROUP)
 fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
          @builtin(workgroup_id) group: vec3u) {
@@ -160,7 +173,7 @@ fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
                 residual[i] = equation.x;
             }
             let r = residual[i];
-            let z = r / equation.y;
+            let z = DAMPING * r / equation.y;
             preconditioned[i].w = z;
             sum += vec4f(r * z, r * r, 0.0, 0.0);
         }
@@ -179,6 +192,75 @@ fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
     }
 }
 
+// Whether the iteration goes on with a residual r.r.
+fn judge(residual_squared: f32) -> u32 {
+    if !finite(residual_squared) {
+        return NOT_FINITE;
+    }
+    if residual_squared <= params.tolerance_squared * solve.source_squared {
+        return CONVERGED;
+    }
+    return select(GO_ON, MAX_ITERATIONS, solve.iterations >= params.max_iterations);
+}
+
+//#if MULTIGRID
+@compute @workgroup_size(WORKGROUP)
+fn descend(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+           @builtin(workgroup_id) group: vec3u) {
+    let total = sum_of_partials(params.reduction_groups, t);
+    if total.w != 0.0 {
+        return;
+    }
+    let verdict = judge(total.y);
+    if group.x == 0u && t == 0u {
+        solve.residual_squared = total.y;
+        if verdict != GO_ON {
+            finish(verdict);
+        }
+    }
+    if verdict != GO_ON {
+        return;
+    }
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let diagonal = source_diagonal[i].y;
+        if diagonal > 0.0 {
+            let me = preconditioned[i];
+            smoothed[i] = residual[i] - (diagonal * me.w - neighbours(i, me.xyz));
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn ascend(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+          @builtin(workgroup_id) group: vec3u) {
+    if done(t) {
+        return;
+    }
+    var sum = 0.0;
+    for (var i = id.x; i < params.pressure_slots; i += stride()) {
+        let diagonal = source_diagonal[i].y;
+        if diagonal > 0.0 {
+            let me = corrected[i];
+            let near = near_of(neighbour_count[i]);
+            var others = 0.0;
+            for (var k = 0u; k < near; k++) {
+                let other = corrected[neighbour_list[near_place(i, k)]];
+                let r = other.xyz - me.xyz;
+                others += weight(dot(r, r)) * other.w;
+            }
+            let r = residual[i];
+            let z = me.w + DAMPING * (r - (diagonal * me.w - others)) / diagonal;
+            preconditioned[i].w = z;
+            sum += r * z;
+        }
+    }
+    let all = workgroup_sum(vec4f(sum, 0.0, 0.0, 0.0), t);
+    if t == 0u {
+        partial_sum[params.reduction_groups + group.x] = all;
+    }
+}
+
+//#endif
 @compute @workgroup_size(WORKGROUP)
 fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
             @builtin(workgroup_id) group: vec3u) {
@@ -188,18 +270,20 @@ fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     }
     let rz = total.x;
     var verdict = GO_ON;
-    if !finite(total.y) {
-        verdict = NOT_FINITE;
-    } else if total.y <= params.tolerance_squared * solve.source_squared {
-        verdict = CONVERGED;
-    } else if solve.iterations >= params.max_iterations {
-        verdict = MAX_ITERATIONS;
-    } else if !(rz > 0.0) {
+//#if MULTIGRID
+    // `descend` has judged the residual.
+//#else
+    verdict = judge(total.y);
+//#endif
+    if verdict == GO_ON && !(rz > 0.0) {
         verdict = BREAKDOWN;
     }
     if group.x == 0u && t == 0u {
         solve.rz = rz;
+//#if MULTIGRID
+//#else
         solve.residual_squared = total.y;
+//#endif
         if verdict != GO_ON {
             finish(verdict);
         }
@@ -251,7 +335,7 @@ fn advance(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_i
             pressure[i] += alpha * p.x;
             let r = residual[i] - alpha * p.y;
             residual[i] = r;
-            let z = r / diagonal;
+            let z = DAMPING * r / diagonal;
             preconditioned[i].w = z;
             sum += vec4f(r * z, r * r, 0.0, 0.0);
         }

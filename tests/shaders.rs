@@ -3,8 +3,10 @@
 #[path = "common/moving.rs"]
 mod common;
 
+use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
 use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, counter};
 use seixo::backend::gpu::{Gpu, shader};
+use seixo::case::Preconditioner;
 use seixo::params::Params;
 use seixo::plan::Plan;
 use seixo::pressure::Settings;
@@ -135,6 +137,8 @@ fn structs_lie_the_same_on_both_sides() {
             pad,
         }
     );
+    same_layout!("multigrid_levels", Hierarchy { level, operation, levels, capacity, cells, operations });
+    same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
     same_layout!(
         "conjugate_gradient",
@@ -203,6 +207,21 @@ fn constants_are_the_same_on_both_sides() {
     }
     assert_eq!(constant(text("monitor"), "WIDTH"), MONITOR_WIDTH as f64);
     assert_eq!(constant(text("monitor"), "SPEED_BINS"), seixo::monitor::SPEED_BINS as f64);
+    use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};
+    // Written alike, hence read alike.
+    let short = |x: f32| x.to_string().parse::<f64>().expect("a number");
+    assert_eq!(constant(text("multigrid"), "DAMPING"), short(DAMPING));
+    assert_eq!(constant(text("multigrid"), "OVER_CORRECTION"), short(OVER_CORRECTION));
+    let with_multigrid = shader::source(text("conjugate_gradient"), &["MULTIGRID"]);
+    assert_eq!(constant(&with_multigrid, "DAMPING"), short(DAMPING));
+    for (name, operation) in [
+        ("DOWN", Operation::Down),
+        ("UP", Operation::Up),
+        ("FORTH", Operation::Forth),
+        ("BACK", Operation::Back),
+    ] {
+        assert_eq!(constant(text("multigrid"), name), f64::from(operation as u32), "{name}");
+    }
     for (name, outcome) in [
         ("CONVERGED", Outcome::Converged),
         ("ZERO_SOURCE", Outcome::ZeroSource),
@@ -237,11 +256,13 @@ fn pipelines_and_bindings_fit_together_for_every_kind_of_scene() {
                     scene.solids.clear();
                 }
                 let params = Params::new(&case, &scene).expect("valid");
-                let plan = Plan::new(&case, &scene, &params);
                 let settings = Settings { tolerance: 1e-3, max_iterations: 100, warm_start: true };
-                let built = Gpu::dry_run(&scene, &params, &plan, settings);
-                if let Err(e) = built {
-                    panic!("{dimensions}D, {preset}, {viscosity}, {collision}, moving {moving}: {e}");
+                for preconditioner in [Preconditioner::Jacobi, Preconditioner::Multigrid] {
+                    let plan = Plan { preconditioner, ..Plan::new(&case, &scene, &params) };
+                    let built = Gpu::dry_run(&scene, &params, &plan, settings);
+                    if let Err(e) = built {
+                        panic!("{dimensions}D, {preset}, {viscosity}, {collision}, moving {moving}: {e}");
+                    }
                 }
             }
         }

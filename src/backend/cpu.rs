@@ -433,7 +433,7 @@ impl Backend for Cpu {
             number: 8,
             vector: 24,
             weight: 8,
-            preconditioner_weight: if self.multigrid.is_some() { 4 } else { 0 },
+            preconditioner_weight: self.multigrid.as_ref().map(|_| 4),
         })
     }
 

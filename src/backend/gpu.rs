@@ -6,6 +6,7 @@
 
 mod adapter;
 mod context;
+pub mod hierarchy;
 pub mod layout;
 pub mod shader;
 mod solve;
@@ -15,6 +16,7 @@ pub use adapter::{AdapterInfo, adapters};
 
 use super::{Backend, Counters, traffic};
 use crate::body::{Pose, Wrench};
+use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
@@ -26,6 +28,7 @@ use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use context::Context;
 use glam::{DVec3, Vec3};
+use hierarchy::Levels;
 use layout::{Coefficients, Constants, Memory, MonitorSum, Sizes, WORKGROUP, counter};
 
 /// Particles in f32 on a device.
@@ -45,6 +48,8 @@ pub struct Gpu {
     coefficients: Coefficients,
     dt: f64,
     last_iterations: u32,
+    /// Levels of the multigrid preconditioner, if that is planned.
+    levels: Option<Levels>,
 }
 
 /// What `scene` takes on a device, without one.
@@ -145,11 +150,16 @@ impl Gpu {
             counters: Counters::default(),
             coefficients: Coefficients::default(),
             dt: 0.0,
-            last_iterations: 30,
+            last_iterations: if plan.preconditioner == Preconditioner::Multigrid { 5 } else { 30 },
+            levels: (plan.wet() && plan.preconditioner == Preconditioner::Multigrid)
+                .then(|| Levels::new(&sizes)),
         };
         if gpu.wet {
             let constants = Constants::new(params, &groups, &gpu.grid, &gpu.settings, &gpu.sizes);
             gpu.context.upload("params", &[constants])?;
+            if let Some(levels) = &gpu.levels {
+                gpu.context.upload("hierarchy", &[levels.hierarchy()])?;
+            }
             gpu.write_fields(&Fields::new(scene))?;
             gpu.write_solids(scene)?;
         }
@@ -397,7 +407,7 @@ impl Backend for Gpu {
             number: 4,
             vector: 16,
             weight: 0,
-            preconditioner_weight: 0,
+            preconditioner_weight: self.levels.as_ref().map(|_| 0),
         })
     }
 

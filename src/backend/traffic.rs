@@ -27,8 +27,8 @@ pub struct Sizes {
     pub vector: u64,
     /// Bytes of a stored weight: 8 where weights are kept, 0 where they are made afresh.
     pub weight: u64,
-    /// Bytes of a weight in the preconditioner; 0 without multigrid.
-    pub preconditioner_weight: u64,
+    /// Bytes of a weight in the multigrid preconditioner, if that runs.
+    pub preconditioner_weight: Option<u64>,
 }
 
 impl Sizes {
@@ -49,9 +49,9 @@ impl Sizes {
                 let iterations = u64::from(solve.iterations);
                 let operator = pressure_pairs * (4 + weight) + pressure * 3 * number;
                 let vectors = pressure * 9 * number;
-                let cycle = if self.preconditioner_weight > 0 {
+                let cycle = if let Some(weight) = self.preconditioner_weight {
                     // Two passes over the finest level's rows; coarse levels are a tenth of that.
-                    2 * (pressure_pairs * (4 + self.preconditioner_weight) + pressure * 4 * 4)
+                    2 * (pressure_pairs * (4 + weight) + pressure * 4 * 4)
                 } else {
                     pressure * 3 * number
                 };

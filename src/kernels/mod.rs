@@ -9,6 +9,8 @@ pub mod conjugate_gradient;
 pub mod correct;
 pub mod monitor;
 pub mod move_solids;
+pub mod multigrid;
+pub mod multigrid_levels;
 pub mod neighbour_list;
 pub mod number_density;
 pub mod predict;

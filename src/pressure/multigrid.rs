@@ -1,25 +1,16 @@
-//! Aggregation multigrid as preconditioner of the PPE, rebuilt every step.
-//!
-//! Level 1 joins the unknowns of a background cell (one effective radius wide), each further level 2 x 2 x 2
-//! cells of the last; interpolation is piecewise constant and the coarse operators are Galerkin products, so
-//! every one is a 27-point stencil. Plain aggregation is about twice too stiff a level, hence the
-//! over-correction. One damped Jacobi sweep before and after; a V-cycle on the finest level, W below,
-//! where work is a tenth. The cycle is symmetric: the preconditioner is positive definite for any positive
-//! over-correction. It is computed in f32: it need only be an approximation, and half the bytes move.
+//! Aggregation multigrid as preconditioner of the PPE, rebuilt every step: levels as
+//! [`crate::kernels::multigrid_levels`] says, the cycle as [`crate::kernels::multigrid`] does, here in
+//! compressed rows. It is computed in f32: it need only be an approximation, and half the bytes move.
 
 use super::cg::{Precondition, System};
 use crate::cells::Grid;
 use crate::fields::State;
+use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
+use crate::kernels::multigrid_levels::{LevelSums, level_cells, offset_of, place_of};
 use crate::neighbours::CHUNK;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Damping of the Jacobi sweeps; the largest eigenvalue of D^-1 A is 1.30 to 1.33.
-const DAMPING: f32 = 0.9;
-/// Factor on coarse corrections.
-const OVER_CORRECTION: f32 = 1.4;
-/// Unknowns at which a level is solved directly.
-const DIRECT: usize = 48;
 /// Rows below which a level is not worth threads.
 const PARALLEL: usize = 4096;
 
@@ -62,7 +53,13 @@ impl Level {
     fn smooth(&mut self) {
         self.residual(|_, r| r);
         let (x, r, d) = (&mut self.x, &self.r, &self.diagonal);
-        x.iter_mut().zip(r).zip(d).for_each(|((x, r), d)| *x += DAMPING * r / d);
+        x.iter_mut().zip(r).zip(d).for_each(|((x, r), d)| *x = sweep(*x, *r, *d));
+    }
+
+    /// The first sweep, from zero.
+    fn first_smooth(&mut self) {
+        let (x, b, d) = (&mut self.x, &self.b, &self.diagonal);
+        x.iter_mut().zip(b).zip(d).for_each(|((x, b), d)| *x = first_sweep(*b, *d));
     }
 }
 
@@ -85,8 +82,6 @@ pub struct Multigrid {
     t: Vec<f32>,
     levels: Vec<Level>,
     used: usize,
-    factor: Vec<f64>,
-    solution: Vec<f64>,
     scratch: Scratch,
 }
 
@@ -110,12 +105,6 @@ impl Scratch {
 /// Marks a slot without an unknown.
 const NOWHERE: i32 = i32::MIN;
 
-/// 9 x + 3 y + z.
-#[inline(always)]
-fn code([x, y, z]: [i32; 3]) -> i32 {
-    9 * x + 3 * y + z
-}
-
 impl Multigrid {
     /// Rebuild for `system` with particles at `position`.
     pub fn build(&mut self, system: &System, grid: &Grid, position: &[DVec3]) {
@@ -124,24 +113,28 @@ impl Multigrid {
         }
         self.aggregate_cells(system, grid, position);
         self.first_level(system);
-        self.used = 1;
-        while self.levels[self.used - 1].rows() > DIRECT {
-            if self.levels.len() == self.used {
-                self.levels.push(Level::default());
-            }
-            let (fine, coarse) = self.levels.split_at_mut(self.used);
-            let shrunk = coarsen(&mut fine[self.used - 1], &mut coarse[0], &mut self.scratch);
-            self.used += 1;
-            if !shrunk {
-                break;
-            }
+        self.used = level_cells(grid.count).len();
+        self.levels.resize_with(self.used.max(self.levels.len()), Level::default);
+        for l in 1..self.used {
+            let (fine, coarse) = self.levels.split_at_mut(l);
+            coarsen(&mut fine[l - 1], &mut coarse[0], &mut self.scratch);
         }
-        self.factorise();
     }
 
     /// Unknowns of each level, finest first.
     pub fn sizes(&self) -> Vec<usize> {
         std::iter::once(self.members.len()).chain(self.levels[..self.used].iter().map(Level::rows)).collect()
+    }
+
+    /// Sums over the operators of the levels, finest first.
+    pub fn sums(&self) -> Vec<LevelSums> {
+        let sums = |level: &Level| {
+            let mut out = LevelSums { rows: level.rows(), ..Default::default() };
+            level.diagonal.iter().for_each(|&v| out.add(f64::from(v), true));
+            level.value.iter().for_each(|&v| out.add(f64::from(v), false));
+            out
+        };
+        self.levels[..self.used].iter().map(sums).collect()
     }
 
     fn aggregate_cells(&mut self, system: &System, grid: &Grid, position: &[DVec3]) {
@@ -157,8 +150,11 @@ impl Multigrid {
             .into_par_iter()
             .with_min_len(CHUNK)
             .for_each(|(c, d, &state, &a, &x)| {
-                *c =
-                    if state == State::Inner { code(grid.coordinates(x).map(|k| k as i32)) } else { NOWHERE };
+                *c = if state == State::Inner {
+                    place_of(grid.coordinates(x).map(|k| k as i32))
+                } else {
+                    NOWHERE
+                };
                 *d = a as f32;
             });
         let coarse = &mut self.levels[0].coordinates;
@@ -229,72 +225,18 @@ impl Multigrid {
         compress(level, &mut self.scratch);
     }
 
-    fn factorise(&mut self) {
-        let level = &self.levels[self.used - 1];
-        let n = level.rows();
-        let a = &mut self.factor;
-        a.clear();
-        if n > 4 * DIRECT {
-            return;
-        }
-        a.resize(n * n, 0.0);
-        for i in 0..n {
-            // Lifted a little: a floating component must not make the factor singular.
-            a[i * n + i] = f64::from(level.diagonal[i]) * (1.0 + 1e-6);
-            for k in level.start[i] as usize..level.start[i + 1] as usize {
-                a[i * n + level.column[k] as usize] += f64::from(level.value[k]);
-            }
-        }
-        for j in 0..n {
-            for k in 0..j {
-                let l = a[j * n + k];
-                a[j * n + j] -= l * l;
-            }
-            let d = a[j * n + j].max(1e-12 * f64::from(level.diagonal[j])).sqrt();
-            a[j * n + j] = d;
-            for i in j + 1..n {
-                let s: f64 = (0..j).map(|k| a[i * n + k] * a[j * n + k]).sum();
-                a[i * n + j] = (a[i * n + j] - s) / d;
-            }
-        }
-    }
-
-    fn solve_directly(&mut self) {
-        let level = &mut self.levels[self.used - 1];
-        let n = level.rows();
-        let a = &self.factor;
-        if a.is_empty() {
-            level
-                .x
-                .iter_mut()
-                .zip(&level.b)
-                .zip(&level.diagonal)
-                .for_each(|((x, b), d)| *x = DAMPING * b / d);
-            (0..8).for_each(|_| level.smooth());
-            return;
-        }
-        let y = &mut self.solution;
-        y.clear();
-        y.extend(level.b.iter().map(|&b| f64::from(b)));
-        for i in 0..n {
-            let s: f64 = (0..i).map(|k| a[i * n + k] * y[k]).sum();
-            y[i] = (y[i] - s) / a[i * n + i];
-        }
-        for i in (0..n).rev() {
-            let s: f64 = (i + 1..n).map(|k| a[k * n + i] * y[k]).sum();
-            y[i] = (y[i] - s) / a[i * n + i];
-        }
-        level.x.iter_mut().zip(y).for_each(|(x, y)| *x = *y as f32);
-    }
-
     /// x <- B b on level `l` (0 is the first coarse one).
     fn cycle(&mut self, l: usize) {
         if l + 1 == self.used {
-            return self.solve_directly();
+            self.levels[l].first_smooth();
+            (1..SWEEPS).for_each(|_| self.levels[l].smooth());
+            return;
         }
-        let level = &mut self.levels[l];
-        level.x.iter_mut().zip(&level.b).zip(&level.diagonal).for_each(|((x, b), d)| *x = DAMPING * b / d);
-        for visit in 0..2 {
+        self.levels[l].first_smooth();
+        for visit in 0..visits(l) {
+            if visit > 0 {
+                self.levels[l].smooth();
+            }
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
             let (level, next) = (&mut fine[l], &mut coarse[0]);
             level.residual(|_, r| r);
@@ -302,18 +244,10 @@ impl Multigrid {
             level.r.iter().zip(&level.parent).for_each(|(r, &p)| next.b[p as usize] += r);
             self.cycle(l + 1);
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
-            let (level, next) = (&mut fine[l], &coarse[0]);
-            level
-                .x
-                .iter_mut()
-                .zip(&level.parent)
-                .for_each(|(x, &p)| *x += OVER_CORRECTION * next.x[p as usize]);
-            if visit == 0 {
-                level.smooth();
-                level.smooth();
-            }
+            let (level, next, factor) = (&mut fine[l], &coarse[0], over_correction(l));
+            level.x.iter_mut().zip(&level.parent).for_each(|(x, &p)| *x += factor * next.x[p as usize]);
+            level.smooth();
         }
-        self.levels[l].smooth();
     }
 
     /// t <- b - A x on the finest level, in f32.
@@ -351,8 +285,8 @@ fn gather(index: &[u32], weight: &[f32], x: &[f32]) -> f32 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// Next coarser level of `fine`; `false` if it did not get smaller.
-fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) -> bool {
+/// Next coarser level of `fine`.
+fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) {
     let mut low = [i32::MAX; 3];
     let mut high = [i32::MIN; 3];
     for c in &fine.coordinates {
@@ -384,12 +318,11 @@ fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) -> bool 
         s[13] += f64::from(fine.diagonal[i]);
         for k in fine.start[i] as usize..fine.start[i + 1] as usize {
             let q = fine.parent[fine.column[k] as usize] as usize;
-            s[(code(coarse.coordinates[q]) - code(coarse.coordinates[p]) + 13) as usize] +=
+            s[(place_of(coarse.coordinates[q]) - place_of(coarse.coordinates[p]) + 13) as usize] +=
                 f64::from(fine.value[k]);
         }
     }
     compress(coarse, scratch);
-    coarse.rows() < fine.rows()
 }
 
 /// Rows of `level` from the stencils of its cells.
@@ -422,7 +355,7 @@ fn compress(level: &mut Level, scratch: &mut Scratch) {
     for (c, s) in level.coordinates.iter().zip(&*stencil) {
         for (k, &v) in s.iter().enumerate() {
             if k != 13 && v != 0.0 {
-                let d = [k as i32 / 9 - 1, k as i32 / 3 % 3 - 1, k as i32 % 3 - 1];
+                let d = offset_of(k);
                 level.column.push(map[place([c[0] + d[0], c[1] + d[1], c[2] + d[2]])]);
                 level.value.push(v as f32);
             }
@@ -447,7 +380,7 @@ impl Precondition for Multigrid {
         (&mut self.b, &mut self.x, &self.diagonal, r).into_par_iter().with_min_len(CHUNK).for_each(
             |(b, x, d, r)| {
                 *b = (r / scale) as f32;
-                *x = DAMPING * *b / d;
+                *x = first_sweep(*b, *d);
             },
         );
         self.residual(system);
@@ -466,7 +399,7 @@ impl Precondition for Multigrid {
         });
         self.residual(system);
         (z, &self.x, &self.t, &self.diagonal).into_par_iter().with_min_len(CHUNK).for_each(|(z, x, t, d)| {
-            *z = scale * f64::from(x + DAMPING * t / d);
+            *z = scale * f64::from(sweep(*x, *t, *d));
         });
     }
 }

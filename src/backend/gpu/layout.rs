@@ -1,5 +1,7 @@
 //! What the device holds: the structs shared with the shaders and the one table of buffers.
 
+use super::hierarchy::{Hierarchy, Levels};
+use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::monitor::SPEED_BINS;
 use crate::params::{Params, Step};
@@ -215,6 +217,8 @@ pub struct Sizes {
     pub pressure: u64,
     /// Cells of the grid.
     pub cells: u64,
+    /// Cells of the grid along x, y, z.
+    pub grid: [u32; 3],
     /// Moving solids.
     pub solids: u64,
     /// Neighbours of a row at most.
@@ -236,6 +240,7 @@ impl Sizes {
             fixed: g.static_range().len() as u64,
             pressure: g.pressure() as u64,
             cells: grid.total() as u64,
+            grid: grid.count,
             solids: scene.solids.len() as u64,
             capacity: u64::from(capacity(params)),
             rows_per_thread: 1,
@@ -287,6 +292,24 @@ pub enum Host {
     Both,
     /// A uniform that the host writes.
     Uniform,
+}
+
+/// The buffers of the multigrid preconditioner, as the table of [`Memory::new`] holds them.
+fn multigrid_buffers(s: &Sizes, levels: &Levels) -> [(&'static str, u64, Host, bool); 11] {
+    let (cells, rows) = (levels.cells, levels.capacity);
+    [
+        ("hierarchy", size_of::<Hierarchy>() as u64, Host::Uniform, true),
+        ("cell_mark", 4 * cells, Host::Writes, true),
+        ("cell_row", 8 * cells, Host::None, true),
+        ("row_block", 8 * levels.blocks(), Host::None, true),
+        ("row_cell", 16 * (rows + 1 + levels.count.len() as u64), Host::Reads, true),
+        ("member", 8 * s.pressure, Host::None, true),
+        ("aggregate", 8 * s.pressure, Host::Writes, true),
+        ("entry", 8 * 27 * rows, Host::Reads, true),
+        ("coarse", 12 * rows, Host::None, true),
+        ("smoothed", 4 * s.pressure, Host::None, true),
+        ("corrected", 16 * s.pressure, Host::None, true),
+    ]
 }
 
 /// What a scene takes on a device.
@@ -344,11 +367,14 @@ impl Memory {
             ("monitor_sum", size_of::<MonitorSum>() as u64 * s.monitor_groups(), Host::Reads, true),
             ("speed_bin", 4 * SPEED_BINS as u64, Host::Both, true),
         ];
+        let levels = (plan.preconditioner == Preconditioner::Multigrid).then(|| Levels::new(s));
         let buffers = table
             .into_iter()
+            .chain(levels.iter().flat_map(|l| multigrid_buffers(s, l)))
             .filter(|&(.., needed)| needed)
             .map(|(name, bytes, host, _)| Buffer { name, bytes: bytes.max(16), host })
             .collect();
+        let blocks = levels.map_or(blocks, |l| l.blocks().max(blocks));
         Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP).max(blocks) }
     }
 
@@ -378,13 +404,13 @@ mod tests {
             fixed: 357_000 * k,
             pressure: 340_000 * k,
             cells: 500_000 * k,
+            grid: [250, 20 * k as u32, 100],
             solids: 2,
             capacity: 64,
             rows_per_thread: 1,
         };
         let reasons = Stage::ALL.map(|s| (s, Ok("planned"))).to_vec();
-        let plan =
-            Plan { reasons, preconditioner: crate::case::Preconditioner::Jacobi, force_relaxation: 1.0 };
+        let plan = Plan { reasons, preconditioner: Preconditioner::Multigrid, force_relaxation: 1.0 };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
         assert!(middle.total() < 200_000_000, "{}", middle.total());
         // What wgpu binds on any adapter, software included.

@@ -1,6 +1,6 @@
 //! The shaders' sources, the switches that shape them, and what they bind.
 
-use crate::case::{FreeSurface, Gradient, Source};
+use crate::case::{FreeSurface, Gradient, Preconditioner, Source};
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
@@ -22,6 +22,8 @@ sources!(
     "correct",
     "monitor",
     "move_solids",
+    "multigrid",
+    "multigrid_levels",
     "neighbour_list",
     "number_density",
     "predict",
@@ -34,8 +36,17 @@ sources!(
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 8] =
-    ["CORRECTED", "MIXED", "MOVING", "REACTION", "STATIC", "THRESHOLD_OFFSET", "TWO_DIMENSIONS", "VISCOSITY"];
+pub const SWITCHES: [&str; 9] = [
+    "CORRECTED",
+    "MIXED",
+    "MOVING",
+    "MULTIGRID",
+    "REACTION",
+    "STATIC",
+    "THRESHOLD_OFFSET",
+    "TWO_DIMENSIONS",
+    "VISCOSITY",
+];
 
 /// The switches that are on for a scene.
 pub fn switches(params: &Params, groups: &Groups, plan: &Plan) -> Vec<&'static str> {
@@ -44,6 +55,7 @@ pub fn switches(params: &Params, groups: &Groups, plan: &Plan) -> Vec<&'static s
         params.gradient == Gradient::MinimumCorrected,
         params.source == Source::Mixed,
         groups.moving_wall + groups.moving_dummy > 0,
+        plan.preconditioner == Preconditioner::Multigrid,
         force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision)),
         !groups.static_range().is_empty(),
         params.free_surface == FreeSurface::ThresholdOffset,
@@ -56,8 +68,13 @@ pub fn switches(params: &Params, groups: &Groups, plan: &Plan) -> Vec<&'static s
 /// The kernels that `plan` needs.
 pub fn kernels(plan: &Plan) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
     KERNELS.iter().copied().filter(|&(name, _)| {
-        // Particle collisions are applied by `correct`, and the monitor is no stage.
-        plan.wet() && (name == "monitor" || Stage::ALL.iter().any(|s| s.name() == name && plan.has(*s)))
+        // Particle collisions are applied by `correct`; the monitor and the preconditioner are no stages.
+        plan.wet()
+            && match name {
+                "monitor" => true,
+                "multigrid" | "multigrid_levels" => plan.preconditioner == Preconditioner::Multigrid,
+                _ => Stage::ALL.iter().any(|s| s.name() == name && plan.has(*s)),
+            }
     })
 }
 

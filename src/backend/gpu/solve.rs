@@ -3,40 +3,93 @@
 use super::Gpu;
 use super::layout::Solve;
 use crate::error::Result;
+use crate::kernels::multigrid_levels::LevelSums;
 use crate::pressure::{Outcome, PressureReport};
 
-/// Iterations between looks once the last solve's number is used up.
-const CHUNK: u32 = 8;
+/// Iterations between looks once the last solve's number is used up, with the diagonal and with multigrid.
+const CHUNK: [u32; 2] = [8, 2];
 
 impl Gpu {
-    /// Conjugate gradients with the diagonal. The residual reported is the true one, ||b - A x|| / ||b||.
+    /// Conjugate gradients with the planned preconditioner. The residual reported is the true one,
+    /// ||b - A x|| / ||b||.
     pub(super) fn conjugate_gradient(&mut self) -> Result<PressureReport> {
+        self.build_levels()?;
         let groups = self.sizes.reduction_groups();
+        let name = |entry| (entry, groups);
+        let mut iteration = Vec::new();
+        // What judges the residual of the last iteration of a chunk; with the diagonal the next chunk does.
+        let mut judge = None;
+        if let Some(levels) = &self.levels {
+            let descend = name("conjugate_gradient.descend");
+            iteration.push(descend);
+            iteration.extend(levels.cycle(groups));
+            iteration.push(name("conjugate_gradient.ascend"));
+            judge = Some(descend);
+        }
+        iteration.extend(["conjugate_gradient.multiply", "conjugate_gradient.advance"].map(name));
+        let end =
+            ["conjugate_gradient.end_pack", "conjugate_gradient.end_residual", "conjugate_gradient.end"];
+
         let context = &mut self.context;
         context.clear("solve")?;
         if !self.settings.warm_start {
             context.clear("pressure")?;
         }
-        let name = |entry| (entry, groups);
         context.pass(
             ["conjugate_gradient.pack", "conjugate_gradient.start_residual", "conjugate_gradient.start"]
                 .map(name),
         )?;
-        // An iteration too many costs an empty dispatch, one too few a round trip to the device.
-        let mut chunk = self.last_iterations + self.last_iterations / 8 + 2;
+        // An iteration too many costs empty dispatches, one too few a round trip to the device.
+        let multigrid = judge.is_some();
+        let spare = if multigrid { 1 } else { self.last_iterations / 8 + 2 };
+        let mut chunk = self.last_iterations + spare;
         loop {
-            let iteration = ["conjugate_gradient.multiply", "conjugate_gradient.advance"].map(name);
-            let end =
-                ["conjugate_gradient.end_pack", "conjugate_gradient.end_residual", "conjugate_gradient.end"]
-                    .map(name);
-            context.pass((0..chunk).flat_map(|_| iteration).chain(end))?;
+            let iterations = (0..chunk).flat_map(|_| iteration.iter().copied());
+            context.pass(iterations.chain(judge).chain(end.map(name)))?;
             let solve = context.download::<Solve>("solve", 1)?[0];
             if solve.done != 0 {
                 self.last_iterations = solve.iterations;
                 return Ok(report(&solve));
             }
-            chunk = CHUNK;
+            chunk = CHUNK[usize::from(multigrid)];
         }
+    }
+
+    /// Give the finest `large` levels of multigrid dispatches of their own (at most two) and leave the others to
+    /// one workgroup. It is the time that depends on that, not the result.
+    pub fn split_levels(&mut self, large: usize) -> Result<()> {
+        let Some(levels) = &mut self.levels else { return Ok(()) };
+        levels.large = large.min(levels.large_max());
+        self.context.upload("hierarchy", &[levels.hierarchy()])
+    }
+
+    /// Make the levels of multigrid for the system at hand; sums over their operators, finest first. None with the
+    /// diagonal as preconditioner.
+    pub fn level_sums(&mut self) -> Result<Vec<LevelSums>> {
+        self.build_levels()?;
+        let Some(levels) = &self.levels else { return Ok(Vec::new()) };
+        let (capacity, count) = (levels.capacity as usize, levels.count.len());
+        let rows = self.context.download_parts::<[u32; 4]>("row_cell", &[(capacity, count + 1)])?;
+        let entry = self.context.download::<[u32; 2]>("entry", 27 * capacity)?;
+        let sums = |l: usize| {
+            let range = rows[l + 1][0] as usize..rows[l][0] as usize;
+            let mut out = LevelSums { rows: range.len(), ..Default::default() };
+            for row in range {
+                for k in 0..27 {
+                    out.add(f64::from(f32::from_bits(entry[k * capacity + row][1])), k == 13);
+                }
+            }
+            out
+        };
+        Ok((0..count).map(sums).collect())
+    }
+
+    /// Make the levels of the multigrid preconditioner for the system at hand.
+    fn build_levels(&mut self) -> Result<()> {
+        let Some(levels) = &self.levels else { return Ok(()) };
+        self.context.clear("cell_mark")?;
+        self.context.clear("aggregate")?;
+        self.context.pass(levels.build())
     }
 }
 

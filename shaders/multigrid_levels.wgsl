@@ -1,0 +1,355 @@
+// Levels of the multigrid preconditioner, made afresh every step: the background cells that hold unknowns, then 2 x 2 x 2
+// cells of the last level and so on; on each the Galerkin operator, a stencil of 27 entries a row.
+// Twin: src/kernels/multigrid_levels.rs
+//
+// The cells of all levels lie in one array, coarsest level first, and are numbered in that order by one scan, so rows of a
+// level follow each other and an overflow of the buffers hits the finest level alone: such cells go uncorrected, which
+// leaves the preconditioner symmetric and positive. Each row gathers its own entries; nothing depends on arrival.
+
+@group(0) @binding(2) var<uniform> hierarchy: Hierarchy;
+@group(0) @binding(3) var<storage, read> position: array<vec4f>;
+@group(0) @binding(4) var<storage, read> neighbour_list: array<u32>;
+@group(0) @binding(5) var<storage, read> neighbour_count: array<u32>;
+@group(0) @binding(6) var<storage, read> source_diagonal: array<vec2f>;
+@group(0) @binding(7) var<storage, read> cell_start: array<u32>;
+@group(0) @binding(8) var<storage, read> moving_slot: array<u32>;
+@group(0) @binding(9) var<storage, read> static_start: array<u32>;
+@group(0) @binding(10) var<storage, read> static_particle: array<vec4u>;
+// Unknowns in a cell of the finest level, ABOVE for a coarser cell that holds some, 0 for the rest.
+@group(0) @binding(11) var<storage, read_write> cell_mark: array<atomic<u32>>;
+@group(0) @binding(12) var<storage, read_write> cell_row: array<vec2u>; // row + 1 or 0, first member
+@group(0) @binding(13) var<storage, read_write> row_block: array<vec2u>;
+// Of each row: cell within its level, row + 1 of the next coarser level or 0, members from, to. Behind the last row:
+// the number of rows, then the first row of each level.
+@group(0) @binding(14) var<storage, read_write> row_cell: array<vec4u>;
+@group(0) @binding(15) var<storage, read_write> member: array<vec2u>; // slot, bits of the diagonal; in cell order
+@group(0) @binding(16) var<storage, read_write> aggregate: array<vec2u>; // of a slot: row + 1 or 0, place_of its cell
+@group(0) @binding(17) var<storage, read_write> entry: array<vec2u>; // column, bits of the value; entry after entry
+
+// As crate::backend::gpu::hierarchy::Hierarchy; the cycle is in shaders/multigrid.wgsl.
+struct Hierarchy {
+    level: array<vec4u, 16>, // cells along x, y, z, first cell
+    operation: array<vec4u, 256>, // kind, level
+    levels: u32,
+    capacity: u32,
+    cells: u32,
+    operations: u32,
+}
+
+const ABOVE: u32 = 0x80000000u;
+
+fn cell_at(level: u32, c: vec3u) -> u32 {
+    let l = hierarchy.level[level];
+    return l.w + (c.x * l.y + c.y) * l.z + c.z;
+}
+
+fn coordinates_of(level: u32, cell: u32) -> vec3u {
+    let l = hierarchy.level[level];
+    return vec3u(cell / (l.y * l.z), cell / l.z % l.y, cell % l.z);
+}
+
+// The difference of two of these is the entry in the stencil.
+fn place_of(c: vec3i) -> i32 {
+    return 9 * c.x + 3 * c.y + c.z;
+}
+
+fn first_row(level: u32) -> u32 {
+    return row_cell[hierarchy.capacity + 1u + level].x;
+}
+
+fn end_row(level: u32) -> u32 {
+    return row_cell[hierarchy.capacity + level].x;
+}
+
+// Where the particles of a cell are listed: fluid, moving solids, what never moves.
+struct Listed {
+    first: vec3u,
+    count: vec3u,
+}
+
+fn listed(cell: u32) -> Listed {
+    var out: Listed;
+    out.first.x = cell_start[cell];
+    out.count.x = cell_start[cell + 1u] - out.first.x;
+//#if MOVING
+    let moving = params.cell_total + 1u + cell;
+    out.first.y = cell_start[moving] - params.fluid;
+    out.count.y = cell_start[moving + 1u] - params.fluid - out.first.y;
+//#endif
+//#if STATIC
+    out.first.z = static_start[cell];
+    out.count.z = static_start[cell + 1u] - out.first.z;
+//#endif
+    return out;
+}
+
+// Slot of the k-th of them.
+fn slot_of(l: Listed, k: u32) -> u32 {
+    if k < l.count.x {
+        return l.first.x + k;
+    }
+//#if MOVING
+    if k < l.count.x + l.count.y {
+        return moving_slot[l.first.y + k - l.count.x];
+    }
+//#endif
+//#if STATIC
+    return static_particle[l.first.z + k - l.count.x - l.count.y].w;
+//#else
+    return params.pressure_slots;
+//#endif
+}
+
+// Diagonal of a slot, 0 if its pressure is no unknown.
+fn diagonal_of(slot: u32) -> f32 {
+    var diagonal = 0.0;
+    if slot < params.pressure_slots {
+        diagonal = source_diagonal[slot].y;
+    }
+    return diagonal;
+}
+
+// Count the unknowns of each cell and mark the cells above.
+@compute @workgroup_size(WORKGROUP)
+fn mark(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var cell = id.x; cell < params.cell_total; cell += groups.x * WORKGROUP) {
+        let l = listed(cell);
+        let all = l.count.x + l.count.y + l.count.z;
+        var unknowns = 0u;
+        for (var k = 0u; k < all; k++) {
+            unknowns += u32(diagonal_of(slot_of(l, k)) > 0.0);
+        }
+        if unknowns > 0u {
+            atomicStore(&cell_mark[hierarchy.level[0].w + cell], unknowns);
+            var c = coordinates_of(0u, cell);
+            for (var level = 1u; level < hierarchy.levels; level++) {
+                c = c >> vec3u(1u);
+                atomicStore(&cell_mark[cell_at(level, c)], ABOVE);
+            }
+        }
+    }
+}
+
+var<workgroup> lane: array<vec2u, 256>;
+var<workgroup> across: array<vec2u, 16>;
+
+// Sum of the values of lower threads (xy), and of all (zw).
+fn exclusive_scan(value: vec2u, t: u32) -> vec4u {
+    workgroupBarrier();
+    lane[t] = value;
+    workgroupBarrier();
+    if t < 16u {
+        var sum = vec2u(0u);
+        for (var k = 0u; k < 16u; k++) {
+            let v = lane[t * 16u + k];
+            lane[t * 16u + k] = sum;
+            sum += v;
+        }
+        across[t] = sum;
+    }
+    workgroupBarrier();
+    var before = vec2u(0u);
+    var total = vec2u(0u);
+    for (var k = 0u; k < 16u; k++) {
+        if k < t / 16u {
+            before += across[k];
+        }
+        total += across[k];
+    }
+    return vec4u(before + lane[t], total);
+}
+
+// Rows and members that a cell brings.
+fn brings(cell: u32) -> vec2u {
+    if cell >= hierarchy.cells {
+        return vec2u(0u);
+    }
+    let mark = atomicLoad(&cell_mark[cell]);
+    return vec2u(u32(mark != 0u), mark & ~ABOVE);
+}
+
+// Scan within blocks of four cells a thread.
+@compute @workgroup_size(WORKGROUP)
+fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let first = (group.x * WORKGROUP + t) * 4u;
+    var sum = vec2u(0u);
+    for (var k = 0u; k < 4u; k++) {
+        sum += brings(first + k);
+    }
+    let scan = exclusive_scan(sum, t);
+    var before = scan.xy;
+    for (var k = 0u; k < 4u; k++) {
+        if first + k < hierarchy.cells {
+            cell_row[first + k] = before;
+        }
+        before += brings(first + k);
+    }
+    if t == 0u {
+        row_block[group.x] = scan.zw;
+    }
+}
+
+// One workgroup scans the sums of the blocks.
+@compute @workgroup_size(WORKGROUP)
+fn scan_sums(@builtin(local_invocation_index) t: u32) {
+    let blocks = (hierarchy.cells + 4u * WORKGROUP - 1u) / (4u * WORKGROUP);
+    var carry = vec2u(0u);
+    for (var first = 0u; first < blocks; first += WORKGROUP) {
+        var value = vec2u(0u);
+        if first + t < blocks {
+            value = row_block[first + t];
+        }
+        let scan = exclusive_scan(value, t);
+        if first + t < blocks {
+            row_block[first + t] = carry + scan.xy;
+        }
+        carry += scan.zw;
+    }
+    if t == 0u {
+        row_cell[hierarchy.capacity].x = min(carry.x, hierarchy.capacity);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn number_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    for (var k = 0u; k < 4u; k++) {
+        let cell = (group.x * WORKGROUP + t) * 4u + k;
+        if cell >= hierarchy.cells {
+            return;
+        }
+        let number = cell_row[cell] + row_block[group.x];
+        let own = brings(cell);
+        // The level that the cell belongs to: levels lie coarsest first.
+        var level = 0u;
+        while cell < hierarchy.level[level].w {
+            level++;
+        }
+        if cell == hierarchy.level[level].w {
+            row_cell[hierarchy.capacity + 1u + level].x = min(number.x, hierarchy.capacity);
+        }
+        let used = own.x > 0u && number.x < hierarchy.capacity;
+        cell_row[cell] = vec2u(select(0u, number.x + 1u, used), number.y);
+        if used {
+            row_cell[number.x] = vec4u(cell - hierarchy.level[level].w, 0u, number.y, number.y + own.y);
+        }
+    }
+}
+
+// The unknowns of each cell, in the order of the lists; they learn their row.
+@compute @workgroup_size(WORKGROUP)
+fn members(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    for (var cell = id.x; cell < params.cell_total; cell += groups.x * WORKGROUP) {
+        let row = cell_row[hierarchy.level[0].w + cell];
+        if row.x > 0u {
+            let place = bitcast<u32>(place_of(vec3i(coordinates_of(0u, cell))));
+            let l = listed(cell);
+            let all = l.count.x + l.count.y + l.count.z;
+            var to = row.y;
+            for (var k = 0u; k < all; k++) {
+                let slot = slot_of(l, k);
+                let diagonal = diagonal_of(slot);
+                if diagonal > 0.0 {
+                    member[to] = vec2u(slot, bitcast<u32>(diagonal));
+                    aggregate[slot] = vec2u(row.x, place);
+                    to++;
+                }
+            }
+        }
+    }
+}
+
+var<private> value: array<f32, 27>;
+var<private> column: array<u32, 27>;
+
+fn empty_stencil(row: u32) {
+    for (var k = 0u; k < 27u; k++) {
+        value[k] = 0.0;
+        column[k] = row;
+    }
+}
+
+// Keep the stencil; the row learns its parent.
+fn keep_stencil(level: u32, row: u32, c: vec3u) {
+    for (var k = 0u; k < 27u; k++) {
+        entry[k * hierarchy.capacity + row] = vec2u(column[k], bitcast<u32>(value[k]));
+    }
+    if level + 1u < hierarchy.levels {
+        row_cell[row].y = cell_row[cell_at(level + 1u, c >> vec3u(1u))].x;
+    }
+}
+
+// Operator of the finest level: what the rows of a cell's unknowns hold, by the cell that a neighbour lies in.
+@compute @workgroup_size(WORKGROUP)
+fn galerkin(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let end = end_row(0u);
+    for (var row = first_row(0u) + id.x; row < end; row += groups.x * WORKGROUP) {
+        let cell = row_cell[row];
+        let c = coordinates_of(0u, cell.x);
+        let own = place_of(vec3i(c)) - 13;
+        empty_stencil(row);
+        for (var m = cell.z; m < cell.w; m++) {
+            let i = member[m].x;
+            value[13] += bitcast<f32>(member[m].y);
+            let x = position[i].xyz;
+            let near = near_of(neighbour_count[i]);
+            for (var k = 0u; k < near; k++) {
+                let j = neighbour_list[near_place(i, k)];
+                let other = aggregate[j];
+                if other.x > 0u {
+                    let r = position[j].xyz - x;
+                    // Listed pairs lay in neighbouring cells when both were sorted: always within the stencil.
+                    let to = u32(bitcast<i32>(other.y) - own);
+                    value[to] -= weight(dot(r, r));
+                    column[to] = other.x - 1u;
+                }
+            }
+        }
+        keep_stencil(0u, row, c);
+    }
+}
+
+// Operator of a level from that of the level below: entries of up to eight rows, by the parents of row and column.
+fn coarsen(level: u32, row: u32) {
+    let p = coordinates_of(level, row_cell[row].x);
+    let size = hierarchy.level[level - 1u].xyz;
+    empty_stencil(row);
+    for (var octant = 0u; octant < 8u; octant++) {
+        let c = 2u * p + ((vec3u(octant) >> vec3u(2u, 1u, 0u)) & vec3u(1u));
+        if all(c < size) {
+            let child = cell_row[cell_at(level - 1u, c)].x;
+            if child > 0u {
+                for (var k = 0u; k < 27u; k++) {
+                    let e = entry[k * hierarchy.capacity + child - 1u];
+                    let v = bitcast<f32>(e.y);
+                    if v != 0.0 {
+                        let d = vec3i(vec3u(k / 9u, k / 3u % 3u, k % 3u)) - 1;
+                        let to = u32(place_of(((vec3i(c) + d) >> vec3u(1u)) - vec3i(p)) + 13);
+                        value[to] += v;
+                        column[to] = row_cell[e.x].y - 1u;
+                    }
+                }
+            }
+        }
+    }
+    keep_stencil(level, row, p);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn coarsen_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let end = end_row(1u);
+    for (var row = first_row(1u) + id.x; row < end; row += groups.x * WORKGROUP) {
+        coarsen(1u, row);
+    }
+}
+
+// All further levels, one after the other, by one workgroup: they are small.
+@compute @workgroup_size(WORKGROUP)
+fn coarsen_rest(@builtin(local_invocation_index) t: u32) {
+    for (var level = 2u; level < hierarchy.levels; level++) {
+        let end = end_row(level);
+        for (var row = first_row(level) + t; row < end; row += WORKGROUP) {
+            coarsen(level, row);
+        }
+        storageBarrier();
+    }
+}
