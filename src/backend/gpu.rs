@@ -14,7 +14,7 @@ mod transfer;
 
 pub use adapter::{AdapterInfo, adapters};
 
-use super::{Backend, Counters, traffic};
+use super::{Backend, Compute, Counters, traffic};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
 use crate::cells::Grid;
@@ -41,6 +41,8 @@ pub struct Gpu {
     sizes: Sizes,
     middle: DVec3,
     wet: bool,
+    /// Contact searches and presses its pairs here.
+    contact: bool,
     /// Solid of each chunk of wall-layer particles.
     chunk_solid: Vec<usize>,
     solids: usize,
@@ -145,6 +147,7 @@ impl Gpu {
             sizes,
             middle: layout::middle(params),
             wet: plan.wet(),
+            contact: plan.contact.kernel.is_some(),
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
             counters: Counters::default(),
@@ -411,8 +414,38 @@ impl Backend for Gpu {
         })
     }
 
+    fn compute(&mut self) -> Option<&mut dyn Compute> {
+        if self.contact { Some(self) } else { None }
+    }
+
     fn dispatches(&self) -> u64 {
         self.context.dispatches
+    }
+}
+
+impl Compute for Gpu {
+    fn reserve(&mut self, buffer: &'static str, bytes: u64) -> Result<()> {
+        self.context.reserve(buffer, bytes)
+    }
+
+    fn write(&mut self, buffer: &'static str, data: &[u8]) -> Result<()> {
+        self.context.reserve(buffer, data.len() as u64)?;
+        if data.is_empty() { Ok(()) } else { self.context.upload(buffer, data) }
+    }
+
+    fn run(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
+        let most = self.context.workgroups_max();
+        if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
+            return Err(Error::Gpu(format!(
+                "{groups} pairs of solids are close, {most} is what {} takes at a time; use contact.device = \"host\"",
+                self.context.info.name
+            )));
+        }
+        self.context.pass(kernels.iter().copied())
+    }
+
+    fn read(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>> {
+        self.context.download(buffer, bytes as usize)
     }
 }
 

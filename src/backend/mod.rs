@@ -1,5 +1,6 @@
 //! Where the particle stages run: the CPU in f64 ([`cpu`]) or a device in f32 ([`gpu`]).
 
+pub mod compute;
 pub mod cpu;
 pub mod gpu;
 pub mod traffic;
@@ -11,6 +12,7 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
 use crate::pressure::PressureReport;
+pub use compute::Compute;
 
 /// What the guards have seen since the start of the run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,6 +64,10 @@ pub trait Backend: Send {
     fn bytes(&self) -> u64;
     /// Sizes that the counted traffic follows from.
     fn sizes(&mut self) -> Result<traffic::Sizes>;
+    /// The device on which contact may search and press its pairs, where the plan has it do so.
+    fn compute(&mut self) -> Option<&mut dyn Compute> {
+        None
+    }
     /// Kernels started on a device so far; 0 for a backend without one.
     fn dispatches(&self) -> u64 {
         0

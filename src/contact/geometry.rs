@@ -1,5 +1,6 @@
 //! Geometry of contact: oriented boxes seen from a point, surface points of bodies, edges of walls.
 
+use crate::body::Body;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 
@@ -110,6 +111,22 @@ pub(crate) struct WallBox {
     pub faces: Faces,
     /// Edges that bodies can reach.
     pub edges: Vec<Edge>,
+}
+
+impl WallBox {
+    /// Samples of the edges whose stretch of the edge meets the body's sphere, `skin` [m] wider; world [m].
+    pub fn samples(&self, body: &Body, skin: f64, spacing: f64) -> impl Iterator<Item = DVec3> {
+        let width = body.radius() + skin + spacing;
+        let center = body.pose.position;
+        self.edges.iter().flat_map(move |edge| {
+            let length = edge.step.length();
+            let from = center - edge.start;
+            let middle = if length > 0.0 { from.dot(edge.step) / length } else { 0.0 };
+            let low = ((middle - width) / length.max(1e-300)).max(0.0) as usize;
+            let high = ((middle + width) / length.max(1e-300)).max(0.0) as usize;
+            (low..=high.min(edge.count - 1)).map(move |k| edge.start + k as f64 * edge.step)
+        })
+    }
 }
 
 /// An edge of a wall, sampled.

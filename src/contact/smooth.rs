@@ -45,6 +45,14 @@ pub(crate) struct Constants {
 }
 
 impl Constants {
+    /// Secant stiffness [N/m] and energy [J] of a contact of effective depth `depth` [m].
+    pub fn stored(&self, depth: f64) -> (f64, f64) {
+        let beyond = (depth - self.stop_depth).max(0.0);
+        let more = self.stop - self.spring;
+        let energy = 0.5 * self.spring * depth * depth + 0.5 * more * beyond * beyond;
+        (self.spring + more * beyond / depth, energy)
+    }
+
     /// Constants that make sub-steps of `h` [s] follow the damped oscillator of mass `mass` [kg].
     ///
     /// The explicit dashpot takes C h / m of the speed where the exact one takes 1 - exp(-C h / m); it is
@@ -92,6 +100,21 @@ struct Contact {
     patch: u8,
 }
 
+/// A patch as a device sums it, world frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DevicePatch {
+    /// As [`Patch`] counts them.
+    pub key: u8,
+    /// Force on the first solid [N].
+    pub force: DVec3,
+    /// Sum of the points' forces [N].
+    pub pressing: f64,
+    /// Centre of the normal force [m].
+    pub at: DVec3,
+    /// Mean distance of the normal force from its centre [m].
+    pub radius: f64,
+}
+
 /// All points pressed by one face: where friction acts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Patch {
@@ -132,6 +155,8 @@ pub(crate) struct Pair {
     pub energy: f64,
     /// Deepest point [m].
     pub depth: f64,
+    /// Points in contact at the last evaluation.
+    count: usize,
 }
 
 impl Pair {
@@ -148,12 +173,36 @@ impl Pair {
             wrench: Default::default(),
             energy: 0.0,
             depth: 0.0,
+            count: 0,
         }
     }
 
     /// Points in contact at the last evaluation.
     pub fn contact_count(&self) -> usize {
-        self.contacts.len()
+        self.count
+    }
+
+    /// Takes over an evaluation by a device: points in contact, effective depth D [m], deepest point [m],
+    /// wrenches on the two solids, patches.
+    pub fn set(
+        &mut self,
+        count: usize,
+        depth: f64,
+        deepest: f64,
+        wrench: [Wrench; 2],
+        patches: &[DevicePatch],
+    ) {
+        (self.count, self.depth, self.wrench) = (count, deepest, wrench);
+        self.energy = if count > 0 { self.constants.stored(depth).1 } else { 0.0 };
+        self.patches.clear();
+        self.patches.extend(patches.iter().map(|p| Patch {
+            key: p.key,
+            normal: p.force.normalize_or_zero(),
+            at: p.at,
+            force: p.force.length(),
+            pressing: p.pressing,
+            radius: p.radius,
+        }));
     }
 
     /// Collects the points of `a` and of `b` that come within `skin` [m] of the other's box.
@@ -188,23 +237,11 @@ impl Pair {
             Other::Wall(w) => {
                 let wall = &walls[w];
                 self.points_a = near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
-                let reach = body.radius() + skin;
-                for edge in &wall.edges {
-                    // only the samples whose stretch of the edge meets the body's sphere
-                    let length = edge.step.length();
-                    let from = body.pose.position - edge.start;
-                    let middle = if length > 0.0 { from.dot(edge.step) / length } else { 0.0 };
-                    let width = reach + spacing;
-                    let low = ((middle - width) / length.max(1e-300)).max(0.0) as usize;
-                    let high = ((middle + width) / length.max(1e-300)).max(0.0) as usize;
-                    for k in low..=high.min(edge.count - 1) {
-                        let x = edge.start + k as f64 * edge.step;
-                        let q = body.rotation.transpose() * (x - body.pose.position);
-                        if geometry::outside(q, body.half) < skin {
-                            self.samples.push(x);
-                        }
-                    }
-                }
+                let near = |x: &DVec3| {
+                    let q = body.rotation.transpose() * (*x - body.pose.position);
+                    geometry::outside(q, body.half) < skin
+                };
+                self.samples.extend(wall.samples(body, skin, spacing).filter(near));
             }
         }
     }
@@ -221,6 +258,7 @@ impl Pair {
         self.wrench = Default::default();
         (self.energy, self.depth) = (0.0, 0.0);
         self.find(bodies, surfaces, walls);
+        self.count = self.contacts.len();
         if !self.contacts.is_empty() {
             self.press();
             self.sum(bodies);
@@ -285,10 +323,8 @@ impl Pair {
         let sum: f64 = self.contacts.iter().map(|c| c.weight * eighth(c.depth / deepest)).sum();
         let mean = sum.sqrt().sqrt().sqrt();
         let depth = deepest * mean;
-        let beyond = (depth - k.stop_depth).max(0.0);
-        let secant = k.spring + (k.stop - k.spring) * beyond / depth;
-        self.energy = 0.5 * k.spring * depth * depth + 0.5 * (k.stop - k.spring) * beyond * beyond;
-        self.depth = deepest;
+        let (secant, energy) = k.stored(depth);
+        (self.energy, self.depth) = (energy, deepest);
         let share = |c: &Contact| {
             let x = c.depth / depth;
             c.weight * (x * x) * (x * x) * (x * x)

@@ -1,5 +1,4 @@
-//! Checks of the smooth law: bodies come to rest, stay there, slide as far as friction lets them; and what
-//! a step costs.
+//! Checks of the smooth law: bodies come to rest, stay there, slide as far as friction lets them.
 
 use super::contact_checks::{DAM_BREAK_CUBE, Random, lowest, none, smooth};
 use super::dry::{DryScene, FreeBox, GRAVITY};
@@ -218,67 +217,5 @@ pub fn sliding_stop(friction: f64, speed: f64, dt: f64) -> Result<StopRow> {
         distance: pose.position.x,
         analytic: speed * speed / (2.0 * friction * GRAVITY),
         speed: pose.velocity.length(),
-    })
-}
-
-/// Cost of contact.
-#[derive(Clone, Debug, Serialize)]
-pub struct CostRow {
-    /// Bodies.
-    pub bodies: usize,
-    /// Surface points of a body.
-    pub points: usize,
-    /// `true`: a heap in motion; `false`: at rest on the floor.
-    pub moving: bool,
-    /// Sub-steps a step.
-    pub substeps: u32,
-    /// Pairs of solids in contact at the end.
-    pub solid_pairs: usize,
-    /// Wall time a step [us].
-    pub step_us: f64,
-}
-
-/// Wall time of contact for `count` dam-break cubes at rest, or falling into a heap.
-///
-/// # Errors
-/// Those of [`Solids::advance`].
-pub fn cost(count: usize, moving: bool, steps: usize) -> Result<CostRow> {
-    let (edge, mass, l0, spring, damping, friction, dt) = DAM_BREAK_CUBE;
-    let mut random = Random::new(5);
-    let mut dry = DryScene::new(l0, DVec3::new(-9.0, -9.0, 0.0), DVec3::new(9.0, 9.0, 1.0)).floor();
-    let side = (count as f64).cbrt().ceil() as usize;
-    let wide = (count as f64).sqrt().ceil() as usize;
-    for k in 0..count {
-        let mut cube = FreeBox::new(DVec3::splat(edge), mass / edge.powi(3), DVec3::ZERO);
-        if moving {
-            let at = DVec3::new((k % side) as f64, (k / side % side) as f64, (k / side / side) as f64);
-            cube.center = 1.02 * edge * (at + 0.5) + DVec3::Z * 0.01;
-            cube.velocity = DVec3::new(random.draw() - 0.5, random.draw() - 0.5, -0.5);
-        } else {
-            let at = DVec3::new((k % wide) as f64, (k / wide) as f64, 0.0);
-            cube.center = 1.3 * edge * at + DVec3::Z * 0.5 * edge;
-        }
-        dry = dry.body(&cube);
-    }
-    let scene = dry.build();
-    let points = scene.solids[0].wall_offset.len();
-    let mut solids = Solids::new(&scene, Some(&smooth(spring, damping, friction)))?;
-    let fluid = none(count);
-    let warm = 20;
-    let mut report = crate::contact::ContactReport::default();
-    for step in 0..warm {
-        report = solids.advance(step as f64 * dt, dt, &fluid)?;
-    }
-    let clock = Instant::now();
-    for step in warm..warm + steps {
-        report = solids.advance(step as f64 * dt, dt, &fluid)?;
-    }
-    Ok(CostRow {
-        bodies: count,
-        points,
-        moving,
-        substeps: report.substeps,
-        solid_pairs: report.solid_pairs,
-        step_us: clock.elapsed().as_secs_f64() * 1e6 / steps as f64,
     })
 }

@@ -1,0 +1,373 @@
+// Contact of true surfaces: which points of one solid come near the other's box (`search`), and the normal forces of a
+// pair of solids (`force`),
+//   D = (sum_i w_i d_i^8)^(1/8),  f_i = s_i (K d_i - C v_i) >= 0,  s_i = w_i (d_i / D)^6.
+// Twin: src/contact/smooth.rs
+//
+// One workgroup a pair. All in the frame of the pair's first solid A. The clearance of a point to a face is affine in
+// the point. The host gives it in f64 where it is largest: at a corner of the bounding box of the points; from there
+// every term only takes away. What is in contact has lost less than it keeps or little more, so a depth comes out to
+// the last digits of its own size, wherever in the tank the solids are. Depths from positions would keep those of the
+// position's size.
+
+const GROUP: u32 = 64u;
+// Set in the number of a point that lies on the edge of a wall.
+const ON_WALL: u32 = 0x80000000u;
+const ALL_FACES: u32 = 0x3fu;
+const FAR: f32 = 3.0e38;
+
+// Of a pair, for as long as its lists hold. First of two: points of A against the box of B; second: the other way.
+struct SmoothPair {
+    low_a: vec3f, // bounding box of the points of A, and of those of B, each in its own frame
+    spring: f32,
+    high_a: vec3f,
+    stop: f32,
+    low_b: vec3f,
+    stop_depth: f32,
+    high_b: vec3f,
+    damping: f32,
+    half_a: vec3f, // of A's box
+    step: f32,
+    first: vec2u, // points
+    count: vec2u,
+    near: vec2u,  // of them listed
+    faces: vec2u, // of B's box, of A's box
+    list: u32,    // place of the lists
+    state: u32,   // place of the listed points' states
+    sum: u32,     // place of the results
+    share: f32,   // of a point's weight
+    skin: f32,
+    pad: array<u32, 3>,
+}
+
+// Where the two are now.
+struct SmoothPose {
+    // Rows of the turn from A's frame to B's; w: velocity of A against B at A's centre, A's frame.
+    row_x: vec4f,
+    row_y: vec4f,
+    row_z: vec4f,
+    spin: vec4f, // of A against B, A's frame
+    // Largest clearances of the points of A to the lower and the upper faces of B's box, and the other way.
+    below_b: vec4f,
+    above_b: vec4f,
+    below_a: vec4f,
+    above_a: vec4f,
+}
+
+@group(0) @binding(2) var<storage, read> contact_point: array<vec4f>;  // xyz in the solid's frame, w weight
+@group(0) @binding(3) var<storage, read> contact_sample: array<vec4f>; // the same of the edges of walls
+@group(0) @binding(4) var<storage, read> smooth_pair: array<SmoothPair>;
+@group(0) @binding(5) var<storage, read> smooth_pose: array<SmoothPose>;
+@group(0) @binding(6) var<storage, read_write> contact_list: array<u32>;
+@group(0) @binding(7) var<storage, read_write> contact_count: array<vec2u>;
+@group(0) @binding(8) var<storage, read_write> contact_state: array<vec4f>;
+@group(0) @binding(9) var<storage, read_write> contact_sum: array<vec4f>;
+
+fn point_of(k: u32) -> vec4f {
+    if (k & ON_WALL) != 0u {
+        return contact_sample[k & ~ON_WALL];
+    }
+    return contact_point[k];
+}
+
+// Clearances of a point to the lower and upper faces of a box.
+struct Clearance {
+    low: vec3f,
+    high: vec3f,
+}
+
+// `rows`: the turn from the point's frame to the box's; `low`, `high`: bounding box of the points; `below`, `above`:
+// their largest clearances.
+fn clearance(p: vec3f, rows: mat3x3f, low: vec3f, high: vec3f, below: vec3f, above: vec3f) -> Clearance {
+    var out: Clearance;
+    for (var k = 0u; k < 3u; k++) {
+        let row = rows[k];
+        let grows = row > vec3f(0.0);
+        out.low[k] = below[k] + dot(row, p - select(low, high, grows));
+        out.high[k] = above[k] - dot(row, p - select(high, low, grows));
+    }
+    return out;
+}
+
+fn clearance_of(n: u32, side: u32, p: vec3f) -> Clearance {
+    let rows = mat3x3f(smooth_pose[n].row_x.xyz, smooth_pose[n].row_y.xyz, smooth_pose[n].row_z.xyz);
+    if side == 0u {
+        return clearance(p, rows, smooth_pair[n].low_a, smooth_pair[n].high_a, smooth_pose[n].below_b.xyz, smooth_pose[n].above_b.xyz);
+    }
+    return clearance(
+        p, transpose(rows), smooth_pair[n].low_b, smooth_pair[n].high_b, smooth_pose[n].below_a.xyz, smooth_pose[n].above_a.xyz,
+    );
+}
+
+var<workgroup> listed: array<atomic<u32>, 2>;
+
+// Lists the points of each side within the skin of the other's box, in their order.
+@compute @workgroup_size(GROUP)
+fn search(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let n = group.x;
+    let skin = smooth_pair[n].skin;
+    var place = smooth_pair[n].list;
+    var near = vec2u(0u);
+    for (var side = 0u; side < 2u; side++) {
+        let first = smooth_pair[n].first[side];
+        let count = smooth_pair[n].count[side];
+        for (var start = 0u; start < count; start += GROUP) {
+            if t < 2u {
+                atomicStore(&listed[t], 0u);
+            }
+            workgroupBarrier();
+            let k = start + t;
+            var is_near = false;
+            if k < count {
+                let c = clearance_of(n, side, point_of(first + k).xyz);
+                let least = min(c.low, c.high);
+                is_near = -min(least.x, min(least.y, least.z)) < skin;
+            }
+            if is_near {
+                atomicOr(&listed[t / 32u], 1u << (t % 32u));
+            }
+            workgroupBarrier();
+            let words = vec2u(atomicLoad(&listed[0]), atomicLoad(&listed[1]));
+            if is_near {
+                let before = words[t / 32u] & ((1u << (t % 32u)) - 1u);
+                let rank = countOneBits(before) + select(0u, countOneBits(words.x), t >= 32u);
+                contact_list[place + near[side] + rank] = first + k;
+            }
+            near[side] += countOneBits(words.x) + countOneBits(words.y);
+            workgroupBarrier();
+        }
+        place += count;
+    }
+    if t == 0u {
+        contact_count[n] = near;
+    }
+}
+
+// Depth (not above 0: outside), minus its gradient, and the nearest face; as `depth` in src/contact/geometry.rs.
+struct Inside {
+    depth: f32,
+    outward: vec3f,
+    face: u32,
+}
+
+fn face_normal(axis: u32, upper: bool) -> vec3f {
+    var n = vec3f(0.0);
+    n[axis] = select(-1.0, 1.0, upper);
+    return n;
+}
+
+fn inside(c: Clearance, faces: u32) -> Inside {
+    let over = min(c.low, c.high);
+    if min(over.x, min(over.y, over.z)) <= 0.0 {
+        return Inside(0.0, vec3f(0.0), 0u);
+    }
+    var near = over;
+    var upper = vec3u(c.high < c.low);
+    for (var k = 0u; k < 3u; k++) {
+        let open = (faces >> (2u * k)) & 3u;
+        if open != 3u {
+            upper[k] = open >> 1u;
+            near[k] = select(select(c.low[k], c.high[k], open == 2u), FAR, open == 0u);
+        }
+    }
+    var first = 0u;
+    if !(near.x <= near.y && near.x <= near.z) {
+        first = 1u + u32(near.z < near.y);
+    }
+    var others = vec2u((first + 1u) % 3u, (first + 2u) % 3u);
+    if near[others.y] < near[others.x] {
+        others = others.yx;
+    }
+    if near[first] == FAR {
+        return Inside(0.0, vec3f(0.0), 0u);
+    }
+    var found = Inside(near[first], face_normal(first, upper[first] == 1u), 2u * first + upper[first]);
+    for (var i = 0u; i < 2u; i++) {
+        let k = others[i];
+        let a = found.depth;
+        let b = near[k];
+        if b < 2.0 * a {
+            let r = b / a;
+            found.depth = 0.2 * a + 0.8 * b - 0.2 * b * r;
+            found.outward = (0.2 + 0.2 * r * r) * found.outward + (0.8 - 0.4 * r) * face_normal(k, upper[k] == 1u);
+        }
+    }
+    return found;
+}
+
+// Share of the dashpot that a point feels which entered `steps` sub-steps ago; as `felt` in src/contact/smooth.rs.
+fn felt(steps: f32) -> f32 {
+    return select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0);
+}
+
+var<workgroup> part_x: array<vec4f, GROUP>;
+var<workgroup> part_y: array<vec4f, GROUP>;
+var<workgroup> part_z: array<vec4f, GROUP>;
+var<workgroup> deepest_bits: atomic<u32>;
+var<workgroup> pressed: atomic<u32>;
+var<workgroup> seen: vec2u;
+
+// Sums of the parts, in a fixed order; left in the first places.
+fn add_parts(t: u32) {
+    for (var s = GROUP / 2u; s > 0u; s /= 2u) {
+        workgroupBarrier();
+        if t < s {
+            part_x[t] += part_x[t + s];
+            part_y[t] += part_y[t + s];
+            part_z[t] += part_z[t + s];
+        }
+    }
+    workgroupBarrier();
+}
+
+// Result of a pair: D, the deepest depth, points in contact, sum of shares. Then of each face of B, and of A, that listed
+// points may press: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
+// of the force; that centre, seen from A's.
+@compute @workgroup_size(GROUP)
+fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let n = group.x;
+    let list = smooth_pair[n].list;
+    let near = smooth_pair[n].near;
+    let total = near.x + near.y;
+    let faces = smooth_pair[n].faces;
+    let rows = mat3x3f(smooth_pose[n].row_x.xyz, smooth_pose[n].row_y.xyz, smooth_pose[n].row_z.xyz);
+    let velocity = vec3f(smooth_pose[n].row_x.w, smooth_pose[n].row_y.w, smooth_pose[n].row_z.w);
+    let spin = smooth_pose[n].spin.xyz;
+    let sum = smooth_pair[n].sum;
+    let state = smooth_pair[n].state;
+    if t == 0u {
+        atomicStore(&deepest_bits, 0u);
+        atomicStore(&pressed, 0u);
+    }
+    workgroupBarrier();
+    for (var m = t; m < total; m += GROUP) {
+        let side = u32(m >= near.x);
+        let k = contact_list[list + select(m, smooth_pair[n].count.x + m - near.x, side == 1u)];
+        let p = point_of(k);
+        let c = clearance_of(n, side, p.xyz);
+        let found = inside(c, select(faces.x, faces.y, side == 1u));
+        var normal = vec3f(0.0);
+        var arm = p.xyz;
+        if side == 0u {
+            normal = rows * found.outward;
+        } else {
+            normal = -found.outward;
+            arm = smooth_pair[n].half_a - c.high;
+        }
+        let speed = dot(velocity + cross(spin, arm), normal);
+        let place = state + 3u * m;
+        contact_state[place] = vec4f(normal, max(found.depth, 0.0));
+        contact_state[place + 1u] = vec4f(arm, speed);
+        contact_state[place + 2u] = vec4f(smooth_pair[n].share * p.w, f32(found.face + 6u * side), 0.0, 0.0);
+        if found.depth > 0.0 {
+            // Positive numbers are in the order of their bits.
+            atomicMax(&deepest_bits, bitcast<u32>(found.depth));
+            atomicOr(&pressed, 1u << (found.face + 6u * side));
+        }
+    }
+    workgroupBarrier();
+    if t == 0u {
+        seen = vec2u(atomicLoad(&deepest_bits), atomicLoad(&pressed));
+    }
+    let both = workgroupUniformLoad(&seen);
+    let deepest = bitcast<f32>(both.x);
+    let used = both.y;
+
+    var eighth = 0.0;
+    var sixth = 0.0;
+    var touching = 0.0;
+    for (var m = t; m < total; m += GROUP) {
+        let depth = contact_state[state + 3u * m].w;
+        if depth > 0.0 {
+            let x = depth / deepest;
+            let x2 = x * x;
+            let share = contact_state[state + 3u * m + 2u].x * x2 * x2 * x2;
+            sixth += share;
+            eighth += share * x2;
+            touching += 1.0;
+        }
+    }
+    part_x[t] = vec4f(eighth, sixth, touching, 0.0);
+    part_y[t] = vec4f(0.0);
+    part_z[t] = vec4f(0.0);
+    add_parts(t);
+    let parts = part_x[0];
+    let mean = sqrt(sqrt(sqrt(parts.x)));
+    let depth = deepest * mean;
+    let to_mean = 1.0 / (mean * mean * mean * mean * mean * mean);
+    let shares = parts.y * to_mean;
+    if t == 0u {
+        contact_sum[sum] = vec4f(depth, deepest, parts.z, shares);
+    }
+    let spring = smooth_pair[n].spring;
+    let beyond = max(depth - smooth_pair[n].stop_depth, 0.0);
+    let secant = spring + (smooth_pair[n].stop - spring) * beyond / max(depth, 1e-30);
+    let damping = smooth_pair[n].damping * sqrt(secant / spring) / sqrt(max(shares, 1e-30));
+    for (var m = t; m < total; m += GROUP) {
+        let place = state + 3u * m;
+        let own = contact_state[place].w;
+        let speed = contact_state[place + 1u].w;
+        var f = 0.0;
+        if own > 0.0 {
+            let x = own / deepest;
+            let share = contact_state[place + 2u].x * x * x * x * x * x * x * to_mean;
+            let part = select(1.0, felt(own / max(-speed * smooth_pair[n].step, 1e-30)), speed < 0.0);
+            f = max(share * (secant * own - part * damping * speed), 0.0);
+        }
+        contact_state[place + 2u].z = f;
+    }
+
+    var slot = sum + 1u;
+    for (var key = 0u; key < 12u; key++) {
+        let open = select(faces.x >> key, faces.y >> (key - 6u), key >= 6u) & 1u;
+        if open == 0u || select(near.x, near.y, key >= 6u) == 0u {
+            continue;
+        }
+        if ((used >> key) & 1u) == 0u {
+            if t < 3u {
+                contact_sum[slot + t] = vec4f(0.0);
+            }
+            slot += 3u;
+            continue;
+        }
+        var push = vec4f(0.0);
+        var moment = vec3f(0.0);
+        var at = vec3f(0.0);
+        for (var m = t; m < total; m += GROUP) {
+            let place = state + 3u * m;
+            let f = contact_state[place + 2u].z;
+            if f > 0.0 && u32(contact_state[place + 2u].y) == key {
+                let arm = contact_state[place + 1u].xyz;
+                let own = f * contact_state[place].xyz;
+                push += vec4f(own, f);
+                moment += cross(arm, own);
+                at += f * arm;
+            }
+        }
+        workgroupBarrier();
+        part_x[t] = push;
+        part_y[t] = vec4f(moment, 0.0);
+        part_z[t] = vec4f(at, 0.0);
+        add_parts(t);
+        let push_sum = part_x[0];
+        let moment_sum = part_y[0].xyz;
+        let center = part_z[0].xyz / max(push_sum.w, 1e-30);
+        workgroupBarrier();
+        var radius = 0.0;
+        for (var m = t; m < total; m += GROUP) {
+            let place = state + 3u * m;
+            if u32(contact_state[place + 2u].y) == key {
+                radius += contact_state[place + 2u].z * distance(contact_state[place + 1u].xyz, center);
+            }
+        }
+        part_x[t] = vec4f(radius, 0.0, 0.0, 0.0);
+        part_y[t] = vec4f(0.0);
+        part_z[t] = vec4f(0.0);
+        add_parts(t);
+        if t == 0u {
+            contact_sum[slot] = push_sum;
+            contact_sum[slot + 1u] = vec4f(moment_sum, part_x[0].x / max(push_sum.w, 1e-30));
+            contact_sum[slot + 2u] = vec4f(center, 0.0);
+        }
+        slot += 3u;
+    }
+}

@@ -1,0 +1,167 @@
+//! Contact's shaders against their twins, the f64 laws of the host: the same candidates, the same forces to
+//! f32's last digits wherever the bodies are, and scenes that must come to rest.
+
+use glam::{DMat3, DQuat, DVec3};
+use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::Backend;
+use seixo::body::Wrench;
+use seixo::case::{Contact, Law};
+use seixo::contact::{Probe, Solids};
+use seixo::scene::Scene;
+use seixo::study::contact_checks::{DAM_BREAK_CUBE, Random, smooth};
+use seixo::study::contact_cost::backend;
+use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
+
+/// Whether there is a device to test; loud if not, and a failure where one is expected.
+fn device() -> bool {
+    if !gpu::adapters().is_empty() {
+        return true;
+    }
+    let text = "NO GPU ADAPTER: contact's shaders are not compared with their twins (libvulkan1 and \
+                mesa-vulkan-drivers give a software one)";
+    assert!(std::env::var_os("CI").is_none(), "{text}");
+    eprintln!("SKIPPED, {text}");
+    false
+}
+
+fn compute(scene: &Scene, contact: &Contact) -> Gpu {
+    backend(scene, contact, |s, p, plan, settings| Gpu::new(s, p, plan, settings, None)).expect("a device")
+}
+
+/// What host and device find in `scene` before anything moves.
+fn both(scene: &Scene, contact: &Contact) -> (Probe, Probe) {
+    let mut gpu = compute(scene, contact);
+    let dt = 1e-4;
+    let mut solids = Solids::new(scene, Some(contact)).expect("valid");
+    let host = solids.probe(None, dt).expect("the host can");
+    let device = solids.probe(gpu.compute(), dt).expect("the device can");
+    (host, device)
+}
+
+/// Largest difference of forces and of torques, over the largest force and over it times the largest arm.
+fn error(host: &Probe, device: &Probe, arm: f64) -> f64 {
+    let force = host.wrenches.iter().map(|w| w.force.length()).fold(0.0, f64::max);
+    assert!(force > 0.0, "nothing touches");
+    let worst = |(a, b): (&Wrench, &Wrench)| {
+        ((a.force - b.force).length() / force).max((a.torque - b.torque).length() / (force * arm))
+    };
+    host.wrenches.iter().zip(&device.wrenches).map(worst).fold(0.0, f64::max)
+}
+
+/// Boxes at random that overlap each other, a floor and a step.
+fn heap(seed: u64, law: Law, flat: bool) -> Scene {
+    let l0 = 0.02;
+    let mut random = Random::new(seed);
+    let mut dry = DryScene::new(l0, DVec3::splat(-1.0), DVec3::splat(1.0)).floor();
+    if law == Law::Paper {
+        dry = dry.particle_floor((-0.5, -0.5), (0.5, 0.5));
+    } else {
+        let axes = DMat3::from_rotation_z(0.4);
+        dry = dry.wall(DVec3::new(0.2, 0.0, 0.0), DVec3::new(0.1, 0.4, 0.08), axes);
+    }
+    for k in 0..12 {
+        let mut draw = || 2.0 * random.draw() - 1.0;
+        let edge = 0.1 + 0.02 * draw();
+        let at = DVec3::new(0.25 * draw(), 0.25 * draw(), 0.06 + 0.06 * draw());
+        let size = DVec3::new(edge, if k % 3 == 0 { 2.0 * edge } else { edge }, edge);
+        let mut body = FreeBox::new(size, 800.0, at);
+        body.velocity = DVec3::new(draw(), draw(), draw());
+        body.angular_velocity = 3.0 * DVec3::new(draw(), draw(), draw());
+        body.orientation = random.orientation();
+        if flat || k % 4 == 0 {
+            body.orientation = DQuat::IDENTITY;
+        }
+        dry = dry.body(&body);
+    }
+    dry.build()
+}
+
+fn contact(law: Law) -> Contact {
+    let viscous_friction = if law == Law::Paper { 4.0 } else { 0.0 };
+    Contact { law, viscous_friction, ..smooth(1e6, 30.0, 0.0) }
+}
+
+#[test]
+fn the_device_lists_the_hosts_candidates_and_gives_its_forces() {
+    if !device() {
+        return;
+    }
+    for (law, bound) in [(Law::Smooth, 2e-6), (Law::Paper, 2e-5)] {
+        for seed in 0..8 {
+            for flat in [false, true] {
+                let (host, device) = both(&heap(seed, law, flat), &contact(law));
+                assert!(
+                    host.candidates.len() > 500 && host.touching > 50,
+                    "{law:?} {seed}: {}",
+                    host.touching
+                );
+                // The device takes in what f32 cannot tell from the skin.
+                let missing = host.candidates.iter().filter(|c| device.candidates.binary_search(c).is_err());
+                let (missing, more) =
+                    (missing.count(), device.candidates.len() as f64 - host.candidates.len() as f64);
+                let e = error(&host, &device, 0.1);
+                println!(
+                    "{law:?} {seed} {flat}: {} candidates, {} missing, {} more, {} touching, error {e:.1e}, energy {:.1e}",
+                    host.candidates.len(),
+                    missing,
+                    more,
+                    host.touching,
+                    device.energy / host.energy - 1.0
+                );
+                assert!(e < bound, "{law:?} {seed}: {e:e}");
+                assert!((device.energy / host.energy - 1.0).abs() < bound);
+                assert_eq!(missing, 0);
+                assert!(more <= 2.0, "{law:?} {seed}: {more} candidates more");
+                assert_eq!(host.touching, device.touching);
+            }
+        }
+    }
+}
+
+/// The dam-break cube of the paper at rest on a floor at `height`, turned by `turn` about z and a little about x: as
+/// deep as its weight presses it.
+fn resting(law: Law, height: f64, turn: f64) -> (Scene, Contact) {
+    let (edge, mass, l0, spring, damping, ..) = DAM_BREAK_CUBE;
+    let contact = Contact { law, ..smooth(spring, damping, 0.0) };
+    let scene = |gap: f64| {
+        let at = DVec3::new(3.1 + 0.3 * l0, 0.2 * l0, height + 0.5 * edge + gap);
+        let mut cube = FreeBox::new(DVec3::splat(edge), mass / edge.powi(3), at);
+        cube.orientation = DQuat::from_rotation_z(turn) * DQuat::from_rotation_x(1e-6);
+        let mut scene = DryScene::new(l0, DVec3::splat(-4.0), DVec3::splat(5.0))
+            .wall(DVec3::new(3.0, 0.0, height - 1.0), DVec3::new(2.0, 2.0, 1.0), DMat3::IDENTITY)
+            .particle_floor((3.0, -0.1), (3.2, 0.1))
+            .body(&cube)
+            .build();
+        scene.position.iter_mut().for_each(|x| x.z += height);
+        scene
+    };
+    let (mut low, mut high) = (-0.3 * l0, 0.3 * l0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        let mut solids = Solids::new(&scene(middle), Some(&contact)).expect("valid");
+        let force = solids.probe(None, 1e-4).expect("the host can").wrenches[0].force.z;
+        if force > mass * GRAVITY { low = middle } else { high = middle }
+    }
+    (scene(low), contact)
+}
+
+#[test]
+fn forces_at_rest_carry_no_noise_wherever_the_body_stands() {
+    if !device() {
+        return;
+    }
+    let (edge, mass, ..) = DAM_BREAK_CUBE;
+    for law in [Law::Smooth, Law::Paper] {
+        for height in [0.0, 1.0, 3.5] {
+            for turn in [0.0, 0.3] {
+                let (scene, contact) = resting(law, height, turn);
+                let (host, device) = both(&scene, &contact);
+                let e = error(&host, &device, 0.5 * edge);
+                let force = host.wrenches[0].force.z / (mass * GRAVITY);
+                println!("{law:?} z {height} turn {turn}: force over weight {force}, error {e:.1e}");
+                assert!((force - 1.0).abs() < 0.02, "at rest: {force}");
+                assert!(e < 2e-5, "{law:?} z = {height}, turn {turn}: {e:e}");
+            }
+        }
+    }
+}
