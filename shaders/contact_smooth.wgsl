@@ -206,17 +206,34 @@ var<workgroup> deepest_bits: atomic<u32>;
 var<workgroup> pressed: atomic<u32>;
 var<workgroup> seen: vec2u;
 
-// Sums of the parts, in a fixed order; left in the first places.
-fn add_parts(t: u32) {
-    for (var s = GROUP / 2u; s > 0u; s /= 2u) {
-        workgroupBarrier();
-        if t < s {
-            part_x[t] += part_x[t + s];
-            part_y[t] += part_y[t + s];
-            part_z[t] += part_z[t + s];
+struct Sums {
+    x: vec4f,
+    y: vec4f,
+    z: vec4f,
+}
+
+// Sums over the threads, in a fixed order; eight at a time, as barriers cost more than additions.
+fn sums_of(t: u32, own: Sums) -> Sums {
+    workgroupBarrier();
+    part_x[t] = own.x;
+    part_y[t] = own.y;
+    part_z[t] = own.z;
+    workgroupBarrier();
+    if t < 8u {
+        for (var k = t + 8u; k < GROUP; k += 8u) {
+            part_x[t] += part_x[k];
+            part_y[t] += part_y[k];
+            part_z[t] += part_z[k];
         }
     }
     workgroupBarrier();
+    var out = Sums(part_x[0], part_y[0], part_z[0]);
+    for (var k = 1u; k < 8u; k++) {
+        out.x += part_x[k];
+        out.y += part_y[k];
+        out.z += part_z[k];
+    }
+    return out;
 }
 
 // Result of a pair: D, the deepest depth, points in contact, sum of shares. Then of each face of B, and of A, that listed
@@ -272,6 +289,15 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let deepest = bitcast<f32>(both.x);
     let used = both.y;
 
+    // Faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's.
+    let open = select(0u, faces.x, near.x > 0u) | (select(0u, faces.y, near.y > 0u) << 6u);
+    if used == 0u {
+        for (var k = t; k < 1u + 3u * countOneBits(open); k += GROUP) {
+            contact_sum[sum + k] = vec4f(0.0);
+        }
+        return;
+    }
+
     var eighth = 0.0;
     var sixth = 0.0;
     var touching = 0.0;
@@ -286,11 +312,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             touching += 1.0;
         }
     }
-    part_x[t] = vec4f(eighth, sixth, touching, 0.0);
-    part_y[t] = vec4f(0.0);
-    part_z[t] = vec4f(0.0);
-    add_parts(t);
-    let parts = part_x[0];
+    let parts = sums_of(t, Sums(vec4f(eighth, sixth, touching, 0.0), vec4f(0.0), vec4f(0.0))).x;
     let mean = sqrt(sqrt(sqrt(parts.x)));
     let depth = deepest * mean;
     let to_mean = 1.0 / (mean * mean * mean * mean * mean * mean);
@@ -300,8 +322,8 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     }
     let spring = smooth_pair[n].spring;
     let beyond = max(depth - smooth_pair[n].stop_depth, 0.0);
-    let secant = spring + (smooth_pair[n].stop - spring) * beyond / max(depth, 1e-30);
-    let damping = smooth_pair[n].damping * sqrt(secant / spring) / sqrt(max(shares, 1e-30));
+    let secant = spring + (smooth_pair[n].stop - spring) * beyond / depth;
+    let damping = smooth_pair[n].damping * sqrt(secant / (spring * shares));
     for (var m = t; m < total; m += GROUP) {
         let place = state + 3u * m;
         let own = contact_state[place].w;
@@ -318,8 +340,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
 
     var slot = sum + 1u;
     for (var key = 0u; key < 12u; key++) {
-        let open = select(faces.x >> key, faces.y >> (key - 6u), key >= 6u) & 1u;
-        if open == 0u || select(near.x, near.y, key >= 6u) == 0u {
+        if ((open >> key) & 1u) == 0u {
             continue;
         }
         if ((used >> key) & 1u) == 0u {
@@ -343,15 +364,8 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
                 at += f * arm;
             }
         }
-        workgroupBarrier();
-        part_x[t] = push;
-        part_y[t] = vec4f(moment, 0.0);
-        part_z[t] = vec4f(at, 0.0);
-        add_parts(t);
-        let push_sum = part_x[0];
-        let moment_sum = part_y[0].xyz;
-        let center = part_z[0].xyz / max(push_sum.w, 1e-30);
-        workgroupBarrier();
+        let face = sums_of(t, Sums(push, vec4f(moment, 0.0), vec4f(at, 0.0)));
+        let center = face.z.xyz / max(face.x.w, 1e-30);
         var radius = 0.0;
         for (var m = t; m < total; m += GROUP) {
             let place = state + 3u * m;
@@ -359,13 +373,10 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
                 radius += contact_state[place + 2u].z * distance(contact_state[place + 1u].xyz, center);
             }
         }
-        part_x[t] = vec4f(radius, 0.0, 0.0, 0.0);
-        part_y[t] = vec4f(0.0);
-        part_z[t] = vec4f(0.0);
-        add_parts(t);
+        let spread = sums_of(t, Sums(vec4f(radius, 0.0, 0.0, 0.0), vec4f(0.0), vec4f(0.0))).x.x;
         if t == 0u {
-            contact_sum[slot] = push_sum;
-            contact_sum[slot + 1u] = vec4f(moment_sum, part_x[0].x / max(push_sum.w, 1e-30));
+            contact_sum[slot] = face.x;
+            contact_sum[slot + 1u] = vec4f(face.y.xyz, spread / max(face.x.w, 1e-30));
             contact_sum[slot + 2u] = vec4f(center, 0.0);
         }
         slot += 3u;

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::neighbours::Neighbours;
 use crate::params::Params;
-use crate::plan::Stage;
+use crate::plan::{ContactPlan, Stage};
 use crate::scene::{Scene, Shape, Solid};
 use crate::simulation::Simulation;
 use glam::DVec3;
@@ -177,7 +177,7 @@ fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
 
 /// Errors of force and torque. A torque may vanish by symmetry: its scale is at least force times the size of
 /// the largest solid.
-fn wrenches(gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid]) -> Vec<StageError> {
+fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid]) -> Vec<StageError> {
     let most = |f: fn(&Wrench) -> DVec3| cpu.iter().map(|w| f(w).length()).fold(0.0, f64::max);
     let sizes = solids.iter().map(|s| match s.shape {
         Shape::Box { half } => half.length(),
@@ -186,8 +186,8 @@ fn wrenches(gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid]) -> Vec<StageError>
     let pairs =
         |f: fn(&Wrench) -> DVec3| -> Vec<_> { gpu.iter().zip(cpu).map(|(a, b)| (f(a), f(b))).collect() };
     vec![
-        error(Stage::BodyForce, "force", &pairs(|w| w.force), None),
-        error(Stage::BodyForce, "torque", &pairs(|w| w.torque), Some(scale)),
+        error(stage, "force", &pairs(|w| w.force), None),
+        error(stage, "torque", &pairs(|w| w.torque), Some(scale)),
     ]
 }
 
@@ -228,11 +228,17 @@ pub fn compare_stages(
     for _ in 0..warmup {
         simulation.step()?;
     }
-    let (plan, params) = (simulation.plan.clone(), simulation.params.clone());
-    if !plan.wet() {
-        return Ok(Vec::new());
-    }
+    let (mut plan, params) = (simulation.plan.clone(), simulation.params.clone());
+    // The plan may leave contact to the host; here it is the device's that is asked about.
+    plan.contact = ContactPlan::on_device(case, scene);
     let settings = simulation.settings();
+    if !plan.wet() {
+        if plan.contact.kernel.is_none() {
+            return Ok(Vec::new());
+        }
+        let mut gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
+        return contact(&mut simulation, &mut gpu, scene);
+    }
     let cpu = Cpu::new(scene, &params, &plan, settings)?;
     let gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
     let mut pair = Pair { cpu, gpu, params };
@@ -259,7 +265,8 @@ pub fn compare_stages(
                 pair.gpu.solve_pressure(&step)?;
             }
             Stage::BodyForce => {
-                out.extend(wrenches(&pair.gpu.body_force()?, &pair.cpu.body_force()?, &scene.solids));
+                let (gpu, cpu) = (pair.gpu.body_force()?, pair.cpu.body_force()?);
+                out.extend(wrenches(stage, &gpu, &cpu, &scene.solids));
                 continue;
             }
             _ => {
@@ -269,6 +276,25 @@ pub fn compare_stages(
         }
         out.extend(pair.errors(stage)?);
     }
+    out.extend(contact(&mut simulation, &mut pair.gpu, scene)?);
+    Ok(out)
+}
+
+/// Errors of contact between the solids where they are: the part of candidates that differs, and the forces
+/// without friction.
+fn contact(simulation: &mut Simulation, gpu: &mut Gpu, scene: &Scene) -> Result<Vec<StageError>> {
+    let Some(compute) = gpu.compute() else { return Ok(Vec::new()) };
+    let dt = simulation.next_step().dt;
+    let device = simulation.solids.probe(Some(compute), dt)?;
+    let host = simulation.solids.probe(None, dt)?;
+    let missing = |a: &[[u64; 4]], b: &[[u64; 4]]| a.iter().filter(|c| b.binary_search(c).is_err()).count();
+    let differing =
+        missing(&device.candidates, &host.candidates) + missing(&host.candidates, &device.candidates);
+    let part = differing as f64 / host.candidates.len().max(1) as f64;
+    let stage = Stage::Contact;
+    let pairs = StageError { stage: stage.name(), field: "pairs", max_relative: part, l2_relative: part };
+    let mut out = vec![pairs];
+    out.extend(wrenches(stage, &device.wrenches, &host.wrenches, &scene.solids));
     Ok(out)
 }
 

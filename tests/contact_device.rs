@@ -2,14 +2,15 @@
 //! f32's last digits wherever the bodies are, and scenes that must come to rest.
 
 use glam::{DMat3, DQuat, DVec3};
-use seixo::backend::gpu::{self, Gpu};
 use seixo::backend::Backend;
+use seixo::backend::gpu::{self, Gpu};
 use seixo::body::Wrench;
 use seixo::case::{Contact, Law};
 use seixo::contact::{Probe, Solids};
 use seixo::scene::Scene;
 use seixo::study::contact_checks::{DAM_BREAK_CUBE, Random, smooth};
 use seixo::study::contact_cost::backend;
+use seixo::study::contact_rest::{dam_break_contact, drops_together, rest, stack_scene};
 use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
 
 /// Whether there is a device to test; loud if not, and a failure where one is expected.
@@ -163,5 +164,79 @@ fn forces_at_rest_carry_no_noise_wherever_the_body_stands() {
                 assert!(e < 2e-5, "{law:?} z = {height}, turn {turn}: {e:e}");
             }
         }
+    }
+}
+
+#[test]
+fn random_drops_of_the_dam_break_cube_end_flat_and_still() {
+    if !device() {
+        return;
+    }
+    let row = drops_together(40, 1.5, |s, c| Ok(Some(compute(s, c)))).expect("it runs");
+    println!("{row:?}");
+    assert_eq!((row.flat, row.at_rest, row.kept), (40, 40, 40), "{row:?}");
+    assert!(row.rise < 0.0 && row.energy_gain < 0.0 && row.penetration < 0.1, "{row:?}");
+}
+
+#[test]
+fn a_stack_of_cubes_and_a_block_on_a_slope_stand() {
+    if !device() {
+        return;
+    }
+    let (scene, contact) = (stack_scene(10), dam_break_contact());
+    let mut solids = Solids::new(&scene, Some(&contact)).expect("valid");
+    let mut gpu = compute(&scene, &contact);
+    let row = rest(&mut solids, gpu.compute(), 0.5, DAM_BREAK_CUBE.6).expect("it runs");
+    println!("{row:?} {:?}", solids.traffic());
+    assert!(row.drift < 1e-4, "{row:?}");
+    let mut on_host = Solids::new(&scene, Some(&contact)).expect("valid");
+    let host = rest(&mut on_host, None, 0.5, DAM_BREAK_CUBE.6).expect("it runs");
+    println!("{host:?}");
+    let apart = on_host.poses().iter().zip(solids.poses()).map(|(a, b)| (a.position - b.position).length());
+    assert!(apart.fold(0.0, f64::max) < 1e-9, "{row:?} {host:?}");
+
+    let block = FreeBox::new(DVec3::new(0.2, 0.2, 0.1), 780.0, DVec3::new(0.0, 0.0, 0.05));
+    let dry = DryScene::new(0.025, DVec3::splat(-2.0), DVec3::splat(2.0));
+    let scene = dry.slope(0.5).floor().body(&block).build();
+    let contact = smooth(9e5, 3.35e3, 0.6);
+    let mut solids = Solids::new(&scene, Some(&contact)).expect("valid");
+    let mut gpu = compute(&scene, &contact);
+    let row = rest(&mut solids, gpu.compute(), 1.0, 1e-3).expect("it runs");
+    println!("{row:?}");
+    assert!(0.5_f64.tan() < 0.6 && row.drift < 1e-4 && row.speed < 1e-6, "{row:?}");
+}
+
+#[test]
+fn two_runs_give_the_same_bits_and_two_solids_exchange_momentum_exactly() {
+    if !device() {
+        return;
+    }
+    for law in [Law::Smooth, Law::Paper] {
+        let size = DVec3::splat(0.2);
+        let mut first = FreeBox::new(size, 800.0, DVec3::new(-0.14, 0.03, -0.02));
+        first.velocity = DVec3::X;
+        let mut second = FreeBox::new(size, 2000.0, DVec3::new(0.14, -0.04, 0.05));
+        second.orientation = Random::new(3).orientation();
+        let dry = DryScene::new(0.025, DVec3::splat(-1.0), DVec3::splat(1.0)).gravity(DVec3::ZERO);
+        let scene = dry.body(&first).body(&second).build();
+        let contact = Contact { law, ..smooth(2e6, 100.0, 0.0) };
+        let mut gpu = compute(&scene, &contact);
+        let mut run = || {
+            let mut solids = Solids::new(&scene, Some(&contact)).expect("valid");
+            let before = solids.momentum();
+            let mut pairs = 0;
+            for step in 0..300 {
+                let t = f64::from(step) * 1e-3;
+                let report = solids.advance_on(gpu.compute(), t, 1e-3, &[Wrench::default(); 2]);
+                pairs = pairs.max(report.expect("it runs").pairs);
+            }
+            assert!(pairs > 0, "they must meet");
+            let after = solids.momentum();
+            let scale = first.mass();
+            assert!((after.0 - before.0).length() < 1e-12 * scale, "{law:?}");
+            assert!((after.1 - before.1).length() < 1e-12 * scale, "{law:?}");
+            solids.states()
+        };
+        assert_eq!(run(), run());
     }
 }

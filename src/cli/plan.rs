@@ -32,6 +32,13 @@ struct StageLine {
     reason: &'static str,
 }
 
+/// Where the pairs of contact are computed, on a backend that has a device.
+#[derive(Serialize)]
+struct ContactLine {
+    device: bool,
+    reason: String,
+}
+
 /// Constants of the fluid's scheme.
 #[derive(Serialize)]
 struct Scheme {
@@ -60,6 +67,7 @@ struct Report {
     particles: seixo::output::result::Particles,
     solids: Vec<String>,
     stages: Vec<StageLine>,
+    contact: ContactLine,
     scheme: Option<Scheme>,
     advice: Vec<String>,
 }
@@ -99,6 +107,7 @@ fn report(setup: &Setup) -> Result<Report> {
         particles: particles(scene),
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
+        contact: ContactLine { device: plan.contact.kernel.is_some(), reason: plan.contact.reason.clone() },
         scheme: if plan.wet() { Some(scheme(setup, &params, &plan, dt)?) } else { None },
         advice,
     })
@@ -202,6 +211,11 @@ fn words(report: &Report) -> String {
             lines.extend([String::new(), title.to_string()]);
         }
         lines.extend(report.stages.iter().filter(of).map(|s| format!("  {:<20}{}", s.stage, s.reason)));
+    }
+    if report.stages.iter().any(|s| s.planned && s.stage == Stage::Contact.name()) {
+        let place = if report.contact.device { "on the GPU, if that is the backend" } else { "on the host" };
+        lines.extend([String::new(), "contact".to_string()]);
+        lines.push(format!("  pairs {place}: {}", report.contact.reason));
     }
     if let Some(s) = &report.scheme {
         lines.extend([

@@ -1,7 +1,9 @@
 //! The studies that come with the program.
 
 use super::definition::{Definition, Files, Setup};
-use super::{Study, compare, dry_studies, gallery, needs, pressure_solve, stability, work_precision};
+use super::{
+    Study, compare, contact_cost, dry_studies, gallery, needs, pressure_solve, stability, work_precision,
+};
 use crate::error::{Error, Result};
 
 /// A built-in study: name, what it asks, in one line.
@@ -91,6 +93,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "spring-drop",
         about: "section 4.1: K_ideal of Table 1, and the three models of Fig. 6",
         make: Maker::Function(dry_studies::spring_drop),
+    },
+    Entry {
+        name: "contact-cost",
+        about: "what contact costs a step for 1 to 1000 bodies, on the host and on a device",
+        make: Maker::Function(contact_cost::study),
     },
 ];
 

@@ -2,8 +2,12 @@
 
 use super::contact_checks::{DAM_BREAK_CUBE, Random, lowest, none, smooth};
 use super::dry::{DryScene, FreeBox, GRAVITY};
+use crate::backend::{Backend, Compute};
+use crate::body::Pose;
+use crate::case::Contact;
 use crate::contact::Solids;
 use crate::error::Result;
+use crate::scene::Scene;
 use glam::{DQuat, DVec3};
 use serde::Serialize;
 use std::time::Instant;
@@ -38,15 +42,26 @@ pub struct RestRow {
 /// # Errors
 /// Those of [`Solids::advance`].
 pub fn stack(count: usize, seconds: f64) -> Result<RestRow> {
-    let (edge, mass, l0, spring, damping, friction, dt) = DAM_BREAK_CUBE;
+    let mut solids = Solids::new(&stack_scene(count), Some(&dam_break_contact()))?;
+    rest(&mut solids, None, seconds, DAM_BREAK_CUBE.6)
+}
+
+/// The contact of the dam-break cube with the smooth law.
+pub fn dam_break_contact() -> Contact {
+    let (.., spring, damping, friction, _) = DAM_BREAK_CUBE;
+    smooth(spring, damping, friction)
+}
+
+/// Cubes of 54 mm (0.073 kg), stacked `count` high.
+pub fn stack_scene(count: usize) -> Scene {
+    let (edge, mass, l0, ..) = DAM_BREAK_CUBE;
     let size = DVec3::splat(edge);
     let mut dry = DryScene::new(l0, DVec3::new(-0.5, -0.5, 0.0), DVec3::new(0.5, 0.5, 1.0)).floor();
     for k in 0..count {
         let center = DVec3::new(0.0, 0.0, (k as f64 + 0.5) * edge);
         dry = dry.body(&FreeBox::new(size, mass / edge.powi(3), center));
     }
-    let mut solids = Solids::new(&dry.build(), Some(&smooth(spring, damping, friction)))?;
-    rest(&mut solids, seconds, dt)
+    dry.build()
 }
 
 /// A wall of `columns` x 10 cubes of 54 mm hit by a cube of 20 kg at 3 m/s, K = `spring` [N/m] at the
@@ -69,17 +84,27 @@ pub fn demolish(columns: usize, spring: f64, seconds: f64) -> Result<RestRow> {
     let mut ram = FreeBox::new(size, 20.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
     ram.velocity = DVec3::new(3.0, 0.0, 0.0);
     let mut solids = Solids::new(&dry.body(&ram).build(), Some(&smooth(spring, damping, friction)))?;
-    rest(&mut solids, seconds, dt)
+    rest(&mut solids, None, seconds, dt)
 }
 
-fn rest(solids: &mut Solids, seconds: f64, dt: f64) -> Result<RestRow> {
+/// Lets the solids move for `seconds` in steps of `dt` [s], their pairs on `compute` if there is one.
+///
+/// # Errors
+/// Those of [`Solids::advance_on`].
+pub fn rest(
+    solids: &mut Solids,
+    mut compute: Option<&mut dyn Compute>,
+    seconds: f64,
+    dt: f64,
+) -> Result<RestRow> {
     let start: Vec<DVec3> = solids.poses().iter().map(|p| p.position).collect();
     let fluid = none(start.len());
     let clock = Instant::now();
     let steps = (seconds / dt) as usize;
     let (mut penetration, mut penetration_end, mut substeps) = (0.0_f64, 0.0_f64, 0);
     for step in 0..steps {
-        let report = solids.advance(step as f64 * dt, dt, &fluid)?;
+        let device = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
+        let report = solids.advance_on(device, step as f64 * dt, dt, &fluid)?;
         penetration = penetration.max(report.penetration_max_over_l0);
         if (steps - step) as f64 * dt < 1.0 {
             penetration_end = penetration_end.max(report.penetration_max_over_l0);
@@ -125,38 +150,112 @@ pub struct RandomDropRow {
     pub step_us: f64,
 }
 
+/// Height from which the cube drops [m].
+const DROP: f64 = 0.05;
+
+/// The cube of drop `k`, of `mass` [kg], before it falls.
+fn dropped(k: usize, mass: f64) -> FreeBox {
+    let (edge, _, l0, ..) = DAM_BREAK_CUBE;
+    let size = DVec3::splat(edge);
+    let mut random = Random::new(k as u64);
+    let q = random.orientation();
+    let z = lowest(0.5 * size, q) + DROP;
+    let mut body = FreeBox::new(size, mass / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
+    body.orientation = q;
+    body.velocity = DVec3::new(0.5, 0.0, 0.0);
+    body
+}
+
+impl RandomDropRow {
+    fn new(spring: f64, mass: f64, drops: usize) -> Self {
+        Self {
+            spring,
+            mass,
+            drops,
+            rise: f64::NEG_INFINITY,
+            energy_gain: f64::NEG_INFINITY,
+            penetration: 0.0,
+            flat: 0,
+            at_rest: 0,
+            kept: 0,
+            substeps: 0,
+            step_us: 0.0,
+        }
+    }
+
+    /// How a cube lies at the end.
+    fn judge(&mut self, pose: Pose) {
+        let edge = DAM_BREAK_CUBE.0;
+        self.flat += usize::from(tilt(pose.orientation) < 1e-3);
+        let still = pose.velocity.length() < 1e-3 && pose.angular_velocity.length() < 1e-2;
+        self.at_rest += usize::from(still);
+        self.kept += usize::from(pose.position.z > 0.4 * edge && pose.position.z < edge);
+    }
+}
+
+/// The drops of [`random_drops`] side by side in one scene, K and mass those of the dam-break cube, the pairs on
+/// `compute` if there is one (made for the scene by `make`). Energies are those of motion and height.
+///
+/// # Errors
+/// Those of [`Solids::advance_on`] and of `make`.
+pub fn drops_together<B: Backend>(
+    drops: usize,
+    seconds: f64,
+    make: impl FnOnce(&Scene, &Contact) -> Result<Option<B>>,
+) -> Result<RandomDropRow> {
+    let (edge, mass, l0, spring, .., dt) = DAM_BREAK_CUBE;
+    let mut dry = DryScene::new(l0, DVec3::new(-2.0, -22.0, 0.0), DVec3::new(3.0, 22.0, 0.75)).floor();
+    for k in 0..drops {
+        let mut body = dropped(k, mass);
+        body.center.y = k as f64 - 0.5 * drops as f64;
+        dry = dry.body(&body);
+    }
+    let (scene, contact) = (dry.build(), dam_break_contact());
+    let mut backend = make(&scene, &contact)?;
+    let mut solids = Solids::new(&scene, Some(&contact))?;
+    // A cube has the same moment about every axis.
+    let energy = |p: &Pose| {
+        let turning = edge * edge / 12.0 * p.angular_velocity.length_squared();
+        mass * (GRAVITY * p.position.z + 0.5 * p.velocity.length_squared() + turning)
+    };
+    let start: Vec<(f64, f64)> = solids.poses().iter().map(|p| (p.position.z, energy(p))).collect();
+    let mut row = RandomDropRow::new(spring, mass, drops);
+    let mut touched = vec![false; drops];
+    let clock = Instant::now();
+    let steps = (seconds / dt) as usize;
+    for step in 0..steps {
+        let compute = backend.as_mut().and_then(Backend::compute);
+        let report = solids.advance_on(compute, step as f64 * dt, dt, &none(drops))?;
+        row.substeps = report.substeps;
+        row.penetration = row.penetration.max(report.penetration_max_over_l0);
+        for (k, pose) in solids.poses().iter().enumerate() {
+            touched[k] |= solids.contact_wrenches()[k].force.length() > 1e-3 * mass * GRAVITY;
+            if touched[k] {
+                row.rise = row.rise.max(pose.position.z - start[k].0);
+                row.energy_gain = row.energy_gain.max((energy(pose) - start[k].1) / (mass * GRAVITY * DROP));
+            }
+        }
+    }
+    solids.poses().iter().for_each(|p| row.judge(*p));
+    row.step_us = clock.elapsed().as_secs_f64() * 1e6 / steps as f64;
+    Ok(row)
+}
+
 /// Drops the dam-break cube `drops` times from 0.05 m with 0.5 m/s sideways, with the cube's mass and K
 /// replaced by `mass` [kg] and `spring` [N/m], at the same damping ratio, for `seconds`.
 ///
 /// # Errors
 /// Those of [`Solids::advance`].
 pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Result<RandomDropRow> {
-    let (edge, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
+    let (_, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
     let damping = c * (spring * mass / (k * cube)).sqrt();
-    let (height, size) = (0.05, DVec3::splat(edge));
-    let scale = mass * GRAVITY * height;
-    let mut row = RandomDropRow {
-        spring,
-        mass,
-        drops,
-        rise: f64::NEG_INFINITY,
-        energy_gain: f64::NEG_INFINITY,
-        penetration: 0.0,
-        flat: 0,
-        at_rest: 0,
-        kept: 0,
-        substeps: 0,
-        step_us: 0.0,
-    };
+    let scale = mass * GRAVITY * DROP;
+    let mut row = RandomDropRow::new(spring, mass, drops);
     let clock = Instant::now();
     let mut steps = 0;
     for drop in 0..drops {
-        let mut random = Random::new(drop as u64);
-        let q = random.orientation();
-        let z = lowest(0.5 * size, q) + height;
-        let mut body = FreeBox::new(size, mass / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
-        body.orientation = q;
-        body.velocity = DVec3::new(0.5, 0.0, 0.0);
+        let body = dropped(drop, mass);
+        let z = body.center.z;
         let dry = DryScene::new(l0, DVec3::new(-2.0, -2.0, 0.0), DVec3::new(3.0, 2.0, 0.75));
         let scene = dry.floor().body(&body).build();
         let mut solids = Solids::new(&scene, Some(&smooth(spring, damping, friction)))?;
@@ -174,11 +273,7 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
                 row.energy_gain = row.energy_gain.max(gain);
             }
         }
-        let pose = solids.poses()[0];
-        row.flat += usize::from(tilt(pose.orientation) < 1e-3);
-        let still = pose.velocity.length() < 1e-3 && pose.angular_velocity.length() < 1e-2;
-        row.at_rest += usize::from(still);
-        row.kept += usize::from(pose.position.z > 0.4 * edge && pose.position.z < edge);
+        row.judge(solids.poses()[0]);
     }
     row.step_us = clock.elapsed().as_secs_f64() * 1e6 / f64::from(steps);
     Ok(row)
