@@ -12,7 +12,6 @@
 const GROUP: u32 = 64u;
 // Set in the number of a point that lies on the edge of a wall.
 const ON_WALL: u32 = 0x80000000u;
-const ALL_FACES: u32 = 0x3fu;
 const FAR: f32 = 3.0e38;
 
 // Of a pair, for as long as its lists hold. First of two: points of A against the box of B; second: the other way.
@@ -75,26 +74,37 @@ struct Clearance {
     high: vec3f,
 }
 
-// `rows`: the turn from the point's frame to the box's; `low`, `high`: bounding box of the points; `below`, `above`:
-// their largest clearances.
-fn clearance(p: vec3f, rows: mat3x3f, low: vec3f, high: vec3f, below: vec3f, above: vec3f) -> Clearance {
-    var out: Clearance;
-    for (var k = 0u; k < 3u; k++) {
-        let row = rows[k];
-        let grows = row > vec3f(0.0);
-        out.low[k] = below[k] + dot(row, p - select(low, high, grows));
-        out.high[k] = above[k] - dot(row, p - select(high, low, grows));
-    }
-    return out;
+// Clearance to the lower face that is `below` at its largest, among points between `low` and `high`; `row` leads to the
+// upper face.
+fn to_lower(p: vec3f, row: vec3f, low: vec3f, high: vec3f, below: f32) -> f32 {
+    return below + dot(row, p - select(low, high, row > vec3f(0.0)));
+}
+
+fn to_upper(p: vec3f, row: vec3f, low: vec3f, high: vec3f, above: f32) -> f32 {
+    return above - dot(row, p - select(high, low, row > vec3f(0.0)));
 }
 
 fn clearance_of(n: u32, side: u32, p: vec3f) -> Clearance {
-    let rows = mat3x3f(smooth_pose[n].row_x.xyz, smooth_pose[n].row_y.xyz, smooth_pose[n].row_z.xyz);
-    if side == 0u {
-        return clearance(p, rows, smooth_pair[n].low_a, smooth_pair[n].high_a, smooth_pose[n].below_b.xyz, smooth_pose[n].above_b.xyz);
+    var x = smooth_pose[n].row_x.xyz;
+    var y = smooth_pose[n].row_y.xyz;
+    var z = smooth_pose[n].row_z.xyz;
+    var low = smooth_pair[n].low_a;
+    var high = smooth_pair[n].high_a;
+    var below = smooth_pose[n].below_b.xyz;
+    var above = smooth_pose[n].above_b.xyz;
+    if side == 1u {
+        let back = transpose(mat3x3f(x, y, z));
+        x = back[0];
+        y = back[1];
+        z = back[2];
+        low = smooth_pair[n].low_b;
+        high = smooth_pair[n].high_b;
+        below = smooth_pose[n].below_a.xyz;
+        above = smooth_pose[n].above_a.xyz;
     }
-    return clearance(
-        p, transpose(rows), smooth_pair[n].low_b, smooth_pair[n].high_b, smooth_pose[n].below_a.xyz, smooth_pose[n].above_a.xyz,
+    return Clearance(
+        vec3f(to_lower(p, x, low, high, below.x), to_lower(p, y, low, high, below.y), to_lower(p, z, low, high, below.z)),
+        vec3f(to_upper(p, x, low, high, above.x), to_upper(p, y, low, high, above.y), to_upper(p, z, low, high, above.z)),
     );
 }
 
@@ -149,10 +159,26 @@ struct Inside {
     face: u32,
 }
 
-fn face_normal(axis: u32, upper: bool) -> vec3f {
-    var n = vec3f(0.0);
-    n[axis] = select(-1.0, 1.0, upper);
-    return n;
+// The face of an axis that a point is pushed out through; `open`: bit 0 the lower one, bit 1 the upper one.
+fn nearest(axis: vec3f, number: u32, low: f32, high: f32, open: u32) -> Inside {
+    let upper = select(high < low, open == 2u, open != 3u);
+    let depth = select(select(low, high, upper), FAR, open == 0u);
+    return Inside(depth, select(-axis, axis, upper), number + u32(upper));
+}
+
+// `found` with the next face blended in.
+fn blended(found: Inside, next: Inside) -> Inside {
+    let a = found.depth;
+    let b = next.depth;
+    if b >= 2.0 * a {
+        return found;
+    }
+    let r = b / a;
+    return Inside(
+        0.2 * a + 0.8 * b - 0.2 * b * r,
+        (0.2 + 0.2 * r * r) * found.outward + (0.8 - 0.4 * r) * next.outward,
+        found.face,
+    );
 }
 
 fn inside(c: Clearance, faces: u32) -> Inside {
@@ -160,38 +186,28 @@ fn inside(c: Clearance, faces: u32) -> Inside {
     if min(over.x, min(over.y, over.z)) <= 0.0 {
         return Inside(0.0, vec3f(0.0), 0u);
     }
-    var near = over;
-    var upper = vec3u(c.high < c.low);
-    for (var k = 0u; k < 3u; k++) {
-        let open = (faces >> (2u * k)) & 3u;
-        if open != 3u {
-            upper[k] = open >> 1u;
-            near[k] = select(select(c.low[k], c.high[k], open == 2u), FAR, open == 0u);
-        }
+    var first = nearest(vec3f(1.0, 0.0, 0.0), 0u, c.low.x, c.high.x, faces & 3u);
+    var second = nearest(vec3f(0.0, 1.0, 0.0), 2u, c.low.y, c.high.y, (faces >> 2u) & 3u);
+    var third = nearest(vec3f(0.0, 0.0, 1.0), 4u, c.low.z, c.high.z, (faces >> 4u) & 3u);
+    if second.depth < first.depth {
+        let other = first;
+        first = second;
+        second = other;
     }
-    var first = 0u;
-    if !(near.x <= near.y && near.x <= near.z) {
-        first = 1u + u32(near.z < near.y);
+    if third.depth < second.depth {
+        let other = second;
+        second = third;
+        third = other;
     }
-    var others = vec2u((first + 1u) % 3u, (first + 2u) % 3u);
-    if near[others.y] < near[others.x] {
-        others = others.yx;
+    if second.depth < first.depth {
+        let other = first;
+        first = second;
+        second = other;
     }
-    if near[first] == FAR {
+    if first.depth == FAR {
         return Inside(0.0, vec3f(0.0), 0u);
     }
-    var found = Inside(near[first], face_normal(first, upper[first] == 1u), 2u * first + upper[first]);
-    for (var i = 0u; i < 2u; i++) {
-        let k = others[i];
-        let a = found.depth;
-        let b = near[k];
-        if b < 2.0 * a {
-            let r = b / a;
-            found.depth = 0.2 * a + 0.8 * b - 0.2 * b * r;
-            found.outward = (0.2 + 0.2 * r * r) * found.outward + (0.8 - 0.4 * r) * face_normal(k, upper[k] == 1u);
-        }
-    }
-    return found;
+    return blended(blended(first, second), third);
 }
 
 // Share of the dashpot that a point feels which entered `steps` sub-steps ago; as `felt` in src/contact/smooth.rs.
@@ -202,9 +218,7 @@ fn felt(steps: f32) -> f32 {
 var<workgroup> part_x: array<vec4f, GROUP>;
 var<workgroup> part_y: array<vec4f, GROUP>;
 var<workgroup> part_z: array<vec4f, GROUP>;
-var<workgroup> deepest_bits: atomic<u32>;
-var<workgroup> pressed: atomic<u32>;
-var<workgroup> seen: vec2u;
+var<workgroup> used_faces: array<u32, GROUP>;
 
 struct Sums {
     x: vec4f,
@@ -251,11 +265,8 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let spin = smooth_pose[n].spin.xyz;
     let sum = smooth_pair[n].sum;
     let state = smooth_pair[n].state;
-    if t == 0u {
-        atomicStore(&deepest_bits, 0u);
-        atomicStore(&pressed, 0u);
-    }
-    workgroupBarrier();
+    var own_deepest = 0.0;
+    var own_used = 0u;
     for (var m = t; m < total; m += GROUP) {
         let side = u32(m >= near.x);
         let k = contact_list[list + select(m, smooth_pair[n].count.x + m - near.x, side == 1u)];
@@ -276,18 +287,29 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         contact_state[place + 1u] = vec4f(arm, speed);
         contact_state[place + 2u] = vec4f(smooth_pair[n].share * p.w, f32(found.face + 6u * side), 0.0, 0.0);
         if found.depth > 0.0 {
-            // Positive numbers are in the order of their bits.
-            atomicMax(&deepest_bits, bitcast<u32>(found.depth));
-            atomicOr(&pressed, 1u << (found.face + 6u * side));
+            own_deepest = max(own_deepest, found.depth);
+            own_used |= 1u << (found.face + 6u * side);
+        }
+    }
+    part_x[t].x = own_deepest;
+    used_faces[t] = own_used;
+    workgroupBarrier();
+    if t < 8u {
+        for (var k = t + 8u; k < GROUP; k += 8u) {
+            part_x[t].x = max(part_x[t].x, part_x[k].x);
+            used_faces[t] |= used_faces[k];
         }
     }
     workgroupBarrier();
     if t == 0u {
-        seen = vec2u(atomicLoad(&deepest_bits), atomicLoad(&pressed));
+        for (var k = 1u; k < 8u; k++) {
+            part_x[0].x = max(part_x[0].x, part_x[k].x);
+            used_faces[0] |= used_faces[k];
+        }
     }
-    let both = workgroupUniformLoad(&seen);
-    let deepest = bitcast<f32>(both.x);
-    let used = both.y;
+    workgroupBarrier();
+    let deepest = part_x[0].x;
+    let used = workgroupUniformLoad(&used_faces[0]);
 
     // Faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's.
     let open = select(0u, faces.x, near.x > 0u) | (select(0u, faces.y, near.y > 0u) << 6u);
