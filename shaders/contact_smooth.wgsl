@@ -215,40 +215,14 @@ fn felt(steps: f32) -> f32 {
     return select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0);
 }
 
+// Threads that share the sums of a face at most.
+const SHARING: u32 = 16u;
+
 var<workgroup> part_x: array<vec4f, GROUP>;
 var<workgroup> part_y: array<vec4f, GROUP>;
 var<workgroup> part_z: array<vec4f, GROUP>;
 var<workgroup> used_faces: array<u32, GROUP>;
-
-struct Sums {
-    x: vec4f,
-    y: vec4f,
-    z: vec4f,
-}
-
-// Sums over the threads, in a fixed order; eight at a time, as barriers cost more than additions.
-fn sums_of(t: u32, own: Sums) -> Sums {
-    workgroupBarrier();
-    part_x[t] = own.x;
-    part_y[t] = own.y;
-    part_z[t] = own.z;
-    workgroupBarrier();
-    if t < 8u {
-        for (var k = t + 8u; k < GROUP; k += 8u) {
-            part_x[t] += part_x[k];
-            part_y[t] += part_y[k];
-            part_z[t] += part_z[k];
-        }
-    }
-    workgroupBarrier();
-    var out = Sums(part_x[0], part_y[0], part_z[0]);
-    for (var k = 1u; k < 8u; k++) {
-        out.x += part_x[k];
-        out.y += part_y[k];
-        out.z += part_z[k];
-    }
-    return out;
-}
+var<workgroup> seen: vec2u;
 
 // Result of a pair: D, the deepest depth, points in contact, sum of shares. Then of each face of B, and of A, that listed
 // points may press: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
@@ -306,17 +280,18 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             part_x[0].x = max(part_x[0].x, part_x[k].x);
             used_faces[0] |= used_faces[k];
         }
+        seen = vec2u(bitcast<u32>(part_x[0].x), used_faces[0]);
     }
-    workgroupBarrier();
-    let deepest = part_x[0].x;
-    let used = workgroupUniformLoad(&used_faces[0]);
+    let both = workgroupUniformLoad(&seen);
+    let deepest = bitcast<f32>(both.x);
+    let used = both.y;
 
     // Faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's.
     let open = select(0u, faces.x, near.x > 0u) | (select(0u, faces.y, near.y > 0u) << 6u);
+    for (var k = t; k < 1u + 3u * countOneBits(open); k += GROUP) {
+        contact_sum[sum + k] = vec4f(0.0);
+    }
     if used == 0u {
-        for (var k = t; k < 1u + 3u * countOneBits(open); k += GROUP) {
-            contact_sum[sum + k] = vec4f(0.0);
-        }
         return;
     }
 
@@ -334,14 +309,22 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             touching += 1.0;
         }
     }
-    let parts = sums_of(t, Sums(vec4f(eighth, sixth, touching, 0.0), vec4f(0.0), vec4f(0.0))).x;
+    part_y[t] = vec4f(eighth, sixth, touching, 0.0);
+    workgroupBarrier();
+    if t < 8u {
+        for (var k = t + 8u; k < GROUP; k += 8u) {
+            part_y[t] += part_y[k];
+        }
+    }
+    workgroupBarrier();
+    var parts = part_y[0];
+    for (var k = 1u; k < 8u; k++) {
+        parts += part_y[k];
+    }
     let mean = sqrt(sqrt(sqrt(parts.x)));
     let depth = deepest * mean;
     let to_mean = 1.0 / (mean * mean * mean * mean * mean * mean);
     let shares = parts.y * to_mean;
-    if t == 0u {
-        contact_sum[sum] = vec4f(depth, deepest, parts.z, shares);
-    }
     let spring = smooth_pair[n].spring;
     let beyond = max(depth - smooth_pair[n].stop_depth, 0.0);
     let secant = spring + (smooth_pair[n].stop - spring) * beyond / depth;
@@ -360,47 +343,71 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         contact_state[place + 2u].z = f;
     }
 
-    var slot = sum + 1u;
-    for (var key = 0u; key < 12u; key++) {
-        if ((open >> key) & 1u) == 0u {
-            continue;
+    // A few threads for each face that is pressed.
+    storageBarrier();
+    let pressed = countOneBits(used);
+    let sharing = min(GROUP / pressed, SHARING);
+    let face = t / sharing;
+    let first = face * sharing;
+    var key = 12u;
+    var m_first = total;
+    if face < pressed {
+        var rest = used;
+        for (var k = 0u; k < face; k++) {
+            rest &= rest - 1u;
         }
-        if ((used >> key) & 1u) == 0u {
-            if t < 3u {
-                contact_sum[slot + t] = vec4f(0.0);
-            }
-            slot += 3u;
-            continue;
+        key = firstTrailingBit(rest);
+        m_first = t - first;
+    }
+    var push = vec4f(0.0);
+    var moment = vec3f(0.0);
+    var at = vec3f(0.0);
+    for (var m = m_first; m < total; m += sharing) {
+        let place = state + 3u * m;
+        let f = contact_state[place + 2u].z;
+        if f > 0.0 && u32(contact_state[place + 2u].y) == key {
+            let arm = contact_state[place + 1u].xyz;
+            let own = f * contact_state[place].xyz;
+            push += vec4f(own, f);
+            moment += cross(arm, own);
+            at += f * arm;
         }
-        var push = vec4f(0.0);
-        var moment = vec3f(0.0);
-        var at = vec3f(0.0);
-        for (var m = t; m < total; m += GROUP) {
-            let place = state + 3u * m;
-            let f = contact_state[place + 2u].z;
-            if f > 0.0 && u32(contact_state[place + 2u].y) == key {
-                let arm = contact_state[place + 1u].xyz;
-                let own = f * contact_state[place].xyz;
-                push += vec4f(own, f);
-                moment += cross(arm, own);
-                at += f * arm;
-            }
+    }
+    part_x[t] = push;
+    part_z[t] = vec4f(at, 0.0);
+    workgroupBarrier();
+    part_y[t] = vec4f(moment, 0.0);
+    if face < pressed && t == first {
+        for (var k = 1u; k < sharing; k++) {
+            part_x[t] += part_x[t + k];
+            part_z[t] += part_z[t + k];
         }
-        let face = sums_of(t, Sums(push, vec4f(moment, 0.0), vec4f(at, 0.0)));
-        let center = face.z.xyz / max(face.x.w, 1e-30);
-        var radius = 0.0;
-        for (var m = t; m < total; m += GROUP) {
+        part_z[t] /= max(part_x[t].w, 1e-30);
+    }
+    workgroupBarrier();
+    var radius = 0.0;
+    if face < pressed {
+        let center = part_z[first].xyz;
+        for (var m = m_first; m < total; m += sharing) {
             let place = state + 3u * m;
             if u32(contact_state[place + 2u].y) == key {
                 radius += contact_state[place + 2u].z * distance(contact_state[place + 1u].xyz, center);
             }
         }
-        let spread = sums_of(t, Sums(vec4f(radius, 0.0, 0.0, 0.0), vec4f(0.0), vec4f(0.0))).x.x;
-        if t == 0u {
-            contact_sum[slot] = face.x;
-            contact_sum[slot + 1u] = vec4f(face.y.xyz, spread / max(face.x.w, 1e-30));
-            contact_sum[slot + 2u] = vec4f(center, 0.0);
+    }
+    part_y[t].w = radius;
+    workgroupBarrier();
+    if face < pressed && t == first {
+        var turning = part_y[t];
+        for (var k = 1u; k < sharing; k++) {
+            turning += part_y[t + k];
         }
-        slot += 3u;
+        let slot = sum + 1u + 3u * countOneBits(open & ((1u << key) - 1u));
+        contact_sum[slot] = part_x[t];
+        contact_sum[slot + 1u] = vec4f(turning.xyz, turning.w / max(part_x[t].w, 1e-30));
+        contact_sum[slot + 2u] = part_z[t];
+    }
+    if t == 0u {
+        contact_sum[sum] = vec4f(depth, deepest, parts.z, shares);
     }
 }
