@@ -10,8 +10,6 @@
 // position's size.
 
 const GROUP: u32 = 64u;
-// Set in the number of a point that lies on the edge of a wall.
-const ON_WALL: u32 = 0x80000000u;
 const FAR: f32 = 3.0e38;
 
 // Of a pair, for as long as its lists hold. First of two: points of A against the box of B; second: the other way.
@@ -50,23 +48,17 @@ struct SmoothPose {
     above_b: vec4f,
     below_a: vec4f,
     above_a: vec4f,
+    // Contacts that the host has found: their deepest depth d, sums of w (d_i / d)^8 and of w (d_i / d)^6.
+    found: vec4f,
 }
 
-@group(0) @binding(2) var<storage, read> contact_point: array<vec4f>;  // xyz in the solid's frame, w weight
-@group(0) @binding(3) var<storage, read> contact_sample: array<vec4f>; // the same of the edges of walls
-@group(0) @binding(4) var<storage, read> smooth_pair: array<SmoothPair>;
-@group(0) @binding(5) var<storage, read> smooth_pose: array<SmoothPose>;
-@group(0) @binding(6) var<storage, read_write> contact_list: array<u32>;
-@group(0) @binding(7) var<storage, read_write> contact_count: array<vec2u>;
-@group(0) @binding(8) var<storage, read_write> contact_state: array<vec4f>;
-@group(0) @binding(9) var<storage, read_write> contact_sum: array<vec4f>;
-
-fn point_of(k: u32) -> vec4f {
-    if (k & ON_WALL) != 0u {
-        return contact_sample[k & ~ON_WALL];
-    }
-    return contact_point[k];
-}
+@group(0) @binding(2) var<storage, read> contact_point: array<vec4f>; // xyz in the solid's frame, w weight
+@group(0) @binding(3) var<storage, read> smooth_pair: array<SmoothPair>;
+@group(0) @binding(4) var<storage, read> smooth_pose: array<SmoothPose>;
+@group(0) @binding(5) var<storage, read_write> contact_list: array<u32>;
+@group(0) @binding(6) var<storage, read_write> contact_count: array<vec2u>;
+@group(0) @binding(7) var<storage, read_write> contact_state: array<vec4f>;
+@group(0) @binding(8) var<storage, read_write> contact_sum: array<vec4f>;
 
 // Clearances of a point to the lower and upper faces of a box.
 struct Clearance {
@@ -128,7 +120,7 @@ fn search(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             let k = start + t;
             var is_near = false;
             if k < count {
-                let c = clearance_of(n, side, point_of(first + k).xyz);
+                let c = clearance_of(n, side, contact_point[first + k].xyz);
                 let least = min(c.low, c.high);
                 is_near = -min(least.x, min(least.y, least.z)) < skin;
             }
@@ -224,7 +216,7 @@ var<workgroup> part_z: array<vec4f, GROUP>;
 var<workgroup> used_faces: array<u32, GROUP>;
 var<workgroup> seen: vec2u;
 
-// Result of a pair: D, the deepest depth, points in contact, sum of shares. Then of each face of B, and of A, that listed
+// Result of a pair, zeros if none of its points touches: D, the deepest depth, points in contact, sum of shares. Then of each face of B, and of A, that listed
 // points may press: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
 // of the force; that centre, seen from A's.
 @compute @workgroup_size(GROUP)
@@ -244,7 +236,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     for (var m = t; m < total; m += GROUP) {
         let side = u32(m >= near.x);
         let k = contact_list[list + select(m, smooth_pair[n].count.x + m - near.x, side == 1u)];
-        let p = point_of(k);
+        let p = contact_point[k];
         let c = clearance_of(n, side, p.xyz);
         let found = inside(c, select(faces.x, faces.y, side == 1u));
         var normal = vec3f(0.0);
@@ -283,7 +275,8 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         seen = vec2u(bitcast<u32>(part_x[0].x), used_faces[0]);
     }
     let both = workgroupUniformLoad(&seen);
-    let deepest = bitcast<f32>(both.x);
+    let added = smooth_pose[n].found;
+    let deepest = max(bitcast<f32>(both.x), added.x);
     let used = both.y;
 
     // Faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's.
@@ -321,6 +314,10 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     for (var k = 1u; k < 8u; k++) {
         parts += part_y[k];
     }
+    let ratio = added.x / deepest;
+    let sixth_power = ratio * ratio * ratio * ratio * ratio * ratio;
+    parts.x += added.y * sixth_power * ratio * ratio;
+    parts.y += added.z * sixth_power;
     let mean = sqrt(sqrt(sqrt(parts.x)));
     let depth = deepest * mean;
     let to_mean = 1.0 / (mean * mean * mean * mean * mean * mean);

@@ -177,10 +177,7 @@ pub(crate) fn set_constants(
     h: f64,
 ) {
     for pair in pairs {
-        let b = match pair.b {
-            smooth::Other::Solid(b) => Some(b),
-            smooth::Other::Wall(_) => None,
-        };
+        let b = pair.b.solid();
         let weight = surfaces[pair.a].smallest_weight;
         pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
         pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());

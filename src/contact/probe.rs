@@ -42,11 +42,7 @@ impl Solids {
         let mut probe = Probe { wrenches: vec![Wrench::default(); self.bodies.len()], ..Probe::default() };
         self.add_wrenches(&mut probe.wrenches);
         for p in self.smooth_pairs() {
-            let b = match p.b {
-                Other::Solid(b) => Some(b),
-                Other::Wall(_) => None,
-            };
-            let patches = p.patches.iter().map(|f| (p.a, b, f.normal, f.at, f.force, f.radius));
+            let patches = p.patches.iter().map(|f| (p.a, p.b.solid(), f.normal, f.at, f.force, f.radius));
             probe.patches.extend(patches);
             probe.energy += p.energy;
             probe.touching += p.contact_count();

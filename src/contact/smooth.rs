@@ -29,6 +29,16 @@ pub(crate) enum Other {
     Wall(usize),
 }
 
+impl Other {
+    /// The moving solid, if it is one.
+    pub fn solid(self) -> Option<usize> {
+        match self {
+            Self::Solid(b) => Some(b),
+            Self::Wall(_) => None,
+        }
+    }
+}
+
 /// Constants of a pair for one length of sub-step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Constants {
@@ -100,19 +110,29 @@ struct Contact {
     patch: u8,
 }
 
-/// A patch as a device sums it, world frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct DevicePatch {
-    /// As [`Patch`] counts them.
-    pub key: u8,
-    /// Force on the first solid [N].
-    pub force: DVec3,
-    /// Sum of the points' forces [N].
-    pub pressing: f64,
-    /// Centre of the normal force [m].
-    pub at: DVec3,
-    /// Mean distance of the normal force from its centre [m].
-    pub radius: f64,
+impl Contact {
+    /// s_i of a point in a contact of effective depth `depth` [m].
+    fn share(&self, depth: f64) -> f64 {
+        let x = self.depth / depth;
+        self.weight * (x * x) * (x * x) * (x * x)
+    }
+}
+
+/// What a device sums over the points of a pair, world frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeviceSums {
+    /// Points in contact.
+    pub count: usize,
+    /// Effective depth D of all contacts [m].
+    pub depth: f64,
+    /// Deepest of all contacts [m].
+    pub deepest: f64,
+    /// Sum of the s_i of all contacts.
+    pub shares: f64,
+    /// Wrenches on the two solids, of the device's points.
+    pub wrench: [Wrench; 2],
+    /// Patches of the device's points.
+    pub patches: Vec<Patch>,
 }
 
 /// All points pressed by one face: where friction acts.
@@ -130,6 +150,25 @@ pub(crate) struct Patch {
     pressing: f64,
     /// Mean distance of the normal force from its centre [m].
     pub radius: f64,
+}
+
+impl Patch {
+    /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
+    /// mean distance from it [m].
+    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, radius: f64) -> Self {
+        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, radius }
+    }
+
+    /// Takes in another patch of the same face. The mean distance from the common centre is exact where
+    /// both have the same centre.
+    fn merge(&mut self, other: &Self) {
+        let force = self.force * self.normal + other.force * other.normal;
+        let pressing = self.pressing + other.pressing;
+        let at = (self.pressing * self.at + other.pressing * other.at) / pressing;
+        let spread = |p: &Self| p.pressing * p.radius.hypot((p.at - at).length());
+        let radius = (spread(self) + spread(other)) / pressing;
+        *self = Self::new(self.key, force, pressing, at, radius);
+    }
 }
 
 /// A pair of solids close to each other.
@@ -182,27 +221,47 @@ impl Pair {
         self.count
     }
 
-    /// Takes over an evaluation by a device: points in contact, effective depth D [m], deepest point [m],
-    /// wrenches on the two solids, patches.
-    pub fn set(
+    /// Finds the contacts that a device does not look for; their deepest depth d [m], and the sums of
+    /// w_i (d_i / d)^8 and w_i (d_i / d)^6.
+    pub fn find_beside_device(
         &mut self,
-        count: usize,
-        depth: f64,
-        deepest: f64,
-        wrench: [Wrench; 2],
-        patches: &[DevicePatch],
-    ) {
-        (self.count, self.depth, self.wrench) = (count, deepest, wrench);
-        self.energy = if count > 0 { self.constants.stored(depth).1 } else { 0.0 };
+        bodies: &[Body],
+        surfaces: &[Surface],
+        walls: &[WallBox],
+    ) -> [f64; 3] {
+        self.contacts.clear();
+        if self.samples.is_empty() {
+            return [0.0; 3];
+        }
+        // its lists of points are empty
+        self.find(bodies, surfaces, walls);
+        let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
+        let sum = |power: i32| self.contacts.iter().map(|c| c.weight * (c.depth / deepest).powi(power)).sum();
+        if deepest > 0.0 { [deepest, sum(8), sum(6)] } else { [0.0; 3] }
+    }
+
+    /// Joins the contacts found beside the device with what it sums over its points.
+    pub fn join(&mut self, sums: &DeviceSums, bodies: &[Body]) {
         self.patches.clear();
-        self.patches.extend(patches.iter().map(|p| Patch {
-            key: p.key,
-            normal: p.force.normalize_or_zero(),
-            at: p.at,
-            force: p.force.length(),
-            pressing: p.pressing,
-            radius: p.radius,
-        }));
+        self.wrench = sums.wrench;
+        (self.energy, self.depth) = (0.0, sums.deepest);
+        self.count = sums.count + self.contacts.len();
+        if sums.count == 0 {
+            if !self.contacts.is_empty() {
+                self.press();
+                self.sum(bodies);
+            }
+            return;
+        }
+        self.push(sums.depth, sums.shares);
+        self.depth = sums.deepest;
+        self.sum(bodies);
+        for p in &sums.patches {
+            match self.patches.iter_mut().find(|own| own.key == p.key) {
+                Some(own) => own.merge(p),
+                None => self.patches.push(*p),
+            }
+        }
     }
 
     /// Collects the points of `a` and of `b` that come within `skin` [m] of the other's box.
@@ -237,13 +296,19 @@ impl Pair {
             Other::Wall(w) => {
                 let wall = &walls[w];
                 self.points_a = near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
-                let near = |x: &DVec3| {
-                    let q = body.rotation.transpose() * (*x - body.pose.position);
-                    geometry::outside(q, body.half) < skin
-                };
-                self.samples.extend(wall.samples(body, skin, spacing).filter(near));
+                self.collect_edges(body, wall, skin, spacing);
             }
         }
+    }
+
+    /// Collects the points on the edges of `wall` that come within `skin` [m] of `body`.
+    pub fn collect_edges(&mut self, body: &Body, wall: &WallBox, skin: f64, spacing: f64) {
+        let near = |x: &DVec3| {
+            let q = body.rotation.transpose() * (*x - body.pose.position);
+            geometry::outside(q, body.half) < skin
+        };
+        self.samples.clear();
+        self.samples.extend(wall.samples(body, skin, spacing).filter(near));
     }
 
     /// Whether any candidate is left.
@@ -317,22 +382,25 @@ impl Pair {
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
     /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i.
     fn press(&mut self) {
-        let k = self.constants;
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
         let sum: f64 = self.contacts.iter().map(|c| c.weight * eighth(c.depth / deepest)).sum();
         let mean = sum.sqrt().sqrt().sqrt();
         let depth = deepest * mean;
+        self.depth = deepest;
+        let shares = self.contacts.iter().map(|c| c.share(depth)).sum();
+        self.push(depth, shares);
+    }
+
+    /// Normal forces of the points and the energy, at the effective depth `depth` [m] and the sum of all
+    /// shares.
+    fn push(&mut self, depth: f64, shares: f64) {
+        let k = self.constants;
         let (secant, energy) = k.stored(depth);
-        (self.energy, self.depth) = (energy, deepest);
-        let share = |c: &Contact| {
-            let x = c.depth / depth;
-            c.weight * (x * x) * (x * x) * (x * x)
-        };
-        let shares: f64 = self.contacts.iter().map(share).sum();
+        self.energy = energy;
         let damping = k.damping * (secant / k.spring).sqrt() / shares.sqrt();
         for c in &mut self.contacts {
-            let share = share(c);
+            let share = c.share(depth);
             let felt = if c.speed < 0.0 { felt(c.depth / -c.speed / k.step) } else { 1.0 };
             c.force = (share * (secant * c.depth - felt * damping * c.speed)).max(0.0);
         }

@@ -320,7 +320,6 @@ fn contact_buffers(kernel: Option<&str>) -> Vec<(&'static str, u64, Host, bool)>
     let (smooth, paper) = (kernel == Some("contact_smooth"), kernel == Some("contact_paper"));
     [
         ("contact_point", Host::Writes, smooth),
-        ("contact_sample", Host::Writes, smooth),
         ("smooth_pair", Host::Writes, smooth),
         ("smooth_pose", Host::Writes, smooth),
         ("contact_count", Host::Reads, smooth),

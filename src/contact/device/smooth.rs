@@ -5,13 +5,11 @@ use crate::body::{Body, Wrench};
 use crate::contact::Limits;
 use crate::contact::candidates::{self, Candidates};
 use crate::contact::geometry::Surface;
-use crate::contact::smooth::{DevicePatch, Other, Pair};
+use crate::contact::smooth::{DeviceSums, Other, Pair, Patch};
 use crate::error::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 
-/// Set in the number of a point on the edge of a wall; `ON_WALL` in the shaders.
-pub const ON_WALL: u32 = 0x8000_0000;
 /// Coordinates this close to the largest or smallest of a solid, over its size, are taken as equal to it: points
 /// of a face then lie in one plane in f32 too.
 const SNAP: f64 = 1e-9;
@@ -58,6 +56,7 @@ pub struct SmoothPose {
     pub above_b: [f32; 4],
     pub below_a: [f32; 4],
     pub above_a: [f32; 4],
+    pub found: [f32; 4],
 }
 
 /// Points in their frame, and the box around them.
@@ -91,34 +90,14 @@ impl Cloud {
     }
 }
 
-/// The other's points, where they are not those of a moving solid.
-#[derive(Clone, Debug)]
-struct Samples {
-    cloud: Cloud,
-    /// Origin of the points, world [m].
-    origin: DVec3,
-    /// Their places, world [m].
-    at: Vec<DVec3>,
-}
-
-/// A pair close to each other.
-struct Entry {
-    a: usize,
-    b: Other,
-    /// Points on the edges of a wall.
-    samples: Option<Samples>,
-    record: SmoothPair,
-}
-
 /// The smooth law's pairs on a device.
 pub(crate) struct Smooth {
     generation: u64,
     clouds: Vec<Cloud>,
-    entries: Vec<Entry>,
-    /// Pairs with points near each other; evaluated on the device.
+    /// Pairs with points near each other, and of each what the device knows.
     pub pairs: Vec<Pair>,
-    poses: Vec<SmoothPose>,
     records: Vec<SmoothPair>,
+    poses: Vec<SmoothPose>,
     sums: usize,
     /// Sub-step and longest step [s] that the device has the constants of.
     constants: Option<(f64, f64)>,
@@ -134,18 +113,8 @@ impl Smooth {
             .map(|s| Cloud::add(&mut points, &s.points, |k| s.weights[k]))
             .collect::<Result<_>>()?;
         link.write("contact_point", &points)?;
-        let (entries, pairs, poses, records) = (vec![], vec![], vec![], vec![]);
-        Ok(Self {
-            generation: 0,
-            clouds,
-            entries,
-            pairs,
-            poses,
-            records,
-            sums: 0,
-            constants: None,
-            sent: false,
-        })
+        let (pairs, records, poses) = (vec![], vec![], vec![]);
+        Ok(Self { generation: 0, clouds, pairs, poses, records, sums: 0, constants: None, sent: false })
     }
 
     /// Whether the lists are those of `candidates`.
@@ -162,31 +131,24 @@ impl Smooth {
         spacing: f64,
         link: &mut Link,
     ) -> Result<()> {
-        let mut sample_points = vec![];
-        let (mut list, mut entries) = (0, vec![]);
-        for (pair, skin) in model.close(candidates, bodies) {
-            let own = self.clouds[pair.a];
-            let (theirs, samples, faces_b, share) = match pair.b {
-                Other::Solid(b) => (self.clouds[b], None, model.surfaces[b].all_faces, 0.5),
+        let mut list = 0;
+        (self.pairs, self.records) = (vec![], vec![]);
+        for (mut pair, skin) in model.close(candidates, bodies) {
+            let (body, own) = (&bodies[pair.a], self.clouds[pair.a]);
+            let (theirs, faces_b, share) = match pair.b {
+                Other::Solid(b) => (self.clouds[b], model.surfaces[b].all_faces, 0.5),
                 Other::Wall(w) => {
-                    let wall = &model.walls[w];
-                    let at: Vec<DVec3> = wall.samples(&bodies[pair.a], skin, spacing).collect();
-                    let origin = at.first().copied().unwrap_or_default();
-                    let to_wall = wall.axes.transpose();
-                    let local: Vec<DVec3> = at.iter().map(|x| to_wall * (*x - origin)).collect();
-                    let weight = model.surfaces[pair.a].smallest_weight;
-                    let mut cloud = Cloud::add(&mut sample_points, &local, |_| weight)?;
-                    cloud.first |= ON_WALL;
-                    (cloud, Some(Samples { cloud, origin, at }), wall.faces, 1.0)
+                    pair.collect_edges(body, &model.walls[w], skin, spacing);
+                    (Cloud::default(), model.walls[w].faces, 1.0)
                 }
             };
-            let size = bodies[pair.a].radius() + theirs.low.length().max(theirs.high.length());
-            let record = SmoothPair {
+            let size = body.radius() + theirs.low.length().max(theirs.high.length());
+            self.records.push(SmoothPair {
                 low_a: three(own.low),
                 high_a: three(own.high),
                 low_b: three(theirs.low),
                 high_b: three(theirs.high),
-                half_a: three(bodies[pair.a].half),
+                half_a: three(body.half),
                 first: [own.first, theirs.first],
                 count: [own.count, theirs.count],
                 faces: [u32::from(faces_b), u32::from(model.surfaces[pair.a].all_faces)],
@@ -194,29 +156,44 @@ impl Smooth {
                 share: share as f32,
                 skin: (skin + ROUNDING * size) as f32,
                 ..SmoothPair::default()
-            };
+            });
             list += (own.count + theirs.count) as usize;
-            entries.push(Entry { a: pair.a, b: pair.b, samples, record });
+            self.pairs.push(pair);
         }
-        self.entries = entries;
-        if !self.entries.is_empty() {
+        if !self.pairs.is_empty() {
             self.place_poses(model, bodies);
-            self.records = self.entries.iter().map(|e| e.record).collect();
-            link.write("contact_sample", &sample_points)?;
             link.write("smooth_pair", &self.records)?;
             link.write("smooth_pose", &self.poses)?;
             link.compute.reserve("contact_list", 4 * list as u64)?;
-            link.compute.reserve("contact_count", 8 * self.entries.len() as u64)?;
-            link.run(&[("contact_smooth.search", self.entries.len() as u64)])?;
-            let near = link.read::<[u32; 2]>("contact_count", self.entries.len())?;
-            self.keep(&near)?;
-            link.compute.reserve("contact_state", 16 * self.states() as u64)?;
+            link.compute.reserve("contact_count", 8 * self.pairs.len() as u64)?;
+            link.run(&[("contact_smooth.search", self.pairs.len() as u64)])?;
+            let near = link.read::<[u32; 2]>("contact_count", self.pairs.len())?;
+            let states = self.keep(&near)?;
+            link.compute.reserve("contact_state", 16 * states as u64)?;
             link.compute.reserve("contact_sum", 16 * self.sums as u64)?;
         }
-        self.pairs = self.entries.iter().map(|e| Pair::new(e.a, e.b)).collect();
         self.generation = candidates.generation();
         (self.constants, self.sent) = (None, false);
         Ok(())
+    }
+
+    /// Keeps the pairs with points near each other and gives each its places; how many states they have.
+    fn keep(&mut self, near: &[[u32; 2]]) -> Result<usize> {
+        let (mut state, mut sum) = (0, 0);
+        let (pairs, records) = (std::mem::take(&mut self.pairs), std::mem::take(&mut self.records));
+        for ((pair, mut record), &near) in pairs.into_iter().zip(records).zip(near) {
+            if near == [0, 0] && pair.is_empty() {
+                continue;
+            }
+            record.near = near;
+            (record.state, record.sum) = (place(state)?, place(sum)?);
+            state += 3 * (near[0] + near[1]) as usize;
+            sum += 1 + 3 * slots(&record).count();
+            self.pairs.push(pair);
+            self.records.push(record);
+        }
+        self.sums = sum;
+        Ok(state)
     }
 
     /// Constants of every pair for sub-steps of `h` [s].
@@ -235,61 +212,41 @@ impl Smooth {
         }
     }
 
-    /// Keeps the pairs with points near each other and gives each its places.
-    fn keep(&mut self, near: &[[u32; 2]]) -> Result<()> {
-        let mut near = near.iter();
-        self.entries.retain_mut(|e| {
-            e.record.near = near.next().copied().unwrap_or_default();
-            e.record.near != [0, 0]
-        });
-        let (mut state, mut sum) = (0, 0);
-        for Entry { record, .. } in &mut self.entries {
-            (record.state, record.sum) = (place(state)?, place(sum)?);
-            state += 3 * (record.near[0] + record.near[1]) as usize;
-            sum += 1 + 3 * slots(record).count();
-        }
-        self.sums = sum;
-        Ok(())
-    }
-
-    fn states(&self) -> usize {
-        self.entries.iter().map(|e| 3 * (e.record.near[0] + e.record.near[1]) as usize).sum()
-    }
-
-    /// How each pair lies now.
+    /// How each pair lies now, and what the host finds beside the points.
     fn place_poses(&mut self, model: &candidates::Smooth, bodies: &[Body]) {
         let clouds = &self.clouds;
         self.poses.clear();
-        self.poses.extend(self.entries.iter().map(|e| pose(e, clouds, model, bodies)));
+        self.poses.extend(self.pairs.iter_mut().map(|pair| SmoothPose {
+            found: {
+                let [deepest, eighth, sixth] = pair.find_beside_device(bodies, &model.surfaces, &model.walls);
+                [deepest as f32, eighth as f32, sixth as f32, 0.0]
+            },
+            ..pose(pair, clouds, model, bodies)
+        }));
     }
 
     /// Normal forces of all pairs at the bodies' poses and velocities.
     pub fn evaluate(&mut self, model: &candidates::Smooth, bodies: &[Body], link: &mut Link) -> Result<()> {
-        if self.entries.is_empty() {
+        if self.pairs.is_empty() {
             return Ok(());
         }
         self.place_poses(model, bodies);
         if !self.sent {
-            let record = |(e, p): (&Entry, &Pair)| {
-                let c = &p.constants;
-                SmoothPair {
-                    spring: c.spring as f32,
-                    stop: c.stop as f32,
-                    stop_depth: c.stop_depth as f32,
-                    damping: c.damping as f32,
-                    step: c.step as f32,
-                    ..e.record
-                }
-            };
-            self.records = self.entries.iter().zip(&self.pairs).map(record).collect();
+            for (record, pair) in self.records.iter_mut().zip(&self.pairs) {
+                let c = &pair.constants;
+                (record.spring, record.stop) = (c.spring as f32, c.stop as f32);
+                (record.stop_depth, record.damping) = (c.stop_depth as f32, c.damping as f32);
+                record.step = c.step as f32;
+            }
             link.write("smooth_pair", &self.records)?;
             self.sent = true;
         }
         link.write("smooth_pose", &self.poses)?;
-        link.run(&[("contact_smooth.force", self.entries.len() as u64)])?;
+        link.run(&[("contact_smooth.force", self.pairs.len() as u64)])?;
         let sums = link.read::<[f32; 4]>("contact_sum", self.sums)?;
         for (pair, record) in self.pairs.iter_mut().zip(&self.records) {
-            take(pair, record, &sums[record.sum as usize..], bodies);
+            let sums = read(pair, record, &sums[record.sum as usize..], bodies);
+            pair.join(&sums, bodies);
         }
         Ok(())
     }
@@ -301,29 +258,20 @@ impl Smooth {
         bodies: &[Body],
         link: &mut Link,
     ) -> Result<Vec<(usize, Other, u8, DVec3)>> {
-        let end = self.entries.iter().map(|e| e.record.list + e.record.count[0] + e.record.count[1]).max();
+        let end = self.records.iter().map(|r| r.list + r.count[0] + r.count[1]).max();
         let list = link.read::<u32>("contact_list", end.unwrap_or(0) as usize)?;
         let mut out = vec![];
-        for Entry { a, b, samples, record } in &self.entries {
-            for side in 0..2 {
+        for (pair, record) in self.pairs.iter().zip(&self.records) {
+            for (side, solid) in [(0, Some(pair.a)), (1, pair.b.solid())] {
+                let Some(solid) = solid else { continue };
                 let from = record.list + if side == 1 { record.count[0] } else { 0 };
                 for &k in &list[from as usize..(from + record.near[side]) as usize] {
-                    let number = (k - record.first[side]) as usize;
-                    let solid = match (side, *b) {
-                        (0, _) => Some(*a),
-                        (_, Other::Solid(b)) => Some(b),
-                        _ => None,
-                    };
-                    let at = match (solid, samples) {
-                        (Some(s), _) => {
-                            bodies[s].pose.position + bodies[s].rotation * surfaces[s].points[number]
-                        }
-                        (None, Some(samples)) => samples.at[number],
-                        _ => continue,
-                    };
-                    out.push((*a, *b, side as u8, at));
+                    let point = surfaces[solid].points[(k - record.first[side]) as usize];
+                    let at = bodies[solid].pose.position + bodies[solid].rotation * point;
+                    out.push((pair.a, pair.b, side as u8, at));
                 }
             }
+            out.extend(pair.samples.iter().map(|x| (pair.a, pair.b, 1, *x)));
         }
         Ok(out)
     }
@@ -354,10 +302,10 @@ fn clearances(turn: DMat3, shift: DVec3, half: DVec3, cloud: &Cloud) -> (DVec3, 
     (of(1.0), of(-1.0))
 }
 
-fn pose(entry: &Entry, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Body]) -> SmoothPose {
-    let a = &bodies[entry.a];
+fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Body]) -> SmoothPose {
+    let a = &bodies[pair.a];
     let still = a.rotation.transpose();
-    let (center, axes, half, velocity, spin) = match entry.b {
+    let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
             let Body { pose, rotation, half, .. } = &bodies[b];
             (pose.position, *rotation, *half, pose.velocity_at(a.pose.position), pose.angular_velocity)
@@ -367,15 +315,11 @@ fn pose(entry: &Entry, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[B
             (wall.center, wall.axes, wall.half, DVec3::ZERO, DVec3::ZERO)
         }
     };
-    let (origin, theirs) = match (&entry.samples, entry.b) {
-        (Some(samples), _) => (samples.origin, samples.cloud),
-        (None, Other::Solid(b)) => (center, clouds[b]),
-        (None, Other::Wall(_)) => (center, Cloud::default()),
-    };
+    let theirs = pair.b.solid().map_or(Cloud::default(), |b| clouds[b]);
     let back = axes.transpose();
     let turn = back * a.rotation;
-    let (below_b, above_b) = clearances(turn, back * (a.pose.position - center), half, &clouds[entry.a]);
-    let (below_a, above_a) = clearances(still * axes, still * (origin - a.pose.position), a.half, &theirs);
+    let (below_b, above_b) = clearances(turn, back * (a.pose.position - center), half, &clouds[pair.a]);
+    let (below_a, above_a) = clearances(still * axes, still * (center - a.pose.position), a.half, &theirs);
     let u = still * (a.pose.velocity - velocity);
     SmoothPose {
         row_x: four(turn.row(0), u.x),
@@ -386,34 +330,38 @@ fn pose(entry: &Entry, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[B
         above_b: four(above_b, 0.0),
         below_a: four(below_a, 0.0),
         above_a: four(above_a, 0.0),
+        found: [0.0; 4],
     }
 }
 
-/// Turns the sums of a pair, which are in A's frame and about A's centre, to the world.
-fn take(pair: &mut Pair, record: &SmoothPair, sums: &[[f32; 4]], bodies: &[Body]) {
+/// The sums of a pair, which are in A's frame and about A's centre, in the world.
+fn read(pair: &Pair, record: &SmoothPair, sums: &[[f32; 4]], bodies: &[Body]) -> DeviceSums {
+    let [depth, deepest, count, shares] = sums[0];
+    if count == 0.0 {
+        return DeviceSums::default();
+    }
     let a = &bodies[pair.a];
-    let [depth, deepest, count, _] = sums[0];
     let mut on_a = Wrench::default();
-    let patches =
-        slots(record).zip(sums[1..].chunks_exact(3)).filter(|(_, s)| s[0][3] > 0.0).map(|(key, s)| {
-            let force = a.rotation * vector(s[0]);
-            on_a += Wrench { force, torque: a.rotation * vector(s[1]) };
-            DevicePatch {
-                key: if key < 6 { key } else { key + 2 },
-                force,
-                pressing: f64::from(s[0][3]),
-                at: a.pose.position + a.rotation * vector(s[2]),
-                radius: f64::from(s[1][3]),
-            }
-        });
-    let patches: Vec<DevicePatch> = patches.collect();
+    let pressed = slots(record).zip(sums[1..].chunks_exact(3)).filter(|(_, s)| s[0][3] > 0.0);
+    let patches = pressed.map(|(key, s)| {
+        let force = a.rotation * vector(s[0]);
+        on_a += Wrench { force, torque: a.rotation * vector(s[1]) };
+        let at = a.pose.position + a.rotation * vector(s[2]);
+        let key = if key < 6 { key } else { key + 2 };
+        Patch::new(key, force, f64::from(s[0][3]), at, f64::from(s[1][3]))
+    });
+    let patches = patches.collect();
     // The same forces at the same points act on B, so their moment about its centre follows.
-    let on_b = match pair.b {
-        Other::Solid(b) => {
-            let between = a.pose.position - bodies[b].pose.position;
-            Wrench { force: -on_a.force, torque: -(on_a.torque + between.cross(on_a.force)) }
-        }
-        Other::Wall(_) => Wrench::default(),
-    };
-    pair.set(count as usize, f64::from(depth), f64::from(deepest), [on_a, on_b], &patches);
+    let on_b = pair.b.solid().map_or(Wrench::default(), |b| {
+        let between = a.pose.position - bodies[b].pose.position;
+        Wrench { force: -on_a.force, torque: -(on_a.torque + between.cross(on_a.force)) }
+    });
+    DeviceSums {
+        count: count as usize,
+        depth: f64::from(depth),
+        deepest: f64::from(deepest),
+        shares: f64::from(shares),
+        wrench: [on_a, on_b],
+        patches,
+    }
 }
