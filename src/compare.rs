@@ -11,7 +11,7 @@ use crate::fields::{Fields, State};
 use crate::neighbours::Neighbours;
 use crate::params::Params;
 use crate::plan::{ContactPlan, Stage};
-use crate::scene::{Scene, Shape, Solid};
+use crate::scene::{Drive, Scene, Shape, Solid};
 use crate::simulation::Simulation;
 use glam::DVec3;
 use serde::Serialize;
@@ -177,16 +177,17 @@ fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
 
 /// Errors of force and torque. A torque may vanish by symmetry: its scale is at least force times the size of
 /// the largest solid.
-fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid]) -> Vec<StageError> {
+fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid], weight: f64) -> Vec<StageError> {
     let most = |f: fn(&Wrench) -> DVec3| cpu.iter().map(|w| f(w).length()).fold(0.0, f64::max);
     let sizes = solids.iter().map(|s| match s.shape {
         Shape::Box { half } => half.length(),
     });
-    let scale = most(|w| w.torque).max(most(|w| w.force) * sizes.fold(0.0, f64::max));
+    let force = most(|w| w.force).max(weight);
+    let scale = most(|w| w.torque).max(force * sizes.fold(0.0, f64::max));
     let pairs =
         |f: fn(&Wrench) -> DVec3| -> Vec<_> { gpu.iter().zip(cpu).map(|(a, b)| (f(a), f(b))).collect() };
     vec![
-        error(stage, "force", &pairs(|w| w.force), None),
+        error(stage, "force", &pairs(|w| w.force), (weight > 0.0).then_some(force)),
         error(stage, "torque", &pairs(|w| w.torque), Some(scale)),
     ]
 }
@@ -266,7 +267,7 @@ pub fn compare_stages(
             }
             Stage::BodyForce => {
                 let (gpu, cpu) = (pair.gpu.body_force()?, pair.cpu.body_force()?);
-                out.extend(wrenches(stage, &gpu, &cpu, &scene.solids));
+                out.extend(wrenches(stage, &gpu, &cpu, &scene.solids, 0.0));
                 continue;
             }
             _ => {
@@ -294,7 +295,13 @@ fn contact(simulation: &mut Simulation, gpu: &mut Gpu, scene: &Scene) -> Result<
     let stage = Stage::Contact;
     let pairs = StageError { stage: stage.name(), field: "pairs", max_relative: part, l2_relative: part };
     let mut out = vec![pairs];
-    out.extend(wrenches(stage, &device.wrenches, &host.wrenches, &scene.solids));
+    // A body that hardly touches has hardly a force; what counts is the noise against its weight.
+    let mass = scene.solids.iter().filter_map(|s| match &s.drive {
+        Drive::Free(body) => Some(body.mass),
+        Drive::Prescribed(_) => None,
+    });
+    let weight = mass.fold(0.0, f64::max) * scene.gravity.length();
+    out.extend(wrenches(stage, &device.wrenches, &host.wrenches, &scene.solids, weight));
     Ok(out)
 }
 

@@ -310,7 +310,9 @@ impl Solids {
                 let pairs = match &mut self.on_device {
                     OnDevice::Paper(pairs) => pairs,
                     other => {
-                        *other = OnDevice::Paper(device::paper::Paper::new(&model.layers, law, link)?.into());
+                        *other = OnDevice::Paper(
+                            device::paper::Paper::new(&model.layers, bodies, law, link)?.into(),
+                        );
                         let OnDevice::Paper(pairs) = other else { unreachable!() };
                         pairs
                     }

@@ -108,8 +108,8 @@ struct Entry {
 pub(crate) struct Paper {
     generation: u64,
     first: Vec<(u32, u32)>,
-    /// Power of two above the size of every solid [m].
-    size: f64,
+    /// Power of two above each solid's size [m]: the largest coordinate of its particles.
+    size: Vec<f64>,
     entries: Vec<Entry>,
     /// Pairs with particles near each other; evaluated on the device.
     pub pairs: Vec<Pair>,
@@ -118,13 +118,20 @@ pub(crate) struct Paper {
 
 impl Paper {
     /// Gives the device the particles of all solids and the law.
-    pub fn new(layers: &[Layer], law: &Law, link: &mut Link) -> Result<Self> {
-        let largest = layers.iter().flat_map(|l| &l.offsets).map(|o| o.length()).fold(0.0, f64::max);
+    pub fn new(layers: &[Layer], bodies: &[Body], law: &Law, link: &mut Link) -> Result<Self> {
         // Fixed particles within reach of a body are not much further from it than its own.
-        let size = power_of_two(2.0 * largest + law.distance);
+        let of = |layer: &Layer| {
+            let largest = layer.offsets.iter().map(|o| o.length()).fold(0.0, f64::max);
+            power_of_two(2.0 * largest + law.distance)
+        };
+        let own: Vec<f64> = layers.iter().map(of).collect();
+        let free = own.iter().zip(bodies).filter(|(_, b)| b.is_free()).map(|(s, _)| *s);
+        // Sums are exact while the first solid of a pair is no larger than four times the second.
+        let least = 0.25 * free.fold(0.0, f64::max);
+        let size: Vec<f64> = own.iter().map(|s| s.max(least)).collect();
         let mut all: Vec<[[f32; 4]; 3]> = vec![];
         let mut first = vec![];
-        for layer in layers {
+        for (layer, size) in layers.iter().zip(&size) {
             first.push((place(all.len())?, layer.offsets.len() as u32));
             let both = layer.offsets.iter().zip(&layer.normals);
             all.extend(both.map(|(o, n)| words(*o, *n, size / PARTS)));
@@ -161,7 +168,7 @@ impl Paper {
                     theirs.1 = walls.len() as u32;
                     let of = |&j: &u32| {
                         let offset = model.walls.grid.point(j) - origin;
-                        words(offset, model.walls.normals[j as usize], self.size / PARTS)
+                        words(offset, model.walls.normals[j as usize], self.size[pair.a] / PARTS)
                     };
                     fixed.extend(walls.iter().map(of));
                 }
@@ -209,9 +216,9 @@ impl Paper {
     }
 
     fn send_poses(&mut self, bodies: &[Body], link: &mut Link) -> Result<()> {
-        let size = self.size;
+        let size = &self.size;
         self.poses.clear();
-        self.poses.extend(self.entries.iter().map(|e| pose(e, size, bodies)));
+        self.poses.extend(self.entries.iter().map(|e| pose(e, size[e.b.unwrap_or(e.a)], bodies)));
         link.write("paper_pose", &self.poses)
     }
 
@@ -243,7 +250,7 @@ impl Paper {
     }
 }
 
-/// How a pair lies now; B's frame in A's in two parts, lengths in `size` [m].
+/// How a pair lies now: B's frame in A's in two parts, where coordinates in B's go up to `size` [m].
 fn pose(entry: &Entry, size: f64, bodies: &[Body]) -> PaperPose {
     let a = &bodies[entry.a];
     let still = a.rotation.transpose();
