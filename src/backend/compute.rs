@@ -13,15 +13,15 @@ pub trait Compute {
     ///
     /// # Errors
     /// As [`Compute::reserve`].
-    fn write(&mut self, buffer: &'static str, data: &[u8]) -> Result<()>;
+    fn upload(&mut self, buffer: &'static str, data: &[u8]) -> Result<()>;
     /// Records kernels, each with its number of workgroups, to run one after the other.
     ///
     /// # Errors
     /// [`crate::error::Error::Gpu`] if there is no such kernel or a device cannot run so many workgroups.
-    fn run(&mut self, kernels: &[(&str, u64)]) -> Result<()>;
+    fn dispatch(&mut self, kernels: &[(&str, u64)]) -> Result<()>;
     /// Waits for what was recorded, and reads the start of a buffer.
     ///
     /// # Errors
     /// [`crate::error::Error::Gpu`] if the device is lost.
-    fn read(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>>;
+    fn download(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>>;
 }

@@ -1,7 +1,7 @@
 //! The GPU backend: the kernels of `shaders/` in f32 on any device that wgpu drives.
 //!
 //! No particle data crosses to the host in a step but the state of the pressure solver and the force on
-//! bodies. Work is recorded and handed to the device only when the host needs an answer. Only what the plan
+//! bodies; of contact, if the plan has it here, the pairs' sums. Work is recorded and handed to the device only when the host needs an answer. Only what the plan
 //! names is compiled and allocated. Nothing outside this module names wgpu.
 
 mod adapter;
@@ -428,12 +428,12 @@ impl Compute for Gpu {
         self.context.reserve(buffer, bytes)
     }
 
-    fn write(&mut self, buffer: &'static str, data: &[u8]) -> Result<()> {
+    fn upload(&mut self, buffer: &'static str, data: &[u8]) -> Result<()> {
         self.context.reserve(buffer, data.len() as u64)?;
         if data.is_empty() { Ok(()) } else { self.context.upload(buffer, data) }
     }
 
-    fn run(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
+    fn dispatch(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
         let most = self.context.workgroups_max();
         if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
             return Err(Error::Gpu(format!(
@@ -444,7 +444,7 @@ impl Compute for Gpu {
         self.context.pass(kernels.iter().copied())
     }
 
-    fn read(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>> {
+    fn download(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>> {
         self.context.download(buffer, bytes as usize)
     }
 }

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use rayon::prelude::*;
 
 /// Pairs from which the evaluation is spread over threads.
-const MANY_PAIRS: usize = 64;
+pub(crate) const MANY_PAIRS: usize = 64;
 /// Steps that the lists of a body in steady flight should last.
 const STEPS_AHEAD: f64 = 6.0;
 

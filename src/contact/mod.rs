@@ -19,7 +19,7 @@ mod state;
 mod stiffness;
 
 pub use advice::ContactAdvice;
-pub use probe::Probe;
+pub use probe::{Probe, ProbePatch};
 pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 

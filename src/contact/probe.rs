@@ -15,12 +15,27 @@ pub struct Probe {
     pub wrenches: Vec<Wrench>,
     /// Candidates of the search, sorted: the two solids (walls last), and which points or particles.
     pub candidates: Vec<[u64; 4]>,
-    /// Friction patches: the two solids, normal, centre [m], normal force [N], mean arm [m].
-    pub patches: Vec<(usize, Option<usize>, DVec3, DVec3, f64, f64)>,
+    /// Where friction acts (law "smooth").
+    pub patches: Vec<ProbePatch>,
     /// Energy in the contact springs [J].
     pub energy: f64,
     /// Points or particle pairs in contact.
     pub touching: usize,
+}
+
+/// All points pressed by one face.
+#[derive(Clone, Copy, Debug)]
+pub struct ProbePatch {
+    /// The two solids; `None` is a wall.
+    pub solids: (usize, Option<usize>),
+    /// Direction of the normal force on the first one.
+    pub normal: DVec3,
+    /// Centre of the normal force [m].
+    pub at: DVec3,
+    /// Normal force [N].
+    pub force: f64,
+    /// Mean distance of the normal force from its centre [m].
+    pub radius: f64,
 }
 
 /// A number for a point.
@@ -42,7 +57,14 @@ impl Solids {
         let mut probe = Probe { wrenches: vec![Wrench::default(); self.bodies.len()], ..Probe::default() };
         self.add_wrenches(&mut probe.wrenches);
         for p in self.smooth_pairs() {
-            let patches = p.patches.iter().map(|f| (p.a, p.b.solid(), f.normal, f.at, f.force, f.radius));
+            let solids = (p.a, p.b.solid());
+            let patches = p.patches.iter().map(|f| ProbePatch {
+                solids,
+                normal: f.normal,
+                at: f.at,
+                force: f.force,
+                radius: f.radius,
+            });
             probe.patches.extend(patches);
             probe.energy += p.energy;
             probe.touching += p.contact_count();
@@ -72,10 +94,7 @@ impl Solids {
                 let listed = pairs.listed(&model.surfaces, bodies, &mut link)?;
                 listed.into_iter().map(|(a, b, s, x)| side(a, b, s, x)).collect()
             }
-            (_, OnDevice::Paper(pairs), Some(mut link)) => {
-                let listed = pairs.listed(&mut link)?.into_iter();
-                listed.map(|(a, b, i, j)| [a as u64, other(b), i.into(), j.into()]).collect()
-            }
+            (_, OnDevice::Paper(pairs), Some(mut link)) => pairs.listed(&mut link)?,
             (Model::Smooth(model), ..) => {
                 let place = |s: usize, k: u32| {
                     bodies[s].pose.position + bodies[s].rotation * model.surfaces[s].points[k as usize]

@@ -37,19 +37,19 @@ pub(crate) struct Link<'a> {
 impl Link<'_> {
     fn write<T: Pod>(&mut self, buffer: &'static str, data: &[T]) -> Result<()> {
         self.traffic.sent += size_of_val(data) as u64;
-        self.compute.write(buffer, bytemuck::cast_slice(data))
+        self.compute.upload(buffer, bytemuck::cast_slice(data))
     }
 
     fn run(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
         self.traffic.dispatches += kernels.len() as u64;
-        self.compute.run(kernels)
+        self.compute.dispatch(kernels)
     }
 
     fn read<T: Pod>(&mut self, buffer: &'static str, count: usize) -> Result<Vec<T>> {
         let bytes = (count * size_of::<T>()) as u64;
         self.traffic.round_trips += 1;
         self.traffic.read += bytes;
-        Ok(bytemuck::pod_collect_to_vec(&self.compute.read(buffer, bytes)?))
+        Ok(bytemuck::pod_collect_to_vec(&self.compute.download(buffer, bytes)?))
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::{Link, four, place, vector};
 use crate::body::{Body, Wrench};
-use crate::contact::candidates::{self, Candidates};
+use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
 use crate::contact::paper::{Law, Layer, Pair};
 use crate::error::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Set in the place of the particles of fixed walls; `ON_WALL` in the shaders.
 pub const ON_WALL: u32 = 0x8000_0000;
@@ -216,9 +217,13 @@ impl Paper {
     }
 
     fn send_poses(&mut self, bodies: &[Body], link: &mut Link) -> Result<()> {
-        let size = &self.size;
-        self.poses.clear();
-        self.poses.extend(self.entries.iter().map(|e| pose(e, size[e.b.unwrap_or(e.a)], bodies)));
+        let of = |e: &Entry| pose(e, self.size[e.b.unwrap_or(e.a)], bodies);
+        if self.entries.len() >= MANY_PAIRS {
+            self.entries.par_iter().map(of).collect_into_vec(&mut self.poses);
+        } else {
+            self.poses.clear();
+            self.poses.extend(self.entries.iter().map(of));
+        }
         link.write("paper_pose", &self.poses)
     }
 
@@ -236,15 +241,16 @@ impl Paper {
         Ok(())
     }
 
-    /// Candidates: the two solids and the numbers of the two particles.
-    pub fn listed(&self, link: &mut Link) -> Result<Vec<(usize, Option<usize>, u32, u32)>> {
+    /// Candidates: the two solids (walls last) and the numbers of the two particles.
+    pub fn listed(&self, link: &mut Link) -> Result<Vec<[u64; 4]>> {
         let end = self.entries.iter().map(|e| e.record.list + e.record.candidates).max().unwrap_or(0);
         let list = link.read::<[u32; 2]>("contact_list", end as usize)?;
         let of = |e: &Entry| {
             let PaperPair { list: first, candidates, .. } = e.record;
             let number = |j: u32| e.walls.get(j as usize).copied().unwrap_or(j);
             let range = first as usize..(first + candidates) as usize;
-            list[range].iter().map(|&[i, j]| (e.a, e.b, i, number(j))).collect::<Vec<_>>()
+            let (a, b) = (e.a as u64, e.b.map_or(u64::MAX, |b| b as u64));
+            list[range].iter().map(|&[i, j]| [a, b, i.into(), number(j).into()]).collect::<Vec<_>>()
         };
         Ok(self.entries.iter().flat_map(of).collect())
     }

@@ -3,12 +3,13 @@
 use super::{Link, four, place, three, vector};
 use crate::body::{Body, Wrench};
 use crate::contact::Limits;
-use crate::contact::candidates::{self, Candidates};
+use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
 use crate::contact::geometry::Surface;
 use crate::contact::smooth::{DeviceSums, Other, Pair, Patch};
 use crate::error::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 /// Coordinates this close to the largest or smallest of a solid, over its size, are taken as equal to it: points
 /// of a face then lie in one plane in f32 too.
@@ -215,14 +216,17 @@ impl Smooth {
     /// How each pair lies now, and what the host finds beside the points.
     fn place_poses(&mut self, model: &candidates::Smooth, bodies: &[Body]) {
         let clouds = &self.clouds;
-        self.poses.clear();
-        self.poses.extend(self.pairs.iter_mut().map(|pair| SmoothPose {
-            found: {
-                let [deepest, eighth, sixth] = pair.find_beside_device(bodies, &model.surfaces, &model.walls);
-                [deepest as f32, eighth as f32, sixth as f32, 0.0]
-            },
-            ..pose(pair, clouds, model, bodies)
-        }));
+        let of = |pair: &mut Pair| {
+            let [deepest, eighth, sixth] = pair.find_beside_device(bodies, &model.surfaces, &model.walls);
+            let found = [deepest as f32, eighth as f32, sixth as f32, 0.0];
+            SmoothPose { found, ..pose(pair, clouds, model, bodies) }
+        };
+        if self.pairs.len() >= MANY_PAIRS {
+            self.pairs.par_iter_mut().map(of).collect_into_vec(&mut self.poses);
+        } else {
+            self.poses.clear();
+            self.poses.extend(self.pairs.iter_mut().map(of));
+        }
     }
 
     /// Normal forces of all pairs at the bodies' poses and velocities.
@@ -244,9 +248,14 @@ impl Smooth {
         link.write("smooth_pose", &self.poses)?;
         link.run(&[("contact_smooth.force", self.pairs.len() as u64)])?;
         let sums = link.read::<[f32; 4]>("contact_sum", self.sums)?;
-        for (pair, record) in self.pairs.iter_mut().zip(&self.records) {
+        let take = |(pair, record): (&mut Pair, &SmoothPair)| {
             let sums = read(pair, record, &sums[record.sum as usize..], bodies);
             pair.join(&sums, bodies);
+        };
+        if self.pairs.len() >= MANY_PAIRS {
+            self.pairs.par_iter_mut().zip(&self.records).for_each(take);
+        } else {
+            self.pairs.iter_mut().zip(&self.records).for_each(take);
         }
         Ok(())
     }
