@@ -5,7 +5,7 @@ use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::Gpu;
 use crate::body::{Pose, Wrench};
-use crate::case::Case;
+use crate::case::{Case, ContactDevice};
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::neighbours::Neighbours;
@@ -214,6 +214,13 @@ impl Pair {
     }
 }
 
+/// `case` for the CPU, which has no device for its contact.
+fn for_cpu(case: &Case) -> Case {
+    let mut case = case.clone();
+    case.contact.iter_mut().for_each(|c| c.device = ContactDevice::Host);
+    case
+}
+
 /// Error of every field after every stage of one step, device (`adapter` as in [`Gpu::new`]) against CPU.
 /// The step starts from the state that `warmup` steps on the CPU lead to, rounded to f32 for both. Errors
 /// pass from stage to stage, as they do in a run.
@@ -223,7 +230,7 @@ pub fn compare_stages(
     adapter: Option<&str>,
     warmup: u64,
 ) -> Result<Vec<StageError>> {
-    let mut simulation = Simulation::new(case, scene, |s, p, plan, settings| {
+    let mut simulation = Simulation::new(&for_cpu(case), scene, |s, p, plan, settings| {
         Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
     })?;
     for _ in 0..warmup {
@@ -349,7 +356,7 @@ pub fn drift(case: &Case, scene: &Scene, adapter: Option<&str>, steps: u64) -> R
         Ok((simulation, start.elapsed().as_secs_f64(), iterations / steps.max(1) as f64))
     };
     let (mut cpu, cpu_seconds, cpu_iterations) =
-        run(Simulation::new(case, scene, |s, p, plan, settings| {
+        run(Simulation::new(&for_cpu(case), scene, |s, p, plan, settings| {
             Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
         })?)?;
     let (mut gpu, gpu_seconds, gpu_iterations) =

@@ -73,7 +73,7 @@ fn runs_stay_together() {
 
 /// A tilted box on its edge, another one on top of it.
 const DRY: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n[tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n\
-                   [contact]\nlaw = \"smooth\"\nspring = 1e5\ndamping_ratio = 0.1\nfriction = 0.3\n\
+                   [contact]\nlaw = \"smooth\"\ndevice = \"gpu\"\nspring = 1e5\ndamping_ratio = 0.1\nfriction = 0.3\n\
                    [[body]]\nname = \"low\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.5, 0.5, 0.147]\ndensity = 800\n\
                    orientation = { axis = [0, 1, 0], angle_deg = 45 }\nvelocity = [0, 0, -1]\n\
                    [[body]]\nname = \"high\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.5, 0.5, 0.395]\ndensity = 800\n\
@@ -97,5 +97,9 @@ fn contact_of_a_dry_scene_is_compared_too() {
         // f32 cannot agree with f64 to the last bit: the bodies do touch.
         assert!(value("force").is_some_and(|e| e > 0.0 && e < 1e-4), "{errors:?}");
         assert!(value("torque").is_some_and(|e| e < 1e-4), "{errors:?}");
+        let drift = compare::drift(&case, &scene, None, 20).expect("both run");
+        for q in &drift.quantities {
+            assert!(q.relative < 1e-6, "{law}: {q:?}");
+        }
     }
 }
