@@ -23,7 +23,11 @@ pub fn pressure_gradient(
 ) -> DVec3 {
     let x = position[i];
     let minimum = all.neighbour[..carry].iter().fold(pressure[i], |m, &j| m.min(pressure[j as usize]));
-    let correct = params.gradient == Gradient::MinimumCorrected && state == State::Inner;
+    let correct = match params.gradient {
+        Gradient::Minimum => false,
+        Gradient::MinimumCorrected => state == State::Inner,
+        Gradient::CorrectedSurface => true,
+    };
     let mut sum = DVec3::ZERO;
     let mut moment = Moment::default();
     for (k, (j, w)) in all.iter().enumerate().take(if correct { usize::MAX } else { carry }) {
