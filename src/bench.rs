@@ -3,7 +3,7 @@
 //! Timings of different machines do not compare; what compares is the fraction of the memory floor, which is
 //! measured in the same process, and the counts of bytes, dispatches and iterations.
 
-use crate::backend::Backend;
+use crate::backend::{Backend, Commands, Timing};
 use crate::case::Case;
 use crate::error::Result;
 use crate::params::Params;
@@ -30,6 +30,31 @@ pub struct StageRow {
     pub bytes: u64,
     /// Time that the bytes take at the measured bandwidth over the time it took [-].
     pub floor_fraction: f64,
+    /// Kernels started a step; 0 on the CPU.
+    pub dispatches: f64,
+}
+
+/// What was asked of a device, a step.
+struct Asked {
+    dispatches: f64,
+    submits: f64,
+    waits: f64,
+    by_stage: BTreeMap<Stage, f64>,
+}
+
+impl Asked {
+    fn of(now: &Commands, before: &Commands, steps: u64) -> Self {
+        let per_step = |now: u64, before: u64| (now - before) as f64 / steps.max(1) as f64;
+        let stage = |(&stage, &count): (&Stage, &u64)| {
+            (stage, per_step(count, before.by_stage.get(&stage).copied().unwrap_or(0)))
+        };
+        Self {
+            dispatches: per_step(now.dispatches, before.dispatches),
+            submits: per_step(now.submits, before.submits),
+            waits: per_step(now.waits, before.waits),
+            by_stage: now.by_stage.iter().map(stage).collect(),
+        }
+    }
 }
 
 /// One spacing on one backend.
@@ -73,9 +98,15 @@ pub struct Row {
     pub bytes_held: u64,
     /// Most memory that the process has held so far [bytes], where the system tells.
     pub peak_memory: Option<u64>,
+    /// How the times of the stages came about.
+    pub timing: Timing,
     /// Kernels started a step; 0 on the CPU.
     pub dispatches: f64,
-    /// By stage, each waited for.
+    /// Hand-overs of recorded work to the device a step.
+    pub submits: f64,
+    /// Times a step that the host waited for the device.
+    pub waits: f64,
+    /// By stage.
     pub stages: Vec<StageRow>,
 }
 
@@ -105,33 +136,51 @@ const WARM_UP: u64 = 3;
 pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
     let scene = Scene::build(case)?;
     let mut sim = Simulation::new(case, &scene, make)?;
-    sim.time_stages = false;
+    let timing = sim.backend.timing();
     let mut times = Vec::new();
     let (mut iterations, mut last) = (0.0, PressureReport::default());
+    let (mut commands, mut stages) = (Commands::default(), BTreeMap::new());
     for k in 0..WARM_UP + steps {
+        if k == WARM_UP {
+            sim.observe()?;
+            (commands, stages) = (sim.backend.commands(), sim.stages.clone());
+        }
         let start = Instant::now();
         last = sim.step()?.pressure;
-        sim.backend.wait()?;
         if k >= WARM_UP {
             times.push(start.elapsed().as_secs_f64());
             iterations += f64::from(last.iterations);
         }
     }
-    let monitor = sim.backend.monitor()?;
-    // The stages by themselves, each waited for.
-    sim.time_stages = true;
-    sim.stages.clear();
-    let staged = (steps / 4).max(2);
-    let before = sim.backend.dispatches();
-    for _ in 0..staged {
-        last = sim.step()?.pressure;
+    // What the last step left to the device is waited for here.
+    let start = Instant::now();
+    sim.backend.wait()?;
+    if let Some(time) = times.last_mut() {
+        *time += start.elapsed().as_secs_f64();
     }
-    let dispatches = (sim.backend.dispatches() - before) as f64 / staged as f64;
+    let device = Asked::of(&sim.backend.commands(), &commands, steps);
+    let (monitor, _) = sim.observe()?;
+    let mut staged = steps;
+    if timing == Timing::Waits {
+        // The stages by themselves, each waited for.
+        sim.wait_for_stages = true;
+        stages = sim.stages.clone();
+        staged = (steps / 4).max(2);
+        for _ in 0..staged {
+            last = sim.step()?.pressure;
+        }
+    }
+    let per_step = |stage: Stage| {
+        let seconds = sim.stages.get(&stage)? - stages.get(&stage).unwrap_or(&0.0);
+        Some((stage, seconds / staged as f64))
+    };
+    let per_step: Vec<(Stage, f64)> = Stage::ALL.into_iter().filter_map(per_step).collect();
     let sizes = sim.backend.sizes()?;
-    let per_step: BTreeMap<Stage, f64> = sim.stages.iter().map(|(&s, t)| (s, t / staged as f64)).collect();
-    let stages = per_step.iter().map(|(&stage, &seconds)| {
+    let stages = per_step.into_iter().map(|(stage, seconds)| {
         let bytes = sizes.bytes(stage, &last);
-        StageRow { stage: stage.name(), seconds, bytes, floor_fraction: bytes as f64 / bandwidth / seconds }
+        let dispatches = device.by_stage.get(&stage).copied().unwrap_or(0.0);
+        let floor_fraction = if seconds > 0.0 { bytes as f64 / bandwidth / seconds } else { 0.0 };
+        StageRow { stage: stage.name(), seconds, bytes, floor_fraction, dispatches }
     });
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
     times.sort_by(f64::total_cmp);
@@ -157,7 +206,10 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         bandwidth,
         bytes_held: sim.backend.bytes(),
         peak_memory: peak_memory(),
-        dispatches,
+        timing,
+        dispatches: device.dispatches,
+        submits: device.submits,
+        waits: device.waits,
         stages: stages.collect(),
     })
 }
@@ -199,7 +251,10 @@ mod tests {
             bandwidth: 1.0,
             bytes_held: 0,
             peak_memory: None,
+            timing: Timing::Host,
             dispatches: 0.0,
+            submits: 0.0,
+            waits: 0.0,
             stages: Vec::new(),
         };
         let rows = [row(1000), row(30_000), row(700_000)];

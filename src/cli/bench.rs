@@ -2,6 +2,7 @@
 
 use super::setup::Setup;
 use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
+use seixo::backend::Timing;
 use seixo::backend::gpu::adapters;
 use seixo::bench::{Row, exponent, host_bandwidth, measure};
 use seixo::error::{Error, Result};
@@ -115,6 +116,15 @@ pub fn bench(args: &BenchArgs) -> Exit {
     Ok(0)
 }
 
+/// As the JSON has it.
+fn name_of(timing: &Timing) -> &'static str {
+    match timing {
+        Timing::Host => "host clock",
+        Timing::Timestamps => "timestamps",
+        Timing::Waits => "host waits",
+    }
+}
+
 fn table(report: &Report, bandwidth: f64) {
     say(&format!("copy bandwidth of the host {:.1} GB/s, {} cores", bandwidth / 1e9, report.cores));
     for r in &report.rows {
@@ -139,16 +149,24 @@ fn table(report: &Report, bandwidth: f64) {
             r.density_error_max
         ));
         if r.dispatches > 0.0 {
-            say(&format!("{:.0} dispatches a step", r.dispatches));
+            say(&format!(
+                "a step: {:.1} dispatches, {:.2} submissions, {:.2} waits of the host",
+                r.dispatches, r.submits, r.waits
+            ));
         }
-        say(&format!("  {:<20} {:>10} {:>10} {:>14}", "stage", "ms", "MB", "of the floor"));
+        say(&format!("stages by {}", name_of(&r.timing)));
+        say(&format!(
+            "  {:<20} {:>10} {:>10} {:>14} {:>11}",
+            "stage", "ms", "MB", "of the floor", "dispatches"
+        ));
         for s in &r.stages {
             say(&format!(
-                "  {:<20} {:>10.3} {:>10.2} {:>13.0} %",
+                "  {:<20} {:>10.3} {:>10.2} {:>13.0} % {:>10.1}",
                 s.stage,
                 1e3 * s.seconds,
                 s.bytes as f64 / 1e6,
-                100.0 * s.floor_fraction
+                100.0 * s.floor_fraction,
+                s.dispatches
             ));
         }
     }

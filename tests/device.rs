@@ -1,0 +1,92 @@
+//! What a step asks of a device: submissions, waits, dispatches, its clock.
+#![allow(missing_docs)]
+
+mod common;
+
+use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::{Backend, Timing};
+use seixo::case::Case;
+use seixo::plan::Stage;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+use std::time::Instant;
+
+/// A simulation on a device; loud if there is none, and a failure where one is expected.
+fn on_device(case: &Case) -> Option<Simulation> {
+    if gpu::adapters().is_empty() {
+        let text = "NO GPU ADAPTER: what a step asks of a device is not tested";
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        eprintln!("SKIPPED, {text}");
+        return None;
+    }
+    let make = |s: &_, p: &_, plan: &_, settings| {
+        Ok(Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>)
+    };
+    let scene = Scene::build(case).expect("the scene builds");
+    Some(Simulation::new(case, &scene, make).expect("the simulation starts"))
+}
+
+/// Still water with a gate beside it and, if `free`, a cube above it, both out of its reach.
+fn still(free: bool, preconditioner: &str) -> Case {
+    let body = "[[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.125, 0.125, 5.6]\ndensity = 500\n\
+                [contact]\nlaw = \"smooth\"\nspring = 1e4\n";
+    common::case(&format!(
+        "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1.0\nadaptive = false\n\
+         [fluid]\nsound_speed = 3\nsolver = {{ preconditioner = \"{preconditioner}\" }}\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 6.0]\nopen = [\"z_max\"]\n\
+         [[moving_wall]]\nname = \"gate\"\nmin = [0.1, 0.1, 5.0]\nmax = [0.15, 0.15, 5.2]\n\
+         motion = [[0, 0, 0, 0], [3, 0, 0, 0.3]]\n{}",
+        if free { body } else { "" }
+    ))
+}
+
+#[test]
+fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
+    for preconditioner in ["jacobi", "multigrid"] {
+        for free in [false, true] {
+            let Some(mut sim) = on_device(&still(free, preconditioner)) else { return };
+            assert_eq!(sim.plan.has(Stage::BodyForce), free);
+            for _ in 0..21 {
+                sim.step().expect("still water is no trouble");
+            }
+            let before = sim.backend.commands();
+            for _ in 0..20 {
+                sim.step().expect("still water is no trouble");
+            }
+            let now = sim.backend.commands();
+            let (submits, waits) = (now.submits - before.submits, now.waits - before.waits);
+            println!("{preconditioner}, body {free}: {submits} submissions, {waits} waits in 20 steps");
+            // The solver's verdict and, with a free body, the force on it; every ten steps a look at the fluid.
+            let answers = if free { 2 * 20 } else { 20 } + 2;
+            assert_eq!((submits, waits), (answers, answers), "{preconditioner}, body {free}");
+            let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
+            assert_eq!(count(Stage::CellList), 6 * 20);
+            assert_eq!(count(Stage::MoveSolids), 2 * 20);
+            assert!(count(Stage::ConjugateGradient) > 6 * 20);
+        }
+    }
+}
+
+#[test]
+fn the_device_clock_tells_every_stage_and_no_more_than_the_wall_clock() {
+    let Some(mut sim) = on_device(&still(true, "jacobi")) else { return };
+    if sim.backend.timing() != Timing::Timestamps {
+        eprintln!("SKIPPED: the adapter has no timestamps");
+        return;
+    }
+    let start = Instant::now();
+    for _ in 0..15 {
+        sim.step().expect("still water is no trouble");
+    }
+    sim.observe().expect("the device is there");
+    let wall = start.elapsed().as_secs_f64();
+    let total: f64 = sim.stages.values().sum();
+    println!("{:?} of {wall} s", sim.stages);
+    for stage in Stage::ALL.into_iter().filter(|&s| sim.plan.has(s)) {
+        assert!(sim.stages.get(&stage).is_some_and(|&t| t > 0.0), "{stage:?}");
+    }
+    assert!(total <= wall, "{total} s of {wall} s");
+    // A solve takes many times as long as a sweep over the particles.
+    assert!(sim.stages[&Stage::ConjugateGradient] > 3.0 * sim.stages[&Stage::Correct]);
+}
