@@ -67,6 +67,23 @@ struct Listed {
     count: vec3u,
 }
 
+//#if STATIC
+// Whether there is fluid within one cell: walls elsewhere have no row, and so no unknown.
+fn near_fluid(cell: u32) -> bool {
+    let c = coordinates_of(0u, cell);
+    let low = max(c, vec3u(1u)) - 1u;
+    let high = min(c + 1u, params.cells - 1u);
+    for (var x = low.x; x <= high.x; x++) {
+        for (var y = low.y; y <= high.y; y++) {
+            if cell_start[cell_index(vec3u(x, y, low.z))] < cell_start[cell_index(vec3u(x, y, high.z)) + 1u] {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+//#endif
 fn listed(cell: u32) -> Listed {
     var out: Listed;
     out.first.x = cell_start[cell];
@@ -79,6 +96,9 @@ fn listed(cell: u32) -> Listed {
 //#if STATIC
     out.first.z = static_start[cell];
     out.count.z = static_start[cell + 1u] - out.first.z;
+    if out.count.z > 0u && !near_fluid(cell) {
+        out.count.z = 0u;
+    }
 //#endif
     return out;
 }

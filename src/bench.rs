@@ -3,6 +3,7 @@
 //! Timings of different machines do not compare; what compares is the fraction of the memory floor, which is
 //! measured in the same process, and the counts of bytes, dispatches and iterations.
 
+use crate::backend::traffic::Solve;
 use crate::backend::{Backend, Commands, Timing};
 use crate::case::Case;
 use crate::error::Result;
@@ -57,6 +58,43 @@ impl Asked {
     }
 }
 
+/// Time of a step on an assumed device, from counts alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Implied {
+    /// Assumed bandwidth of a data-centre GPU's memory in use [bytes/s].
+    pub assumed_bandwidth: f64,
+    /// Assumed time of a dispatch, start and barrier [s].
+    pub assumed_seconds_per_dispatch: f64,
+    /// Counted bytes a step.
+    pub bytes: u64,
+    /// Time of a step [s]: bytes over bandwidth and dispatches, one after the other.
+    pub seconds_per_step: f64,
+    /// Of it the pressure solver [s].
+    pub pressure_seconds: f64,
+}
+
+impl Implied {
+    /// Three quarters of what the data sheet of an H200 promises.
+    const BANDWIDTH: f64 = 3.5e12;
+    /// Generous: 2 to 3 microseconds are usual.
+    const PER_DISPATCH: f64 = 5e-6;
+
+    /// Of `stages`, and dispatches that belong to none.
+    fn of(stages: &[StageRow], dispatches: f64) -> Self {
+        let seconds =
+            |bytes: u64, dispatches: f64| bytes as f64 / Self::BANDWIDTH + dispatches * Self::PER_DISPATCH;
+        let bytes = stages.iter().map(|s| s.bytes).sum();
+        let solver = stages.iter().filter(|s| s.stage == Stage::ConjugateGradient.name());
+        Self {
+            assumed_bandwidth: Self::BANDWIDTH,
+            assumed_seconds_per_dispatch: Self::PER_DISPATCH,
+            bytes,
+            seconds_per_step: seconds(bytes, dispatches),
+            pressure_seconds: solver.map(|s| seconds(s.bytes, s.dispatches)).sum(),
+        }
+    }
+}
+
 /// One spacing on one backend.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
@@ -106,6 +144,12 @@ pub struct Row {
     pub submits: f64,
     /// Times a step that the host waited for the device.
     pub waits: f64,
+    /// Slots that carry pressure, and those of them that have neighbours: the rest are dry walls.
+    pub slots: [u64; 2],
+    /// Counted work of the solver.
+    pub solve: Solve,
+    /// What the counts amount to on an assumed device; nothing for the CPU.
+    pub implied: Option<Implied>,
     /// By stage.
     pub stages: Vec<StageRow>,
 }
@@ -175,13 +219,18 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         Some((stage, seconds / staged as f64))
     };
     let per_step: Vec<(Stage, f64)> = Stage::ALL.into_iter().filter_map(per_step).collect();
-    let sizes = sim.backend.sizes()?;
-    let stages = per_step.into_iter().map(|(stage, seconds)| {
-        let bytes = sizes.bytes(stage, &last);
-        let dispatches = device.by_stage.get(&stage).copied().unwrap_or(0.0);
-        let floor_fraction = if seconds > 0.0 { bytes as f64 / bandwidth / seconds } else { 0.0 };
-        StageRow { stage: stage.name(), seconds, bytes, floor_fraction, dispatches }
-    });
+    let traffic = sim.backend.traffic()?;
+    let iterations = iterations / steps.max(1) as f64;
+    let stages: Vec<StageRow> = per_step
+        .into_iter()
+        .map(|(stage, seconds)| {
+            let bytes = traffic.bytes(stage, iterations);
+            let dispatches = device.by_stage.get(&stage).copied().unwrap_or(0.0);
+            let floor_fraction = if seconds > 0.0 { bytes as f64 / bandwidth / seconds } else { 0.0 };
+            StageRow { stage: stage.name(), seconds, bytes, floor_fraction, dispatches }
+        })
+        .collect();
+    let implied = (timing != Timing::Host).then(|| Implied::of(&stages, device.dispatches));
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
     times.sort_by(f64::total_cmp);
     let quartile = |q: f64| times.get((q * times.len() as f64) as usize).copied().unwrap_or(mean);
@@ -193,14 +242,14 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         particles: total,
         fluid: scene.groups.fluid,
         unknowns: last.unknowns,
-        pairs: sizes.pairs,
+        pairs: traffic.pairs,
         steps,
         seconds_per_step: mean,
         quartiles: [quartile(0.25), quartile(0.75)],
         particles_per_second: total as f64 / mean,
         preconditioner: sim.plan.preconditioner_name(),
         tolerance: sim.settings().tolerance,
-        iterations: iterations / steps.max(1) as f64,
+        iterations,
         density_error_max: monitor.density_error_max,
         density_error_mean: monitor.density_error_mean,
         bandwidth,
@@ -210,7 +259,10 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         dispatches: device.dispatches,
         submits: device.submits,
         waits: device.waits,
-        stages: stages.collect(),
+        slots: [traffic.slots, traffic.rows],
+        solve: traffic.solve,
+        implied,
+        stages,
     })
 }
 
@@ -255,6 +307,9 @@ mod tests {
             dispatches: 0.0,
             submits: 0.0,
             waits: 0.0,
+            slots: [0; 2],
+            solve: Solve::default(),
+            implied: None,
             stages: Vec::new(),
         };
         let rows = [row(1000), row(30_000), row(700_000)];

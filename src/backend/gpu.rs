@@ -5,6 +5,7 @@
 //! names is compiled and allocated. Nothing outside this module names wgpu.
 
 mod adapter;
+mod bandwidth;
 mod clock;
 mod context;
 mod exchange;
@@ -12,11 +13,14 @@ pub mod hierarchy;
 pub mod layout;
 pub mod shader;
 mod solve;
+mod traffic;
 mod transfer;
 
 pub use adapter::{AdapterInfo, adapters};
+pub use bandwidth::bandwidth;
 
-use super::{Backend, Commands, Counters, Timing, traffic};
+use super::traffic::Traffic;
+use super::{Backend, Commands, Counters, Timing};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
 use crate::cells::Grid;
@@ -53,6 +57,8 @@ pub struct Gpu {
     last_iterations: u32,
     /// Levels of the multigrid preconditioner, if that is planned.
     levels: Option<Levels>,
+    /// Stages that run.
+    stages: Vec<Stage>,
 }
 
 /// What `scene` takes on a device, without one.
@@ -160,6 +166,7 @@ impl Gpu {
             last_iterations: if plan.preconditioner == Preconditioner::Multigrid { 5 } else { 30 },
             levels: (plan.wet() && plan.preconditioner == Preconditioner::Multigrid)
                 .then(|| Levels::new(&sizes)),
+            stages: Stage::ALL.into_iter().filter(|&s| plan.has(s)).collect(),
         };
         if gpu.wet {
             let constants = Constants::new(params, &groups, &gpu.grid, &gpu.settings, &gpu.sizes);
@@ -432,22 +439,8 @@ impl Backend for Gpu {
         self.context.bytes
     }
 
-    fn sizes(&mut self) -> Result<traffic::Sizes> {
-        let rows = self.neighbours()?;
-        let sum = |part: fn(&(Vec<u32>, Vec<u32>)) -> usize| rows.iter().map(part).sum::<usize>() as u64;
-        let pressure_pairs = sum(|r| r.0.len());
-        Ok(traffic::Sizes {
-            fluid: self.groups.fluid as u64 - self.counters.lost,
-            rows: sum(|r| usize::from(!r.0.is_empty())),
-            cells: self.grid.total() as u64,
-            pairs: pressure_pairs + sum(|r| r.1.len()),
-            pressure_pairs,
-            pressure: self.groups.pressure() as u64,
-            number: 4,
-            vector: 16,
-            weight: 0,
-            preconditioner_weight: self.levels.as_ref().map(|_| 0),
-        })
+    fn traffic(&mut self) -> Result<Traffic> {
+        if self.wet { self.count_traffic() } else { Ok(Traffic::default()) }
     }
 
     fn commands(&self) -> Commands {

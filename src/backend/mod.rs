@@ -4,6 +4,7 @@ pub mod cpu;
 pub mod gpu;
 pub mod traffic;
 
+use self::traffic::Traffic;
 use crate::body::{Pose, Wrench};
 use crate::error::Result;
 use crate::fields::Fields;
@@ -110,8 +111,8 @@ pub trait Backend: Send {
     }
     /// Bytes that the backend holds for particles.
     fn bytes(&self) -> u64;
-    /// Sizes that the counted traffic follows from.
-    fn sizes(&mut self) -> Result<traffic::Sizes>;
+    /// Bytes that a step like the last one must move.
+    fn traffic(&mut self) -> Result<Traffic>;
     /// What was asked of a device; nothing for a backend without one.
     fn commands(&self) -> Commands {
         Commands::default()

@@ -3,7 +3,8 @@
 use super::setup::Setup;
 use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
 use seixo::backend::Timing;
-use seixo::backend::gpu::adapters;
+use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
+use seixo::backend::traffic::Solve;
 use seixo::bench::{Row, exponent, host_bandwidth, measure};
 use seixo::error::{Error, Result};
 use serde::Serialize;
@@ -41,6 +42,7 @@ struct Report {
     version: &'static str,
     commit: Option<String>,
     cores: usize,
+    adapters: Vec<AdapterInfo>,
     case: String,
     sets: Vec<String>,
     rows: Vec<Row>,
@@ -84,9 +86,13 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
 
 pub fn bench(args: &BenchArgs) -> Exit {
     device::set_threads(&args.device);
-    let bandwidth = host_bandwidth();
+    let host = host_bandwidth();
     let (mut rows, mut exponents) = (Vec::new(), Vec::new());
     for backend in choices(&args.device) {
+        let bandwidth = match backend {
+            BackendName::Gpu => bandwidth(args.device.adapter.as_deref())?,
+            _ => host,
+        };
         let mut own = Vec::new();
         for &spacing in &args.spacings {
             own.extend(timed(args, backend, spacing, bandwidth)?);
@@ -99,6 +105,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
         version: env!("CARGO_PKG_VERSION"),
         commit: commit(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
+        adapters: adapters(),
         case: args.case.display().to_string(),
         sets: args.sets.clone(),
         rows,
@@ -111,9 +118,50 @@ pub fn bench(args: &BenchArgs) -> Exit {
     if args.json {
         say_json(&report);
     } else {
-        table(&report, bandwidth);
+        table(&report);
     }
     Ok(0)
+}
+
+/// The counted work of the solver, and what all counts amount to.
+fn solver(r: &Row) {
+    let Solve { ends, build, iteration, cycle } = r.solve;
+    say("  counted in the solver     MB  dispatches");
+    let parts = [
+        ("once: residuals", ends),
+        ("once: levels", build),
+        ("iteration: vectors", iteration),
+        ("iteration: cycle", cycle),
+    ];
+    for (name, work) in parts.iter().filter(|(_, work)| work.bytes > 0) {
+        say(&format!("    {name:<18} {:>8.2} {:>11}", work.bytes as f64 / 1e6, work.dispatches));
+    }
+    if build.bytes > 0 {
+        let each = iteration + cycle;
+        say(&format!(
+            "    the levels are worth {:.2} iterations in bytes{}",
+            build.bytes as f64 / each.bytes as f64,
+            if each.dispatches > 0 {
+                format!(", {:.2} in dispatches", build.dispatches as f64 / each.dispatches as f64)
+            } else {
+                String::new()
+            }
+        ));
+    }
+    let [slots, rows] = r.slots;
+    say(&format!("  {} of {slots} slots of the solver are dry walls", slots - rows));
+    if let Some(i) = &r.implied {
+        say(&format!(
+            "  counted {:.1} MB and {:.1} dispatches a step; on a device with {:.1} TB/s and {:.0} us a dispatch that \
+             would be {:.2} ms, {:.2} ms of it in the solver",
+            i.bytes as f64 / 1e6,
+            r.dispatches,
+            i.assumed_bandwidth / 1e12,
+            1e6 * i.assumed_seconds_per_dispatch,
+            1e3 * i.seconds_per_step,
+            1e3 * i.pressure_seconds
+        ));
+    }
 }
 
 /// As the JSON has it.
@@ -125,13 +173,13 @@ fn name_of(timing: &Timing) -> &'static str {
     }
 }
 
-fn table(report: &Report, bandwidth: f64) {
-    say(&format!("copy bandwidth of the host {:.1} GB/s, {} cores", bandwidth / 1e9, report.cores));
+fn table(report: &Report) {
+    say(&format!("{} cores", report.cores));
     for r in &report.rows {
         say(&format!(
             "\n{} ({}), l0 = {} m: {} particles, {} of them fluid, {} unknowns\n\
              {:.4} s a step (middle half {:.4} to {:.4}), {:.2e} particles a second, {} {:.1} iterations to {:.0e}, \
-             {:.0} MB held, density error at most {:.3}",
+             {:.0} MB held, density error at most {:.3}; copy bandwidth of its memory {:.1} GB/s",
             r.adapter,
             r.precision,
             r.spacing,
@@ -146,7 +194,8 @@ fn table(report: &Report, bandwidth: f64) {
             r.iterations,
             r.tolerance,
             r.bytes_held as f64 / 1e6,
-            r.density_error_max
+            r.density_error_max,
+            r.bandwidth / 1e9
         ));
         if r.dispatches > 0.0 {
             say(&format!(
@@ -169,6 +218,7 @@ fn table(report: &Report, bandwidth: f64) {
                 s.dispatches
             ));
         }
+        solver(r);
     }
     for (name, exponent) in &report.exponents {
         if let Some(e) = exponent {
