@@ -6,7 +6,9 @@ mod common;
 use seixo::backend::gpu::{self, Gpu};
 use seixo::backend::{Backend, Timing};
 use seixo::case::Case;
-use seixo::plan::Stage;
+use seixo::params::Params;
+use seixo::plan::{Plan, Stage};
+use seixo::pressure::Settings;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use std::time::Instant;
@@ -98,4 +100,31 @@ fn the_device_clock_tells_every_stage_and_no_more_than_the_wall_clock() {
     assert!(total <= wall, "{total} s of {wall} s");
     // A solve takes many times as long as a sweep over the particles.
     assert!(sim.stages[&Stage::ConjugateGradient] > 3.0 * sim.stages[&Stage::Correct]);
+}
+
+/// Every buffer that the plan counts is allocated, and nothing else that grows with the scene.
+#[test]
+fn planned_bytes_are_allocated_bytes() {
+    if gpu::adapters().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "NO GPU ADAPTER: memory is not tested");
+        return;
+    }
+    for (free, preconditioner) in [(false, "jacobi"), (true, "multigrid")] {
+        let case = still(free, preconditioner);
+        let scene = Scene::build(&case).expect("the scene builds");
+        let params = Params::new(&case, &scene).expect("valid");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
+        let planned = gpu::memory(&scene, &params, &plan).expect("it can be planned");
+        let gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+        let Some(allocated) = gpu.allocated() else {
+            eprintln!("SKIPPED: the driver's allocator does not tell");
+            return;
+        };
+        println!("planned {}, held {}, allocated {allocated}", planned.total(), gpu.bytes());
+        // What the program keeps to talk to the device, and what wgpu does; the driver rounds each buffer up.
+        let rest = allocated.checked_sub(gpu.bytes()).expect("not all that is planned is allocated");
+        assert!(rest < 1 << 20, "{rest} bytes are allocated that are not planned");
+        assert!(planned.total() > 2 << 20 && gpu.bytes() - planned.total() <= 17 << 20);
+    }
 }

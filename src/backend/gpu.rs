@@ -9,6 +9,7 @@ mod bandwidth;
 mod clock;
 mod context;
 mod exchange;
+pub mod forecast;
 pub mod hierarchy;
 pub mod layout;
 pub mod shader;
@@ -61,14 +62,20 @@ pub struct Gpu {
     stages: Vec<Stage>,
 }
 
-/// What `scene` takes on a device, without one.
-pub fn memory(scene: &Scene, params: &Params, plan: &Plan) -> Result<Memory> {
-    Ok(Memory::new(&Sizes::new(scene, params, &grid(params, plan)?), plan))
+/// Numbers of things of `scene` on a device.
+///
+/// # Errors
+/// A domain with more cells than can be numbered.
+pub fn sizes(scene: &Scene, params: &Params, plan: &Plan) -> Result<Sizes> {
+    Ok(Sizes::new(scene, params, &grid(params, plan)?))
 }
 
-/// Bytes that `scene` takes on a device, without one.
-pub fn bytes_needed(scene: &Scene, params: &Params, plan: &Plan) -> Result<u64> {
-    Ok(memory(scene, params, plan)?.total())
+/// What `scene` takes on a device, without one.
+///
+/// # Errors
+/// As [`sizes`].
+pub fn memory(scene: &Scene, params: &Params, plan: &Plan) -> Result<Memory> {
+    Ok(Memory::new(&sizes(scene, params, plan)?, plan))
 }
 
 fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
@@ -178,6 +185,11 @@ impl Gpu {
             gpu.write_solids(scene)?;
         }
         Ok(gpu)
+    }
+
+    /// Bytes that the driver's allocator has given out for this device, where it tells.
+    pub fn allocated(&self) -> Option<u64> {
+        self.context.allocated()
     }
 
     /// What never changes about moving solids.

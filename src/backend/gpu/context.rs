@@ -178,6 +178,11 @@ impl Context {
         }
     }
 
+    /// Bytes that the allocator has given out, where it tells.
+    pub fn allocated(&self) -> Option<u64> {
+        self.device.generate_allocator_report().map(|r| r.total_allocated_bytes)
+    }
+
     /// Lose the device.
     #[cfg(test)]
     pub fn destroy(&self) {

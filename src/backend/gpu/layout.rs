@@ -247,6 +247,30 @@ impl Sizes {
         }
     }
 
+    /// Of the same scene with a spacing `finer` times as small, nearly: water fills a volume, walls and bodies'
+    /// layers line surfaces.
+    pub fn refined(&self, finer: f64) -> Self {
+        let flat = self.grid[1] == 1;
+        let surface = |n: u64| (n as f64 * if flat { finer } else { finer * finer }).round() as u64;
+        let volume = |n: u64| (n as f64 * if flat { finer * finer } else { finer.powi(3) }).round() as u64;
+        let mut grid = self.grid.map(|n| (f64::from(n) * finer).ceil() as u32);
+        if flat {
+            grid[1] = 1;
+        }
+        let (fluid, moving, fixed) = (volume(self.fluid), surface(self.moving), surface(self.fixed));
+        Self {
+            total: fluid + moving + fixed,
+            fluid,
+            moving_wall: surface(self.moving_wall),
+            moving,
+            fixed,
+            pressure: fluid + surface(self.pressure - self.fluid),
+            cells: grid.iter().map(|&n| u64::from(n)).product(),
+            grid,
+            ..*self
+        }
+    }
+
     /// Keys of the counting sort.
     pub fn keys(&self) -> u64 {
         self.cells + 1 + if self.moving > 0 { self.cells } else { 0 }
