@@ -429,6 +429,12 @@ impl Backend for Gpu {
         self.context.clock.as_ref().map(|c| c.seconds.clone()).unwrap_or_default()
     }
 
+    fn solution(&mut self) -> Result<Option<Vec<f64>>> {
+        // Beside the positions, where the last residual was computed from.
+        let packed = self.context.download::<[f32; 4]>("preconditioned", self.groups.pressure())?;
+        Ok(Some(packed.into_iter().map(|x| f64::from(x[3])).collect()))
+    }
+
     fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
         let parts: Vec<_> = slots.iter().map(|&s| (s, 1)).collect();
         let pressures = self.context.download_parts::<f32>("pressure", &parts)?;

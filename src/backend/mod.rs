@@ -99,6 +99,10 @@ pub trait Backend: Send {
     fn stage_seconds(&self) -> BTreeMap<Stage, f64> {
         BTreeMap::new()
     }
+    /// Pressures as the last solve found them, before bounds cut them [Pa], if the backend keeps them.
+    fn solution(&mut self) -> Result<Option<Vec<f64>>> {
+        Ok(None)
+    }
     /// Pressures of single slots [Pa].
     fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>>;
     /// All fields, on the host.

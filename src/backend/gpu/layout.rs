@@ -378,7 +378,7 @@ impl Memory {
             ("static_particle", 16 * s.fixed, Host::Writes, s.fixed > 0),
             ("neighbour_list", 4 * s.capacity * s.pressure, Host::Reads, true),
             ("neighbour_count", 4 * s.pressure, Host::Both, true),
-            ("preconditioned", 16 * s.pressure, Host::None, true),
+            ("preconditioned", 16 * s.pressure, Host::Reads, true),
             ("residual", 4 * s.pressure, Host::None, true),
             ("search", 8 * s.pressure, Host::None, true),
             ("partial_sum", 32 * s.reduction_groups(), Host::None, true),
