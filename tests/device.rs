@@ -128,3 +128,42 @@ fn planned_bytes_are_allocated_bytes() {
         assert!(planned.total() > 2 << 20 && gpu.bytes() - planned.total() <= 17 << 20);
     }
 }
+
+/// With more blocks of cells than workgroups each takes several: a huge empty domain changes nothing.
+#[test]
+fn water_in_a_huge_domain_is_the_same_water() {
+    let column = |domain: &str| {
+        common::case(&format!(
+            "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1.0\nadaptive = false\n{domain}\n\
+             [fluid]\nsound_speed = 3\nsolver = {{ preconditioner = \"multigrid\" }}\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.2]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.4]\nopen = [\"z_max\"]\n"
+        ))
+    };
+    // The same corner, 0.21 m or four cells apart: cells of one lie on cells of the other, on every level.
+    let mut ends = Vec::new();
+    for far in [1.0, 6.0] {
+        let to = [far, far, far];
+        let domain = format!("domain = [[-0.21, -0.21, -0.21], {to:?}]");
+        let Some(mut sim) = on_device(&column(&domain)) else { return };
+        let mut iterations = 0;
+        for _ in 0..12 {
+            iterations += sim.step().expect("still water is no trouble").pressure.iterations;
+        }
+        let fields = sim.backend.read().expect("the device is there");
+        let mut by_number: Vec<(u32, f64)> =
+            fields.id.iter().copied().zip(fields.pressure.iter().copied()).collect();
+        by_number.sort_by_key(|p| p.0);
+        assert!(fields.pressure.iter().any(|&p| p > 100.0));
+        let cells = seixo::cells::Grid::new(&sim.params).expect("a grid").total();
+        println!("{cells} cells, {iterations} iterations");
+        ends.push((iterations, by_number, cells));
+    }
+    assert!(ends[1].2 > 1024 * 1024, "{} cells fit the workgroups", ends[1].2);
+    assert_eq!(ends[0].0, ends[1].0);
+    // Positions are rounded relative to another middle.
+    let most = ends[0].1.iter().map(|p| p.1).fold(0.0, f64::max);
+    for (a, b) in ends[0].1.iter().zip(&ends[1].1) {
+        assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-2 * most, "{a:?} {b:?}");
+    }
+}

@@ -36,7 +36,9 @@ use crate::scene::{Groups, Scene};
 use context::Context;
 use glam::{DVec3, Vec3};
 use hierarchy::Levels;
-use layout::{Coefficients, Constants, Memory, MonitorSum, Sizes, WORKGROUP, counter};
+use layout::{
+    Coefficients, Constants, Memory, MonitorSum, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, counter,
+};
 use std::collections::BTreeMap;
 
 /// Particles in f32 on a device.
@@ -245,7 +247,8 @@ impl Gpu {
 
     fn cell_list(&mut self) -> Result<()> {
         let Sizes { fluid, moving, .. } = self.sizes;
-        let (particles, blocks) = (groups(fluid + moving), self.sizes.keys().div_ceil(4 * WORKGROUP));
+        let particles = groups(fluid + moving);
+        let blocks = self.sizes.keys().div_ceil(SCAN_BLOCK).min(SCAN_GROUPS_MAX);
         self.context.clear("cell_count")?;
         self.context.pass([
             ("cell_list.count", particles),

@@ -55,7 +55,8 @@ struct Moment {
 
 impl Moment {
     fn new((name, text, spacing): Size) -> Result<Self> {
-        let (case, _, _) = parse(name, text.to_owned(), &[format!("run.spacing={spacing:?}")])?;
+        let sets = [format!("run.spacing={spacing:?}"), "run.adaptive=true".into()];
+        let (case, _, _) = parse(name, text.to_owned(), &sets)?;
         let scene = Scene::build(&case)?;
         let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
             Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)

@@ -17,6 +17,10 @@ pub const WORKGROUP: u64 = 256;
 pub const MONITOR_WIDTH: u64 = 128;
 /// Workgroups that share a reduction at most: every one of them adds the sums of all others.
 const REDUCTION_GROUPS_MAX: u64 = 1024;
+/// Keys of a scan that a workgroup takes at a time: four a thread.
+pub const SCAN_BLOCK: u64 = 4 * WORKGROUP;
+/// Workgroups of a scan at most; they then take several blocks. A GPU is full with them.
+pub const SCAN_GROUPS_MAX: u64 = 1024;
 /// Fluid particles at most: numbers travel in an f32.
 pub const FLUID_MAX: usize = 1 << 24;
 
@@ -354,7 +358,7 @@ impl Memory {
         let (moving, force) = (s.moving > 0, plan.has(Stage::BodyForce) && s.moving_wall > 0);
         let reaction = force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision));
         let sorted = s.fluid + s.moving;
-        let blocks = s.keys().div_ceil(4 * WORKGROUP);
+        let blocks = s.keys().div_ceil(SCAN_BLOCK);
         let table = [
             ("params", size_of::<Constants>() as u64, Host::Uniform, true),
             ("now", size_of::<Coefficients>() as u64, Host::Uniform, true),
@@ -398,8 +402,7 @@ impl Memory {
             .filter(|&(.., needed)| needed)
             .map(|(name, bytes, host, _)| Buffer { name, bytes: bytes.max(16), host })
             .collect();
-        let blocks = levels.map_or(blocks, |l| l.blocks().max(blocks));
-        Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP).max(blocks) }
+        Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP) }
     }
 
     /// All bytes.
