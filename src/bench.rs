@@ -112,6 +112,8 @@ pub struct Row {
     pub unknowns: usize,
     /// Neighbour pairs listed.
     pub pairs: u64,
+    /// Simulated time at which the warm-up began [s].
+    pub from: f64,
     /// Steps timed, after the warm-up.
     pub steps: u64,
     /// Mean time a step [s], with no wait between stages.
@@ -176,11 +178,18 @@ pub fn peak_memory() -> Option<u64> {
 /// Steps before the clock runs.
 const WARM_UP: u64 = 3;
 
-/// Time `steps` steps of `case` from its start.
-pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
+/// Time `steps` steps of `case` once it has reached `from` [s] of simulated time.
+///
+/// # Errors
+/// What keeps the case from starting or ends its run.
+pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
     let scene = Scene::build(case)?;
     let mut sim = Simulation::new(case, &scene, make)?;
     let timing = sim.backend.timing();
+    while sim.time < from {
+        sim.step()?;
+    }
+    let started = sim.time;
     let mut times = Vec::new();
     let (mut iterations, mut last) = (0.0, PressureReport::default());
     let (mut commands, mut stages) = (Commands::default(), BTreeMap::new());
@@ -243,6 +252,7 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         fluid: scene.groups.fluid,
         unknowns: last.unknowns,
         pairs: traffic.pairs,
+        from: started,
         steps,
         seconds_per_step: mean,
         quartiles: [quartile(0.25), quartile(0.75)],
@@ -266,10 +276,28 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
     })
 }
 
-/// Exponent e of time ~ particles^e, by least squares over `rows`; nothing for fewer than two.
-pub fn exponent(rows: &[&Row]) -> Option<f64> {
+/// How the time of a step grows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Growth {
+    /// Exponent e of time ~ particles^e, all kinds counted. Finer scenes have a larger share of water.
+    pub with_particles: f64,
+    /// Exponent e of time ~ unknowns^e.
+    pub with_unknowns: f64,
+}
+
+impl Growth {
+    /// By least squares over `rows`; nothing for fewer than two sizes.
+    pub fn of(rows: &[Row]) -> Option<Self> {
+        Some(Self {
+            with_particles: exponent(rows, |r| r.particles)?,
+            with_unknowns: exponent(rows, |r| r.unknowns)?,
+        })
+    }
+}
+
+fn exponent(rows: &[Row], size: fn(&Row) -> usize) -> Option<f64> {
     let points: Vec<(f64, f64)> =
-        rows.iter().map(|r| ((r.particles as f64).ln(), r.seconds_per_step.ln())).collect();
+        rows.iter().map(|r| ((size(r) as f64).ln(), r.seconds_per_step.ln())).collect();
     let n = points.len() as f64;
     let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
@@ -289,8 +317,10 @@ mod tests {
             spacing: 1.0,
             particles,
             fluid: 0,
-            unknowns: 0,
+            // Particles to the power 1/2: twice the exponent.
+            unknowns: particles.isqrt(),
             pairs: 0,
+            from: 0.0,
             steps: 1,
             seconds_per_step: 3e-7 * (particles as f64).powf(1.25),
             quartiles: [0.0; 2],
@@ -312,9 +342,9 @@ mod tests {
             implied: None,
             stages: Vec::new(),
         };
-        let rows = [row(1000), row(30_000), row(700_000)];
-        let all: Vec<&Row> = rows.iter().collect();
-        assert!((exponent(&all).expect("three points") - 1.25).abs() < 1e-12);
-        assert!(exponent(&all[..1]).is_none());
+        let rows = [row(900), row(40_000), row(810_000)];
+        let growth = Growth::of(&rows).expect("three points");
+        assert!((growth.with_particles - 1.25).abs() < 1e-12 && (growth.with_unknowns - 2.5).abs() < 1e-9);
+        assert!(Growth::of(&rows[..1]).is_none());
     }
 }

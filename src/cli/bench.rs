@@ -5,7 +5,7 @@ use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
 use seixo::backend::Timing;
 use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
 use seixo::backend::traffic::Solve;
-use seixo::bench::{Row, exponent, host_bandwidth, measure};
+use seixo::bench::{Growth, Row, host_bandwidth, measure};
 use seixo::error::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub struct BenchArgs {
     #[arg(default_value = "cases/dam_break_transport.toml")]
     case: PathBuf,
     /// Spacings l0 [m] to time.
-    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.0075])]
+    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.01, 0.0075, 0.006])]
     spacings: Vec<f64>,
     /// Change a value of the case; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -26,6 +26,9 @@ pub struct BenchArgs {
     /// Steps to time at each spacing.
     #[arg(long, value_name = "N", default_value_t = 100)]
     steps: u64,
+    /// Simulated time from which to time [s], e.g. after the collapse.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    from: f64,
     /// Spacings with more particles than this are left out on a software GPU [thousands].
     #[arg(long, value_name = "K", default_value_t = 150)]
     software_limit: usize,
@@ -46,8 +49,8 @@ struct Report {
     case: String,
     sets: Vec<String>,
     rows: Vec<Row>,
-    /// Exponent of time against particles, by backend.
-    exponents: Vec<(String, Option<f64>)>,
+    /// How time grows with size, by backend.
+    growth: Vec<(String, Option<Growth>)>,
 }
 
 /// The commit of the checkout that the program runs in, if it is one.
@@ -81,13 +84,13 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
     // Software acts as a GPU for correctness, not speed: a tenth of the steps will do.
     let steps = if software { (args.steps / 10).max(3) } else { args.steps };
     let make = |s: &_, p: &_, plan: &_, settings| device::backend(&device, s, p, plan, settings);
-    measure(&setup.loaded.case, steps, bandwidth, &make).map(Some)
+    measure(&setup.loaded.case, args.from, steps, bandwidth, &make).map(Some)
 }
 
 pub fn bench(args: &BenchArgs) -> Exit {
     device::set_threads(&args.device);
     let host = host_bandwidth();
-    let (mut rows, mut exponents) = (Vec::new(), Vec::new());
+    let (mut rows, mut growth) = (Vec::new(), Vec::new());
     for backend in choices(&args.device) {
         let bandwidth = match backend {
             BackendName::Gpu => bandwidth(args.device.adapter.as_deref())?,
@@ -98,7 +101,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
             own.extend(timed(args, backend, spacing, bandwidth)?);
         }
         let name = own.first().map_or_else(|| format!("{backend:?}"), |r: &Row| r.adapter.clone());
-        exponents.push((name, exponent(&own.iter().collect::<Vec<_>>())));
+        growth.push((name, Growth::of(&own)));
         rows.append(&mut own);
     }
     let report = Report {
@@ -109,7 +112,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
         case: args.case.display().to_string(),
         sets: args.sets.clone(),
         rows,
-        exponents,
+        growth,
     };
     if let Some(path) = &args.out {
         let text = serde_json::to_string_pretty(&report).unwrap_or_default() + "\n";
@@ -220,9 +223,12 @@ fn table(report: &Report) {
         }
         solver(r);
     }
-    for (name, exponent) in &report.exponents {
-        if let Some(e) = exponent {
-            say(&format!("\n{name}: time a step grows with particles to the power {e:.3}"));
+    for (name, growth) in &report.growth {
+        if let Some(g) = growth {
+            say(&format!(
+                "\n{name}: time a step ~ particles^{:.3} ~ unknowns^{:.3}",
+                g.with_particles, g.with_unknowns
+            ));
         }
     }
 }
