@@ -87,9 +87,11 @@ impl Moment {
     }
 }
 
+type Kept = Option<(Size, Arc<Moment>)>;
+
 /// The moment of the size asked for last: jobs come in the order of their sizes.
 #[derive(Clone, Default)]
-struct Last(Arc<Mutex<Option<(Size, Arc<Moment>)>>>);
+struct Last(Arc<Mutex<Kept>>);
 
 impl Last {
     fn of(&self, size: Size) -> Result<Arc<Moment>> {
