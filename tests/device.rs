@@ -116,7 +116,10 @@ fn planned_bytes_are_allocated_bytes() {
         let plan = Plan::new(&case, &scene, &params);
         let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
         let planned = gpu::memory(&scene, &params, &plan).expect("it can be planned");
-        let gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+        let mut gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+        // What the uploads travel in is given back.
+        gpu.read().expect("the device is there");
+        gpu.wait().expect("the device is there");
         let Some(allocated) = gpu.allocated() else {
             eprintln!("SKIPPED: the driver's allocator does not tell");
             return;
