@@ -1,6 +1,6 @@
 //! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
 
-use super::traffic::Sizes;
+use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
@@ -418,12 +418,12 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn sizes(&mut self) -> Result<Sizes> {
+    fn traffic(&mut self) -> Result<Traffic> {
         let rows =
             self.neighbours.chunks.iter().flat_map(|c| c.start.windows(2)).filter(|w| w[0] < w[1]).count();
         let carrying = |c: &Chunk| (0..c.rows()).map(|k| c.pressure(k).neighbour.len()).sum::<usize>();
         let pressure_pairs: usize = self.neighbours.chunks.iter().map(carrying).sum();
-        Ok(Sizes {
+        let sizes = Sizes {
             fluid: self.live as u64,
             rows: rows as u64,
             cells: self.grid.total() as u64,
@@ -433,8 +433,9 @@ impl Backend for Cpu {
             number: 8,
             vector: 24,
             weight: 8,
-            preconditioner_weight: self.multigrid.as_ref().map(|_| 4),
-        })
+            multigrid: self.multigrid.as_ref().map(|m| (4, m.stored())),
+        };
+        Ok(sizes.traffic())
     }
 
     fn bytes(&self) -> u64 {

@@ -126,6 +126,11 @@ impl Multigrid {
         std::iter::once(self.members.len()).chain(self.levels[..self.used].iter().map(Level::rows)).collect()
     }
 
+    /// Rows and entries beside the diagonal of each coarse level, finest first.
+    pub fn stored(&self) -> Vec<[u64; 2]> {
+        self.levels[..self.used].iter().map(|l| [l.rows() as u64, l.value.len() as u64]).collect()
+    }
+
     /// Sums over the operators of the levels, finest first.
     pub fn sums(&self) -> Vec<LevelSums> {
         let sums = |level: &Level| {

@@ -1,7 +1,9 @@
 //! The studies that come with the program.
 
 use super::definition::{Definition, Files, Setup};
-use super::{Study, compare, dry_studies, gallery, needs, pressure_solve, stability, work_precision};
+use super::{
+    Study, compare, dry_studies, gallery, needs, pressure_size, pressure_solve, stability, work_precision,
+};
 use crate::error::{Error, Result};
 
 /// A built-in study: name, what it asks, in one line.
@@ -51,6 +53,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "pressure-solve",
         about: "the pressure equation alone: residual and pressure error against iterations and time",
         make: Maker::Function(pressure_solve::study),
+    },
+    Entry {
+        name: "pressure-size",
+        about: "the pressure equation over its size: iterations and time of both preconditioners, what f32 reaches",
+        make: Maker::Function(pressure_size::study),
     },
     Entry {
         name: "stability",

@@ -26,6 +26,7 @@ pub mod incline;
 pub mod measure;
 pub mod needs;
 pub mod pareto;
+pub mod pressure_size;
 pub mod pressure_solve;
 pub mod report;
 pub mod row;
