@@ -3,9 +3,10 @@
 
 use super::cell_list::CellList;
 use crate::cells::Grid;
-use crate::neighbours::{CAPACITY, Chunk};
+use crate::neighbours::{CAPACITY, CHUNK, Chunk};
 use crate::params::Params;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Candidates examined together.
 const BLOCK: usize = 4;
@@ -21,11 +22,14 @@ pub struct Coordinates {
 impl Coordinates {
     /// Take over `position`; the arrays get a block of padding, so that blocks may be read past the end.
     pub fn set(&mut self, position: &[DVec3]) {
-        for (out, k) in [(&mut self.x, 0), (&mut self.y, 1), (&mut self.z, 2)] {
-            out.clear();
-            out.extend(position.iter().map(|p| p[k]));
-            out.resize(position.len() + BLOCK, 0.0);
+        let (n, Self { x, y, z }) = (position.len(), self);
+        for v in [&mut *x, &mut *y, &mut *z] {
+            v.resize(n + BLOCK, 0.0);
         }
+        (&mut x[..n], &mut y[..n], &mut z[..n], position)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .for_each(|(x, y, z, p)| (*x, *y, *z) = (p.x, p.y, p.z));
     }
 
     /// Squared distances to `c` from `k` on.
@@ -237,8 +241,7 @@ fn chunk_rows(
     search: &mut Search,
     below: impl Below,
 ) -> (usize, usize) {
-    let reach =
-        Reach { radius2: params.effective_radius.powi(2), close2: params.collision_distance.powi(2) };
+    let reach = Reach { radius2: params.effective_radius.powi(2), close2: params.collision_distance.powi(2) };
     let mut largest = (0, 0);
     search.cell = None;
     chunk.neighbour.clear();
