@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod gpu;
+mod rows;
 pub mod traffic;
 
 use self::traffic::Traffic;
