@@ -110,3 +110,27 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 fn total(l: [f64; LANES]) -> f64 {
     ((l[0] + l[4]) + (l[1] + l[5])) + ((l[2] + l[6]) + (l[3] + l[7]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_over_rows_of_any_length_are_the_plain_ones() {
+        let field: Vec<DVec3> = (0..60)
+            .map(|k| DVec3::new(0.1 * f64::from(k), f64::from(k % 7), -1.0 / f64::from(k + 1)))
+            .collect();
+        let mut arrays = RowArrays::default();
+        for n in (0..50).rev() {
+            let row: Vec<u32> = (0..n).map(|k| (3 * k + 1) % 60).collect();
+            let filled = arrays.r.differences(5, &row, &field);
+            assert!(filled >= row.len() && filled % LANES == 0);
+            let plain: DVec3 = row.iter().map(|&j| field[j as usize] - field[5]).sum();
+            let got = arrays.r.weighted_sum(&[1.0; LONGEST][..filled]);
+            assert!((got - plain).length() < 1e-12, "{n}: {got} for {plain}");
+            arrays.r.map_squares(&mut arrays.s[..row.len()], |_, r2| r2);
+            let squares: f64 = row.iter().map(|&j| field[j as usize].distance_squared(field[5])).sum();
+            assert!((sum(&arrays.s[..row.len()]) - squares).abs() < 1e-10 * (1.0 + squares));
+        }
+    }
+}

@@ -309,3 +309,33 @@ pub fn neighbour_list(
     }
     chunk_rows(chunk, active, params, from, search, below)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_the_set_bits() {
+        for (mask, places) in PLACES.iter().enumerate() {
+            let set: Vec<u32> = (0..BLOCK as u32).filter(|k| mask >> k & 1 == 1).collect();
+            assert_eq!(places[..set.len()], set);
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn the_comparison_in_vectors_is_the_plain_one() {
+        if !is_x86_feature_detected!("avx2") {
+            eprintln!("SKIPPED: no AVX2");
+            return;
+        }
+        let numbers = [-1.0, 0.0, 1.0, 1.0 + f64::EPSILON, f64::NAN, f64::INFINITY];
+        for k in 0..numbers.len().pow(BLOCK as u32) {
+            let value = std::array::from_fn(|l| numbers[k / numbers.len().pow(l as u32) % numbers.len()]);
+            for limit in numbers {
+                // SAFETY: the machine has AVX2, checked just above.
+                assert_eq!(unsafe { below_avx2(value, limit) }, below(value, limit), "{value:?} {limit}");
+            }
+        }
+    }
+}
