@@ -6,7 +6,7 @@ use seixo::case::{Contact, Law};
 use seixo::contact::Solids;
 use seixo::error::Error;
 use seixo::scene::Motion;
-use seixo::study::contact_checks::{DAM_BREAK_CUBE, collide, elastic_drop, restitution, smooth};
+use seixo::study::contact_checks::{DAM_BREAK_CUBE, collide, edge_drop, elastic_drop, restitution, smooth};
 use seixo::study::contact_rest::{demolish, random_drops, sliding_stop, stack};
 use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
 use seixo::study::incline::{Slide, calibrate, coulomb_curve, travel_time};
@@ -397,4 +397,21 @@ fn in_two_dimensions_a_tilted_square_falls_flat_in_its_plane() {
     assert!((pose.position.z - 0.1).abs() < 1e-4 && pose.velocity.length() < 1e-9, "{pose:?}");
     let up = pose.orientation.inverse() * DVec3::Z;
     assert!(up.abs().max_element() > 1.0 - 1e-9, "flat: {up}");
+}
+
+#[test]
+fn edges_that_cross_between_points_hold_and_push_across_both() {
+    for on_wall in [true, false] {
+        for spacing in [0.05, 0.025, 0.0125] {
+            for turn in [90.0, 70.0, 45.0, 20.0] {
+                for slope in [0.0, 3.0, 12.0] {
+                    let gentle = edge_drop(spacing, (turn, slope), on_wall, 0.02, 1e-3).unwrap();
+                    assert!(gentle.sinks > 0.0 && gentle.sinks < 0.05, "{gentle:?}");
+                    assert!(gentle.off_normal_deg < 0.5, "{gentle:?}");
+                    let hard = edge_drop(spacing, (turn, slope), on_wall, 2.0, 1e-4).unwrap();
+                    assert!(gentle.energy_error.abs() < 1e-3 && hard.energy_error.abs() < 1e-3, "{hard:?}");
+                }
+            }
+        }
+    }
 }

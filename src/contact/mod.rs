@@ -8,6 +8,7 @@ mod advice;
 mod broad;
 mod candidates;
 mod collision;
+mod edges;
 mod friction;
 mod geometry;
 mod paper;
@@ -247,7 +248,7 @@ impl Solids {
             Model::None => {}
             Model::Smooth(model) => {
                 if self.candidates.refresh(bodies, self.spacing, dt) {
-                    model.collect(&self.candidates, bodies, self.spacing);
+                    model.collect(&self.candidates, bodies);
                     model.set_constants(&self.limits, bodies, self.spacing, h);
                 }
                 model.evaluate(bodies);
