@@ -10,7 +10,7 @@ use seixo::study::contact_checks::{DAM_BREAK_CUBE, collide, edge_drop, elastic_d
 use seixo::study::contact_rest::{demolish, random_drops, sliding_stop, stack};
 use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
 use seixo::study::incline::{Slide, calibrate, coulomb_curve, travel_time};
-use seixo::study::spring_drop::{CASES, Drop, Offset};
+use seixo::study::spring_drop::{CASES, Drop, Offset, bounce, returns};
 use seixo::study::spring_static::{amplitude, oscillation, oscillation_error};
 
 #[test]
@@ -84,13 +84,36 @@ fn a13_the_block_sticks_on_a_slope_below_the_angle_of_friction() {
 
 #[test]
 fn a5_every_entry_phase_returns_at_the_papers_spring() {
-    for case in CASES.iter().filter(|c| c.spacing > 0.015 && c.name.starts_with("CL")) {
-        for phase in 0..8 {
-            let drop = Drop::new(*case, 6.9 * case.smallest_spring());
-            let height = drop.height + 3e-3 * f64::from(phase) / 8.0;
-            let row = Drop { height, ..drop }.run(false).unwrap();
-            assert!(row.returns, "{} phase {phase}: {row:?}", case.name);
-        }
+    for case in CASES.iter().filter(|c| c.spacing > 0.015) {
+        let row = returns(*case, 6.9, 5e-4, 8).unwrap();
+        assert!(row.passed == 8 && row.worst_over_band < 0.8, "{}: {row:?}", case.name);
+    }
+}
+
+#[test]
+fn a5_the_finest_case_returns_only_with_a_fifth_of_the_step() {
+    assert_eq!(CASES[5].name, "CL01");
+    let coarse = returns(CASES[5], 6.9, 5e-4, 8).unwrap();
+    assert!(coarse.passed < 8 && coarse.worst_over_band > 3.0, "{coarse:?}");
+    let fine = returns(CASES[5], 6.9, 1e-4, 8).unwrap();
+    assert_eq!(fine.passed, 8, "{fine:?}");
+}
+
+#[test]
+fn a8_the_energy_error_of_a_bounce_grows_as_the_square_of_the_step() {
+    for (omega_dt, expected) in [(0.1, 0.0008), (0.3, 0.0085), (0.5, 0.024)] {
+        let row = bounce(Offset::StaggeredXy, omega_dt, 60).unwrap();
+        assert!(row.rms < 2.0 * expected && row.rms > 0.5 * expected, "{row:?}");
+    }
+}
+
+#[test]
+fn a10_continuous_viscous_drag_takes_the_time_of_its_equation() {
+    let slide = Slide { viscous_friction: 4.054, ..Slide::new(Law::Smooth) };
+    for time_step in [2e-3, 1e-3, 1e-4] {
+        let row = Slide { time_step, ..slide }.run(2.0).unwrap();
+        assert!((row.time / 0.9078 - 1.0).abs() < 2e-3, "{row:?}");
+        assert!(row.duty > 0.99 && row.tilt_deg < 0.01, "{row:?}");
     }
 }
 

@@ -130,10 +130,7 @@ impl Smooth {
     /// Constants of every pair for sub-steps of `h` [s].
     pub fn set_constants(&mut self, limits: &Limits, bodies: &[Body], spacing: f64, h: f64) {
         for pair in &mut self.pairs {
-            let b = match pair.b {
-                smooth::Other::Solid(b) => Some(b),
-                smooth::Other::Wall(_) => None,
-            };
+            let b = pair.b.solid();
             let weight = self.surfaces[pair.a].smallest_weight;
             pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
             pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());

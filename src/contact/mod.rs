@@ -291,7 +291,10 @@ impl Solids {
             }
         }
         match &mut self.model {
-            Model::Smooth(model) => model.friction.apply(&model.pairs, bodies, self.limits.friction, h),
+            Model::Smooth(model) => {
+                let (mu, eta) = (self.limits.friction, self.limits.viscous_friction);
+                model.friction.apply(&model.pairs, bodies, mu, eta, h);
+            }
             Model::Collision(model) => {
                 for pair in &model.pairs {
                     let distance = COLLISION_DISTANCE * self.spacing;

@@ -32,6 +32,16 @@ pub(crate) enum Other {
     Wall(usize),
 }
 
+impl Other {
+    /// Index of the moving solid; `None` for a wall.
+    pub fn solid(self) -> Option<usize> {
+        match self {
+            Self::Solid(b) => Some(b),
+            Self::Wall(_) => None,
+        }
+    }
+}
+
 /// Constants of a pair for one length of sub-step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Constants {
@@ -345,10 +355,7 @@ impl Pair {
         let first = self.contacts.len();
         let mut push = DVec3::ZERO;
         let a = &bodies[self.a];
-        let b = match self.b {
-            Other::Solid(b) => Some(&bodies[b]),
-            Other::Wall(_) => None,
-        };
+        let b = self.b.solid().map(|b| &bodies[b]);
         edges::nodes(start, along, line.length, other.half, faces, |s, width, inside| {
             let at = other.center + other.axes * (start + s * along);
             let normal = sign * (other.axes * inside.outward);
