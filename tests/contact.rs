@@ -7,7 +7,7 @@ use seixo::contact::Solids;
 use seixo::error::Error;
 use seixo::scene::Motion;
 use seixo::study::contact_checks::{DAM_BREAK_CUBE, collide, edge_drop, elastic_drop, restitution, smooth};
-use seixo::study::contact_rest::{demolish, random_drops, sliding_stop, stack};
+use seixo::study::contact_rest::{demolish, drop_on_body, random_drops, sliding_stop, stack};
 use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
 use seixo::study::incline::{Slide, calibrate, coulomb_curve, travel_time};
 use seixo::study::spring_drop::{CASES, Drop, Offset, bounce, returns};
@@ -210,11 +210,32 @@ fn a16_random_drops_of_the_dam_break_cube_end_flat_and_still() {
 #[test]
 fn no_spring_and_no_mass_loses_or_launches_a_body() {
     for spring in [1e4, 1e6, 1e9] {
-        for mass in [1e-3, 1.0, 1000.0] {
+        for mass in [1e-3, 1.0, 1000.0, 1e4] {
             let row = random_drops(spring, mass, 3, 1.5).unwrap();
             assert_eq!(row.kept, 3, "{row:?}");
             assert!(row.rise < 0.0 && row.energy_gain < 0.0 && row.penetration < 0.8, "{row:?}");
             assert!(row.substeps <= 64, "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn a_heavy_body_on_a_soft_spring_comes_to_rest_on_the_stop() {
+    let row = random_drops(1e4, 1000.0, 5, 1.5).unwrap();
+    assert_eq!((row.flat, row.at_rest), (5, 5), "{row:?}");
+}
+
+#[test]
+fn no_spring_and_no_pair_of_masses_loses_or_launches_a_body() {
+    for spring in [1e4, 1e9] {
+        for (mass, other) in [(1e-3, 1e-3), (1e3, 1e-3), (1e-3, 1.0), (1e3, 1e3), (1.0, 1.0)] {
+            for seed in 0..3 {
+                let row = drop_on_body(spring, mass, other, seed, 1.0).unwrap();
+                assert_eq!(row.kept, 2, "{other} kg: {row:?}");
+                // within a contact the energy of symplectic Euler swings by w dt / 2 of what the spring holds
+                assert!(row.rise < 0.0 && row.energy_gain < 0.01, "{other} kg: {row:?}");
+                assert!(row.penetration < 0.8 && row.substeps <= 64, "{other} kg: {row:?}");
+            }
         }
     }
 }
