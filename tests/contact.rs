@@ -387,7 +387,7 @@ fn a_restored_state_continues_to_the_last_bit() {
 fn results_do_not_depend_on_the_number_of_threads() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| demolish(10, 1e6, 0.2).unwrap().drift)
+        pool.install(|| demolish(10, 1e6, 9e-4, 0.2).unwrap().drift)
     };
     assert_eq!(run(1), run(3));
 }
@@ -420,7 +420,7 @@ fn a_state_that_is_no_number_is_reported_with_the_body() {
 
 #[test]
 fn a_wall_of_cubes_hit_by_a_heavy_one_comes_to_rest() {
-    let row = demolish(3, 5.6e5, 6.0).unwrap();
+    let row = demolish(3, 5.6e5, 9e-4, 6.0).unwrap();
     assert!(row.drift > 0.5, "it was hit: {row:?}");
     assert!(row.penetration_end < 0.1 && row.speed < 0.05, "{row:?}");
 }

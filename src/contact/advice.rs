@@ -190,6 +190,13 @@ impl Solids {
                 worst.softest
             ));
         }
+        let sinks = self.limits.fastest * (heaviest / worst.softest).sqrt() / self.spacing;
+        if smooth.is_some() && sinks > 0.1 {
+            words.push(format!(
+                "contact: at that speed the heaviest body may press what lies between it and a wall {sinks:.2} \
+                 spacings deep; a spring four times as stiff halves that, where the sub-steps carry it"
+            ));
+        }
         ContactAdvice {
             omega_dt: worst.omega_dt,
             damping_dt: worst.damping_dt,

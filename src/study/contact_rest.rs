@@ -50,13 +50,16 @@ pub fn stack(count: usize, seconds: f64) -> Result<RestRow> {
     rest(&mut solids, seconds, dt)
 }
 
+/// The cube that hits the wall: mass [kg], speed [m/s].
+pub const RAM: (f64, f64) = (20.0, 3.0);
+
 /// A wall of `columns` x 10 cubes of 54 mm hit by a cube of 20 kg at 3 m/s, K = `spring` [N/m] at the
-/// dam-break cube's damping ratio, after `seconds`.
+/// dam-break cube's damping ratio, steps of `dt` [s], after `seconds`.
 ///
 /// # Errors
 /// Those of [`Solids::advance`].
-pub fn demolish(columns: usize, spring: f64, seconds: f64) -> Result<RestRow> {
-    let (edge, mass, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
+pub fn demolish(columns: usize, spring: f64, dt: f64, seconds: f64) -> Result<RestRow> {
+    let (edge, mass, l0, k, c, friction, _) = DAM_BREAK_CUBE;
     let damping = c * (spring / k).sqrt();
     let mut dry = DryScene::new(l0, DVec3::new(-5.0, -5.0, 0.0), DVec3::new(9.0, 5.0, 1.0)).floor();
     for row in 0..10 {
@@ -67,8 +70,8 @@ pub fn demolish(columns: usize, spring: f64, seconds: f64) -> Result<RestRow> {
         }
     }
     let size = DVec3::splat(0.15);
-    let mut ram = FreeBox::new(size, 20.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
-    ram.velocity = DVec3::new(3.0, 0.0, 0.0);
+    let mut ram = FreeBox::new(size, RAM.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
+    ram.velocity = DVec3::new(RAM.1, 0.0, 0.0);
     let mut solids = Solids::new(&dry.body(&ram).build(), Some(&smooth(spring, damping, friction)))?;
     rest(&mut solids, seconds, dt)
 }

@@ -37,7 +37,8 @@ pub mod spring_static;
 pub mod stability;
 pub mod stability_contact;
 pub mod stability_fluid;
-pub mod work_precision;
+pub mod wall_of_cubes;
+mod work_precision;
 
 use crate::error::Result;
 use engine::{Context, Job, Options};
