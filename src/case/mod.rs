@@ -408,7 +408,8 @@ pub struct Contact {
     pub damping_ratio: Option<f64>,
     /// Normal restitution e of a free impact [-] (law "smooth").
     pub restitution: Option<f64>,
-    /// Numerical friction eta of Eq. (12) [kg/s] (law "paper").
+    /// Numerical friction eta of Eq. (12) [kg/s]: over particle pairs (law "paper") or over the true
+    /// surfaces, where it adds to `friction` (law "smooth").
     #[serde(default)]
     pub viscous_friction: f64,
     /// Coulomb coefficient mu [-], static and kinetic (law "smooth").

@@ -86,6 +86,7 @@ pub(crate) struct Smooth {
     pub walls: Vec<WallBox>,
     pub pairs: Vec<smooth::Pair>,
     pub friction: Friction,
+    spacing: f64,
 }
 
 impl Smooth {
@@ -95,11 +96,12 @@ impl Smooth {
             walls: geometry::walls(scene),
             pairs: vec![],
             friction: Friction::default(),
+            spacing: scene.spacing,
         }
     }
 
     /// Makes the lists of points.
-    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body], spacing: f64) {
+    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body]) {
         let mut pairs: Vec<(smooth::Pair, f64)> = vec![];
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             for (w, wall) in self.walls.iter().enumerate() {
@@ -115,7 +117,7 @@ impl Smooth {
             pairs.push((smooth::Pair::new(a, smooth::Other::Solid(b)), skin));
         }
         let fill = |(mut pair, skin): (smooth::Pair, f64)| {
-            pair.collect(bodies, &self.surfaces, &self.walls, skin, spacing);
+            pair.collect(bodies, &self.surfaces, &self.walls, skin);
             (!pair.is_empty()).then_some(pair)
         };
         self.pairs = if pairs.len() >= MANY_PAIRS {
@@ -128,10 +130,7 @@ impl Smooth {
     /// Constants of every pair for sub-steps of `h` [s].
     pub fn set_constants(&mut self, limits: &Limits, bodies: &[Body], spacing: f64, h: f64) {
         for pair in &mut self.pairs {
-            let b = match pair.b {
-                smooth::Other::Solid(b) => Some(b),
-                smooth::Other::Wall(_) => None,
-            };
+            let b = pair.b.solid();
             let weight = self.surfaces[pair.a].smallest_weight;
             pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
             pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());
@@ -139,11 +138,11 @@ impl Smooth {
     }
 
     pub fn evaluate(&mut self, bodies: &[Body]) {
-        let (surfaces, walls) = (&self.surfaces, &self.walls);
+        let (surfaces, walls, spacing) = (&self.surfaces, &self.walls, self.spacing);
         if self.pairs.len() >= MANY_PAIRS {
-            self.pairs.par_iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls));
+            self.pairs.par_iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls, spacing));
         } else {
-            self.pairs.iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls));
+            self.pairs.iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls, spacing));
         }
     }
 }

@@ -8,6 +8,7 @@ mod advice;
 mod broad;
 mod candidates;
 mod collision;
+mod edges;
 mod friction;
 mod geometry;
 mod paper;
@@ -247,7 +248,7 @@ impl Solids {
             Model::None => {}
             Model::Smooth(model) => {
                 if self.candidates.refresh(bodies, self.spacing, dt) {
-                    model.collect(&self.candidates, bodies, self.spacing);
+                    model.collect(&self.candidates, bodies);
                     model.set_constants(&self.limits, bodies, self.spacing, h);
                 }
                 model.evaluate(bodies);
@@ -290,7 +291,10 @@ impl Solids {
             }
         }
         match &mut self.model {
-            Model::Smooth(model) => model.friction.apply(&model.pairs, bodies, self.limits.friction, h),
+            Model::Smooth(model) => {
+                let (mu, eta) = (self.limits.friction, self.limits.viscous_friction);
+                model.friction.apply(&model.pairs, bodies, mu, eta, h);
+            }
             Model::Collision(model) => {
                 for pair in &model.pairs {
                     let distance = COLLISION_DISTANCE * self.spacing;

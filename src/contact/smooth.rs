@@ -5,6 +5,8 @@
 //!
 //! D = (sum_i w_i d_i^p)^(1/p),  p = 8,
 //!
+//! where edges carry their weight along their length and the sum over them is an integral (`edges`),
+//!
 //! and the contact stores U = K D^2 / 2. With all of a face in contact D is the depth and K the
 //! stiffness of the contact as a whole, whatever the resolution: what Eq. (14) wants of 1/n_c. Unlike
 //! that average, U is a continuous function of the two poses and the forces
@@ -16,9 +18,10 @@
 //! Beyond a quarter spacing a second spring joins, stiff enough to stop the fastest body of the scene
 //! within half a spacing more; it is never reached with a sensible K, and it is conservative too.
 
-use super::geometry::{self, Inside, Surface, WallBox};
+use super::edges::{self, Line};
+use super::geometry::{self, Faces, Inside, Surface, WallBox};
 use crate::body::{Body, Wrench};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// What a free solid touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +30,16 @@ pub(crate) enum Other {
     Solid(usize),
     /// A fixed wall.
     Wall(usize),
+}
+
+impl Other {
+    /// Index of the moving solid; `None` for a wall.
+    pub fn solid(self) -> Option<usize> {
+        match self {
+            Self::Solid(b) => Some(b),
+            Self::Wall(_) => None,
+        }
+    }
 }
 
 /// Constants of a pair for one length of sub-step.
@@ -76,6 +89,37 @@ fn felt(steps: f64) -> f64 {
     if steps < 1.0 { 1.5 * steps } else { (2.0 - 0.5 * steps).max(1.0) }
 }
 
+/// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
+const ALONG_NORMAL: f64 = 0.95;
+
+/// Where a box stands.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    center: DVec3,
+    axes: DMat3,
+    half: DVec3,
+}
+
+/// A box as the edges of another frame see it.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    other: Frame,
+    faces: Faces,
+    /// Turns the edges' frame into the box's.
+    turn: DMat3,
+    /// The edges' frame in the box's.
+    shift: DVec3,
+    /// Weight times depth^8 below which an edge is left out [m8].
+    least: f64,
+}
+
+impl View {
+    fn new(own: Frame, other: Frame, faces: Faces, least: f64) -> Self {
+        let still = other.axes.transpose();
+        Self { other, faces, turn: still * own.axes, shift: still * (own.center - other.center), least }
+    }
+}
+
 /// One point in contact.
 #[derive(Clone, Copy, Debug)]
 struct Contact {
@@ -120,8 +164,12 @@ pub(crate) struct Pair {
     pub points_a: Vec<u32>,
     /// Points of solid `b` near `a`.
     pub points_b: Vec<u32>,
-    /// Points on the edges of wall `b` near `a`, world [m].
+    /// Corners of wall `b` near `a`, world [m].
     pub samples: Vec<DVec3>,
+    /// Edges of `a` near `b`.
+    pub edges_a: Vec<u32>,
+    /// Edges of `b`, a solid or a wall, near `a`.
+    pub edges_b: Vec<u32>,
     pub constants: Constants,
     contacts: Vec<Contact>,
     /// Patches of the last evaluation.
@@ -142,6 +190,8 @@ impl Pair {
             points_a: vec![],
             points_b: vec![],
             samples: vec![],
+            edges_a: vec![],
+            edges_b: vec![],
             constants: Constants::default(),
             contacts: vec![],
             patches: vec![],
@@ -156,71 +206,62 @@ impl Pair {
         self.contacts.len()
     }
 
-    /// Collects the points of `a` and of `b` that come within `skin` [m] of the other's box.
-    pub fn collect(
-        &mut self,
-        bodies: &[Body],
-        surfaces: &[Surface],
-        walls: &[WallBox],
-        skin: f64,
-        spacing: f64,
-    ) {
+    /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's box.
+    pub fn collect(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
-        self.points_a.clear();
-        self.points_b.clear();
         self.samples.clear();
-        let near = |surface: &Surface, own: &Body, center: DVec3, axes: glam::DMat3, half: DVec3| {
+        let near = |surface: &Surface, own: &Body, center: DVec3, axes: DMat3, half: DVec3| {
             let turn = axes.transpose() * own.rotation;
             let shift = axes.transpose() * (own.pose.position - center);
             let points = surface.points.iter().enumerate();
-            points
-                .filter(|(_, p)| geometry::outside(turn * **p + shift, half) < skin)
-                .map(|(k, _)| k as u32)
-                .collect::<Vec<u32>>()
+            let points = points.filter(|(_, p)| geometry::outside(turn * **p + shift, half) < skin);
+            let lines = surface.edges.iter().enumerate();
+            let lines = lines.filter(|(_, e)| {
+                edges::clip(turn * e.start + shift, turn * e.along, e.length, half + skin).is_some()
+            });
+            let points: Vec<u32> = points.map(|(k, _)| k as u32).collect();
+            let lines: Vec<u32> = lines.map(|(k, _)| k as u32).collect();
+            (points, lines)
         };
         match self.b {
             Other::Solid(b) => {
                 let other = &bodies[b];
-                self.points_a =
+                (self.points_a, self.edges_a) =
                     near(&surfaces[self.a], body, other.pose.position, other.rotation, other.half);
-                self.points_b = near(&surfaces[b], other, body.pose.position, body.rotation, body.half);
+                (self.points_b, self.edges_b) =
+                    near(&surfaces[b], other, body.pose.position, body.rotation, body.half);
             }
             Other::Wall(w) => {
                 let wall = &walls[w];
-                self.points_a = near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
-                let reach = body.radius() + skin;
-                for edge in &wall.edges {
-                    // only the samples whose stretch of the edge meets the body's sphere
-                    let length = edge.step.length();
-                    let from = body.pose.position - edge.start;
-                    let middle = if length > 0.0 { from.dot(edge.step) / length } else { 0.0 };
-                    let width = reach + spacing;
-                    let low = ((middle - width) / length.max(1e-300)).max(0.0) as usize;
-                    let high = ((middle + width) / length.max(1e-300)).max(0.0) as usize;
-                    for k in low..=high.min(edge.count - 1) {
-                        let x = edge.start + k as f64 * edge.step;
-                        let q = body.rotation.transpose() * (x - body.pose.position);
-                        if geometry::outside(q, body.half) < skin {
-                            self.samples.push(x);
-                        }
-                    }
-                }
+                (self.points_a, self.edges_a) =
+                    near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
+                let still = body.rotation.transpose();
+                let lines = wall.edges.iter().enumerate().filter(|(_, e)| {
+                    let start = still * (e.start - body.pose.position);
+                    edges::clip(start, still * e.along, e.length, body.half + skin).is_some()
+                });
+                self.edges_b = lines.map(|(k, _)| k as u32).collect();
+                let near =
+                    |x: &&DVec3| geometry::outside(still * (**x - body.pose.position), body.half) < skin;
+                self.samples.extend(wall.corners.iter().filter(near));
             }
         }
     }
 
     /// Whether any candidate is left.
     pub fn is_empty(&self) -> bool {
-        self.points_a.is_empty() && self.points_b.is_empty() && self.samples.is_empty()
+        let points = self.points_a.len() + self.points_b.len() + self.samples.len();
+        points + self.edges_a.len() + self.edges_b.len() == 0
     }
 
     /// Forces, energy and friction patches at the bodies' poses and velocities.
-    pub fn evaluate(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+    pub fn evaluate(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
         self.contacts.clear();
         self.patches.clear();
         self.wrench = Default::default();
         (self.energy, self.depth) = (0.0, 0.0);
         self.find(bodies, surfaces, walls);
+        self.find_edges(bodies, surfaces, walls, spacing);
         if !self.contacts.is_empty() {
             self.press();
             self.sum(bodies);
@@ -274,10 +315,88 @@ impl Pair {
         }
     }
 
+    /// Nodes of the edges inside the other solid, after the points.
+    fn find_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
+        let (edges_a, edges_b) = (std::mem::take(&mut self.edges_a), std::mem::take(&mut self.edges_b));
+        let a = &bodies[self.a];
+        let own = Frame { center: a.pose.position, axes: a.rotation, half: a.half };
+        let (other, faces, share) = match self.b {
+            Other::Solid(b) => {
+                let (b, surface) = (&bodies[b], &surfaces[b]);
+                let frame = Frame { center: b.pose.position, axes: b.rotation, half: b.half };
+                (frame, surface.all_faces, 0.5)
+            }
+            Other::Wall(w) => {
+                let wall = &walls[w];
+                (Frame { center: wall.center, axes: wall.axes, half: wall.half }, wall.faces, 1.0)
+            }
+        };
+        // the end of an upright edge adds nothing to a face: what is a millionth of the sum is left out
+        let eighths: f64 = self.contacts.iter().map(|c| c.weight * c.depth.powi(8)).sum();
+        let least = 1e-6 * eighths;
+        let view = View::new(own, other, faces, least);
+        for &k in &edges_a {
+            let line = surfaces[self.a].edges[k as usize];
+            self.press_edge(line, &view, share * line.density, 1.0, 32 + k as u8, bodies);
+        }
+        let all = surfaces[self.a].all_faces;
+        match self.b {
+            Other::Solid(b) => {
+                let view = View::new(other, own, all, least);
+                for &k in &edges_b {
+                    let line = surfaces[b].edges[k as usize];
+                    self.press_edge(line, &view, share * line.density, -1.0, 64 + k as u8, bodies);
+                }
+            }
+            Other::Wall(w) => {
+                let world = Frame { center: DVec3::ZERO, axes: DMat3::IDENTITY, half: DVec3::ZERO };
+                let view = View::new(world, own, all, least);
+                let density = surfaces[self.a].smallest_weight / spacing;
+                for &k in &edges_b {
+                    self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, 64 + k as u8, bodies);
+                }
+            }
+        }
+        (self.edges_a, self.edges_b) = (edges_a, edges_b);
+    }
+
+    /// Nodes of one edge inside a box. `sign` turns outward of that box into the direction of the force
+    /// on the pair's first solid.
+    ///
+    /// An edge that lies in a face belongs to the face's patch; one that crosses an edge makes its own,
+    /// so that friction acts across the cross product of both.
+    fn press_edge(&mut self, line: Line, view: &View, density: f64, sign: f64, key: u8, bodies: &[Body]) {
+        let other = &view.other;
+        let start = view.turn * line.start + view.shift;
+        let along = view.turn * line.along;
+        let first = self.contacts.len();
+        let mut push = DVec3::ZERO;
+        let a = &bodies[self.a];
+        let b = self.b.solid().map(|b| &bodies[b]);
+        let least = view.least / density;
+        edges::nodes(start, along, line.length, other.half, view.faces, least, |s, width, inside| {
+            let at = other.center + other.axes * (start + s * along);
+            let normal = sign * (other.axes * inside.outward);
+            let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
+            let speed = (a.pose.velocity_at(at) - velocity_b).dot(normal);
+            push += width * inside.depth.powi(7) * inside.outward;
+            let (depth, weight) = (inside.depth, density * width);
+            self.contacts.push(Contact { at, normal, depth, weight, speed, force: 0.0, patch: key });
+        });
+        let toward = push.abs();
+        let axis = toward.max_position();
+        if toward[axis] > ALONG_NORMAL * push.length() {
+            let face = 2 * axis as u8 + u8::from(push[axis] > 0.0);
+            let patch = if sign > 0.0 { face } else { 8 + face };
+            self.contacts[first..].iter_mut().for_each(|c| c.patch = patch);
+        }
+    }
+
     /// Normal forces of the points: the pair's spring and dashpot, no tension.
     ///
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
-    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i.
+    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i. The second spring
+    /// brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
     fn press(&mut self) {
         let k = self.constants;
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
@@ -294,11 +413,13 @@ impl Pair {
             c.weight * (x * x) * (x * x) * (x * x)
         };
         let shares: f64 = self.contacts.iter().map(share).sum();
-        let damping = k.damping * (secant / k.spring).sqrt() / shares.sqrt();
+        let stop = (k.stop / k.spring).sqrt() - 1.0;
         for c in &mut self.contacts {
             let share = share(c);
-            let felt = if c.speed < 0.0 { felt(c.depth / -c.speed / k.step) } else { 1.0 };
-            c.force = (share * (secant * c.depth - felt * damping * c.speed)).max(0.0);
+            let since = |depth: f64| if c.speed < 0.0 { felt(depth / -c.speed / k.step) } else { 1.0 };
+            let stopping = if beyond > 0.0 { stop * since(beyond) } else { 0.0 };
+            let damping = k.damping / shares.sqrt() * (since(c.depth) + stopping);
+            c.force = (share * (secant * c.depth - damping * c.speed)).max(0.0);
         }
     }
 

@@ -2,7 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, compare, dry_studies, gallery, needs, pressure_size, pressure_solve, stability, work_precision,
+    Study, compare, dry_studies, gallery, needs, pressure_size, pressure_solve, stability, wall_of_cubes,
+    work_precision,
 };
 use crate::error::{Error, Result};
 
@@ -93,6 +94,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "spring-static",
         about: "section 4.1: amplitude of a resting cube against K",
         make: Maker::Function(dry_studies::spring_static),
+    },
+    Entry {
+        name: "wall-of-cubes",
+        about: "100 cubes hit by a heavy one: overlap during the hit and at rest against K",
+        make: Maker::Function(wall_of_cubes::study),
     },
     Entry {
         name: "spring-drop",
