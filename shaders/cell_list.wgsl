@@ -98,41 +98,47 @@ fn exclusive_scan(value: u32, t: u32) -> vec2u {
     return vec2u(before + lane[t], total);
 }
 
+fn blocks() -> u32 {
+    return (keys() + 4u * WORKGROUP - 1u) / (4u * WORKGROUP);
+}
+
 // Scan within blocks of four keys a thread.
 @compute @workgroup_size(WORKGROUP)
-fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let first = (group.x * WORKGROUP + t) * 4u;
-    var before: vec4u;
-    var sum = 0u;
-    for (var k = 0u; k < 4u; k++) {
-        before[k] = sum;
-        if first + k < keys() {
-            sum += atomicLoad(&cell_count[first + k]);
+fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
+               @builtin(num_workgroups) groups: vec3u) {
+    for (var block = group.x; block < blocks(); block += groups.x) {
+        let first = (block * WORKGROUP + t) * 4u;
+        var before: vec4u;
+        var sum = 0u;
+        for (var k = 0u; k < 4u; k++) {
+            before[k] = sum;
+            if first + k < keys() {
+                sum += atomicLoad(&cell_count[first + k]);
+            }
         }
-    }
-    let scan = exclusive_scan(sum, t);
-    for (var k = 0u; k < 4u; k++) {
-        if first + k < keys() {
-            cell_start[first + k] = scan.x + before[k];
+        let scan = exclusive_scan(sum, t);
+        for (var k = 0u; k < 4u; k++) {
+            if first + k < keys() {
+                cell_start[first + k] = scan.x + before[k];
+            }
         }
-    }
-    if t == 0u {
-        block_sum[group.x] = scan.y;
+        if t == 0u {
+            block_sum[block] = scan.y;
+        }
     }
 }
 
 // One workgroup scans the sums of the blocks.
 @compute @workgroup_size(WORKGROUP)
 fn scan_sums(@builtin(local_invocation_index) t: u32) {
-    let blocks = (keys() + 4u * WORKGROUP - 1u) / (4u * WORKGROUP);
     var carry = 0u;
-    for (var first = 0u; first < blocks; first += WORKGROUP) {
+    for (var first = 0u; first < blocks(); first += WORKGROUP) {
         var value = 0u;
-        if first + t < blocks {
+        if first + t < blocks() {
             value = block_sum[first + t];
         }
         let scan = exclusive_scan(value, t);
-        if first + t < blocks {
+        if first + t < blocks() {
             block_sum[first + t] = carry + scan.x;
         }
         carry += scan.y;
@@ -140,11 +146,14 @@ fn scan_sums(@builtin(local_invocation_index) t: u32) {
 }
 
 @compute @workgroup_size(WORKGROUP)
-fn scan_add(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let first = (group.x * WORKGROUP + t) * 4u;
-    for (var k = 0u; k < 4u; k++) {
-        if first + k < keys() {
-            cell_start[first + k] += block_sum[group.x];
+fn scan_add(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
+            @builtin(num_workgroups) groups: vec3u) {
+    for (var block = group.x; block < blocks(); block += groups.x) {
+        let first = (block * WORKGROUP + t) * 4u;
+        for (var k = 0u; k < 4u; k++) {
+            if first + k < keys() {
+                cell_start[first + k] += block_sum[block];
+            }
         }
     }
     if group.x == 0u && t == 0u {

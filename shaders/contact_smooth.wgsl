@@ -3,6 +3,9 @@
 //   D = (sum_i w_i d_i^8)^(1/8),  f_i = s_i (K d_i - C v_i) >= 0,  s_i = w_i (d_i / D)^6.
 // Twin: src/contact/smooth.rs
 //
+// Edges are integrated on the host. What they bring to a face is taken in as more points; where two edges cross, only
+// into D and the sum of shares.
+//
 // One workgroup a pair. All in the frame of the pair's first solid A. The clearance of a point to a face is affine in
 // the point. The host gives it in f64 where it is largest: at a corner of the bounding box of the points; from there
 // every term only takes away. What is in contact has lost less than it keeps or little more, so a depth comes out to
@@ -29,10 +32,10 @@ struct SmoothPair {
     near: vec2u,  // of them listed
     faces: vec2u, // of B's box, of A's box
     list: u32,    // place of the lists
-    state: u32,   // place of the listed points' states
     sum: u32,     // place of the results
     share: f32,   // of a point's weight
     skin: f32,
+    open: u32, // faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's
     pad: array<u32, 3>,
 }
 
@@ -48,8 +51,10 @@ struct SmoothPose {
     above_b: vec4f,
     below_a: vec4f,
     above_a: vec4f,
-    // Contacts that the host has found: their deepest depth d, sums of w (d_i / d)^8 and of w (d_i / d)^6.
+    // Crossings of edges, which the host keeps: their deepest depth d, sums of w (d_i / d)^8 and of w (d_i / d)^6.
     found: vec4f,
+    // Contacts that the host has found on faces: first and count in `contact_given`; z: place of the states.
+    given: vec4u,
 }
 
 @group(0) @binding(2) var<storage, read> contact_point: array<vec4f>; // xyz in the solid's frame, w weight
@@ -57,8 +62,10 @@ struct SmoothPose {
 @group(0) @binding(4) var<storage, read> smooth_pose: array<SmoothPose>;
 @group(0) @binding(5) var<storage, read_write> contact_list: array<u32>;
 @group(0) @binding(6) var<storage, read_write> contact_count: array<vec2u>;
+// Of a contact: normal, depth; arm from A's centre, separating speed; weight, face (as in `open`), force.
 @group(0) @binding(7) var<storage, read_write> contact_state: array<vec4f>;
 @group(0) @binding(8) var<storage, read_write> contact_sum: array<vec4f>;
+@group(0) @binding(9) var<storage, read> contact_given: array<vec4f>; // as contact_state
 
 // Clearances of a point to the lower and upper faces of a box.
 struct Clearance {
@@ -202,9 +209,11 @@ fn inside(c: Clearance, faces: u32) -> Inside {
     return blended(blended(first, second), third);
 }
 
-// Share of the dashpot that a point feels which entered `steps` sub-steps ago; as `felt` in src/contact/smooth.rs.
-fn felt(steps: f32) -> f32 {
-    return select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0);
+// Share of a dashpot that a point feels which has come `depth` since it began, in sub-steps of `step`; as `felt` in
+// src/contact/smooth.rs.
+fn felt(depth: f32, speed: f32, step: f32) -> f32 {
+    let steps = depth / max(-speed * step, 1e-30);
+    return select(1.0, select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0), speed < 0.0);
 }
 
 // Threads that share the sums of a face at most.
@@ -216,24 +225,36 @@ var<workgroup> part_z: array<vec4f, GROUP>;
 var<workgroup> used_faces: array<u32, GROUP>;
 var<workgroup> seen: vec2u;
 
-// Result of a pair, zeros if none of its points touches: D, the deepest depth, points in contact, sum of shares. Then of each face of B, and of A, that listed
-// points may press: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
+// Result of a pair, zeros if nothing touches but crossings: D, the deepest depth, contacts without crossings, sum of
+// shares. Then of each face of B, and of A, that is open: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
 // of the force; that centre, seen from A's.
 @compute @workgroup_size(GROUP)
 fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
     let n = group.x;
     let list = smooth_pair[n].list;
     let near = smooth_pair[n].near;
-    let total = near.x + near.y;
+    let points = near.x + near.y;
+    let given = smooth_pose[n].given;
+    let total = points + given.y;
     let faces = smooth_pair[n].faces;
     let rows = mat3x3f(smooth_pose[n].row_x.xyz, smooth_pose[n].row_y.xyz, smooth_pose[n].row_z.xyz);
     let velocity = vec3f(smooth_pose[n].row_x.w, smooth_pose[n].row_y.w, smooth_pose[n].row_z.w);
     let spin = smooth_pose[n].spin.xyz;
     let sum = smooth_pair[n].sum;
-    let state = smooth_pair[n].state;
+    let state = given.z;
     var own_deepest = 0.0;
     var own_used = 0u;
     for (var m = t; m < total; m += GROUP) {
+        if m >= points {
+            let read_at = 3u * (given.x + m - points);
+            let place = state + 3u * m;
+            contact_state[place] = contact_given[read_at];
+            contact_state[place + 1u] = contact_given[read_at + 1u];
+            contact_state[place + 2u] = contact_given[read_at + 2u];
+            own_deepest = max(own_deepest, contact_given[read_at].w);
+            own_used |= 1u << u32(contact_given[read_at + 2u].y);
+            continue;
+        }
         let side = u32(m >= near.x);
         let k = contact_list[list + select(m, smooth_pair[n].count.x + m - near.x, side == 1u)];
         let p = contact_point[k];
@@ -279,8 +300,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let deepest = max(bitcast<f32>(both.x), added.x);
     let used = both.y;
 
-    // Faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's.
-    let open = select(0u, faces.x, near.x > 0u) | (select(0u, faces.y, near.y > 0u) << 6u);
+    let open = smooth_pair[n].open;
     for (var k = t; k < 1u + 3u * countOneBits(open); k += GROUP) {
         contact_sum[sum + k] = vec4f(0.0);
     }
@@ -325,7 +345,10 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let spring = smooth_pair[n].spring;
     let beyond = max(depth - smooth_pair[n].stop_depth, 0.0);
     let secant = spring + (smooth_pair[n].stop - spring) * beyond / depth;
-    let damping = smooth_pair[n].damping * sqrt(secant / (spring * shares));
+    let damping = smooth_pair[n].damping / sqrt(shares);
+    let step = smooth_pair[n].step;
+    // The second spring's dashpot.
+    let stopping = select(0.0, sqrt(smooth_pair[n].stop / spring) - 1.0, beyond > 0.0);
     for (var m = t; m < total; m += GROUP) {
         let place = state + 3u * m;
         let own = contact_state[place].w;
@@ -334,7 +357,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         if own > 0.0 {
             let x = own / deepest;
             let share = contact_state[place + 2u].x * x * x * x * x * x * x * to_mean;
-            let part = select(1.0, felt(own / max(-speed * smooth_pair[n].step, 1e-30)), speed < 0.0);
+            let part = felt(own, speed, step) + stopping * felt(beyond, speed, step);
             f = max(share * (secant * own - part * damping * speed), 0.0);
         }
         contact_state[place + 2u].z = f;

@@ -67,6 +67,23 @@ struct Listed {
     count: vec3u,
 }
 
+//#if STATIC
+// Whether there is fluid within one cell: walls elsewhere have no row, and so no unknown.
+fn near_fluid(cell: u32) -> bool {
+    let c = coordinates_of(0u, cell);
+    let low = max(c, vec3u(1u)) - 1u;
+    let high = min(c + 1u, params.cells - 1u);
+    for (var x = low.x; x <= high.x; x++) {
+        for (var y = low.y; y <= high.y; y++) {
+            if cell_start[cell_index(vec3u(x, y, low.z))] < cell_start[cell_index(vec3u(x, y, high.z)) + 1u] {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+//#endif
 fn listed(cell: u32) -> Listed {
     var out: Listed;
     out.first.x = cell_start[cell];
@@ -79,6 +96,9 @@ fn listed(cell: u32) -> Listed {
 //#if STATIC
     out.first.z = static_start[cell];
     out.count.z = static_start[cell + 1u] - out.first.z;
+    if out.count.z > 0u && !near_fluid(cell) {
+        out.count.z = 0u;
+    }
 //#endif
     return out;
 }
@@ -168,39 +188,45 @@ fn brings(cell: u32) -> vec2u {
     return vec2u(u32(mark != 0u), mark & ~ABOVE);
 }
 
+fn blocks() -> u32 {
+    return (hierarchy.cells + 4u * WORKGROUP - 1u) / (4u * WORKGROUP);
+}
+
 // Scan within blocks of four cells a thread.
 @compute @workgroup_size(WORKGROUP)
-fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let first = (group.x * WORKGROUP + t) * 4u;
-    var sum = vec2u(0u);
-    for (var k = 0u; k < 4u; k++) {
-        sum += brings(first + k);
-    }
-    let scan = exclusive_scan(sum, t);
-    var before = scan.xy;
-    for (var k = 0u; k < 4u; k++) {
-        if first + k < hierarchy.cells {
-            cell_row[first + k] = before;
+fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
+               @builtin(num_workgroups) groups: vec3u) {
+    for (var block = group.x; block < blocks(); block += groups.x) {
+        let first = (block * WORKGROUP + t) * 4u;
+        var sum = vec2u(0u);
+        for (var k = 0u; k < 4u; k++) {
+            sum += brings(first + k);
         }
-        before += brings(first + k);
-    }
-    if t == 0u {
-        row_block[group.x] = scan.zw;
+        let scan = exclusive_scan(sum, t);
+        var before = scan.xy;
+        for (var k = 0u; k < 4u; k++) {
+            if first + k < hierarchy.cells {
+                cell_row[first + k] = before;
+            }
+            before += brings(first + k);
+        }
+        if t == 0u {
+            row_block[block] = scan.zw;
+        }
     }
 }
 
 // One workgroup scans the sums of the blocks.
 @compute @workgroup_size(WORKGROUP)
 fn scan_sums(@builtin(local_invocation_index) t: u32) {
-    let blocks = (hierarchy.cells + 4u * WORKGROUP - 1u) / (4u * WORKGROUP);
     var carry = vec2u(0u);
-    for (var first = 0u; first < blocks; first += WORKGROUP) {
+    for (var first = 0u; first < blocks(); first += WORKGROUP) {
         var value = vec2u(0u);
-        if first + t < blocks {
+        if first + t < blocks() {
             value = row_block[first + t];
         }
         let scan = exclusive_scan(value, t);
-        if first + t < blocks {
+        if first + t < blocks() {
             row_block[first + t] = carry + scan.xy;
         }
         carry += scan.zw;
@@ -210,27 +236,33 @@ fn scan_sums(@builtin(local_invocation_index) t: u32) {
     }
 }
 
+fn number_row(cell: u32, before: vec2u) {
+    let number = cell_row[cell] + before;
+    let own = brings(cell);
+    // The level that the cell belongs to: levels lie coarsest first.
+    var level = 0u;
+    while cell < hierarchy.level[level].w {
+        level++;
+    }
+    if cell == hierarchy.level[level].w {
+        row_cell[hierarchy.capacity + 1u + level].x = min(number.x, hierarchy.capacity);
+    }
+    let used = own.x > 0u && number.x < hierarchy.capacity;
+    cell_row[cell] = vec2u(select(0u, number.x + 1u, used), number.y);
+    if used {
+        row_cell[number.x] = vec4u(cell - hierarchy.level[level].w, 0u, number.y, number.y + own.y);
+    }
+}
+
 @compute @workgroup_size(WORKGROUP)
-fn number_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    for (var k = 0u; k < 4u; k++) {
-        let cell = (group.x * WORKGROUP + t) * 4u + k;
-        if cell >= hierarchy.cells {
-            return;
-        }
-        let number = cell_row[cell] + row_block[group.x];
-        let own = brings(cell);
-        // The level that the cell belongs to: levels lie coarsest first.
-        var level = 0u;
-        while cell < hierarchy.level[level].w {
-            level++;
-        }
-        if cell == hierarchy.level[level].w {
-            row_cell[hierarchy.capacity + 1u + level].x = min(number.x, hierarchy.capacity);
-        }
-        let used = own.x > 0u && number.x < hierarchy.capacity;
-        cell_row[cell] = vec2u(select(0u, number.x + 1u, used), number.y);
-        if used {
-            row_cell[number.x] = vec4u(cell - hierarchy.level[level].w, 0u, number.y, number.y + own.y);
+fn number_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
+               @builtin(num_workgroups) groups: vec3u) {
+    for (var block = group.x; block < blocks(); block += groups.x) {
+        for (var k = 0u; k < 4u; k++) {
+            let cell = (block * WORKGROUP + t) * 4u + k;
+            if cell < hierarchy.cells {
+                number_row(cell, row_block[block]);
+            }
         }
     }
 }

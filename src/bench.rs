@@ -3,7 +3,8 @@
 //! Timings of different machines do not compare; what compares is the fraction of the memory floor, which is
 //! measured in the same process, and the counts of bytes, dispatches and iterations.
 
-use crate::backend::Backend;
+use crate::backend::traffic::Solve;
+use crate::backend::{Backend, Commands, Timing};
 use crate::case::Case;
 use crate::error::Result;
 use crate::params::Params;
@@ -30,6 +31,68 @@ pub struct StageRow {
     pub bytes: u64,
     /// Time that the bytes take at the measured bandwidth over the time it took [-].
     pub floor_fraction: f64,
+    /// Kernels started a step; 0 on the CPU.
+    pub dispatches: f64,
+}
+
+/// What was asked of a device, a step.
+struct Asked {
+    dispatches: f64,
+    submits: f64,
+    waits: f64,
+    by_stage: BTreeMap<Stage, f64>,
+}
+
+impl Asked {
+    fn of(now: &Commands, before: &Commands, steps: u64) -> Self {
+        let per_step = |now: u64, before: u64| (now - before) as f64 / steps.max(1) as f64;
+        let stage = |(&stage, &count): (&Stage, &u64)| {
+            (stage, per_step(count, before.by_stage.get(&stage).copied().unwrap_or(0)))
+        };
+        Self {
+            dispatches: per_step(now.dispatches, before.dispatches),
+            submits: per_step(now.submits, before.submits),
+            waits: per_step(now.waits, before.waits),
+            by_stage: now.by_stage.iter().map(stage).collect(),
+        }
+    }
+}
+
+/// Time of a step on an assumed device, from counts alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Implied {
+    /// Assumed bandwidth of a data-centre GPU's memory in use [bytes/s].
+    pub assumed_bandwidth: f64,
+    /// Assumed time of a dispatch, start and barrier [s].
+    pub assumed_seconds_per_dispatch: f64,
+    /// Counted bytes a step.
+    pub bytes: u64,
+    /// Time of a step [s]: bytes over bandwidth and dispatches, one after the other.
+    pub seconds_per_step: f64,
+    /// Of it the pressure solver [s].
+    pub pressure_seconds: f64,
+}
+
+impl Implied {
+    /// Three quarters of what the data sheet of an H200 promises.
+    const BANDWIDTH: f64 = 3.5e12;
+    /// Generous: 2 to 3 microseconds are usual.
+    const PER_DISPATCH: f64 = 5e-6;
+
+    /// Of `stages`, and dispatches that belong to none.
+    fn of(stages: &[StageRow], dispatches: f64) -> Self {
+        let seconds =
+            |bytes: u64, dispatches: f64| bytes as f64 / Self::BANDWIDTH + dispatches * Self::PER_DISPATCH;
+        let bytes = stages.iter().map(|s| s.bytes).sum();
+        let solver = stages.iter().filter(|s| s.stage == Stage::ConjugateGradient.name());
+        Self {
+            assumed_bandwidth: Self::BANDWIDTH,
+            assumed_seconds_per_dispatch: Self::PER_DISPATCH,
+            bytes,
+            seconds_per_step: seconds(bytes, dispatches),
+            pressure_seconds: solver.map(|s| seconds(s.bytes, s.dispatches)).sum(),
+        }
+    }
 }
 
 /// One spacing on one backend.
@@ -49,6 +112,8 @@ pub struct Row {
     pub unknowns: usize,
     /// Neighbour pairs listed.
     pub pairs: u64,
+    /// Simulated time at which the warm-up began [s].
+    pub from: f64,
     /// Steps timed, after the warm-up.
     pub steps: u64,
     /// Mean time a step [s], with no wait between stages.
@@ -73,9 +138,21 @@ pub struct Row {
     pub bytes_held: u64,
     /// Most memory that the process has held so far [bytes], where the system tells.
     pub peak_memory: Option<u64>,
+    /// How the times of the stages came about.
+    pub timing: Timing,
     /// Kernels started a step; 0 on the CPU.
     pub dispatches: f64,
-    /// By stage, each waited for.
+    /// Hand-overs of recorded work to the device a step.
+    pub submits: f64,
+    /// Times a step that the host waited for the device.
+    pub waits: f64,
+    /// Slots that carry pressure, and those of them that have neighbours: the rest are dry walls.
+    pub slots: [u64; 2],
+    /// Counted work of the solver.
+    pub solve: Solve,
+    /// What the counts amount to on an assumed device; nothing for the CPU.
+    pub implied: Option<Implied>,
+    /// By stage.
     pub stages: Vec<StageRow>,
 }
 
@@ -101,38 +178,68 @@ pub fn peak_memory() -> Option<u64> {
 /// Steps before the clock runs.
 const WARM_UP: u64 = 3;
 
-/// Time `steps` steps of `case` from its start.
-pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
+/// Time `steps` steps of `case` once it has reached `from` [s] of simulated time.
+///
+/// # Errors
+/// What keeps the case from starting or ends its run.
+pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
     let scene = Scene::build(case)?;
     let mut sim = Simulation::new(case, &scene, make)?;
-    sim.time_stages = false;
+    let timing = sim.backend.timing();
+    while sim.time < from {
+        sim.step()?;
+    }
+    let started = sim.time;
     let mut times = Vec::new();
     let (mut iterations, mut last) = (0.0, PressureReport::default());
+    let (mut commands, mut stages) = (Commands::default(), BTreeMap::new());
     for k in 0..WARM_UP + steps {
+        if k == WARM_UP {
+            sim.observe()?;
+            (commands, stages) = (sim.backend.commands(), sim.stages.clone());
+        }
         let start = Instant::now();
         last = sim.step()?.pressure;
-        sim.backend.wait()?;
         if k >= WARM_UP {
             times.push(start.elapsed().as_secs_f64());
             iterations += f64::from(last.iterations);
         }
     }
-    let monitor = sim.backend.monitor()?;
-    // The stages by themselves, each waited for.
-    sim.time_stages = true;
-    sim.stages.clear();
-    let staged = (steps / 4).max(2);
-    let before = sim.backend.dispatches();
-    for _ in 0..staged {
-        last = sim.step()?.pressure;
+    // What the last step left to the device is waited for here.
+    let start = Instant::now();
+    sim.backend.wait()?;
+    if let Some(time) = times.last_mut() {
+        *time += start.elapsed().as_secs_f64();
     }
-    let dispatches = (sim.backend.dispatches() - before) as f64 / staged as f64;
-    let sizes = sim.backend.sizes()?;
-    let per_step: BTreeMap<Stage, f64> = sim.stages.iter().map(|(&s, t)| (s, t / staged as f64)).collect();
-    let stages = per_step.iter().map(|(&stage, &seconds)| {
-        let bytes = sizes.bytes(stage, &last);
-        StageRow { stage: stage.name(), seconds, bytes, floor_fraction: bytes as f64 / bandwidth / seconds }
-    });
+    let device = Asked::of(&sim.backend.commands(), &commands, steps);
+    let (monitor, _) = sim.observe()?;
+    let mut staged = steps;
+    if timing == Timing::Waits {
+        // The stages by themselves, each waited for.
+        sim.wait_for_stages = true;
+        stages = sim.stages.clone();
+        staged = (steps / 4).max(2);
+        for _ in 0..staged {
+            last = sim.step()?.pressure;
+        }
+    }
+    let per_step = |stage: Stage| {
+        let seconds = sim.stages.get(&stage)? - stages.get(&stage).unwrap_or(&0.0);
+        Some((stage, seconds / staged as f64))
+    };
+    let per_step: Vec<(Stage, f64)> = Stage::ALL.into_iter().filter_map(per_step).collect();
+    let traffic = sim.backend.traffic()?;
+    let iterations = iterations / steps.max(1) as f64;
+    let stages: Vec<StageRow> = per_step
+        .into_iter()
+        .map(|(stage, seconds)| {
+            let bytes = traffic.bytes(stage, iterations);
+            let dispatches = device.by_stage.get(&stage).copied().unwrap_or(0.0);
+            let floor_fraction = if seconds > 0.0 { bytes as f64 / bandwidth / seconds } else { 0.0 };
+            StageRow { stage: stage.name(), seconds, bytes, floor_fraction, dispatches }
+        })
+        .collect();
+    let implied = (timing != Timing::Host).then(|| Implied::of(&stages, device.dispatches));
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
     times.sort_by(f64::total_cmp);
     let quartile = |q: f64| times.get((q * times.len() as f64) as usize).copied().unwrap_or(mean);
@@ -144,28 +251,53 @@ pub fn measure(case: &Case, steps: u64, bandwidth: f64, make: &Make) -> Result<R
         particles: total,
         fluid: scene.groups.fluid,
         unknowns: last.unknowns,
-        pairs: sizes.pairs,
+        pairs: traffic.pairs,
+        from: started,
         steps,
         seconds_per_step: mean,
         quartiles: [quartile(0.25), quartile(0.75)],
         particles_per_second: total as f64 / mean,
         preconditioner: sim.plan.preconditioner_name(),
         tolerance: sim.settings().tolerance,
-        iterations: iterations / steps.max(1) as f64,
+        iterations,
         density_error_max: monitor.density_error_max,
         density_error_mean: monitor.density_error_mean,
         bandwidth,
         bytes_held: sim.backend.bytes(),
         peak_memory: peak_memory(),
-        dispatches,
-        stages: stages.collect(),
+        timing,
+        dispatches: device.dispatches,
+        submits: device.submits,
+        waits: device.waits,
+        slots: [traffic.slots, traffic.rows],
+        solve: traffic.solve,
+        implied,
+        stages,
     })
 }
 
-/// Exponent e of time ~ particles^e, by least squares over `rows`; nothing for fewer than two.
-pub fn exponent(rows: &[&Row]) -> Option<f64> {
+/// How the time of a step grows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Growth {
+    /// Exponent e of time ~ particles^e, all kinds counted. Finer scenes have a larger share of water.
+    pub with_particles: f64,
+    /// Exponent e of time ~ unknowns^e.
+    pub with_unknowns: f64,
+}
+
+impl Growth {
+    /// By least squares over `rows`; nothing for fewer than two sizes.
+    pub fn of(rows: &[Row]) -> Option<Self> {
+        Some(Self {
+            with_particles: exponent(rows, |r| r.particles)?,
+            with_unknowns: exponent(rows, |r| r.unknowns)?,
+        })
+    }
+}
+
+fn exponent(rows: &[Row], size: fn(&Row) -> usize) -> Option<f64> {
     let points: Vec<(f64, f64)> =
-        rows.iter().map(|r| ((r.particles as f64).ln(), r.seconds_per_step.ln())).collect();
+        rows.iter().map(|r| ((size(r) as f64).ln(), r.seconds_per_step.ln())).collect();
     let n = points.len() as f64;
     let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
@@ -185,8 +317,10 @@ mod tests {
             spacing: 1.0,
             particles,
             fluid: 0,
-            unknowns: 0,
+            // Particles to the power 1/2: twice the exponent.
+            unknowns: particles.isqrt(),
             pairs: 0,
+            from: 0.0,
             steps: 1,
             seconds_per_step: 3e-7 * (particles as f64).powf(1.25),
             quartiles: [0.0; 2],
@@ -199,12 +333,18 @@ mod tests {
             bandwidth: 1.0,
             bytes_held: 0,
             peak_memory: None,
+            timing: Timing::Host,
             dispatches: 0.0,
+            submits: 0.0,
+            waits: 0.0,
+            slots: [0; 2],
+            solve: Solve::default(),
+            implied: None,
             stages: Vec::new(),
         };
-        let rows = [row(1000), row(30_000), row(700_000)];
-        let all: Vec<&Row> = rows.iter().collect();
-        assert!((exponent(&all).expect("three points") - 1.25).abs() < 1e-12);
-        assert!(exponent(&all[..1]).is_none());
+        let rows = [row(900), row(40_000), row(810_000)];
+        let growth = Growth::of(&rows).expect("three points");
+        assert!((growth.with_particles - 1.25).abs() < 1e-12 && (growth.with_unknowns - 2.5).abs() < 1e-9);
+        assert!(Growth::of(&rows[..1]).is_none());
     }
 }

@@ -60,6 +60,13 @@ impl Grid {
         (c[0] as usize * self.count[1] as usize + c[1] as usize) * self.count[2] as usize + c[2] as usize
     }
 
+    /// Coordinates of the cell with this number.
+    #[inline(always)]
+    pub fn coordinates_of(&self, cell: usize) -> [u32; 3] {
+        let (y, z) = (self.count[1] as usize, self.count[2] as usize);
+        [(cell / (y * z)) as u32, (cell / z % y) as u32, (cell % z) as u32]
+    }
+
     /// First and last cell (inclusive) of each of the up to nine columns of cells around `c`.
     #[inline(always)]
     pub fn columns(&self, c: [u32; 3]) -> impl Iterator<Item = (usize, usize)> + use<> {

@@ -346,7 +346,6 @@ pub struct Drift {
 /// largest energy at the end, momenta to mass times the root mean square speed, positions to the depth.
 pub fn drift(case: &Case, scene: &Scene, adapter: Option<&str>, steps: u64) -> Result<Drift> {
     let run = |mut simulation: Simulation| -> Result<(Simulation, f64, f64)> {
-        simulation.time_stages = false;
         let start = Instant::now();
         let mut iterations = 0.0;
         for _ in 0..steps {

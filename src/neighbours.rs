@@ -74,6 +74,12 @@ impl Chunk {
         Row { neighbour: &self.neighbour[a..b], weight: self.weight.get(a..b).unwrap_or(&[]) }
     }
 
+    /// Whether no row has a neighbour: dry walls.
+    #[inline(always)]
+    pub fn is_dry(&self) -> bool {
+        self.neighbour.is_empty()
+    }
+
     /// Rows of this chunk.
     pub fn rows(&self) -> usize {
         self.dummies.len()

@@ -1,6 +1,6 @@
 //! A scene in motion: backend, solids and clock. [`Simulation::step`] is in `step.rs`.
 
-use crate::backend::{Backend, Counters};
+use crate::backend::{Backend, Counters, Timing};
 use crate::body::Wrench;
 use crate::case::{Case, ContactDevice, Fluid};
 use crate::contact::{ContactReport, Solids};
@@ -38,8 +38,8 @@ pub struct StepReport {
     pub pressure: PressureReport,
     /// The solids.
     pub contact: ContactReport,
-    /// The fluid, every few steps.
-    pub monitor: Option<FluidMonitor>,
+    /// The fluid and the guards, every few steps.
+    pub look: Option<(FluidMonitor, Counters)>,
 }
 
 /// A scene in motion.
@@ -60,10 +60,11 @@ pub struct Simulation {
     pub time: f64,
     /// Steps done.
     pub steps: u64,
-    /// Wall-clock seconds a stage since the start.
+    /// Seconds a stage since the start: by the host's clock, or by the device's as of the last look. Of a device
+    /// without a clock only what the host computes, unless `wait_for_stages`.
     pub stages: BTreeMap<Stage, f64>,
-    /// Wait for the device after every stage, so that `stages` tells each one's time.
-    pub time_stages: bool,
+    /// Wait for the device after every stage, so that the host's clock tells each one's time.
+    pub wait_for_stages: bool,
     /// Sizes of the particle groups.
     pub groups: Groups,
     speed: f64,
@@ -118,7 +119,7 @@ impl Simulation {
             time: 0.0,
             steps: 0,
             stages: BTreeMap::new(),
-            time_stages: true,
+            wait_for_stages: false,
             speed: 0.0,
         })
     }
@@ -154,11 +155,27 @@ impl Simulation {
     fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         let start = Instant::now();
         let out = work(self);
-        if self.time_stages {
+        if self.wait_for_stages {
             self.backend.wait()?;
         }
-        *self.stages.entry(stage).or_default() += start.elapsed().as_secs_f64();
+        // Contact is the host's own work; where the pairs are on a device, the host waits for them.
+        if self.wait_for_stages || stage == Stage::Contact || self.backend.timing() == Timing::Host {
+            *self.stages.entry(stage).or_default() += start.elapsed().as_secs_f64();
+        }
         out
+    }
+
+    /// Look at the fluid, the guards and the device's clock.
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn observe(&mut self) -> Result<(FluidMonitor, Counters)> {
+        let seen = self.backend.look()?;
+        if !self.wait_for_stages {
+            let of_device = self.backend.stage_seconds().into_iter();
+            self.stages.extend(of_device.filter(|(stage, _)| *stage != Stage::Contact));
+        }
+        Ok(seen)
     }
 
     pub(crate) fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
@@ -237,19 +254,18 @@ impl Simulation {
         Ok(())
     }
 
-    /// Look at the device's counters and at the speed of the flow, every few steps.
-    pub(crate) fn look(&mut self, step: &Step) -> Result<Option<FluidMonitor>> {
+    /// Look at the guards and at the speed of the flow, every few steps.
+    pub(crate) fn look(&mut self, step: &Step) -> Result<Option<(FluidMonitor, Counters)>> {
         if !self.plan.wet() || !self.steps.is_multiple_of(LOOK_EVERY) {
             return Ok(None);
         }
-        let counters = self.backend.counters()?;
+        let (monitor, counters) = self.observe()?;
         self.check(&counters, step)?;
-        let monitor = self.backend.monitor()?;
         self.speed = monitor.speed_most;
         if !monitor.kinetic.is_finite() {
             return Err(self.diverged(step, Stage::Correct, "the kinetic energy is not a number".into()));
         }
-        Ok(Some(monitor))
+        Ok(Some((monitor, counters)))
     }
 
     /// An error if the guards have seen something that ends a run.

@@ -32,7 +32,7 @@ impl Simulation {
         // Solids: fluid force, gravity and contact, Eqs. (10) to (14).
         report.contact = self.advance_solids(&step)?;
 
-        report.monitor = self.look(&step)?;
+        report.look = self.look(&step)?;
         self.time = t + dt;
         self.steps += 1;
         Ok(report)

@@ -132,7 +132,12 @@ const WRONG: &[(&str, &str, &[&str])] = &[
         "damping = 10.0\nrestitution = 0.5",
         &["`damping` and `restitution` exclude each other", "keep one"],
     ),
-    ("damping = 10.0", "viscous_friction = 1.0", &["contact.viscous_friction", "belongs to law = \"paper\""]),
+    ("damping = 10.0", "torque = false", &["contact.torque", "belongs to law = \"paper\""]),
+    (
+        "law = \"smooth\"",
+        "law = \"pressure\"\nviscous_friction = 1.0",
+        &["contact.viscous_friction", "or set one of these laws"],
+    ),
     (
         "law = \"smooth\"",
         "law = \"paper\"\nfriction = 0.3",

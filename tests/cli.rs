@@ -269,6 +269,37 @@ fn plan_tells_what_is_left_out_and_why() {
     }
 }
 
+/// Too many particles to build are estimated from a coarser scene, with the limits that they break.
+#[test]
+fn plan_answers_for_scenes_that_nothing_holds() {
+    let plan = |spacing: &str| {
+        let args = ["plan", "cases/dam_break_transport.toml", "--spacing", spacing, "--json"];
+        let ran = ran(&args);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        json(&ran.out)
+    };
+    let number = |v: &serde_json::Value| v.as_f64().unwrap();
+    let (built, huge) = (plan("0.01"), plan("0.001"));
+    assert!(built["estimated_from_spacing_m"].is_null() && number(&huge["estimated_from_spacing_m"]) > 0.003);
+    // 0.5 x 0.5 x 0.35 m of water.
+    assert!((number(&huge["particles"]["fluid"]) / 8.75e7 - 1.0).abs() < 0.02, "{}", huge["particles"]);
+    let walls = |plan: &serde_json::Value| number(&plan["particles"]["wall"]);
+    assert!((walls(&huge) / walls(&built) / 100.0 - 1.0).abs() < 0.05);
+    let scheme = &huge["scheme"];
+    let excesses = scheme["gpu_forecasts"][0]["excesses"].as_array().unwrap();
+    assert!(excesses.iter().any(|e| e["what"] == "neighbour_list"), "{excesses:?}");
+    // What was built whole keeps all limits, and so does it with ten million particles.
+    let forecasts = built["scheme"]["gpu_forecasts"].as_array().unwrap();
+    assert_eq!(forecasts.len(), 3);
+    assert!(forecasts[0]["excesses"].as_array().unwrap().is_empty());
+    assert!(number(&forecasts[1]["bytes"]) < 24e9);
+    let groups = built["scheme"]["gpu_groups"].as_array().unwrap();
+    assert_eq!(
+        groups.iter().map(|g| number(&g["bytes"])).sum::<f64>(),
+        number(&built["scheme"]["gpu_bytes"])
+    );
+}
+
 /// Without a driver a GPU that is asked for is refused, and `auto` takes the CPU and says so.
 #[cfg(target_os = "linux")]
 #[test]

@@ -9,7 +9,7 @@ use seixo::body::Wrench;
 use seixo::case::{Case, Contact, Law};
 use seixo::contact::{Probe, Solids};
 use seixo::params::Params;
-use seixo::plan::Plan;
+use seixo::plan::{Plan, Stage};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use seixo::study::contact_checks::{DAM_BREAK_CUBE, Random, smooth};
@@ -118,24 +118,25 @@ fn agree(law: Law, bound: f64) {
             assert_eq!(missing, 0);
             assert!(more <= 2.0, "{law:?} {seed}: {more} candidates more");
             assert_eq!(host.touching, device.touching);
-            // Where friction acts.
-            assert_eq!(host.patches.len(), device.patches.len());
+            // Where friction acts. What adds less than a millionth is left out on the host alone.
             let most = host.patches.iter().map(|p| p.force).fold(0.0, f64::max);
-            for h in host.patches.iter().filter(|h| h.force > 1e-3 * most) {
-                let same = device.patches.iter().any(|d| {
-                    h.solids == d.solids
-                        && (h.normal - d.normal).length() < 1e-3
-                        && (h.at - d.at).length() < 1e-5
-                        && (h.force - d.force).abs() < 1e-5 * most
-                        && (h.radius - d.radius).abs() < 1e-5
-                });
-                assert!(same, "{law:?} {seed}: {h:?}");
+            for (these, others) in [(&host.patches, &device.patches), (&device.patches, &host.patches)] {
+                for h in these.iter().filter(|h| h.force > 1e-3 * most) {
+                    let same = others.iter().any(|d| {
+                        h.solids == d.solids
+                            && (h.normal - d.normal).length() < 1e-3
+                            && (h.at - d.at).length() < 1e-5
+                            && (h.force - d.force).abs() < 1e-5 * most
+                            && (h.radius - d.radius).abs() < 1e-5
+                    });
+                    assert!(same, "{law:?} {seed}: {h:?}");
+                }
             }
-            // Points of the step's edges that the host has found for the device.
-            on_edges += host.candidates.iter().filter(|c| c[1] > u64::MAX / 2 && c[2] == 1).count();
+            // Edges of the step, which the host integrates for the device.
+            on_edges += host.candidates.iter().filter(|c| c[1] > u64::MAX / 2 && c[2] == 3).count();
         }
     }
-    assert!(law == Law::Paper || on_edges > 100, "{on_edges} points on edges");
+    assert!(law == Law::Paper || on_edges > 40, "{on_edges} edges of walls");
 }
 
 #[test]
@@ -304,7 +305,7 @@ fn the_plan_leaves_few_points_to_the_host_and_many_to_the_device() {
         assert_eq!(plan.contact.kernel, kernel, "{count} {line}");
         assert!(plan.contact.reason.contains(words), "{}", plan.contact.reason);
         // What is not planned takes nothing.
-        let bytes = gpu::bytes_needed(&scene, &params, &plan).expect("it can be counted");
+        let bytes = gpu::memory(&scene, &params, &plan).expect("it can be counted").total();
         assert_eq!(bytes > 0, kernel.is_some(), "{count} {line}: {bytes} bytes");
         assert_eq!(gpu::shader::kernels(&plan).map(|k| k.0).collect::<Vec<_>>(), Vec::from_iter(kernel));
     }
@@ -328,7 +329,8 @@ fn a_dry_case_runs_with_its_contact_on_the_gpu_and_is_refused_on_the_cpu() {
     for _ in 0..20 {
         simulation.step().expect("it runs");
     }
-    assert!(simulation.backend.dispatches() > 20, "{}", simulation.backend.dispatches());
+    let commands = simulation.backend.commands();
+    assert!(commands.by_stage[&Stage::Contact] > 20, "{commands:?}");
     let force = simulation.solids.contact_wrenches()[1].force.z / (0.5 * 9.806_65);
     assert!(force > 0.1, "the floor carries the cube: {force}");
 }

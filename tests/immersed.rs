@@ -86,6 +86,60 @@ fn a_floating_cube_is_carried_by_its_displacement() {
     assert!((draft - s * 0.1).abs() < 0.003, "draft {draft}");
 }
 
+/// Shallow water, ten layers deep, with or without the cube of section 4.3 in it, four particles to the edge, which
+/// can only heave. Its draft is two layers.
+fn shallow(cube: bool, fluid: &str) -> Case {
+    let cube = if cube {
+        "[contact]\nlaw = \"smooth\"\nspring = 2e4\nrestitution = 0.5\n\
+         [[body]]\nname = \"cube\"\nsize = [0.054, 0.054, 0.054]\ncenter = [0.135, 0.135, 0.135]\n\
+         density = 463.6\ndisplaces_fluid = true\n\
+         locked = ['x', 'y', 'rotation_x', 'rotation_y', 'rotation_z']\n"
+    } else {
+        ""
+    };
+    case(&format!(
+        "[run]\nspacing = 0.0135\ntime_step = 7.5e-4\nend = 2.0\ngravity = [0, 0, -9.806]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.27, 0.27, 0.225]\nopen = [\"z_max\"]\n\
+         [fluid]\nsound_speed = 3\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.27, 0.27, 0.135]\n{cube}"
+    ))
+}
+
+#[test]
+fn still_water_does_not_rock_itself_when_the_gradient_is_corrected_at_the_surface() {
+    let kinetic = |fluid: &str| {
+        let mut sim = simulation(&shallow(false, fluid));
+        let (mut sum, mut count) = (0.0, 0.0);
+        while sim.time < 1.5 {
+            sim.step().expect("water at rest");
+            if sim.time > 1.0 {
+                sum += sim.backend.monitor().expect("water").kinetic;
+                count += 1.0;
+            }
+        }
+        sum / count
+    };
+    let (plain, corrected) = (kinetic(""), kinetic("gradient = \"corrected_surface\""));
+    println!("kinetic energy {plain:.4} J, corrected at the surface {corrected:.4} J");
+    assert!(corrected < 0.55 * plain && corrected < 0.011);
+}
+
+#[test]
+fn a_small_cube_does_not_swing_itself_out_of_the_water() {
+    let mut sim = simulation(&shallow(true, "gradient = \"corrected_surface\""));
+    let mut heights = Vec::new();
+    while sim.time < 1.75 {
+        sim.step().expect("the cube floats");
+        if sim.time > 0.25 {
+            heights.push(sim.solids.poses()[0].position.z);
+        }
+    }
+    let mean = heights.iter().sum::<f64>() / heights.len() as f64;
+    let swing = (heights.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
+    let expected = 0.135 + 0.027 - 0.4636 * 0.054;
+    println!("height {mean:.4} m for {expected:.4}, rms {:.2} mm", 1e3 * swing);
+    assert!((mean - expected).abs() < 0.003 && swing < 3.5e-3, "{mean} {swing}");
+}
+
 #[test]
 fn a_closed_box_full_of_water_keeps_a_finite_pressure() {
     let case = case(

@@ -179,16 +179,16 @@ fn structs_lie_the_same_on_both_sides() {
             near,
             faces,
             list,
-            state,
             sum,
             share,
             skin,
+            open,
             pad,
         }
     );
     same_layout!(
         "contact_smooth",
-        SmoothPose { row_x, row_y, row_z, spin, below_b, above_b, below_a, above_a, found }
+        SmoothPose { row_x, row_y, row_z, spin, below_b, above_b, below_a, above_a, found, given }
     );
     same_layout!("contact_paper", PaperPair { first, count, row, list, candidates, pad });
     same_layout!(

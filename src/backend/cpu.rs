@@ -1,6 +1,7 @@
 //! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
 
-use super::traffic::Sizes;
+use super::rows::{Shared, density_rows, gradient_rows, viscosity_rows};
+use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
@@ -10,8 +11,7 @@ use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::neighbour_list::{Candidates, Coordinates, Search, neighbour_list};
 use crate::kernels::{
-    body_force, collision, correct, monitor, move_solids, number_density, predict, pressure_gradient,
-    pressure_source, viscosity,
+    body_force, collision, correct, monitor, move_solids, predict, pressure_source, viscosity,
 };
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CAPACITY, CHUNK, Chunk, Neighbours};
@@ -20,6 +20,7 @@ use crate::plan::{Plan, Stage};
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
+use crate::row_arrays::RowArrays;
 use crate::scene::{Groups, Kind, Scene, Solid};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -108,20 +109,31 @@ impl Cpu {
     }
 
     fn viscosity(&mut self) {
-        let Self { fields, neighbours, params, groups, .. } = self;
-        let (x, v) = (&fields.position, &fields.velocity);
+        let Self { fields, neighbours, params, groups, live, .. } = self;
         if neighbours.pairs() == 0 {
             return;
         }
-        fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
-            let chunk = &neighbours.chunks[i / CHUNK];
-            *a = viscosity::viscosity(i, chunk.pressure(i % CHUNK), params, x, v);
-        });
-        fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
+        let (position, velocity) = (&fields.position, &fields.velocity);
+        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        fields
+            .acceleration
+            .par_chunks_mut(CHUNK)
+            .zip(&neighbours.chunks)
+            .enumerate()
+            .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
+        let reaction = |arrays: &mut RowArrays, (k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
-            let chunk = &neighbours.chunks[i / CHUNK];
-            *f = viscosity::reaction(i, chunk.pressure(i % CHUNK), params, groups.fluid, x, v);
-        });
+            *f = viscosity::reaction(
+                i,
+                neighbours.pressure(i),
+                params,
+                groups.fluid,
+                position,
+                velocity,
+                arrays,
+            );
+        };
+        fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::default, reaction);
     }
 
     fn predict(&mut self, dt: f64) {
@@ -211,33 +223,12 @@ impl Cpu {
 
     fn number_density(&mut self) {
         let Self { fields, neighbours, params, groups, live, .. } = self;
-        let (position, fluid, live) = (&fields.position, groups.fluid, *live);
-        (
-            &mut neighbours.chunks,
-            fields.number_density.par_chunks_mut(CHUNK),
-            fields.state.par_chunks_mut(CHUNK),
-        )
+        let Fields { position, velocity, number_density, state, .. } = fields;
+        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        (&mut neighbours.chunks, number_density.par_chunks_mut(CHUNK), state.par_chunks_mut(CHUNK))
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (chunk, n, state))| {
-                for k in 0..n.len() {
-                    let i = c * CHUNK + k;
-                    let range = chunk.range(k);
-                    if range.is_empty() {
-                        (n[k], state[k]) = (0.0, if i < live { State::Surface } else { State::Inactive });
-                        continue;
-                    }
-                    number_density::weights(
-                        i,
-                        &chunk.neighbour[range.clone()],
-                        &mut chunk.weight[range],
-                        params,
-                        position,
-                    );
-                    (n[k], state[k]) =
-                        number_density::number_density(i, chunk.all(k), params, fluid, position);
-                }
-            });
+            .for_each(|(c, (chunk, density, state))| density_rows(c * CHUNK, chunk, density, state, on));
     }
 
     fn pressure_source(&mut self, step: &Step) {
@@ -262,22 +253,13 @@ impl Cpu {
     }
 
     fn pressure_gradient(&mut self) {
-        let Self { fields, neighbours, params, live, .. } = self;
-        let (position, pressure, state, live) = (&fields.position, &fields.pressure, &fields.state, *live);
-        fields.acceleration.par_chunks_mut(CHUNK).zip(&neighbours.chunks).enumerate().for_each(
-            |(c, (a, chunk))| {
-                for (k, a) in a.iter_mut().enumerate() {
-                    let i = c * CHUNK + k;
-                    *a = DVec3::ZERO;
-                    if i < live {
-                        let row = chunk.parts(k);
-                        *a = pressure_gradient::pressure_gradient(
-                            i, row, state[i], params, position, pressure,
-                        );
-                    }
-                }
-            },
-        );
+        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
+        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        (acceleration.par_chunks_mut(CHUNK), &neighbours.chunks, state.par_chunks(CHUNK))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(c, (a, chunk, state))| gradient_rows(c * CHUNK, chunk, a, state, pressure, on));
     }
 
     fn correct(&mut self, dt: f64) {
@@ -347,12 +329,13 @@ impl Backend for Cpu {
             None => &mut Jacobi,
         };
         let report = solve(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
-        let mut clamps = 0;
-        for p in &mut fields.pressure {
-            clamps += u64::from(*p > step.pressure_max);
+        let clamp = |p: &mut f64| {
+            let high = *p > step.pressure_max;
             *p = p.clamp(0.0, step.pressure_max);
-        }
-        self.counters.pressure_clamps += clamps;
+            u64::from(high)
+        };
+        let clamps = |p: &mut [f64]| p.iter_mut().map(clamp).sum::<u64>();
+        self.counters.pressure_clamps += fields.pressure.par_chunks_mut(CHUNK).map(clamps).sum::<u64>();
         Ok(report)
     }
 
@@ -418,12 +401,12 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn sizes(&mut self) -> Result<Sizes> {
+    fn traffic(&mut self) -> Result<Traffic> {
         let rows =
             self.neighbours.chunks.iter().flat_map(|c| c.start.windows(2)).filter(|w| w[0] < w[1]).count();
         let carrying = |c: &Chunk| (0..c.rows()).map(|k| c.pressure(k).neighbour.len()).sum::<usize>();
         let pressure_pairs: usize = self.neighbours.chunks.iter().map(carrying).sum();
-        Ok(Sizes {
+        let sizes = Sizes {
             fluid: self.live as u64,
             rows: rows as u64,
             cells: self.grid.total() as u64,
@@ -433,8 +416,9 @@ impl Backend for Cpu {
             number: 8,
             vector: 24,
             weight: 8,
-            preconditioner_weight: self.multigrid.as_ref().map(|_| 4),
-        })
+            multigrid: self.multigrid.as_ref().map(|m| (4, m.stored())),
+        };
+        Ok(sizes.traffic())
     }
 
     fn bytes(&self) -> u64 {

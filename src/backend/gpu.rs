@@ -5,16 +5,23 @@
 //! names is compiled and allocated. Nothing outside this module names wgpu.
 
 mod adapter;
+mod bandwidth;
+mod clock;
 mod context;
+mod exchange;
+pub mod forecast;
 pub mod hierarchy;
 pub mod layout;
 pub mod shader;
 mod solve;
+mod traffic;
 mod transfer;
 
 pub use adapter::{AdapterInfo, adapters};
+pub use bandwidth::bandwidth;
 
-use super::{Backend, Compute, Counters, traffic};
+use super::traffic::Traffic;
+use super::{Backend, Commands, Compute, Counters, Timing};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
 use crate::cells::Grid;
@@ -29,7 +36,10 @@ use crate::scene::{Groups, Scene};
 use context::Context;
 use glam::{DVec3, Vec3};
 use hierarchy::Levels;
-use layout::{Coefficients, Constants, Memory, MonitorSum, Sizes, WORKGROUP, counter};
+use layout::{
+    Coefficients, Constants, Memory, MonitorSum, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, counter,
+};
+use std::collections::BTreeMap;
 
 /// Particles in f32 on a device.
 pub struct Gpu {
@@ -52,16 +62,24 @@ pub struct Gpu {
     last_iterations: u32,
     /// Levels of the multigrid preconditioner, if that is planned.
     levels: Option<Levels>,
+    /// Stages that run.
+    stages: Vec<Stage>,
+}
+
+/// Numbers of things of `scene` on a device.
+///
+/// # Errors
+/// A domain with more cells than can be numbered.
+pub fn sizes(scene: &Scene, params: &Params, plan: &Plan) -> Result<Sizes> {
+    Ok(Sizes::new(scene, params, &grid(params, plan)?))
 }
 
 /// What `scene` takes on a device, without one.
+///
+/// # Errors
+/// As [`sizes`].
 pub fn memory(scene: &Scene, params: &Params, plan: &Plan) -> Result<Memory> {
-    Ok(Memory::new(&Sizes::new(scene, params, &grid(params, plan)?), plan))
-}
-
-/// Bytes that `scene` takes on a device, without one.
-pub fn bytes_needed(scene: &Scene, params: &Params, plan: &Plan) -> Result<u64> {
-    Ok(memory(scene, params, plan)?.total())
+    Ok(Memory::new(&sizes(scene, params, plan)?, plan))
 }
 
 fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
@@ -91,8 +109,12 @@ impl Gpu {
     ) -> Result<Self> {
         let (adapter, info) = adapter::choose(adapter)?;
         let limits = adapter::limits(&memory(scene, params, plan)?, &adapter.limits(), &info.name)?;
-        let descriptor =
-            wgpu::DeviceDescriptor { label: Some("seixo"), required_limits: limits, ..Default::default() };
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("seixo"),
+            required_limits: limits,
+            required_features: adapter.features() & clock::FEATURES,
+            ..Default::default()
+        };
         let device = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| Error::Gpu(format!("{}: {e}", info.name)))?;
         Self::on(device, info, scene, params, plan, settings)
@@ -156,6 +178,7 @@ impl Gpu {
             last_iterations: if plan.preconditioner == Preconditioner::Multigrid { 5 } else { 30 },
             levels: (plan.wet() && plan.preconditioner == Preconditioner::Multigrid)
                 .then(|| Levels::new(&sizes)),
+            stages: Stage::ALL.into_iter().filter(|&s| plan.has(s)).collect(),
         };
         if gpu.wet {
             let constants = Constants::new(params, &groups, &gpu.grid, &gpu.settings, &gpu.sizes);
@@ -167,6 +190,11 @@ impl Gpu {
             gpu.write_solids(scene)?;
         }
         Ok(gpu)
+    }
+
+    /// Bytes that the driver's allocator has given out for this device, where it tells.
+    pub fn allocated(&self) -> Option<u64> {
+        self.context.allocated()
     }
 
     /// What never changes about moving solids.
@@ -222,7 +250,8 @@ impl Gpu {
 
     fn cell_list(&mut self) -> Result<()> {
         let Sizes { fluid, moving, .. } = self.sizes;
-        let (particles, blocks) = (groups(fluid + moving), self.sizes.keys().div_ceil(4 * WORKGROUP));
+        let particles = groups(fluid + moving);
+        let blocks = self.sizes.keys().div_ceil(SCAN_BLOCK).min(SCAN_GROUPS_MAX);
         self.context.clear("cell_count")?;
         self.context.pass([
             ("cell_list.count", particles),
@@ -235,6 +264,56 @@ impl Gpu {
         self.context.copy(("sorted", 0), "position", 16 * fluid)?;
         self.context.copy(("sorted", 16 * fluid), "velocity", 16 * fluid)?;
         self.context.copy(("sorted", 32 * fluid), "pressure", 4 * fluid)
+    }
+
+    /// Take in the counters that were read; the device counts from zero again, so that 32 bits last for any run.
+    fn take_counters(&mut self, seen: &[u32]) -> Result<Counters> {
+        let c = &mut self.counters;
+        c.lost += u64::from(seen[counter::LOST]);
+        c.displacement_clamps += u64::from(seen[counter::DISPLACEMENT_CLAMPS]);
+        c.pressure_clamps += u64::from(seen[counter::PRESSURE_CLAMPS]);
+        c.neighbours_max = c.neighbours_max.max(seen[counter::NEIGHBOURS_MAX]);
+        let first = |k: usize| Some(seen[k]).filter(|&n| n != u32::MAX);
+        c.non_finite = c.non_finite.or(first(counter::NON_FINITE));
+        c.overflow = c.overflow.or(first(counter::OVERFLOW).map(|slot| (slot, c.neighbours_max)));
+        let out = c.clone();
+        if seen[..counter::NEIGHBOURS_MAX].iter().any(|&n| n > 0) {
+            let mut reset = seen.to_vec();
+            reset[..counter::NEIGHBOURS_MAX].fill(0);
+            self.context.upload("counters", &reset)?;
+        }
+        Ok(out)
+    }
+
+    /// The workgroups' sums and the histogram, put together in f64.
+    fn finish_monitor(&self, sums: &[MonitorSum], bins: &[u32]) -> FluidMonitor {
+        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let mass = self.params.particle_mass();
+        let mut out = FluidMonitor::default();
+        let (mut momentum, mut position, mut extent) = (DVec3::ZERO, DVec3::ZERO, DVec3::MIN);
+        for s in sums {
+            out.particles += u64::from(s.particles);
+            out.kinetic += mass * f64::from(s.kinetic);
+            momentum += mass * vector(s.momentum);
+            position += vector(s.position);
+            out.speed_max = out.speed_max.max(f64::from(s.speed_squared_max).sqrt());
+            extent = extent.max(vector(s.extent_max));
+            out.density_error_mean += f64::from(s.density_error);
+            out.density_error_max = out.density_error_max.max(f64::from(s.density_error_max));
+            out.inner += u64::from(s.inner);
+        }
+        let count = out.particles as f64;
+        position += count * self.middle;
+        out.potential = -mass * self.params.gravity.dot(position);
+        out.momentum = momentum.to_array();
+        out.centroid = (position / count.max(1.0)).to_array();
+        out.extent_max = if out.particles > 0 { (extent + self.middle).to_array() } else { [0.0; 3] };
+        out.density_error_mean /= out.inner.max(1) as f64;
+        let per_bin = speed_range(&self.params, self.dt) / SPEED_BINS as f64;
+        let mut histogram = [0_u64; SPEED_BINS];
+        histogram.iter_mut().zip(bins).for_each(|(h, &b)| *h = u64::from(b));
+        out.speed_most = speed_most(&histogram, out.particles, per_bin);
+        out
     }
 }
 
@@ -254,6 +333,7 @@ impl Backend for Gpu {
     }
 
     fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
+        self.context.begin(Some(stage));
         self.set_step(step)?;
         let (fluid, rows) = (groups(self.sizes.fluid), groups(self.sizes.pressure));
         let felt = if self.context.has("reaction") { self.sizes.moving_wall } else { 0 };
@@ -277,9 +357,9 @@ impl Backend for Gpu {
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        self.context.begin(Some(Stage::ConjugateGradient));
         self.set_step(step)?;
-        let report = self.conjugate_gradient()?;
-        Ok(report)
+        self.conjugate_gradient()
     }
 
     fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
@@ -294,6 +374,7 @@ impl Backend for Gpu {
             angular_velocity: four(p.angular_velocity),
         };
         let poses: Vec<_> = poses.iter().map(device).collect();
+        self.context.begin(Some(Stage::MoveSolids));
         self.context.upload("poses", &poses)?;
         self.context.pass([("move_solids.move_solids", groups(self.sizes.moving))])
     }
@@ -304,6 +385,7 @@ impl Backend for Gpu {
             return Ok(total);
         }
         let chunks = self.chunk_solid.len();
+        self.context.begin(Some(Stage::BodyForce));
         self.context.pass([("body_force.body_force", chunks as u64)])?;
         let parts = self.context.download::<[f32; 4]>("wrench", 2 * chunks)?;
         let vector = |v: &[f32; 4]| Vec3::new(v[0], v[1], v[2]).as_dvec3();
@@ -318,60 +400,45 @@ impl Backend for Gpu {
         if !self.wet {
             return Ok(Counters::default());
         }
-        let seen = self.context.download::<u32>("counters", counter::WORDS)?;
-        let c = &mut self.counters;
-        c.lost += u64::from(seen[counter::LOST]);
-        c.displacement_clamps += u64::from(seen[counter::DISPLACEMENT_CLAMPS]);
-        c.pressure_clamps += u64::from(seen[counter::PRESSURE_CLAMPS]);
-        c.neighbours_max = c.neighbours_max.max(seen[counter::NEIGHBOURS_MAX]);
-        let first = |k: usize| Some(seen[k]).filter(|&n| n != u32::MAX);
-        c.non_finite = c.non_finite.or(first(counter::NON_FINITE));
-        c.overflow = c.overflow.or(first(counter::OVERFLOW).map(|slot| (slot, c.neighbours_max)));
-        if seen[..counter::NEIGHBOURS_MAX].iter().any(|&n| n > 0) {
-            // Counted from here on, so that 32 bits last for any run.
-            let mut reset = seen;
-            reset[..counter::NEIGHBOURS_MAX].fill(0);
-            self.context.upload("counters", &reset)?;
-        }
-        Ok(self.counters.clone())
+        let seen = self.context.download("counters", counter::WORDS)?;
+        self.take_counters(&seen)
     }
 
     fn monitor(&mut self) -> Result<FluidMonitor> {
+        Ok(self.look()?.0)
+    }
+
+    fn look(&mut self) -> Result<(FluidMonitor, Counters)> {
         if !self.wet {
-            return Ok(FluidMonitor::default());
+            return Ok(Default::default());
         }
         let groups = self.sizes.monitor_groups();
+        self.context.begin(None);
         self.context.clear("speed_bin")?;
         self.context.pass([("monitor.monitor", groups)])?;
-        let sums = self.context.download::<MonitorSum>("monitor_sum", groups as usize)?;
-        let bins = self.context.download::<u32>("speed_bin", SPEED_BINS)?;
-        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
-        let mass = self.params.particle_mass();
-        let mut out = FluidMonitor::default();
-        let (mut momentum, mut position, mut extent) = (DVec3::ZERO, DVec3::ZERO, DVec3::MIN);
-        for s in &sums {
-            out.particles += u64::from(s.particles);
-            out.kinetic += mass * f64::from(s.kinetic);
-            momentum += mass * vector(s.momentum);
-            position += vector(s.position);
-            out.speed_max = out.speed_max.max(f64::from(s.speed_squared_max).sqrt());
-            extent = extent.max(vector(s.extent_max));
-            out.density_error_mean += f64::from(s.density_error);
-            out.density_error_max = out.density_error_max.max(f64::from(s.density_error_max));
-            out.inner += u64::from(s.inner);
-        }
-        let count = out.particles as f64;
-        position += count * self.middle;
-        out.potential = -mass * self.params.gravity.dot(position);
-        out.momentum = momentum.to_array();
-        out.centroid = (position / count.max(1.0)).to_array();
-        out.extent_max = if out.particles > 0 { (extent + self.middle).to_array() } else { [0.0; 3] };
-        out.density_error_mean /= out.inner.max(1) as f64;
-        let per_bin = speed_range(&self.params, self.dt) / SPEED_BINS as f64;
-        let mut histogram = [0_u64; SPEED_BINS];
-        histogram.iter_mut().zip(&bins).for_each(|(h, &b)| *h = u64::from(b));
-        out.speed_most = speed_most(&histogram, out.particles, per_bin);
-        Ok(out)
+        let sums = groups * size_of::<MonitorSum>() as u64;
+        let (bins, seen) = (4 * SPEED_BINS as u64, 4 * counter::WORDS as u64);
+        let parts = [("monitor_sum", 0, sums), ("speed_bin", 0, bins), ("counters", 0, seen)];
+        let bytes = self.context.download_bytes(&parts, true)?;
+        let (sums, rest) = bytes.split_at(sums as usize);
+        let (bins, seen) = rest.split_at(bins as usize);
+        let counters = self.take_counters(&bytemuck::pod_collect_to_vec::<u8, u32>(seen))?;
+        let sums: Vec<MonitorSum> = bytemuck::pod_collect_to_vec(sums);
+        Ok((self.finish_monitor(&sums, &bytemuck::pod_collect_to_vec::<u8, u32>(bins)), counters))
+    }
+
+    fn timing(&self) -> Timing {
+        if self.context.clock.is_some() { Timing::Timestamps } else { Timing::Waits }
+    }
+
+    fn stage_seconds(&self) -> BTreeMap<Stage, f64> {
+        self.context.clock.as_ref().map(|c| c.seconds.clone()).unwrap_or_default()
+    }
+
+    fn solution(&mut self) -> Result<Option<Vec<f64>>> {
+        // Beside the positions, where the last residual was computed from.
+        let packed = self.context.download::<[f32; 4]>("preconditioned", self.groups.pressure())?;
+        Ok(Some(packed.into_iter().map(|x| f64::from(x[3])).collect()))
     }
 
     fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
@@ -396,30 +463,16 @@ impl Backend for Gpu {
         self.context.bytes
     }
 
-    fn sizes(&mut self) -> Result<traffic::Sizes> {
-        let rows = self.neighbours()?;
-        let sum = |part: fn(&(Vec<u32>, Vec<u32>)) -> usize| rows.iter().map(part).sum::<usize>() as u64;
-        let pressure_pairs = sum(|r| r.0.len());
-        Ok(traffic::Sizes {
-            fluid: self.groups.fluid as u64 - self.counters.lost,
-            rows: sum(|r| usize::from(!r.0.is_empty())),
-            cells: self.grid.total() as u64,
-            pairs: pressure_pairs + sum(|r| r.1.len()),
-            pressure_pairs,
-            pressure: self.groups.pressure() as u64,
-            number: 4,
-            vector: 16,
-            weight: 0,
-            preconditioner_weight: self.levels.as_ref().map(|_| 0),
-        })
+    fn traffic(&mut self) -> Result<Traffic> {
+        if self.wet { self.count_traffic() } else { Ok(Traffic::default()) }
     }
 
     fn compute(&mut self) -> Option<&mut dyn Compute> {
         if self.contact { Some(self) } else { None }
     }
 
-    fn dispatches(&self) -> u64 {
-        self.context.dispatches
+    fn commands(&self) -> Commands {
+        self.context.commands.clone()
     }
 }
 
@@ -429,6 +482,7 @@ impl Compute for Gpu {
     }
 
     fn upload(&mut self, buffer: &'static str, data: &[u8]) -> Result<()> {
+        self.context.begin(Some(Stage::Contact));
         self.context.reserve(buffer, data.len() as u64)?;
         if data.is_empty() { Ok(()) } else { self.context.upload(buffer, data) }
     }
@@ -441,10 +495,12 @@ impl Compute for Gpu {
                 self.context.info.name
             )));
         }
+        self.context.begin(Some(Stage::Contact));
         self.context.pass(kernels.iter().copied())
     }
 
     fn download(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>> {
+        self.context.begin(Some(Stage::Contact));
         self.context.download(buffer, bytes as usize)
     }
 }

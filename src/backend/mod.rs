@@ -3,8 +3,10 @@
 pub mod compute;
 pub mod cpu;
 pub mod gpu;
+mod rows;
 pub mod traffic;
 
+use self::traffic::Traffic;
 use crate::body::{Pose, Wrench};
 use crate::error::Result;
 use crate::fields::Fields;
@@ -13,6 +15,7 @@ use crate::params::Step;
 use crate::plan::Stage;
 use crate::pressure::PressureReport;
 pub use compute::Compute;
+use std::collections::BTreeMap;
 
 /// What the guards have seen since the start of the run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,6 +32,43 @@ pub struct Counters {
     pub non_finite: Option<u32>,
     /// A row with more neighbours than the lists hold: slot and neighbours.
     pub overflow: Option<(u32, u32)>,
+}
+
+/// How the time of a stage can be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub enum Timing {
+    /// By the host's clock: a call returns when its work is done.
+    #[serde(rename = "host clock")]
+    Host,
+    /// By the device's own clock, see [`Backend::stage_seconds`].
+    #[serde(rename = "timestamps")]
+    Timestamps,
+    /// Only by waiting for the device after each stage.
+    #[serde(rename = "host waits")]
+    Waits,
+}
+
+/// What was asked of a device since the start.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Commands {
+    /// Kernels started.
+    pub dispatches: u64,
+    /// Of them, by stage.
+    pub by_stage: BTreeMap<Stage, u64>,
+    /// Times that recorded work was handed over.
+    pub submits: u64,
+    /// Times that the host waited for it.
+    pub waits: u64,
+}
+
+impl Commands {
+    /// Count a kernel of `stage`.
+    pub fn add(&mut self, stage: Option<Stage>) {
+        self.dispatches += 1;
+        if let Some(stage) = stage {
+            *self.by_stage.entry(stage).or_default() += 1;
+        }
+    }
 }
 
 /// A backend holds the particles and runs stages on them.
@@ -50,6 +90,22 @@ pub trait Backend: Send {
     fn counters(&mut self) -> Result<Counters>;
     /// Sums over the fluid.
     fn monitor(&mut self) -> Result<FluidMonitor>;
+    /// Both of these, with one wait on a device; [`Self::stage_seconds`] is up to date then.
+    fn look(&mut self) -> Result<(FluidMonitor, Counters)> {
+        Ok((self.monitor()?, self.counters()?))
+    }
+    /// How the time of a stage can be told.
+    fn timing(&self) -> Timing {
+        Timing::Host
+    }
+    /// Time of each stage since the start by the device's own clock, as of the last look [s].
+    fn stage_seconds(&self) -> BTreeMap<Stage, f64> {
+        BTreeMap::new()
+    }
+    /// Pressures as the last solve found them, before bounds cut them [Pa], if the backend keeps them.
+    fn solution(&mut self) -> Result<Option<Vec<f64>>> {
+        Ok(None)
+    }
     /// Pressures of single slots [Pa].
     fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>>;
     /// All fields, on the host.
@@ -62,14 +118,14 @@ pub trait Backend: Send {
     }
     /// Bytes that the backend holds for particles.
     fn bytes(&self) -> u64;
-    /// Sizes that the counted traffic follows from.
-    fn sizes(&mut self) -> Result<traffic::Sizes>;
     /// The device on which contact may search and press its pairs, where the plan has it do so.
     fn compute(&mut self) -> Option<&mut dyn Compute> {
         None
     }
-    /// Kernels started on a device so far; 0 for a backend without one.
-    fn dispatches(&self) -> u64 {
-        0
+    /// Bytes that a step like the last one must move.
+    fn traffic(&mut self) -> Result<Traffic>;
+    /// What was asked of a device; nothing for a backend without one.
+    fn commands(&self) -> Commands {
+        Commands::default()
     }
 }

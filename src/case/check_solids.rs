@@ -123,11 +123,14 @@ impl Checker<'_> {
             let remedy = "leave `device` out or set law = \"smooth\" or \"paper\"";
             self.add("contact.device", "law = \"pressure\" runs on the host only", remedy);
         }
+        if contact.viscous_friction != 0.0 && contact.law == Law::Pressure {
+            let message = "`viscous_friction` belongs to law = \"paper\" or \"smooth\"";
+            self.add("contact.viscous_friction", message, "remove it or set one of these laws");
+        }
         let only = |key: &str, law: &str| {
             (format!("`{key}` belongs to law = \"{law}\""), format!("remove `{key}` or set law = \"{law}\""))
         };
         for (key, given, law, name) in [
-            ("viscous_friction", contact.viscous_friction != 0.0, Law::Paper, "paper"),
             ("torque", !contact.torque, Law::Paper, "paper"),
             ("friction", contact.friction != 0.0, Law::Smooth, "smooth"),
             ("restitution", contact.restitution.is_some(), Law::Smooth, "smooth"),

@@ -104,6 +104,10 @@ pub enum Gradient {
     Minimum,
     /// Eq. (9) times the inverse of the particle's moment matrix: exact for linear fields.
     MinimumCorrected,
+    /// The same at the free surface too, where the one-sided sum carries half the weight of a particle. Still
+    /// water stays three times calmer and small bodies float steadily; a collapse gains up to 0.5 % of energy
+    /// before it loses any.
+    CorrectedSurface,
 }
 
 /// Which particles lie on the free surface (P = 0).
@@ -417,7 +421,8 @@ pub struct Contact {
     pub damping_ratio: Option<f64>,
     /// Normal restitution e of a free impact [-] (law "smooth").
     pub restitution: Option<f64>,
-    /// Numerical friction eta of Eq. (12) [kg/s] (law "paper").
+    /// Numerical friction eta of Eq. (12) [kg/s]: over particle pairs (law "paper") or over the true
+    /// surfaces, where it adds to `friction` (law "smooth").
     #[serde(default)]
     pub viscous_friction: f64,
     /// Coulomb coefficient mu [-], static and kinetic (law "smooth").

@@ -2,8 +2,10 @@
 
 use super::setup::Setup;
 use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
-use seixo::backend::gpu::adapters;
-use seixo::bench::{Row, exponent, host_bandwidth, measure};
+use seixo::backend::Timing;
+use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
+use seixo::backend::traffic::Solve;
+use seixo::bench::{Growth, Row, host_bandwidth, measure};
 use seixo::error::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -14,7 +16,7 @@ pub struct BenchArgs {
     #[arg(default_value = "cases/dam_break_transport.toml")]
     case: PathBuf,
     /// Spacings l0 [m] to time.
-    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.0075])]
+    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.01, 0.0075, 0.006])]
     spacings: Vec<f64>,
     /// Change a value of the case; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -24,6 +26,9 @@ pub struct BenchArgs {
     /// Steps to time at each spacing.
     #[arg(long, value_name = "N", default_value_t = 100)]
     steps: u64,
+    /// Simulated time from which to time [s], e.g. after the collapse.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    from: f64,
     /// Spacings with more particles than this are left out on a software GPU [thousands].
     #[arg(long, value_name = "K", default_value_t = 150)]
     software_limit: usize,
@@ -40,11 +45,12 @@ struct Report {
     version: &'static str,
     commit: Option<String>,
     cores: usize,
+    adapters: Vec<AdapterInfo>,
     case: String,
     sets: Vec<String>,
     rows: Vec<Row>,
-    /// Exponent of time against particles, by backend.
-    exponents: Vec<(String, Option<f64>)>,
+    /// How time grows with size, by backend.
+    growth: Vec<(String, Option<Growth>)>,
 }
 
 /// The commit of the checkout that the program runs in, if it is one.
@@ -78,30 +84,35 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
     // Software acts as a GPU for correctness, not speed: a tenth of the steps will do.
     let steps = if software { (args.steps / 10).max(3) } else { args.steps };
     let make = |s: &_, p: &_, plan: &_, settings| device::backend(&device, s, p, plan, settings);
-    measure(&setup.loaded.case, steps, bandwidth, &make).map(Some)
+    measure(&setup.loaded.case, args.from, steps, bandwidth, &make).map(Some)
 }
 
 pub fn bench(args: &BenchArgs) -> Exit {
     device::set_threads(&args.device);
-    let bandwidth = host_bandwidth();
-    let (mut rows, mut exponents) = (Vec::new(), Vec::new());
+    let host = host_bandwidth();
+    let (mut rows, mut growth) = (Vec::new(), Vec::new());
     for backend in choices(&args.device) {
+        let bandwidth = match backend {
+            BackendName::Gpu => bandwidth(args.device.adapter.as_deref())?,
+            _ => host,
+        };
         let mut own = Vec::new();
         for &spacing in &args.spacings {
             own.extend(timed(args, backend, spacing, bandwidth)?);
         }
         let name = own.first().map_or_else(|| format!("{backend:?}"), |r: &Row| r.adapter.clone());
-        exponents.push((name, exponent(&own.iter().collect::<Vec<_>>())));
+        growth.push((name, Growth::of(&own)));
         rows.append(&mut own);
     }
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         commit: commit(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
+        adapters: adapters(),
         case: args.case.display().to_string(),
         sets: args.sets.clone(),
         rows,
-        exponents,
+        growth,
     };
     if let Some(path) = &args.out {
         let text = serde_json::to_string_pretty(&report).unwrap_or_default() + "\n";
@@ -110,18 +121,68 @@ pub fn bench(args: &BenchArgs) -> Exit {
     if args.json {
         say_json(&report);
     } else {
-        table(&report, bandwidth);
+        table(&report);
     }
     Ok(0)
 }
 
-fn table(report: &Report, bandwidth: f64) {
-    say(&format!("copy bandwidth of the host {:.1} GB/s, {} cores", bandwidth / 1e9, report.cores));
+/// The counted work of the solver, and what all counts amount to.
+fn solver(r: &Row) {
+    let Solve { ends, build, iteration, cycle } = r.solve;
+    say("  counted in the solver     MB  dispatches");
+    let parts = [
+        ("once: residuals", ends),
+        ("once: levels", build),
+        ("iteration: vectors", iteration),
+        ("iteration: cycle", cycle),
+    ];
+    for (name, work) in parts.iter().filter(|(_, work)| work.bytes > 0) {
+        say(&format!("    {name:<18} {:>8.2} {:>11}", work.bytes as f64 / 1e6, work.dispatches));
+    }
+    if build.bytes > 0 {
+        let each = iteration + cycle;
+        say(&format!(
+            "    the levels are worth {:.2} iterations in bytes{}",
+            build.bytes as f64 / each.bytes as f64,
+            if each.dispatches > 0 {
+                format!(", {:.2} in dispatches", build.dispatches as f64 / each.dispatches as f64)
+            } else {
+                String::new()
+            }
+        ));
+    }
+    let [slots, rows] = r.slots;
+    say(&format!("  {} of {slots} slots of the solver are dry walls", slots - rows));
+    if let Some(i) = &r.implied {
+        say(&format!(
+            "  counted {:.1} MB and {:.1} dispatches a step; on a device with {:.1} TB/s and {:.0} us a dispatch that \
+             would be {:.2} ms, {:.2} ms of it in the solver",
+            i.bytes as f64 / 1e6,
+            r.dispatches,
+            i.assumed_bandwidth / 1e12,
+            1e6 * i.assumed_seconds_per_dispatch,
+            1e3 * i.seconds_per_step,
+            1e3 * i.pressure_seconds
+        ));
+    }
+}
+
+/// As the JSON has it.
+fn name_of(timing: &Timing) -> &'static str {
+    match timing {
+        Timing::Host => "host clock",
+        Timing::Timestamps => "timestamps",
+        Timing::Waits => "host waits",
+    }
+}
+
+fn table(report: &Report) {
+    say(&format!("{} cores", report.cores));
     for r in &report.rows {
         say(&format!(
             "\n{} ({}), l0 = {} m: {} particles, {} of them fluid, {} unknowns\n\
              {:.4} s a step (middle half {:.4} to {:.4}), {:.2e} particles a second, {} {:.1} iterations to {:.0e}, \
-             {:.0} MB held, density error at most {:.3}",
+             {:.0} MB held, density error at most {:.3}; copy bandwidth of its memory {:.1} GB/s",
             r.adapter,
             r.precision,
             r.spacing,
@@ -136,25 +197,38 @@ fn table(report: &Report, bandwidth: f64) {
             r.iterations,
             r.tolerance,
             r.bytes_held as f64 / 1e6,
-            r.density_error_max
+            r.density_error_max,
+            r.bandwidth / 1e9
         ));
         if r.dispatches > 0.0 {
-            say(&format!("{:.0} dispatches a step", r.dispatches));
+            say(&format!(
+                "a step: {:.1} dispatches, {:.2} submissions, {:.2} waits of the host",
+                r.dispatches, r.submits, r.waits
+            ));
         }
-        say(&format!("  {:<20} {:>10} {:>10} {:>14}", "stage", "ms", "MB", "of the floor"));
+        say(&format!("stages by {}", name_of(&r.timing)));
+        say(&format!(
+            "  {:<20} {:>10} {:>10} {:>14} {:>11}",
+            "stage", "ms", "MB", "of the floor", "dispatches"
+        ));
         for s in &r.stages {
             say(&format!(
-                "  {:<20} {:>10.3} {:>10.2} {:>13.0} %",
+                "  {:<20} {:>10.3} {:>10.2} {:>13.0} % {:>10.1}",
                 s.stage,
                 1e3 * s.seconds,
                 s.bytes as f64 / 1e6,
-                100.0 * s.floor_fraction
+                100.0 * s.floor_fraction,
+                s.dispatches
             ));
         }
+        solver(r);
     }
-    for (name, exponent) in &report.exponents {
-        if let Some(e) = exponent {
-            say(&format!("\n{name}: time a step grows with particles to the power {e:.3}"));
+    for (name, growth) in &report.growth {
+        if let Some(g) = growth {
+            say(&format!(
+                "\n{name}: time a step ~ particles^{:.3} ~ unknowns^{:.3}",
+                g.with_particles, g.with_unknowns
+            ));
         }
     }
 }

@@ -4,7 +4,11 @@ use super::setup::Setup;
 use super::{CaseArgs, Exit, say, say_json};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
-use seixo::backend::gpu::bytes_needed;
+use seixo::backend::gpu::forecast::{Forecast, Group, groups};
+use seixo::backend::gpu::layout::{Memory, Sizes};
+use seixo::backend::gpu::sizes;
+use seixo::case::Case;
+use seixo::case::file::load;
 use seixo::cells::Grid;
 use seixo::contact::Solids;
 use seixo::error::Result;
@@ -50,9 +54,14 @@ struct Scheme {
     relaxation: f64,
     compressibility_1_pa: f64,
     cells: usize,
-    neighbours_max: u32,
+    /// Nothing for a scene that was not built whole.
+    neighbours_max: Option<u32>,
     cpu_bytes: u64,
     gpu_bytes: u64,
+    gpu_bytes_per_particle: f64,
+    gpu_groups: Vec<Group>,
+    /// As asked for, and refined to 10 and 100 million particles.
+    gpu_forecasts: Vec<Forecast>,
 }
 
 /// What `plan` tells.
@@ -61,6 +70,8 @@ struct Report {
     case: String,
     dimensions: u32,
     spacing_m: f64,
+    /// Spacing of the coarser scene that the numbers of particles were scaled up from, if any [m].
+    estimated_from_spacing_m: Option<f64>,
     time_step_s: f64,
     adaptive: bool,
     end_s: f64,
@@ -72,9 +83,46 @@ struct Report {
     advice: Vec<String>,
 }
 
+/// Fluid particles up to which the scene is built whole; more are estimated from a coarser one.
+const WHOLE: f64 = 1.6e7;
+/// Fluid particles of that coarser scene.
+const COARSER: f64 = 5e5;
+/// Numbers of particles to look ahead to.
+const FORECASTS: [u64; 2] = [10_000_000, 100_000_000];
+/// Memory of a usual large GPU [bytes].
+const LARGE_GPU: u64 = 24_000_000_000;
+
+/// A scene, or a coarser one that stands for it.
+struct Seen {
+    setup: Setup,
+    /// The case as asked for.
+    case: Case,
+    /// Spacing of the scene over that asked for, 1 or more.
+    coarser: f64,
+}
+
+impl Seen {
+    fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
+        let mut case = load(&args.case, args.spacing, &args.sets)?.case;
+        let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
+        let blocks = case.fluid.iter().flat_map(|f| &f.block);
+        let extent = |b: &seixo::case::Block, k: usize| (b.max[k] - b.min[k]).abs();
+        let fluid = |b| extent(b, 0) * extent(b, 2) * if d == 3.0 { extent(b, 1) } else { 1.0 } / l0.powf(d);
+        let fluid: f64 = blocks.map(fluid).sum();
+        let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
+        let spacing = if coarser > 1.0 { Some(coarser * l0) } else { args.spacing };
+        let typed = CaseArgs { spacing, sets: args.sets.clone(), case: args.case.clone(), ..*args };
+        // What the coarser lattice rounds is no news.
+        let setup = Setup::new(&typed, quiet || coarser > 1.0)?;
+        if coarser == 1.0 {
+            case = setup.loaded.case.clone();
+        }
+        Ok(Self { setup, case, coarser })
+    }
+}
+
 pub fn plan(args: &PlanArgs) -> Exit {
-    let setup = Setup::new(&args.case, args.json)?;
-    let report = report(&setup)?;
+    let report = report(&Seen::new(&args.case, args.json)?)?;
     if args.json {
         say_json(&report);
     } else {
@@ -83,44 +131,66 @@ pub fn plan(args: &PlanArgs) -> Exit {
     Ok(0)
 }
 
-fn report(setup: &Setup) -> Result<Report> {
-    let (case, scene) = (&setup.loaded.case, &setup.scene);
+fn report(seen: &Seen) -> Result<Report> {
+    let (case, scene, built) = (&seen.case, &seen.setup.scene, seen.coarser == 1.0);
     let params = Params::new(case, scene)?;
     let plan = Plan::new(case, scene, &params);
     let dt = longest_step(&params, case.run.time_step, case.run.adaptive && plan.wet());
-    let solids = Solids::new(scene, case.contact.as_ref())?;
     let mut advice =
         if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive) } else { vec![] };
-    advice.extend(solids.advice(dt).words);
+    if built {
+        advice.extend(Solids::new(scene, case.contact.as_ref())?.advice(dt).words);
+    } else if plan.has(Stage::Contact) {
+        advice.push("contact: not judged, the particles of the solids were not built".into());
+    }
     let stages = plan.reasons.iter().map(|(stage, reason)| StageLine {
         stage: stage.name(),
         planned: reason.is_ok(),
         reason: reason.unwrap_or_else(|why| why),
     });
+    let mut count = particles(scene);
+    if !built {
+        let (cube, square) =
+            (seen.coarser.powi(params.dimensions as i32), seen.coarser.powi(params.dimensions as i32 - 1));
+        let scaled = |n: usize, by: f64| (n as f64 * by).round() as usize;
+        count.fluid = scaled(count.fluid, cube);
+        for surface in [&mut count.wall, &mut count.dummy, &mut count.body] {
+            *surface = scaled(*surface, square);
+        }
+        count.total = count.fluid + count.wall + count.dummy + count.body;
+    }
     Ok(Report {
-        case: setup.name.clone(),
+        case: seen.setup.name.clone(),
         dimensions: params.dimensions,
         spacing_m: params.spacing,
+        estimated_from_spacing_m: (!built).then_some(scene.spacing),
         time_step_s: dt,
         adaptive: case.run.adaptive,
         end_s: case.run.end,
-        particles: particles(scene),
+        particles: count,
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.kernel.is_some(), reason: plan.contact.reason.clone() },
-        scheme: if plan.wet() { Some(scheme(setup, &params, &plan, dt)?) } else { None },
+        scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
     })
 }
 
-fn scheme(setup: &Setup, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> {
+fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> {
     let step = params.step(0.0, dt, expected_speed(params));
-    // The lists at t = 0 tell the memory and whether the lattice is sound.
+    let (scene, built) = (&seen.setup.scene, seen.coarser == 1.0);
+    // The lists at t = 0 tell the memory and, of the scene itself, whether the lattice is sound.
     let settings = Settings { tolerance: 1e-3, max_iterations: 1, warm_start: false };
-    let mut cpu = Cpu::new(&setup.scene, params, plan, settings)?;
+    let own = Params::new(&seen.setup.loaded.case, scene)?;
+    let mut cpu = Cpu::new(scene, &own, plan, settings)?;
     for stage in [Stage::CellList, Stage::NeighbourList] {
         cpu.run(stage, &step)?;
     }
+    let sizes: Sizes = sizes(scene, &own, plan)?;
+    let fluid = sizes.fluid as f64;
+    let sizes = if built { sizes } else { sizes.refined(seen.coarser) };
+    let memory = Memory::new(&sizes, plan);
+    let forecasts = FORECASTS.iter().filter(|&&n| n > sizes.total).map(|&n| Forecast::new(&sizes, plan, n));
     Ok(Scheme {
         number_density: params.number_density,
         laplacian_over_l0_squared: params.laplacian / params.spacing.powi(2),
@@ -130,9 +200,12 @@ fn scheme(setup: &Setup, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme
         relaxation: step.relaxation,
         compressibility_1_pa: step.compressibility,
         cells: Grid::new(params)?.total(),
-        neighbours_max: cpu.counters()?.neighbours_max,
-        cpu_bytes: cpu.bytes(),
-        gpu_bytes: bytes_needed(&setup.scene, params, plan)?,
+        neighbours_max: if built { Some(cpu.counters()?.neighbours_max) } else { None },
+        cpu_bytes: (cpu.bytes() as f64 * sizes.fluid as f64 / fluid) as u64,
+        gpu_bytes: memory.total(),
+        gpu_bytes_per_particle: memory.total() as f64 / sizes.total as f64,
+        gpu_groups: groups(&memory),
+        gpu_forecasts: std::iter::once(Forecast::at(&sizes, plan, 1.0)).chain(forecasts).collect(),
     })
 }
 
@@ -195,7 +268,10 @@ fn words(report: &Report) -> String {
             report.case, report.dimensions, report.spacing_m, report.time_step_s, report.end_s
         ),
         String::new(),
-        "particles".to_string(),
+        match report.estimated_from_spacing_m {
+            Some(l0) => format!("particles, estimated from l0 = {l0:.4} m"),
+            None => "particles".to_string(),
+        },
     ];
     for (name, count) in
         [("fluid", p.fluid), ("wall", p.wall), ("dummy", p.dummy), ("body", p.body), ("total", p.total)]
@@ -230,19 +306,64 @@ fn words(report: &Report) -> String {
                 s.sound_speed_m_s, s.relaxation, s.compressibility_1_pa
             ),
             format!(
-                "  preconditioner {}; {} cells; at most {} neighbours at t = 0",
-                s.preconditioner, s.cells, s.neighbours_max
+                "  preconditioner {}; {} cells{}",
+                s.preconditioner,
+                s.cells,
+                s.neighbours_max.map_or(String::new(), |n| format!("; at most {n} neighbours at t = 0"))
             ),
             format!(
                 "  memory: CPU {:.1} MB at t = 0, GPU {:.1} MB",
                 s.cpu_bytes as f64 / 1e6,
                 s.gpu_bytes as f64 / 1e6
             ),
+            String::new(),
+            format!("GPU memory, {:.0} bytes a particle", s.gpu_bytes_per_particle),
         ]);
+        lines.extend(s.gpu_groups.iter().map(|g| {
+            let each = g.bytes as f64 / p.total.max(1) as f64;
+            format!(
+                "  {:<20}{:>10.1} MB{each:>8.1} bytes a particle, most in {}",
+                g.name,
+                g.bytes as f64 / 1e6,
+                g.largest
+            )
+        }));
+        lines.extend(
+            s.gpu_forecasts.iter().enumerate().flat_map(|(k, f)| forecast(f, k > 0, report.spacing_m)),
+        );
     }
     if !report.advice.is_empty() {
         lines.extend([String::new(), "advice".to_string()]);
         lines.extend(report.advice.iter().map(|a| format!("  {a}")));
     }
     lines.join("\n")
+}
+
+/// A scene against the limits of devices.
+fn forecast(f: &Forecast, ahead: bool, spacing: f64) -> Vec<String> {
+    let fits = if f.bytes < LARGE_GPU { "fits a GPU with 24 GB" } else { "more than a GPU with 24 GB holds" };
+    let mut lines = Vec::new();
+    if ahead {
+        lines.push(format!(
+            "  {:.0} million particles (l0 about {:.2e} m): {:.1} GB, {fits}; largest buffer {} {:.2} GB",
+            f.particles as f64 / 1e6,
+            spacing * f.finer,
+            f.bytes as f64 / 1e9,
+            f.largest.0,
+            f.largest.1 as f64 / 1e9
+        ));
+    }
+    lines.extend(f.excesses.iter().map(|e| {
+        let bytes = e.limit.ends_with("size");
+        let number = |n: u64| if bytes { format!("{:.2} GB", n as f64 / 1e9) } else { n.to_string() };
+        format!(
+            "    over a limit: {} {} of {} ({}); would take {}",
+            e.what,
+            number(e.needs),
+            number(e.allows),
+            e.limit,
+            e.remedy
+        )
+    }));
+    lines
 }

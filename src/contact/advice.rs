@@ -17,8 +17,8 @@ pub struct ContactAdvice {
     pub omega_dt: f64,
     /// C dt / m_e of the whole step [-].
     pub damping_dt: f64,
-    /// Sub-steps planned.
-    pub substeps: u32,
+    /// Sub-steps planned; `None` if the case's own number is refused.
+    pub substeps: Option<u32>,
     /// K that the case's heights and masses ask for [N/m].
     pub spring_recommended: f64,
     /// Stiffness that the softest contact gets [N/m]: below K where the sub-steps cannot carry K.
@@ -155,15 +155,15 @@ impl Solids {
             None => PAPER_FACTOR * energy / (1.5 * self.spacing.powi(2)),
         };
         let substeps = self.substeps(&worst);
-        if let Err(e) = &substeps {
-            words.push(e.to_string());
-        }
-        let substeps = substeps.unwrap_or(0);
         let spring = self.limits.spring;
-        words.push(format!(
-            "contact: dt sqrt(K / m_e) = {:.2}, C dt / m_e = {:.2}: {substeps} sub-steps a step",
+        let numbers = format!(
+            "contact: dt sqrt(K / m_e) = {:.2}, C dt / m_e = {:.2}",
             worst.omega_dt, worst.damping_dt
-        ));
+        );
+        match &substeps {
+            Ok(n) => words.push(format!("{numbers}: {n} sub-steps a step")),
+            Err(e) => words.extend([e.to_string(), format!("{numbers}: refused, see above")]),
+        }
         words.push(format!(
             "contact: the heaviest body ({heaviest:.3e} kg) at {:.1} m/s asks for a spring of about {:.1e} N/m; \
              the case has {spring:.1e}",
@@ -183,17 +183,24 @@ impl Solids {
                 }
             });
         }
-        if worst.softest < 0.999 * spring {
+        if let (Ok(substeps), true) = (&substeps, worst.softest < 0.999 * spring) {
             words.push(format!(
                 "contact: {substeps} sub-steps carry {:.1e} N/m on the lightest body, so its contact is softened \
                  to that; a smaller run.time_step raises it",
                 worst.softest
             ));
         }
+        let sinks = self.limits.fastest * (heaviest / worst.softest).sqrt() / self.spacing;
+        if smooth.is_some() && sinks > 0.1 {
+            words.push(format!(
+                "contact: at that speed the heaviest body may press what lies between it and a wall {sinks:.2} \
+                 spacings deep; a spring four times as stiff halves that, where the sub-steps carry it"
+            ));
+        }
         ContactAdvice {
             omega_dt: worst.omega_dt,
             damping_dt: worst.damping_dt,
-            substeps,
+            substeps: substeps.ok(),
             spring_recommended,
             spring_softest: worst.softest,
             words,

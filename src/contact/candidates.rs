@@ -99,6 +99,7 @@ pub(crate) struct Smooth {
     pub walls: Vec<WallBox>,
     pub pairs: Vec<smooth::Pair>,
     pub friction: Friction,
+    pub spacing: f64,
     generation: u64,
 }
 
@@ -109,6 +110,7 @@ impl Smooth {
             walls: geometry::walls(scene),
             pairs: vec![],
             friction: Friction::default(),
+            spacing: scene.spacing,
             generation: 0,
         }
     }
@@ -138,11 +140,11 @@ impl Smooth {
     }
 
     /// Makes the lists of points.
-    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body], spacing: f64) {
+    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body]) {
         self.generation = candidates.generation;
         let pairs = self.close(candidates, bodies);
         let fill = |(mut pair, skin): (smooth::Pair, f64)| {
-            pair.collect(bodies, &self.surfaces, &self.walls, skin, spacing);
+            pair.collect(bodies, &self.surfaces, &self.walls, skin);
             (!pair.is_empty()).then_some(pair)
         };
         self.pairs = if pairs.len() >= MANY_PAIRS {
@@ -158,11 +160,11 @@ impl Smooth {
     }
 
     pub fn evaluate(&mut self, bodies: &[Body]) {
-        let (surfaces, walls) = (&self.surfaces, &self.walls);
+        let (surfaces, walls, spacing) = (&self.surfaces, &self.walls, self.spacing);
         if self.pairs.len() >= MANY_PAIRS {
-            self.pairs.par_iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls));
+            self.pairs.par_iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls, spacing));
         } else {
-            self.pairs.iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls));
+            self.pairs.iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls, spacing));
         }
     }
 }

@@ -7,8 +7,11 @@
 //! slip that *remains*: (A + s 1) j = -u with |j| = mu N h, s > 0, A the response of the slip to the
 //! impulse. No history, no elastic pre-slip and no parameter beside mu: a body at rest on a slope
 //! stays where it is. Bodies with several patches are swept in a fixed order.
+//!
+//! The viscous friction of the paper's Eq. (12) is at hand as well: -eta times the slip, shared among the
+//! patches of two solids by their normal forces.
 
-use super::smooth::{Other, Pair};
+use super::smooth::Pair;
 use crate::body::Body;
 use glam::{DMat3, DVec3};
 
@@ -45,19 +48,25 @@ pub(crate) struct Friction {
 }
 
 impl Friction {
-    /// Applies friction `mu` to the bodies for the sub-step `h` [s] with the pairs' normal forces.
-    pub fn apply(&mut self, pairs: &[Pair], bodies: &mut [Body], mu: f64, h: f64) {
+    /// Applies the friction `mu` [-] and `eta` [kg/s] to the bodies for the sub-step `h` [s] with the
+    /// pairs' normal forces.
+    pub fn apply(&mut self, pairs: &[Pair], bodies: &mut [Body], mu: f64, eta: f64, h: f64) {
+        if eta > 0.0 {
+            for pair in pairs {
+                let all: f64 = pair.patches.iter().map(|p| p.force).sum();
+                for patch in &pair.patches {
+                    let slip = Slip::new(pair.a, pair.b.solid(), patch, bodies, 0.0);
+                    slip.drag(bodies, eta * h * patch.force / all);
+                }
+            }
+        }
         self.slips.clear();
         if mu <= 0.0 {
             return;
         }
         for pair in pairs {
-            let b = match pair.b {
-                Other::Solid(b) => Some(b),
-                Other::Wall(_) => None,
-            };
             for patch in &pair.patches {
-                self.slips.push(Slip::new(pair.a, b, patch, bodies, mu * patch.force * h));
+                self.slips.push(Slip::new(pair.a, pair.b.solid(), patch, bodies, mu * patch.force * h));
             }
         }
         let sweeps = if self.slips.len() == 1 { 1 } else { SWEEPS };
@@ -117,13 +126,25 @@ impl Slip {
         }
         let change = impulse - self.impulse;
         self.impulse = impulse;
+        self.kick(bodies, change);
+        change.length() > TOLERANCE * self.cap
+    }
+
+    /// Drag `eta_h` [kg] times the slip in the middle of the sub-step: stable for any eta.
+    fn drag(&self, bodies: &mut [Body], eta_h: f64) {
+        let middle = DMat3::IDENTITY + 0.5 * eta_h * self.response;
+        let impulse = -eta_h * (middle.inverse() * self.velocity(bodies));
+        self.kick(bodies, impulse);
+    }
+
+    /// Gives both bodies the impulse `change` along the tangents and the spin [N s].
+    fn kick(&self, bodies: &mut [Body], change: DVec3) {
         let push = change.x * self.tangent[0] + change.y * self.tangent[1];
         let twist = change.z * self.spin;
         bodies[self.a].kick(push, self.arm_a.cross(push) + twist);
         if let Some(b) = self.b {
             bodies[b].kick(-push, -self.arm_b.cross(push) - twist);
         }
-        change.length() > TOLERANCE * self.cap
     }
 }
 

@@ -1,7 +1,7 @@
 //! Geometry of contact: oriented boxes seen from a point, surface points of bodies, edges of walls.
 
-use crate::body::Body;
-use crate::scene::{Scene, Solid};
+use super::edges::Line;
+use crate::scene::{Scene, Shape, Solid};
 use glam::{DMat3, DVec3};
 
 /// Faces of a box: bit 2 k for the lower face of axis k, bit 2 k + 1 for the upper one.
@@ -110,34 +110,9 @@ pub(crate) struct WallBox {
     /// Faces that bodies can reach.
     pub faces: Faces,
     /// Edges that bodies can reach.
-    pub edges: Vec<Edge>,
-}
-
-impl WallBox {
-    /// Samples of the edges whose stretch of the edge meets the body's sphere, `skin` [m] wider; world [m].
-    pub fn samples(&self, body: &Body, skin: f64, spacing: f64) -> impl Iterator<Item = DVec3> {
-        let width = body.radius() + skin + spacing;
-        let center = body.pose.position;
-        self.edges.iter().flat_map(move |edge| {
-            let length = edge.step.length();
-            let from = center - edge.start;
-            let middle = if length > 0.0 { from.dot(edge.step) / length } else { 0.0 };
-            let low = ((middle - width) / length.max(1e-300)).max(0.0) as usize;
-            let high = ((middle + width) / length.max(1e-300)).max(0.0) as usize;
-            (low..=high.min(edge.count - 1)).map(move |k| edge.start + k as f64 * edge.step)
-        })
-    }
-}
-
-/// An edge of a wall, sampled.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Edge {
-    /// First sample, world [m].
-    pub start: DVec3,
-    /// From one sample to the next, world [m].
-    pub step: DVec3,
-    /// Samples.
-    pub count: usize,
+    pub edges: Vec<Line>,
+    /// Corners that bodies can reach, world [m].
+    pub corners: Vec<DVec3>,
 }
 
 /// The walls of a scene. A face can be reached if wall particles that face the free space lie under
@@ -170,73 +145,94 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
                 }
             }
             let faces = if found { faces } else { ALL_FACES } & flat;
-            WallBox { center: wall.center, axes: wall.axes, half: wall.half, faces, edges: vec![] }
+            WallBox {
+                center: wall.center,
+                axes: wall.axes,
+                half: wall.half,
+                faces,
+                edges: vec![],
+                corners: vec![],
+            }
         })
         .collect();
     for k in 0..walls.len() {
-        let edges = wall_edges(&walls, k, spacing, scene.dimensions == 2);
-        walls[k].edges = edges;
+        let (edges, corners) = wall_edges(&walls, k, spacing, scene.dimensions == 2);
+        (walls[k].edges, walls[k].corners) = (edges, corners);
     }
     walls
 }
 
-/// Edges between two reachable faces of wall `k`, sampled at the spacing, unless another wall covers
-/// them. A body's face has points every spacing, so it could sink on an edge that lies between them.
-fn wall_edges(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<Edge> {
+/// Edges between two reachable faces of wall `k` and corners between three, unless another wall covers
+/// them. A body's face has points every spacing, so it could sink on an edge that lies between them. In
+/// two dimensions edges are seen end on and are the corners.
+fn wall_edges(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> (Vec<Line>, Vec<DVec3>) {
     let wall = &walls[k];
-    let mut edges = vec![];
+    let bit = |axis: usize, side: f64| 1 << (2 * axis as u8 + u8::from(side > 0.0));
+    // what leans on another wall is no edge of the union
+    let covered = |at: DVec3, out: DVec3| {
+        let world = wall.center + wall.axes * (at + 1e-3 * spacing * out);
+        walls.iter().enumerate().any(|(other, w)| {
+            other != k && outside(w.axes.transpose() * (world - w.center), w.half) < 2e-3 * spacing
+        })
+    };
+    let (mut edges, mut corners) = (vec![], vec![]);
     for along in 0..3_usize {
         let (u, v) = ((along + 1) % 3, (along + 2) % 3);
-        for (su, sv) in [(0_u8, 0_u8), (0, 1), (1, 0), (1, 1)] {
-            let bit = |axis: usize, side: u8| 1 << (2 * axis as u8 + side);
+        for (su, sv) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
             if wall.faces & bit(u, su) == 0 || wall.faces & bit(v, sv) == 0 || flat && along != 1 {
                 continue;
             }
-            let sign = |side: u8| if side == 1 { 1.0 } else { -1.0 };
-            let mut middle = DVec3::ZERO;
-            middle[u] = sign(su) * wall.half[u];
-            middle[v] = sign(sv) * wall.half[v];
-            let length = 2.0 * wall.half[along];
-            let count = if flat { 1 } else { (length / spacing).round().max(1.0) as usize + 1 };
-            let step = if flat { 0.0 } else { length / (count - 1) as f64 };
-            let mut start = middle;
-            start[along] = if flat { 0.0 } else { -wall.half[along] };
-            // an edge that leans on another wall is no edge of the union
-            let out = middle + 1e-3 * spacing * middle.signum() * (DVec3::ONE - DVec3::AXES[along]);
-            let world = wall.center + wall.axes * out;
-            let covered = walls.iter().enumerate().any(|(other, w)| {
-                other != k && outside(w.axes.transpose() * (world - w.center), w.half) < 2e-3 * spacing
+            let out = su * DVec3::AXES[u] + sv * DVec3::AXES[v];
+            let middle = out * wall.half;
+            if covered(middle, out) {
+                continue;
+            }
+            let axis = DVec3::AXES[along];
+            if flat {
+                corners.push(wall.center + wall.axes * middle);
+                continue;
+            }
+            edges.push(Line {
+                start: wall.center + wall.axes * (middle - axis * wall.half),
+                along: wall.axes * axis,
+                length: 2.0 * wall.half[along],
+                density: 0.0,
             });
-            if !covered {
-                edges.push(Edge {
-                    start: wall.center + wall.axes * start,
-                    step: wall.axes * (DVec3::AXES[along] * step),
-                    count,
-                });
+            for side in [-1.0, 1.0] {
+                let (at, out) = (middle + side * axis * wall.half, out + side * axis);
+                // every corner is the end of three edges: the one along x reports it
+                if along == 0 && wall.faces & bit(along, side) != 0 && !covered(at, out) {
+                    corners.push(wall.center + wall.axes * at);
+                }
             }
         }
     }
-    edges
+    (edges, corners)
 }
 
-/// The surface of a body as contact sees it: points on the true surface with constant weights.
+/// The surface of a body as contact sees it: points on the true surface and edges, with constant weights.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surface {
-    /// Points in the body's frame [m].
+    /// Points inside the faces and at the corners, body's frame [m].
     pub points: Vec<DVec3>,
-    /// Weight of each point [-]; those of a face sum to 1 (exactly for a cube).
+    /// Weight of each point [-]; those of a face and its edges sum to 1 (exactly for a cube).
     pub weights: Vec<f64>,
     /// For each point, the faces it lies on.
     pub faces: Vec<Faces>,
+    /// Edges, body's frame; none in two dimensions.
+    pub edges: Vec<Line>,
+    /// For each edge, the faces it lies between.
+    edge_faces: Vec<Faces>,
     /// Faces of the body that others can touch.
     pub all_faces: Faces,
-    /// Smallest weight of a single point [-].
+    /// Smallest weight of a surface particle [-].
     pub smallest_weight: f64,
 }
 
 impl Surface {
     /// The surface of `solid`. A point on several faces gets the mean of its shares of them: constant
     /// weights are what makes the law conservative, so they may not depend on the face that touches.
+    /// What the particles along an edge would weigh is spread over its length.
     pub fn new(solid: &Solid, dimensions: u32) -> Self {
         let points: Vec<DVec3> =
             solid.wall_offset.iter().zip(&solid.wall_to_surface).map(|(o, s)| *o + *s).collect();
@@ -253,27 +249,124 @@ impl Surface {
             .collect();
         let on = |face: u8| faces.iter().filter(|f| *f & (1 << face) != 0).count();
         let share: Vec<f64> = (0..6).map(|face| 1.0 / on(face).max(1) as f64).collect();
-        let mut weights: Vec<f64> = faces
+        let weights: Vec<f64> = faces
             .iter()
             .map(|f| {
                 let mine: Vec<f64> = (0..6).filter(|k| f & (1 << k) != 0).map(|k| share[k]).collect();
                 mine.iter().sum::<f64>() / mine.len().max(1) as f64
             })
             .collect();
-        // bring the mean over the faces back to 1 (it is off for boxes that are no cubes)
-        let sums: Vec<f64> = (0..6_u8)
-            .filter(|&face| on(face) > 0)
-            .map(|face| {
-                weights.iter().zip(&faces).filter(|(_, f)| *f & (1 << face) != 0).map(|(w, _)| w).sum()
-            })
-            .collect();
-        let mean = sums.iter().sum::<f64>() / sums.len().max(1) as f64;
-        if mean > 0.0 {
-            weights.iter_mut().for_each(|w| *w /= mean);
-        }
         let all_faces = if dimensions == 2 { 0b11_0011 } else { ALL_FACES };
         let smallest_weight = weights.iter().copied().fold(1.0, f64::min);
-        Self { points, weights, faces, all_faces, smallest_weight }
+        let mut surface = Self { points, weights, faces, all_faces, smallest_weight, ..Self::default() };
+        if dimensions == 3 {
+            let Shape::Box { half } = solid.shape;
+            surface.spread_edges(half);
+        }
+        surface.balance();
+        surface.normalise();
+        surface
+    }
+
+    /// Second moment of the weights of all faces over that of an even pressure, in the mean, with the
+    /// border's weights times `border`.
+    fn moment(samples: &[(DVec3, f64, Faces)], border: f64) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for face in 0..6_u8 {
+            let on = samples.iter().filter(|s| s.2 & (1 << face) != 0);
+            let on: Vec<(DVec3, f64)> =
+                on.map(|s| (s.0, if s.2.count_ones() > 1 { border * s.1 } else { s.1 })).collect();
+            if samples.iter().all(|s| s.2 & (1 << face) == 0 || s.2.count_ones() > 1) {
+                continue; // all border: nothing to balance it with
+            }
+            let all: f64 = on.iter().map(|s| s.1).sum();
+            let axis = usize::from(face / 2);
+            for other in [(axis + 1) % 3, (axis + 2) % 3] {
+                let half = on.iter().map(|s| s.0[other].abs()).fold(0.0, f64::max);
+                let second: f64 = on.iter().map(|s| s.1 * s.0[other].powi(2)).sum();
+                if half > 0.0 {
+                    sum += 3.0 * second / (all * half * half);
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 { sum / count } else { 1.0 }
+    }
+
+    /// Makes edges and corners light enough that a face rocks, and its friction resists a spin, like an
+    /// even pressure: particles stand for cells, whose outermost have been moved to the border.
+    fn balance(&mut self) {
+        let samples = self.samples();
+        if samples.iter().all(|s| s.2.count_ones() > 1) {
+            return;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if Self::moment(&samples, middle) < 1.0 { low = middle } else { high = middle }
+        }
+        let border = self.faces.iter().map(|f| f.count_ones() > 1);
+        self.weights.iter_mut().zip(border).filter(|(_, b)| *b).for_each(|(w, _)| *w *= high);
+        self.edges.iter_mut().for_each(|e| e.density *= high);
+        self.smallest_weight *= high;
+    }
+
+    /// Turns the points along each edge into a line of their weight.
+    fn spread_edges(&mut self, half: DVec3) {
+        for along in 0..3_usize {
+            let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+            for (su, sv) in [(0_u8, 0_u8), (0, 1), (1, 0), (1, 1)] {
+                let both: Faces = 1 << (2 * u as u8 + su) | 1 << (2 * v as u8 + sv);
+                let own = self.faces.iter().zip(&self.weights).filter(|(f, _)| **f == both);
+                let mut weight: f64 = own.map(|(_, w)| w).sum();
+                if weight == 0.0 {
+                    // two particles along it: both are corners
+                    let corners = self.faces.iter().zip(&self.weights).filter(|(f, _)| **f & both == both);
+                    weight = corners.map(|(_, w)| w / 6.0).sum();
+                }
+                let sign = |side: u8| if side == 1 { 1.0 } else { -1.0 };
+                let mut start = -half;
+                start[u] *= -sign(su);
+                start[v] *= -sign(sv);
+                let length = 2.0 * half[along];
+                let line = Line { start, along: DVec3::AXES[along], length, density: weight / length };
+                self.edges.push(line);
+                self.edge_faces.push(both);
+            }
+        }
+        let inner = |f: &Faces| f.count_ones() != 2;
+        let mut kept = self.faces.iter().map(inner);
+        self.points.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = self.faces.iter().map(inner);
+        self.weights.retain(|_| kept.next().unwrap_or(true));
+        self.faces.retain(inner);
+    }
+
+    /// Brings the mean over the faces of their weight to 1: it is off for boxes that are no cubes.
+    fn normalise(&mut self) {
+        let samples = self.samples();
+        let sums =
+            (0..6_u8).map(|face| samples.iter().filter(|s| s.2 & (1 << face) != 0).map(|s| s.1).sum::<f64>());
+        let sums: Vec<f64> = sums.filter(|s| *s > 0.0).collect();
+        let mean = sums.iter().sum::<f64>() / sums.len().max(1) as f64;
+        if mean > 0.0 {
+            self.weights.iter_mut().for_each(|w| *w /= mean);
+            self.edges.iter_mut().for_each(|e| e.density /= mean);
+            self.smallest_weight /= mean;
+        }
+    }
+
+    /// Points with their weights and faces, and for each edge two that have its weight, centre and
+    /// second moment.
+    pub fn samples(&self) -> Vec<(DVec3, f64, Faces)> {
+        let points = self.points.iter().zip(&self.weights).zip(&self.faces).map(|((p, w), f)| (*p, *w, *f));
+        let edges = self.edges.iter().zip(&self.edge_faces).flat_map(|(e, f)| {
+            [-1.0, 1.0].map(|side: f64| {
+                let s = e.length * (0.5 + side / 12.0_f64.sqrt());
+                (e.start + s * e.along, 0.5 * e.density * e.length, *f)
+            })
+        });
+        points.chain(edges).collect()
     }
 }
 

@@ -9,6 +9,7 @@ mod broad;
 mod candidates;
 mod collision;
 pub mod device;
+mod edges;
 mod friction;
 mod geometry;
 mod paper;
@@ -279,7 +280,7 @@ impl Solids {
             (Model::Smooth(model), None) => {
                 self.on_device = OnDevice::None;
                 if !model.is_current(candidates) {
-                    model.collect(candidates, bodies, spacing);
+                    model.collect(candidates, bodies);
                     model.set_constants(&self.limits, bodies, spacing, h);
                 }
                 model.evaluate(bodies);
@@ -294,7 +295,7 @@ impl Solids {
                     }
                 };
                 if !pairs.is_current(candidates) {
-                    pairs.search(model, candidates, bodies, spacing, link)?;
+                    pairs.search(model, candidates, bodies, link)?;
                 }
                 pairs.set_constants(model, &self.limits, bodies, spacing, h);
                 pairs.evaluate(model, bodies, link)?;
@@ -402,7 +403,8 @@ impl Solids {
                     OnDevice::Smooth(pairs) => &pairs.pairs,
                     _ => &model.pairs,
                 };
-                model.friction.apply(pairs, bodies, self.limits.friction, h);
+                let (mu, eta) = (self.limits.friction, self.limits.viscous_friction);
+                model.friction.apply(pairs, bodies, mu, eta, h);
             }
             Model::Collision(model) => {
                 for pair in &model.pairs {

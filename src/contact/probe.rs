@@ -13,13 +13,13 @@ use glam::DVec3;
 pub struct Probe {
     /// Forces of contact, one per solid, without Coulomb friction.
     pub wrenches: Vec<Wrench>,
-    /// Candidates of the search, sorted: the two solids (walls last), and which points or particles.
+    /// Candidates of the search, sorted: the two solids (walls last), and which points, edges or particles.
     pub candidates: Vec<[u64; 4]>,
     /// Where friction acts (law "smooth").
     pub patches: Vec<ProbePatch>,
     /// Energy in the contact springs [J].
     pub energy: f64,
-    /// Points or particle pairs in contact.
+    /// Points (without those of edges) or particle pairs in contact.
     pub touching: usize,
 }
 
@@ -41,6 +41,14 @@ pub struct ProbePatch {
 /// A number for a point.
 fn number(x: DVec3) -> u64 {
     x.x.to_bits() ^ x.y.to_bits().rotate_left(21) ^ x.z.to_bits().rotate_left(42)
+}
+
+/// A number for a solid; walls last.
+fn number_of(b: Other) -> u64 {
+    match b {
+        Other::Solid(b) => b as u64,
+        Other::Wall(w) => u64::MAX - w as u64,
+    }
 }
 
 impl Solids {
@@ -67,13 +75,21 @@ impl Solids {
             });
             probe.patches.extend(patches);
             probe.energy += p.energy;
-            probe.touching += p.contact_count();
+            probe.touching += p.point_count();
         }
         for p in self.paper_pairs() {
             probe.energy += p.energy;
             probe.touching += p.count;
         }
         probe.candidates = self.listed(compute)?;
+        for p in self.smooth_pairs() {
+            let b = number_of(p.b);
+            let edges = |side: u64, edges: &[u32]| {
+                edges.iter().map(|&k| [p.a as u64, b, 2 + side, k.into()]).collect::<Vec<_>>()
+            };
+            probe.candidates.extend(edges(0, &p.edges_a));
+            probe.candidates.extend(edges(1, &p.edges_b));
+        }
         probe.candidates.sort_unstable();
         Ok(probe)
     }
@@ -82,13 +98,8 @@ impl Solids {
         let bodies = &self.bodies;
         let link = compute.map(|compute| Link { compute, traffic: &mut self.traffic });
         let other = |b: Option<usize>| b.map_or(u64::MAX, |b| b as u64);
-        let side = |a: usize, b: Other, side: u8, x: DVec3| {
-            let b = match b {
-                Other::Solid(b) => b as u64,
-                Other::Wall(w) => u64::MAX - w as u64,
-            };
-            [a as u64, b, u64::from(side), number(x)]
-        };
+        let side =
+            |a: usize, b: Other, side: u8, x: DVec3| [a as u64, number_of(b), u64::from(side), number(x)];
         Ok(match (&self.model, &mut self.on_device, link) {
             (Model::Smooth(model), OnDevice::Smooth(pairs), Some(mut link)) => {
                 let listed = pairs.listed(&model.surfaces, bodies, &mut link)?;

@@ -5,6 +5,8 @@
 //!
 //! D = (sum_i w_i d_i^p)^(1/p),  p = 8,
 //!
+//! where edges carry their weight along their length and the sum over them is an integral (`edges`),
+//!
 //! and the contact stores U = K D^2 / 2. With all of a face in contact D is the depth and K the
 //! stiffness of the contact as a whole, whatever the resolution: what Eq. (14) wants of 1/n_c. Unlike
 //! that average, U is a continuous function of the two poses and the forces
@@ -16,9 +18,10 @@
 //! Beyond a quarter spacing a second spring joins, stiff enough to stop the fastest body of the scene
 //! within half a spacing more; it is never reached with a sensible K, and it is conservative too.
 
-use super::geometry::{self, Inside, Surface, WallBox};
+use super::edges::{self, Line};
+use super::geometry::{self, Faces, Inside, Surface, WallBox};
 use crate::body::{Body, Wrench};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// What a free solid touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +33,7 @@ pub(crate) enum Other {
 }
 
 impl Other {
-    /// The moving solid, if it is one.
+    /// Index of the moving solid; `None` for a wall.
     pub fn solid(self) -> Option<usize> {
         match self {
             Self::Solid(b) => Some(b),
@@ -94,23 +97,67 @@ fn felt(steps: f64) -> f64 {
     if steps < 1.0 { 1.5 * steps } else { (2.0 - 0.5 * steps).max(1.0) }
 }
 
+/// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
+const ALONG_NORMAL: f64 = 0.95;
+
+/// Where a box stands.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    center: DVec3,
+    axes: DMat3,
+    half: DVec3,
+}
+
+/// Where the edges of walls are given.
+const WORLD: Frame = Frame { center: DVec3::ZERO, axes: DMat3::IDENTITY, half: DVec3::ZERO };
+
+/// A box as the edges of another frame see it.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    other: Frame,
+    faces: Faces,
+    /// Turns the edges' frame into the box's.
+    turn: DMat3,
+    /// The edges' frame in the box's.
+    shift: DVec3,
+    /// Weight times depth^8 below which an edge is left out [m8].
+    least: f64,
+}
+
+impl View {
+    fn new(own: Frame, other: Frame, faces: Faces, least: f64) -> Self {
+        let still = other.axes.transpose();
+        Self { other, faces, turn: still * own.axes, shift: still * (own.center - other.center), least }
+    }
+}
+
 /// One point in contact.
 #[derive(Clone, Copy, Debug)]
-struct Contact {
+pub(crate) struct Contact {
     /// Where, world [m].
-    at: DVec3,
+    pub at: DVec3,
     /// Direction of the force on the pair's first solid: minus the gradient of the depth, of length 1
     /// except near edges.
-    normal: DVec3,
-    depth: f64,
-    weight: f64,
+    pub normal: DVec3,
+    pub depth: f64,
+    pub weight: f64,
     /// Minus the rate of change of the depth [m/s].
-    speed: f64,
+    pub speed: f64,
     force: f64,
     patch: u8,
 }
 
 impl Contact {
+    /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
+    /// cross.
+    pub fn face(&self) -> Option<u8> {
+        match self.patch {
+            patch @ 0..6 => Some(patch),
+            patch @ 8..14 => Some(patch - 2),
+            _ => None,
+        }
+    }
+
     /// s_i of a point in a contact of effective depth `depth` [m].
     fn share(&self, depth: f64) -> f64 {
         let x = self.depth / depth;
@@ -118,10 +165,10 @@ impl Contact {
     }
 }
 
-/// What a device sums over the points of a pair, world frame.
+/// What a device sums over the points of a pair and the contacts given to it, world frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DeviceSums {
-    /// Points in contact.
+    /// Points and given ones in contact.
     pub count: usize,
     /// Effective depth D of all contacts [m].
     pub depth: f64,
@@ -129,9 +176,9 @@ pub(crate) struct DeviceSums {
     pub deepest: f64,
     /// Sum of the s_i of all contacts.
     pub shares: f64,
-    /// Wrenches on the two solids, of the device's points.
+    /// Wrenches on the two solids, of these.
     pub wrench: [Wrench; 2],
-    /// Patches of the device's points.
+    /// Patches of these.
     pub patches: Vec<Patch>,
 }
 
@@ -158,17 +205,6 @@ impl Patch {
     pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, radius: f64) -> Self {
         Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, radius }
     }
-
-    /// Takes in another patch of the same face. The mean distance from the common centre is exact where
-    /// both have the same centre.
-    fn merge(&mut self, other: &Self) {
-        let force = self.force * self.normal + other.force * other.normal;
-        let pressing = self.pressing + other.pressing;
-        let at = (self.pressing * self.at + other.pressing * other.at) / pressing;
-        let spread = |p: &Self| p.pressing * p.radius.hypot((p.at - at).length());
-        let radius = (spread(self) + spread(other)) / pressing;
-        *self = Self::new(self.key, force, pressing, at, radius);
-    }
 }
 
 /// A pair of solids close to each other.
@@ -182,10 +218,16 @@ pub(crate) struct Pair {
     pub points_a: Vec<u32>,
     /// Points of solid `b` near `a`.
     pub points_b: Vec<u32>,
-    /// Points on the edges of wall `b` near `a`, world [m].
+    /// Corners of wall `b` near `a`, world [m].
     pub samples: Vec<DVec3>,
+    /// Edges of `a` near `b`.
+    pub edges_a: Vec<u32>,
+    /// Edges of `b`, a solid or a wall, near `a`.
+    pub edges_b: Vec<u32>,
     pub constants: Constants,
     contacts: Vec<Contact>,
+    /// Contacts for the device to take in.
+    pub given: Vec<Contact>,
     /// Patches of the last evaluation.
     pub patches: Vec<Patch>,
     /// Wrench on `a` and on `b`, of the last evaluation.
@@ -194,7 +236,8 @@ pub(crate) struct Pair {
     pub energy: f64,
     /// Deepest point [m].
     pub depth: f64,
-    /// Points in contact at the last evaluation.
+    /// Points in contact at the last evaluation, and those with the nodes of edges.
+    points: usize,
     count: usize,
 }
 
@@ -206,45 +249,70 @@ impl Pair {
             points_a: vec![],
             points_b: vec![],
             samples: vec![],
+            edges_a: vec![],
+            edges_b: vec![],
             constants: Constants::default(),
             contacts: vec![],
+            given: vec![],
             patches: vec![],
             wrench: Default::default(),
             energy: 0.0,
             depth: 0.0,
+            points: 0,
             count: 0,
         }
     }
 
-    /// Points in contact at the last evaluation.
+    /// Points and nodes of edges in contact at the last evaluation.
     pub fn contact_count(&self) -> usize {
         self.count
     }
 
-    /// Finds the contacts that a device does not look for; their deepest depth d [m], and the sums of
-    /// w_i (d_i / d)^8 and w_i (d_i / d)^6.
+    /// Points in contact at the last evaluation.
+    pub fn point_count(&self) -> usize {
+        self.points
+    }
+
+    /// Finds the contacts that a device does not look for, those of edges and of walls' corners. Those pressed
+    /// by a face in `open` (bits 0 to 5: of `b`, 6 to 11: of `a`) are to be given to the device; of the
+    /// others, their deepest depth d [m], and the sums of w_i (d_i / d)^8 and w_i (d_i / d)^6.
     pub fn find_beside_device(
         &mut self,
         bodies: &[Body],
         surfaces: &[Surface],
         walls: &[WallBox],
+        spacing: f64,
+        open: u32,
     ) -> [f64; 3] {
         self.contacts.clear();
-        if self.samples.is_empty() {
+        self.given.clear();
+        self.points = 0;
+        if self.is_empty() {
             return [0.0; 3];
         }
         // its lists of points are empty
         self.find(bodies, surfaces, walls);
+        self.points = self.contacts.len();
+        self.find_edges(bodies, surfaces, walls, spacing);
+        let given = &mut self.given;
+        self.contacts.retain(|c| {
+            let on_face = c.face().is_some_and(|face| open >> face & 1 == 1);
+            if on_face {
+                given.push(*c);
+            }
+            !on_face
+        });
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let sum = |power: i32| self.contacts.iter().map(|c| c.weight * (c.depth / deepest).powi(power)).sum();
         if deepest > 0.0 { [deepest, sum(8), sum(6)] } else { [0.0; 3] }
     }
 
-    /// Joins the contacts found beside the device with what it sums over its points.
+    /// Joins the contacts kept beside the device with what it sums over its own and those it was given.
     pub fn join(&mut self, sums: &DeviceSums, bodies: &[Body]) {
         self.patches.clear();
         self.wrench = sums.wrench;
         (self.energy, self.depth) = (0.0, sums.deepest);
+        self.points += sums.count - self.given.len();
         self.count = sums.count + self.contacts.len();
         if sums.count == 0 {
             if !self.contacts.is_empty() {
@@ -254,37 +322,19 @@ impl Pair {
             return;
         }
         self.push(sums.depth, sums.shares);
-        self.depth = sums.deepest;
         self.sum(bodies);
-        for p in &sums.patches {
-            match self.patches.iter_mut().find(|own| own.key == p.key) {
-                Some(own) => own.merge(p),
-                None => self.patches.push(*p),
-            }
-        }
+        self.patches.extend(&sums.patches);
     }
 
-    /// Collects the points of `a` and of `b` that come within `skin` [m] of the other's box.
-    pub fn collect(
-        &mut self,
-        bodies: &[Body],
-        surfaces: &[Surface],
-        walls: &[WallBox],
-        skin: f64,
-        spacing: f64,
-    ) {
+    /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's box.
+    pub fn collect(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
-        self.points_a.clear();
-        self.points_b.clear();
-        self.samples.clear();
-        let near = |surface: &Surface, own: &Body, center: DVec3, axes: glam::DMat3, half: DVec3| {
+        let near = |surface: &Surface, own: &Body, center: DVec3, axes: DMat3, half: DVec3| {
             let turn = axes.transpose() * own.rotation;
             let shift = axes.transpose() * (own.pose.position - center);
             let points = surface.points.iter().enumerate();
-            points
-                .filter(|(_, p)| geometry::outside(turn * **p + shift, half) < skin)
-                .map(|(k, _)| k as u32)
-                .collect::<Vec<u32>>()
+            let points = points.filter(|(_, p)| geometry::outside(turn * **p + shift, half) < skin);
+            points.map(|(k, _)| k as u32).collect::<Vec<u32>>()
         };
         match self.b {
             Other::Solid(b) => {
@@ -296,33 +346,59 @@ impl Pair {
             Other::Wall(w) => {
                 let wall = &walls[w];
                 self.points_a = near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
-                self.collect_edges(body, wall, skin, spacing);
+            }
+        }
+        self.collect_edges(bodies, surfaces, walls, skin);
+    }
+
+    /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's box.
+    pub fn collect_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
+        let body = &bodies[self.a];
+        let own = Frame { center: body.pose.position, axes: body.rotation, half: body.half };
+        let near = |lines: &[Line], of: Frame, to: Frame| {
+            let turn = to.axes.transpose() * of.axes;
+            let shift = to.axes.transpose() * (of.center - to.center);
+            let lines = lines.iter().enumerate().filter(|(_, e)| {
+                edges::clip(turn * e.start + shift, turn * e.along, e.length, to.half + skin).is_some()
+            });
+            lines.map(|(k, _)| k as u32).collect::<Vec<u32>>()
+        };
+        self.samples.clear();
+        match self.b {
+            Other::Solid(b) => {
+                let other = &bodies[b];
+                let other = Frame { center: other.pose.position, axes: other.rotation, half: other.half };
+                self.edges_a = near(&surfaces[self.a].edges, own, other);
+                self.edges_b = near(&surfaces[b].edges, other, own);
+            }
+            Other::Wall(w) => {
+                let wall = &walls[w];
+                let other = Frame { center: wall.center, axes: wall.axes, half: wall.half };
+                self.edges_a = near(&surfaces[self.a].edges, own, other);
+                self.edges_b = near(&wall.edges, WORLD, own);
+                let near = |x: &&DVec3| {
+                    geometry::outside(own.axes.transpose() * (**x - own.center), own.half) < skin
+                };
+                self.samples.extend(wall.corners.iter().filter(near));
             }
         }
     }
 
-    /// Collects the points on the edges of `wall` that come within `skin` [m] of `body`.
-    pub fn collect_edges(&mut self, body: &Body, wall: &WallBox, skin: f64, spacing: f64) {
-        let near = |x: &DVec3| {
-            let q = body.rotation.transpose() * (*x - body.pose.position);
-            geometry::outside(q, body.half) < skin
-        };
-        self.samples.clear();
-        self.samples.extend(wall.samples(body, skin, spacing).filter(near));
-    }
-
     /// Whether any candidate is left.
     pub fn is_empty(&self) -> bool {
-        self.points_a.is_empty() && self.points_b.is_empty() && self.samples.is_empty()
+        let points = self.points_a.len() + self.points_b.len() + self.samples.len();
+        points + self.edges_a.len() + self.edges_b.len() == 0
     }
 
     /// Forces, energy and friction patches at the bodies' poses and velocities.
-    pub fn evaluate(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+    pub fn evaluate(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
         self.contacts.clear();
         self.patches.clear();
         self.wrench = Default::default();
         (self.energy, self.depth) = (0.0, 0.0);
         self.find(bodies, surfaces, walls);
+        self.points = self.contacts.len();
+        self.find_edges(bodies, surfaces, walls, spacing);
         self.count = self.contacts.len();
         if !self.contacts.is_empty() {
             self.press();
@@ -377,10 +453,87 @@ impl Pair {
         }
     }
 
+    /// Nodes of the edges inside the other solid, after the points.
+    fn find_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
+        let (edges_a, edges_b) = (std::mem::take(&mut self.edges_a), std::mem::take(&mut self.edges_b));
+        let a = &bodies[self.a];
+        let own = Frame { center: a.pose.position, axes: a.rotation, half: a.half };
+        let (other, faces, share) = match self.b {
+            Other::Solid(b) => {
+                let (b, surface) = (&bodies[b], &surfaces[b]);
+                let frame = Frame { center: b.pose.position, axes: b.rotation, half: b.half };
+                (frame, surface.all_faces, 0.5)
+            }
+            Other::Wall(w) => {
+                let wall = &walls[w];
+                (Frame { center: wall.center, axes: wall.axes, half: wall.half }, wall.faces, 1.0)
+            }
+        };
+        // the end of an upright edge adds nothing to a face: what is a millionth of the sum is left out
+        let eighths: f64 = self.contacts.iter().map(|c| c.weight * c.depth.powi(8)).sum();
+        let least = 1e-6 * eighths;
+        let view = View::new(own, other, faces, least);
+        for &k in &edges_a {
+            let line = surfaces[self.a].edges[k as usize];
+            self.press_edge(line, &view, share * line.density, 1.0, 32 + k as u8, bodies);
+        }
+        let all = surfaces[self.a].all_faces;
+        match self.b {
+            Other::Solid(b) => {
+                let view = View::new(other, own, all, least);
+                for &k in &edges_b {
+                    let line = surfaces[b].edges[k as usize];
+                    self.press_edge(line, &view, share * line.density, -1.0, 64 + k as u8, bodies);
+                }
+            }
+            Other::Wall(w) => {
+                let view = View::new(WORLD, own, all, least);
+                let density = surfaces[self.a].smallest_weight / spacing;
+                for &k in &edges_b {
+                    self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, 64 + k as u8, bodies);
+                }
+            }
+        }
+        (self.edges_a, self.edges_b) = (edges_a, edges_b);
+    }
+
+    /// Nodes of one edge inside a box. `sign` turns outward of that box into the direction of the force
+    /// on the pair's first solid.
+    ///
+    /// An edge that lies in a face belongs to the face's patch; one that crosses an edge makes its own,
+    /// so that friction acts across the cross product of both.
+    fn press_edge(&mut self, line: Line, view: &View, density: f64, sign: f64, key: u8, bodies: &[Body]) {
+        let other = &view.other;
+        let start = view.turn * line.start + view.shift;
+        let along = view.turn * line.along;
+        let first = self.contacts.len();
+        let mut push = DVec3::ZERO;
+        let a = &bodies[self.a];
+        let b = self.b.solid().map(|b| &bodies[b]);
+        let least = view.least / density;
+        edges::nodes(start, along, line.length, other.half, view.faces, least, |s, width, inside| {
+            let at = other.center + other.axes * (start + s * along);
+            let normal = sign * (other.axes * inside.outward);
+            let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
+            let speed = (a.pose.velocity_at(at) - velocity_b).dot(normal);
+            push += width * inside.depth.powi(7) * inside.outward;
+            let (depth, weight) = (inside.depth, density * width);
+            self.contacts.push(Contact { at, normal, depth, weight, speed, force: 0.0, patch: key });
+        });
+        let toward = push.abs();
+        let axis = toward.max_position();
+        if toward[axis] > ALONG_NORMAL * push.length() {
+            let face = 2 * axis as u8 + u8::from(push[axis] > 0.0);
+            let patch = if sign > 0.0 { face } else { 8 + face };
+            self.contacts[first..].iter_mut().for_each(|c| c.patch = patch);
+        }
+    }
+
     /// Normal forces of the points: the pair's spring and dashpot, no tension.
     ///
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
-    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i.
+    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i. The second spring
+    /// brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
     fn press(&mut self) {
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
@@ -398,11 +551,14 @@ impl Pair {
         let k = self.constants;
         let (secant, energy) = k.stored(depth);
         self.energy = energy;
-        let damping = k.damping * (secant / k.spring).sqrt() / shares.sqrt();
+        let beyond = (depth - k.stop_depth).max(0.0);
+        let stop = (k.stop / k.spring).sqrt() - 1.0;
         for c in &mut self.contacts {
             let share = c.share(depth);
-            let felt = if c.speed < 0.0 { felt(c.depth / -c.speed / k.step) } else { 1.0 };
-            c.force = (share * (secant * c.depth - felt * damping * c.speed)).max(0.0);
+            let since = |depth: f64| if c.speed < 0.0 { felt(depth / -c.speed / k.step) } else { 1.0 };
+            let stopping = if beyond > 0.0 { stop * since(beyond) } else { 0.0 };
+            let damping = k.damping / shares.sqrt() * (since(c.depth) + stopping);
+            c.force = (share * (secant * c.depth - damping * c.speed)).max(0.0);
         }
     }
 

@@ -16,7 +16,7 @@ impl Solids {
         match &mut self.model {
             Model::Smooth(model) => {
                 if !model.is_current(&self.candidates) {
-                    model.collect(&self.candidates, &self.bodies, self.spacing);
+                    model.collect(&self.candidates, &self.bodies);
                     let h = self.limits.longest_step;
                     model.set_constants(&self.limits, &self.bodies, self.spacing, h.max(f64::MIN_POSITIVE));
                 }

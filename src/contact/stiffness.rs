@@ -49,15 +49,15 @@ pub(crate) fn smooth(body: &Body, surface: &Surface) -> Lambda {
     if !turns {
         return lambda;
     }
-    for (p, w) in surface.points.iter().zip(&surface.weights) {
+    let samples = surface.samples();
+    for (p, w, _) in &samples {
         let give = mass + p.length_squared() * turn;
         take(share(*w) * give, share(*w).sqrt() * give);
     }
     for face in 0..6_u8 {
         let on = |other: u8| {
             let both = 1 << face | 1 << other;
-            let points = surface.points.iter().zip(&surface.weights).zip(&surface.faces);
-            points.filter(move |(_, f)| *f & both == both).map(|((p, w), _)| (*p, *w))
+            samples.iter().filter(move |s| s.2 & both == both).map(|s| (s.0, s.1))
         };
         for other in 0..6_u8 {
             // `face` alone when both are the same, else the edge between them

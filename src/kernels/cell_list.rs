@@ -19,9 +19,9 @@ pub struct CellList {
     pub coordinates: Coordinates,
 }
 
-/// Stable counting sort: `start[c]` gets the first place of cell c, `place[k]` the place of particle k.
+/// Stable counting sort: `start[c]` gets the first place of cell c, `order[p]` the particle that goes to place p.
 /// Particles with cell `cells` (ghosts) come last.
-pub fn counting_sort(cell: &[u32], cells: usize, start: &mut Vec<u32>, place: &mut Vec<u32>) {
+pub fn counting_sort(cell: &[u32], cells: usize, start: &mut Vec<u32>, order: &mut Vec<u32>) {
     start.clear();
     start.resize(cells + 2, 0);
     for &c in cell {
@@ -30,15 +30,13 @@ pub fn counting_sort(cell: &[u32], cells: usize, start: &mut Vec<u32>, place: &m
     for c in 0..=cells {
         start[c + 1] += start[c];
     }
-    place.resize(cell.len(), 0);
+    order.resize(cell.len(), 0);
     // `start[c]` serves as the cursor of cell c; afterwards every entry has moved one cell on.
-    for (p, &c) in place.iter_mut().zip(cell) {
-        *p = start[c as usize];
+    for (k, &c) in cell.iter().enumerate() {
+        order[start[c as usize] as usize] = k as u32;
         start[c as usize] += 1;
     }
-    for c in (0..=cells).rev() {
-        start[c + 1] = start[c];
-    }
+    start.copy_within(0..=cells, 1);
     start[0] = 0;
     start.truncate(cells + 1);
 }
@@ -57,11 +55,9 @@ impl CellList {
         scratch.cell.clear();
         let cell = |&s: &u32| grid.index(grid.coordinates(position[s as usize])) as u32;
         scratch.cell.extend(scratch.slots.iter().map(cell));
-        counting_sort(&scratch.cell, grid.total(), &mut self.start, &mut scratch.place);
-        self.slot.resize(scratch.slots.len(), 0);
-        for (&s, &p) in scratch.slots.iter().zip(&scratch.place) {
-            self.slot[p as usize] = s;
-        }
+        counting_sort(&scratch.cell, grid.total(), &mut self.start, &mut scratch.order);
+        self.slot.clear();
+        self.slot.extend(scratch.order.iter().map(|&k| scratch.slots[k as usize]));
         scratch.vector.clear();
         scratch.vector.extend(self.slot.iter().map(|&s| position[s as usize]));
         self.coordinates.set(&scratch.vector);
@@ -73,7 +69,7 @@ impl CellList {
 pub struct Scratch {
     slots: Vec<u32>,
     cell: Vec<u32>,
-    place: Vec<u32>,
+    order: Vec<u32>,
     vector: Vec<DVec3>,
     scalar: Vec<f64>,
     number: Vec<u32>,
@@ -109,14 +105,14 @@ pub fn reorder_fluid(
             }
         },
     );
-    counting_sort(&scratch.cell, grid.total(), start, &mut scratch.place);
+    counting_sort(&scratch.cell, grid.total(), start, &mut scratch.order);
     let live = start[grid.total()] as usize;
-    let place = &scratch.place;
-    permute(&mut fields.position[..n], place, &mut scratch.vector);
-    permute(&mut fields.velocity[..n], place, &mut scratch.vector);
-    permute(&mut fields.pressure[..n], place, &mut scratch.scalar);
-    permute(&mut fields.id, place, &mut scratch.number);
-    permute(&mut fields.kind[..n], place, &mut scratch.kind);
+    let order = &scratch.order;
+    permute(&mut fields.position[..n], order, &mut scratch.vector);
+    permute(&mut fields.velocity[..n], order, &mut scratch.vector);
+    permute(&mut fields.pressure[..n], order, &mut scratch.scalar);
+    permute(&mut fields.id, order, &mut scratch.number);
+    permute(&mut fields.kind[..n], order, &mut scratch.kind);
     for i in live..n {
         fields.kind[i] = Kind::Ghost;
         fields.position[i] = domain.0;
@@ -126,13 +122,13 @@ pub fn reorder_fluid(
     (n - live - ghosts_before) as u64
 }
 
-/// `values[k]` moves to `place[k]`.
-fn permute<T: Copy>(values: &mut [T], place: &[u32], scratch: &mut Vec<T>) {
-    scratch.clear();
-    scratch.extend_from_slice(values);
-    for (&v, &p) in scratch.iter().zip(place) {
-        values[p as usize] = v;
-    }
+/// Particles that a thread permutes at a time.
+const PART: usize = 4096;
+
+/// `values[order[p]]` moves to place p.
+fn permute<T: Copy + Send + Sync>(values: &mut [T], order: &[u32], scratch: &mut Vec<T>) {
+    order.par_iter().with_min_len(PART).map(|&k| values[k as usize]).collect_into_vec(scratch);
+    values.par_chunks_mut(PART).zip(scratch.par_chunks(PART)).for_each(|(v, s)| v.copy_from_slice(s));
 }
 
 /// Mark every cell within one cell of a cell that holds fluid: only walls there can feel or be felt.

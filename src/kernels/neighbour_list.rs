@@ -3,13 +3,13 @@
 
 use super::cell_list::CellList;
 use crate::cells::Grid;
-use crate::neighbours::{CAPACITY, Chunk};
+use crate::neighbours::{CAPACITY, CHUNK, Chunk};
 use crate::params::Params;
 use glam::DVec3;
+use rayon::prelude::*;
 
-/// Candidates examined together: enough to fill vector registers, few enough not to run far over the end
-/// of a column of cells.
-const BLOCK: usize = 16;
+/// Candidates examined together.
+const BLOCK: usize = 4;
 
 /// Coordinates in cell order, each component by itself, so that distances are computed several at a time.
 #[derive(Clone, Default, Debug)]
@@ -22,36 +22,117 @@ pub struct Coordinates {
 impl Coordinates {
     /// Take over `position`; the arrays get a block of padding, so that blocks may be read past the end.
     pub fn set(&mut self, position: &[DVec3]) {
-        for (out, k) in [(&mut self.x, 0), (&mut self.y, 1), (&mut self.z, 2)] {
-            out.clear();
-            out.extend(position.iter().map(|p| p[k]));
-            out.resize(position.len() + BLOCK, 0.0);
+        let (n, Self { x, y, z }) = (position.len(), self);
+        for v in [&mut *x, &mut *y, &mut *z] {
+            v.resize(n + BLOCK, 0.0);
         }
+        (&mut x[..n], &mut y[..n], &mut z[..n], position)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .for_each(|(x, y, z, p)| (*x, *y, *z) = (p.x, p.y, p.z));
     }
 
-    /// Call `hit(k, r2)` for each k in `a..b` closer than sqrt(`re2`) to `c`, in rising order.
+    /// Squared distances to `c` from `k` on.
     #[inline(always)]
-    fn within(&self, (a, b): (usize, usize), c: DVec3, re2: f64, mut hit: impl FnMut(usize, f64)) {
-        let mut first = a;
-        while first < b {
-            let range = first..first + BLOCK;
-            let (x, y, z) = (&self.x[range.clone()], &self.y[range.clone()], &self.z[range]);
-            let mut r2 = [0.0; BLOCK];
-            let mut hits = 0_u32;
-            for k in 0..BLOCK {
-                let (dx, dy, dz) = (x[k] - c.x, y[k] - c.y, z[k] - c.z);
-                r2[k] = dx * dx + dy * dy + dz * dz;
-                hits |= u32::from(r2[k] < re2) << k;
+    fn squares(&self, k: usize, c: DVec3) -> [f64; BLOCK] {
+        let (x, y, z) = (&self.x[k..k + BLOCK], &self.y[k..k + BLOCK], &self.z[k..k + BLOCK]);
+        std::array::from_fn(|l| {
+            let (dx, dy, dz) = (x[l] - c.x, y[l] - c.y, z[l] - c.z);
+            dx * dx + dy * dy + dz * dz
+        })
+    }
+
+    /// Append those of `run` that are closer than `reach` to `found`, in rising order.
+    #[inline(always)]
+    fn within(&self, run: Run, c: DVec3, reach: Reach, below: impl Below, found: &mut Found) {
+        for first in (run.first..run.end).step_by(BLOCK) {
+            let square = self.squares(first as usize, c);
+            let inside = u32::MAX >> (32 - (run.end - first).min(BLOCK as u32));
+            let hits = below(square, reach.radius2) & inside;
+            found.close += (below(square, reach.close2) & inside).count_ones();
+            // The last places take the overflow, which the count reveals.
+            let at = found.count.min(CAPACITY);
+            found.index[at..at + BLOCK].copy_from_slice(&PLACES[hits as usize].map(|k| first + k));
+            found.count += hits.count_ones() as usize;
+        }
+    }
+}
+
+/// Bit k of the result tells whether the k-th number lies below the limit.
+trait Below: Fn([f64; BLOCK], f64) -> u32 + Copy {}
+impl<F: Fn([f64; BLOCK], f64) -> u32 + Copy> Below for F {}
+
+/// Where the set bits of each mask are, from the first on.
+const PLACES: [[u32; BLOCK]; 1 << BLOCK] = {
+    let mut places = [[0; BLOCK]; 1 << BLOCK];
+    let mut mask = 0;
+    while mask < 1 << BLOCK {
+        let (mut bit, mut n) = (0, 0);
+        while bit < BLOCK {
+            if mask >> bit & 1 == 1 {
+                places[mask][n] = bit as u32;
+                n += 1;
             }
-            if b - first < BLOCK {
-                hits &= (1 << (b - first)) - 1;
-            }
-            while hits != 0 {
-                let k = hits.trailing_zeros() as usize;
-                hit(first + k, r2[k]);
-                hits &= hits - 1;
-            }
-            first += BLOCK;
+            bit += 1;
+        }
+        mask += 1;
+    }
+    places
+};
+
+/// Squared distances that matter [m2].
+#[derive(Clone, Copy)]
+struct Reach {
+    /// Of the effective radius.
+    radius2: f64,
+    /// Of the collision distance.
+    close2: f64,
+}
+
+/// Candidates that lie next to each other in a cell list: a column of cells.
+#[derive(Clone, Copy, Default)]
+struct Run {
+    first: u32,
+    end: u32,
+}
+
+/// Candidates found within reach.
+struct Found {
+    index: [u32; CAPACITY + BLOCK],
+    /// All of them, also those that had no place.
+    count: usize,
+    /// Those closer than the collision distance.
+    close: u32,
+}
+
+impl Default for Found {
+    fn default() -> Self {
+        Self { index: [0; CAPACITY + BLOCK], count: 0, close: 0 }
+    }
+}
+
+impl Found {
+    fn clear(&mut self) {
+        (self.count, self.close) = (0, 0);
+    }
+
+    fn kept(&self) -> &[u32] {
+        &self.index[..self.count.min(CAPACITY)]
+    }
+
+    #[inline(always)]
+    fn push(&mut self, j: u32) {
+        self.index[self.count.min(CAPACITY)] = j;
+        self.count += 1;
+    }
+
+    /// Take `j` out, if it is there.
+    #[inline(always)]
+    fn remove(&mut self, j: u32) {
+        let kept = self.kept().len();
+        if let Some(at) = self.kept().iter().position(|&k| k == j) {
+            self.index.copy_within(at + 1..kept, at);
+            self.count -= 1;
         }
     }
 }
@@ -72,69 +153,80 @@ pub struct Candidates<'a> {
     pub pressure_slots: u32,
 }
 
-/// One row under construction.
-pub struct Search {
-    near: [u32; CAPACITY],
-    dummy: [u32; CAPACITY],
-    near_count: usize,
-    dummy_count: usize,
-    smallest: f64,
-}
+/// Columns of cells around a cell.
+const COLUMNS: usize = 9;
 
-impl Default for Search {
-    fn default() -> Self {
-        Self { near: [0; CAPACITY], dummy: [0; CAPACITY], near_count: 0, dummy_count: 0, smallest: 0.0 }
-    }
+/// One row under construction.
+#[derive(Default)]
+pub struct Search {
+    /// Cell that the runs lie around: rows that follow each other often share it.
+    cell: Option<[u32; 3]>,
+    fluid: [Run; COLUMNS],
+    fluid_runs: usize,
+    solid: [(Run, bool); 2 * COLUMNS],
+    solid_runs: usize,
+    near: Found,
+    dummy: Found,
+    hits: Found,
 }
 
 impl Search {
-    #[inline(always)]
-    fn take(&mut self, j: u32, r2: f64, carries_pressure: bool) {
-        // The last place takes the overflow, which the counts reveal.
-        if carries_pressure {
-            self.near[self.near_count.min(CAPACITY - 1)] = j;
-            self.near_count += 1;
-        } else {
-            self.dummy[self.dummy_count.min(CAPACITY - 1)] = j;
-            self.dummy_count += 1;
+    /// Look up the columns of cells around `cell`.
+    fn approach(&mut self, cell: [u32; 3], from: &Candidates) {
+        (self.cell, self.fluid_runs, self.solid_runs) = (Some(cell), 0, 0);
+        for (first, last) in from.grid.columns(cell) {
+            let run = |start: &[u32]| Run { first: start[first], end: start[last + 1] };
+            let fluid = run(from.fluid_start);
+            if fluid.first < fluid.end {
+                self.fluid[self.fluid_runs] = fluid;
+                self.fluid_runs += 1;
+            }
+            for (list, moves) in [(from.moving, true), (from.fixed, false)] {
+                let run = list.map_or(Run::default(), |list| run(&list.start));
+                if run.first < run.end {
+                    self.solid[self.solid_runs] = (run, moves);
+                    self.solid_runs += 1;
+                }
+            }
         }
-        self.smallest = self.smallest.min(r2);
     }
 
     /// Find the neighbours of slot `i` at `x`; they are then read by [`Search::append`]. Returns their number.
     #[inline(always)]
-    pub fn row(&mut self, i: usize, x: DVec3, params: &Params, from: &Candidates) -> usize {
-        let re2 = params.effective_radius * params.effective_radius;
-        (self.near_count, self.dummy_count, self.smallest) = (0, 0, f64::MAX);
-        for (first, last) in from.grid.columns(from.grid.coordinates(x)) {
-            let fluid = (from.fluid_start[first] as usize, from.fluid_start[last + 1] as usize);
-            from.fluid.within(fluid, x, re2, |j, r2| {
-                if j != i {
-                    self.take(j as u32, r2, true);
-                }
-            });
-            for list in [from.moving, from.fixed].into_iter().flatten() {
-                let solid = (list.start[first] as usize, list.start[last + 1] as usize);
-                list.coordinates.within(solid, x, re2, |k, r2| {
-                    let j = list.slot[k];
-                    if j as usize != i {
-                        self.take(j, r2, j < from.pressure_slots);
-                    }
-                });
-            }
+    fn row(&mut self, i: usize, x: DVec3, reach: Reach, from: &Candidates, below: impl Below) -> usize {
+        let cell = from.grid.coordinates(x);
+        if self.cell != Some(cell) {
+            self.approach(cell, from);
         }
-        self.near_count + self.dummy_count
+        let Self { fluid, fluid_runs, solid, solid_runs, near, dummy, hits, .. } = self;
+        near.clear();
+        dummy.clear();
+        for &run in &fluid[..*fluid_runs] {
+            from.fluid.within(run, x, reach, below, near);
+        }
+        for &(run, moves) in &solid[..*solid_runs] {
+            let Some(list) = (if moves { from.moving } else { from.fixed }) else { continue };
+            hits.clear();
+            list.coordinates.within(run, x, reach, below, hits);
+            for &k in hits.kept() {
+                let j = list.slot[k as usize];
+                if j < from.pressure_slots { near.push(j) } else { dummy.push(j) }
+            }
+            near.close += hits.close;
+        }
+        near.remove(i as u32);
+        near.count + dummy.count
     }
 
     /// Append the row found last to `chunk` as row `k`.
     #[inline(always)]
-    pub fn append(&self, chunk: &mut Chunk, k: usize, params: &Params) {
-        let (near, dummy) = (self.near_count.min(CAPACITY), self.dummy_count.min(CAPACITY));
-        chunk.neighbour.extend_from_slice(&self.near[..near]);
+    fn append(&self, chunk: &mut Chunk, k: usize) {
+        chunk.neighbour.extend_from_slice(self.near.kept());
         chunk.dummies[k] = chunk.neighbour.len() as u32;
-        chunk.neighbour.extend_from_slice(&self.dummy[..dummy]);
+        chunk.neighbour.extend_from_slice(self.dummy.kept());
         chunk.start[k + 1] = chunk.neighbour.len() as u32;
-        chunk.close[k] = self.smallest < params.collision_distance * params.collision_distance;
+        // The particle itself is always close.
+        chunk.close[k] = self.near.close > 1;
     }
 }
 
@@ -147,14 +239,17 @@ fn chunk_rows(
     params: &Params,
     from: &Candidates,
     search: &mut Search,
+    below: impl Below,
 ) -> (usize, usize) {
+    let reach = Reach { radius2: params.effective_radius.powi(2), close2: params.collision_distance.powi(2) };
     let mut largest = (0, 0);
+    search.cell = None;
     chunk.neighbour.clear();
     for k in 0..chunk.rows() {
         if let Some((i, x)) = active(k) {
-            let found = search.row(i, x, params, from);
+            let found = search.row(i, x, reach, from, below);
             largest = largest.max((found, i));
-            search.append(chunk, k, params);
+            search.append(chunk, k);
         } else {
             chunk.dummies[k] = chunk.neighbour.len() as u32;
             chunk.start[k + 1] = chunk.dummies[k];
@@ -165,8 +260,25 @@ fn chunk_rows(
     largest
 }
 
+/// [`Below`] for any machine.
+#[inline(always)]
+fn below(value: [f64; BLOCK], limit: f64) -> u32 {
+    (0..BLOCK).map(|k| u32::from(value[k] < limit) << k).sum()
+}
+
+/// [`Below`] in two instructions, which compilers do not find by themselves.
 #[cfg(target_arch = "x86_64")]
+#[inline]
 #[target_feature(enable = "avx2")]
+fn below_avx2(value: [f64; BLOCK], limit: f64) -> u32 {
+    use std::arch::x86_64::{_CMP_LT_OQ, _mm256_cmp_pd, _mm256_loadu_pd, _mm256_movemask_pd, _mm256_set1_pd};
+    // SAFETY: four numbers are read from an array of four.
+    let value = unsafe { _mm256_loadu_pd(value.as_ptr()) };
+    _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(value, _mm256_set1_pd(limit))) as u32
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,popcnt,bmi1,bmi2")]
 fn chunk_rows_avx2(
     chunk: &mut Chunk,
     active: impl Fn(usize) -> Option<(usize, DVec3)>,
@@ -174,7 +286,8 @@ fn chunk_rows_avx2(
     from: &Candidates,
     search: &mut Search,
 ) -> (usize, usize) {
-    chunk_rows(chunk, active, params, from, search)
+    let below = |value, limit| below_avx2(value, limit);
+    chunk_rows(chunk, active, params, from, search, below)
 }
 
 /// [`chunk_rows`], with the widest vectors that the machine has. The arithmetic is the same, bit for bit.
@@ -186,9 +299,43 @@ pub fn neighbour_list(
     search: &mut Search,
 ) -> (usize, usize) {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the machine has AVX2, checked just above.
+    if is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("popcnt")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+    {
+        // SAFETY: the machine has these features, checked just above.
         return unsafe { chunk_rows_avx2(chunk, active, params, from, search) };
     }
-    chunk_rows(chunk, active, params, from, search)
+    chunk_rows(chunk, active, params, from, search, below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_the_set_bits() {
+        for (mask, places) in PLACES.iter().enumerate() {
+            let set: Vec<u32> = (0..BLOCK as u32).filter(|k| mask >> k & 1 == 1).collect();
+            assert_eq!(places[..set.len()], set);
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn the_comparison_in_vectors_is_the_plain_one() {
+        if !is_x86_feature_detected!("avx2") {
+            eprintln!("SKIPPED: no AVX2");
+            return;
+        }
+        let numbers = [-1.0, 0.0, 1.0, 1.0 + f64::EPSILON, f64::NAN, f64::INFINITY];
+        for k in 0..numbers.len().pow(BLOCK as u32) {
+            let value = std::array::from_fn(|l| numbers[k / numbers.len().pow(l as u32) % numbers.len()]);
+            for limit in numbers {
+                // SAFETY: the machine has AVX2, checked just above.
+                assert_eq!(unsafe { below_avx2(value, limit) }, below(value, limit), "{value:?} {limit}");
+            }
+        }
+    }
 }

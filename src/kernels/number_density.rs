@@ -3,8 +3,8 @@
 
 use crate::case::FreeSurface;
 use crate::fields::State;
-use crate::neighbours::Row;
 use crate::params::{Params, weight};
+use crate::row_arrays::{LANES, RowArrays, sum};
 use glam::DVec3;
 
 /// Distance of the neighbours' centroid, over l0, from which a thin particle counts as surface.
@@ -13,30 +13,33 @@ const OFFSET: f64 = 0.1;
 /// Smallest distance used in weights, over l0: coincident particles must not give infinities.
 pub const CLOSEST: f64 = 0.1;
 
-/// Weights of all neighbours of slot `i`, Eq. (3); pairs beyond the effective radius (the collision may
-/// have moved them since the search) get 0.
+/// Weights of `n` neighbours at distances `r.r`, Eq. (3), into `r.w`; pairs beyond the effective radius (the
+/// collision may have moved them since the search) get 0.
 #[inline(always)]
-pub fn weights(i: usize, neighbour: &[u32], out: &mut [f64], params: &Params, position: &[DVec3]) {
-    let re = params.effective_radius;
-    let floor = CLOSEST * params.spacing;
-    let x = position[i];
-    for (w, &j) in out.iter_mut().zip(neighbour) {
-        let r = position[j as usize].distance(x).max(floor);
-        *w = weight(r, re).max(0.0);
-    }
+pub fn weights(n: usize, r: &mut RowArrays, params: &Params) {
+    let (re, floor) = (params.effective_radius, CLOSEST * params.spacing);
+    let filled = n.next_multiple_of(LANES);
+    let RowArrays { r, w, .. } = r;
+    r.map_squares(&mut w[..filled], |_, r2| weight(r2.sqrt().max(floor), re).max(0.0));
+    w[n..filled].fill(0.0);
 }
 
-/// Number density of slot `i` and its part in the PPE. `fluid` is the number of fluid slots: a wall
-/// particle without fluid in reach is dry and inactive.
+/// Number density of slot `i` and its part in the PPE; `r` gets distances and weights of its neighbours. `fluid` is
+/// the number of fluid slots: a wall particle without fluid in reach is dry and inactive.
 #[inline(always)]
-pub fn number_density(i: usize, row: Row, params: &Params, fluid: usize, position: &[DVec3]) -> (f64, State) {
-    let x = position[i];
-    let (mut n, mut centroid, mut wet) = (0.0, DVec3::ZERO, i < fluid);
-    for (j, w) in row.iter() {
-        n += w;
-        centroid += w * (position[j] - x);
-        wet |= j < fluid && w > 0.0;
-    }
+pub fn number_density(
+    i: usize,
+    neighbour: &[u32],
+    params: &Params,
+    fluid: usize,
+    position: &[DVec3],
+    r: &mut RowArrays,
+) -> (f64, State) {
+    let filled = r.r.differences(i, neighbour, position);
+    weights(neighbour.len(), r, params);
+    let w = &r.w[..filled];
+    let n = sum(w);
+    let wet = i < fluid || neighbour.iter().zip(w).any(|(&j, &w)| (j as usize) < fluid && w > 0.0);
     if !wet {
         return (n, State::Inactive);
     }
@@ -44,7 +47,8 @@ pub fn number_density(i: usize, row: Row, params: &Params, fluid: usize, positio
     let surface = match params.free_surface {
         FreeSurface::Threshold => n < threshold,
         FreeSurface::ThresholdOffset => {
-            n < 0.8 * threshold || (n < threshold && centroid.length() > OFFSET * params.spacing * n)
+            n < 0.8 * threshold
+                || (n < threshold && r.r.weighted_sum(w).length() > OFFSET * params.spacing * n)
         }
     };
     (n, if surface { State::Surface } else { State::Inner })

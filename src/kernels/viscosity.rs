@@ -5,22 +5,21 @@
 
 use crate::neighbours::Row;
 use crate::params::{Params, weight};
+use crate::row_arrays::RowArrays;
 use glam::DVec3;
 
 /// nu times the Laplacian of the velocity at slot `i` [m/s2]; `row` holds its pressure-carrying neighbours.
 /// The particles have moved since the list was made: weights are made afresh.
 #[inline(always)]
-pub fn viscosity(i: usize, row: Row, params: &Params, position: &[DVec3], velocity: &[DVec3]) -> DVec3 {
-    let re = params.effective_radius;
-    let mut sum = DVec3::ZERO;
-    for &j in row.neighbour {
-        let j = j as usize;
-        let r = position[j].distance(position[i]);
-        if r < re && r > 0.0 {
-            sum += (velocity[j] - velocity[i]) * weight(r, re);
-        }
-    }
-    params.viscosity * 2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density) * sum
+pub fn viscosity(
+    i: usize,
+    row: Row,
+    params: &Params,
+    position: &[DVec3],
+    velocity: &[DVec3],
+    arrays: &mut RowArrays,
+) -> DVec3 {
+    coefficient(params) * laplacian_sum(i, row, |_| true, params, position, velocity, arrays)
 }
 
 /// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
@@ -32,17 +31,42 @@ pub fn reaction(
     fluid: usize,
     position: &[DVec3],
     velocity: &[DVec3],
+    arrays: &mut RowArrays,
+) -> DVec3 {
+    let wet = |j: u32| (j as usize) < fluid;
+    params.particle_mass()
+        * coefficient(params)
+        * laplacian_sum(i, row, wet, params, position, velocity, arrays)
+}
+
+/// 2 d nu / (lambda n0) [1/s].
+fn coefficient(params: &Params) -> f64 {
+    params.viscosity * 2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density)
+}
+
+/// sum w (v_j - v_i) over the neighbours that `counts` admits.
+#[inline(always)]
+fn laplacian_sum(
+    i: usize,
+    row: Row,
+    counts: impl Fn(u32) -> bool,
+    params: &Params,
+    position: &[DVec3],
+    velocity: &[DVec3],
+    arrays: &mut RowArrays,
 ) -> DVec3 {
     let re = params.effective_radius;
+    let RowArrays { r, w, .. } = arrays;
+    r.differences(i, row.neighbour, position);
+    let w = &mut w[..row.neighbour.len()];
+    r.map_squares(w, |_, r2| {
+        let r = r2.sqrt();
+        if r > 0.0 && r < re { weight(r, re) } else { 0.0 }
+    });
     let mut sum = DVec3::ZERO;
-    for &j in row.neighbour {
-        let j = j as usize;
-        let r = position[j].distance(position[i]);
-        if j < fluid && r < re && r > 0.0 {
-            sum += (velocity[j] - velocity[i]) * weight(r, re);
-        }
+    for (&w, &j) in w.iter().zip(row.neighbour) {
+        let w = if counts(j) { w } else { 0.0 };
+        sum += w * (velocity[j as usize] - velocity[i]);
     }
-    let coefficient =
-        params.viscosity * 2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density);
-    params.particle_mass() * coefficient * sum
+    sum
 }

@@ -3,7 +3,7 @@
 use super::{Outcome, PressureReport, Settings};
 use crate::fields::State;
 use crate::kernels::conjugate_gradient::apply;
-use crate::neighbours::{CHUNK, Neighbours};
+use crate::neighbours::{CHUNK, Chunk, Neighbours};
 use rayon::prelude::*;
 
 /// The system A P = b of one step. Vectors run over all pressure-carrying slots and are zero where the
@@ -30,9 +30,10 @@ pub struct Jacobi;
 
 impl Precondition for Jacobi {
     fn apply(&mut self, system: &System, r: &[f64], z: &mut [f64]) {
-        (z.par_chunks_mut(CHUNK), r.par_chunks(CHUNK), system.diagonal.par_chunks(CHUNK))
+        (z.par_chunks_mut(CHUNK), r.par_chunks(CHUNK), system.diagonal.par_chunks(CHUNK), system.chunks())
             .into_par_iter()
-            .for_each(|(z, r, d)| z.iter_mut().zip(r).zip(d).for_each(|((z, r), d)| *z = r / d));
+            .filter(|(.., chunk)| !chunk.is_dry())
+            .for_each(|(z, r, d, _)| z.iter_mut().zip(r).zip(d).for_each(|((z, r), d)| *z = r / d));
     }
 }
 
@@ -47,20 +48,91 @@ pub struct Workspace {
 }
 
 impl System<'_> {
+    /// Chunks of rows. Those of dry walls hold no unknowns: nothing is computed there, and vectors stay zero.
+    fn chunks(&self) -> &[Chunk] {
+        &self.neighbours.chunks
+    }
+
     /// q <- A p on the unknowns, 0 elsewhere. Returns p.q.
     pub fn multiply(&self, p: &[f64], q: &mut [f64], sums: &mut Vec<f64>) -> f64 {
-        (q.par_chunks_mut(CHUNK), &self.neighbours.chunks)
+        (q.par_chunks_mut(CHUNK), self.chunks(), self.state.par_chunks(CHUNK))
             .into_par_iter()
             .enumerate()
-            .map(|(c, (q, chunk))| {
+            .map(|(c, (q, chunk, state))| {
+                if chunk.is_dry() {
+                    return 0.0;
+                }
                 let mut sum = 0.0;
-                for (k, q) in q.iter_mut().enumerate() {
+                for (k, (q, &state)) in q.iter_mut().zip(state).enumerate() {
                     let i = c * CHUNK + k;
-                    *q = 0.0;
-                    if self.state[i] == State::Inner {
-                        *q = apply(i, chunk.pressure(k), self.coefficient, self.diagonal[i], p);
-                        sum += *q * p[i];
-                    }
+                    let row = apply(i, chunk.pressure(k), self.coefficient, self.diagonal[i], p);
+                    // Chosen afterwards: a jump over single surface particles would cost more than their rows.
+                    *q = if state == State::Inner { row } else { 0.0 };
+                    sum += *q * p[i];
+                }
+                sum
+            })
+            .collect_into_vec(sums);
+        sums.iter().sum()
+    }
+
+    /// a.b of vectors that are zero in dry chunks, in an order that does not depend on the number of threads.
+    fn dot(&self, a: &[f64], b: &[f64], sums: &mut Vec<f64>) -> f64 {
+        (a.par_chunks(CHUNK), b.par_chunks(CHUNK), self.chunks())
+            .into_par_iter()
+            .map(|(a, b, chunk)| if chunk.is_dry() { 0.0 } else { product(a, b) })
+            .collect_into_vec(sums);
+        sums.iter().sum()
+    }
+
+    /// r <- b - A x with x set to zero where there is no unknown, or everywhere unless `warm`. Returns r.r.
+    fn start(&self, warm: bool, b: &[f64], x: &mut [f64], work: &mut Workspace) -> f64 {
+        let Workspace { r, z, p, q, sums } = work;
+        (
+            x.par_chunks_mut(CHUNK),
+            r.par_chunks_mut(CHUNK),
+            z.par_chunks_mut(CHUNK),
+            p.par_chunks_mut(CHUNK),
+            self.state.par_chunks(CHUNK),
+            self.chunks(),
+        )
+            .into_par_iter()
+            .for_each(|(x, r, z, p, state, chunk)| {
+                x.iter_mut().zip(state).for_each(|(x, &s)| {
+                    *x = if warm && s == State::Inner { *x } else { 0.0 };
+                });
+                if chunk.is_dry() {
+                    [r, z, p].into_iter().for_each(|v| v.fill(0.0));
+                }
+            });
+        self.multiply(x, q, sums);
+        (r.par_chunks_mut(CHUNK), b.par_chunks(CHUNK), q.par_chunks(CHUNK), self.chunks())
+            .into_par_iter()
+            .filter(|(.., chunk)| !chunk.is_dry())
+            .for_each(|(r, b, q, _)| r.iter_mut().zip(b).zip(q).for_each(|((r, b), q)| *r = b - q));
+        self.dot(r, r, sums)
+    }
+
+    /// x += alpha p, r -= alpha q. Returns r.r.
+    fn advance(&self, alpha: f64, x: &mut [f64], work: &mut Workspace) -> f64 {
+        let Workspace { r, p, q, sums, .. } = work;
+        (
+            x.par_chunks_mut(CHUNK),
+            r.par_chunks_mut(CHUNK),
+            p.par_chunks(CHUNK),
+            q.par_chunks(CHUNK),
+            self.chunks(),
+        )
+            .into_par_iter()
+            .map(|(x, r, p, q, chunk)| {
+                let mut sum = 0.0;
+                if chunk.is_dry() {
+                    return sum;
+                }
+                for k in 0..x.len() {
+                    x[k] += alpha * p[k];
+                    r[k] -= alpha * q[k];
+                    sum += r[k] * r[k];
                 }
                 sum
             })
@@ -69,11 +141,15 @@ impl System<'_> {
     }
 }
 
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Dot product, in an order that does not depend on the number of threads.
 pub fn dot(a: &[f64], b: &[f64], sums: &mut Vec<f64>) -> f64 {
     (a.par_chunks(CHUNK), b.par_chunks(CHUNK))
         .into_par_iter()
-        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>())
+        .map(|(a, b)| product(a, b))
         .collect_into_vec(sums);
     sums.iter().sum()
 }
@@ -87,32 +163,22 @@ pub fn solve(
     settings: &Settings,
     work: &mut Workspace,
 ) -> PressureReport {
-    let n = x.len();
-    let Workspace { r, z, p, q, sums } = work;
-    for v in [&mut *r, &mut *z, &mut *p, &mut *q] {
-        v.resize(n, 0.0);
+    for v in [&mut work.r, &mut work.z, &mut work.p, &mut work.q] {
+        v.resize(x.len(), 0.0);
     }
     let unknowns = system.state.iter().filter(|&&s| s == State::Inner).count();
     let mut report = PressureReport { unknowns, ..Default::default() };
-    let b_norm = dot(b, b, sums).sqrt();
+    let b_norm = system.dot(b, b, &mut work.sums).sqrt();
     if b_norm == 0.0 || unknowns == 0 {
         x.fill(0.0);
         report.outcome = Outcome::ZeroSource;
         return report;
     }
-    for ((x, s), r) in x.iter_mut().zip(system.state).zip(r.iter_mut()) {
-        if !settings.warm_start || *s != State::Inner {
-            *x = 0.0;
-        }
-        *r = 0.0;
-    }
-    system.multiply(x, q, sums);
-    r.iter_mut().zip(b).zip(q.iter()).for_each(|((r, b), q)| *r = b - q);
-    let mut r_norm = dot(r, r, sums).sqrt();
+    let mut r_norm = system.start(settings.warm_start, b, x, work).sqrt();
     if r_norm > b_norm {
         // The last pressure is worse than none: start from zero.
         x.fill(0.0);
-        r.copy_from_slice(b);
+        work.r.copy_from_slice(b);
         r_norm = b_norm;
     }
     let mut rz_old = 0.0;
@@ -125,17 +191,19 @@ pub fn solve(
         } else if report.iterations >= settings.max_iterations {
             Outcome::MaxIterations
         } else {
+            let Workspace { r, z, p, q, sums } = &mut *work;
             preconditioner.apply(system, r, z);
-            let rz = dot(r, z, sums);
+            let rz = system.dot(r, z, sums);
             if rz > 0.0 {
                 let beta = if report.iterations == 0 { 0.0 } else { rz / rz_old };
                 rz_old = rz;
-                (p.par_chunks_mut(CHUNK), z.par_chunks(CHUNK))
+                (p.par_chunks_mut(CHUNK), z.par_chunks(CHUNK), system.chunks())
                     .into_par_iter()
-                    .for_each(|(p, z)| p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p));
+                    .filter(|(.., chunk)| !chunk.is_dry())
+                    .for_each(|(p, z, _)| p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p));
                 let pq = system.multiply(p, q, sums);
                 if pq > 0.0 {
-                    r_norm = advance(rz / pq, p, q, x, r, sums).sqrt();
+                    r_norm = system.advance(rz / pq, x, work).sqrt();
                     report.iterations += 1;
                     continue;
                 }
@@ -144,21 +212,4 @@ pub fn solve(
         };
         return report;
     }
-}
-
-/// x += alpha p, r -= alpha q. Returns r.r.
-fn advance(alpha: f64, p: &[f64], q: &[f64], x: &mut [f64], r: &mut [f64], sums: &mut Vec<f64>) -> f64 {
-    (x.par_chunks_mut(CHUNK), r.par_chunks_mut(CHUNK), p.par_chunks(CHUNK), q.par_chunks(CHUNK))
-        .into_par_iter()
-        .map(|(x, r, p, q)| {
-            let mut sum = 0.0;
-            for k in 0..x.len() {
-                x[k] += alpha * p[k];
-                r[k] -= alpha * q[k];
-                sum += r[k] * r[k];
-            }
-            sum
-        })
-        .collect_into_vec(sums);
-    sums.iter().sum()
 }

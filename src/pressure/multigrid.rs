@@ -7,7 +7,7 @@ use crate::cells::Grid;
 use crate::fields::State;
 use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
 use crate::kernels::multigrid_levels::{LevelSums, level_cells, offset_of, place_of};
-use crate::neighbours::CHUNK;
+use crate::neighbours::{CHUNK, Chunk};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -126,6 +126,11 @@ impl Multigrid {
         std::iter::once(self.members.len()).chain(self.levels[..self.used].iter().map(Level::rows)).collect()
     }
 
+    /// Rows and entries beside the diagonal of each coarse level, finest first.
+    pub fn stored(&self) -> Vec<[u64; 2]> {
+        self.levels[..self.used].iter().map(|l| [l.rows() as u64, l.value.len() as u64]).collect()
+    }
+
     /// Sums over the operators of the levels, finest first.
     pub fn sums(&self) -> Vec<LevelSums> {
         let sums = |level: &Level| {
@@ -139,43 +144,60 @@ impl Multigrid {
 
     fn aggregate_cells(&mut self, system: &System, grid: &Grid, position: &[DVec3]) {
         let n = system.state.len();
-        self.aggregate.clear();
         self.aggregate.resize(n, u32::MAX);
         self.code.resize(n, NOWHERE);
-        self.diagonal.resize(n, 1.0);
+        for v in [&mut self.diagonal, &mut self.x, &mut self.b, &mut self.t] {
+            v.resize(n, 0.0);
+        }
         if self.cell_aggregate.len() != grid.total() {
             self.cell_aggregate = vec![u32::MAX; grid.total()];
         }
-        (&mut self.code, &mut self.diagonal, system.state, system.diagonal, &position[..n])
+        // For now `aggregate` holds the cells.
+        (
+            self.code.par_chunks_mut(CHUNK),
+            self.aggregate.par_chunks_mut(CHUNK),
+            self.diagonal.par_chunks_mut(CHUNK),
+            self.x.par_chunks_mut(CHUNK),
+            system.state.par_chunks(CHUNK),
+            system.diagonal.par_chunks(CHUNK),
+            position[..n].par_chunks(CHUNK),
+            &system.neighbours.chunks,
+        )
             .into_par_iter()
-            .with_min_len(CHUNK)
-            .for_each(|(c, d, &state, &a, &x)| {
-                *c = if state == State::Inner {
-                    place_of(grid.coordinates(x).map(|k| k as i32))
-                } else {
-                    NOWHERE
-                };
-                *d = a as f32;
+            .for_each(|(code, cell, d32, x32, state, d, position, chunk)| {
+                if chunk.is_dry() {
+                    code.fill(NOWHERE);
+                    x32.fill(0.0);
+                    return;
+                }
+                for k in 0..code.len() {
+                    code[k] = NOWHERE;
+                    d32[k] = d[k] as f32;
+                    if state[k] == State::Inner {
+                        let c = grid.coordinates(position[k]);
+                        code[k] = place_of(c.map(|k| k as i32));
+                        cell[k] = grid.index(c) as u32;
+                    }
+                }
             });
         let coarse = &mut self.levels[0].coordinates;
         coarse.clear();
         self.touched.clear();
         self.member_start.clear();
-        for (i, &x) in position.iter().enumerate().take(n) {
-            if self.code[i] == NOWHERE {
+        for (aggregate, code) in self.aggregate.iter_mut().zip(&self.code) {
+            if *code == NOWHERE {
+                *aggregate = u32::MAX;
                 continue;
             }
-            let c = grid.coordinates(x);
-            let cell = grid.index(c);
-            if self.cell_aggregate[cell] == u32::MAX {
-                self.cell_aggregate[cell] = coarse.len() as u32;
-                self.touched.push(cell as u32);
-                coarse.push(c.map(|k| k as i32));
+            let joined = &mut self.cell_aggregate[*aggregate as usize];
+            if *joined == u32::MAX {
+                *joined = coarse.len() as u32;
+                self.touched.push(*aggregate);
+                coarse.push(grid.coordinates_of(*aggregate as usize).map(|k| k as i32));
                 self.member_start.push(0);
             }
-            let a = self.cell_aggregate[cell];
-            self.aggregate[i] = a;
-            self.member_start[a as usize] += 1;
+            *aggregate = *joined;
+            self.member_start[*joined as usize] += 1;
         }
         let mut sum = 0;
         for s in &mut self.member_start {
@@ -202,25 +224,29 @@ impl Multigrid {
         let c = system.coefficient;
         self.weight.resize_with(chunks.len(), Vec::new);
         self.weight.par_iter_mut().zip(chunks).for_each(|(w32, chunk)| {
-            w32.clear();
-            w32.extend(chunk.weight.iter().map(|&w| (c * w) as f32));
+            w32.resize(chunk.weight.len(), 0.0);
+            w32.iter_mut().zip(&chunk.weight).for_each(|(w32, &w)| *w32 = (c * w) as f32);
         });
         let codes = &self.code;
         let (members, start) = (&self.members, &self.member_start);
         let level = &mut self.levels[0];
         let rows = level.coordinates.len();
         self.scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
+            // Two stencils in turn: neighbours that follow each other mostly fall into the same entry, and would wait
+            // for each other's sum.
+            let mut turns = [[0.0; 27]; 2];
             for &i in &members[start[a] as usize..start[a + 1] as usize] {
                 let i = i as usize;
-                s[13] += system.diagonal[i];
+                turns[0][13] += system.diagonal[i];
                 let own = codes[i] - 13;
-                for (j, w) in chunks[i / CHUNK].pressure(i % CHUNK).iter() {
+                for (k, (j, w)) in chunks[i / CHUNK].pressure(i % CHUNK).iter().enumerate() {
                     // A pair without weight may lie further apart than neighbouring cells.
                     if codes[j] != NOWHERE && w > 0.0 {
-                        s[(codes[j] - own) as usize] -= c * w;
+                        turns[k % 2][(codes[j] - own) as usize] -= c * w;
                     }
                 }
             }
+            *s = std::array::from_fn(|k| turns[0][k] + turns[1][k]);
         });
         compress(level, &mut self.scratch);
     }
@@ -253,18 +279,17 @@ impl Multigrid {
     /// t <- b - A x on the finest level, in f32.
     fn residual(&mut self, system: &System) {
         let (x, b, d, weight) = (&self.x, &self.b, &self.diagonal, &self.weight);
-        (self.t.par_chunks_mut(CHUNK), &system.neighbours.chunks, weight)
+        (self.t.par_chunks_mut(CHUNK), system.state.par_chunks(CHUNK), &system.neighbours.chunks, weight)
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (t, chunk, w))| {
-                for (k, t) in t.iter_mut().enumerate() {
+            .filter(|(_, (.., chunk, _))| !chunk.is_dry())
+            .for_each(|(c, (t, state, chunk, w))| {
+                for (k, (t, &state)) in t.iter_mut().zip(state).enumerate() {
                     let i = c * CHUNK + k;
-                    *t = 0.0;
-                    if system.state[i] == State::Inner {
-                        let (a, e) = (chunk.start[k] as usize, chunk.dummies[k] as usize);
-                        let sum = gather(&chunk.neighbour[a..e], &w[a..e], x);
-                        *t = b[i] - d[i] * x[i] + sum;
-                    }
+                    let (a, e) = (chunk.start[k] as usize, chunk.dummies[k] as usize);
+                    let row = b[i] - d[i] * x[i] + gather(&chunk.neighbour[a..e], &w[a..e], x);
+                    // Chosen afterwards, as in the operator.
+                    *t = if state == State::Inner { row } else { 0.0 };
                 }
             });
     }
@@ -352,11 +377,15 @@ fn compress(level: &mut Level, scratch: &mut Scratch) {
     level.value.clear();
     level.diagonal.clear();
     level.start.push(0);
-    for (c, s) in level.coordinates.iter().zip(&*stencil) {
+    let step: [isize; 27] = std::array::from_fn(|k| {
+        let d = offset_of(k).map(|d| d as isize);
+        (d[0] * size[1] as isize + d[1]) * size[2] as isize + d[2]
+    });
+    for (&c, s) in level.coordinates.iter().zip(&*stencil) {
+        let own = place(c);
         for (k, &v) in s.iter().enumerate() {
             if k != 13 && v != 0.0 {
-                let d = offset_of(k);
-                level.column.push(map[place([c[0] + d[0], c[1] + d[1], c[2] + d[2]])]);
+                level.column.push(map[own.wrapping_add_signed(step[k])]);
                 level.value.push(v as f32);
             }
         }
@@ -371,18 +400,23 @@ fn compress(level: &mut Level, scratch: &mut Scratch) {
 
 impl Precondition for Multigrid {
     fn apply(&mut self, system: &System, r: &[f64], z: &mut [f64]) {
-        let n = r.len();
-        for v in [&mut self.x, &mut self.b, &mut self.t] {
-            v.resize(n, 0.0);
-        }
+        let chunks = &system.neighbours.chunks;
         // Scaled to unit size: late residuals must not leave the range of f32.
-        let scale = r.par_iter().map(|r| r.abs()).reduce(|| 0.0, f64::max).max(f64::MIN_POSITIVE);
-        (&mut self.b, &mut self.x, &self.diagonal, r).into_par_iter().with_min_len(CHUNK).for_each(
-            |(b, x, d, r)| {
-                *b = (r / scale) as f32;
-                *x = first_sweep(*b, *d);
-            },
-        );
+        let largest = |(r, chunk): (&[f64], &Chunk)| {
+            if chunk.is_dry() { 0.0 } else { r.iter().fold(0.0_f64, |m, r| m.max(r.abs())) }
+        };
+        let scale = (r.par_chunks(CHUNK), chunks).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
+        let scale = scale.max(f64::MIN_POSITIVE);
+        let (b, x, d) = (&mut self.b, &mut self.x, &self.diagonal);
+        (b.par_chunks_mut(CHUNK), x.par_chunks_mut(CHUNK), d.par_chunks(CHUNK), r.par_chunks(CHUNK), chunks)
+            .into_par_iter()
+            .filter(|(.., chunk)| !chunk.is_dry())
+            .for_each(|(b, x, d, r, _)| {
+                for k in 0..b.len() {
+                    b[k] = (r[k] / scale) as f32;
+                    x[k] = first_sweep(b[k], d[k]);
+                }
+            });
         self.residual(system);
         {
             let (t, members, start) = (&self.t, &self.members, &self.member_start);
@@ -392,14 +426,25 @@ impl Precondition for Multigrid {
         }
         self.cycle(0);
         let coarse = &self.levels[0].x;
-        (&mut self.x, &self.aggregate).into_par_iter().with_min_len(CHUNK).for_each(|(x, &a)| {
-            if a != u32::MAX {
-                *x += OVER_CORRECTION * coarse[a as usize];
-            }
-        });
+        (self.x.par_chunks_mut(CHUNK), self.aggregate.par_chunks(CHUNK), chunks)
+            .into_par_iter()
+            .filter(|(.., chunk)| !chunk.is_dry())
+            .for_each(|(x, aggregate, _)| {
+                for (x, &a) in x.iter_mut().zip(aggregate) {
+                    if a != u32::MAX {
+                        *x += OVER_CORRECTION * coarse[a as usize];
+                    }
+                }
+            });
         self.residual(system);
-        (z, &self.x, &self.t, &self.diagonal).into_par_iter().with_min_len(CHUNK).for_each(|(z, x, t, d)| {
-            *z = scale * f64::from(sweep(*x, *t, *d));
-        });
+        let (x, t, d) = (&self.x, &self.t, &self.diagonal);
+        (z.par_chunks_mut(CHUNK), x.par_chunks(CHUNK), t.par_chunks(CHUNK), d.par_chunks(CHUNK), chunks)
+            .into_par_iter()
+            .filter(|(.., chunk)| !chunk.is_dry())
+            .for_each(|(z, x, t, d, _)| {
+                for k in 0..z.len() {
+                    z[k] = scale * f64::from(sweep(x[k], t[k], d[k]));
+                }
+            });
     }
 }

@@ -3,7 +3,7 @@
 use super::Due;
 use super::gauges::Gauges;
 use super::summary::Totals;
-use crate::backend::Counters;
+use crate::backend::{Counters, Timing};
 use crate::contact::Energy;
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
@@ -145,11 +145,10 @@ impl Tables {
     fn write(&mut self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
         self.last = Some(simulation.steps);
         let (fluid, counters) = if simulation.plan.wet() {
-            let fluid = match report.monitor {
-                Some(monitor) => monitor,
-                None => simulation.backend.monitor()?,
-            };
-            (fluid, simulation.backend.counters()?)
+            match &report.look {
+                Some(seen) => seen.clone(),
+                None => simulation.observe()?,
+            }
         } else {
             (FluidMonitor::default(), Counters::default())
         };
@@ -220,12 +219,12 @@ impl Tables {
             Cell::from(counters.pressure_clamps),
             Cell::from(u64::from(counters.neighbours_max)),
         ]);
-        let seconds = |of: &BTreeMap<Stage, f64>, stage| of.get(stage).copied().unwrap_or(0.0);
-        row.extend(
-            self.stages
-                .iter()
-                .map(|s| Cell::from(seconds(&simulation.stages, s) - seconds(&since.stages, s))),
-        );
+        // A stage whose time nothing tells gets an empty cell.
+        let told = simulation.backend.timing() != Timing::Waits || simulation.wait_for_stages;
+        row.extend(self.stages.iter().map(|s| match (simulation.stages.get(s), since.stages.get(s)) {
+            (Some(now), before) => Cell::from(now - before.unwrap_or(&0.0)),
+            (None, _) => Cell::from(if told { 0.0 } else { f64::NAN }),
+        }));
         row
     }
 

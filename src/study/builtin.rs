@@ -2,7 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, compare, contact_cost, dry_studies, gallery, needs, pressure_solve, stability, work_precision,
+    Study, compare, contact_cost, dry_studies, gallery, needs, pressure_size, pressure_solve, stability,
+    wall_of_cubes, work_precision,
 };
 use crate::error::{Error, Result};
 
@@ -55,6 +56,11 @@ pub const ENTRIES: &[Entry] = &[
         make: Maker::Function(pressure_solve::study),
     },
     Entry {
+        name: "pressure-size",
+        about: "the pressure equation over its size: iterations and time of both preconditioners, what f32 reaches",
+        make: Maker::Function(pressure_size::study),
+    },
+    Entry {
         name: "stability",
         about: "maps of what is stable: gamma x CFL, contact stiffness x damping, alpha, density ratio, tolerance",
         make: Maker::Function(stability::study),
@@ -88,6 +94,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "spring-static",
         about: "section 4.1: amplitude of a resting cube against K",
         make: Maker::Function(dry_studies::spring_static),
+    },
+    Entry {
+        name: "wall-of-cubes",
+        about: "100 cubes hit by a heavy one: overlap during the hit and at rest against K",
+        make: Maker::Function(wall_of_cubes::study),
     },
     Entry {
         name: "spring-drop",

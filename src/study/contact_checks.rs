@@ -117,6 +117,81 @@ pub fn elastic_drop(tilt_deg: (f64, f64), factor: f64, dt: f64) -> Result<Elasti
     Ok(row)
 }
 
+/// An elastic impact of a cube edge on edge.
+#[derive(Clone, Debug, Serialize)]
+pub struct EdgeRow {
+    /// Spacing [m].
+    pub spacing: f64,
+    /// Angle between both edges seen from above, and slope of the cube's [degrees].
+    pub turn_deg: (f64, f64),
+    /// Whether on a fixed edge or on that of another cube.
+    pub on_wall: bool,
+    /// Change of energy over that of the impact [-].
+    pub energy_error: f64,
+    /// Largest depth of one edge below the other, over the spacing [-].
+    pub sinks: f64,
+    /// Angle between the change of momentum and the cross product of the edges [degrees].
+    pub off_normal_deg: f64,
+}
+
+/// An edge of a cube of 0.2 m meets an edge at `speed` [m/s], K = 1.6e6 N/m, without gravity, damping and
+/// friction, until they part.
+///
+/// # Errors
+/// Those of [`Solids::advance`].
+pub fn edge_drop(spacing: f64, turn_deg: (f64, f64), on_wall: bool, speed: f64, dt: f64) -> Result<EdgeRow> {
+    use std::f64::consts::FRAC_PI_4;
+    let size = DVec3::splat(0.2);
+    let (turn, slope) = (turn_deg.0.to_radians(), turn_deg.1.to_radians());
+    let up = 0.1 * 2_f64.sqrt();
+    // the lower edge of the cube is along x before the slope and the turn
+    let q = DQuat::from_rotation_z(FRAC_PI_4 * 2.0 - turn)
+        * DQuat::from_rotation_y(slope)
+        * DQuat::from_rotation_x(FRAC_PI_4);
+    let along = DQuat::from_rotation_z(FRAC_PI_4 * 2.0 - turn) * DQuat::from_rotation_y(slope) * DVec3::X;
+    // edges cross off the middle of both, between the points of any spacing
+    let below = q * DVec3::new(0.023_7, -0.1, -0.1);
+    // a steep one meets the other's face with its corner first
+    let lift = ((0.1 - 0.023_7) * (slope.sin() - turn.sin() * slope.cos())).max(0.0);
+    let mut cube = FreeBox::new(size, 2660.0, DVec3::new(0.0, 0.031_3, 1e-4 + lift) - below);
+    cube.orientation = q;
+    cube.velocity = -speed * DVec3::Z;
+    let tilt = DQuat::from_rotation_y(FRAC_PI_4);
+    let dry = DryScene::new(spacing, DVec3::splat(-0.2), DVec3::splat(0.2)).gravity(DVec3::ZERO);
+    let dry = if on_wall {
+        dry.wall(DVec3::new(0.0, 0.0, -up), 0.5 * size, glam::DMat3::from_quat(tilt)).body(&cube)
+    } else {
+        let mut other = FreeBox::new(size, 2660.0, DVec3::new(0.0, 0.0, -up));
+        other.orientation = tilt;
+        dry.body(&cube).body(&other)
+    };
+    let mut solids = Solids::new(&dry.build(), Some(&smooth(1.6e6, 0.0, 0.0)))?;
+    let bodies = solids.poses().len();
+    let (before, start) = (solids.poses()[0].velocity, solids.energy().total());
+    let (mut touched, mut sinks) = (false, 0.0_f64);
+    let normal = along.cross(DVec3::Y).normalize();
+    let normal = normal * normal.z.signum();
+    for step in 0..(0.3 / dt) as usize {
+        let report = solids.advance(step as f64 * dt, dt, &none(bodies))?;
+        touched |= report.pairs > 0;
+        if touched && report.pairs == 0 {
+            break;
+        }
+        let tip = solids.poses()[0].point(DVec3::new(0.023_7, -0.1, -0.1));
+        let edge = if on_wall { DVec3::ZERO } else { solids.poses()[1].point(DVec3::new(-0.1, 0.0, 0.1)) };
+        sinks = sinks.max((edge - tip).dot(normal) / spacing);
+    }
+    let change = solids.poses()[0].velocity - before;
+    Ok(EdgeRow {
+        spacing,
+        turn_deg,
+        on_wall,
+        energy_error: solids.energy().total() / start - 1.0,
+        sinks,
+        off_normal_deg: change.angle_between(normal).to_degrees(),
+    })
+}
+
 /// Two cubes that collide off-centre in free space.
 #[derive(Clone, Debug, Serialize)]
 pub struct CollisionRow {

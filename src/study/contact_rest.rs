@@ -64,13 +64,16 @@ pub fn stack_scene(count: usize) -> Scene {
     dry.build()
 }
 
+/// The cube that hits the wall: mass [kg], speed [m/s].
+pub const RAM: (f64, f64) = (20.0, 3.0);
+
 /// A wall of `columns` x 10 cubes of 54 mm hit by a cube of 20 kg at 3 m/s, K = `spring` [N/m] at the
-/// dam-break cube's damping ratio, after `seconds`.
+/// dam-break cube's damping ratio, steps of `dt` [s], after `seconds`.
 ///
 /// # Errors
 /// Those of [`Solids::advance`].
-pub fn demolish(columns: usize, spring: f64, seconds: f64) -> Result<RestRow> {
-    let (edge, mass, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
+pub fn demolish(columns: usize, spring: f64, dt: f64, seconds: f64) -> Result<RestRow> {
+    let (edge, mass, l0, k, c, friction, _) = DAM_BREAK_CUBE;
     let damping = c * (spring / k).sqrt();
     let mut dry = DryScene::new(l0, DVec3::new(-5.0, -5.0, 0.0), DVec3::new(9.0, 5.0, 1.0)).floor();
     for row in 0..10 {
@@ -81,8 +84,8 @@ pub fn demolish(columns: usize, spring: f64, seconds: f64) -> Result<RestRow> {
         }
     }
     let size = DVec3::splat(0.15);
-    let mut ram = FreeBox::new(size, 20.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
-    ram.velocity = DVec3::new(3.0, 0.0, 0.0);
+    let mut ram = FreeBox::new(size, RAM.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
+    ram.velocity = DVec3::new(RAM.1, 0.0, 0.0);
     let mut solids = Solids::new(&dry.body(&ram).build(), Some(&smooth(spring, damping, friction)))?;
     rest(&mut solids, None, seconds, dt)
 }
@@ -167,7 +170,7 @@ fn dropped(k: usize, mass: f64) -> FreeBox {
 }
 
 impl RandomDropRow {
-    fn new(spring: f64, mass: f64, drops: usize) -> Self {
+    fn empty(spring: f64, mass: f64, drops: usize) -> Self {
         Self {
             spring,
             mass,
@@ -219,7 +222,7 @@ pub fn drops_together<B: Backend>(
         mass * (GRAVITY * p.position.z + 0.5 * p.velocity.length_squared() + turning)
     };
     let start: Vec<(f64, f64)> = solids.poses().iter().map(|p| (p.position.z, energy(p))).collect();
-    let mut row = RandomDropRow::new(spring, mass, drops);
+    let mut row = RandomDropRow::empty(spring, mass, drops);
     let mut touched = vec![false; drops];
     let clock = Instant::now();
     let steps = (seconds / dt) as usize;
@@ -250,7 +253,7 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
     let (_, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
     let damping = c * (spring * mass / (k * cube)).sqrt();
     let scale = mass * GRAVITY * DROP;
-    let mut row = RandomDropRow::new(spring, mass, drops);
+    let mut row = RandomDropRow::empty(spring, mass, drops);
     let clock = Instant::now();
     let mut steps = 0;
     for drop in 0..drops {
@@ -275,6 +278,51 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
         }
         row.judge(solids.poses()[0]);
     }
+    row.step_us = clock.elapsed().as_secs_f64() * 1e6 / f64::from(steps);
+    Ok(row)
+}
+
+/// Two dam-break cubes, of `mass` and `other` [kg], the second dropped on the first in a random
+/// orientation, K = `spring` [N/m] at the damping ratio of the dam-break cube, for `seconds`.
+///
+/// # Errors
+/// Those of [`Solids::advance`].
+pub fn drop_on_body(spring: f64, mass: f64, other: f64, seed: u64, seconds: f64) -> Result<RandomDropRow> {
+    let (edge, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
+    let damping = c * (spring * mass.min(other) / (k * cube)).sqrt();
+    let (height, size) = (0.05, DVec3::splat(edge));
+    let mut random = Random::new(seed);
+    let q = random.orientation();
+    let z = edge + lowest(0.5 * size, q) + height;
+    let below = FreeBox::new(size, mass / edge.powi(3), DVec3::new(0.0, 0.0, 0.5 * edge));
+    let mut body = FreeBox::new(size, other / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
+    body.orientation = q;
+    body.velocity = DVec3::new(0.1, 0.0, 0.0);
+    let dry = DryScene::new(l0, DVec3::new(-2.0, -2.0, 0.0), DVec3::new(3.0, 2.0, 0.75));
+    let scene = dry.floor().body(&below).body(&body).build();
+    let mut solids = Solids::new(&scene, Some(&smooth(spring, damping, friction)))?;
+    let scale = (mass + other) * GRAVITY * height;
+    let start = solids.energy().total();
+    let mut row = RandomDropRow::empty(spring, mass, 1);
+    let clock = Instant::now();
+    let mut steps = 0;
+    let mut touched = false;
+    for step in 0..(seconds / dt) as usize {
+        let report = solids.advance(step as f64 * dt, dt, &none(2))?;
+        steps += 1;
+        row.substeps = report.substeps;
+        row.penetration = row.penetration.max(report.penetration_max_over_l0);
+        touched |= report.pairs > 1;
+        if touched {
+            row.rise = row.rise.max(solids.poses()[1].position.z - z);
+            row.energy_gain = row.energy_gain.max((solids.energy().total() - start) / scale);
+        }
+    }
+    let lowest = |n: usize| {
+        let pose = solids.poses()[n];
+        pose.position.z - lowest(0.5 * size, pose.orientation)
+    };
+    row.kept = [0, 1].iter().filter(|n| lowest(**n) > -0.8 * l0).count();
     row.step_us = clock.elapsed().as_secs_f64() * 1e6 / f64::from(steps);
     Ok(row)
 }

@@ -5,7 +5,7 @@ use super::engine::Job;
 use super::incline::{PAPER_ETA, Slide, calibrate, travel_time};
 use super::report::{Report, short};
 use super::row::{Measured, Row, Timing, Work};
-use super::spring_drop::{CASES, Drop, HEIGHT, Offset, ideal_spring, three_models};
+use super::spring_drop::{CASES, Drop, HEIGHT, Offset, ideal_spring};
 use super::spring_static::{
     DAMPING_RATIOS, PAPER_LARGEST, PAPER_LIMIT, SPRINGS, amplitude, oscillation, oscillation_error,
 };
@@ -304,25 +304,13 @@ pub fn spring_drop(setup: &Setup) -> Study {
             }));
         }
     }
-    for model in ["collision model", "undamped", "critically damped"] {
-        jobs.push(Job::new("Fig. 6", &[("model", model.into())], 20.0, move |_| {
-            let mut out = Measured { machine: "CPU, 1 thread, f64".into(), ..Measured::default() };
-            let rows = three_models(CASES[2], 6.9 * CASES[2].smallest_spring())?;
-            if let Some((_, row)) = rows.iter().find(|(name, _)| *name == model) {
-                if row.height_ratio.is_finite() {
-                    out.put("height of return over height of fall [-]", row.height_ratio);
-                }
-                out.put("collisions [-]", f64::from(row.collisions));
-                out.put("speed at the end [m/s]", row.end_speed);
-            }
-            Ok(out)
-        }));
-    }
+    jobs.extend(super::drop_rows::jobs(setup.full));
     Study {
         name: "spring-drop".into(),
         title: "K_ideal of Table 1".into(),
         question: "The smallest K that meets Eq. (17) for every entry phase, and the paper's argmin beside it: linear in \
-                   the weight, and in 1 / l0^2."
+                   the weight, and in 1 / l0^2. Also Eq. (17) at the paper's K for every case, the energy error of \
+                   an elastic bounce against the step, and the three models of Fig. 6."
             .into(),
         jobs,
         finish: Box::new(|rows: &mut [Row], _| Ok(ideal_report(rows))),
@@ -379,5 +367,6 @@ fn ideal_report(rows: &[Row]) -> Report {
         y: Axis::log("K_ideal [N/m]"),
         series,
     };
+    findings.extend(super::drop_rows::findings(rows));
     Report { charts: vec![("spring-drop".into(), chart)], findings }
 }

@@ -99,7 +99,6 @@ fn play(sort: &Sort, all: bool) -> Result<(Ran, Plan, Scene)> {
     if all {
         simulation.plan = everything(&plan);
     }
-    simulation.time_stages = false;
     // The first steps allocate.
     let warm = (sort.steps / 4).max(1);
     let mut clock = Instant::now();

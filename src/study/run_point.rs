@@ -38,8 +38,7 @@ fn start(point: &Point, context: &Context) -> Result<(Simulation, Scene)> {
     let (case, _, _) = parse("case", point.text.clone(), &[])?;
     let scene = Scene::build(&case)?;
     let make = |s: &_, p: &_, plan: &_, settings| (context.make)(point.processor, s, p, plan, settings);
-    let mut simulation = Simulation::new(&case, &scene, make)?;
-    simulation.time_stages = false;
+    let simulation = Simulation::new(&case, &scene, make)?;
     Ok((simulation, scene))
 }
 

@@ -201,6 +201,85 @@ impl Drop {
     }
 }
 
+/// Falls of one case at one K and time step, over entry phases, against Eq. (17).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ReturnRow {
+    /// Entry phases.
+    pub phases: usize,
+    /// How many meet Eq. (17).
+    pub passed: usize,
+    /// Largest |h_final - h| over the 3 l0 of Eq. (17) [-]; infinite if one fell through.
+    pub worst_over_band: f64,
+    /// dt sqrt(K / m) [-].
+    pub omega_dt: f64,
+}
+
+/// Drops `case` with K = `factor` K_min from `phases` heights within 3 mm.
+///
+/// # Errors
+/// Those of [`Drop::run`].
+pub fn returns(case: DropCase, factor: f64, dt: f64, phases: usize) -> Result<ReturnRow> {
+    let drop = Drop::new(case, factor * case.smallest_spring());
+    let omega_dt = dt * (drop.spring / case.mass()).sqrt();
+    let mut row = ReturnRow { phases, passed: 0, worst_over_band: 0.0, omega_dt };
+    for phase in 0..phases {
+        let height = HEIGHT + 3e-3 * phase as f64 / phases as f64;
+        let fall = Drop { height, time_step: dt, ..drop }.run(false)?;
+        row.passed += usize::from(fall.returns);
+        let off = if fall.held { (fall.height_ratio - 1.0).abs() * height } else { f64::INFINITY };
+        row.worst_over_band = row.worst_over_band.max(off / (3.0 * case.spacing));
+    }
+    Ok(row)
+}
+
+/// Energy of an elastic bounce.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct BounceRow {
+    /// dt sqrt(K / m) [-].
+    pub omega_dt: f64,
+    /// Root mean square over the entry phases of the change of energy over that of the impact [-].
+    pub rms: f64,
+    /// Largest of them [-].
+    pub max: f64,
+}
+
+/// Energy error of the paper's law in one bounce of CD03 at 8 K_min, single steps of dt sqrt(K / m) =
+/// `omega_dt`, over `phases` entry phases within one step of fall.
+///
+/// # Errors
+/// Those of [`Solids::new`] and [`Solids::advance`].
+pub fn bounce(offset: Offset, omega_dt: f64, phases: usize) -> Result<BounceRow> {
+    let case = CASES[2];
+    let spring = 8.0 * case.smallest_spring();
+    let dt = omega_dt * (case.mass() / spring).sqrt();
+    let step_of_fall = dt * (2.0 * GRAVITY * HEIGHT).sqrt();
+    let mut row = BounceRow { omega_dt, rms: 0.0, max: 0.0 };
+    for phase in 0..phases {
+        let height = HEIGHT + step_of_fall * phase as f64 / phases as f64;
+        let drop = Drop { offset, time_step: dt, height, ..Drop::new(case, spring) };
+        let mut solids = Solids::new(&drop.scene(), Some(&contact(drop.law, spring, 0.0, true)))?;
+        // what free flight in symplectic Euler keeps exactly
+        let energy = |solids: &Solids| {
+            let pose = solids.poses()[0];
+            let v = pose.velocity.z;
+            0.5 * v * v + GRAVITY * (pose.position.z - 0.5 * dt * v)
+        };
+        let (start, mut touched) = (energy(&solids), false);
+        for step in 0..(2.0 / dt) as usize {
+            let pairs = solids.advance(step as f64 * dt, dt, &[Wrench::default()])?.pairs;
+            touched |= pairs > 0;
+            if touched && pairs == 0 {
+                break;
+            }
+        }
+        let error = ((energy(&solids) - start) / (GRAVITY * height)).abs();
+        row.rms += error * error / phases as f64;
+        row.max = row.max.max(error);
+    }
+    row.rms = row.rms.sqrt();
+    Ok(row)
+}
+
 /// K_ideal of one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct IdealRow {

@@ -68,7 +68,7 @@ fn sloshing(preset: &str, gamma: f64, courant: f64, context: &Context) -> Result
         match simulation.step() {
             Err(error) => return Ok(failed(&mut simulation, &error)),
             Ok(report) => {
-                if let Some(m) = report.monitor {
+                if let Some((m, _)) = report.look {
                     rise = rise.max((m.kinetic + m.potential) / start - 1.0);
                     density += m.density_error_mean.max(0.0);
                     samples += 1.0;
@@ -150,7 +150,9 @@ fn viscous_limit(dimensions: u32, context: &Context) -> Result<Measured> {
             match simulation.step() {
                 Err(Error::Diverged { .. }) => return Ok(false),
                 Err(other) => return Err(other),
-                Ok(report) if report.monitor.is_some_and(|m| m.kinetic + m.potential > 1.01 * start) => {
+                Ok(report)
+                    if report.look.as_ref().is_some_and(|(m, _)| m.kinetic + m.potential > 1.01 * start) =>
+                {
                     return Ok(false);
                 }
                 Ok(_) => {}

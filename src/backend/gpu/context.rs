@@ -1,15 +1,19 @@
 //! A device with its buffers and pipelines: recording, submitting, moving data.
 
 use super::adapter::AdapterInfo;
+use super::clock::Clock;
 use super::layout::{Host, Memory};
 use super::shader;
+use crate::backend::Commands;
 use crate::error::{Error, Result};
-use bytemuck::Pod;
+use crate::plan::Stage;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::{Arc, Mutex};
 
-/// Bytes that travel to the host at a time.
-const STAGING: u64 = 16 << 20;
+/// Bytes that travel to the host at a time, at least and at most.
+const STAGING: (u64, u64) = (64 << 10, 16 << 20);
+/// Bytes that wait for the next submission at most.
+const MAIL: u64 = 64 << 10;
 
 struct Pipeline {
     pipeline: wgpu::ComputePipeline,
@@ -21,15 +25,20 @@ struct Pipeline {
 /// A device at work.
 pub(super) struct Context {
     pub info: AdapterInfo,
-    device: wgpu::Device,
-    queue: wgpu::Queue,
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
     buffers: HashMap<&'static str, wgpu::Buffer>,
     pipelines: HashMap<String, Pipeline>,
-    staging: wgpu::Buffer,
-    encoder: Option<wgpu::CommandEncoder>,
+    pub(super) staging: wgpu::Buffer,
+    /// Small uploads on their way, and the bytes of it that are in use.
+    pub(super) mail: (wgpu::Buffer, u64),
+    pub(super) encoder: Option<wgpu::CommandEncoder>,
     /// What the driver complained of, from a callback.
     fault: Arc<Mutex<Option<String>>>,
-    pub dispatches: u64,
+    pub clock: Option<Clock>,
+    /// What the commands recorded now belong to.
+    stage: Option<Stage>,
+    pub commands: Commands,
     pub bytes: u64,
 }
 
@@ -82,8 +91,9 @@ impl Context {
         let buffers: HashMap<_, _> = buffers.collect();
         let readable = |b: &&super::layout::Buffer| matches!(b.host, Host::Reads | Host::Both);
         let largest = memory.buffers.iter().filter(readable).map(|b| b.bytes).max().unwrap_or(16);
-        let staging_bytes = largest.min(STAGING);
+        let staging_bytes = largest.clamp(STAGING.0, STAGING.1);
         let staging = create("staging", staging_bytes, Usage::MAP_READ | Usage::COPY_DST);
+        let mail = create("mail", MAIL, Usage::COPY_SRC | Usage::COPY_DST);
         let invalid = pollster::block_on(wrong.pop());
         if let Some(e) = pollster::block_on(full.pop()) {
             return Err(Error::Gpu(format!(
@@ -97,16 +107,19 @@ impl Context {
         }
 
         let mut context = Self {
-            bytes: memory.total() + staging_bytes,
+            bytes: memory.total() + staging_bytes + MAIL,
             info,
+            clock: Clock::new(&device, &queue),
             device,
             queue,
             buffers,
             pipelines: HashMap::new(),
             staging,
+            mail: (mail, 0),
             encoder: None,
             fault,
-            dispatches: 0,
+            stage: None,
+            commands: Commands::default(),
         };
         for (file, text) in kernels {
             context.compile(file, &shader::source(text, switches))?;
@@ -209,7 +222,7 @@ impl Context {
         };
         let buffer = create(name, size, usage);
         let staging = self.staging.size();
-        let wanted = size.min(STAGING);
+        let wanted = size.min(STAGING.1);
         let larger = (usage.contains(wgpu::BufferUsages::COPY_SRC) && wanted > staging)
             .then(|| create("staging", wanted, self.staging.usage()));
         if let Some(e) = pollster::block_on(scope.pop()) {
@@ -246,6 +259,11 @@ impl Context {
         u64::from(self.device.limits().max_compute_workgroups_per_dimension)
     }
 
+    /// Bytes that the allocator has given out, where it tells.
+    pub fn allocated(&self) -> Option<u64> {
+        self.device.generate_allocator_report().map(|r| r.total_allocated_bytes)
+    }
+
     /// Lose the device.
     #[cfg(test)]
     pub fn destroy(&self) {
@@ -262,18 +280,36 @@ impl Context {
         self.buffers.contains_key(buffer)
     }
 
-    fn buffer(&self, name: &str) -> Result<&wgpu::Buffer> {
+    pub(super) fn buffer(&self, name: &str) -> Result<&wgpu::Buffer> {
         self.buffers.get(name).ok_or_else(|| Error::Gpu(format!("there is no buffer {name}")))
     }
 
-    fn record(&mut self) -> &mut wgpu::CommandEncoder {
-        self.encoder.get_or_insert_with(|| self.device.create_command_encoder(&Default::default()))
+    /// What is recorded from here on belongs to `stage`.
+    pub fn begin(&mut self, stage: Option<Stage>) {
+        if self.stage == stage {
+            return;
+        }
+        self.stage = stage;
+        if let (Some(clock), Some(encoder)) = (&mut self.clock, &mut self.encoder) {
+            clock.mark(encoder, stage);
+        }
+    }
+
+    pub(super) fn record(&mut self) -> &mut wgpu::CommandEncoder {
+        let Self { encoder, device, clock, stage, .. } = self;
+        encoder.get_or_insert_with(|| {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            if let Some(clock) = clock {
+                clock.mark(&mut encoder, *stage);
+            }
+            encoder
+        })
     }
 
     /// Record a pass over kernels, each with its number of workgroups.
     pub fn pass<'a>(&mut self, kernels: impl IntoIterator<Item = (&'a str, u64)>) -> Result<()> {
-        let Self { encoder, device, pipelines, dispatches, .. } = self;
-        let encoder = encoder.get_or_insert_with(|| device.create_command_encoder(&Default::default()));
+        self.record();
+        let Self { encoder: Some(encoder), pipelines, commands, stage, .. } = self else { return Ok(()) };
         let mut pass = encoder.begin_compute_pass(&Default::default());
         for (name, groups) in kernels {
             let kernel = pipelines
@@ -282,7 +318,7 @@ impl Context {
             pass.set_pipeline(&kernel.pipeline);
             pass.set_bind_group(0, &kernel.group, &[]);
             pass.dispatch_workgroups(groups as u32, 1, 1);
-            *dispatches += 1;
+            commands.add(*stage);
         }
         Ok(())
     }
@@ -296,89 +332,6 @@ impl Context {
     pub fn copy(&mut self, from: (&str, u64), to: &str, bytes: u64) -> Result<()> {
         let (source, target) = (self.buffer(from.0)?.clone(), self.buffer(to)?.clone());
         self.record().copy_buffer_to_buffer(&source, from.1, &target, 0, bytes);
-        Ok(())
-    }
-
-    /// Hand what is recorded to the device.
-    pub fn submit(&mut self) {
-        if let Some(encoder) = self.encoder.take() {
-            self.queue.submit([encoder.finish()]);
-        }
-    }
-
-    /// Write to the start of a buffer. What is recorded goes first: it still sees the old content.
-    pub fn upload<T: Pod>(&mut self, name: &str, data: &[T]) -> Result<()> {
-        self.submit();
-        self.queue.write_buffer(self.buffer(name)?, 0, bytemuck::cast_slice(data));
-        Ok(())
-    }
-
-    /// Read parts of a buffer, given as offset and length in elements, one after the other.
-    pub fn download_parts<T: Pod>(&mut self, name: &str, parts: &[(usize, usize)]) -> Result<Vec<T>> {
-        let size = size_of::<T>() as u64;
-        let buffer = self.buffer(name)?.clone();
-        let mut out: Vec<T> = Vec::with_capacity(parts.iter().map(|p| p.1).sum());
-        let mut pending = Vec::new();
-        for &(first, count) in parts {
-            let (mut at, end) = (first as u64 * size, (first + count) as u64 * size);
-            while at < end {
-                let filled: u64 = pending.iter().map(|&(_, bytes)| bytes).sum();
-                // Whole elements only; their sizes divide the staging buffer's.
-                let bytes = (end - at).min(self.staging.size() / size * size - filled);
-                if bytes == 0 {
-                    self.fetch(&buffer, &mut pending, &mut out)?;
-                    continue;
-                }
-                pending.push((at, bytes));
-                at += bytes;
-            }
-        }
-        self.fetch(&buffer, &mut pending, &mut out)?;
-        Ok(out)
-    }
-
-    /// Read the first `count` elements of a buffer.
-    pub fn download<T: Pod>(&mut self, name: &str, count: usize) -> Result<Vec<T>> {
-        self.download_parts(name, &[(0, count)])
-    }
-
-    fn fetch<T: Pod>(
-        &mut self,
-        buffer: &wgpu::Buffer,
-        parts: &mut Vec<(u64, u64)>,
-        out: &mut Vec<T>,
-    ) -> Result<()> {
-        let staging = self.staging.clone();
-        let mut filled = 0;
-        for (at, bytes) in parts.drain(..) {
-            self.record().copy_buffer_to_buffer(buffer, at, &staging, filled, bytes);
-            filled += bytes;
-        }
-        self.submit();
-        if filled == 0 {
-            return Ok(());
-        }
-        let (send, receive) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, ..filled, move |done| {
-            // The receiver is gone only if waiting has failed, which is reported there.
-            let _ = send.send(done);
-        });
-        self.wait()?;
-        let lost = |e: String| Error::Gpu(format!("{}: reading back failed: {e}", self.info.name));
-        receive.try_recv().map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
-        let view = staging.get_mapped_range(..filled).map_err(|e| lost(e.to_string()))?;
-        out.extend_from_slice(&bytemuck::pod_collect_to_vec::<u8, T>(&view));
-        drop(view);
-        staging.unmap();
-        Ok(())
-    }
-
-    /// Wait until the device has done what was submitted.
-    pub fn wait(&mut self) -> Result<()> {
-        self.submit();
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
-        self.check()?;
-        polled.map_err(|e| Error::Gpu(format!("{}: {e}", self.info.name)))?;
         Ok(())
     }
 }

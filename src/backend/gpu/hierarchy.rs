@@ -1,7 +1,7 @@
 //! What the plan fixes of the multigrid levels: where the cells of each lie, how many rows are kept, and the
 //! order of operations of the cycle.
 
-use super::layout::{Sizes, WORKGROUP};
+use super::layout::{SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP};
 use crate::kernels::multigrid::{SWEEPS, visits};
 use crate::kernels::multigrid_levels::{LEVELS_MAX, level_cells};
 use bytemuck::{Pod, Zeroable};
@@ -83,7 +83,7 @@ impl Levels {
 
     /// Blocks of the scan over the cells.
     pub fn blocks(&self) -> u64 {
-        self.cells.div_ceil(4 * WORKGROUP)
+        self.cells.div_ceil(SCAN_BLOCK)
     }
 
     /// For the shaders.
@@ -131,11 +131,12 @@ impl Levels {
     pub fn build(&self) -> Vec<(&'static str, u64)> {
         let [x, y, z] = self.count[0].map(u64::from);
         let cells = (x * y * z).div_ceil(WORKGROUP).min(GROUPS_MAX);
+        let scan = self.blocks().min(SCAN_GROUPS_MAX);
         let mut out = vec![
             ("multigrid_levels.mark", cells),
-            ("multigrid_levels.scan_blocks", self.blocks()),
+            ("multigrid_levels.scan_blocks", scan),
             ("multigrid_levels.scan_sums", 1),
-            ("multigrid_levels.number_rows", self.blocks()),
+            ("multigrid_levels.number_rows", scan),
             ("multigrid_levels.members", cells),
             ("multigrid_levels.galerkin", self.groups(0, 1)),
         ];

@@ -17,6 +17,10 @@ pub const WORKGROUP: u64 = 256;
 pub const MONITOR_WIDTH: u64 = 128;
 /// Workgroups that share a reduction at most: every one of them adds the sums of all others.
 const REDUCTION_GROUPS_MAX: u64 = 1024;
+/// Keys of a scan that a workgroup takes at a time: four a thread.
+pub const SCAN_BLOCK: u64 = 4 * WORKGROUP;
+/// Workgroups of a scan at most; they then take several blocks. A GPU is full with them.
+pub const SCAN_GROUPS_MAX: u64 = 1024;
 /// Fluid particles at most: numbers travel in an f32.
 pub const FLUID_MAX: usize = 1 << 24;
 
@@ -247,6 +251,30 @@ impl Sizes {
         }
     }
 
+    /// Of the same scene with a spacing `finer` times as small, nearly: water fills a volume, walls and bodies'
+    /// layers line surfaces.
+    pub fn refined(&self, finer: f64) -> Self {
+        let flat = self.grid[1] == 1;
+        let surface = |n: u64| (n as f64 * if flat { finer } else { finer * finer }).round() as u64;
+        let volume = |n: u64| (n as f64 * if flat { finer * finer } else { finer.powi(3) }).round() as u64;
+        let mut grid = self.grid.map(|n| (f64::from(n) * finer).ceil() as u32);
+        if flat {
+            grid[1] = 1;
+        }
+        let (fluid, moving, fixed) = (volume(self.fluid), surface(self.moving), surface(self.fixed));
+        Self {
+            total: fluid + moving + fixed,
+            fluid,
+            moving_wall: surface(self.moving_wall),
+            moving,
+            fixed,
+            pressure: fluid + surface(self.pressure - self.fluid),
+            cells: grid.iter().map(|&n| u64::from(n)).product(),
+            grid,
+            ..*self
+        }
+    }
+
     /// Keys of the counting sort.
     pub fn keys(&self) -> u64 {
         self.cells + 1 + if self.moving > 0 { self.cells } else { 0 }
@@ -322,6 +350,7 @@ fn contact_buffers(kernel: Option<&str>) -> Vec<(&'static str, u64, Host, bool)>
         ("contact_point", Host::Writes, smooth),
         ("smooth_pair", Host::Writes, smooth),
         ("smooth_pose", Host::Writes, smooth),
+        ("contact_given", Host::Writes, smooth),
         ("contact_count", Host::Reads, smooth),
         ("contact_state", Host::None, smooth),
         ("contact_layer", Host::Writes, paper),
@@ -360,7 +389,7 @@ impl Memory {
         let (moving, force) = (s.moving > 0, plan.has(Stage::BodyForce) && s.moving_wall > 0);
         let reaction = force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision));
         let sorted = s.fluid + s.moving;
-        let blocks = s.keys().div_ceil(4 * WORKGROUP);
+        let blocks = s.keys().div_ceil(SCAN_BLOCK);
         let table = [
             ("params", size_of::<Constants>() as u64, Host::Uniform, true),
             ("now", size_of::<Coefficients>() as u64, Host::Uniform, true),
@@ -384,7 +413,7 @@ impl Memory {
             ("static_particle", 16 * s.fixed, Host::Writes, s.fixed > 0),
             ("neighbour_list", 4 * s.capacity * s.pressure, Host::Reads, true),
             ("neighbour_count", 4 * s.pressure, Host::Both, true),
-            ("preconditioned", 16 * s.pressure, Host::None, true),
+            ("preconditioned", 16 * s.pressure, Host::Reads, true),
             ("residual", 4 * s.pressure, Host::None, true),
             ("search", 8 * s.pressure, Host::None, true),
             ("partial_sum", 32 * s.reduction_groups(), Host::None, true),
@@ -400,8 +429,7 @@ impl Memory {
         let levels = (plan.preconditioner == Preconditioner::Multigrid).then(|| Levels::new(s));
         let rest = levels.iter().flat_map(|l| multigrid_buffers(s, l)).chain(contact);
         let buffers = listed(table.into_iter().chain(rest).collect());
-        let blocks = levels.map_or(blocks, |l| l.blocks().max(blocks));
-        Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP).max(blocks) }
+        Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP) }
     }
 
     /// All bytes.

@@ -38,8 +38,9 @@ sources!(
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 9] = [
+pub const SWITCHES: [&str; 10] = [
     "CORRECTED",
+    "CORRECTED_SURFACE",
     "MIXED",
     "MOVING",
     "MULTIGRID",
@@ -54,7 +55,8 @@ pub const SWITCHES: [&str; 9] = [
 pub fn switches(params: &Params, groups: &Groups, plan: &Plan) -> Vec<&'static str> {
     let force = plan.has(Stage::BodyForce) && groups.moving_wall > 0;
     let on = [
-        params.gradient == Gradient::MinimumCorrected,
+        params.gradient != Gradient::Minimum,
+        params.gradient == Gradient::CorrectedSurface,
         params.source == Source::Mixed,
         groups.moving_wall + groups.moving_dummy > 0,
         plan.preconditioner == Preconditioner::Multigrid,

@@ -51,13 +51,13 @@ fn index(
         grid.index([along(c.x, grid.count[0]), along(c.y, grid.count[1]), along(c.z, grid.count[2])]) as u32
     };
     let cells: Vec<u32> = position.iter().map(cell).collect();
-    let (mut start, mut place) = (Vec::new(), Vec::new());
-    counting_sort(&cells, grid.total(), &mut start, &mut place);
-    let mut particle = vec![[0; 4]; position.len()];
-    for (k, (x, &p)) in position.iter().zip(&place).enumerate() {
-        particle[p as usize] = [x[0].to_bits(), x[1].to_bits(), x[2].to_bits(), (first + k) as u32];
-    }
-    (start, particle)
+    let (mut start, mut order) = (Vec::new(), Vec::new());
+    counting_sort(&cells, grid.total(), &mut start, &mut order);
+    let entry = |&k: &u32| {
+        let x = position[k as usize];
+        [x[0].to_bits(), x[1].to_bits(), x[2].to_bits(), first as u32 + k]
+    };
+    (start, order.iter().map(entry).collect())
 }
 
 impl Gpu {

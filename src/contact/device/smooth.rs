@@ -5,7 +5,7 @@ use crate::body::{Body, Wrench};
 use crate::contact::Limits;
 use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
 use crate::contact::geometry::Surface;
-use crate::contact::smooth::{DeviceSums, Other, Pair, Patch};
+use crate::contact::smooth::{Contact, DeviceSums, Other, Pair, Patch};
 use crate::error::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
@@ -37,10 +37,10 @@ pub struct SmoothPair {
     pub near: [u32; 2],
     pub faces: [u32; 2],
     pub list: u32,
-    pub state: u32,
     pub sum: u32,
     pub share: f32,
     pub skin: f32,
+    pub open: u32,
     pub pad: [u32; 3],
 }
 
@@ -58,6 +58,7 @@ pub struct SmoothPose {
     pub below_a: [f32; 4],
     pub above_a: [f32; 4],
     pub found: [f32; 4],
+    pub given: [u32; 4],
 }
 
 /// Points in their frame, and the box around them.
@@ -99,6 +100,9 @@ pub(crate) struct Smooth {
     pub pairs: Vec<Pair>,
     records: Vec<SmoothPair>,
     poses: Vec<SmoothPose>,
+    /// Contacts found beside the device that it takes in.
+    given: Vec<[[f32; 4]; 3]>,
+    states: usize,
     sums: usize,
     /// Sub-step and longest step [s] that the device has the constants of.
     constants: Option<(f64, f64)>,
@@ -114,8 +118,18 @@ impl Smooth {
             .map(|s| Cloud::add(&mut points, &s.points, |k| s.weights[k]))
             .collect::<Result<_>>()?;
         link.write("contact_point", &points)?;
-        let (pairs, records, poses) = (vec![], vec![], vec![]);
-        Ok(Self { generation: 0, clouds, pairs, poses, records, sums: 0, constants: None, sent: false })
+        Ok(Self {
+            generation: 0,
+            clouds,
+            pairs: vec![],
+            records: vec![],
+            poses: vec![],
+            given: vec![],
+            states: 0,
+            sums: 0,
+            constants: None,
+            sent: false,
+        })
     }
 
     /// Whether the lists are those of `candidates`.
@@ -129,7 +143,6 @@ impl Smooth {
         model: &candidates::Smooth,
         candidates: &Candidates,
         bodies: &[Body],
-        spacing: f64,
         link: &mut Link,
     ) -> Result<()> {
         let mut list = 0;
@@ -138,11 +151,9 @@ impl Smooth {
             let (body, own) = (&bodies[pair.a], self.clouds[pair.a]);
             let (theirs, faces_b, share) = match pair.b {
                 Other::Solid(b) => (self.clouds[b], model.surfaces[b].all_faces, 0.5),
-                Other::Wall(w) => {
-                    pair.collect_edges(body, &model.walls[w], skin, spacing);
-                    (Cloud::default(), model.walls[w].faces, 1.0)
-                }
+                Other::Wall(w) => (Cloud::default(), model.walls[w].faces, 1.0),
             };
+            pair.collect_edges(bodies, &model.surfaces, &model.walls, skin);
             let size = body.radius() + theirs.low.length().max(theirs.high.length());
             self.records.push(SmoothPair {
                 low_a: three(own.low),
@@ -162,15 +173,14 @@ impl Smooth {
             self.pairs.push(pair);
         }
         if !self.pairs.is_empty() {
-            self.place_poses(model, bodies);
+            self.place_poses(model, bodies)?;
             link.write("smooth_pair", &self.records)?;
             link.write("smooth_pose", &self.poses)?;
             link.compute.reserve("contact_list", 4 * list as u64)?;
             link.compute.reserve("contact_count", 8 * self.pairs.len() as u64)?;
             link.run(&[("contact_smooth.search", self.pairs.len() as u64)])?;
             let near = link.read::<[u32; 2]>("contact_count", self.pairs.len())?;
-            let states = self.keep(&near)?;
-            link.compute.reserve("contact_state", 16 * states as u64)?;
+            self.keep(&near)?;
             link.compute.reserve("contact_sum", 16 * self.sums as u64)?;
         }
         self.generation = candidates.generation();
@@ -178,23 +188,29 @@ impl Smooth {
         Ok(())
     }
 
-    /// Keeps the pairs with points near each other and gives each its places; how many states they have.
-    fn keep(&mut self, near: &[[u32; 2]]) -> Result<usize> {
-        let (mut state, mut sum) = (0, 0);
+    /// Keeps the pairs with points near each other and gives each its place.
+    fn keep(&mut self, near: &[[u32; 2]]) -> Result<()> {
+        let mut sum = 0;
         let (pairs, records) = (std::mem::take(&mut self.pairs), std::mem::take(&mut self.records));
         for ((pair, mut record), &near) in pairs.into_iter().zip(records).zip(near) {
             if near == [0, 0] && pair.is_empty() {
                 continue;
             }
             record.near = near;
-            (record.state, record.sum) = (place(state)?, place(sum)?);
-            state += 3 * (near[0] + near[1]) as usize;
+            // Faces that points, edges or corners of the other may press.
+            let pressed = [
+                near[0] > 0 || !pair.edges_a.is_empty(),
+                near[1] > 0 || !pair.edges_b.is_empty() || !pair.samples.is_empty(),
+            ];
+            let [on_b, on_a] = [0, 1].map(|k| if pressed[k] { record.faces[k] } else { 0 });
+            record.open = on_b | on_a << 6;
+            record.sum = place(sum)?;
             sum += 1 + 3 * slots(&record).count();
             self.pairs.push(pair);
             self.records.push(record);
         }
         self.sums = sum;
-        Ok(state)
+        Ok(())
     }
 
     /// Constants of every pair for sub-steps of `h` [s].
@@ -214,19 +230,31 @@ impl Smooth {
     }
 
     /// How each pair lies now, and what the host finds beside the points.
-    fn place_poses(&mut self, model: &candidates::Smooth, bodies: &[Body]) {
+    fn place_poses(&mut self, model: &candidates::Smooth, bodies: &[Body]) -> Result<()> {
         let clouds = &self.clouds;
-        let of = |pair: &mut Pair| {
-            let [deepest, eighth, sixth] = pair.find_beside_device(bodies, &model.surfaces, &model.walls);
-            let found = [deepest as f32, eighth as f32, sixth as f32, 0.0];
-            SmoothPose { found, ..pose(pair, clouds, model, bodies) }
+        let of = |(pair, record): (&mut Pair, &SmoothPair)| {
+            let (surfaces, walls) = (&model.surfaces, &model.walls);
+            let found = pair.find_beside_device(bodies, surfaces, walls, model.spacing, record.open);
+            let [deepest, eighth, sixth] = found.map(|x| x as f32);
+            SmoothPose { found: [deepest, eighth, sixth, 0.0], ..pose(pair, clouds, model, bodies) }
         };
         if self.pairs.len() >= MANY_PAIRS {
-            self.pairs.par_iter_mut().map(of).collect_into_vec(&mut self.poses);
+            self.pairs.par_iter_mut().zip(&self.records).map(of).collect_into_vec(&mut self.poses);
         } else {
             self.poses.clear();
-            self.poses.extend(self.pairs.iter_mut().map(of));
+            self.poses.extend(self.pairs.iter_mut().zip(&self.records).map(of));
         }
+        self.given.clear();
+        let mut state = 0;
+        for ((pose, pair), record) in self.poses.iter_mut().zip(&self.pairs).zip(&self.records) {
+            let count = pair.given.len();
+            pose.given = [place(self.given.len())?, place(count)?, place(state)?, 0];
+            state += 3 * (record.near.iter().sum::<u32>() as usize + count);
+            let a = &bodies[pair.a];
+            self.given.extend(pair.given.iter().map(|c| given(c, a)));
+        }
+        self.states = state;
+        Ok(())
     }
 
     /// Normal forces of all pairs at the bodies' poses and velocities.
@@ -234,7 +262,8 @@ impl Smooth {
         if self.pairs.is_empty() {
             return Ok(());
         }
-        self.place_poses(model, bodies);
+        self.place_poses(model, bodies)?;
+        link.compute.reserve("contact_state", 16 * self.states as u64)?;
         if !self.sent {
             for (record, pair) in self.records.iter_mut().zip(&self.pairs) {
                 let c = &pair.constants;
@@ -246,6 +275,7 @@ impl Smooth {
             self.sent = true;
         }
         link.write("smooth_pose", &self.poses)?;
+        link.write("contact_given", &self.given)?;
         link.run(&[("contact_smooth.force", self.pairs.len() as u64)])?;
         let sums = link.read::<[f32; 4]>("contact_sum", self.sums)?;
         let take = |(pair, record): (&mut Pair, &SmoothPair)| {
@@ -286,13 +316,21 @@ impl Smooth {
     }
 }
 
-/// Side and face of each sum of a pair, in their order.
+/// Face of each sum of a pair, in their order: 0 to 5 of its second solid, 6 to 11 of the first.
 fn slots(record: &SmoothPair) -> impl Iterator<Item = u8> + use<> {
-    let SmoothPair { near, faces, .. } = *record;
-    (0..12_u8).filter(move |key| {
-        let (side, face) = (usize::from(key / 6), key % 6);
-        near[side] > 0 && faces[side] >> face & 1 == 1
-    })
+    let open = record.open;
+    (0..12_u8).filter(move |key| open >> key & 1 == 1)
+}
+
+/// A contact as the shader keeps its own; see `contact_state` there.
+fn given(contact: &Contact, a: &Body) -> [[f32; 4]; 3] {
+    let still = a.rotation.transpose();
+    let face = contact.face().unwrap_or_default();
+    [
+        four(still * contact.normal, contact.depth),
+        four(still * (contact.at - a.pose.position), contact.speed),
+        [contact.weight as f32, f32::from(face), 0.0, 0.0],
+    ]
 }
 
 /// Largest clearances to the lower and upper faces of a box of half edges `half` among the corners of a cloud's
@@ -340,6 +378,7 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Bod
         below_a: four(below_a, 0.0),
         above_a: four(above_a, 0.0),
         found: [0.0; 4],
+        given: [0; 4],
     }
 }
 

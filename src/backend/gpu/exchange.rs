@@ -1,0 +1,134 @@
+//! Data between host and device, and the submissions that they take.
+
+use super::context::Context;
+use crate::error::{Error, Result};
+use bytemuck::Pod;
+use std::sync::mpsc;
+
+/// A part of a buffer: name, first byte, bytes.
+pub(super) type Part<'a> = (&'a str, u64, u64);
+
+impl Context {
+    /// Hand what is recorded to the device.
+    pub fn submit(&mut self) {
+        if let Some(mut encoder) = self.encoder.take() {
+            if let Some(clock) = &mut self.clock {
+                clock.mark(&mut encoder, None);
+            }
+            self.queue.submit([encoder.finish()]);
+            self.mail.1 = 0;
+            self.commands.submits += 1;
+        }
+    }
+
+    /// Write to the start of a buffer; what was recorded before still sees the old content. Little data goes with
+    /// the next submission, much causes one.
+    pub fn upload<T: Pod>(&mut self, name: &str, data: &[T]) -> Result<()> {
+        let data: &[u8] = bytemuck::cast_slice(data);
+        let (mail, at) = (self.mail.0.clone(), self.mail.1);
+        let end = at + data.len() as u64;
+        let target = self.buffer(name)?.clone();
+        if end > mail.size() {
+            self.submit();
+            self.queue.write_buffer(&target, 0, data);
+        } else {
+            // The queue writes before the submission; no two uploads of one share a place.
+            self.queue.write_buffer(&mail, at, data);
+            self.record().copy_buffer_to_buffer(&mail, at, &target, 0, data.len() as u64);
+            self.mail.1 = end;
+        }
+        Ok(())
+    }
+
+    /// Read the first `count` elements of a buffer.
+    pub fn download<T: Pod>(&mut self, name: &str, count: usize) -> Result<Vec<T>> {
+        self.download_parts(name, &[(0, count)])
+    }
+
+    /// Read parts of a buffer, given as offset and length in elements, one after the other.
+    pub fn download_parts<T: Pod>(&mut self, name: &str, parts: &[(usize, usize)]) -> Result<Vec<T>> {
+        let size = size_of::<T>() as u64;
+        let part = |&(first, count): &(usize, usize)| (name, first as u64 * size, count as u64 * size);
+        let bytes = self.download_bytes(&parts.iter().map(part).collect::<Vec<_>>(), false)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// Read parts of several buffers, one after the other, and the clock as well if `clock`: one wait, unless they
+    /// are large.
+    pub fn download_bytes(&mut self, parts: &[Part], clock: bool) -> Result<Vec<u8>> {
+        let total = parts.iter().map(|p| p.2).sum::<u64>();
+        let mut out = Vec::with_capacity(total as usize);
+        let mut filled = 0;
+        let staging = self.staging.clone();
+        for &(name, first, bytes) in parts {
+            let buffer = self.buffer(name)?.clone();
+            let (mut at, end) = (first, first + bytes);
+            while at < end {
+                if filled == staging.size() {
+                    self.fetch(filled, false, &mut out)?;
+                    filled = 0;
+                }
+                let bytes = (end - at).min(staging.size() - filled);
+                self.record().copy_buffer_to_buffer(&buffer, at, &staging, filled, bytes);
+                (at, filled) = (at + bytes, filled + bytes);
+            }
+        }
+        self.fetch(filled, clock, &mut out)?;
+        Ok(out)
+    }
+
+    /// Wait for `filled` bytes in the staging buffer, and for the clock if asked or due.
+    fn fetch(&mut self, filled: u64, clock: bool, out: &mut Vec<u8>) -> Result<()> {
+        let mut ticks = None;
+        if self.clock.as_ref().is_some_and(|c| clock || c.is_full()) {
+            self.record();
+            if let (Some(clock), Some(encoder)) = (&mut self.clock, &mut self.encoder) {
+                ticks = clock.fetch(encoder);
+            }
+        }
+        self.submit();
+        let (send, receive) = mpsc::channel();
+        let staging = (filled > 0).then(|| (self.staging.clone(), filled));
+        let wanted: Vec<_> = staging.iter().chain(&ticks).cloned().collect();
+        for (buffer, bytes) in &wanted {
+            let send = send.clone();
+            buffer.map_async(wgpu::MapMode::Read, ..*bytes, move |done| {
+                // The receiver is gone only if waiting has failed, which is reported there.
+                let _ = send.send(done);
+            });
+        }
+        if wanted.is_empty() {
+            return Ok(());
+        }
+        self.wait()?;
+        let lost = |e: String| Error::Gpu(format!("{}: reading back failed: {e}", self.info.name));
+        let mut read = Vec::with_capacity(wanted.len());
+        for _ in &wanted {
+            receive.try_recv().map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
+        }
+        for (buffer, bytes) in &wanted {
+            let view = buffer.get_mapped_range(..*bytes).map_err(|e| lost(e.to_string()))?;
+            read.push(view.to_vec());
+            drop(view);
+            buffer.unmap();
+        }
+        let mut read = read.into_iter();
+        if staging.is_some() {
+            out.extend(read.next().unwrap_or_default());
+        }
+        if let (Some(clock), Some(ticks)) = (&mut self.clock, read.next()) {
+            clock.read(&bytemuck::pod_collect_to_vec::<u8, u64>(&ticks));
+        }
+        Ok(())
+    }
+
+    /// Wait until the device has done what was submitted.
+    pub fn wait(&mut self) -> Result<()> {
+        self.submit();
+        self.commands.waits += 1;
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        polled.map_err(|e| Error::Gpu(format!("{}: {e}", self.info.name)))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! Rows of neighbours laid out by component, so that sums over them take several neighbours at a time.
+//!
+//! Arrays are filled up with zeros to whole [`LANES`]; sums run over that many partial sums side by side, on every
+//! machine, so that results do not depend on its vectors.
+
+use crate::neighbours::CAPACITY;
+use glam::DVec3;
+
+/// Partial sums of a sum.
+pub const LANES: usize = 8;
+
+/// Longest row: as many neighbours that carry pressure as fit, as many dummies, and the filling.
+pub const LONGEST: usize = 2 * CAPACITY + LANES;
+
+/// A number for each neighbour.
+pub type Column = [f64; LONGEST];
+
+/// A vector for each neighbour.
+#[derive(Clone, Copy, Debug)]
+pub struct Columns {
+    /// Components along x.
+    pub x: Column,
+    /// Components along y.
+    pub y: Column,
+    /// Components along z.
+    pub z: Column,
+}
+
+impl Columns {
+    /// f_j - f_i of `field` for each neighbour j; returns the length with the filling.
+    #[inline(always)]
+    pub fn differences(&mut self, i: usize, neighbour: &[u32], field: &[DVec3]) -> usize {
+        let (n, own) = (neighbour.len(), field[i]);
+        let filled = n.next_multiple_of(LANES);
+        let (x, y, z) = (&mut self.x[..filled], &mut self.y[..filled], &mut self.z[..filled]);
+        for (k, &j) in neighbour.iter().enumerate() {
+            let d = field[j as usize] - own;
+            (x[k], y[k], z[k]) = (d.x, d.y, d.z);
+        }
+        for v in [x, y, z] {
+            v[n..].fill(0.0);
+        }
+        filled
+    }
+
+    /// out_k <- f(k, |v_k|^2).
+    #[inline(always)]
+    pub fn map_squares(&self, out: &mut [f64], f: impl Fn(usize, f64) -> f64) {
+        let n = out.len();
+        let (x, y, z) = (&self.x[..n], &self.y[..n], &self.z[..n]);
+        for k in 0..n {
+            out[k] = f(k, x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
+        }
+    }
+
+    /// sum w_k v_k.
+    #[inline(always)]
+    pub fn weighted_sum(&self, w: &[f64]) -> DVec3 {
+        DVec3::new(dot(w, &self.x), dot(w, &self.y), dot(w, &self.z))
+    }
+}
+
+/// Room for the rows of one thread.
+#[derive(Clone, Debug)]
+pub struct RowArrays {
+    /// r_j - r_i.
+    pub r: Columns,
+    /// Another vector of each neighbour.
+    pub v: Columns,
+    /// A number for each neighbour, mostly the weight.
+    pub w: Column,
+    /// Another number.
+    pub s: Column,
+}
+
+impl Default for RowArrays {
+    fn default() -> Self {
+        let v = Columns { x: [0.0; LONGEST], y: [0.0; LONGEST], z: [0.0; LONGEST] };
+        Self { r: v, v, w: [0.0; LONGEST], s: [0.0; LONGEST] }
+    }
+}
+
+/// sum a_k.
+#[inline(always)]
+pub fn sum(a: &[f64]) -> f64 {
+    let mut lanes = [0.0; LANES];
+    let blocks = a.chunks_exact(LANES);
+    let rest: f64 = blocks.remainder().iter().sum();
+    for a in blocks {
+        for k in 0..LANES {
+            lanes[k] += a[k];
+        }
+    }
+    total(lanes) + rest
+}
+
+/// sum a_k b_k over the length of `a`, a multiple of [`LANES`].
+#[inline(always)]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for k in 0..LANES {
+            lanes[k] += a[k] * b[k];
+        }
+    }
+    total(lanes)
+}
+
+#[inline(always)]
+fn total(l: [f64; LANES]) -> f64 {
+    ((l[0] + l[4]) + (l[1] + l[5])) + ((l[2] + l[6]) + (l[3] + l[7]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_over_rows_of_any_length_are_the_plain_ones() {
+        let field: Vec<DVec3> = (0..60)
+            .map(|k| DVec3::new(0.1 * f64::from(k), f64::from(k % 7), -1.0 / f64::from(k + 1)))
+            .collect();
+        let mut arrays = RowArrays::default();
+        for n in (0..50).rev() {
+            let row: Vec<u32> = (0..n).map(|k| (3 * k + 1) % 60).collect();
+            let filled = arrays.r.differences(5, &row, &field);
+            assert!(filled >= row.len() && filled % LANES == 0);
+            let plain: DVec3 = row.iter().map(|&j| field[j as usize] - field[5]).sum();
+            let got = arrays.r.weighted_sum(&[1.0; LONGEST][..filled]);
+            assert!((got - plain).length() < 1e-12, "{n}: {got} for {plain}");
+            arrays.r.map_squares(&mut arrays.s[..row.len()], |_, r2| r2);
+            let squares: f64 = row.iter().map(|&j| field[j as usize].distance_squared(field[5])).sum();
+            assert!((sum(&arrays.s[..row.len()]) - squares).abs() < 1e-10 * (1.0 + squares));
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! What a step asks of a device: submissions, waits, dispatches, its clock.
+#![allow(missing_docs)]
+
+mod common;
+
+use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::{Backend, Timing};
+use seixo::case::Case;
+use seixo::params::Params;
+use seixo::plan::{Plan, Stage};
+use seixo::pressure::Settings;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+use std::time::Instant;
+
+/// A simulation on a device; loud if there is none, and a failure where one is expected.
+fn on_device(case: &Case) -> Option<Simulation> {
+    if gpu::adapters().is_empty() {
+        let text = "NO GPU ADAPTER: what a step asks of a device is not tested";
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        eprintln!("SKIPPED, {text}");
+        return None;
+    }
+    let make = |s: &_, p: &_, plan: &_, settings| {
+        Ok(Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>)
+    };
+    let scene = Scene::build(case).expect("the scene builds");
+    Some(Simulation::new(case, &scene, make).expect("the simulation starts"))
+}
+
+/// Still water with a gate beside it and, if `free`, a cube above it, both out of its reach.
+fn still(free: bool, preconditioner: &str) -> Case {
+    let body = "[[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.125, 0.125, 5.6]\ndensity = 500\n\
+                [contact]\nlaw = \"smooth\"\nspring = 1e4\n";
+    common::case(&format!(
+        "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1.0\nadaptive = false\n\
+         [fluid]\nsound_speed = 3\nsolver = {{ preconditioner = \"{preconditioner}\" }}\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 6.0]\nopen = [\"z_max\"]\n\
+         [[moving_wall]]\nname = \"gate\"\nmin = [0.1, 0.1, 5.0]\nmax = [0.15, 0.15, 5.2]\n\
+         motion = [[0, 0, 0, 0], [3, 0, 0, 0.3]]\n{}",
+        if free { body } else { "" }
+    ))
+}
+
+#[test]
+fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
+    for preconditioner in ["jacobi", "multigrid"] {
+        for free in [false, true] {
+            let Some(mut sim) = on_device(&still(free, preconditioner)) else { return };
+            assert_eq!(sim.plan.has(Stage::BodyForce), free);
+            for _ in 0..21 {
+                sim.step().expect("still water is no trouble");
+            }
+            let before = sim.backend.commands();
+            for _ in 0..20 {
+                sim.step().expect("still water is no trouble");
+            }
+            let now = sim.backend.commands();
+            let (submits, waits) = (now.submits - before.submits, now.waits - before.waits);
+            println!("{preconditioner}, body {free}: {submits} submissions, {waits} waits in 20 steps");
+            // The solver's verdict and, with a free body, the force on it; every ten steps a look at the fluid.
+            let answers = if free { 2 * 20 } else { 20 } + 2;
+            assert_eq!((submits, waits), (answers, answers), "{preconditioner}, body {free}");
+            let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
+            assert_eq!(count(Stage::CellList), 6 * 20);
+            assert_eq!(count(Stage::MoveSolids), 2 * 20);
+            // Nothing in the solver goes uncounted: once a solve the residuals, the levels and the last verdict, the
+            // rest are whole iterations.
+            let solve = sim.backend.traffic().expect("it can be counted").solve;
+            let once = solve.ends + solve.build;
+            let verdict = u64::from(preconditioner == "multigrid");
+            let iterations = count(Stage::ConjugateGradient) - 20 * (once.dispatches + verdict);
+            let each = solve.iteration + solve.cycle;
+            println!("{solve:?}");
+            assert!(iterations >= 20 * each.dispatches && iterations % each.dispatches == 0);
+            assert!(solve.build.bytes < 2 * each.bytes && solve.build.dispatches < 2 * each.dispatches);
+        }
+    }
+}
+
+#[test]
+fn the_device_clock_tells_every_stage_and_no_more_than_the_wall_clock() {
+    let Some(mut sim) = on_device(&still(true, "jacobi")) else { return };
+    if sim.backend.timing() != Timing::Timestamps {
+        eprintln!("SKIPPED: the adapter has no timestamps");
+        return;
+    }
+    let start = Instant::now();
+    for _ in 0..15 {
+        sim.step().expect("still water is no trouble");
+    }
+    sim.observe().expect("the device is there");
+    let wall = start.elapsed().as_secs_f64();
+    let total: f64 = sim.stages.values().sum();
+    println!("{:?} of {wall} s", sim.stages);
+    for stage in Stage::ALL.into_iter().filter(|&s| sim.plan.has(s)) {
+        assert!(sim.stages.get(&stage).is_some_and(|&t| t > 0.0), "{stage:?}");
+    }
+    assert!(total <= wall, "{total} s of {wall} s");
+    // A solve takes many times as long as a sweep over the particles.
+    assert!(sim.stages[&Stage::ConjugateGradient] > 3.0 * sim.stages[&Stage::Correct]);
+}
+
+/// Every buffer that the plan counts is allocated, and nothing else that grows with the scene.
+#[test]
+fn planned_bytes_are_allocated_bytes() {
+    if gpu::adapters().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "NO GPU ADAPTER: memory is not tested");
+        return;
+    }
+    for (free, preconditioner) in [(false, "jacobi"), (true, "multigrid")] {
+        let case = still(free, preconditioner);
+        let scene = Scene::build(&case).expect("the scene builds");
+        let params = Params::new(&case, &scene).expect("valid");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
+        let planned = gpu::memory(&scene, &params, &plan).expect("it can be planned");
+        let mut gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+        // What the uploads travel in is given back.
+        gpu.read().expect("the device is there");
+        gpu.wait().expect("the device is there");
+        let Some(allocated) = gpu.allocated() else {
+            eprintln!("SKIPPED: the driver's allocator does not tell");
+            return;
+        };
+        println!("planned {}, held {}, allocated {allocated}", planned.total(), gpu.bytes());
+        // What the program keeps to talk to the device, and what wgpu does; the driver rounds each buffer up.
+        let rest = allocated.checked_sub(gpu.bytes()).expect("not all that is planned is allocated");
+        assert!(rest < 1 << 20, "{rest} bytes are allocated that are not planned");
+        assert!(planned.total() > 2 << 20 && gpu.bytes() - planned.total() <= 17 << 20);
+    }
+}
+
+/// With more blocks of cells than workgroups each takes several: a huge empty domain changes nothing.
+#[test]
+fn water_in_a_huge_domain_is_the_same_water() {
+    let column = |domain: &str| {
+        common::case(&format!(
+            "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1.0\nadaptive = false\n{domain}\n\
+             [fluid]\nsound_speed = 3\nsolver = {{ preconditioner = \"multigrid\" }}\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.2]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.4]\nopen = [\"z_max\"]\n"
+        ))
+    };
+    // The same corner, 0.21 m or four cells apart: cells of one lie on cells of the other, on every level.
+    let mut ends = Vec::new();
+    for far in [1.0, 6.0] {
+        let to = [far, far, far];
+        let domain = format!("domain = [[-0.21, -0.21, -0.21], {to:?}]");
+        let Some(mut sim) = on_device(&column(&domain)) else { return };
+        let mut iterations = 0;
+        for _ in 0..12 {
+            iterations += sim.step().expect("still water is no trouble").pressure.iterations;
+        }
+        let fields = sim.backend.read().expect("the device is there");
+        let mut by_number: Vec<(u32, f64)> =
+            fields.id.iter().copied().zip(fields.pressure.iter().copied()).collect();
+        by_number.sort_by_key(|p| p.0);
+        assert!(fields.pressure.iter().any(|&p| p > 100.0));
+        let cells = seixo::cells::Grid::new(&sim.params).expect("a grid").total();
+        println!("{cells} cells, {iterations} iterations");
+        ends.push((iterations, by_number, cells));
+    }
+    assert!(ends[1].2 > 1024 * 1024, "{} cells fit the workgroups", ends[1].2);
+    assert_eq!(ends[0].0, ends[1].0);
+    // Positions are rounded relative to another middle.
+    let most = ends[0].1.iter().map(|p| p.1).fold(0.0, f64::max);
+    for (a, b) in ends[0].1.iter().zip(&ends[1].1) {
+        assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-2 * most, "{a:?} {b:?}");
+    }
+}
