@@ -5,13 +5,13 @@ use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::Gpu;
 use crate::body::{Pose, Wrench};
-use crate::case::Case;
+use crate::case::{Case, ContactDevice};
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::neighbours::Neighbours;
 use crate::params::Params;
-use crate::plan::Stage;
-use crate::scene::{Scene, Shape, Solid};
+use crate::plan::{ContactPlan, Stage};
+use crate::scene::{Drive, Scene, Shape, Solid};
 use crate::simulation::Simulation;
 use glam::DVec3;
 use serde::Serialize;
@@ -177,17 +177,18 @@ fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
 
 /// Errors of force and torque. A torque may vanish by symmetry: its scale is at least force times the size of
 /// the largest solid.
-fn wrenches(gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid]) -> Vec<StageError> {
+fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid], weight: f64) -> Vec<StageError> {
     let most = |f: fn(&Wrench) -> DVec3| cpu.iter().map(|w| f(w).length()).fold(0.0, f64::max);
     let sizes = solids.iter().map(|s| match s.shape {
         Shape::Box { half } => half.length(),
     });
-    let scale = most(|w| w.torque).max(most(|w| w.force) * sizes.fold(0.0, f64::max));
+    let force = most(|w| w.force).max(weight);
+    let scale = most(|w| w.torque).max(force * sizes.fold(0.0, f64::max));
     let pairs =
         |f: fn(&Wrench) -> DVec3| -> Vec<_> { gpu.iter().zip(cpu).map(|(a, b)| (f(a), f(b))).collect() };
     vec![
-        error(Stage::BodyForce, "force", &pairs(|w| w.force), None),
-        error(Stage::BodyForce, "torque", &pairs(|w| w.torque), Some(scale)),
+        error(stage, "force", &pairs(|w| w.force), (weight > 0.0).then_some(force)),
+        error(stage, "torque", &pairs(|w| w.torque), Some(scale)),
     ]
 }
 
@@ -213,6 +214,13 @@ impl Pair {
     }
 }
 
+/// `case` for the CPU, which has no device for its contact.
+fn for_cpu(case: &Case) -> Case {
+    let mut case = case.clone();
+    case.contact.iter_mut().for_each(|c| c.device = ContactDevice::Host);
+    case
+}
+
 /// Error of every field after every stage of one step, device (`adapter` as in [`Gpu::new`]) against CPU.
 /// The step starts from the state that `warmup` steps on the CPU lead to, rounded to f32 for both. Errors
 /// pass from stage to stage, as they do in a run.
@@ -222,17 +230,23 @@ pub fn compare_stages(
     adapter: Option<&str>,
     warmup: u64,
 ) -> Result<Vec<StageError>> {
-    let mut simulation = Simulation::new(case, scene, |s, p, plan, settings| {
+    let mut simulation = Simulation::new(&for_cpu(case), scene, |s, p, plan, settings| {
         Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
     })?;
     for _ in 0..warmup {
         simulation.step()?;
     }
-    let (plan, params) = (simulation.plan.clone(), simulation.params.clone());
-    if !plan.wet() {
-        return Ok(Vec::new());
-    }
+    let (mut plan, params) = (simulation.plan.clone(), simulation.params.clone());
+    // The plan may leave contact to the host; here it is the device's that is asked about.
+    plan.contact = ContactPlan::on_device(case, scene);
     let settings = simulation.settings();
+    if !plan.wet() {
+        if plan.contact.kernel.is_none() {
+            return Ok(Vec::new());
+        }
+        let mut gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
+        return contact(&mut simulation, &mut gpu, scene);
+    }
     let cpu = Cpu::new(scene, &params, &plan, settings)?;
     let gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
     let mut pair = Pair { cpu, gpu, params };
@@ -259,7 +273,8 @@ pub fn compare_stages(
                 pair.gpu.solve_pressure(&step)?;
             }
             Stage::BodyForce => {
-                out.extend(wrenches(&pair.gpu.body_force()?, &pair.cpu.body_force()?, &scene.solids));
+                let (gpu, cpu) = (pair.gpu.body_force()?, pair.cpu.body_force()?);
+                out.extend(wrenches(stage, &gpu, &cpu, &scene.solids, 0.0));
                 continue;
             }
             _ => {
@@ -269,6 +284,31 @@ pub fn compare_stages(
         }
         out.extend(pair.errors(stage)?);
     }
+    out.extend(contact(&mut simulation, &mut pair.gpu, scene)?);
+    Ok(out)
+}
+
+/// Errors of contact between the solids where they are: the part of candidates that differs, and the forces
+/// without friction.
+fn contact(simulation: &mut Simulation, gpu: &mut Gpu, scene: &Scene) -> Result<Vec<StageError>> {
+    let Some(compute) = gpu.compute() else { return Ok(Vec::new()) };
+    let dt = simulation.next_step().dt;
+    let device = simulation.solids.probe(Some(compute), dt)?;
+    let host = simulation.solids.probe(None, dt)?;
+    let missing = |a: &[[u64; 4]], b: &[[u64; 4]]| a.iter().filter(|c| b.binary_search(c).is_err()).count();
+    let differing =
+        missing(&device.candidates, &host.candidates) + missing(&host.candidates, &device.candidates);
+    let part = differing as f64 / host.candidates.len().max(1) as f64;
+    let stage = Stage::Contact;
+    let pairs = StageError { stage: stage.name(), field: "pairs", max_relative: part, l2_relative: part };
+    let mut out = vec![pairs];
+    // A body that hardly touches has hardly a force; what counts is the noise against its weight.
+    let mass = scene.solids.iter().filter_map(|s| match &s.drive {
+        Drive::Free(body) => Some(body.mass),
+        Drive::Prescribed(_) => None,
+    });
+    let weight = mass.fold(0.0, f64::max) * scene.gravity.length();
+    out.extend(wrenches(stage, &device.wrenches, &host.wrenches, &scene.solids, weight));
     Ok(out)
 }
 
@@ -315,7 +355,7 @@ pub fn drift(case: &Case, scene: &Scene, adapter: Option<&str>, steps: u64) -> R
         Ok((simulation, start.elapsed().as_secs_f64(), iterations / steps.max(1) as f64))
     };
     let (mut cpu, cpu_seconds, cpu_iterations) =
-        run(Simulation::new(case, scene, |s, p, plan, settings| {
+        run(Simulation::new(&for_cpu(case), scene, |s, p, plan, settings| {
             Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
         })?)?;
     let (mut gpu, gpu_seconds, gpu_iterations) =

@@ -1,7 +1,7 @@
 //! Which stages a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{Case, Preconditioner, Source};
+use crate::case::{Case, ContactDevice, Law, Preconditioner, Source};
 use crate::params::Params;
 use crate::scene::{Drive, Scene};
 
@@ -32,7 +32,7 @@ pub enum Stage {
     Correct,
     /// Force of the fluid on solids.
     BodyForce,
-    /// Contact and motion of the bodies, on the host.
+    /// Contact and motion of the bodies; sums, friction and motion on the host.
     Contact,
 }
 
@@ -77,6 +77,12 @@ impl Stage {
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
 pub const MULTIGRID_UNKNOWNS: usize = 30_000;
 
+/// Surface points of bodies that move freely from which the device searches and presses their contacts. A sub-step
+/// costs a round trip to the device, 0.1 ms or so, however many bodies there are; the host takes a few microseconds
+/// for a body of 200 points. The two meet at some tens of bodies, and this is a hundred of them. It counts points
+/// and no microseconds, so that the same case computes in the same way on every machine.
+pub const DEVICE_CONTACT_POINTS: usize = 20_000;
+
 /// Density ratio of body to water below which the fluid's force is relaxed, in three dimensions [-].
 pub const LIGHT_3D: f64 = 0.4;
 /// The same in two dimensions, where a body drags more water along: unrelaxed, 0.5 swings and 0.7 does not.
@@ -90,6 +96,48 @@ fn relaxation(ratio: f64) -> f64 {
     (1.0 / (1.0 + ADDED_MASS / ratio)).min(0.2)
 }
 
+/// Where a backend with a device searches and presses the pairs of contact; a backend without one leaves it to the
+/// host.
+#[derive(Clone, Debug, Default)]
+pub struct ContactPlan {
+    /// The device's kernel; `None`: on the host.
+    pub kernel: Option<&'static str>,
+    /// Why.
+    pub reason: String,
+}
+
+impl ContactPlan {
+    /// On the device, whatever the size of the scene; for comparisons. Nothing changes where the device has no
+    /// kernel for the law.
+    pub fn on_device(case: &Case, scene: &Scene) -> Self {
+        Self::judge(case, scene, ContactDevice::Gpu)
+    }
+
+    fn judge(case: &Case, scene: &Scene, asked: ContactDevice) -> Self {
+        let host = |reason: &str| Self { kernel: None, reason: reason.into() };
+        let free = |s: &&crate::scene::Solid| matches!(s.drive, Drive::Free(_));
+        let points: usize = scene.solids.iter().filter(free).map(|s| s.wall_offset.len()).sum();
+        let kernel = match case.contact.as_ref().map(|c| c.law) {
+            None => return host("no contact"),
+            Some(Law::Pressure) => return host("the baseline's impulses follow one another"),
+            Some(Law::Smooth) => Some("contact_smooth"),
+            Some(Law::Paper) => Some("contact_paper"),
+        };
+        let most = DEVICE_CONTACT_POINTS;
+        match asked {
+            _ if points == 0 => host("no body is free"),
+            ContactDevice::Host => host("contact.device = \"host\""),
+            ContactDevice::Gpu => Self { kernel, reason: "contact.device = \"gpu\"".into() },
+            ContactDevice::Auto if points < most => {
+                host(&format!("{points} surface points, below {most} a round trip to a device costs more"))
+            }
+            ContactDevice::Auto => {
+                Self { kernel, reason: format!("{points} surface points, {most} or more") }
+            }
+        }
+    }
+}
+
 /// What a scene needs.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -99,6 +147,8 @@ pub struct Plan {
     pub preconditioner: Preconditioner,
     /// Under-relaxation of the fluid's force on bodies: F <- s F + (1 - s) F_old with this s; 1 for none.
     pub force_relaxation: f64,
+    /// Where the pairs of contact are computed.
+    pub contact: ContactPlan,
 }
 
 impl Plan {
@@ -154,7 +204,9 @@ impl Plan {
         } else {
             1.0
         };
-        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation }
+        let asked = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
+        let contact = ContactPlan::judge(case, scene, asked);
+        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation, contact }
     }
 
     /// Whether `stage` runs.

@@ -2,7 +2,7 @@
 
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::Wrench;
-use crate::case::{Case, Fluid};
+use crate::case::{Case, ContactDevice, Fluid};
 use crate::contact::{ContactReport, Solids};
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
@@ -101,8 +101,15 @@ impl Simulation {
         let params = Params::new(case, scene)?;
         let plan = Plan::new(case, scene, &params);
         let settings = settings(case);
+        let mut backend = make(scene, &params, &plan, settings)?;
+        let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
+        if device == ContactDevice::Gpu && plan.contact.kernel.is_some() && backend.compute().is_none() {
+            let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
+                        what there is) or leave contact.device out";
+            return Err(crate::error::Error::Case(text.into()));
+        }
         Ok(Self {
-            backend: make(scene, &params, &plan, settings)?,
+            backend,
             solids: Solids::new(scene, case.contact.as_ref())?,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
@@ -151,7 +158,7 @@ impl Simulation {
         if self.wait_for_stages {
             self.backend.wait()?;
         }
-        // Contact is the host's own work.
+        // Contact is the host's own work; where the pairs are on a device, the host waits for them.
         if self.wait_for_stages || stage == Stage::Contact || self.backend.timing() == Timing::Host {
             *self.stages.entry(stage).or_default() += start.elapsed().as_secs_f64();
         }
@@ -165,7 +172,8 @@ impl Simulation {
     pub fn observe(&mut self) -> Result<(FluidMonitor, Counters)> {
         let seen = self.backend.look()?;
         if !self.wait_for_stages {
-            self.stages.extend(self.backend.stage_seconds());
+            let of_device = self.backend.stage_seconds().into_iter();
+            self.stages.extend(of_device.filter(|(stage, _)| *stage != Stage::Contact));
         }
         Ok(seen)
     }
@@ -210,7 +218,8 @@ impl Simulation {
             }
         }
         let force = std::mem::take(&mut self.fluid_force);
-        let report = self.timed(Stage::Contact, |s| s.solids.advance(step.time, step.dt, &force));
+        let report = self
+            .timed(Stage::Contact, |s| s.solids.advance_on(s.backend.compute(), step.time, step.dt, &force));
         self.fluid_force = force;
         let report = report?;
         self.check_bodies(step)?;

@@ -152,6 +152,16 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     // names and gauges
     ("name = \"cube\"", "name = \"gate\"", &["body.0.name: the name `gate` is taken by moving_wall.0"]),
     (
+        "law = \"smooth\"",
+        "law = \"pressure\"\ndevice = \"gpu\"",
+        &["contact.device: law = \"pressure\" runs on the host only", "leave `device` out"],
+    ),
+    (
+        "law = \"smooth\"",
+        "law = \"smooth\"\ndevice = \"cuda\"",
+        &["contact.device: unknown variant `cuda`", "auto", "host", "gpu"],
+    ),
+    (
         "on = \"cube\"",
         "on = \"cub\"",
         &["gauge.force.0.on: no body or moving wall is called `cub`", "did you mean `cube`?"],

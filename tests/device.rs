@@ -5,7 +5,7 @@ mod common;
 
 use seixo::backend::gpu::{self, Gpu};
 use seixo::backend::{Backend, Timing};
-use seixo::case::Case;
+use seixo::case::{Case, ContactDevice};
 use seixo::params::Params;
 use seixo::plan::{Plan, Stage};
 use seixo::pressure::Settings;
@@ -79,9 +79,45 @@ fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
     }
 }
 
+/// [`still`] water, the cube on the gate and its contact on the device.
+fn pressed() -> Case {
+    let mut case = still(true, "jacobi");
+    case.body[0].center[2] = 5.25;
+    let contact = case.contact.as_mut().expect("the case has contact");
+    contact.device = ContactDevice::Gpu;
+    case
+}
+
+#[test]
+fn contact_on_the_device_adds_its_round_trips_and_no_other_wait() {
+    let Some(mut sim) = on_device(&pressed()) else { return };
+    for _ in 0..21 {
+        sim.step().expect("still water is no trouble");
+    }
+    let (before, asked) = (sim.backend.commands(), sim.solids.traffic());
+    for _ in 0..20 {
+        sim.step().expect("still water is no trouble");
+    }
+    let (now, asks) = (sim.backend.commands(), sim.solids.traffic());
+    let trips = asks.round_trips - asked.round_trips;
+    let (submits, waits) = (now.submits - before.submits, now.waits - before.waits);
+    println!("{trips} round trips of contact, {submits} submissions, {waits} waits in 20 steps");
+    assert!(trips >= 20, "the gate carries the cube");
+    assert_eq!((submits, waits), (2 * 20 + 2 + trips, 2 * 20 + 2 + trips));
+    let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
+    assert_eq!(count(Stage::Contact), asks.dispatches - asked.dispatches);
+    assert_eq!((count(Stage::MoveSolids), count(Stage::BodyForce)), (2 * 20, 20));
+}
+
 #[test]
 fn the_device_clock_tells_every_stage_and_no_more_than_the_wall_clock() {
-    let Some(mut sim) = on_device(&still(true, "jacobi")) else { return };
+    for case in [still(true, "jacobi"), pressed()] {
+        the_clock_tells(&case);
+    }
+}
+
+fn the_clock_tells(case: &Case) {
+    let Some(mut sim) = on_device(case) else { return };
     if sim.backend.timing() != Timing::Timestamps {
         eprintln!("SKIPPED: the adapter has no timestamps");
         return;
@@ -109,8 +145,7 @@ fn planned_bytes_are_allocated_bytes() {
         assert!(std::env::var_os("CI").is_none(), "NO GPU ADAPTER: memory is not tested");
         return;
     }
-    for (free, preconditioner) in [(false, "jacobi"), (true, "multigrid")] {
-        let case = still(free, preconditioner);
+    for case in [still(false, "jacobi"), still(true, "multigrid"), pressed()] {
         let scene = Scene::build(&case).expect("the scene builds");
         let params = Params::new(&case, &scene).expect("valid");
         let plan = Plan::new(&case, &scene, &params);

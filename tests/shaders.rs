@@ -7,8 +7,10 @@ use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
 use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, counter};
 use seixo::backend::gpu::{Gpu, shader};
 use seixo::case::Preconditioner;
+use seixo::contact::device::paper::{PaperLaw, PaperPair, PaperPose};
+use seixo::contact::device::smooth::{SmoothPair, SmoothPose};
 use seixo::params::Params;
-use seixo::plan::Plan;
+use seixo::plan::{ContactPlan, Plan};
 use seixo::pressure::Settings;
 use std::collections::BTreeSet;
 use std::mem::offset_of;
@@ -27,16 +29,21 @@ fn files(folder: &str, extension: &str, except: &str) -> BTreeSet<String> {
 #[test]
 fn every_shader_has_a_twin_and_every_twin_a_shader() {
     let shaders = files("shaders", ".wgsl", "common");
-    assert_eq!(shaders, files("src/kernels", ".rs", "mod"));
+    // The twins of contact's shaders are the laws themselves.
+    let twin = |name: &str| match name.strip_prefix("contact_") {
+        Some(law) => format!("src/contact/{law}.rs"),
+        None => format!("src/kernels/{name}.rs"),
+    };
+    let of_particles: BTreeSet<String> =
+        shaders.iter().filter(|s| !s.starts_with("contact_")).cloned().collect();
+    assert_eq!(of_particles, files("src/kernels", ".rs", "mod"));
     let listed: BTreeSet<String> = shader::KERNELS.iter().map(|(name, _)| (*name).to_owned()).collect();
     assert_eq!(shaders, listed);
     for (name, text) in shader::KERNELS {
-        assert!(
-            text.contains(&format!("// Twin: src/kernels/{name}.rs")),
-            "{name}: head comment names no twin"
-        );
+        let path = twin(name);
+        assert!(text.contains(&format!("// Twin: {path}")), "{name}: head comment names no twin");
         assert!(text.starts_with("// "), "{name}: no head comment");
-        let twin = std::fs::read_to_string(format!("{}/src/kernels/{name}.rs", env!("CARGO_MANIFEST_DIR")));
+        let twin = std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR")));
         assert!(twin.is_ok_and(|t| t.starts_with("//! ")), "{name}: the twin has no head comment");
     }
 }
@@ -155,6 +162,44 @@ fn structs_lie_the_same_on_both_sides() {
         }
     );
     same_layout!(
+        "contact_smooth",
+        SmoothPair {
+            low_a,
+            spring,
+            high_a,
+            stop,
+            low_b,
+            stop_depth,
+            high_b,
+            damping,
+            half_a,
+            step,
+            first,
+            count,
+            near,
+            faces,
+            list,
+            sum,
+            share,
+            skin,
+            open,
+            pad,
+        }
+    );
+    same_layout!(
+        "contact_smooth",
+        SmoothPose { row_x, row_y, row_z, spin, below_b, above_b, below_a, above_a, found, given }
+    );
+    same_layout!("contact_paper", PaperPair { first, count, row, list, candidates, pad });
+    same_layout!(
+        "contact_paper",
+        PaperPose { high_x, high_y, high_z, low_x, low_y, low_z, velocity, spin, spin_b }
+    );
+    same_layout!(
+        "contact_paper",
+        PaperLaw { spring, damping, viscous_friction, distance, scale, whole, fraction, pad }
+    );
+    same_layout!(
         "monitor",
         MonitorSum {
             momentum,
@@ -207,6 +252,8 @@ fn constants_are_the_same_on_both_sides() {
     }
     assert_eq!(constant(text("monitor"), "WIDTH"), MONITOR_WIDTH as f64);
     assert_eq!(constant(text("monitor"), "SPEED_BINS"), seixo::monitor::SPEED_BINS as f64);
+    let on_wall = format!("const ON_WALL: u32 = {:#x}u;", seixo::contact::device::paper::ON_WALL);
+    assert!(text("contact_paper").contains(&on_wall));
     use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};
     // Written alike, hence read alike.
     let short = |x: f32| x.to_string().parse::<f64>().expect("a number");
@@ -257,8 +304,13 @@ fn pipelines_and_bindings_fit_together_for_every_kind_of_scene() {
                 }
                 let params = Params::new(&case, &scene).expect("valid");
                 let settings = Settings { tolerance: 1e-3, max_iterations: 100, warm_start: true };
-                for preconditioner in [Preconditioner::Jacobi, Preconditioner::Multigrid] {
-                    let plan = Plan { preconditioner, ..Plan::new(&case, &scene, &params) };
+                for (preconditioner, kernel) in [
+                    (Preconditioner::Jacobi, None),
+                    (Preconditioner::Jacobi, Some("contact_paper")),
+                    (Preconditioner::Multigrid, Some("contact_smooth")),
+                ] {
+                    let contact = ContactPlan { kernel, reason: String::new() };
+                    let plan = Plan { preconditioner, contact, ..Plan::new(&case, &scene, &params) };
                     let built = Gpu::dry_run(&scene, &params, &plan, settings);
                     if let Err(e) = built {
                         panic!("{dimensions}D, {preset}, {viscosity}, {collision}, moving {moving}: {e}");

@@ -667,7 +667,7 @@ fn two_runs_give_the_same_bytes() {
 
 #[test]
 fn every_stage_has_a_test() {
-    let text = include_str!("twins.rs");
+    let text = [include_str!("twins.rs"), include_str!("contact_device.rs")].concat();
     for (name, _) in gpu::shader::KERNELS {
         assert!(text.contains(&format!("#[test]\nfn {name}()")), "no test is called {name}");
     }

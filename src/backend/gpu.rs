@@ -1,7 +1,7 @@
 //! The GPU backend: the kernels of `shaders/` in f32 on any device that wgpu drives.
 //!
 //! No particle data crosses to the host in a step but the state of the pressure solver and the force on
-//! bodies. Work is recorded and handed to the device only when the host needs an answer. Only what the plan
+//! bodies; of contact, if the plan has it here, the pairs' sums. Work is recorded and handed to the device only when the host needs an answer. Only what the plan
 //! names is compiled and allocated. Nothing outside this module names wgpu.
 
 mod adapter;
@@ -21,7 +21,7 @@ pub use adapter::{AdapterInfo, adapters};
 pub use bandwidth::bandwidth;
 
 use super::traffic::Traffic;
-use super::{Backend, Commands, Counters, Timing};
+use super::{Backend, Commands, Compute, Counters, Timing};
 use crate::body::{Pose, Wrench};
 use crate::case::Preconditioner;
 use crate::cells::Grid;
@@ -51,6 +51,8 @@ pub struct Gpu {
     sizes: Sizes,
     middle: DVec3,
     wet: bool,
+    /// Contact searches and presses its pairs here.
+    contact: bool,
     /// Solid of each chunk of wall-layer particles.
     chunk_solid: Vec<usize>,
     solids: usize,
@@ -167,6 +169,7 @@ impl Gpu {
             sizes,
             middle: layout::middle(params),
             wet: plan.wet(),
+            contact: plan.contact.kernel.is_some(),
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
             counters: Counters::default(),
@@ -467,8 +470,41 @@ impl Backend for Gpu {
         if self.wet { self.count_traffic() } else { Ok(Traffic::default()) }
     }
 
+    fn compute(&mut self) -> Option<&mut dyn Compute> {
+        if self.contact { Some(self) } else { None }
+    }
+
     fn commands(&self) -> Commands {
         self.context.commands.clone()
+    }
+}
+
+impl Compute for Gpu {
+    fn reserve(&mut self, buffer: &'static str, bytes: u64) -> Result<()> {
+        self.context.reserve(buffer, bytes)
+    }
+
+    fn upload(&mut self, buffer: &'static str, data: &[u8]) -> Result<()> {
+        self.context.begin(Some(Stage::Contact));
+        self.context.reserve(buffer, data.len() as u64)?;
+        if data.is_empty() { Ok(()) } else { self.context.upload(buffer, data) }
+    }
+
+    fn dispatch(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
+        let most = self.context.workgroups_max();
+        if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
+            return Err(Error::Gpu(format!(
+                "{groups} pairs of solids are close, {most} is what {} takes at a time; use contact.device = \"host\"",
+                self.context.info.name
+            )));
+        }
+        self.context.begin(Some(Stage::Contact));
+        self.context.pass(kernels.iter().copied())
+    }
+
+    fn download(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>> {
+        self.context.begin(Some(Stage::Contact));
+        self.context.download(buffer, bytes as usize)
     }
 }
 

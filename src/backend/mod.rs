@@ -1,5 +1,6 @@
 //! Where the particle stages run: the CPU in f64 ([`cpu`]) or a device in f32 ([`gpu`]).
 
+pub mod compute;
 pub mod cpu;
 pub mod gpu;
 mod rows;
@@ -13,6 +14,7 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
 use crate::pressure::PressureReport;
+pub use compute::Compute;
 use std::collections::BTreeMap;
 
 /// What the guards have seen since the start of the run.
@@ -127,6 +129,10 @@ pub trait Backend: Send {
     }
     /// Bytes that the backend holds for particles.
     fn bytes(&self) -> u64;
+    /// The device on which contact may search and press its pairs, where the plan has it do so.
+    fn compute(&mut self) -> Option<&mut dyn Compute> {
+        None
+    }
     /// Bytes that a step like the last one must move.
     fn traffic(&mut self) -> Result<Traffic>;
     /// What was asked of a device; nothing for a backend without one.

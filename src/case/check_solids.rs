@@ -1,7 +1,7 @@
 //! The part of the check that judges bodies and their contact.
 
 use super::check::{Checker, length};
-use super::{Body, Law};
+use super::{Body, ContactDevice, Law};
 
 impl Checker<'_> {
     pub(super) fn body(&mut self, k: usize, body: &Body) {
@@ -118,6 +118,10 @@ impl Checker<'_> {
         self.not_negative("contact.friction", contact.friction, "");
         if contact.substeps == Some(0) {
             self.add("contact.substeps", "0 sub-steps", "allowed: 1 or more, or leave it out");
+        }
+        if contact.device == ContactDevice::Gpu && contact.law == Law::Pressure {
+            let remedy = "leave `device` out or set law = \"smooth\" or \"paper\"";
+            self.add("contact.device", "law = \"pressure\" runs on the host only", remedy);
         }
         if contact.viscous_friction != 0.0 && contact.law == Law::Pressure {
             let message = "`viscous_friction` belongs to law = \"paper\" or \"smooth\"";

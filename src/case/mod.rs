@@ -393,6 +393,19 @@ pub enum Law {
     Pressure,
 }
 
+/// Where contact searches and presses its pairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactDevice {
+    /// On the GPU backend by the number of surface points: few on the host, many on the GPU.
+    #[default]
+    Auto,
+    /// On the host, in f64.
+    Host,
+    /// On the GPU (laws "smooth" and "paper"); needs the GPU backend.
+    Gpu,
+}
+
 /// Contact between solids.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -420,6 +433,9 @@ pub struct Contact {
     pub torque: bool,
     /// Force this many contact sub-steps a step instead of as many as stability asks for.
     pub substeps: Option<u32>,
+    /// Where pairs are searched and pressed. Sums, friction and motion are the host's, in f64, either way.
+    #[serde(default)]
+    pub device: ContactDevice,
 }
 
 impl Contact {

@@ -36,6 +36,13 @@ struct StageLine {
     reason: &'static str,
 }
 
+/// Where the pairs of contact are computed, on a backend that has a device.
+#[derive(Serialize)]
+struct ContactLine {
+    device: bool,
+    reason: String,
+}
+
 /// Constants of the fluid's scheme.
 #[derive(Serialize)]
 struct Scheme {
@@ -71,6 +78,7 @@ struct Report {
     particles: seixo::output::result::Particles,
     solids: Vec<String>,
     stages: Vec<StageLine>,
+    contact: ContactLine,
     scheme: Option<Scheme>,
     advice: Vec<String>,
 }
@@ -165,6 +173,7 @@ fn report(seen: &Seen) -> Result<Report> {
         particles: count,
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
+        contact: ContactLine { device: plan.contact.kernel.is_some(), reason: plan.contact.reason.clone() },
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
     })
@@ -281,6 +290,11 @@ fn words(report: &Report) -> String {
             lines.extend([String::new(), title.to_string()]);
         }
         lines.extend(report.stages.iter().filter(of).map(|s| format!("  {:<20}{}", s.stage, s.reason)));
+    }
+    if report.stages.iter().any(|s| s.planned && s.stage == Stage::Contact.name()) {
+        let place = if report.contact.device { "on the GPU, if that is the backend" } else { "on the host" };
+        lines.extend([String::new(), "contact".to_string()]);
+        lines.push(format!("  pairs {place}: {}", report.contact.reason));
     }
     if let Some(s) = &report.scheme {
         lines.extend([

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use rayon::prelude::*;
 
 /// Pairs from which the evaluation is spread over threads.
-const MANY_PAIRS: usize = 64;
+pub(crate) const MANY_PAIRS: usize = 64;
 /// Steps that the lists of a body in steady flight should last.
 const STEPS_AHEAD: f64 = 6.0;
 
@@ -24,18 +24,31 @@ pub(crate) struct Candidates {
     /// Path that each solid may make [m].
     skin: Vec<f64>,
     valid: bool,
+    /// Counts how often the pairs were made.
+    generation: u64,
     /// Pairs of solids (a free one first) whose bounding boxes meet, sorted.
     pub close: Vec<(usize, usize)>,
 }
 
 impl Candidates {
     pub fn new(solids: usize) -> Self {
-        Self { travel: vec![0.0; solids], skin: vec![0.0; solids], valid: false, close: vec![] }
+        Self {
+            travel: vec![0.0; solids],
+            skin: vec![0.0; solids],
+            valid: false,
+            generation: 0,
+            close: vec![],
+        }
     }
 
     /// Drops the lists.
     pub fn forget(&mut self) {
         self.valid = false;
+    }
+
+    /// Changes whenever the pairs are made anew; never 0 then.
+    pub fn generation(&self) -> u64 {
+        self.generation
     }
 
     /// Skin of solid `k` [m].
@@ -51,10 +64,10 @@ impl Candidates {
         self.valid &= self.travel[k] <= self.skin[k];
     }
 
-    /// Makes the pairs of solids anew if the old ones no longer hold; whether it did.
-    pub fn refresh(&mut self, bodies: &[Body], spacing: f64, dt: f64) -> bool {
+    /// Makes the pairs of solids anew if the old ones no longer hold.
+    pub fn refresh(&mut self, bodies: &[Body], spacing: f64, dt: f64) {
         if self.valid {
-            return false;
+            return;
         }
         for (k, body) in bodies.iter().enumerate() {
             let speed = body.pose.velocity.length() + body.pose.angular_velocity.length() * body.radius();
@@ -76,7 +89,7 @@ impl Candidates {
             .map(|(i, j)| if bodies[i].is_free() { (i, j) } else { (j, i) })
             .collect();
         self.valid = true;
-        true
+        self.generation += 1;
     }
 }
 
@@ -86,7 +99,8 @@ pub(crate) struct Smooth {
     pub walls: Vec<WallBox>,
     pub pairs: Vec<smooth::Pair>,
     pub friction: Friction,
-    spacing: f64,
+    pub spacing: f64,
+    generation: u64,
 }
 
 impl Smooth {
@@ -97,11 +111,17 @@ impl Smooth {
             pairs: vec![],
             friction: Friction::default(),
             spacing: scene.spacing,
+            generation: 0,
         }
     }
 
-    /// Makes the lists of points.
-    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body]) {
+    /// Whether the lists are those of `candidates`.
+    pub fn is_current(&self, candidates: &Candidates) -> bool {
+        self.generation == candidates.generation
+    }
+
+    /// Pairs of solids that are close, each with its skin [m]; without points.
+    pub fn close(&self, candidates: &Candidates, bodies: &[Body]) -> Vec<(smooth::Pair, f64)> {
         let mut pairs: Vec<(smooth::Pair, f64)> = vec![];
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             for (w, wall) in self.walls.iter().enumerate() {
@@ -116,6 +136,13 @@ impl Smooth {
             let skin = candidates.skin(a) + candidates.skin(b);
             pairs.push((smooth::Pair::new(a, smooth::Other::Solid(b)), skin));
         }
+        pairs
+    }
+
+    /// Makes the lists of points.
+    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body]) {
+        self.generation = candidates.generation;
+        let pairs = self.close(candidates, bodies);
         let fill = |(mut pair, skin): (smooth::Pair, f64)| {
             pair.collect(bodies, &self.surfaces, &self.walls, skin);
             (!pair.is_empty()).then_some(pair)
@@ -129,12 +156,7 @@ impl Smooth {
 
     /// Constants of every pair for sub-steps of `h` [s].
     pub fn set_constants(&mut self, limits: &Limits, bodies: &[Body], spacing: f64, h: f64) {
-        for pair in &mut self.pairs {
-            let b = pair.b.solid();
-            let weight = self.surfaces[pair.a].smallest_weight;
-            pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
-            pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());
-        }
+        set_constants(&mut self.pairs, &self.surfaces, limits, bodies, spacing, h);
     }
 
     pub fn evaluate(&mut self, bodies: &[Body]) {
@@ -147,11 +169,29 @@ impl Smooth {
     }
 }
 
+/// Constants of `pairs` for sub-steps of `h` [s].
+pub(crate) fn set_constants(
+    pairs: &mut [smooth::Pair],
+    surfaces: &[Surface],
+    limits: &Limits,
+    bodies: &[Body],
+    spacing: f64,
+    h: f64,
+) {
+    for pair in pairs {
+        let b = pair.b.solid();
+        let weight = surfaces[pair.a].smallest_weight;
+        pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
+        pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());
+    }
+}
+
 /// The paper's law's geometry and pairs.
 pub(crate) struct Paper {
     pub layers: Vec<paper::Layer>,
     pub walls: paper::Walls,
     pub pairs: Vec<paper::Pair>,
+    generation: u64,
 }
 
 impl Paper {
@@ -168,11 +208,17 @@ impl Paper {
                 normals: scene.static_wall_normal.clone(),
             },
             pairs: vec![],
+            generation: 0,
         }
     }
 
-    /// Makes the lists of particle pairs within `distance` [m].
-    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body], distance: f64) {
+    /// Whether the lists are those of `candidates`.
+    pub fn is_current(&self, candidates: &Candidates) -> bool {
+        self.generation == candidates.generation
+    }
+
+    /// Pairs of solids that are close, each with the reach of its particles [m]; without particles.
+    pub fn close(&self, candidates: &Candidates, bodies: &[Body], distance: f64) -> Vec<(paper::Pair, f64)> {
         let mut pairs: Vec<(paper::Pair, f64)> = vec![];
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             let reach = body.extent() + candidates.skin(a) + distance;
@@ -184,6 +230,13 @@ impl Paper {
             let reach = distance + candidates.skin(a) + candidates.skin(b);
             pairs.push((paper::Pair::new(a, Some(b)), reach));
         }
+        pairs
+    }
+
+    /// Makes the lists of particle pairs within `distance` [m].
+    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body], distance: f64) {
+        self.generation = candidates.generation;
+        let pairs = self.close(candidates, bodies, distance);
         let fill = |(mut pair, reach): (paper::Pair, f64)| {
             pair.collect(bodies, &self.layers, &self.walls, reach);
             (!pair.candidates.is_empty()).then_some(pair)

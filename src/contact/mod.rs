@@ -1,31 +1,36 @@
 //! Contact between solids: the bodies of a scene, their motion over a step, sub-stepped on the host.
 //!
-//! Everything here is f64 on the host, the same for every backend: a contact is thousands of points at
-//! most, forces from positions in f32 carry 1 to 10 % of noise, and a round trip to a device for every
-//! sub-step would cost more than the work.
+//! Everything is f64 on the host, but for the pairs of points of scenes with many bodies: a backend with a
+//! device searches and presses those in f32, from numbers that do not hold positions ([`device`]). For few
+//! bodies a round trip to a device at every sub-step would cost more than the work; [`crate::plan`] judges.
 
 mod advice;
 mod broad;
 mod candidates;
 mod collision;
+pub mod device;
 mod edges;
 mod friction;
 mod geometry;
 mod paper;
+mod probe;
 mod report;
 mod smooth;
 mod state;
 mod stiffness;
 
 pub use advice::ContactAdvice;
+pub use probe::{Probe, ProbePatch};
 pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 
+use crate::backend::Compute;
 use crate::body::{Body, Pose, Wrench};
 use crate::case;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use candidates::Candidates;
+use device::{Link, OnDevice, Traffic};
 use glam::DVec3;
 use stiffness::Damping;
 
@@ -64,6 +69,8 @@ pub struct Solids {
     spacing: f64,
     candidates: Candidates,
     model: Model,
+    on_device: OnDevice,
+    traffic: Traffic,
     limits: Limits,
     load: Vec<Wrench>,
     /// Time step, its dt sqrt(K / m_e) and its sub-steps, as last planned.
@@ -72,7 +79,7 @@ pub struct Solids {
 
 /// What the case asks of contact, and the stiffness of each body.
 #[derive(Clone)]
-struct Limits {
+pub(crate) struct Limits {
     spring: f64,
     damping: Damping,
     viscous_friction: f64,
@@ -152,6 +159,8 @@ impl Solids {
             candidates: Candidates::new(bodies.len()),
             bodies,
             model,
+            on_device: OnDevice::None,
+            traffic: Traffic::default(),
             limits,
             planned: None,
         })
@@ -191,12 +200,26 @@ impl Solids {
     }
 
     /// Moves the solids from `t` to `t + dt` under gravity, the fluid's wrenches (one per solid, held
-    /// over the step) and contact in sub-steps.
+    /// over the step) and contact in sub-steps, all on the host.
     ///
     /// # Errors
     /// [`Error::Case`] if a forced number of sub-steps is unstable; [`Error::Diverged`] (step left at 0)
     /// if a body's state is no longer finite.
     pub fn advance(&mut self, t: f64, dt: f64, fluid: &[Wrench]) -> Result<ContactReport> {
+        self.advance_on(None, t, dt, fluid)
+    }
+
+    /// As [`Solids::advance`], with the pairs of points on `compute` if there is one: always the same one.
+    ///
+    /// # Errors
+    /// Those of [`Solids::advance`], and [`Error::Gpu`].
+    pub fn advance_on(
+        &mut self,
+        mut compute: Option<&mut dyn Compute>,
+        t: f64,
+        dt: f64,
+        fluid: &[Wrench],
+    ) -> Result<ContactReport> {
         let mut report = self.prepare(dt)?;
         let h = dt / f64::from(report.substeps);
         let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
@@ -206,7 +229,9 @@ impl Solids {
             }
         }
         for step in 0..report.substeps {
-            self.substep(h, dt, fluid, &mut report);
+            // a plain as_deref_mut would keep the borrow for the whole loop
+            let compute = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
+            self.substep(compute, h, dt, fluid, &mut report)?;
             let now = t + dt * f64::from(step + 1) / f64::from(report.substeps);
             for (k, body) in self.bodies.iter_mut().enumerate() {
                 if body.is_free() {
@@ -238,53 +263,135 @@ impl Solids {
         Ok(report)
     }
 
-    /// Forces, impulses and friction of one sub-step; positions stay.
-    fn substep(&mut self, h: f64, dt: f64, fluid: &[Wrench], report: &mut ContactReport) {
-        let bodies = &mut self.bodies;
-        self.load.copy_from_slice(fluid);
-        (report.pairs, report.solid_pairs, report.potential_energy) = (0, 0, 0.0);
-        let deepest = &mut report.penetration_max_over_l0;
-        match &mut self.model {
-            Model::None => {}
-            Model::Smooth(model) => {
-                if self.candidates.refresh(bodies, self.spacing, dt) {
-                    model.collect(&self.candidates, bodies);
-                    model.set_constants(&self.limits, bodies, self.spacing, h);
+    /// What contact has asked of a device so far.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    /// Forces of contact at the bodies' poses and velocities, on `compute` if there is one, for sub-steps of
+    /// `h` [s] of steps of `dt` [s]. Lists are made anew if they no longer hold.
+    fn evaluate(&mut self, compute: Option<&mut dyn Compute>, h: f64, dt: f64) -> Result<()> {
+        let (bodies, spacing) = (&self.bodies, self.spacing);
+        self.candidates.refresh(bodies, spacing, dt);
+        let candidates = &self.candidates;
+        let mut link = compute.map(|compute| Link { compute, traffic: &mut self.traffic });
+        match (&mut self.model, &mut link) {
+            (Model::None, _) => {}
+            (Model::Smooth(model), None) => {
+                self.on_device = OnDevice::None;
+                if !model.is_current(candidates) {
+                    model.collect(candidates, bodies);
+                    model.set_constants(&self.limits, bodies, spacing, h);
                 }
                 model.evaluate(bodies);
-                for pair in &model.pairs {
-                    self.load[pair.a] += pair.wrench[0];
-                    if let smooth::Other::Solid(b) = pair.b {
-                        self.load[b] += pair.wrench[1];
-                    }
-                    report.pairs += pair.contact_count();
-                    report.solid_pairs += usize::from(pair.contact_count() > 0);
-                    report.potential_energy += pair.energy;
-                    *deepest = deepest.max(pair.depth);
-                }
             }
-            Model::Paper(model, law) => {
-                if self.candidates.refresh(bodies, self.spacing, dt) {
-                    model.collect(&self.candidates, bodies, law.distance);
+            (Model::Smooth(model), Some(link)) => {
+                let pairs = match &mut self.on_device {
+                    OnDevice::Smooth(pairs) => pairs,
+                    other => {
+                        *other = OnDevice::Smooth(device::smooth::Smooth::new(&model.surfaces, link)?.into());
+                        let OnDevice::Smooth(pairs) = other else { unreachable!() };
+                        pairs
+                    }
+                };
+                if !pairs.is_current(candidates) {
+                    pairs.search(model, candidates, bodies, link)?;
+                }
+                pairs.set_constants(model, &self.limits, bodies, spacing, h);
+                pairs.evaluate(model, bodies, link)?;
+            }
+            (Model::Paper(model, law), None) => {
+                self.on_device = OnDevice::None;
+                if !model.is_current(candidates) {
+                    model.collect(candidates, bodies, law.distance);
                 }
                 model.evaluate(law, bodies);
-                for pair in &model.pairs {
-                    self.load[pair.a] += pair.wrench[0];
-                    if let Some(b) = pair.b {
-                        self.load[b] += pair.wrench[1];
-                    }
-                    report.pairs += pair.count;
-                    report.solid_pairs += usize::from(pair.count > 0);
-                    report.potential_energy += pair.energy;
-                    *deepest = deepest.max(law.distance - pair.closest);
-                }
             }
-            Model::Collision(model) => {
-                if self.candidates.refresh(bodies, self.spacing, dt) {
-                    model.collect(&self.candidates, bodies, self.spacing);
+            (Model::Paper(model, law), Some(link)) => {
+                let pairs = match &mut self.on_device {
+                    OnDevice::Paper(pairs) => pairs,
+                    other => {
+                        *other = OnDevice::Paper(
+                            device::paper::Paper::new(&model.layers, bodies, law, link)?.into(),
+                        );
+                        let OnDevice::Paper(pairs) = other else { unreachable!() };
+                        pairs
+                    }
+                };
+                if !pairs.is_current(candidates) {
+                    pairs.search(model, candidates, bodies, law, link)?;
+                }
+                pairs.evaluate(law, bodies, link)?;
+            }
+            (Model::Collision(model), _) => {
+                if !model.is_current(candidates) {
+                    model.collect(candidates, bodies, spacing);
                 }
             }
         }
+        Ok(())
+    }
+
+    /// The smooth law's pairs of the last evaluation.
+    fn smooth_pairs(&self) -> &[smooth::Pair] {
+        match (&self.on_device, &self.model) {
+            (OnDevice::Smooth(pairs), _) => &pairs.pairs,
+            (_, Model::Smooth(model)) => &model.pairs,
+            _ => &[],
+        }
+    }
+
+    /// The paper's law's pairs of the last evaluation.
+    fn paper_pairs(&self) -> &[paper::Pair] {
+        match (&self.on_device, &self.model) {
+            (OnDevice::Paper(pairs), _) => &pairs.pairs,
+            (_, Model::Paper(model, _)) => &model.pairs,
+            _ => &[],
+        }
+    }
+
+    /// Adds the wrenches of the last evaluation to `load`, one per solid.
+    fn add_wrenches(&self, load: &mut [Wrench]) {
+        for pair in self.smooth_pairs() {
+            load[pair.a] += pair.wrench[0];
+            if let smooth::Other::Solid(b) = pair.b {
+                load[b] += pair.wrench[1];
+            }
+        }
+        for pair in self.paper_pairs() {
+            load[pair.a] += pair.wrench[0];
+            if let Some(b) = pair.b {
+                load[b] += pair.wrench[1];
+            }
+        }
+    }
+
+    /// Forces, impulses and friction of one sub-step; positions stay.
+    fn substep(
+        &mut self,
+        compute: Option<&mut dyn Compute>,
+        h: f64,
+        dt: f64,
+        fluid: &[Wrench],
+        report: &mut ContactReport,
+    ) -> Result<()> {
+        self.evaluate(compute, h, dt)?;
+        let mut load = std::mem::take(&mut self.load);
+        load.copy_from_slice(fluid);
+        self.add_wrenches(&mut load);
+        self.load = load;
+        (report.pairs, report.solid_pairs, report.potential_energy) = (0, 0, 0.0);
+        let mut count = |pairs: usize, energy: f64, depth: f64| {
+            report.pairs += pairs;
+            report.solid_pairs += usize::from(pairs > 0);
+            report.potential_energy += energy;
+            report.penetration_max_over_l0 = report.penetration_max_over_l0.max(depth);
+        };
+        self.smooth_pairs().iter().for_each(|p| count(p.contact_count(), p.energy, p.depth));
+        if let Model::Paper(_, law) = &self.model {
+            self.paper_pairs().iter().for_each(|p| count(p.count, p.energy, law.distance - p.closest));
+        }
+        let bodies = &mut self.bodies;
         for (body, load) in bodies.iter_mut().zip(&self.load) {
             if body.is_free() {
                 body.kick(h * (body.mass * self.gravity + load.force), h * load.torque);
@@ -292,8 +399,12 @@ impl Solids {
         }
         match &mut self.model {
             Model::Smooth(model) => {
+                let pairs = match &self.on_device {
+                    OnDevice::Smooth(pairs) => &pairs.pairs,
+                    _ => &model.pairs,
+                };
                 let (mu, eta) = (self.limits.friction, self.limits.viscous_friction);
-                model.friction.apply(&model.pairs, bodies, mu, eta, h);
+                model.friction.apply(pairs, bodies, mu, eta, h);
             }
             Model::Collision(model) => {
                 for pair in &model.pairs {
@@ -312,5 +423,6 @@ impl Solids {
             }
             Model::None | Model::Paper(..) => {}
         }
+        Ok(())
     }
 }

@@ -58,6 +58,14 @@ pub(crate) struct Constants {
 }
 
 impl Constants {
+    /// Secant stiffness [N/m] and energy [J] of a contact of effective depth `depth` [m].
+    pub fn stored(&self, depth: f64) -> (f64, f64) {
+        let beyond = (depth - self.stop_depth).max(0.0);
+        let more = self.stop - self.spring;
+        let energy = 0.5 * self.spring * depth * depth + 0.5 * more * beyond * beyond;
+        (self.spring + more * beyond / depth, energy)
+    }
+
     /// Constants that make sub-steps of `h` [s] follow the damped oscillator of mass `mass` [kg].
     ///
     /// The explicit dashpot takes C h / m of the speed where the exact one takes 1 - exp(-C h / m); it is
@@ -100,6 +108,9 @@ struct Frame {
     half: DVec3,
 }
 
+/// Where the edges of walls are given.
+const WORLD: Frame = Frame { center: DVec3::ZERO, axes: DMat3::IDENTITY, half: DVec3::ZERO };
+
 /// A box as the edges of another frame see it.
 #[derive(Clone, Copy, Debug)]
 struct View {
@@ -122,18 +133,53 @@ impl View {
 
 /// One point in contact.
 #[derive(Clone, Copy, Debug)]
-struct Contact {
+pub(crate) struct Contact {
     /// Where, world [m].
-    at: DVec3,
+    pub at: DVec3,
     /// Direction of the force on the pair's first solid: minus the gradient of the depth, of length 1
     /// except near edges.
-    normal: DVec3,
-    depth: f64,
-    weight: f64,
+    pub normal: DVec3,
+    pub depth: f64,
+    pub weight: f64,
     /// Minus the rate of change of the depth [m/s].
-    speed: f64,
+    pub speed: f64,
     force: f64,
     patch: u8,
+}
+
+impl Contact {
+    /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
+    /// cross.
+    pub fn face(&self) -> Option<u8> {
+        match self.patch {
+            patch @ 0..6 => Some(patch),
+            patch @ 8..14 => Some(patch - 2),
+            _ => None,
+        }
+    }
+
+    /// s_i of a point in a contact of effective depth `depth` [m].
+    fn share(&self, depth: f64) -> f64 {
+        let x = self.depth / depth;
+        self.weight * (x * x) * (x * x) * (x * x)
+    }
+}
+
+/// What a device sums over the points of a pair and the contacts given to it, world frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeviceSums {
+    /// Points and given ones in contact.
+    pub count: usize,
+    /// Effective depth D of all contacts [m].
+    pub depth: f64,
+    /// Deepest of all contacts [m].
+    pub deepest: f64,
+    /// Sum of the s_i of all contacts.
+    pub shares: f64,
+    /// Wrenches on the two solids, of these.
+    pub wrench: [Wrench; 2],
+    /// Patches of these.
+    pub patches: Vec<Patch>,
 }
 
 /// All points pressed by one face: where friction acts.
@@ -151,6 +197,14 @@ pub(crate) struct Patch {
     pressing: f64,
     /// Mean distance of the normal force from its centre [m].
     pub radius: f64,
+}
+
+impl Patch {
+    /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
+    /// mean distance from it [m].
+    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, radius: f64) -> Self {
+        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, radius }
+    }
 }
 
 /// A pair of solids close to each other.
@@ -172,6 +226,8 @@ pub(crate) struct Pair {
     pub edges_b: Vec<u32>,
     pub constants: Constants,
     contacts: Vec<Contact>,
+    /// Contacts for the device to take in.
+    pub given: Vec<Contact>,
     /// Patches of the last evaluation.
     pub patches: Vec<Patch>,
     /// Wrench on `a` and on `b`, of the last evaluation.
@@ -180,6 +236,9 @@ pub(crate) struct Pair {
     pub energy: f64,
     /// Deepest point [m].
     pub depth: f64,
+    /// Points in contact at the last evaluation, and those with the nodes of edges.
+    points: usize,
+    count: usize,
 }
 
 impl Pair {
@@ -194,55 +253,132 @@ impl Pair {
             edges_b: vec![],
             constants: Constants::default(),
             contacts: vec![],
+            given: vec![],
             patches: vec![],
             wrench: Default::default(),
             energy: 0.0,
             depth: 0.0,
+            points: 0,
+            count: 0,
         }
     }
 
-    /// Points in contact at the last evaluation.
+    /// Points and nodes of edges in contact at the last evaluation.
     pub fn contact_count(&self) -> usize {
-        self.contacts.len()
+        self.count
+    }
+
+    /// Points in contact at the last evaluation.
+    pub fn point_count(&self) -> usize {
+        self.points
+    }
+
+    /// Finds the contacts that a device does not look for, those of edges and of walls' corners. Those pressed
+    /// by a face in `open` (bits 0 to 5: of `b`, 6 to 11: of `a`) are to be given to the device; of the
+    /// others, their deepest depth d [m], and the sums of w_i (d_i / d)^8 and w_i (d_i / d)^6.
+    pub fn find_beside_device(
+        &mut self,
+        bodies: &[Body],
+        surfaces: &[Surface],
+        walls: &[WallBox],
+        spacing: f64,
+        open: u32,
+    ) -> [f64; 3] {
+        self.contacts.clear();
+        self.given.clear();
+        self.points = 0;
+        if self.is_empty() {
+            return [0.0; 3];
+        }
+        // its lists of points are empty
+        self.find(bodies, surfaces, walls);
+        self.points = self.contacts.len();
+        self.find_edges(bodies, surfaces, walls, spacing);
+        let given = &mut self.given;
+        self.contacts.retain(|c| {
+            let on_face = c.face().is_some_and(|face| open >> face & 1 == 1);
+            if on_face {
+                given.push(*c);
+            }
+            !on_face
+        });
+        let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
+        let sum = |power: i32| self.contacts.iter().map(|c| c.weight * (c.depth / deepest).powi(power)).sum();
+        if deepest > 0.0 { [deepest, sum(8), sum(6)] } else { [0.0; 3] }
+    }
+
+    /// Joins the contacts kept beside the device with what it sums over its own and those it was given.
+    pub fn join(&mut self, sums: &DeviceSums, bodies: &[Body]) {
+        self.patches.clear();
+        self.wrench = sums.wrench;
+        (self.energy, self.depth) = (0.0, sums.deepest);
+        self.points += sums.count - self.given.len();
+        self.count = sums.count + self.contacts.len();
+        if sums.count == 0 {
+            if !self.contacts.is_empty() {
+                self.press();
+                self.sum(bodies);
+            }
+            return;
+        }
+        self.push(sums.depth, sums.shares);
+        self.sum(bodies);
+        self.patches.extend(&sums.patches);
     }
 
     /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's box.
     pub fn collect(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
-        self.samples.clear();
         let near = |surface: &Surface, own: &Body, center: DVec3, axes: DMat3, half: DVec3| {
             let turn = axes.transpose() * own.rotation;
             let shift = axes.transpose() * (own.pose.position - center);
             let points = surface.points.iter().enumerate();
             let points = points.filter(|(_, p)| geometry::outside(turn * **p + shift, half) < skin);
-            let lines = surface.edges.iter().enumerate();
-            let lines = lines.filter(|(_, e)| {
-                edges::clip(turn * e.start + shift, turn * e.along, e.length, half + skin).is_some()
-            });
-            let points: Vec<u32> = points.map(|(k, _)| k as u32).collect();
-            let lines: Vec<u32> = lines.map(|(k, _)| k as u32).collect();
-            (points, lines)
+            points.map(|(k, _)| k as u32).collect::<Vec<u32>>()
         };
         match self.b {
             Other::Solid(b) => {
                 let other = &bodies[b];
-                (self.points_a, self.edges_a) =
+                self.points_a =
                     near(&surfaces[self.a], body, other.pose.position, other.rotation, other.half);
-                (self.points_b, self.edges_b) =
-                    near(&surfaces[b], other, body.pose.position, body.rotation, body.half);
+                self.points_b = near(&surfaces[b], other, body.pose.position, body.rotation, body.half);
             }
             Other::Wall(w) => {
                 let wall = &walls[w];
-                (self.points_a, self.edges_a) =
-                    near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
-                let still = body.rotation.transpose();
-                let lines = wall.edges.iter().enumerate().filter(|(_, e)| {
-                    let start = still * (e.start - body.pose.position);
-                    edges::clip(start, still * e.along, e.length, body.half + skin).is_some()
-                });
-                self.edges_b = lines.map(|(k, _)| k as u32).collect();
-                let near =
-                    |x: &&DVec3| geometry::outside(still * (**x - body.pose.position), body.half) < skin;
+                self.points_a = near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
+            }
+        }
+        self.collect_edges(bodies, surfaces, walls, skin);
+    }
+
+    /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's box.
+    pub fn collect_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
+        let body = &bodies[self.a];
+        let own = Frame { center: body.pose.position, axes: body.rotation, half: body.half };
+        let near = |lines: &[Line], of: Frame, to: Frame| {
+            let turn = to.axes.transpose() * of.axes;
+            let shift = to.axes.transpose() * (of.center - to.center);
+            let lines = lines.iter().enumerate().filter(|(_, e)| {
+                edges::clip(turn * e.start + shift, turn * e.along, e.length, to.half + skin).is_some()
+            });
+            lines.map(|(k, _)| k as u32).collect::<Vec<u32>>()
+        };
+        self.samples.clear();
+        match self.b {
+            Other::Solid(b) => {
+                let other = &bodies[b];
+                let other = Frame { center: other.pose.position, axes: other.rotation, half: other.half };
+                self.edges_a = near(&surfaces[self.a].edges, own, other);
+                self.edges_b = near(&surfaces[b].edges, other, own);
+            }
+            Other::Wall(w) => {
+                let wall = &walls[w];
+                let other = Frame { center: wall.center, axes: wall.axes, half: wall.half };
+                self.edges_a = near(&surfaces[self.a].edges, own, other);
+                self.edges_b = near(&wall.edges, WORLD, own);
+                let near = |x: &&DVec3| {
+                    geometry::outside(own.axes.transpose() * (**x - own.center), own.half) < skin
+                };
                 self.samples.extend(wall.corners.iter().filter(near));
             }
         }
@@ -261,7 +397,9 @@ impl Pair {
         self.wrench = Default::default();
         (self.energy, self.depth) = (0.0, 0.0);
         self.find(bodies, surfaces, walls);
+        self.points = self.contacts.len();
         self.find_edges(bodies, surfaces, walls, spacing);
+        self.count = self.contacts.len();
         if !self.contacts.is_empty() {
             self.press();
             self.sum(bodies);
@@ -349,8 +487,7 @@ impl Pair {
                 }
             }
             Other::Wall(w) => {
-                let world = Frame { center: DVec3::ZERO, axes: DMat3::IDENTITY, half: DVec3::ZERO };
-                let view = View::new(world, own, all, least);
+                let view = View::new(WORLD, own, all, least);
                 let density = surfaces[self.a].smallest_weight / spacing;
                 for &k in &edges_b {
                     self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, 64 + k as u8, bodies);
@@ -398,24 +535,26 @@ impl Pair {
     /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i. The second spring
     /// brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
     fn press(&mut self) {
-        let k = self.constants;
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
         let sum: f64 = self.contacts.iter().map(|c| c.weight * eighth(c.depth / deepest)).sum();
         let mean = sum.sqrt().sqrt().sqrt();
         let depth = deepest * mean;
-        let beyond = (depth - k.stop_depth).max(0.0);
-        let secant = k.spring + (k.stop - k.spring) * beyond / depth;
-        self.energy = 0.5 * k.spring * depth * depth + 0.5 * (k.stop - k.spring) * beyond * beyond;
         self.depth = deepest;
-        let share = |c: &Contact| {
-            let x = c.depth / depth;
-            c.weight * (x * x) * (x * x) * (x * x)
-        };
-        let shares: f64 = self.contacts.iter().map(share).sum();
+        let shares = self.contacts.iter().map(|c| c.share(depth)).sum();
+        self.push(depth, shares);
+    }
+
+    /// Normal forces of the points and the energy, at the effective depth `depth` [m] and the sum of all
+    /// shares.
+    fn push(&mut self, depth: f64, shares: f64) {
+        let k = self.constants;
+        let (secant, energy) = k.stored(depth);
+        self.energy = energy;
+        let beyond = (depth - k.stop_depth).max(0.0);
         let stop = (k.stop / k.spring).sqrt() - 1.0;
         for c in &mut self.contacts {
-            let share = share(c);
+            let share = c.share(depth);
             let since = |depth: f64| if c.speed < 0.0 { felt(depth / -c.speed / k.step) } else { 1.0 };
             let stopping = if beyond > 0.0 { stop * since(beyond) } else { 0.0 };
             let damping = k.damping / shares.sqrt() * (since(c.depth) + stopping);

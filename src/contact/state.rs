@@ -12,10 +12,10 @@ impl Solids {
             energy.kinetic += body.kinetic_energy();
             energy.gravity -= body.mass * self.gravity.dot(body.pose.position);
         }
-        let stale = self.candidates.refresh(&self.bodies, self.spacing, 0.0);
+        self.candidates.refresh(&self.bodies, self.spacing, 0.0);
         match &mut self.model {
             Model::Smooth(model) => {
-                if stale {
+                if !model.is_current(&self.candidates) {
                     model.collect(&self.candidates, &self.bodies);
                     let h = self.limits.longest_step;
                     model.set_constants(&self.limits, &self.bodies, self.spacing, h.max(f64::MIN_POSITIVE));
@@ -24,7 +24,7 @@ impl Solids {
                 energy.contact = model.pairs.iter().map(|p| p.energy).sum();
             }
             Model::Paper(model, law) => {
-                if stale {
+                if !model.is_current(&self.candidates) {
                     model.collect(&self.candidates, &self.bodies, law.distance);
                 }
                 model.evaluate(law, &self.bodies);

@@ -2,8 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, compare, dry_studies, gallery, needs, pressure_size, pressure_solve, stability, wall_of_cubes,
-    work_precision,
+    Study, compare, contact_cost, dry_studies, gallery, needs, pressure_size, pressure_solve, stability,
+    wall_of_cubes, work_precision,
 };
 use crate::error::{Error, Result};
 
@@ -104,6 +104,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "spring-drop",
         about: "section 4.1: K_ideal of Table 1, and the three models of Fig. 6",
         make: Maker::Function(dry_studies::spring_drop),
+    },
+    Entry {
+        name: "contact-cost",
+        about: "what contact costs a step for 1 to 1000 bodies, on the host and on a device",
+        make: Maker::Function(contact_cost::study),
     },
 ];
 

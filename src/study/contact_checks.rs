@@ -20,6 +20,7 @@ pub fn smooth(spring: f64, damping: f64, friction: f64) -> Contact {
         friction,
         torque: true,
         substeps: None,
+        device: Default::default(),
     }
 }
 

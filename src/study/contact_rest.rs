@@ -1,10 +1,13 @@
-//! Checks of the smooth law: bodies come to rest, stay there, slide as far as friction lets them; and what
-//! a step costs.
+//! Checks of the smooth law: bodies come to rest, stay there, slide as far as friction lets them.
 
 use super::contact_checks::{DAM_BREAK_CUBE, Random, lowest, none, smooth};
 use super::dry::{DryScene, FreeBox, GRAVITY};
+use crate::backend::{Backend, Compute};
+use crate::body::Pose;
+use crate::case::Contact;
 use crate::contact::Solids;
 use crate::error::Result;
+use crate::scene::Scene;
 use glam::{DQuat, DVec3};
 use serde::Serialize;
 use std::time::Instant;
@@ -39,15 +42,26 @@ pub struct RestRow {
 /// # Errors
 /// Those of [`Solids::advance`].
 pub fn stack(count: usize, seconds: f64) -> Result<RestRow> {
-    let (edge, mass, l0, spring, damping, friction, dt) = DAM_BREAK_CUBE;
+    let mut solids = Solids::new(&stack_scene(count), Some(&dam_break_contact()))?;
+    rest(&mut solids, None, seconds, DAM_BREAK_CUBE.6)
+}
+
+/// The contact of the dam-break cube with the smooth law.
+pub fn dam_break_contact() -> Contact {
+    let (.., spring, damping, friction, _) = DAM_BREAK_CUBE;
+    smooth(spring, damping, friction)
+}
+
+/// Cubes of 54 mm (0.073 kg), stacked `count` high.
+pub fn stack_scene(count: usize) -> Scene {
+    let (edge, mass, l0, ..) = DAM_BREAK_CUBE;
     let size = DVec3::splat(edge);
     let mut dry = DryScene::new(l0, DVec3::new(-0.5, -0.5, 0.0), DVec3::new(0.5, 0.5, 1.0)).floor();
     for k in 0..count {
         let center = DVec3::new(0.0, 0.0, (k as f64 + 0.5) * edge);
         dry = dry.body(&FreeBox::new(size, mass / edge.powi(3), center));
     }
-    let mut solids = Solids::new(&dry.build(), Some(&smooth(spring, damping, friction)))?;
-    rest(&mut solids, seconds, dt)
+    dry.build()
 }
 
 /// The cube that hits the wall: mass [kg], speed [m/s].
@@ -73,17 +87,27 @@ pub fn demolish(columns: usize, spring: f64, dt: f64, seconds: f64) -> Result<Re
     let mut ram = FreeBox::new(size, RAM.0 / size.element_product(), DVec3::new(-0.3, 0.01, 0.2));
     ram.velocity = DVec3::new(RAM.1, 0.0, 0.0);
     let mut solids = Solids::new(&dry.body(&ram).build(), Some(&smooth(spring, damping, friction)))?;
-    rest(&mut solids, seconds, dt)
+    rest(&mut solids, None, seconds, dt)
 }
 
-fn rest(solids: &mut Solids, seconds: f64, dt: f64) -> Result<RestRow> {
+/// Lets the solids move for `seconds` in steps of `dt` [s], their pairs on `compute` if there is one.
+///
+/// # Errors
+/// Those of [`Solids::advance_on`].
+pub fn rest(
+    solids: &mut Solids,
+    mut compute: Option<&mut dyn Compute>,
+    seconds: f64,
+    dt: f64,
+) -> Result<RestRow> {
     let start: Vec<DVec3> = solids.poses().iter().map(|p| p.position).collect();
     let fluid = none(start.len());
     let clock = Instant::now();
     let steps = (seconds / dt) as usize;
     let (mut penetration, mut penetration_end, mut substeps) = (0.0_f64, 0.0_f64, 0);
     for step in 0..steps {
-        let report = solids.advance(step as f64 * dt, dt, &fluid)?;
+        let device = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
+        let report = solids.advance_on(device, step as f64 * dt, dt, &fluid)?;
         penetration = penetration.max(report.penetration_max_over_l0);
         if (steps - step) as f64 * dt < 1.0 {
             penetration_end = penetration_end.max(report.penetration_max_over_l0);
@@ -129,6 +153,22 @@ pub struct RandomDropRow {
     pub step_us: f64,
 }
 
+/// Height from which the cube drops [m].
+const DROP: f64 = 0.05;
+
+/// The cube of drop `k`, of `mass` [kg], before it falls.
+fn dropped(k: usize, mass: f64) -> FreeBox {
+    let (edge, _, l0, ..) = DAM_BREAK_CUBE;
+    let size = DVec3::splat(edge);
+    let mut random = Random::new(k as u64);
+    let q = random.orientation();
+    let z = lowest(0.5 * size, q) + DROP;
+    let mut body = FreeBox::new(size, mass / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
+    body.orientation = q;
+    body.velocity = DVec3::new(0.5, 0.0, 0.0);
+    body
+}
+
 impl RandomDropRow {
     fn empty(spring: f64, mass: f64, drops: usize) -> Self {
         Self {
@@ -145,6 +185,63 @@ impl RandomDropRow {
             step_us: 0.0,
         }
     }
+
+    /// How a cube lies at the end.
+    fn judge(&mut self, pose: Pose) {
+        let edge = DAM_BREAK_CUBE.0;
+        self.flat += usize::from(tilt(pose.orientation) < 1e-3);
+        let still = pose.velocity.length() < 1e-3 && pose.angular_velocity.length() < 1e-2;
+        self.at_rest += usize::from(still);
+        self.kept += usize::from(pose.position.z > 0.4 * edge && pose.position.z < edge);
+    }
+}
+
+/// The drops of [`random_drops`] side by side in one scene, K and mass those of the dam-break cube, the pairs on
+/// `compute` if there is one (made for the scene by `make`). Energies are those of motion and height.
+///
+/// # Errors
+/// Those of [`Solids::advance_on`] and of `make`.
+pub fn drops_together<B: Backend>(
+    drops: usize,
+    seconds: f64,
+    make: impl FnOnce(&Scene, &Contact) -> Result<Option<B>>,
+) -> Result<RandomDropRow> {
+    let (edge, mass, l0, spring, .., dt) = DAM_BREAK_CUBE;
+    let mut dry = DryScene::new(l0, DVec3::new(-2.0, -22.0, 0.0), DVec3::new(3.0, 22.0, 0.75)).floor();
+    for k in 0..drops {
+        let mut body = dropped(k, mass);
+        body.center.y = k as f64 - 0.5 * drops as f64;
+        dry = dry.body(&body);
+    }
+    let (scene, contact) = (dry.build(), dam_break_contact());
+    let mut backend = make(&scene, &contact)?;
+    let mut solids = Solids::new(&scene, Some(&contact))?;
+    // A cube has the same moment about every axis.
+    let energy = |p: &Pose| {
+        let turning = edge * edge / 12.0 * p.angular_velocity.length_squared();
+        mass * (GRAVITY * p.position.z + 0.5 * p.velocity.length_squared() + turning)
+    };
+    let start: Vec<(f64, f64)> = solids.poses().iter().map(|p| (p.position.z, energy(p))).collect();
+    let mut row = RandomDropRow::empty(spring, mass, drops);
+    let mut touched = vec![false; drops];
+    let clock = Instant::now();
+    let steps = (seconds / dt) as usize;
+    for step in 0..steps {
+        let compute = backend.as_mut().and_then(Backend::compute);
+        let report = solids.advance_on(compute, step as f64 * dt, dt, &none(drops))?;
+        row.substeps = report.substeps;
+        row.penetration = row.penetration.max(report.penetration_max_over_l0);
+        for (k, pose) in solids.poses().iter().enumerate() {
+            touched[k] |= solids.contact_wrenches()[k].force.length() > 1e-3 * mass * GRAVITY;
+            if touched[k] {
+                row.rise = row.rise.max(pose.position.z - start[k].0);
+                row.energy_gain = row.energy_gain.max((energy(pose) - start[k].1) / (mass * GRAVITY * DROP));
+            }
+        }
+    }
+    solids.poses().iter().for_each(|p| row.judge(*p));
+    row.step_us = clock.elapsed().as_secs_f64() * 1e6 / steps as f64;
+    Ok(row)
 }
 
 /// Drops the dam-break cube `drops` times from 0.05 m with 0.5 m/s sideways, with the cube's mass and K
@@ -153,20 +250,15 @@ impl RandomDropRow {
 /// # Errors
 /// Those of [`Solids::advance`].
 pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Result<RandomDropRow> {
-    let (edge, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
+    let (_, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
     let damping = c * (spring * mass / (k * cube)).sqrt();
-    let (height, size) = (0.05, DVec3::splat(edge));
-    let scale = mass * GRAVITY * height;
+    let scale = mass * GRAVITY * DROP;
     let mut row = RandomDropRow::empty(spring, mass, drops);
     let clock = Instant::now();
     let mut steps = 0;
     for drop in 0..drops {
-        let mut random = Random::new(drop as u64);
-        let q = random.orientation();
-        let z = lowest(0.5 * size, q) + height;
-        let mut body = FreeBox::new(size, mass / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
-        body.orientation = q;
-        body.velocity = DVec3::new(0.5, 0.0, 0.0);
+        let body = dropped(drop, mass);
+        let z = body.center.z;
         let dry = DryScene::new(l0, DVec3::new(-2.0, -2.0, 0.0), DVec3::new(3.0, 2.0, 0.75));
         let scene = dry.floor().body(&body).build();
         let mut solids = Solids::new(&scene, Some(&smooth(spring, damping, friction)))?;
@@ -184,11 +276,7 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
                 row.energy_gain = row.energy_gain.max(gain);
             }
         }
-        let pose = solids.poses()[0];
-        row.flat += usize::from(tilt(pose.orientation) < 1e-3);
-        let still = pose.velocity.length() < 1e-3 && pose.angular_velocity.length() < 1e-2;
-        row.at_rest += usize::from(still);
-        row.kept += usize::from(pose.position.z > 0.4 * edge && pose.position.z < edge);
+        row.judge(solids.poses()[0]);
     }
     row.step_us = clock.elapsed().as_secs_f64() * 1e6 / f64::from(steps);
     Ok(row)
@@ -272,67 +360,5 @@ pub fn sliding_stop(friction: f64, speed: f64, dt: f64) -> Result<StopRow> {
         distance: pose.position.x,
         analytic: speed * speed / (2.0 * friction * GRAVITY),
         speed: pose.velocity.length(),
-    })
-}
-
-/// Cost of contact.
-#[derive(Clone, Debug, Serialize)]
-pub struct CostRow {
-    /// Bodies.
-    pub bodies: usize,
-    /// Surface points of a body.
-    pub points: usize,
-    /// `true`: a heap in motion; `false`: at rest on the floor.
-    pub moving: bool,
-    /// Sub-steps a step.
-    pub substeps: u32,
-    /// Pairs of solids in contact at the end.
-    pub solid_pairs: usize,
-    /// Wall time a step [us].
-    pub step_us: f64,
-}
-
-/// Wall time of contact for `count` dam-break cubes at rest, or falling into a heap.
-///
-/// # Errors
-/// Those of [`Solids::advance`].
-pub fn cost(count: usize, moving: bool, steps: usize) -> Result<CostRow> {
-    let (edge, mass, l0, spring, damping, friction, dt) = DAM_BREAK_CUBE;
-    let mut random = Random::new(5);
-    let mut dry = DryScene::new(l0, DVec3::new(-9.0, -9.0, 0.0), DVec3::new(9.0, 9.0, 1.0)).floor();
-    let side = (count as f64).cbrt().ceil() as usize;
-    let wide = (count as f64).sqrt().ceil() as usize;
-    for k in 0..count {
-        let mut cube = FreeBox::new(DVec3::splat(edge), mass / edge.powi(3), DVec3::ZERO);
-        if moving {
-            let at = DVec3::new((k % side) as f64, (k / side % side) as f64, (k / side / side) as f64);
-            cube.center = 1.02 * edge * (at + 0.5) + DVec3::Z * 0.01;
-            cube.velocity = DVec3::new(random.draw() - 0.5, random.draw() - 0.5, -0.5);
-        } else {
-            let at = DVec3::new((k % wide) as f64, (k / wide) as f64, 0.0);
-            cube.center = 1.3 * edge * at + DVec3::Z * 0.5 * edge;
-        }
-        dry = dry.body(&cube);
-    }
-    let scene = dry.build();
-    let points = scene.solids[0].wall_offset.len();
-    let mut solids = Solids::new(&scene, Some(&smooth(spring, damping, friction)))?;
-    let fluid = none(count);
-    let warm = 20;
-    let mut report = crate::contact::ContactReport::default();
-    for step in 0..warm {
-        report = solids.advance(step as f64 * dt, dt, &fluid)?;
-    }
-    let clock = Instant::now();
-    for step in warm..warm + steps {
-        report = solids.advance(step as f64 * dt, dt, &fluid)?;
-    }
-    Ok(CostRow {
-        bodies: count,
-        points,
-        moving,
-        substeps: report.substeps,
-        solid_pairs: report.solid_pairs,
-        step_us: clock.elapsed().as_secs_f64() * 1e6 / steps as f64,
     })
 }

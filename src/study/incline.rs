@@ -106,6 +106,7 @@ impl Slide {
             friction: self.friction,
             torque: self.torque,
             substeps: self.substeps,
+            device: Default::default(),
         }
     }
 

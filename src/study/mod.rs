@@ -15,6 +15,7 @@ pub mod builtin;
 pub mod command;
 pub mod compare;
 pub mod contact_checks;
+pub mod contact_cost;
 pub mod contact_rest;
 pub mod definition;
 pub mod drop_rows;

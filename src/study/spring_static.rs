@@ -76,6 +76,7 @@ pub(crate) fn contact(law: Law, spring: f64, damping_ratio: f64, single: bool) -
         friction: 0.0,
         torque: false,
         substeps: single.then_some(1),
+        device: Default::default(),
     }
 }
 

@@ -18,6 +18,8 @@ const MAIL: u64 = 64 << 10;
 struct Pipeline {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
+    /// Number and buffer of each binding.
+    bound: Vec<(u32, String)>,
 }
 
 /// A device at work.
@@ -157,25 +159,104 @@ impl Context {
                 },
                 cache: None,
             });
-            let mut bound = Vec::with_capacity(entry.bindings.len());
-            for (binding, field, _) in &entry.bindings {
-                let buffer = self
-                    .buffers
-                    .get(field.as_str())
-                    .ok_or_else(|| Error::Gpu(format!("{name} binds {field}, which the plan leaves out")))?;
-                bound.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
-            }
-            let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(&name),
-                layout: &pipeline.get_bind_group_layout(0),
-                entries: &bound,
-            });
-            self.pipelines.insert(name, Pipeline { pipeline, group });
+            let bound: Vec<_> =
+                entry.bindings.into_iter().map(|(binding, field, _)| (binding, field)).collect();
+            let group = self.group(&name, &pipeline, &bound)?;
+            self.pipelines.insert(name, Pipeline { pipeline, group, bound });
         }
         match pollster::block_on(scope.pop()) {
             Some(e) => Err(Error::Gpu(format!("shaders/{file}.wgsl on {}: {e}", self.info.name))),
             None => Ok(()),
         }
+    }
+
+    /// The buffers that a kernel binds.
+    fn group(
+        &self,
+        name: &str,
+        pipeline: &wgpu::ComputePipeline,
+        bound: &[(u32, String)],
+    ) -> Result<wgpu::BindGroup> {
+        let mut entries = Vec::with_capacity(bound.len());
+        for (binding, field) in bound {
+            let buffer = self
+                .buffers
+                .get(field.as_str())
+                .ok_or_else(|| Error::Gpu(format!("{name} binds {field}, which the plan leaves out")))?;
+            entries.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
+        }
+        Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(name),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        }))
+    }
+
+    /// Make a buffer hold at least `bytes`; by half more than asked, so that it does not grow every time. What
+    /// it held is lost if it grows.
+    pub fn reserve(&mut self, name: &'static str, bytes: u64) -> Result<()> {
+        let old = self.buffer(name)?;
+        let (have, usage) = (old.size(), old.usage());
+        if bytes <= have {
+            return Ok(());
+        }
+        let limits = self.device.limits();
+        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+        if bytes > most {
+            return Err(Error::Gpu(format!(
+                "{name} needs a buffer of {:.0} MB, but {} was asked for {:.0} MB at most; use contact.device = \
+                 \"host\"",
+                bytes as f64 / 1e6,
+                self.info.name,
+                most as f64 / 1e6
+            )));
+        }
+        // What is recorded still means the old one.
+        self.submit();
+        let size = (bytes + bytes / 2).next_multiple_of(16).min(most / 16 * 16);
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let create = |label, size, usage| {
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+            self.device.create_buffer(&descriptor)
+        };
+        let buffer = create(name, size, usage);
+        let staging = self.staging.size();
+        let wanted = size.min(STAGING.1);
+        let larger = (usage.contains(wgpu::BufferUsages::COPY_SRC) && wanted > staging)
+            .then(|| create("staging", wanted, self.staging.usage()));
+        if let Some(e) = pollster::block_on(scope.pop()) {
+            return Err(Error::Gpu(format!(
+                "{} has no {:.0} MB left for {name} ({e}); use contact.device = \"host\"",
+                self.info.name,
+                size as f64 / 1e6
+            )));
+        }
+        self.bytes += size - have;
+        if let Some(larger) = larger {
+            self.bytes += wanted - staging;
+            self.staging = larger;
+        }
+        self.buffers.insert(name, buffer);
+        let users: Vec<String> = self
+            .pipelines
+            .iter()
+            .filter(|(_, p)| p.bound.iter().any(|(_, field)| field == name))
+            .map(|(kernel, _)| kernel.clone())
+            .collect();
+        for kernel in users {
+            let of = &self.pipelines[&kernel];
+            let group = self.group(&kernel, &of.pipeline, &of.bound)?;
+            if let Some(of) = self.pipelines.get_mut(&kernel) {
+                of.group = group;
+            }
+        }
+        Ok(())
+    }
+
+    /// Workgroups of a dispatch at most.
+    pub fn workgroups_max(&self) -> u64 {
+        u64::from(self.device.limits().max_compute_workgroups_per_dimension)
     }
 
     /// Bytes that the allocator has given out, where it tells.

@@ -33,6 +33,9 @@ fn purpose(buffer: &Buffer) -> &'static str {
         | "entry" | "coarse" | "smoothed" | "corrected" => "multigrid",
         "cell_of" | "cell_count" | "cell_start" | "block_sum" | "unsorted" | "sorted" | "moving_slot"
         | "static_start" | "static_particle" => "search",
+        "contact_point" | "contact_given" | "smooth_pair" | "smooth_pose" | "contact_count"
+        | "contact_state" | "contact_layer" | "contact_wall" | "paper_pair" | "paper_pose" | "paper_law"
+        | "contact_row" | "contact_list" | "contact_sum" => "contact, to begin with",
         _ => "solids and the rest",
     }
 }
@@ -177,7 +180,12 @@ mod tests {
 
     fn plan() -> Plan {
         let reasons = Stage::ALL.map(|s| (s, Ok("planned"))).to_vec();
-        Plan { reasons, preconditioner: Preconditioner::Multigrid, force_relaxation: 1.0 }
+        Plan {
+            reasons,
+            preconditioner: Preconditioner::Multigrid,
+            force_relaxation: 1.0,
+            contact: Default::default(),
+        }
     }
 
     #[test]

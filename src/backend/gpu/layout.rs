@@ -340,6 +340,32 @@ fn multigrid_buffers(s: &Sizes, levels: &Levels) -> [(&'static str, u64, Host, b
     ]
 }
 
+/// Bytes that the buffers of contact start with; they grow with the pairs of solids that come close.
+const CONTACT_START: u64 = 4096;
+
+/// The buffers of contact, as the table of [`Memory::new`] holds them.
+fn contact_buffers(kernel: Option<&str>) -> Vec<(&'static str, u64, Host, bool)> {
+    let (smooth, paper) = (kernel == Some("contact_smooth"), kernel == Some("contact_paper"));
+    [
+        ("contact_point", Host::Writes, smooth),
+        ("smooth_pair", Host::Writes, smooth),
+        ("smooth_pose", Host::Writes, smooth),
+        ("contact_given", Host::Writes, smooth),
+        ("contact_count", Host::Reads, smooth),
+        ("contact_state", Host::None, smooth),
+        ("contact_layer", Host::Writes, paper),
+        ("contact_wall", Host::Writes, paper),
+        ("paper_pair", Host::Writes, paper),
+        ("paper_pose", Host::Writes, paper),
+        ("paper_law", Host::Writes, paper),
+        ("contact_row", Host::Reads, paper),
+        ("contact_list", Host::Reads, smooth || paper),
+        ("contact_sum", Host::Reads, smooth || paper),
+    ]
+    .map(|(name, host, needed)| (name, CONTACT_START, host, needed))
+    .to_vec()
+}
+
 /// What a scene takes on a device.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
@@ -350,10 +376,15 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// The buffers of `sizes` for the planned stages; none for a dry scene.
+    /// The buffers of `sizes` for the planned stages; of a dry scene only those of contact, if it is planned there.
     pub fn new(s: &Sizes, plan: &Plan) -> Self {
+        let contact = contact_buffers(plan.contact.kernel);
+        let listed = |table: Vec<(&'static str, u64, Host, bool)>| -> Vec<Buffer> {
+            let needed = table.into_iter().filter(|&(.., needed)| needed);
+            needed.map(|(name, bytes, host, _)| Buffer { name, bytes: bytes.max(16), host }).collect()
+        };
         if !plan.wet() {
-            return Self::default();
+            return Self { buffers: listed(contact), workgroups: 0 };
         }
         let (moving, force) = (s.moving > 0, plan.has(Stage::BodyForce) && s.moving_wall > 0);
         let reaction = force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision));
@@ -396,12 +427,8 @@ impl Memory {
             ("speed_bin", 4 * SPEED_BINS as u64, Host::Both, true),
         ];
         let levels = (plan.preconditioner == Preconditioner::Multigrid).then(|| Levels::new(s));
-        let buffers = table
-            .into_iter()
-            .chain(levels.iter().flat_map(|l| multigrid_buffers(s, l)))
-            .filter(|&(.., needed)| needed)
-            .map(|(name, bytes, host, _)| Buffer { name, bytes: bytes.max(16), host })
-            .collect();
+        let rest = levels.iter().flat_map(|l| multigrid_buffers(s, l)).chain(contact);
+        let buffers = listed(table.into_iter().chain(rest).collect());
         Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP) }
     }
 
@@ -437,7 +464,12 @@ mod tests {
             rows_per_thread: 1,
         };
         let reasons = Stage::ALL.map(|s| (s, Ok("planned"))).to_vec();
-        let plan = Plan { reasons, preconditioner: Preconditioner::Multigrid, force_relaxation: 1.0 };
+        let plan = Plan {
+            reasons,
+            preconditioner: Preconditioner::Multigrid,
+            force_relaxation: 1.0,
+            contact: Default::default(),
+        };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
         assert!(middle.total() < 200_000_000, "{}", middle.total());
         // What wgpu binds on any adapter, software included.
@@ -450,8 +482,12 @@ mod tests {
     #[test]
     fn a_dry_scene_takes_nothing() {
         let reasons = Stage::ALL.map(|s| (s, Err("no fluid"))).to_vec();
-        let plan =
-            Plan { reasons, preconditioner: crate::case::Preconditioner::Jacobi, force_relaxation: 1.0 };
+        let plan = Plan {
+            reasons,
+            preconditioner: crate::case::Preconditioner::Jacobi,
+            force_relaxation: 1.0,
+            contact: Default::default(),
+        };
         assert_eq!(Memory::new(&Sizes::default(), &plan).total(), 0);
     }
 }

@@ -19,6 +19,8 @@ sources!(
     "cell_list",
     "collision",
     "conjugate_gradient",
+    "contact_paper",
+    "contact_smooth",
     "correct",
     "monitor",
     "move_solids",
@@ -70,6 +72,9 @@ pub fn switches(params: &Params, groups: &Groups, plan: &Plan) -> Vec<&'static s
 /// The kernels that `plan` needs.
 pub fn kernels(plan: &Plan) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
     KERNELS.iter().copied().filter(|&(name, _)| {
+        if name.starts_with("contact_") {
+            return plan.contact.kernel == Some(name);
+        }
         // Particle collisions are applied by `correct`; the monitor and the preconditioner are no stages.
         plan.wet()
             && match name {
