@@ -74,7 +74,7 @@ pub struct Implied {
 }
 
 impl Implied {
-    /// Three quarters of what the data sheet of an H200 promises.
+    /// What a data-centre GPU of the day reaches.
     const BANDWIDTH: f64 = 3.5e12;
     /// Generous: 2 to 3 microseconds are usual.
     const PER_DISPATCH: f64 = 5e-6;

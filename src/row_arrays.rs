@@ -43,13 +43,13 @@ impl Columns {
         filled
     }
 
-    /// out_k <- f(k, |v_k|^2).
+    /// out_k <- f(|v_k|^2).
     #[inline(always)]
-    pub fn map_squares(&self, out: &mut [f64], f: impl Fn(usize, f64) -> f64) {
+    pub fn map_squares(&self, out: &mut [f64], f: impl Fn(f64) -> f64) {
         let n = out.len();
         let (x, y, z) = (&self.x[..n], &self.y[..n], &self.z[..n]);
         for k in 0..n {
-            out[k] = f(k, x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
+            out[k] = f(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
         }
     }
 
@@ -128,7 +128,7 @@ mod tests {
             let plain: DVec3 = row.iter().map(|&j| field[j as usize] - field[5]).sum();
             let got = arrays.r.weighted_sum(&[1.0; LONGEST][..filled]);
             assert!((got - plain).length() < 1e-12, "{n}: {got} for {plain}");
-            arrays.r.map_squares(&mut arrays.s[..row.len()], |_, r2| r2);
+            arrays.r.map_squares(&mut arrays.s[..row.len()], |r2| r2);
             let squares: f64 = row.iter().map(|&j| field[j as usize].distance_squared(field[5])).sum();
             assert!((sum(&arrays.s[..row.len()]) - squares).abs() < 1e-10 * (1.0 + squares));
         }

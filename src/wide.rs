@@ -1,4 +1,4 @@
-//! The widest vectors that the machine has, chosen when the program runs.
+//! AVX2 where the machine has it, found when the program runs.
 
 /// Compiles a function twice, as for any machine and with AVX2, and calls the one that the machine can run. The
 /// arithmetic is the same, bit for bit: nothing is reordered or contracted that is not written so.

@@ -273,7 +273,8 @@ fn plan_tells_what_is_left_out_and_why() {
 #[test]
 fn plan_answers_for_scenes_that_nothing_holds() {
     let plan = |spacing: &str| {
-        let args = ["plan", "cases/dam_break_transport.toml", "--spacing", spacing, "--json"];
+        let set = format!("run.spacing={spacing}");
+        let args = ["plan", "cases/dam_break_transport.toml", "--set", &set, "--until", "0.25", "--json"];
         let ran = ran(&args);
         assert_eq!(ran.code, 0, "{}", ran.err);
         json(&ran.out)
@@ -281,6 +282,7 @@ fn plan_answers_for_scenes_that_nothing_holds() {
     let number = |v: &serde_json::Value| v.as_f64().unwrap();
     let (built, huge) = (plan("0.01"), plan("0.001"));
     assert!(built["estimated_from_spacing_m"].is_null() && number(&huge["estimated_from_spacing_m"]) > 0.003);
+    assert_eq!((number(&built["end_s"]), number(&huge["end_s"])), (0.25, 0.25));
     // 0.5 x 0.5 x 0.35 m of water.
     assert!((number(&huge["particles"]["fluid"]) / 8.75e7 - 1.0).abs() < 0.02, "{}", huge["particles"]);
     let walls = |plan: &serde_json::Value| number(&plan["particles"]["wall"]);

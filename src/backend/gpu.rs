@@ -437,6 +437,9 @@ impl Backend for Gpu {
     }
 
     fn solution(&mut self) -> Result<Option<Vec<f64>>> {
+        if !self.wet {
+            return Ok(None);
+        }
         // Beside the positions, where the last residual was computed from.
         let packed = self.context.download::<[f32; 4]>("preconditioned", self.groups.pressure())?;
         Ok(Some(packed.into_iter().map(|x| f64::from(x[3])).collect()))

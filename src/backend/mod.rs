@@ -48,6 +48,17 @@ pub enum Timing {
     Waits,
 }
 
+impl Timing {
+    /// In words, as the JSON has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Host => "host clock",
+            Self::Timestamps => "timestamps",
+            Self::Waits => "host waits",
+        }
+    }
+}
+
 /// What was asked of a device since the start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Commands {

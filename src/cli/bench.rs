@@ -2,7 +2,6 @@
 
 use super::setup::Setup;
 use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
-use seixo::backend::Timing;
 use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
 use seixo::backend::traffic::Solve;
 use seixo::bench::{Growth, Row, host_bandwidth, measure};
@@ -24,7 +23,7 @@ pub struct BenchArgs {
     #[command(flatten)]
     device: DeviceArgs,
     /// Steps to time at each spacing.
-    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
     steps: u64,
     /// Simulated time from which to time [s], e.g. after the collapse.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
@@ -73,6 +72,13 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
     let case =
         CaseArgs { case: args.case.clone(), spacing: Some(spacing), sets: args.sets.clone(), until: None };
     let setup = Setup::new(&case, true)?;
+    let end = setup.loaded.case.run.end;
+    if !(0.0..=end).contains(&args.from) {
+        let from = args.from;
+        return Err(Error::Case(format!(
+            "--from {from} lies outside of the run; allowed: 0 to {end} (run.end)"
+        )));
+    }
     let particles = setup.scene.groups.total();
     let device = DeviceArgs { backend, ..args.device.clone() };
     let software = backend == BackendName::Gpu && !adapters().iter().any(|a| a.is_hardware());
@@ -167,15 +173,6 @@ fn solver(r: &Row) {
     }
 }
 
-/// As the JSON has it.
-fn name_of(timing: &Timing) -> &'static str {
-    match timing {
-        Timing::Host => "host clock",
-        Timing::Timestamps => "timestamps",
-        Timing::Waits => "host waits",
-    }
-}
-
 fn table(report: &Report) {
     say(&format!("{} cores", report.cores));
     for r in &report.rows {
@@ -206,7 +203,7 @@ fn table(report: &Report) {
                 r.dispatches, r.submits, r.waits
             ));
         }
-        say(&format!("stages by {}", name_of(&r.timing)));
+        say(&format!("stages by {}", r.timing.name()));
         say(&format!(
             "  {:<20} {:>10} {:>10} {:>14} {:>11}",
             "stage", "ms", "MB", "of the floor", "dispatches"

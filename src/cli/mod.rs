@@ -71,6 +71,14 @@ struct CaseArgs {
     until: Option<f64>,
 }
 
+impl CaseArgs {
+    /// All changes of values, those with an option of their own as well.
+    fn all_sets(&self) -> Vec<String> {
+        let end = self.until.map(|end| format!("run.end={end:?}"));
+        self.sets.iter().cloned().chain(end).collect()
+    }
+}
+
 /// Where to compute.
 #[derive(Clone, Debug, clap::Args)]
 struct DeviceArgs {

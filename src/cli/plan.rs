@@ -103,15 +103,18 @@ struct Seen {
 
 impl Seen {
     fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let mut case = load(&args.case, args.spacing, &args.sets)?.case;
+        let mut case = load(&args.case, args.spacing, &args.all_sets())?.case;
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
         let blocks = case.fluid.iter().flat_map(|f| &f.block);
         let extent = |b: &seixo::case::Block, k: usize| (b.max[k] - b.min[k]).abs();
         let fluid = |b| extent(b, 0) * extent(b, 2) * if d == 3.0 { extent(b, 1) } else { 1.0 } / l0.powf(d);
         let fluid: f64 = blocks.map(fluid).sum();
         let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
-        let spacing = if coarser > 1.0 { Some(coarser * l0) } else { args.spacing };
-        let typed = CaseArgs { spacing, sets: args.sets.clone(), case: args.case.clone(), ..*args };
+        let mut sets = args.sets.clone();
+        if coarser > 1.0 {
+            sets.push(format!("run.spacing={:?}", coarser * l0));
+        }
+        let typed = CaseArgs { sets, case: args.case.clone(), ..*args };
         // What the coarser lattice rounds is no news.
         let setup = Setup::new(&typed, quiet || coarser > 1.0)?;
         if coarser == 1.0 {
@@ -187,7 +190,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
         cpu.run(stage, &step)?;
     }
     let sizes: Sizes = sizes(scene, &own, plan)?;
-    let fluid = sizes.fluid as f64;
+    let coarse = sizes.pressure as f64;
     let sizes = if built { sizes } else { sizes.refined(seen.coarser) };
     let memory = Memory::new(&sizes, plan);
     let forecasts = FORECASTS.iter().filter(|&&n| n > sizes.total).map(|&n| Forecast::new(&sizes, plan, n));
@@ -201,7 +204,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
         compressibility_1_pa: step.compressibility,
         cells: Grid::new(params)?.total(),
         neighbours_max: if built { Some(cpu.counters()?.neighbours_max) } else { None },
-        cpu_bytes: (cpu.bytes() as f64 * sizes.fluid as f64 / fluid) as u64,
+        cpu_bytes: (cpu.bytes() as f64 * sizes.pressure as f64 / coarse) as u64,
         gpu_bytes: memory.total(),
         gpu_bytes_per_particle: memory.total() as f64 / sizes.total as f64,
         gpu_groups: groups(&memory),
@@ -347,7 +350,7 @@ fn forecast(f: &Forecast, ahead: bool, spacing: f64) -> Vec<String> {
         lines.push(format!(
             "  {:.0} million particles (l0 about {:.2e} m): {:.1} GB, {fits}; largest buffer {} {:.2} GB",
             f.particles as f64 / 1e6,
-            spacing * f.finer,
+            spacing * f.spacing_ratio,
             f.bytes as f64 / 1e9,
             f.largest.0,
             f.largest.1 as f64 / 1e9

@@ -22,9 +22,7 @@ impl Setup {
     /// # Errors
     /// What is wrong with the case.
     pub fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let mut sets = args.sets.clone();
-        sets.extend(args.until.map(|end| format!("run.end={end:?}")));
-        let loaded = load(&args.case, args.spacing, &sets)?;
+        let loaded = load(&args.case, args.spacing, &args.all_sets())?;
         let scene = Scene::build(&loaded.case)?;
         if !quiet {
             loaded.warnings.iter().for_each(|w| eprintln!("{w}"));

@@ -10,7 +10,7 @@
 //! Between the points where another face becomes the nearest, or joins the blending near an edge, the
 //! depth below one face is linear and its integrals are closed: each half of such a stretch is one point
 //! with the depth, weight and place that give them exactly. Where faces are blended, five Gauss nodes are
-//! good to 2e-4, of which depth^8 leaves a quarter for the energy.
+//! good to 3e-4, of which depth^8 leaves a quarter for the energy.
 
 use super::geometry::{self, Faces, Inside};
 use glam::DVec3;

@@ -198,13 +198,13 @@ fn wall_edges(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> (Vec<Lin
                 length: 2.0 * wall.half[along],
                 density: 0.0,
             });
-            for side in [-1.0, 1.0] {
-                let (at, out) = (middle + side * axis * wall.half, out + side * axis);
-                // every corner is the end of three edges: the one along x reports it
-                if along == 0 && wall.faces & bit(along, side) != 0 && !covered(at, out) {
-                    corners.push(wall.center + wall.axes * at);
-                }
-            }
+        }
+    }
+    for corner in 0..if flat { 0 } else { 8 } {
+        let side = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+        let out = DVec3::new(side(0), side(1), side(2));
+        if (0..3).all(|axis| wall.faces & bit(axis, side(axis)) != 0) && !covered(out * wall.half, out) {
+            corners.push(wall.center + wall.axes * (out * wall.half));
         }
     }
     (edges, corners)

@@ -96,9 +96,12 @@ struct Run {
     end: u32,
 }
 
+/// The particle itself is found as well, before it is taken out.
+const PLACES_KEPT: usize = CAPACITY + 1;
+
 /// Candidates found within reach.
 struct Found {
-    index: [u32; CAPACITY + BLOCK],
+    index: [u32; PLACES_KEPT + BLOCK],
     /// All of them, also those that had no place.
     count: usize,
     /// Those closer than the collision distance.
@@ -107,7 +110,7 @@ struct Found {
 
 impl Default for Found {
     fn default() -> Self {
-        Self { index: [0; CAPACITY + BLOCK], count: 0, close: 0 }
+        Self { index: [0; PLACES_KEPT + BLOCK], count: 0, close: 0 }
     }
 }
 
@@ -117,12 +120,12 @@ impl Found {
     }
 
     fn kept(&self) -> &[u32] {
-        &self.index[..self.count.min(CAPACITY)]
+        &self.index[..self.count.min(PLACES_KEPT)]
     }
 
     #[inline(always)]
     fn push(&mut self, j: u32) {
-        self.index[self.count.min(CAPACITY)] = j;
+        self.index[self.count.min(PLACES_KEPT)] = j;
         self.count += 1;
     }
 
@@ -212,6 +215,8 @@ impl Search {
                 let j = list.slot[k as usize];
                 if j < from.pressure_slots { near.push(j) } else { dummy.push(j) }
             }
+            // What had no place counts, so that the guard sees it.
+            near.count += hits.count - hits.kept().len();
             near.close += hits.close;
         }
         near.remove(i as u32);
@@ -290,7 +295,7 @@ fn chunk_rows_avx2(
     chunk_rows(chunk, active, params, from, search, below)
 }
 
-/// [`chunk_rows`], with the widest vectors that the machine has. The arithmetic is the same, bit for bit.
+/// [`chunk_rows`], with AVX2 where the machine has it. The arithmetic is the same, bit for bit.
 pub fn neighbour_list(
     chunk: &mut Chunk,
     active: impl Fn(usize) -> Option<(usize, DVec3)>,
@@ -320,6 +325,15 @@ mod tests {
             let set: Vec<u32> = (0..BLOCK as u32).filter(|k| mask >> k & 1 == 1).collect();
             assert_eq!(places[..set.len()], set);
         }
+    }
+
+    #[test]
+    fn a_full_row_keeps_all_its_neighbours_beside_the_particle_itself() {
+        let mut found = Found::default();
+        (0..=CAPACITY as u32).for_each(|j| found.push(j));
+        found.remove(100);
+        let expected: Vec<u32> = (0..=CAPACITY as u32).filter(|&j| j != 100).collect();
+        assert_eq!((found.count, found.kept()), (CAPACITY, &expected[..]));
     }
 
     #[cfg(target_arch = "x86_64")]

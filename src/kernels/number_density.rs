@@ -20,7 +20,7 @@ pub fn weights(n: usize, r: &mut RowArrays, params: &Params) {
     let (re, floor) = (params.effective_radius, CLOSEST * params.spacing);
     let filled = n.next_multiple_of(LANES);
     let RowArrays { r, w, .. } = r;
-    r.map_squares(&mut w[..filled], |_, r2| weight(r2.sqrt().max(floor), re).max(0.0));
+    r.map_squares(&mut w[..filled], |r2| weight(r2.sqrt().max(floor), re).max(0.0));
     w[n..filled].fill(0.0);
 }
 

@@ -59,7 +59,7 @@ fn laplacian_sum(
     let RowArrays { r, w, .. } = arrays;
     r.differences(i, row.neighbour, position);
     let w = &mut w[..row.neighbour.len()];
-    r.map_squares(w, |_, r2| {
+    r.map_squares(w, |r2| {
         let r = r2.sqrt();
         if r > 0.0 && r < re { weight(r, re) } else { 0.0 }
     });

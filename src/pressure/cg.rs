@@ -53,7 +53,7 @@ impl System<'_> {
         &self.neighbours.chunks
     }
 
-    /// q <- A p on the unknowns, 0 elsewhere. Returns p.q.
+    /// q <- A p on the unknowns, 0 elsewhere; the chunks of dry walls stay as they are. Returns p.q.
     pub fn multiply(&self, p: &[f64], q: &mut [f64], sums: &mut Vec<f64>) -> f64 {
         (q.par_chunks_mut(CHUNK), self.chunks(), self.state.par_chunks(CHUNK))
             .into_par_iter()

@@ -312,7 +312,7 @@ pub fn drop_on_body(spring: f64, mass: f64, other: f64, seed: u64, seconds: f64)
         steps += 1;
         row.substeps = report.substeps;
         row.penetration = row.penetration.max(report.penetration_max_over_l0);
-        touched |= report.pairs > 1;
+        touched |= report.solid_pairs > 1;
         if touched {
             row.rise = row.rise.max(solids.poses()[1].position.z - z);
             row.energy_gain = row.energy_gain.max((solids.energy().total() - start) / scale);

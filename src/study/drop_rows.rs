@@ -80,13 +80,16 @@ fn put_model(out: &mut Measured, row: &DropRow) {
 pub(super) fn findings(rows: &[Row]) -> Vec<String> {
     let mut findings = Vec::new();
     let of = |method: &'static str| rows.iter().filter(move |r| r.method == method);
-    let worst = of(RETURNS).filter(|r| r.parameters.get("case").is_none_or(|c| c != "CL01"));
-    let worst = worst.filter_map(|r| r.measured.value("|h_final - h| over 3 l0 [-]")).fold(0.0, f64::max);
-    findings.push(format!(
-        "Eq. (17) at {FACTOR} K_min and dt = {TIME_STEP:e} s, eight entry phases, all cases but CL01: at most {} of \
-         the band.",
-        short(worst)
-    ));
+    let others = || of(RETURNS).filter(|r| r.parameters.get("case").is_none_or(|c| c != "CL01"));
+    let band = |r: &&Row| r.measured.value("|h_final - h| over 3 l0 [-]");
+    let fell = others().filter(|r| band(r).is_none()).count();
+    if let Some(worst) = others().filter_map(|r| band(&r)).reduce(f64::max) {
+        findings.push(format!(
+            "Eq. (17) at {FACTOR} K_min and dt = {TIME_STEP:e} s, eight entry phases, all cases but CL01: at most {} \
+             of the band; {fell} fell through.",
+            short(worst)
+        ));
+    }
     for row in of(RETURNS).filter(|r| r.parameters.get("case").is_some_and(|c| c == "CL01")) {
         let value = |name: &str| row.measured.value(name).unwrap_or(f64::NAN);
         findings.push(format!(

@@ -11,7 +11,7 @@ use crate::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 
 const PEAK: &str = "largest overlap during the hit, over l0 [-]";
 const REST: &str = "largest overlap in the last second, over l0 [-]";
-const ENERGY: &str = "v sqrt(m / K) of the heavy cube, over l0 [-]";
+const ESTIMATE: &str = "v sqrt(m / K) of the heavy cube, over l0 [-]";
 
 /// The study.
 pub fn study(setup: &Setup) -> Study {
@@ -28,7 +28,7 @@ pub fn study(setup: &Setup) -> Study {
             let row = demolish(10, spring, dt, 6.0)?;
             out.put(PEAK, row.penetration);
             out.put(REST, row.penetration_end);
-            out.put(ENERGY, RAM.1 * (RAM.0 / spring).sqrt() / DAM_BREAK_CUBE.2);
+            out.put(ESTIMATE, RAM.1 * (RAM.0 / spring).sqrt() / DAM_BREAK_CUBE.2);
             out.put("fastest body at the end [m/s]", row.speed);
             out.put("sub-steps [-]", f64::from(row.substeps));
             out.timing = Timing::of(vec![row.step_us * 1e-6 * 6.0 / dt]);
@@ -57,7 +57,7 @@ fn report(rows: &[Row]) -> Report {
         line.mark = Some((Mark::Circle, 4.5));
         line
     };
-    let energy = Series::line("v sqrt(m / K), Eq. (16)", "#000000", Stroke::Dashed, points(ENERGY));
+    let energy = Series::line("v sqrt(m / K), Eq. (16)", "#000000", Stroke::Dashed, points(ESTIMATE));
     let chart = Chart {
         title: "A wall of 100 cubes hit by a heavy one".into(),
         subtitle: "20 kg at 3 m/s on 73 g each, l0 = 7.5 mm".into(),

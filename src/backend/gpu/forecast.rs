@@ -7,8 +7,6 @@ use serde::Serialize;
 
 /// Bytes that a shader binds at most on any device [bytes].
 pub const BINDING_MAX: u64 = (1 << 31) - 1;
-/// Bytes that a driver allocates at a time, on common ones [bytes].
-pub const BUFFER_MAX: u64 = 1 << 32;
 /// Workgroups that a dispatch starts along one dimension.
 pub const WORKGROUPS_MAX: u64 = 65_535;
 
@@ -78,13 +76,10 @@ pub fn excesses(sizes: &Sizes, memory: &Memory) -> Vec<Excess> {
     let mut out = Vec::new();
     for buffer in &memory.buffers {
         let (bytes, name) = (buffer.bytes, buffer.name);
-        let (limit, allows) = if bytes > BINDING_MAX {
-            ("max_storage_buffer_binding_size", BINDING_MAX)
-        } else if bytes > BUFFER_MAX {
-            ("max_buffer_size", BUFFER_MAX)
-        } else {
+        let (limit, allows) = ("max_storage_buffer_binding_size", BINDING_MAX);
+        if bytes <= allows {
             continue;
-        };
+        }
         let parts = bytes.div_ceil(allows);
         let remedy = match name {
             "neighbour_list" => {
@@ -125,7 +120,7 @@ pub struct Forecast {
     /// Fluid particles.
     pub fluid: u64,
     /// Spacing over that of the scene [-].
-    pub finer: f64,
+    pub spacing_ratio: f64,
     /// Bytes on a device.
     pub bytes: u64,
     /// Largest buffer and its bytes.
@@ -146,13 +141,13 @@ impl Forecast {
         Self::at(&sizes.refined(high), plan, 1.0 / high)
     }
 
-    /// Of `sizes`, whose spacing is `finer` times that of the scene.
-    pub fn at(sizes: &Sizes, plan: &Plan, finer: f64) -> Self {
+    /// Of `sizes`, whose spacing is `spacing_ratio` times that of the scene.
+    pub fn at(sizes: &Sizes, plan: &Plan, spacing_ratio: f64) -> Self {
         let memory = Memory::new(sizes, plan);
         Self {
             particles: sizes.total,
             fluid: sizes.fluid,
-            finer,
+            spacing_ratio,
             bytes: memory.total(),
             largest: memory.largest(),
             excesses: excesses(sizes, &memory),
@@ -207,7 +202,7 @@ mod tests {
     #[test]
     fn ten_million_fit_and_the_first_limit_of_a_hundred_is_named() {
         let ten = Forecast::new(&sizes(), &plan(), 10_000_000);
-        assert!(ten.particles.abs_diff(10_000_000) < 1000 && ten.finer < 0.4, "{ten:?}");
+        assert!(ten.particles.abs_diff(10_000_000) < 1000 && ten.spacing_ratio < 0.4, "{ten:?}");
         assert!(ten.bytes < 24_000_000_000 && ten.excesses.is_empty(), "{ten:?}");
         let hundred = Forecast::new(&sizes(), &plan(), 100_000_000);
         let first = &hundred.excesses[0];
