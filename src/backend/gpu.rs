@@ -1,8 +1,9 @@
 //! The GPU backend: the kernels of `shaders/` in f32 on any device that wgpu drives.
 //!
 //! No particle data crosses to the host in a step but the state of the pressure solver and the force on
-//! bodies; of contact, if the plan has it here, the pairs' sums. Work is recorded and handed to the device only when the host needs an answer. Only what the plan
-//! names is compiled and allocated. Nothing outside this module names wgpu.
+//! bodies; of contact, if the plan has it here, the pairs' sums. Work is recorded and handed to the device only when
+//! the host needs an answer. Only what the plan names is compiled and allocated. Nothing outside this module names
+//! wgpu.
 
 mod adapter;
 mod bandwidth;

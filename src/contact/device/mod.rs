@@ -1,7 +1,7 @@
 //! Contact with the pairs of points on a device: it searches them once for every life of the lists and gives
 //! their forces at every sub-step. Which solids are close, f64 sums over the solids, friction and motion stay on
-//! the host, and so do the edges of the smooth law: their integrals take as long as on the host alone, for every
-//! body in contact, and what they bring to a face is handed over.
+//! the host, and so do the edges of the smooth law: what they bring to a face is handed over. They are sought
+//! where the host alone would seek them, for every pair and sub-step, and are most of what is left to the host.
 //!
 //! A device computes in f32, and the overlap of a body at rest is a millionth of its size. So no position crosses
 //! over. For each pair of solids the host gives in f64 how one lies to the other, as clearances (`smooth`) or in
