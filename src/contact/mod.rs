@@ -133,7 +133,9 @@ impl Solids {
                     let model = candidates::Paper::new(scene);
                     let layers = bodies.iter().zip(&model.layers);
                     limits.lambda = layers.map(|(b, l)| stiffness::paper(b, &l.offsets, c.torque)).collect();
-                    let Damping::Coefficient(damping) = limits.damping else { unreachable!() };
+                    let Damping::Coefficient(damping) = limits.damping else {
+                        unreachable!("Damping::new gives a Ratio to the smooth law alone")
+                    };
                     let law = paper::Law {
                         spring: c.spring,
                         damping,
@@ -290,7 +292,7 @@ impl Solids {
                     OnDevice::Smooth(pairs) => pairs,
                     other => {
                         *other = OnDevice::Smooth(device::smooth::Smooth::new(&model.surfaces, link)?.into());
-                        let OnDevice::Smooth(pairs) = other else { unreachable!() };
+                        let OnDevice::Smooth(pairs) = other else { unreachable!("just set") };
                         pairs
                     }
                 };
@@ -314,7 +316,7 @@ impl Solids {
                         *other = OnDevice::Paper(
                             device::paper::Paper::new(&model.layers, bodies, law, link)?.into(),
                         );
-                        let OnDevice::Paper(pairs) = other else { unreachable!() };
+                        let OnDevice::Paper(pairs) = other else { unreachable!("just set") };
                         pairs
                     }
                 };

@@ -5,7 +5,7 @@ use super::dry::{DryScene, FreeBox, GRAVITY};
 use crate::backend::{Backend, Compute};
 use crate::body::Pose;
 use crate::case::Contact;
-use crate::contact::Solids;
+use crate::contact::{ContactReport, Solids};
 use crate::error::Result;
 use crate::scene::Scene;
 use glam::{DQuat, DVec3};
@@ -157,10 +157,10 @@ pub struct RandomDropRow {
 const DROP: f64 = 0.05;
 
 /// The cube of drop `k`, of `mass` [kg], before it falls.
-fn dropped(k: usize, mass: f64) -> FreeBox {
+fn dropped(k: u64, mass: f64) -> FreeBox {
     let (edge, _, l0, ..) = DAM_BREAK_CUBE;
     let size = DVec3::splat(edge);
-    let mut random = Random::new(k as u64);
+    let mut random = Random::new(k);
     let q = random.orientation();
     let z = lowest(0.5 * size, q) + DROP;
     let mut body = FreeBox::new(size, mass / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
@@ -186,6 +186,18 @@ impl RandomDropRow {
         }
     }
 
+    /// What a step did.
+    fn note(&mut self, report: &ContactReport) {
+        self.substeps = report.substeps;
+        self.penetration = self.penetration.max(report.penetration_max_over_l0);
+    }
+
+    /// Where a cube is after its first contact: how far above its start [m], and its energy gain [-].
+    fn rebound(&mut self, rise: f64, gain: f64) {
+        self.rise = self.rise.max(rise);
+        self.energy_gain = self.energy_gain.max(gain);
+    }
+
     /// How a cube lies at the end.
     fn judge(&mut self, pose: Pose) {
         let edge = DAM_BREAK_CUBE.0;
@@ -209,7 +221,7 @@ pub fn drops_together<B: Backend>(
     let (edge, mass, l0, spring, .., dt) = DAM_BREAK_CUBE;
     let mut dry = DryScene::new(l0, DVec3::new(-2.0, -22.0, 0.0), DVec3::new(3.0, 22.0, 0.75)).floor();
     for k in 0..drops {
-        let mut body = dropped(k, mass);
+        let mut body = dropped(k as u64, mass);
         body.center.y = k as f64 - 0.5 * drops as f64;
         dry = dry.body(&body);
     }
@@ -229,13 +241,14 @@ pub fn drops_together<B: Backend>(
     for step in 0..steps {
         let compute = backend.as_mut().and_then(Backend::compute);
         let report = solids.advance_on(compute, step as f64 * dt, dt, &none(drops))?;
-        row.substeps = report.substeps;
-        row.penetration = row.penetration.max(report.penetration_max_over_l0);
+        row.note(&report);
         for (k, pose) in solids.poses().iter().enumerate() {
             touched[k] |= solids.contact_wrenches()[k].force.length() > 1e-3 * mass * GRAVITY;
             if touched[k] {
-                row.rise = row.rise.max(pose.position.z - start[k].0);
-                row.energy_gain = row.energy_gain.max((energy(pose) - start[k].1) / (mass * GRAVITY * DROP));
+                row.rebound(
+                    pose.position.z - start[k].0,
+                    (energy(pose) - start[k].1) / (mass * GRAVITY * DROP),
+                );
             }
         }
     }
@@ -257,7 +270,7 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
     let clock = Instant::now();
     let mut steps = 0;
     for drop in 0..drops {
-        let body = dropped(drop, mass);
+        let body = dropped(drop as u64, mass);
         let z = body.center.z;
         let dry = DryScene::new(l0, DVec3::new(-2.0, -2.0, 0.0), DVec3::new(3.0, 2.0, 0.75));
         let scene = dry.floor().body(&body).build();
@@ -267,13 +280,10 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
         for step in 0..(seconds / dt) as usize {
             let report = solids.advance(step as f64 * dt, dt, &none(1))?;
             steps += 1;
-            row.substeps = report.substeps;
-            row.penetration = row.penetration.max(report.penetration_max_over_l0);
+            row.note(&report);
             touched |= report.pairs > 0;
             if touched {
-                row.rise = row.rise.max(solids.poses()[0].position.z - z);
-                let gain = (solids.energy().total() - start) / scale;
-                row.energy_gain = row.energy_gain.max(gain);
+                row.rebound(solids.poses()[0].position.z - z, (solids.energy().total() - start) / scale);
             }
         }
         row.judge(solids.poses()[0]);
@@ -290,18 +300,16 @@ pub fn random_drops(spring: f64, mass: f64, drops: usize, seconds: f64) -> Resul
 pub fn drop_on_body(spring: f64, mass: f64, other: f64, seed: u64, seconds: f64) -> Result<RandomDropRow> {
     let (edge, cube, l0, k, c, friction, dt) = DAM_BREAK_CUBE;
     let damping = c * (spring * mass.min(other) / (k * cube)).sqrt();
-    let (height, size) = (0.05, DVec3::splat(edge));
-    let mut random = Random::new(seed);
-    let q = random.orientation();
-    let z = edge + lowest(0.5 * size, q) + height;
+    let size = DVec3::splat(edge);
     let below = FreeBox::new(size, mass / edge.powi(3), DVec3::new(0.0, 0.0, 0.5 * edge));
-    let mut body = FreeBox::new(size, other / edge.powi(3), DVec3::new(random.draw() * l0, 0.0, z));
-    body.orientation = q;
-    body.velocity = DVec3::new(0.1, 0.0, 0.0);
+    let mut body = dropped(seed, other);
+    body.center.z += edge;
+    body.velocity.x = 0.1;
+    let z = body.center.z;
     let dry = DryScene::new(l0, DVec3::new(-2.0, -2.0, 0.0), DVec3::new(3.0, 2.0, 0.75));
     let scene = dry.floor().body(&below).body(&body).build();
     let mut solids = Solids::new(&scene, Some(&smooth(spring, damping, friction)))?;
-    let scale = (mass + other) * GRAVITY * height;
+    let scale = (mass + other) * GRAVITY * DROP;
     let start = solids.energy().total();
     let mut row = RandomDropRow::empty(spring, mass, 1);
     let clock = Instant::now();
@@ -310,12 +318,10 @@ pub fn drop_on_body(spring: f64, mass: f64, other: f64, seed: u64, seconds: f64)
     for step in 0..(seconds / dt) as usize {
         let report = solids.advance(step as f64 * dt, dt, &none(2))?;
         steps += 1;
-        row.substeps = report.substeps;
-        row.penetration = row.penetration.max(report.penetration_max_over_l0);
+        row.note(&report);
         touched |= report.solid_pairs > 1;
         if touched {
-            row.rise = row.rise.max(solids.poses()[1].position.z - z);
-            row.energy_gain = row.energy_gain.max((solids.energy().total() - start) / scale);
+            row.rebound(solids.poses()[1].position.z - z, (solids.energy().total() - start) / scale);
         }
     }
     let lowest = |n: usize| {
