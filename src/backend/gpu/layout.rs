@@ -1,13 +1,13 @@
 //! What the device holds: the structs shared with the shaders and the one table of buffers.
 
 use super::hierarchy::{Hierarchy, Levels};
-use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::monitor::SPEED_BINS;
 use crate::params::{Params, Step};
 use crate::plan::{Plan, Stage};
 use crate::pressure::Settings;
 use crate::scene::{Groups, Scene};
+use crate::scheme::Preconditioner;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -484,7 +484,7 @@ mod tests {
         let reasons = Stage::ALL.map(|s| (s, Err("no fluid"))).to_vec();
         let plan = Plan {
             reasons,
-            preconditioner: crate::case::Preconditioner::Jacobi,
+            preconditioner: crate::scheme::Preconditioner::Jacobi,
             force_relaxation: 1.0,
             contact: Default::default(),
         };

@@ -1,10 +1,10 @@
 //! The shaders' sources, the switches that shape them, and what they bind.
 
-use crate::case::{FreeSurface, Gradient, Preconditioner, Source};
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
 use crate::scene::Groups;
+use crate::scheme::{FreeSurface, Gradient, Preconditioner, Source};
 use wgpu::naga;
 
 macro_rules! sources {
