@@ -1,11 +1,8 @@
-//! Charts as SVG and PNG. The only file that knows the plotting library.
+//! Charts: what is drawn. How it is drawn is in [`super::plot_svg`], the only file that knows the plotting library.
 
+use super::plot_svg;
 use super::write_whole;
-use crate::error::{Error, Result};
-use kuva::plot::scatter::{MarkerShape, ScatterPlot};
-use kuva::plot::{LegendPosition, LinePlot, LineStyle};
-use kuva::render::layout::Layout;
-use kuva::render::plots::Plot;
+use crate::error::Result;
 use std::path::{Path, PathBuf};
 
 /// An axis.
@@ -28,7 +25,8 @@ impl Axis {
         Self { label: label.into(), log: true }
     }
 
-    fn takes(&self, value: f64) -> bool {
+    /// Whether the axis can show `value`.
+    pub fn takes(&self, value: f64) -> bool {
         value.is_finite() && (!self.log || value > 0.0)
     }
 }
@@ -119,129 +117,25 @@ pub struct Chart {
 }
 
 impl Chart {
-    fn plots(&self) -> Vec<Plot> {
-        let mut plots = Vec::new();
-        for s in &self.series {
-            let shown: Vec<usize> = (0..s.points.len())
-                .filter(|&k| self.x.takes(s.points[k][0]) && self.y.takes(s.points[k][1]))
-                .collect();
-            if shown.is_empty() {
-                continue;
-            }
-            let data: Vec<(f64, f64)> = shown.iter().map(|&k| (s.points[k][0], s.points[k][1])).collect();
-            let mut named = false;
-            if let Some(stroke) = s.stroke.filter(|_| data.len() > 1) {
-                let style = match stroke {
-                    Stroke::Solid => LineStyle::Solid,
-                    Stroke::Dashed => LineStyle::Dashed,
-                };
-                let mut line = LinePlot::new()
-                    .with_data(data.clone())
-                    .with_color(s.color.as_str())
-                    .with_stroke_width(1.8)
-                    .with_line_style(style);
-                if s.mark.is_none() {
-                    line = line.with_legend(s.name.as_str());
-                    named = true;
-                }
-                plots.push(Plot::Line(line));
-            }
-            if let Some((mark, size)) = s.mark {
-                let shape = match mark {
-                    Mark::Circle => MarkerShape::Circle,
-                    Mark::Square => MarkerShape::Square,
-                    Mark::Triangle => MarkerShape::Triangle,
-                    Mark::Cross => MarkerShape::Cross,
-                    Mark::Star => MarkerShape::Star,
-                };
-                let mut scatter = ScatterPlot::new()
-                    .with_data(data)
-                    .with_color(s.color.as_str())
-                    .with_size(size)
-                    .with_marker(shape);
-                if s.spread.len() == s.points.len() {
-                    let bars = shown
-                        .iter()
-                        .map(|&k| (s.points[k][0] - s.spread[k][0], s.spread[k][1] - s.points[k][0]));
-                    scatter = scatter.with_x_err_asymmetric(bars.collect::<Vec<_>>());
-                }
-                if !named {
-                    scatter = scatter.with_legend(s.name.as_str());
-                }
-                plots.push(Plot::Scatter(scatter));
-            }
-        }
-        plots
-    }
-
-    /// Range of axis `k` with a margin; `None` without points.
-    fn range(&self, k: usize) -> Option<(f64, f64)> {
-        let shown = self.series.iter().flat_map(|s| &s.points);
-        let shown = shown.filter(|p| self.x.takes(p[0]) && self.y.takes(p[1])).map(|p| p[k]);
-        let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-        let log = if k == 0 { self.x.log } else { self.y.log };
-        if low > high {
-            None
-        } else if log {
-            let margin = (high / low).powf(0.06).max(1.25);
-            Some((low / margin, high * margin))
-        } else {
-            let margin = (0.05 * (high - low)).max(1e-9 * high.abs()).max(f64::MIN_POSITIVE);
-            Some((low - margin, high + margin))
-        }
-    }
-
-    fn layout(&self, plots: &[Plot]) -> Layout {
-        let mut layout = Layout::auto_from_plots(plots)
-            .with_width(900.0)
-            .with_height(520.0)
-            .with_title(self.title.as_str())
-            .with_title_size(17)
-            .with_title_wrap(64)
-            .with_subtitle(self.subtitle.as_str())
-            .with_x_label(self.x.label.as_str())
-            .with_y_label(self.y.label.as_str())
-            .with_legend_position(LegendPosition::OutsideRightTop);
-        // A little air, so that no mark is cut by the frame.
-        if let Some((low, high)) = self.range(0) {
-            layout = layout.with_x_axis_min(low).with_x_axis_max(high);
-        }
-        if let Some((low, high)) = self.range(1) {
-            layout = layout.with_y_axis_min(low).with_y_axis_max(high);
-        }
-        if self.x.log {
-            layout = layout.with_log_x();
-        }
-        if self.y.log {
-            layout = layout.with_log_y();
-        }
-        layout
+    /// Indices of the points of `series` that both axes can show.
+    pub fn shown(&self, series: &Series) -> Vec<usize> {
+        let takes = |p: &[f64; 2]| self.x.takes(p[0]) && self.y.takes(p[1]);
+        (0..series.points.len()).filter(|&k| takes(&series.points[k])).collect()
     }
 
     /// The chart as SVG; `None` if there is no point to draw.
     pub fn svg(&self) -> Option<String> {
-        let plots = self.plots();
-        (!plots.is_empty()).then(|| {
-            let layout = self.layout(&plots);
-            kuva::render_to_svg(plots, layout)
-        })
+        self.series.iter().any(|s| !self.shown(s).is_empty()).then(|| plot_svg::draw(self))
     }
 
-    /// Write `STEM.svg` and `STEM.png`. A chart without a point writes nothing; returns whether it wrote.
+    /// Write `STEM.svg`. A chart without a point writes nothing; returns whether it wrote.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::error::Error::Io`].
     pub fn write(&self, stem: &Path) -> Result<bool> {
         let Some(svg) = self.svg() else { return Ok(false) };
         // Names may have dots in them, so that the extension is added, not replaced.
-        let with = |extension: &str| PathBuf::from(format!("{}.{extension}", stem.display()));
-        write_whole(&with("svg"), svg.as_bytes())?;
-        let plots = self.plots();
-        let layout = self.layout(&plots);
-        let path = with("png");
-        let png = kuva::render_to_png(plots, layout, 1.5)
-            .map_err(|e| Error::io(&path)(std::io::Error::other(e.to_string())))?;
-        write_whole(&path, &png)?;
+        write_whole(&PathBuf::from(format!("{}.svg", stem.display())), svg.as_bytes())?;
         Ok(true)
     }
 }

@@ -9,7 +9,7 @@
 //! | `points/HASH.json` | a finished point; the hash is that of everything it depends on |
 //! | `results.csv`, `results.json` | all points |
 //! | `report.md` | findings in words, charts, the table |
-//! | `NAME.svg`, `NAME.png` | charts |
+//! | `NAME.svg` | charts |
 
 pub mod builtin;
 pub mod command;

@@ -1,4 +1,4 @@
-//! What a study leaves: results.csv, results.json, report.md, and its charts as SVG and PNG.
+//! What a study leaves: results.csv, results.json, report.md, and its charts as SVG.
 
 use super::row::{Class, Row};
 use crate::error::{Error, Result};
