@@ -17,8 +17,6 @@
 pub mod folder;
 pub mod particles;
 pub mod picture;
-pub mod plot;
-mod plot_svg;
 pub mod pvd;
 pub mod render;
 pub mod result;
