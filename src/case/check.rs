@@ -4,7 +4,7 @@
 
 use super::{Case, Face, Gauges, Vector};
 use crate::error::{Error, Result};
-use crate::lattice::Lattice;
+use crate::params::Lattice;
 
 /// Something wrong, or worth a warning, about a key.
 #[derive(Clone, Debug, PartialEq)]
