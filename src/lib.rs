@@ -18,6 +18,7 @@ pub mod pressure;
 pub mod row_arrays;
 pub mod run;
 pub mod scene;
+pub mod shape;
 pub mod simulation;
 mod step;
 pub mod study;

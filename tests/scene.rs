@@ -101,7 +101,7 @@ fn area_and_surface_of_a_cube() {
     assert!(total.length() < 1e-14);
     let up: f64 = cube.wall_area.iter().map(|a| a.z.max(0.0)).sum();
     assert!((up - 0.04).abs() < 1e-12);
-    let Shape::Box { half } = cube.shape;
+    let half = cube.shape.as_cuboid().unwrap().half;
     for (&offset, &to) in cube.wall_offset.iter().zip(&cube.wall_to_surface) {
         let on = (offset + to).abs();
         assert!((on - half).abs().min_element() < 1e-12 && (on - half).max_element() < 1e-12);
