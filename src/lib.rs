@@ -1,10 +1,8 @@
 //! seixo: water that carries solids.
 pub mod backend;
-pub mod bench;
 pub mod body;
 pub mod case;
 pub mod cells;
-pub mod compare;
 pub mod contact;
 pub mod error;
 pub mod fields;
@@ -21,5 +19,4 @@ pub mod scene;
 pub mod shape;
 pub mod simulation;
 mod step;
-pub mod study;
 mod wide;

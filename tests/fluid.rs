@@ -1,7 +1,6 @@
 //! The fluid against analytic answers, brute force and measured figures of the scheme.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 use common::*;
 use glam::{DMat3, DVec3};
 use seixo::backend::Backend;
