@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use seixo::case::{Case, file};
-use seixo::scene::{Drive, Kind, Scene, Shape};
+use seixo::scene::{Drive, Kind, Scene};
 use std::path::Path;
 
 fn case(name: &str, sets: &[&str]) -> Case {
