@@ -1,17 +1,31 @@
 //! The part of the check that judges bodies and their contact.
 
 use super::check::{Checker, length};
-use super::{Body, ContactDevice, Law};
+use super::{Body, BodyShape, ContactDevice, Law};
+
+/// Most sub-steps of a step that a case can ask for.
+const MOST_SUBSTEPS: u32 = 100_000;
+/// Springs outside of this range overflow, or vanish in rounding [N/m].
+const SPRING_LEAST: f64 = 1e-9;
+const SPRING_MOST: f64 = 1e18;
+
+/// Volume of a whole body [m3], and its extent along y in two dimensions [m].
+fn whole(body: &Body) -> (f64, f64) {
+    let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
+    match body.shape {
+        BodyShape::Box => {
+            let [x, y, z] = body.size.unwrap_or_default();
+            (x * y * z, y)
+        }
+        BodyShape::Sphere => (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3), 2.0 * radius),
+        BodyShape::Cylinder => (std::f64::consts::PI * radius.powi(2) * height, height),
+    }
+}
 
 impl Checker<'_> {
     pub(super) fn body(&mut self, k: usize, body: &Body) {
         let path = |key: &str| format!("body.{k}.{key}");
-        for (axis, &length) in body.size.iter().enumerate() {
-            self.positive(&path(&format!("size.{axis}")), length, "m");
-        }
-        if body.size.iter().all(|&l| l > 0.0) {
-            self.fits(&path("size"), &format!("body `{}`", body.name), &[0.0; 3], &body.size);
-        }
+        self.shape(k, body);
         let given = self.one_of(
             &format!("body.{k}"),
             &[("mass", body.mass.is_some()), ("density", body.density.is_some())],
@@ -36,7 +50,7 @@ impl Checker<'_> {
                 self.add(
                     path("inertia"),
                     "one moment exceeds the sum of the other two, no mass has that",
-                    "correct it or leave it out for a uniform box",
+                    "correct it or leave it out for a uniform body",
                 );
             }
         }
@@ -83,6 +97,111 @@ impl Checker<'_> {
         }
     }
 
+    /// A spring that a body's own weight presses through is none.
+    fn soft_spring(&mut self, spring: f64) {
+        let run = &self.case.run;
+        if !(spring.is_finite() && spring > 0.0) {
+            return;
+        }
+        if !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
+            let allowed = format!("{SPRING_LEAST:e} to {SPRING_MOST:e} N/m");
+            self.range("contact.spring", spring, false, &allowed);
+            return;
+        }
+        let weight = |body: &Body| {
+            let (volume, depth) = whole(body);
+            let share = if self.flat() { run.spacing / depth } else { 1.0 };
+            body.mass.or(body.density.map(|d| d * volume)).unwrap_or(0.0) * share * length(&run.gravity)
+        };
+        let smallest = |body: &Body| {
+            let edges = body.size.unwrap_or([f64::INFINITY; 3]);
+            let across = 2.0 * body.radius.unwrap_or(f64::INFINITY);
+            let along =
+                if self.flat() { f64::INFINITY } else { edges[1].min(body.height.unwrap_or(f64::INFINITY)) };
+            edges[0].min(edges[2]).min(across).min(along)
+        };
+        let free = self.case.body.iter().filter(|b| b.motion.is_none() && b.locked.len() < 6);
+        let sinks = |b: &&Body| weight(b) / spring > smallest(b);
+        let found = free.filter(sinks).max_by(|a, b| weight(a).total_cmp(&weight(b)));
+        if let Some((name, weight, edge)) = found.map(|b| (b.name.clone(), weight(b), smallest(b))) {
+            let message = format!(
+                "the weight of body `{name}`, {weight:.3e} N, presses a spring of {spring:e} N/m {:.3e} m deep, more \
+                 than the body's {edge} m",
+                weight / spring
+            );
+            self.add("contact.spring", message, format!("use {:.1e} N/m or more", 100.0 * weight / edge));
+        }
+    }
+
+    /// The keys that the shape needs, no others, and a particle across at least.
+    fn shape(&mut self, k: usize, body: &Body) {
+        let path = |key: &str| format!("body.{k}.{key}");
+        let (name, needed): (_, &[&str]) = match body.shape {
+            BodyShape::Box => ("box", &["size"]),
+            BodyShape::Sphere => ("sphere", &["radius"]),
+            BodyShape::Cylinder => ("cylinder", &["radius", "height"]),
+        };
+        let keys = [
+            ("size", body.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
+            ("radius", body.radius.is_some(), "0.1", "[m]"),
+            ("height", body.height.is_some(), "0.2", "the length along the axis [m]"),
+        ];
+        let mut complete = true;
+        for (key, given, example, what) in keys {
+            if needed.contains(&key) && !given {
+                complete = false;
+                let message = format!("body `{}` is a {name} without `{key}`", body.name);
+                self.add(format!("body.{k}"), message, format!("add `{key} = {example}`, {what}"));
+            } else if given && !needed.contains(&key) {
+                let other = if key == "size" { "box" } else { "cylinder" };
+                self.add(
+                    path(key),
+                    format!("body `{}` is a {name}: `{key}` does not belong to it", body.name),
+                    format!("remove `{key}`, or set shape = \"{other}\""),
+                );
+            }
+        }
+        for (axis, &length) in body.size.iter().flatten().enumerate() {
+            self.positive(&path(&format!("size.{axis}")), length, "m");
+        }
+        for (key, length) in [("radius", body.radius), ("height", body.height)] {
+            if let Some(length) = length {
+                self.positive(&path(key), length, "m");
+            }
+        }
+        let flat = self.flat();
+        if flat && body.shape == BodyShape::Sphere {
+            let message = format!("body `{}`: there are no spheres in two dimensions", body.name);
+            self.add(
+                path("shape"),
+                message,
+                "set shape = \"cylinder\" with `radius` and `height`: it lies along y",
+            );
+        }
+        if let Some(axis) = body.axis {
+            if body.shape != BodyShape::Cylinder {
+                let message = format!("body `{}` is a {name}: it has no `axis`", body.name);
+                self.add(path("axis"), message, "remove `axis`; `orientation` turns a body");
+            } else if length(&axis) == 0.0 {
+                self.add(path("axis"), "the axis has no length", "give a direction, e.g. [0, 1, 0]");
+            } else if flat && (axis[0] != 0.0 || axis[2] != 0.0) {
+                let message = "in two dimensions a cylinder lies along y";
+                self.add(path("axis"), message, "set axis = [0, 1, 0], or leave it out");
+            }
+        }
+        let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
+        let (key, size) = match body.shape {
+            BodyShape::Box => ("size", body.size.unwrap_or_default()),
+            BodyShape::Sphere => ("radius", [2.0 * radius; 3]),
+            BodyShape::Cylinder if flat => ("radius", [2.0 * radius; 3]),
+            BodyShape::Cylinder if height < 2.0 * radius => ("height", [2.0 * radius, 2.0 * radius, height]),
+            BodyShape::Cylinder => ("radius", [2.0 * radius, 2.0 * radius, height]),
+        };
+        if complete && size.iter().all(|&l| l > 0.0) {
+            self.fits(&path(key), &format!("body `{}`", body.name), &[0.0; 3], &size);
+        }
+    }
+
     pub(super) fn contact(&mut self) {
         let moves = |b: &&Body| b.motion.is_none() && b.locked.len() < 6;
         let Some(contact) = &self.case.contact else {
@@ -116,12 +235,31 @@ impl Checker<'_> {
         }
         self.not_negative("contact.viscous_friction", contact.viscous_friction, "kg/s");
         self.not_negative("contact.friction", contact.friction, "");
-        if contact.substeps == Some(0) {
-            self.add("contact.substeps", "0 sub-steps", "allowed: 1 or more, or leave it out");
+        if contact.law != Law::Pressure {
+            self.soft_spring(contact.spring);
+        }
+        match contact.substeps {
+            Some(0) => self.add("contact.substeps", "0 sub-steps", "allowed: 1 or more, or leave it out"),
+            Some(n) if n > MOST_SUBSTEPS => self.add(
+                "contact.substeps",
+                format!("{n} sub-steps a step never end"),
+                format!("allowed: 1 to {MOST_SUBSTEPS}, or leave it out for as many as stability asks for"),
+            ),
+            _ => {}
         }
         if contact.device == ContactDevice::Gpu && contact.law == Law::Pressure {
             let remedy = "leave `device` out or set law = \"smooth\" or \"paper\"";
             self.add("contact.device", "law = \"pressure\" runs on the host only", remedy);
+        }
+        let round = self.case.body.iter().find(|b| b.shape != BodyShape::Box);
+        if let Some(body) =
+            round.filter(|_| contact.device == ContactDevice::Gpu && contact.law == Law::Smooth)
+        {
+            let message = format!(
+                "body `{}` is round: its contact by law = \"smooth\" runs on the host only",
+                body.name
+            );
+            self.add("contact.device", message, "leave `device` out");
         }
         if contact.viscous_friction != 0.0 && contact.law == Law::Pressure {
             let message = "`viscous_friction` belongs to law = \"paper\" or \"smooth\"";

@@ -18,9 +18,13 @@ mod lattice;
 mod layout;
 mod oriented;
 mod placement;
+mod support;
 mod walls;
 mod water;
 
+pub use crate::shape::Shape;
+
+use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::Range;
 
@@ -84,16 +88,6 @@ impl Groups {
     }
 }
 
-/// A solid's shape in its own frame, centred on its centre of mass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// A box of half edge lengths [m].
-    Box {
-        /// Half of the edge lengths [m].
-        half: DVec3,
-    },
-}
-
 /// Geometry of a fixed wall, for contact and for the checks at t = 0. Surfaces lie where the wall
 /// particles put them (half a spacing outside the wall layer's centres).
 #[derive(Clone, Debug, PartialEq)]
@@ -149,6 +143,13 @@ impl Motion {
         }
     }
 
+    /// Largest speed [m/s] between the times `from` and `to` [s].
+    pub fn fastest(&self, from: f64, to: f64) -> f64 {
+        let rows = self.time.windows(2).zip(self.displacement.windows(2));
+        let met = rows.filter(|(t, _)| t[0] < to && t[1] > from);
+        met.map(|(t, x)| (x[1] - x[0]).length() / (t[1] - t[0])).fold(0.0, f64::max)
+    }
+
     /// Velocity [m/s] just after time `t` [s].
     pub fn velocity(&self, t: f64) -> DVec3 {
         match self.time.iter().position(|&ti| t < ti) {
@@ -197,6 +198,14 @@ pub struct Solid {
     /// For each wall-layer particle, the vector from its centre to the true surface (to the edge or
     /// corner where it belongs to two or three faces), solid's frame [m].
     pub wall_to_surface: Vec<DVec3>,
+}
+
+impl Solid {
+    /// What of its surface presses into others.
+    pub(crate) fn surface(&self, spacing: f64, dimensions: u32) -> Surface {
+        let wall = WallLayer { offset: &self.wall_offset, to_surface: &self.wall_to_surface };
+        self.shape.surface(&wall, spacing, dimensions)
+    }
 }
 
 /// The scene.
