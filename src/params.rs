@@ -11,6 +11,13 @@ pub fn weight(r: f64, re: f64) -> f64 {
     re / r - 1.0
 }
 
+/// Weight W of the smooth density sum, Wendland's C2 without its norm, at `q` = r / re [-].
+#[inline(always)]
+pub fn wendland(q: f64) -> f64 {
+    let rest = (1.0 - q).max(0.0);
+    rest * rest * (rest * rest) * (1.0 + 4.0 * q)
+}
+
 /// Sums over the full cubic (or square) lattice around one particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
@@ -18,6 +25,8 @@ pub struct Lattice {
     pub number_density: f64,
     /// Laplacian correction lambda, Eq. (7), over l0^2 [-].
     pub laplacian: f64,
+    /// Sum W0 of [`wendland`], the particle itself among them [-].
+    pub wendland: f64,
     /// Neighbours closer than the effective radius.
     pub neighbours: u32,
 }
@@ -26,7 +35,7 @@ impl Lattice {
     /// Sums for an effective radius of `radius` spacings in `dimensions` dimensions.
     pub fn new(dimensions: u32, radius: f64) -> Self {
         let m = radius.ceil() as i32;
-        let (mut n, mut s, mut count) = (0.0, 0.0, 0);
+        let (mut n, mut s, mut smooth, mut count) = (0.0, 0.0, wendland(0.0), 0);
         for x in -m..=m {
             for y in if dimensions == 3 { -m..=m } else { 0..=0 } {
                 for z in -m..=m {
@@ -35,12 +44,13 @@ impl Lattice {
                         let w = weight(r2.sqrt(), radius);
                         n += w;
                         s += r2 * w;
+                        smooth += wendland(r2.sqrt() / radius);
                         count += 1;
                     }
                 }
             }
         }
-        Self { number_density: n, laplacian: s / n, neighbours: count }
+        Self { number_density: n, laplacian: s / n, wendland: smooth, neighbours: count }
     }
 }
 
@@ -82,6 +92,8 @@ pub struct Params {
     pub number_density: f64,
     /// lambda, Eq. (7) [m2].
     pub laplacian: f64,
+    /// Sum W0 of the smooth density on the full lattice [-].
+    pub wendland: f64,
     /// Neighbours of a particle on the full lattice.
     pub neighbours: u32,
     /// Gravity [m/s2].
@@ -162,6 +174,7 @@ impl Params {
             effective_radius: run.effective_radius * l0,
             number_density: lattice.number_density,
             laplacian: lattice.laplacian * l0 * l0,
+            wendland: lattice.wendland,
             neighbours: lattice.neighbours,
             gravity: scene.gravity,
             density: fluid.map_or(1000.0, |f| f.density),
@@ -178,6 +191,14 @@ impl Params {
             domain_min: scene.domain.0,
             domain_max: scene.domain.1,
         })
+    }
+
+    /// Gravity of the explicit stage [m/s2]: none where it acts together with the pressure that balances it.
+    pub fn explicit_gravity(&self) -> DVec3 {
+        match self.source {
+            Source::NumberDensity => self.gravity,
+            Source::Mixed => DVec3::ZERO,
+        }
     }
 
     /// Reference speed c_s [m/s] for a time step `dt` [s].

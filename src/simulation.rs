@@ -191,7 +191,7 @@ impl Simulation {
             return Ok(());
         }
         self.timed(Stage::MoveSolids, |s| {
-            let poses = s.solids.predict(t, dt);
+            let poses = s.solids.predict(t, dt, s.params.explicit_gravity());
             s.backend.move_solids(poses)
         })
     }

@@ -3,7 +3,6 @@
 pub mod compute;
 pub mod cpu;
 pub mod gpu;
-mod rows;
 pub mod traffic;
 
 use self::traffic::Traffic;

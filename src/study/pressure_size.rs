@@ -65,7 +65,8 @@ impl Moment {
             simulation.step()?;
         }
         let step = simulation.next_step();
-        let poses = simulation.solids.predict(step.time, step.dt).to_vec();
+        let gravity = simulation.params.explicit_gravity();
+        let poses = simulation.solids.predict(step.time, step.dt, gravity).to_vec();
         let fields = simulation.backend.read()?;
         let (params, plan) = (simulation.params.clone(), simulation.plan.clone());
         Ok(Self { params, plan, step, poses, fields, scene })

@@ -1,6 +1,21 @@
-//! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
+//! The CPU backend: the kernels in f64, over all particles, on all cores. Those that sum over neighbours have a fast
+//! version here, tested against the plain one in [`crate::kernels`].
 
-use super::rows::{Shared, density_rows, gradient_rows, viscosity_rows};
+mod moment;
+mod number_density;
+mod pressure_gradient;
+mod pressure_source;
+mod row_arrays;
+mod search;
+mod viscosity;
+mod wide;
+
+use self::number_density::density_rows;
+use self::pressure_gradient::gradient_rows;
+use self::pressure_source::source_rows;
+use self::row_arrays::RowArrays;
+use self::search::{Candidates, Coordinates, Search, neighbour_list};
+use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
@@ -9,10 +24,8 @@ use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
-use crate::kernels::neighbour_list::{Candidates, Coordinates, Search, neighbour_list};
-use crate::kernels::{
-    body_force, collision, correct, monitor, move_solids, predict, pressure_source, viscosity,
-};
+use crate::kernels::pressure_source::laplacian_coefficient;
+use crate::kernels::{Particles, body_force, collision, correct, monitor, move_solids, predict};
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CAPACITY, CHUNK, Chunk, Neighbours};
 use crate::params::{Params, Step};
@@ -20,7 +33,6 @@ use crate::plan::{Plan, Stage};
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
-use crate::row_arrays::RowArrays;
 use crate::scene::{Groups, Kind, Scene, Solid};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -37,8 +49,8 @@ pub struct Cpu {
     grid: Grid,
     fluid_start: Vec<u32>,
     coordinates: Coordinates,
-    moving: Option<CellList>,
-    fixed: Option<CellList>,
+    moving: Option<(CellList, Coordinates)>,
+    fixed: Option<(CellList, Coordinates)>,
     near_fluid: Vec<bool>,
     /// Keep dry walls in every stage, to show that leaving them out changes nothing.
     pub active_set: bool,
@@ -62,7 +74,9 @@ impl Cpu {
         let fixed = (wet && !groups.static_range().is_empty()).then(|| {
             let mut list = CellList::default();
             list.index(&grid, groups.static_range(), &scene.position, &mut scratch);
-            list
+            let mut coordinates = Coordinates::default();
+            coordinates.set(list.slot.par_iter().map(|&s| &scene.position[s as usize]));
+            (list, coordinates)
         });
         Ok(Self {
             params: params.clone(),
@@ -74,7 +88,7 @@ impl Cpu {
             grid,
             fluid_start: Vec::new(),
             coordinates: Coordinates::default(),
-            moving: (wet && groups.moving_wall > 0).then(CellList::default),
+            moving: (wet && groups.moving_wall > 0).then(Default::default),
             fixed,
             near_fluid: Vec::new(),
             active_set: true,
@@ -109,12 +123,12 @@ impl Cpu {
     }
 
     fn viscosity(&mut self) {
-        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let Self { fields, neighbours, params, groups, .. } = self;
         if neighbours.pairs() == 0 {
             return;
         }
         let (position, velocity) = (&fields.position, &fields.velocity);
-        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
         fields
             .acceleration
             .par_chunks_mut(CHUNK)
@@ -123,21 +137,13 @@ impl Cpu {
             .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
         let reaction = |arrays: &mut RowArrays, (k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
-            *f = viscosity::reaction(
-                i,
-                neighbours.pressure(i),
-                params,
-                groups.fluid,
-                position,
-                velocity,
-                arrays,
-            );
+            *f = viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays);
         };
         fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::default, reaction);
     }
 
     fn predict(&mut self, dt: f64) {
-        let (g, l0, n) = (self.params.gravity, self.params.spacing, self.live);
+        let (g, l0, n) = (self.params.explicit_gravity(), self.params.spacing, self.live);
         let Fields { position, velocity, acceleration, .. } = &mut self.fields;
         let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n])
             .into_par_iter()
@@ -156,9 +162,10 @@ impl Cpu {
         self.counters.lost +=
             cell_list::reorder_fluid(fields, grid, domain, params.dimensions, fluid_start, scratch);
         self.live = fluid_start[grid.total()] as usize;
-        if let Some(list) = &mut self.moving {
+        if let Some((list, coordinates)) = &mut self.moving {
             let slots = groups.moving_wall_range().chain(groups.moving_dummy_range());
             list.index(grid, slots, &fields.position, scratch);
+            coordinates.set(list.slot.par_iter().map(|&s| &fields.position[s as usize]));
         }
         if self.active_set {
             cell_list::mark_near_fluid(grid, fluid_start, &mut self.near_fluid);
@@ -171,13 +178,13 @@ impl Cpu {
     fn neighbour_list(&mut self) {
         let Self { fields, grid, params, groups, near_fluid, live, .. } = self;
         let (fluid, position, live) = (groups.fluid, &fields.position, *live);
-        self.coordinates.set(&position[..live]);
+        self.coordinates.set(position[..live].par_iter());
         let from = Candidates {
             grid,
             fluid_start: &self.fluid_start,
             fluid: &self.coordinates,
-            moving: self.moving.as_ref(),
-            fixed: self.fixed.as_ref(),
+            moving: self.moving.as_ref().map(|(list, x)| (list, x)),
+            fixed: self.fixed.as_ref().map(|(list, x)| (list, x)),
             pressure_slots: groups.pressure() as u32,
         };
         let (largest, slot) = self
@@ -224,42 +231,43 @@ impl Cpu {
     fn number_density(&mut self) {
         let Self { fields, neighbours, params, groups, live, .. } = self;
         let Fields { position, velocity, number_density, state, .. } = fields;
-        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
         (&mut neighbours.chunks, number_density.par_chunks_mut(CHUNK), state.par_chunks_mut(CHUNK))
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (chunk, density, state))| density_rows(c * CHUNK, chunk, density, state, on));
+            .for_each(|(c, (chunk, density, state))| {
+                density_rows(c * CHUNK, *live, chunk, density, state, on)
+            });
     }
 
     fn pressure_source(&mut self, step: &Step) {
-        let Self { fields, neighbours, params, .. } = self;
-        let (position, velocity, density, state) =
-            (&fields.position, &fields.velocity, &fields.number_density, &fields.state);
-        (&neighbours.chunks, fields.source.par_chunks_mut(CHUNK), fields.diagonal.par_chunks_mut(CHUNK))
+        let Self { fields, neighbours, params, groups, .. } = self;
+        let Fields { position, velocity, number_density, state, source, diagonal, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        (
+            &neighbours.chunks,
+            (number_density.par_chunks(CHUNK), state.par_chunks(CHUNK)),
+            (source.par_chunks_mut(CHUNK), diagonal.par_chunks_mut(CHUNK)),
+        )
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (chunk, source, diagonal))| {
-                for k in 0..source.len() {
-                    let i = c * CHUNK + k;
-                    (source[k], diagonal[k]) = (0.0, 1.0);
-                    if state[i] == State::Inner {
-                        let rows = (chunk.all(k), chunk.pressure(k));
-                        (source[k], diagonal[k]) = pressure_source::pressure_source(
-                            i, density[i], rows, params, step, position, velocity,
-                        );
-                    }
-                }
-            });
+            .for_each(|(c, (chunk, given, out))| source_rows(c * CHUNK, chunk, given, out, on, step));
     }
 
     fn pressure_gradient(&mut self) {
         let Self { fields, neighbours, params, groups, live, .. } = self;
         let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
-        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
-        (acceleration.par_chunks_mut(CHUNK), &neighbours.chunks, state.par_chunks(CHUNK))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(c, (a, chunk, state))| gradient_rows(c * CHUNK, chunk, a, state, pressure, on));
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let live = *live;
+        let rows = |pressure: &[f64], acceleration: &mut [DVec3]| {
+            (acceleration.par_chunks_mut(CHUNK), &neighbours.chunks, state.par_chunks(CHUNK))
+                .into_par_iter()
+                .enumerate()
+                .for_each(|(c, (a, chunk, state))| {
+                    gradient_rows(c * CHUNK, live, chunk, a, state, pressure, on);
+                });
+        };
+        rows(pressure, acceleration);
     }
 
     fn correct(&mut self, dt: f64) {
@@ -305,7 +313,9 @@ impl Backend for Cpu {
             Stage::NumberDensity => self.number_density(),
             Stage::PressureSource => self.pressure_source(step),
             Stage::PressureGradient => self.pressure_gradient(),
-            Stage::Correct => self.correct(step.dt),
+            Stage::Correct => {
+                self.correct(step.dt);
+            }
             Stage::ConjugateGradient | Stage::MoveSolids | Stage::BodyForce | Stage::Contact => {
                 unreachable!("{} has a call of its own", stage.name())
             }
@@ -319,7 +329,7 @@ impl Backend for Cpu {
             neighbours,
             state: &fields.state,
             diagonal: &fields.diagonal,
-            coefficient: pressure_source::laplacian_coefficient(params),
+            coefficient: laplacian_coefficient(params),
         };
         let preconditioner: &mut dyn Precondition = match multigrid {
             Some(multigrid) => {
@@ -377,6 +387,7 @@ impl Backend for Cpu {
         Ok(wrenches)
     }
 
+
     fn counters(&mut self) -> Result<Counters> {
         Ok(self.counters.clone())
     }
@@ -427,6 +438,6 @@ impl Backend for Cpu {
         let f = &self.fields;
         (f.position.len() * per_particle + f.pressure.len() * per_pressure + self.neighbours.bytes()) as u64
             + (self.fluid_start.len() * 4 + self.near_fluid.len()) as u64
-            + self.fixed.as_ref().map_or(0, |l| l.start.len() * 4 + l.slot.len() * 28) as u64
+            + self.fixed.as_ref().map_or(0, |l| l.0.start.len() * 4 + l.0.slot.len() * 28) as u64
     }
 }
