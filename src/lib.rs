@@ -9,6 +9,7 @@ pub mod contact;
 pub mod error;
 pub mod fields;
 pub mod kernels;
+pub mod ledger;
 pub mod monitor;
 pub mod neighbours;
 pub mod output;

@@ -173,6 +173,16 @@ impl Solids {
         &self.poses
     }
 
+    /// Poses that [`Solids::predict`] gave last.
+    pub fn predicted(&self) -> &[Pose] {
+        &self.predicted
+    }
+
+    /// Whether forces move solid `k`.
+    pub fn is_free(&self, k: usize) -> bool {
+        self.bodies[k].is_free()
+    }
+
     /// Name of solid `k`, as in the case.
     pub fn name(&self, k: usize) -> &str {
         &self.names[k]

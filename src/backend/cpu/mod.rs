@@ -1,6 +1,7 @@
 //! The CPU backend: the kernels in f64, over all particles, on all cores. Those that sum over neighbours have a fast
 //! version here, tested against the plain one in [`crate::kernels`].
 
+mod ledger;
 mod moment;
 mod number_density;
 mod pressure_gradient;
@@ -10,6 +11,7 @@ mod search;
 mod viscosity;
 mod wide;
 
+use self::ledger::WaterLedger;
 use self::number_density::density_rows;
 use self::pressure_gradient::gradient_rows;
 use self::pressure_source::source_rows;
@@ -26,6 +28,7 @@ use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{Particles, body_force, collision, correct, monitor, move_solids, predict};
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CAPACITY, CHUNK, Chunk, Neighbours};
 use crate::params::{Params, Step};
@@ -60,6 +63,7 @@ pub struct Cpu {
     multigrid: Option<Multigrid>,
     live: usize,
     counters: Counters,
+    ledger: Option<Box<WaterLedger>>,
     dt: f64,
 }
 
@@ -98,6 +102,7 @@ impl Cpu {
             multigrid: (wet && plan.preconditioner == Preconditioner::Multigrid).then(Multigrid::default),
             live: groups.fluid,
             counters: Counters::default(),
+            ledger: (wet && plan.ledger).then(Box::default),
             dt: 0.0,
         })
     }
@@ -143,6 +148,11 @@ impl Cpu {
     }
 
     fn predict(&mut self, dt: f64) {
+        if let Some(ledger) = &mut self.ledger {
+            let Fields { position, velocity, acceleration, .. } = &self.fields;
+            let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
+            ledger.predict(self.live, on, acceleration, dt);
+        }
         let (g, l0, n) = (self.params.explicit_gravity(), self.params.spacing, self.live);
         let Fields { position, velocity, acceleration, .. } = &mut self.fields;
         let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n])
@@ -157,6 +167,11 @@ impl Cpu {
     }
 
     fn cell_list(&mut self) {
+        if let Some(ledger) = &mut self.ledger {
+            let Fields { position, velocity, .. } = &self.fields;
+            let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
+            ledger.lost(self.live, on);
+        }
         let domain = (self.params.domain_min, self.params.domain_max);
         let Self { fields, grid, params, fluid_start, scratch, groups, .. } = self;
         self.counters.lost +=
@@ -225,6 +240,10 @@ impl Cpu {
                 *f += collision::reaction(i, row, params, groups.fluid, x, v, step.dt);
             }
         });
+        if let Some(ledger) = &mut self.ledger {
+            let on = Particles { params, position: x, velocity: v, fluid: groups.fluid };
+            ledger.collision(self.live, on, &fields.acceleration, step.dt);
+        }
         self.correct(step.dt);
     }
 
@@ -255,7 +274,7 @@ impl Cpu {
     }
 
     fn pressure_gradient(&mut self) {
-        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let Self { fields, neighbours, params, groups, live, ledger, .. } = self;
         let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let live = *live;
@@ -268,6 +287,10 @@ impl Cpu {
                 });
         };
         rows(pressure, acceleration);
+        if let Some(ledger) = ledger {
+            ledger.unclipped.resize(acceleration.len(), DVec3::ZERO);
+            rows(&ledger.solution, &mut ledger.unclipped);
+        }
     }
 
     fn correct(&mut self, dt: f64) {
@@ -314,6 +337,11 @@ impl Backend for Cpu {
             Stage::PressureSource => self.pressure_source(step),
             Stage::PressureGradient => self.pressure_gradient(),
             Stage::Correct => {
+                if let Some(ledger) = &mut self.ledger {
+                    let Fields { position, velocity, acceleration, .. } = &self.fields;
+                    let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
+                    ledger.pressure(self.live, on, acceleration, step.dt);
+                }
                 self.correct(step.dt);
             }
             Stage::ConjugateGradient | Stage::MoveSolids | Stage::BodyForce | Stage::Contact => {
@@ -339,6 +367,9 @@ impl Backend for Cpu {
             None => &mut Jacobi,
         };
         let report = solve(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
+        if let Some(ledger) = &mut self.ledger {
+            ledger.solution.clone_from(&fields.pressure);
+        }
         let clamp = |p: &mut f64| {
             let high = *p > step.pressure_max;
             *p = p.clamp(0.0, step.pressure_max);
@@ -387,6 +418,9 @@ impl Backend for Cpu {
         Ok(wrenches)
     }
 
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        Ok(self.ledger.as_ref().map(|ledger| ledger.work))
+    }
 
     fn counters(&mut self) -> Result<Counters> {
         Ok(self.counters.clone())
