@@ -1,10 +1,8 @@
 //! seixo: water that carries solids.
 pub mod backend;
-pub mod bench;
 pub mod body;
 pub mod case;
 pub mod cells;
-pub mod compare;
 pub mod contact;
 pub mod error;
 pub mod fields;
@@ -20,4 +18,3 @@ pub mod run;
 pub mod scene;
 pub mod simulation;
 mod step;
-pub mod study;

@@ -145,7 +145,7 @@ impl Simulation {
     }
 
     /// Coefficients of the next step, with the time step that the case and the flow allow.
-    pub(crate) fn next_step(&mut self) -> Step {
+    pub fn next_step(&mut self) -> Step {
         let mut dt = self.case.run.time_step;
         if self.case.run.adaptive && self.plan.wet() {
             let l0 = self.params.spacing;

@@ -5,7 +5,7 @@ use seixo::scene::Scene;
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+    PathBuf::from(crate::common::ROOT)
 }
 
 fn strings(sets: &[&str]) -> Vec<String> {

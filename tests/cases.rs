@@ -1,7 +1,6 @@
 //! Every case under cases/ runs: a few coarse steps without a lost particle, a failed solve or a gain of energy.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use seixo::case::file::load;
 use seixo::pressure::Outcome;

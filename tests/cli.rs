@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 fn seixo() -> Command {
     let mut command = Command::cargo_bin("seixo").unwrap();
-    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    command.current_dir(crate::common::ROOT);
     command
 }
 

@@ -3,14 +3,14 @@
 use seixo::backend::gpu;
 use seixo::case::Case;
 use seixo::case::file::load;
-use seixo::compare;
 use seixo::plan::Stage;
 use seixo::scene::Scene;
+use seixo_study::device_compare as compare;
 use std::path::Path;
 
 /// The paper's main experiment, coarse: a gate, a cube, two columns.
 fn transport() -> (Case, Scene) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("cases/dam_break_transport.toml");
+    let path = Path::new(crate::common::ROOT).join("cases/dam_break_transport.toml");
     let sets = ["fluid.solver.tolerance=1e-4".to_owned()];
     let case = load(&path, Some(0.03), &sets).expect("the case is valid").case;
     let scene = Scene::build(&case).expect("the scene builds");

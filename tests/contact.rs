@@ -6,12 +6,12 @@ use seixo::case::{Contact, Law};
 use seixo::contact::Solids;
 use seixo::error::Error;
 use seixo::scene::Motion;
-use seixo::study::contact_checks::{DAM_BREAK_CUBE, collide, edge_drop, elastic_drop, restitution, smooth};
-use seixo::study::contact_rest::{demolish, drop_on_body, random_drops, sliding_stop, stack};
-use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
-use seixo::study::incline::{Slide, calibrate, coulomb_curve, travel_time};
-use seixo::study::spring_drop::{CASES, Drop, Offset, bounce, returns};
-use seixo::study::spring_static::{amplitude, oscillation, oscillation_error};
+use seixo_study::contact_checks::{DAM_BREAK_CUBE, collide, edge_drop, elastic_drop, restitution, smooth};
+use seixo_study::contact_rest::{demolish, drop_on_body, random_drops, sliding_stop, stack};
+use seixo_study::dry::{DryScene, FreeBox, GRAVITY};
+use seixo_study::incline::{Slide, calibrate, coulomb_curve, travel_time};
+use seixo_study::spring_drop::{CASES, Drop, Offset, bounce, returns};
+use seixo_study::spring_static::{amplitude, oscillation, oscillation_error};
 
 #[test]
 fn a1_the_resting_cube_swings_by_twice_its_sag() {

@@ -12,10 +12,10 @@ use seixo::params::Params;
 use seixo::plan::{Plan, Stage};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
-use seixo::study::contact_checks::{DAM_BREAK_CUBE, Random, smooth};
-use seixo::study::contact_cost::backend;
-use seixo::study::contact_rest::{dam_break_contact, drops_together, rest, stack_scene};
-use seixo::study::dry::{DryScene, FreeBox, GRAVITY};
+use seixo_study::contact_checks::{DAM_BREAK_CUBE, Random, smooth};
+use seixo_study::contact_cost::backend;
+use seixo_study::contact_rest::{dam_break_contact, drops_together, rest, stack_scene};
+use seixo_study::dry::{DryScene, FreeBox, GRAVITY};
 
 /// Whether there is a device to test; loud if not, and a failure where one is expected.
 fn device() -> bool {

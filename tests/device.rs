@@ -1,7 +1,6 @@
 //! What a step asks of a device: submissions, waits, dispatches, its clock.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use seixo::backend::gpu::{self, Gpu};
 use seixo::backend::{Backend, Timing};

@@ -1,7 +1,6 @@
 //! Bodies in water: buoyancy, added mass, light bodies, and water without a free surface.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 use common::*;
 use seixo::case::Case;
 

@@ -1,8 +1,7 @@
 //! The CPU's fast stages against the plain kernels that say what they must do, row by row, in a state that uses
 //! everything: water off its lattice that collides, an obstacle, a gate that moves, a body that moves and turns.
 
-#[path = "common/moving.rs"]
-mod common;
+use crate::common::moving as common;
 
 use glam::DVec3;
 use seixo::backend::Backend;

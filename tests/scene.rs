@@ -6,7 +6,7 @@ use seixo::scene::{Drive, Kind, Scene, Shape};
 use std::path::Path;
 
 fn case(name: &str, sets: &[&str]) -> Case {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("cases").join(name).with_extension("toml");
+    let path = Path::new(crate::common::ROOT).join("cases").join(name).with_extension("toml");
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
     file::load(&path, None, &sets).unwrap_or_else(|e| panic!("{e}")).case
 }
@@ -310,8 +310,7 @@ fn bodies_stand_on_bodies() {
     let second = "[[body]]\nname = \"upper\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.4, 0.4, 0.3]\ndensity = 1000\nstanding = true\n";
     for (law, gap) in [("paper", 1.5f64.sqrt() * 0.025 - 0.025), ("smooth", 0.0)] {
         let text =
-            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("cases/resting_cube.toml"))
-                .unwrap();
+            std::fs::read_to_string(Path::new(crate::common::ROOT).join("cases/resting_cube.toml")).unwrap();
         let text = text
             .replace("law = \"paper\"", &format!("law = \"{law}\""))
             .replace("[contact]", &format!("{second}\n[contact]"));

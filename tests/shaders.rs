@@ -1,7 +1,6 @@
 //! Checks of every WGSL file, with no device.
 
-#[path = "common/moving.rs"]
-mod common;
+use crate::common::moving as common;
 
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
 use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, counter};
@@ -18,7 +17,7 @@ use wgpu::naga;
 
 /// Names of the files in `folder` that end in `extension`, but for `except`.
 fn files(folder: &str, extension: &str, except: &str) -> BTreeSet<String> {
-    let root = env!("CARGO_MANIFEST_DIR");
+    let root = crate::common::ROOT;
     std::fs::read_dir(format!("{root}/{folder}"))
         .expect("the folder exists")
         .filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(extension)?.to_owned()))
@@ -43,7 +42,7 @@ fn every_shader_has_a_twin_and_every_twin_a_shader() {
         let path = twin(name);
         assert!(text.contains(&format!("// Twin: {path}")), "{name}: head comment names no twin");
         assert!(text.starts_with("// "), "{name}: no head comment");
-        let twin = std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR")));
+        let twin = std::fs::read_to_string(format!("{}/{path}", crate::common::ROOT));
         assert!(twin.is_ok_and(|t| t.starts_with("//! ")), "{name}: the twin has no head comment");
     }
 }

@@ -1,10 +1,9 @@
 //! Extreme scenes: none hangs, panics, keeps a number that is none, or loses particles uncounted.
-#![allow(missing_docs)]
 
-use seixo::study::definition::Setup;
-use seixo::study::engine::{Context, Options, cpu_only};
-use seixo::study::row::{Class, Row};
-use seixo::study::{builtin, stability_contact};
+use seixo_study::definition::Setup;
+use seixo_study::engine::{Context, Options, cpu_only};
+use seixo_study::row::{Class, Row};
+use seixo_study::{builtin, stability_contact};
 
 fn rows(name: &str, keep: impl Fn(&str) -> bool) -> Vec<Row> {
     let mut study = builtin::find(name, &Setup::default()).expect("the study is built in");

@@ -1,5 +1,4 @@
 //! The study command: resumed after a kill, split into shards, failures as rows, mistakes told.
-#![allow(missing_docs)]
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -4,8 +4,7 @@
 //! Each test asks that its stage did something and bounds the error. States come from the device, so both
 //! sides start from the same numbers.
 
-#[path = "common/moving.rs"]
-mod common;
+use crate::common::moving as common;
 
 use glam::DVec3;
 use seixo::backend::Backend;
@@ -13,7 +12,6 @@ use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
 use seixo::body::Pose;
 use seixo::case::Preconditioner;
-use seixo::compare::{self, StageError};
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Params, Step};
@@ -23,6 +21,7 @@ use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::{Kind, Scene};
 use seixo::simulation::Simulation;
+use seixo_study::device_compare::{self as compare, StageError};
 
 /// Largest error of a particle stage, relative to the largest value (to l0 for positions).
 const PARTICLE: f64 = 1e-5;

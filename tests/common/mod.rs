@@ -1,11 +1,15 @@
 //! Scenes for the tests, written as a user would write them.
-#![allow(dead_code, missing_docs)]
+
+pub mod moving;
 
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::case::Case;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+
+/// The repository.
+pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 pub fn case(text: &str) -> Case {
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))

@@ -397,7 +397,7 @@ impl Backend for Cpu {
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        let (weight, spacing) = (self.params.density * self.params.gravity, self.params.spacing);
+        let params = &self.params;
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
@@ -406,7 +406,7 @@ impl Backend for Cpu {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let unknown = fields.state[i] == State::Inner;
                 let pressure =
-                    body_force::surface_pressure(fields.pressure[i], unknown, to_surface, weight, spacing);
+                    body_force::surface_pressure(fields.pressure[i], unknown, to_surface, params);
                 let force = body_force::body_force(pressure, area, fields.reaction[i - fluid]);
                 total.force += force;
                 total.torque += (pose.orientation * solid.wall_offset[k] + to_surface).cross(force);

@@ -1,0 +1,80 @@
+//! `seixo compare`.
+
+use super::setup::Setup;
+use super::{CaseArgs, Exit, say, say_json};
+use seixo_study::device_compare::{Drift, StageError, compare_stages, drift};
+
+#[derive(Debug, clap::Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    case: CaseArgs,
+    /// Number of the adapter as `seixo adapters` lists it, or a part of its name; the best one if absent.
+    #[arg(long, value_name = "N")]
+    adapter: Option<String>,
+    /// Steps over which the drift is followed; 0 leaves it out.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    steps: u64,
+    /// Steps on the CPU before the stages are compared, so that the state is more than the lattice.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    warmup: u64,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(serde::Serialize)]
+struct Report {
+    case: String,
+    warmup: u64,
+    stages: Vec<StageError>,
+    drift: Option<Drift>,
+}
+
+pub fn compare(args: &CompareArgs) -> Exit {
+    let setup = Setup::new(&args.case, args.json)?;
+    let (case, scene, adapter) = (&setup.loaded.case, &setup.scene, args.adapter.as_deref());
+    let report = Report {
+        case: setup.name.clone(),
+        warmup: args.warmup,
+        stages: compare_stages(case, scene, adapter, args.warmup)?,
+        drift: if args.steps > 0 { Some(drift(case, scene, adapter, args.steps)?) } else { None },
+    };
+    if args.json {
+        say_json(&report);
+    } else {
+        say(&words(&report));
+    }
+    Ok(0)
+}
+
+fn words(report: &Report) -> String {
+    let mut lines =
+        vec![format!("one step of {} after {} steps, GPU against CPU", report.case, report.warmup)];
+    if report.stages.is_empty() {
+        lines.push("  a dry scene has no stages on the GPU".to_string());
+    } else {
+        lines.push(format!("  {:<20}{:<16}{:>10}{:>10}", "stage", "field", "largest", "rms"));
+    }
+    lines.extend(report.stages.iter().map(|s| {
+        format!("  {:<20}{:<16}{:>10.1e}{:>10.1e}", s.stage, s.field, s.max_relative, s.l2_relative)
+    }));
+    if let Some(drift) = &report.drift {
+        lines.push(format!("\n{} steps from the start", drift.steps));
+        lines.push(format!("  {:<28}{:>16}{:>16}{:>10}", "quantity", "CPU", "GPU", "relative"));
+        lines.extend(
+            drift
+                .quantities
+                .iter()
+                .map(|q| format!("  {:<28}{:>16.8e}{:>16.8e}{:>10.1e}", q.name, q.cpu, q.gpu, q.relative)),
+        );
+        for k in 0..2 {
+            let step = drift.seconds[k] / drift.steps.max(1) as f64;
+            let iterations = drift.iterations[k];
+            lines.push(format!(
+                "  {:.3} s, {step:.3e} s a step, {iterations:.1} iterations a solve: {}",
+                drift.seconds[k], drift.backends[k]
+            ));
+        }
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,142 @@
+//! What can be typed, and what the program answers with: results on stdout, progress and remarks on stderr,
+//! and an exit code.
+
+mod bench;
+mod compare;
+mod device;
+mod plan;
+mod progress;
+mod run;
+mod setup;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use seixo::error::Error;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const EXIT_CODES: &str = "Exit codes:
+  0    done
+  2    the case or the command line is wrong
+  3    no suitable GPU, or the device was lost
+  4    the computation diverged (its last state is kept)
+  5    a file could not be read or written
+  130  interrupted by SIGINT (Ctrl-C)
+  143  interrupted by SIGTERM";
+
+/// Water that carries solids: incompressible particle flow (MPS) with rigid bodies that float, collide and
+/// slide, on any GPU or on the CPU.
+#[derive(Debug, Parser)]
+#[command(name = "seixo", version, after_help = EXIT_CODES, max_term_width = 110)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a case and write its results.
+    Run(run::RunArgs),
+    /// Show what a run would compute, and what it would leave out and why; compute nothing.
+    Plan(plan::PlanArgs),
+    /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
+    Compare(compare::CompareArgs),
+    /// Run a study: error against run time, limits of stability, what a scene does not need.
+    Study(seixo_study::command::StudyArgs),
+    /// Time a step by stage, against the bytes that must move.
+    Bench(bench::BenchArgs),
+    /// List the adapters that can be used.
+    Adapters {
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print the JSON schema of case files.
+    Schema,
+}
+
+/// Which case, and what to change in it.
+#[derive(Debug, clap::Args)]
+struct CaseArgs {
+    /// The case file (TOML).
+    case: PathBuf,
+    /// Particle spacing l0 [m], instead of run.spacing.
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    spacing: Option<f64>,
+    /// Change a value of the case, e.g. --set fluid.preset=paper --set body.0.density=800; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// End of the run [s], instead of run.end.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    until: Option<f64>,
+}
+
+impl CaseArgs {
+    /// All changes of values, those with an option of their own as well.
+    fn all_sets(&self) -> Vec<String> {
+        let end = self.until.map(|end| format!("run.end={end:?}"));
+        self.sets.iter().cloned().chain(end).collect()
+    }
+}
+
+/// Where to compute.
+#[derive(Clone, Debug, clap::Args)]
+struct DeviceArgs {
+    /// Processor: auto takes a hardware GPU if there is one, else the CPU.
+    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
+    backend: BackendName,
+    /// Number of the adapter as `seixo adapters` lists it, or a part of its name; implies --backend gpu.
+    #[arg(long, value_name = "N")]
+    adapter: Option<String>,
+    /// Threads of the CPU path; all cores if absent.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum BackendName {
+    Auto,
+    Gpu,
+    Cpu,
+}
+
+/// How a command ended, if it did not fail: its exit code.
+type Exit = Result<u8, Error>;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    let exit = match args.command {
+        Command::Run(args) => run::run(&args),
+        Command::Plan(args) => plan::plan(&args),
+        Command::Bench(args) => bench::bench(&args),
+        Command::Compare(args) => compare::compare(&args),
+        Command::Study(args) => seixo_study::command::command(&args).map(|()| 0),
+        Command::Adapters { json } => device::list(json),
+        Command::Schema => {
+            say(seixo::case::Case::schema().trim_end());
+            Ok(0)
+        }
+    };
+    match exit {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            let text = error.to_string();
+            // Reports on case files come with their own heading.
+            eprintln!("{}{text}", if text.starts_with("error") { "" } else { "error: " });
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Print a result. A reader that has gone away (`seixo ... | head`) is no error.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// Print a JSON value.
+fn say_json(value: &impl serde::Serialize) {
+    match serde_json::to_string_pretty(value) {
+        Ok(text) => say(&text),
+        Err(error) => eprintln!("error: {error}"),
+    }
+}

@@ -1,0 +1,208 @@
+//! The studies that come with the program.
+
+use super::definition::{Definition, Files, Setup};
+use super::{
+    Study, compare, contact_cost, dry_studies, gallery, needs, pressure_size, pressure_solve, stability,
+    wall_of_cubes, work_precision,
+};
+use seixo::error::{Error, Result};
+
+/// A built-in study: name, what it asks, in one line.
+pub struct Entry {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it asks.
+    pub about: &'static str,
+    make: Maker,
+}
+
+enum Maker {
+    /// A study file.
+    File(&'static str),
+    /// A function.
+    Function(fn(&Setup) -> Study),
+}
+
+/// All built-in studies.
+pub const ENTRIES: &[Entry] = &[
+    Entry {
+        name: "hydrostatic",
+        about: "water at rest: pressure, sensor noise, spurious motion, volume against run time",
+        make: Maker::File(include_str!("../../cases/study/hydrostatic.toml")),
+    },
+    Entry {
+        name: "dam-break",
+        about: "front and energy of a dam break over spacing, preset, tolerance and sound speed",
+        make: Maker::File(include_str!("../../cases/study/dam_break.toml")),
+    },
+    Entry {
+        name: "dam-break-2d",
+        about: "front of a dam break in two dimensions against three experiments",
+        make: Maker::File(include_str!("../../cases/study/dam_break_2d.toml")),
+    },
+    Entry {
+        name: "floating-cube",
+        about: "draft of a floating cube against Archimedes' law",
+        make: Maker::File(include_str!("../../cases/study/floating_cube.toml")),
+    },
+    Entry {
+        name: "precision",
+        about: "GPU in f32 against CPU in f64",
+        make: Maker::File(include_str!("../../cases/study/precision.toml")),
+    },
+    Entry {
+        name: "pressure-solve",
+        about: "the pressure equation alone: residual and pressure error against iterations and time",
+        make: Maker::Function(pressure_solve::study),
+    },
+    Entry {
+        name: "pressure-size",
+        about: "the pressure equation over its size: iterations and time of both preconditioners, what f32 reaches",
+        make: Maker::Function(pressure_size::study),
+    },
+    Entry {
+        name: "stability",
+        about: "maps of what is stable: gamma x CFL, contact stiffness x damping, alpha, density ratio, tolerance",
+        make: Maker::Function(stability::study),
+    },
+    Entry {
+        name: "gallery",
+        about: "extreme scenes: what must happen and what does",
+        make: Maker::Function(gallery::study),
+    },
+    Entry {
+        name: "needs",
+        about: "what a scene does not need: stages left out, bytes and time saved, identical results",
+        make: Maker::Function(needs::study),
+    },
+    Entry {
+        name: "free-fall",
+        about: "a cube falls and bounces: height of return against the time step",
+        make: Maker::Function(dry_studies::free_fall),
+    },
+    Entry {
+        name: "oscillator",
+        about: "a cube on its contact spring against the damped oscillator",
+        make: Maker::Function(dry_studies::oscillator),
+    },
+    Entry {
+        name: "incline",
+        about: "a block on a slope against Eq. (21); eta(mu) of the paper's law",
+        make: Maker::Function(dry_studies::incline),
+    },
+    Entry {
+        name: "spring-static",
+        about: "section 4.1: amplitude of a resting cube against K",
+        make: Maker::Function(dry_studies::spring_static),
+    },
+    Entry {
+        name: "wall-of-cubes",
+        about: "100 cubes hit by a heavy one: overlap during the hit and at rest against K",
+        make: Maker::Function(wall_of_cubes::study),
+    },
+    Entry {
+        name: "spring-drop",
+        about: "section 4.1: K_ideal of Table 1, and the three models of Fig. 6",
+        make: Maker::Function(dry_studies::spring_drop),
+    },
+    Entry {
+        name: "contact-cost",
+        about: "what contact costs a step for 1 to 1000 bodies, on the host and on a device",
+        make: Maker::Function(contact_cost::study),
+    },
+];
+
+/// Files that the built-in study files refer to, as they stood when the program was built.
+fn embedded(name: &str) -> Result<String> {
+    let text = match name.trim_start_matches("../") {
+        "hydrostatic.toml" => include_str!("../../cases/hydrostatic.toml"),
+        "dam_break.toml" => include_str!("../../cases/dam_break.toml"),
+        "dam_break_2d.toml" => include_str!("../../cases/dam_break_2d.toml"),
+        "floating_cube.toml" => include_str!("../../cases/floating_cube.toml"),
+        "reference/front_koshizuka_oka_1996_experiment.csv" => {
+            include_str!("../../cases/reference/front_koshizuka_oka_1996_experiment.csv")
+        }
+        "reference/front_martin_moyce_1952_a1.csv" => {
+            include_str!("../../cases/reference/front_martin_moyce_1952_a1.csv")
+        }
+        "reference/front_martin_moyce_1952_a2.csv" => {
+            include_str!("../../cases/reference/front_martin_moyce_1952_a2.csv")
+        }
+        _ => return Err(Error::Case(format!("`{name}` is not built in"))),
+    };
+    Ok(text.to_owned())
+}
+
+/// The built-in study `name`; with what the command line adds.
+///
+/// # Errors
+/// [`Error::Case`] if there is none of that name, or for an override that fits nothing.
+pub fn find(name: &str, setup: &Setup) -> Result<Study> {
+    let Some(entry) = ENTRIES.iter().find(|e| e.name == name) else {
+        let mut names: Vec<&str> = ENTRIES.iter().map(|e| e.name).collect();
+        names.sort_by_key(|n| std::cmp::Reverse((strsim::jaro_winkler(n, name) * 1e6) as u64));
+        let hint = names.first().filter(|n| strsim::jaro_winkler(n, name) > 0.8);
+        let hint = hint.map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+        names.sort_unstable();
+        return Err(Error::Case(format!(
+            "no study file and no built-in study is called `{name}`{hint}\nbuilt in: {}",
+            names.join(", ")
+        )));
+    };
+    match entry.make {
+        Maker::File(text) => from_file(name, text, &embedded, setup),
+        Maker::Function(make) if setup.sets.is_empty() => Ok(make(setup)),
+        Maker::Function(_) => {
+            Err(Error::Case(format!("`{name}` sets up its own scenes: --set does not apply")))
+        }
+    }
+}
+
+/// A study from the text of a file.
+///
+/// # Errors
+/// [`Error::Case`] for what is wrong with it.
+pub fn from_file(name: &str, text: &str, files: &Files, setup: &Setup) -> Result<Study> {
+    let definition = Definition::parse(name, text)?;
+    let jobs = definition.jobs(files, setup)?;
+    // References are read before anything runs: a sweep must not end in a missing file.
+    let mut references = std::collections::BTreeMap::new();
+    for against in definition.error.iter().filter_map(|e| e.against.as_ref()).filter(|a| *a != "finest") {
+        references.insert(against.clone(), files(against)?);
+    }
+    let (name, title, question) =
+        (definition.name.clone(), definition.title.clone(), definition.question.clone());
+    let finish = Box::new(move |rows: &mut [super::row::Row], wanted| {
+        let read = |file: &str| {
+            references.get(file).cloned().ok_or_else(|| Error::Case(format!("no reference `{file}`")))
+        };
+        compare::curves(&definition, rows, &read)?;
+        let errors: Vec<String> = definition.error.iter().map(|e| e.name()).collect();
+        let mut report = work_precision::report(&definition.name, &definition.title, rows, &errors, wanted);
+        report.charts.extend(compare::charts(&definition, rows, &read)?);
+        Ok(report)
+    });
+    Ok(Study { name, title, question, jobs, finish })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_study_can_be_set_up_quick_and_full() {
+        for entry in ENTRIES {
+            for full in [false, true] {
+                let study = find(entry.name, &Setup { full, ..Setup::default() })
+                    .unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+                assert!(!study.jobs.is_empty(), "{}", entry.name);
+                let mut hashes: Vec<String> = study.jobs.iter().map(|j| j.hash(entry.name)).collect();
+                hashes.sort();
+                hashes.dedup();
+                assert_eq!(hashes.len(), study.jobs.len(), "{}: points that are the same", entry.name);
+            }
+        }
+        let error = find("hydrostatics", &Setup::default()).err().unwrap().to_string();
+        assert!(error.contains("did you mean `hydrostatic`"), "{error}");
+    }
+}

@@ -1,0 +1,184 @@
+//! `seixo study`: what can be typed, and what happens then.
+
+use super::Study;
+use super::builtin::{self, ENTRIES};
+use super::definition::{Setup, files_of};
+use super::engine::{Context, Make, Options, Processor, Shard};
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
+use seixo::backend::gpu::Gpu;
+use seixo::error::{Error, Result};
+use seixo::output::write_whole;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Run a study: error against run time, limits of stability, what a scene does not need.
+#[derive(Clone, Debug, clap::Args)]
+pub struct StudyArgs {
+    /// A study file (TOML), the name of a built-in study, `list`, or `collect` to join the results of shards.
+    pub what: String,
+    /// With `collect`: the folders to join; the first one gets the result, unless --out names another.
+    pub folders: Vec<PathBuf>,
+    /// Folder of the results; `study-NAME` if absent. Finished points in it are kept.
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// All points, also the costly ones.
+    #[arg(long)]
+    pub full: bool,
+    /// The error that you want to stay below, for the recommendation, e.g. 0.01.
+    #[arg(long, value_name = "X")]
+    pub error: Option<f64>,
+    /// Compute one part of the points, e.g. 2/8; `collect` joins them.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Change a value of the case at every point; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub sets: Vec<String>,
+    /// Runs of each point, for the median time.
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub repetitions: u32,
+    /// Where points compute that do not say: cpu or gpu.
+    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor)]
+    pub backend: Processor,
+    /// Adapter of the GPU's points, a number or a part of a name as `seixo adapters` lists them. Without it a
+    /// hardware GPU is taken, and no software one.
+    #[arg(long, value_name = "N")]
+    pub adapter: Option<String>,
+    /// Threads of the CPU's points; all cores if absent.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// List the points and compute nothing.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// No progress on stderr.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+fn processor(text: &str) -> std::result::Result<Processor, String> {
+    match text {
+        "cpu" => Ok(Processor::Cpu),
+        "gpu" => Ok(Processor::Gpu),
+        _ => Err("expected cpu or gpu".into()),
+    }
+}
+
+/// What `collect` needs to know of a study: `study.json` in its folder.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Manifest {
+    what: String,
+    /// Text and folder of a study file; nothing for a built-in study.
+    file: Option<(String, PathBuf)>,
+    full: bool,
+    sets: Vec<String>,
+    gpu: bool,
+}
+
+impl Manifest {
+    fn new(args: &StudyArgs) -> Result<Self> {
+        let path = Path::new(&args.what);
+        let is_file = path.extension().is_some_and(|e| e == "toml");
+        let file = if is_file {
+            let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+                std::io::ErrorKind::NotFound => Error::Case(format!("no study file at `{}`", path.display())),
+                _ => Error::io(path)(e),
+            })?;
+            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some((text, folder.canonicalize().map_err(Error::io(folder))?))
+        } else {
+            None
+        };
+        Ok(Self {
+            what: args.what.clone(),
+            file,
+            full: args.full,
+            sets: args.sets.clone(),
+            gpu: args.backend == Processor::Gpu,
+        })
+    }
+
+    fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join("study.json");
+        let text = std::fs::read_to_string(&path)
+            .map_err(|_| Error::Case(format!("`{}` holds no study (no study.json)", folder.display())))?;
+        serde_json::from_str(&text).map_err(|e| Error::Case(format!("{}: {e}", path.display())))
+    }
+
+    fn write(&self, folder: &Path) -> Result<()> {
+        std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+        let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
+        write_whole(&folder.join("study.json"), text.as_bytes())
+    }
+
+    fn study(&self) -> Result<Study> {
+        let processor = if self.gpu { Processor::Gpu } else { Processor::Cpu };
+        let setup = Setup { full: self.full, sets: self.sets.clone(), processor };
+        match &self.file {
+            Some((text, folder)) => builtin::from_file(&self.what, text, &files_of(folder), &setup),
+            None => builtin::find(&self.what, &setup),
+        }
+    }
+}
+
+/// Run `args`. Findings go to stdout, progress to stderr.
+///
+/// # Errors
+/// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
+pub fn command(args: &StudyArgs) -> Result<()> {
+    if let Some(threads) = args.threads {
+        // Fails only if the pool exists already, and nothing parallel has run yet.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+    }
+    // Drivers are asked only when the first point wants one.
+    let hardware = std::sync::LazyLock::new(|| args.adapter.is_some() || Gpu::hardware_available());
+    let make: &Make = &|processor, scene, params, plan, settings| match processor {
+        Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?) as Box<dyn Backend>),
+        Processor::Gpu if !*hardware => Err(Error::Gpu(
+            "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
+        )),
+        Processor::Gpu => Ok(Box::new(Gpu::new(scene, params, plan, settings, args.adapter.as_deref())?)),
+    };
+    if args.what == "list" {
+        for entry in ENTRIES {
+            println!("{:16} {}", entry.name, entry.about);
+        }
+        return Ok(());
+    }
+    let collect = args.what == "collect";
+    let (manifest, folders) = if collect {
+        let first = args.folders.first().ok_or_else(|| {
+            Error::Case("collect: name the folders to join, e.g. seixo study collect part-1 part-2".into())
+        })?;
+        (Manifest::read(first)?, args.folders.clone())
+    } else if let Some(extra) = args.folders.first() {
+        return Err(Error::Case(format!("`{}`: only `collect` takes folders", extra.display())));
+    } else {
+        (Manifest::new(args)?, Vec::new())
+    };
+    let study = manifest.study()?;
+    if args.dry_run {
+        for (k, job) in study.jobs.iter().enumerate() {
+            let parts: Vec<String> = job.parameters.iter().map(|(k, v)| format!("{k} = {v}")).collect();
+            println!("{k:4}  {}  {} ({})", job.hash(&study.name), job.method, parts.join(", "));
+        }
+        return Ok(());
+    }
+    let out = args.out.clone().or_else(|| folders.first().cloned());
+    let out = out.unwrap_or_else(|| PathBuf::from(format!("study-{}", study.name)));
+    manifest.write(&out)?;
+    let options = Options {
+        out: out.clone(),
+        shard: args.shard,
+        quiet: args.quiet,
+        collect: collect.then_some(folders),
+    };
+    let context = Context { make, repetitions: args.repetitions };
+    let (rows, text) = study.run(&options, &context, args.error)?;
+    print!("{text}");
+    let missing = study.jobs.len() - rows.len();
+    if missing > 0 {
+        println!("{missing} of {} points are still to be computed.", study.jobs.len());
+    }
+    println!("Results: {}", out.join("report.md").display());
+    Ok(())
+}

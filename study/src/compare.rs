@@ -1,0 +1,163 @@
+//! Errors of curves: against an experiment, or against the finest run of the study.
+
+use super::definition::{Definition, ErrorMeasure, Files};
+use super::row::{Class, Row};
+use seixo::error::{Error, Result};
+use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
+
+impl ErrorMeasure {
+    /// Name of the error, as in the tables.
+    pub fn name(&self) -> String {
+        match (&self.name, &self.value, &self.curve, &self.against) {
+            (Some(name), ..) => name.clone(),
+            (None, Some(value), ..) => value.clone(),
+            (None, None, Some(curve), Some(against)) => format!("{curve} against {against} [-]"),
+            _ => "error [-]".into(),
+        }
+    }
+}
+
+/// Two columns of numbers from a CSV text; lines that begin with `#` and the header are passed over.
+///
+/// # Errors
+/// [`Error::Case`] if there are fewer than two rows.
+pub fn table(name: &str, text: &str) -> Result<Vec<[f64; 2]>> {
+    let rows: Vec<[f64; 2]> = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .filter_map(|l| {
+            let mut cells = l.split(',').map(|c| c.trim().parse::<f64>());
+            Some([cells.next()?.ok()?, cells.next()?.ok()?])
+        })
+        .collect();
+    if rows.len() < 2 {
+        return Err(Error::Case(format!("{name}: expected two columns of numbers")));
+    }
+    Ok(rows)
+}
+
+/// `curve` at `x`, linear between its points; `None` outside.
+fn at(curve: &[[f64; 2]], x: f64) -> Option<f64> {
+    let k = curve.iter().position(|p| p[0] >= x)?;
+    if k == 0 {
+        return (curve[0][0] == x).then_some(curve[0][1]);
+    }
+    let ([x0, y0], [x1, y1]) = (curve[k - 1], curve[k]);
+    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+}
+
+/// Rms difference of `curve` from `reference` at the points of `reference` that `curve` covers. `None` if they
+/// share fewer than two points.
+pub fn difference(curve: &[[f64; 2]], reference: &[[f64; 2]]) -> Option<f64> {
+    let squares: Vec<f64> =
+        reference.iter().filter_map(|r| at(curve, r[0]).map(|y| (y - r[1]).powi(2))).collect();
+    (squares.len() > 1).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// The row to compare with: the one with the most particles, and of those the most steps, that has `curve`.
+pub fn finest<'a>(rows: &'a [Row], curve: &str) -> Option<&'a Row> {
+    let usable = |r: &&Row| r.measured.class <= Class::Degraded && r.measured.curves.contains_key(curve);
+    let key = |r: &Row| (r.measured.work.particles, r.measured.work.steps);
+    rows.iter().filter(usable).max_by_key(|r| key(r))
+}
+
+/// A chart of the curves themselves for each one that is compared, with everything it is compared with.
+///
+/// # Errors
+/// A reference file that cannot be read.
+pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(String, Chart)>> {
+    let mut charts: Vec<(String, Chart)> = Vec::new();
+    let mut names: Vec<&String> = study.error.iter().filter_map(|e| e.curve.as_ref()).collect();
+    names.dedup();
+    for name in names {
+        let with = rows.iter().filter(|r| r.measured.class <= Class::Degraded);
+        let with: Vec<&Row> = with.filter(|r| r.measured.curves.contains_key(name)).collect();
+        let mut series = Vec::new();
+        for (k, row) in with.iter().enumerate() {
+            let label = row.label();
+            let stroke = if k < COLORS.len() { Stroke::Solid } else { Stroke::Dashed };
+            let points = row.measured.curves[name].clone();
+            series.push(Series::line(&label, COLORS[k % COLORS.len()], stroke, points));
+        }
+        let marks = [Mark::Circle, Mark::Square, Mark::Triangle, Mark::Star];
+        let references = study.error.iter().filter(|e| e.curve.as_ref() == Some(name));
+        let references =
+            references.filter_map(|e| e.against.as_ref().filter(|a| *a != "finest").map(|a| (e, a)));
+        for (k, (error, against)) in references.enumerate() {
+            let most =
+                with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
+            let all = with.iter().flat_map(|r| &r.measured.curves[name]);
+            let high = all.map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+            let reached = |p: &[f64; 2]| p[0] <= most && p[1] <= high;
+            let points = table(against, &files(against)?)?.into_iter().filter(reached).collect();
+            let label = error.name().replace("front against ", "experiment: ").replace(" [-]", "");
+            series.push(Series::marks(&label, "#000000", marks[k % marks.len()], 4.5, points));
+        }
+        let (x, y) = match name.as_str() {
+            "front scaled" => ("T = t sqrt(2 g / L) [-]", "Z = x / L [-]"),
+            "front" => ("time [s]", "front, 99.9th percentile of x [m]"),
+            "energy" => ("time [s]", "energy over its start [-]"),
+            _ => ("time [s]", name.as_str()),
+        };
+        let owned: Vec<Row> = with.iter().map(|r| (*r).clone()).collect();
+        charts.push((
+            super::work_precision::file_name(&study.name, name, "curve"),
+            Chart {
+                title: format!("{}: {name}", study.title),
+                subtitle: super::work_precision::machines(&owned),
+                x: Axis::linear(x),
+                y: Axis::linear(y),
+                series,
+            },
+        ));
+    }
+    Ok(charts)
+}
+
+/// Put the errors of all curves into `rows`.
+///
+/// # Errors
+/// A reference file that cannot be read.
+pub fn curves(study: &Definition, rows: &mut [Row], files: &Files) -> Result<()> {
+    for error in &study.error {
+        let (Some(curve), Some(against)) = (&error.curve, &error.against) else { continue };
+        let name = error.name();
+        let (reference, own) = if against == "finest" {
+            let Some(row) = finest(rows, curve) else { continue };
+            (row.measured.curves[curve].clone(), Some(row.index))
+        } else {
+            (table(against, &files(against)?)?, None)
+        };
+        let range = reference.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
+        for row in rows.iter_mut().filter(|r| Some(r.index) != own) {
+            let Some(points) = row.measured.curves.get(curve) else { continue };
+            // The experiment's tank may be longer: what lies beyond the run's last wall is not compared.
+            let most = points.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+            let inside: Vec<[f64; 2]> =
+                reference.iter().copied().filter(|r| own.is_some() || r[1] <= most).collect();
+            if let Some(rms) = difference(points, &inside) {
+                row.measured.put(&name, rms / range);
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{difference, table};
+
+    #[test]
+    fn curves_are_compared_where_both_are_known() {
+        let curve = [[0.0, 0.0], [2.0, 4.0]];
+        assert_eq!(difference(&curve, &[[0.5, 1.0], [1.0, 2.0], [9.0, 100.0]]), Some(0.0));
+        assert_eq!(difference(&curve, &[[0.0, 1.0], [1.0, 3.0]]), Some(1.0));
+        assert_eq!(difference(&curve, &[[5.0, 1.0], [1.0, 3.0]]), None);
+    }
+
+    #[test]
+    fn a_table_has_a_source_a_header_and_numbers() {
+        assert_eq!(table("t", "# source\nt,x\n0,1\n1, 2.5\n").unwrap(), [[0.0, 1.0], [1.0, 2.5]]);
+        assert!(table("t", "t,x\n0,1\n").is_err());
+    }
+}

@@ -1,0 +1,356 @@
+//! A study as a TOML file: a case, what to vary, what to measure, what to compare with.
+//!
+//! ```toml
+//! name = "hydrostatic"
+//! title = "Water at rest"
+//! case = "../hydrostatic.toml"          # or text = """..."""
+//! set = ["output.every=0"]
+//! repetitions = 3
+//! method = "{preset}"                   # one line of the plot for each
+//!
+//! [measure]
+//! of = ["hydrostatic_pressure", "volume"]
+//! from = 1.0
+//! every = 0.01
+//!
+//! [[axis]]                              # the sweep is the grid of all axes
+//! name = "preset"
+//! key = "fluid.preset"
+//! values = ["paper", "accurate"]
+//! [[axis]]
+//! name = "spacing"
+//! choices = [{ name = "0.05", set = ["run.spacing=0.05", "run.time_step=2e-3"] }]
+//!
+//! [[error]]
+//! value = "pressure error [-]"
+//! ```
+
+use super::engine::{Job, Processor};
+use super::measure::Spec;
+use super::run_point::{Point, run};
+use seixo::case::file::parse;
+use seixo::error::{Error, Result};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A study file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Definition {
+    /// Name, for files.
+    pub name: String,
+    /// First line of the plots.
+    pub title: String,
+    /// The question it answers, for the report.
+    #[serde(default)]
+    pub question: String,
+    /// The case file, relative to the study file.
+    pub case: Option<String>,
+    /// The case itself, instead of `case`.
+    pub text: Option<String>,
+    /// Overrides of every point, `key=value`.
+    #[serde(default)]
+    pub set: Vec<String>,
+    /// Runs of each point, for the time.
+    #[serde(default = "three")]
+    pub repetitions: u32,
+    /// Method of a point, with `{axis}` for what it takes on that axis.
+    pub method: String,
+    /// What to measure.
+    pub measure: Spec,
+    /// What is varied: the sweep is the grid of all axes.
+    #[serde(default)]
+    pub axis: Vec<Axis>,
+    /// More grids: each replaces the axes of the same name by its own.
+    #[serde(default)]
+    pub grid: Vec<Grid>,
+    /// What counts as error.
+    pub error: Vec<ErrorMeasure>,
+    /// Values beyond which a point counts as degraded.
+    #[serde(default)]
+    pub limit: BTreeMap<String, f64>,
+}
+
+fn three() -> u32 {
+    3
+}
+
+/// A grid of its own.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Method of its points, instead of the study's.
+    pub method: Option<String>,
+    /// Only with `--full`.
+    #[serde(default)]
+    pub full: bool,
+    /// Its axes.
+    pub axis: Vec<Axis>,
+}
+
+/// Something that is varied.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// Name, for tables and plots.
+    pub name: String,
+    /// The key that takes each of `values`.
+    pub key: Option<String>,
+    /// Values of `key`.
+    #[serde(default)]
+    pub values: Vec<toml::Value>,
+    /// Further values, only with `--full`.
+    #[serde(default)]
+    pub full_values: Vec<toml::Value>,
+    /// Settings of several keys, instead of `key` and `values`.
+    #[serde(default)]
+    pub choices: Vec<Choice>,
+}
+
+/// A setting of several keys at once.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Choice {
+    /// Name, for tables and plots.
+    pub name: String,
+    /// Overrides, `key=value`.
+    #[serde(default)]
+    pub set: Vec<String>,
+    /// Where it computes.
+    pub processor: Option<Processor>,
+    /// Only with `--full`.
+    #[serde(default)]
+    pub full: bool,
+}
+
+/// What counts as error.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorMeasure {
+    /// A measured value that is an error by itself (against an analytic solution).
+    pub value: Option<String>,
+    /// A curve to compare, instead of `value`.
+    pub curve: Option<String>,
+    /// With what: `finest` (the row with the most particles, and of those the most steps), or a CSV file
+    /// of two columns, relative to the study file.
+    pub against: Option<String>,
+    /// Name, for tables and plots.
+    pub name: Option<String>,
+}
+
+/// What the command line adds to a study.
+#[derive(Clone, Debug, Default)]
+pub struct Setup {
+    /// Also the costly points.
+    pub full: bool,
+    /// Overrides of the case, `key=value`.
+    pub sets: Vec<String>,
+    /// Where points compute that do not say.
+    pub processor: Processor,
+}
+
+/// A file that a study refers to.
+pub type Files<'a> = dyn Fn(&str) -> Result<String> + 'a;
+
+/// Reads files relative to `folder`.
+pub fn files_of(folder: &Path) -> impl Fn(&str) -> Result<String> {
+    let folder = folder.to_path_buf();
+    move |name| {
+        let path = folder.join(name);
+        std::fs::read_to_string(&path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => Error::Case(format!("no file at `{}`", path.display())),
+            _ => Error::io(&path)(e),
+        })
+    }
+}
+
+/// One value of an axis.
+#[derive(Clone, Debug)]
+struct Pick {
+    axis: String,
+    name: String,
+    set: Vec<String>,
+    processor: Option<Processor>,
+}
+
+impl Axis {
+    fn picks(&self, full: bool) -> Result<Vec<Pick>> {
+        let pick = |name: String, set, processor| Pick { axis: self.name.clone(), name, set, processor };
+        let mut picks = Vec::new();
+        if let Some(key) = &self.key {
+            let more: &[toml::Value] = if full { &self.full_values } else { &[] };
+            for value in self.values.iter().chain(more) {
+                let name = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                picks.push(pick(name, vec![format!("{key}={value}")], None));
+            }
+        }
+        for choice in self.choices.iter().filter(|c| full || !c.full) {
+            picks.push(pick(choice.name.clone(), choice.set.clone(), choice.processor));
+        }
+        if picks.is_empty() {
+            let name = &self.name;
+            return Err(Error::Case(format!("axis `{name}`: give `key` with `values`, or `choices`")));
+        }
+        Ok(picks)
+    }
+}
+
+impl Definition {
+    /// Read a study; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// [`Error::Case`] with line and column.
+    pub fn parse(name: &str, text: &str) -> Result<Self> {
+        let study: Self = toml::from_str(text).map_err(|e| Error::Case(format!("{name}: {e}")))?;
+        for e in &study.error {
+            let whole =
+                matches!((&e.value, &e.curve, &e.against), (Some(_), None, None) | (None, Some(_), Some(_)));
+            if !whole {
+                return Err(Error::Case(format!("{name}: error: give `value`, or `curve` and `against`")));
+            }
+        }
+        if study.case.is_some() == study.text.is_some() {
+            return Err(Error::Case(format!("{name}: give `case` or `text`, one of them")));
+        }
+        Ok(study)
+    }
+
+    /// The text of the case.
+    ///
+    /// # Errors
+    /// Those of `files`.
+    fn case_text(&self, files: &Files) -> Result<String> {
+        match (&self.text, &self.case) {
+            (Some(text), _) => Ok(text.clone()),
+            (None, Some(case)) => files(case),
+            (None, None) => Err(Error::Case(format!("study `{}` has no case", self.name))),
+        }
+    }
+
+    /// The points. Overrides of the command line come after those of the study and before those of the axes. A
+    /// point whose case is refused is a point that fails.
+    ///
+    /// # Errors
+    /// [`Error::Case`] for a case that cannot be read, or an axis without values.
+    pub fn jobs(&self, files: &Files, setup: &Setup) -> Result<Vec<Job>> {
+        let full = setup.full;
+        let text = self.case_text(files)?;
+        let mut jobs: Vec<Job> = Vec::new();
+        let main = Grid { method: None, full: false, axis: self.axis.clone() };
+        for grid in std::iter::once(&main).chain(&self.grid).filter(|g| full || !g.full) {
+            if grid.axis.is_empty() {
+                continue;
+            }
+            let method = grid.method.as_ref().unwrap_or(&self.method);
+            let mut points: Vec<Vec<Pick>> = vec![Vec::new()];
+            for axis in &grid.axis {
+                let picks = axis.picks(full)?;
+                let with = |point: &Vec<Pick>| {
+                    let point = point.clone();
+                    picks.clone().into_iter().map(move |p| [point.clone(), vec![p]].concat())
+                };
+                points = points.iter().flat_map(with).collect();
+            }
+            for picks in points {
+                jobs.push(self.job(&text, method, &picks, setup));
+            }
+        }
+        Ok(jobs)
+    }
+
+    fn job(&self, text: &str, method: &str, picks: &[Pick], setup: &Setup) -> Job {
+        let all = self.set.iter().chain(&setup.sets).chain(picks.iter().flat_map(|p| &p.set));
+        let all: Vec<String> = all.cloned().collect();
+        let mut method = method.to_owned();
+        for pick in picks {
+            method = method.replace(&format!("{{{}}}", pick.axis), &pick.name);
+        }
+        let processor = picks.iter().find_map(|p| p.processor).unwrap_or(setup.processor);
+        let parsed = parse(&self.name, text.to_owned(), &all);
+        // Particles go with the spacing to the power of the dimensions; steps with the end over the time step.
+        let weight = parsed.as_ref().map_or(0.0, |(case, _, _)| {
+            let run = &case.run;
+            let steps = run.end / run.time_step;
+            steps * run.spacing.powi(-(run.dimensions as i32))
+        });
+        let effective = parsed.map(|(_, text, _)| text);
+        let parameters = picks.iter().map(|p| (p.axis.clone(), p.name.clone())).collect();
+        let identity = match &effective {
+            Ok(text) => format!("{text}\n{:?} {processor:?} {:?}", self.measure, self.limit),
+            Err(error) => format!("{error} {all:?}"),
+        };
+        let (spec, limits, repetitions) = (self.measure.clone(), self.limit.clone(), self.repetitions);
+        Job {
+            method,
+            parameters,
+            identity,
+            weight,
+            task: Box::new(move |context| {
+                let text = match &effective {
+                    Ok(text) => text.clone(),
+                    Err(error) => return Err(Error::Case(error.to_string())),
+                };
+                let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
+                limits.iter().for_each(|(name, most)| out.limit(name, *most));
+                Ok(out)
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Definition, Setup};
+
+    const STUDY: &str = r#"
+name = "s"
+title = "t"
+method = "{a} at {b}"
+text = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1\n"
+[measure]
+of = []
+[[axis]]
+name = "a"
+key = "run.end"
+values = [1.0, 2.0]
+full_values = [3.0]
+[[axis]]
+name = "b"
+choices = [{ name = "x", set = ["run.time_step=2e-3"] }, { name = "y", full = true }]
+[[error]]
+value = "e [-]"
+"#;
+
+    #[test]
+    fn the_grid_is_the_product_of_the_axes_and_each_point_has_its_own_hash() {
+        let study = Definition::parse("s.toml", STUDY).unwrap();
+        let none = |_: &str| unreachable!();
+        let quick = study.jobs(&none, &Setup::default()).unwrap();
+        let methods: Vec<&str> = quick.iter().map(|j| j.method.as_str()).collect();
+        assert_eq!(methods, ["1.0 at x", "2.0 at x"]);
+        let full = study.jobs(&none, &Setup { full: true, ..Setup::default() }).unwrap();
+        assert_eq!(full.len(), 6);
+        let mut hashes: Vec<String> = full.iter().map(|j| j.hash("s")).collect();
+        assert!(hashes.contains(&quick[0].hash("s")), "--full computes the quick points again");
+        hashes.sort();
+        hashes.dedup();
+        assert_eq!(hashes.len(), 6);
+        let other = study
+            .jobs(&none, &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() })
+            .unwrap();
+        assert_ne!(other[0].hash("s"), quick[0].hash("s"));
+    }
+
+    #[test]
+    fn mistakes_are_told() {
+        for (from, to) in
+            [("value = \"e [-]\"", "curve = \"c\""), ("title", "tilte"), ("text", "case = 'c'\ntext")]
+        {
+            assert!(Definition::parse("s.toml", &STUDY.replacen(from, to, 1)).is_err(), "{to}");
+        }
+        let text = STUDY.replace("key = \"run.end\"\nvalues = [1.0, 2.0]\nfull_values = [3.0]\n", "");
+        let study = Definition::parse("s.toml", &text).unwrap();
+        assert!(study.jobs(&|_| unreachable!(), &Setup::default()).is_err());
+    }
+}

@@ -1,0 +1,308 @@
+//! Runs the points of a study: each once, each kept, in any order, on any number of machines.
+//!
+//! A finished point is the file `points/HASH.json`, written by rename; the hash is that of everything its result
+//! depends on. A sweep that was killed goes on where it stopped, shards of one sweep share the folder or are
+//! joined later, and a changed case computes only what changed.
+
+use super::row::{FORMAT, Measured, Row, hash};
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
+use seixo::error::{Error, Result};
+use seixo::output::write_whole;
+use seixo::params::Params;
+use seixo::plan::Plan;
+use seixo::pressure::Settings;
+use seixo::scene::Scene;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Where a point computes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Processor {
+    /// The CPU, in f64.
+    #[default]
+    Cpu,
+    /// A GPU, in f32.
+    Gpu,
+}
+
+/// Makes backends.
+pub type Make<'a> =
+    dyn Fn(Processor, &Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>> + Sync + 'a;
+
+/// Backends on the CPU; a GPU is an error.
+///
+/// # Errors
+/// [`Error::Gpu`] for a GPU, or what the backend says.
+pub fn cpu_only(
+    processor: Processor,
+    scene: &Scene,
+    params: &Params,
+    plan: &Plan,
+    settings: Settings,
+) -> Result<Box<dyn Backend>> {
+    match processor {
+        Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?)),
+        Processor::Gpu => Err(Error::Gpu("no GPU adapter to compute on".into())),
+    }
+}
+
+/// What the points of a study are given.
+pub struct Context<'a> {
+    /// Makes backends.
+    pub make: &'a Make<'a>,
+    /// How often a run is repeated for its time; 0 for what the study asks for.
+    pub repetitions: u32,
+}
+
+/// What a point does.
+pub type Task = Box<dyn Fn(&Context) -> Result<Measured> + Send + Sync>;
+
+/// A point that is to be computed.
+pub struct Job {
+    /// Line of the plot that it belongs to.
+    pub method: String,
+    /// What is varied.
+    pub parameters: Vec<(String, String)>,
+    /// Everything that the result depends on: the case's text with overrides, the measures.
+    pub identity: String,
+    /// Expected cost against that of other points, for the remaining time.
+    pub weight: f64,
+    /// The computation.
+    pub task: Task,
+}
+
+impl Job {
+    /// A point whose result depends on `study`, `method` and `parameters` alone.
+    pub fn new(
+        method: &str,
+        parameters: &[(&str, String)],
+        weight: f64,
+        task: impl Fn(&Context) -> Result<Measured> + Send + Sync + 'static,
+    ) -> Self {
+        let parameters: Vec<(String, String)> =
+            parameters.iter().map(|(k, v)| ((*k).to_string(), v.clone())).collect();
+        let identity = format!("{parameters:?}");
+        Self { method: method.into(), parameters, identity, weight, task: Box::new(task) }
+    }
+
+    /// Hash of everything that the result depends on.
+    pub fn hash(&self, study: &str) -> String {
+        hash(&[&FORMAT.to_string(), study, &self.method, &self.identity])
+    }
+}
+
+/// Which part of the points to compute: number `index` (from 1) of `of`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1.
+    pub index: usize,
+    /// Number of shards.
+    pub of: usize,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || format!("`{text}`: expected i/n with i from 1 to n, e.g. 2/8");
+        let (i, n) = text.split_once('/').ok_or_else(wrong)?;
+        let (index, of) = (i.trim().parse().map_err(|_| wrong())?, n.trim().parse().map_err(|_| wrong())?);
+        if index >= 1 && index <= of { Ok(Self { index, of }) } else { Err(wrong()) }
+    }
+}
+
+impl Shard {
+    fn has(self, k: usize) -> bool {
+        k % self.of == self.index - 1
+    }
+}
+
+/// How a sweep goes.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder of the results.
+    pub out: PathBuf,
+    /// Part of the points; all if absent.
+    pub shard: Option<Shard>,
+    /// No progress on stderr.
+    pub quiet: bool,
+    /// Read finished points only, also from these folders.
+    pub collect: Option<Vec<PathBuf>>,
+}
+
+/// Rows of the points that are there at the end, in the order of `jobs`.
+///
+/// # Errors
+/// [`Error::Io`]. A point that fails is a row.
+pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) -> Result<Vec<Row>> {
+    let folder = options.out.join("points");
+    std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
+    let mine = |k: &usize| options.collect.is_none() && options.shard.is_none_or(|s| s.has(*k));
+    let mut rows: Vec<Option<Row>> = Vec::new();
+    for (k, job) in jobs.iter().enumerate() {
+        let hash = job.hash(study);
+        let mut row = read(&point(&folder, &hash), &hash);
+        for other in options.collect.iter().flatten() {
+            if row.is_some() {
+                break;
+            }
+            row = read(&point(&other.join("points"), &hash), &hash);
+            if let Some(row) = &row {
+                write_whole(&point(&folder, &hash), json(row).as_bytes())?;
+            }
+        }
+        rows.push(row.map(|row| Row { index: k, ..row }));
+    }
+    let open: Vec<usize> = (0..jobs.len()).filter(mine).filter(|&k| rows[k].is_none()).collect();
+    let total: f64 = open.iter().map(|&k| jobs[k].weight).sum();
+    let found = rows.iter().flatten().count();
+    if found > 0 && !options.quiet {
+        eprintln!("{study}: {found} of {} points are finished already", jobs.len());
+    }
+    let (start, mut done) = (Instant::now(), 0.0);
+    for (n, &k) in open.iter().enumerate() {
+        let job = &jobs[k];
+        let row = Row {
+            format: FORMAT,
+            study: study.into(),
+            index: k,
+            hash: job.hash(study),
+            method: job.method.clone(),
+            parameters: job.parameters.iter().cloned().collect(),
+            measured: attempt(job, context),
+        };
+        let text = json(&row);
+        write_whole(&point(&folder, &row.hash), text.as_bytes())?;
+        done += job.weight;
+        if !options.quiet {
+            let elapsed = start.elapsed().as_secs_f64();
+            let left = elapsed * (total / done.max(1e-300) - 1.0).max(0.0);
+            let why = if row.measured.reason.is_empty() { "" } else { ": " };
+            let place = format!("{}/{}", n + 1, open.len());
+            eprintln!(
+                "{study} [{place}] {} ({}): {}{why}{}  elapsed {elapsed:.0} s, ETA {left:.0} s",
+                row.method,
+                row.setting(),
+                row.measured.class.name(),
+                first_line(&row.measured.reason),
+            );
+        }
+        // What is shown is what is in the file, to the last digit.
+        rows[k] = serde_json::from_str(&text).ok().or(Some(row));
+    }
+    Ok(rows.into_iter().flatten().collect())
+}
+
+/// First line of `text`.
+pub(crate) fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+/// The point, or the reason why there is none: a point never takes the sweep with it.
+fn attempt(job: &Job, context: &Context) -> Measured {
+    match catch_unwind(AssertUnwindSafe(|| (job.task)(context))) {
+        Ok(Ok(measured)) => measured,
+        Ok(Err(error)) => Measured::failed(&error),
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+            Measured {
+                class: super::row::Class::Failed,
+                reason: format!("panic, which is a fault of this program: {text}"),
+                ..Measured::default()
+            }
+        }
+    }
+}
+
+fn point(folder: &Path, hash: &str) -> PathBuf {
+    folder.join(format!("{hash}.json"))
+}
+
+/// A finished point; what is not whole or of another format is computed again.
+fn read(path: &Path, hash: &str) -> Option<Row> {
+    let row: Row = serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()?;
+    // Without a GPU a point is skipped, which another machine may change.
+    let kept = row.measured.class != super::row::Class::Skipped;
+    (row.format == FORMAT && row.hash == hash && kept).then_some(row)
+}
+
+fn json(row: &Row) -> String {
+    // Only finite numbers are kept in rows, so that this cannot fail.
+    serde_json::to_string_pretty(row).unwrap_or_default() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::row::Class;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+    fn jobs(count: usize, calls: &Arc<AtomicU32>) -> Vec<Job> {
+        let job = |k: usize| {
+            let calls = calls.clone();
+            Job::new("m", &[("k", k.to_string())], 1.0, move |_| {
+                calls.fetch_add(1, Relaxed);
+                match k {
+                    1 => panic!("on purpose"),
+                    2 => Err(Error::Case("no such thing".into())),
+                    _ => {
+                        let mut m = Measured::default();
+                        m.put("third [-]", k as f64 / 3.0);
+                        Ok(m)
+                    }
+                }
+            })
+        };
+        (0..count).map(job).collect()
+    }
+
+    fn run(
+        out: &Path,
+        shard: Option<&str>,
+        collect: Option<Vec<PathBuf>>,
+        calls: &Arc<AtomicU32>,
+    ) -> Vec<Row> {
+        let shard = shard.map(|s| s.parse().unwrap());
+        let options = Options { out: out.into(), shard, quiet: true, collect };
+        sweep("test", &jobs(5, calls), &options, &Context { make: &cpu_only, repetitions: 1 }).unwrap()
+    }
+
+    #[test]
+    fn failures_are_rows_and_finished_points_are_not_computed_again() {
+        let (folder, calls) = (tempfile::tempdir().unwrap(), Arc::default());
+        let first = run(folder.path(), None, None, &calls);
+        assert_eq!(calls.load(Relaxed), 5);
+        let classes: Vec<Class> = first.iter().map(|r| r.measured.class).collect();
+        assert_eq!(classes, [Class::Ok, Class::Failed, Class::Failed, Class::Ok, Class::Ok]);
+        assert!(first[1].measured.reason.contains("on purpose"));
+        assert!(first[2].measured.reason.contains("no such thing"));
+        let again = run(folder.path(), None, None, &calls);
+        assert_eq!(calls.load(Relaxed), 5, "a finished point was computed again");
+        assert_eq!(again, first);
+        // A point cut off in the middle is computed again, and the table is the same.
+        let file = folder.path().join("points").join(format!("{}.json", first[3].hash));
+        std::fs::write(&file, "{\"format\": 1, \"stu").unwrap();
+        assert_eq!(run(folder.path(), None, None, &calls), first);
+        assert_eq!(calls.load(Relaxed), 6);
+    }
+
+    #[test]
+    fn shards_in_folders_of_their_own_are_collected_to_the_whole() {
+        let (a, b, c) =
+            (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let calls = Arc::default();
+        assert_eq!(run(a.path(), Some("1/2"), None, &calls).len(), 3);
+        assert_eq!(run(b.path(), Some("2/2"), None, &calls).len(), 2);
+        let all = run(a.path(), None, Some(vec![b.path().into()]), &calls);
+        assert_eq!(calls.load(Relaxed), 5);
+        assert_eq!(all, run(c.path(), None, None, &calls));
+        for wrong in ["0/2", "3/2", "1", "a/b", "1/0"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! The scenes of the gallery.
+
+use glam::DVec3;
+use seixo::fields::Fields;
+use seixo::scene::Groups;
+
+/// What must happen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Expect {
+    /// It ends right: with at most so many particles lost, and none faster than this [m/s].
+    Finish {
+        /// Particles.
+        lost: u64,
+        /// Speed at the end [m/s].
+        speed: f64,
+    },
+    /// A guard must stop it.
+    Guard,
+    /// It ends, or a guard stops it: nobody can say what is right.
+    FinishOrGuard,
+    /// The case must be refused.
+    Refuse,
+}
+
+impl Expect {
+    /// In words.
+    pub fn words(self) -> String {
+        match self {
+            Self::Finish { lost: 0, .. } => "finish with all particles".into(),
+            Self::Finish { lost, .. } => format!("finish with at most {lost} particles lost"),
+            Self::Guard => "be stopped by a guard".into(),
+            Self::FinishOrGuard => "finish or be stopped by a guard".into(),
+            Self::Refuse => "be refused".into(),
+        }
+    }
+}
+
+/// Changes the state before the first step.
+pub type Change = fn(&mut Fields, &Groups);
+
+/// A scene.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name.
+    pub name: &'static str,
+    /// Case.
+    pub text: String,
+    /// Overrides.
+    pub sets: Vec<String>,
+    /// Steps.
+    pub steps: u64,
+    /// What must happen.
+    pub expect: Expect,
+    /// What is done to the state before the first step.
+    pub change: Option<Change>,
+}
+
+impl Scene {
+    fn new(name: &'static str, text: String, steps: u64, expect: Expect) -> Self {
+        Self { name, text, sets: Vec::new(), steps, expect, change: None }
+    }
+
+    fn set(mut self, sets: &[&str]) -> Self {
+        self.sets.extend(sets.iter().map(|s| (*s).to_string()));
+        self
+    }
+
+    fn change(self, change: Change) -> Self {
+        Self { change: Some(change), ..self }
+    }
+}
+
+/// Still water `n` particles wide and deep, in two dimensions, at `l0` [m], with the time step dt of
+/// gamma = 0.04 and air above; `at` is its lower corner.
+fn pool(n: [u32; 2], l0: f64, at: [f64; 2]) -> String {
+    let (width, depth) = (f64::from(n[0]) * l0, f64::from(n[1]) * l0);
+    let speed = (100.0 * 9.80665 * l0).sqrt().max(2.5 * (9.80665 * depth).sqrt());
+    let [x, z] = at;
+    format!(
+        "[run]\nspacing = {l0:?}\ntime_step = {dt:?}\nend = 10\ndimensions = 2\n\
+         [tank]\nmin = [{x:?}, 0, {z:?}]\nmax = [{right:?}, {l0:?}, {top:?}]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [{x:?}, 0, {z:?}]\nmax = [{right:?}, {l0:?}, {surface:?}]\n\
+         [output]\nevery = 0\n",
+        dt = 0.2 * l0 / speed,
+        right = x + width,
+        top = z + 2.0 * depth,
+        surface = z + depth,
+    )
+}
+
+/// Water that fills a box to the lid, n particles along each edge.
+fn full_box(n: u32, dimensions: u32) -> String {
+    let (l0, a) = (0.025, 0.025 * f64::from(n));
+    format!(
+        "[run]\nspacing = {l0}\ntime_step = 5e-4\nend = 10\ndimensions = {dimensions}\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [{a}, {a}, {a}]\n\
+         [fluid]\nrelaxation = 0.01\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{a}, {a}, {a}]\n[output]\nevery = 0\n"
+    )
+}
+
+/// A dry cube of 0.1 m above a floor.
+fn cube(height: f64, contact: &str) -> String {
+    format!(
+        "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 10\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.8, 2.0]\n\
+         [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.4, 0.4, {}]\ndensity = 1000.0\n\
+         [contact]\nlaw = \"smooth\"\nspring = 1e6\nrestitution = 0.3\nfriction = 0.3\n{contact}[output]\nevery = 0\n",
+        height + 0.05
+    )
+}
+
+/// `count` cubes of 0.05 m in layers of 5 x 5, half a cube apart, that fall into a heap.
+fn heap(count: u32) -> String {
+    let mut text = String::from(
+        "[run]\nspacing = 0.0125\ntime_step = 1e-3\nend = 10\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 6.0]\nopen = [\"z_max\"]\n\
+         [contact]\nlaw = \"smooth\"\nspring = 1e5\nrestitution = 0.2\nfriction = 0.3\n[output]\nevery = 0\n",
+    );
+    for k in 0..count {
+        let (x, y, z) = (k % 5, k / 5 % 5, k / 25);
+        let place = |i: u32| 0.075 + 0.085 * f64::from(i);
+        // Each layer is shifted a little, so that cubes do not land flat on each other.
+        let shift = 0.01 * f64::from(z % 3);
+        text += &format!(
+            "[[body]]\nname = \"b{k}\"\nsize = [0.05, 0.05, 0.05]\ncenter = [{:?}, {:?}, {:?}]\ndensity = 800.0\n",
+            place(x) + shift,
+            place(y) - shift,
+            0.05 + 0.07 * f64::from(z)
+        );
+    }
+    text
+}
+
+/// A gate that comes down onto standing water and reaches the floor.
+const GATE: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 10\ndimensions = 2\n\
+    [tank]\nmin = [0, 0, 0]\nmax = [0.8, 1, 0.8]\nopen = [\"z_max\"]\n\
+    [[moving_wall]]\nname = \"gate\"\nmin = [0.36, 0, 0.3]\nmax = [0.44, 1, 0.7]\nmotion = [[0, 0, 0, 0], [0.5, 0, 0, -0.3]]\n\
+    [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 1, 0.2]\n[output]\nevery = 0\n";
+
+/// The dam break of the paper's tank, coarse and in two dimensions.
+const COLLAPSE: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 10\ndimensions = 2\n\
+    [tank]\nmin = [0, 0, 0]\nmax = [0.8, 1, 0.6]\nopen = [\"z_max\"]\n\
+    [fluid]\nsound_speed = 6.0\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 1, 0.4]\n[output]\nevery = 0\n";
+
+fn middle(fields: &mut Fields, groups: &Groups) -> usize {
+    // The particle nearest to the middle of the water.
+    let n = groups.fluid;
+    let mean = fields.position[..n].iter().sum::<DVec3>() / n as f64;
+    let distance = |i: &usize| fields.position[*i].distance_squared(mean);
+    (0..n).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+}
+
+fn squeeze(fields: &mut Fields, groups: &Groups, part: f64) {
+    fields.position[..groups.fluid].iter_mut().for_each(|x| x.z *= part);
+}
+
+/// All scenes; `full` has the large ones as well.
+pub fn scenes(full: bool) -> Vec<Scene> {
+    let still = |speed| Expect::Finish { lost: 0, speed };
+    let shot = |speed: f64| {
+        let block = format!(
+            "[[fluid.block]]\nmin = [0.2, 0, 0.5]\nmax = [0.22, 0.02, 0.52]\nvelocity = [0, 0, -{speed:?}]\n"
+        );
+        pool([20, 15], 0.02, [0.0, 0.0])
+            .replace("max = [0.4, 0.02, 0.6]", "max = [0.4, 0.02, 1.0]")
+            .replace("[output]", &format!("{block}[output]"))
+    };
+    let mut all = vec![
+        Scene::new("a column 10 m deep", pool([5, 100], 0.1, [0.0; 2]), 600, still(14.0)),
+        Scene::new("a column 100 m deep", pool([5, 100], 1.0, [0.0; 2]), 600, still(44.0)),
+        Scene::new("a drop at 50 m/s", shot(50.0), 300, Expect::Finish { lost: 2, speed: 50.0 }),
+        Scene::new("a drop at 500 m/s", shot(500.0), 300, Expect::Finish { lost: 2, speed: 500.0 }),
+        Scene::new(
+            "a velocity that is not a number",
+            pool([20, 10], 0.02, [0.0; 2]),
+            100,
+            Expect::FinishOrGuard,
+        )
+        .change(|f, g| {
+            let i = middle(f, g);
+            f.velocity[i].x = f64::NAN;
+        }),
+        Scene::new("an infinite velocity", pool([20, 10], 0.02, [0.0; 2]), 100, Expect::FinishOrGuard)
+            .change(|f, g| {
+                let i = middle(f, g);
+                f.velocity[i].z = f64::INFINITY;
+            }),
+        Scene::new(
+            "a position that is not a number",
+            pool([20, 10], 0.02, [0.0; 2]),
+            100,
+            Expect::Finish { lost: 1, speed: 3.0 },
+        )
+        .change(|f, g| {
+            let i = middle(f, g);
+            f.position[i].x = f64::NAN;
+        }),
+        Scene::new(
+            "an infinite position",
+            pool([20, 10], 0.02, [0.0; 2]),
+            100,
+            Expect::Finish { lost: 1, speed: 3.0 },
+        )
+        .change(|f, g| {
+            let i = middle(f, g);
+            f.position[i].z = f64::INFINITY;
+        }),
+        Scene::new("two particles in one place", pool([20, 10], 0.02, [0.0; 2]), 100, still(3.0)).change(
+            |f, g| {
+                let i = middle(f, g);
+                let j = if i == 0 { 1 } else { 0 };
+                f.position[j] = f.position[i];
+            },
+        ),
+        Scene::new("water squeezed to 0.9", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.9)),
+        Scene::new("water squeezed to 0.7", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.7)),
+        Scene::new("water squeezed to 0.3", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.3)),
+        Scene::new("water squeezed to nothing", pool([20, 10], 0.02, [0.0; 2]), 200, Expect::FinishOrGuard)
+            .change(|f, g| squeeze(f, g, 0.0)),
+        Scene::new("a closed box full to the lid", full_box(8, 3), 200, still(1.0)),
+        Scene::new("a pocket without a free surface", full_box(4, 2), 400, still(1.0))
+            .set(&["fluid.compressibility=1e-10"]),
+        Scene::new("one particle", pool([1, 1], 0.02, [0.0; 2]), 300, still(2.0)),
+        Scene::new(
+            "an empty scene",
+            "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 10\n".into(),
+            10,
+            still(0.0),
+        ),
+        Scene::new("l0 of 10 micrometres", pool([20, 10], 1e-5, [0.0; 2]), 300, still(1.0)),
+        Scene::new("l0 of 100 m", pool([20, 10], 100.0, [0.0; 2]), 300, still(200.0)),
+        Scene::new("1 km from the origin", pool([20, 10], 0.02, [1000.0, 1000.0]), 300, still(3.0)),
+        Scene::new("no gravity", pool([20, 10], 0.02, [0.0; 2]), 300, still(0.1))
+            .set(&["run.gravity=[0,0,0]"]),
+        Scene::new("gravity sideways", pool([20, 10], 0.02, [0.0; 2]), 300, still(4.0))
+            .set(&["run.gravity=[9.81,0,0]", "tank.open=[]"]),
+        Scene::new("gravity upwards, out of the tank", pool([20, 10], 0.02, [0.0; 2]), 10, Expect::Refuse)
+            .set(&["run.gravity=[0,0,9.81]"]),
+        Scene::new("viscosity 1e-6", COLLAPSE.into(), 300, still(5.0)).set(&["fluid.viscosity=1e-6"]),
+        Scene::new("viscosity 1e-2", COLLAPSE.into(), 300, still(5.0)).set(&["fluid.viscosity=1e-2"]),
+        Scene::new("viscosity 1", COLLAPSE.into(), 300, Expect::Refuse).set(&["fluid.viscosity=1"]),
+        Scene::new("viscosity 10", COLLAPSE.into(), 300, Expect::Refuse).set(&["fluid.viscosity=10"]),
+        Scene::new("viscosity 10, with the step adapted", COLLAPSE.into(), 300, still(5.0))
+            .set(&["fluid.viscosity=10", "run.adaptive=true"]),
+        Scene::new("a wall is missing and a body falls out", cube(0.2, ""), 3000, Expect::Guard)
+            .set(&["tank.open=[\"z_min\"]"]),
+        Scene::new("spring 1e4 N/m", cube(0.2, ""), 1000, still(0.0)).set(&["contact.spring=1e4"]),
+        Scene::new("spring 1e9 N/m", cube(0.2, ""), 1000, still(0.0)).set(&["contact.spring=1e9"]),
+        Scene::new("a body of 1 g", cube(0.2, ""), 1000, still(0.0)).set(&["body.0.density=1.0"]),
+        Scene::new("a body of 100 t", cube(0.2, ""), 1000, still(0.0))
+            .set(&["body.0.density=1e8", "contact.spring=1e11"]),
+        Scene::new("a body that spins at 1000 rad/s", cube(0.0, ""), 1000, Expect::FinishOrGuard)
+            .set(&["body.0.angular_velocity=[1000,300,0]", "body.0.center=[0.4,0.4,0.3]"]),
+        Scene::new("a heap of 100 bodies", heap(100), 500, still(0.0)),
+        Scene::new("a gate that shuts onto water", GATE.into(), 700, Expect::FinishOrGuard),
+        Scene::new("a time step ten times too long", COLLAPSE.into(), 200, Expect::FinishOrGuard)
+            .set(&["run.time_step=1e-2", "fluid.sound_speed=2"]),
+        Scene::new("the same, with the step adapted", COLLAPSE.into(), 300, still(5.0))
+            .set(&["run.time_step=1e-2", "run.adaptive=true"]),
+        Scene::new(
+            "gamma of 4.5",
+            COLLAPSE.replace("sound_speed = 6.0", "relaxation = 4.5"),
+            10,
+            Expect::Refuse,
+        ),
+        Scene::new("a spacing that is not a number", COLLAPSE.into(), 10, Expect::Refuse)
+            .set(&["run.spacing=nan"]),
+        Scene::new("a tank of 1e12 cells", COLLAPSE.into(), 10, Expect::Refuse)
+            .set(&["tank.max=[2e4,1,2e4]"]),
+        Scene::new("a body in the water that does not displace it", COLLAPSE.into(), 10, Expect::Refuse)
+            .set(&[]),
+    ];
+    if let Some(last) = all.last_mut() {
+        last.text += "[[body]]\nname = \"b\"\nsize = [0.1, 0.02, 0.1]\ncenter = [0.1, 0, 0.1]\ndensity = 500.0\n\
+                      [contact]\nlaw = \"smooth\"\nspring = 1e4\n";
+    }
+    if full {
+        all.push(Scene::new("a heap of 1000 bodies", heap(1000), 500, still(0.0)));
+        all.push(Scene::new(
+            "a closed box full to the lid, 8000 particles",
+            full_box(20, 3),
+            400,
+            still(1.0),
+        ));
+    }
+    all
+}

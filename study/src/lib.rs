@@ -1,0 +1,85 @@
+//! Studies: error against run time, limits of stability, what a scene does not need.
+//!
+//! A study is a list of points ([`engine::Job`]) and what to make of their results. Points come from a TOML file
+//! ([`definition`]) or from a function ([`pressure_solve`], [`stability`], [`gallery`], [`needs`]); the engine
+//! runs them, keeps each finished one, and a report with tables and charts follows.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `points/HASH.json` | a finished point; the hash is that of everything it depends on |
+//! | `results.csv`, `results.json` | all points |
+//! | `report.md` | findings in words, charts, the table |
+//! | `NAME.svg`, `NAME.png` | charts |
+
+pub mod bench;
+pub mod builtin;
+pub mod command;
+pub mod compare;
+pub mod contact_checks;
+pub mod contact_cost;
+pub mod contact_rest;
+pub mod definition;
+pub mod device_compare;
+pub mod drop_rows;
+pub mod dry;
+mod dry_studies;
+pub mod engine;
+pub mod gallery;
+pub mod gallery_scenes;
+pub mod incline;
+pub mod measure;
+pub mod needs;
+pub mod pareto;
+pub mod pressure_size;
+pub mod pressure_solve;
+pub mod report;
+pub mod row;
+pub mod run_point;
+pub mod single;
+pub mod spring_drop;
+pub mod spring_static;
+pub mod stability;
+pub mod stability_contact;
+pub mod stability_fluid;
+pub mod wall_of_cubes;
+mod work_precision;
+
+use engine::{Context, Job, Options};
+use report::Report;
+use row::Row;
+use seixo::error::Result;
+
+/// Makes a report of the rows, for a wanted error; may add values to them.
+pub type Finish = Box<dyn Fn(&mut [Row], Option<f64>) -> Result<Report>>;
+
+/// A study, ready to run.
+pub struct Study {
+    /// Name.
+    pub name: String,
+    /// First line of charts and report.
+    pub title: String,
+    /// What it asks.
+    pub question: String,
+    /// Its points.
+    pub jobs: Vec<Job>,
+    /// What to make of them.
+    pub finish: Finish,
+}
+
+impl Study {
+    /// Run what is open, and write the results of all that is there. Returns the rows and the findings.
+    ///
+    /// # Errors
+    /// [`seixo::error::Error::Io`], or a reference that cannot be read.
+    pub fn run(
+        &self,
+        options: &Options,
+        context: &Context,
+        wanted: Option<f64>,
+    ) -> Result<(Vec<Row>, String)> {
+        let mut rows = engine::sweep(&self.name, &self.jobs, options, context)?;
+        let report = (self.finish)(&mut rows, wanted)?;
+        let text = report::write(&options.out, &self.name, &self.title, &self.question, &rows, &report)?;
+        Ok((rows, text))
+    }
+}

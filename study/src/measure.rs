@@ -1,0 +1,328 @@
+//! Measures on a running simulation, against analytic solutions where there is one.
+
+use super::row::Measured;
+use glam::DVec3;
+use seixo::error::{Error, Result};
+use seixo::fields::{Fields, State};
+use seixo::run::Due;
+use seixo::run::gauges::level;
+use seixo::scene::{Kind, Scene, Shape};
+use seixo::simulation::Simulation;
+use serde::Deserialize;
+
+/// A measure of a study file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// Pressure of water at rest, P = rho g z below the surface: rms over all inner fluid particles and the window,
+    /// over rho g H; slope dP/dz over rho g.
+    HydrostaticPressure,
+    /// One wall particle, the nearest to the first pressure gauge: mean, standard deviation and rms jump from
+    /// sample to sample, over rho g H.
+    Sensor,
+    /// Kinetic energy of water at rest, and the speed that it stands for over sqrt(g H).
+    KineticEnergy,
+    /// Depth from the centroid, 2 (z_c - floor) / H.
+    Volume,
+    /// Front of the water: the 99.9th percentile of x over time, and scaled for comparison with experiments.
+    Front,
+    /// Kinetic plus potential energy of the water over its start, over time.
+    Energy,
+    /// Draft of the first body at rest against Archimedes' law.
+    Draft,
+    /// Height of the first body's centre over time.
+    BodyHeight,
+}
+
+/// What to measure, and when.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct Spec {
+    /// Measures.
+    pub of: Vec<Measure>,
+    /// Start of the window of means [s].
+    pub from: f64,
+    /// Interval between samples [s].
+    pub every: f64,
+}
+
+/// Sums and curves of a run.
+pub struct Sampler {
+    spec: Spec,
+    due: Due,
+    floor: f64,
+    width: f64,
+    left: f64,
+    weight: f64,
+    sensor: Option<usize>,
+    samples: f64,
+    square: f64,
+    slope: f64,
+    kinetic: f64,
+    depth: f64,
+    sensed: Vec<f64>,
+    draft: Vec<[f64; 2]>,
+    tilt: f64,
+    speed_body: f64,
+    energy_start: f64,
+    rise: f64,
+    density_error: f64,
+    iterations_max: u32,
+    front: Vec<[f64; 2]>,
+    energy: Vec<[f64; 2]>,
+    height: Vec<[f64; 2]>,
+}
+
+impl Sampler {
+    /// For a run of `simulation`.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if the case lacks what a measure needs.
+    pub fn new(spec: &Spec, simulation: &Simulation, scene: &Scene) -> Result<Self> {
+        let has = |m| spec.of.contains(&m);
+        let case = &simulation.case;
+        let block = case.fluid.as_ref().and_then(|f| f.block.first());
+        let needs = |what: &str| Error::Case(format!("this study measures what the case lacks: {what}"));
+        if block.is_none() && spec.of.iter().any(|m| *m != Measure::BodyHeight) {
+            return Err(needs("a fluid.block"));
+        }
+        if (has(Measure::Draft) || has(Measure::BodyHeight)) && scene.solids.is_empty() {
+            return Err(needs("a body"));
+        }
+        let sensor = match case.gauge.pressure.first().filter(|_| has(Measure::Sensor)) {
+            None if has(Measure::Sensor) => return Err(needs("a gauge.pressure")),
+            None => None,
+            Some(gauge) => {
+                let point = DVec3::from(gauge.point);
+                let distance = |s: &usize| scene.position[*s].distance(point);
+                scene.groups.static_wall_range().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            }
+        };
+        let params = &simulation.params;
+        Ok(Self {
+            due: Due::new((spec.every > 0.0).then_some(spec.every)),
+            floor: block.map_or(0.0, |b| b.min[2]),
+            left: block.map_or(0.0, |b| b.min[0]),
+            width: block.map_or(1.0, |b| b.max[0] - b.min[0]),
+            weight: params.density * params.gravity.length(),
+            spec: spec.clone(),
+            sensor,
+            samples: 0.0,
+            square: 0.0,
+            slope: 0.0,
+            kinetic: 0.0,
+            depth: 0.0,
+            sensed: Vec::new(),
+            draft: Vec::new(),
+            tilt: 0.0,
+            speed_body: 0.0,
+            energy_start: 0.0,
+            rise: 0.0,
+            density_error: 0.0,
+            iterations_max: 0,
+            front: Vec::new(),
+            energy: Vec::new(),
+            height: Vec::new(),
+        })
+    }
+
+    fn has(&self, measure: Measure) -> bool {
+        self.spec.of.contains(&measure)
+    }
+
+    /// After a step of `iterations` of the pressure solver; samples if one is due.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn sample(&mut self, simulation: &mut Simulation, iterations: u32) -> Result<()> {
+        self.iterations_max = self.iterations_max.max(iterations);
+        let first = simulation.steps == 0;
+        if !first && !self.due.reached(simulation.time) {
+            return Ok(());
+        }
+        let t = simulation.time;
+        let in_window = !first && t >= self.spec.from - 1e-9;
+        if self.has(Measure::BodyHeight) {
+            self.height.push([t, simulation.solids.poses()[0].position.z]);
+        }
+        if !simulation.plan.wet() {
+            return Ok(());
+        }
+        let monitor = simulation.backend.monitor()?;
+        let energy = monitor.kinetic + monitor.potential;
+        let depth = simulation.params.depth;
+        // From the floor of the first block, so that the ratio does not depend on the origin.
+        let mass = monitor.particles as f64 * simulation.params.particle_mass();
+        let ground = mass * simulation.params.gravity.length() * self.floor;
+        if first {
+            self.energy_start = energy - ground;
+        }
+        let ratio = (energy - ground) / self.energy_start;
+        self.rise = self.rise.max(ratio - 1.0);
+        if self.has(Measure::Energy) {
+            self.energy.push([t, ratio]);
+        }
+        let fields_wanted = self.has(Measure::Front)
+            || in_window && (self.has(Measure::HydrostaticPressure) || self.has(Measure::Draft));
+        let fields = if fields_wanted { Some(simulation.backend.read()?) } else { None };
+        if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::Front)) {
+            self.front.push([t, front(fields, simulation.groups.fluid)]);
+        }
+        if !in_window {
+            return Ok(());
+        }
+        self.samples += 1.0;
+        self.kinetic += monitor.kinetic;
+        self.density_error += monitor.density_error_mean;
+        let centroid = monitor.centroid[2] - self.floor;
+        self.depth += 2.0 * centroid / depth;
+        if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::HydrostaticPressure)) {
+            // The pressure is zero at the centres of the topmost particles, half a spacing below the surface.
+            let surface = self.floor + 2.0 * centroid - 0.5 * simulation.params.spacing;
+            let (rms, slope) = hydrostatics(fields, simulation.groups.fluid, surface, self.weight);
+            self.square += (rms / (self.weight * depth)).powi(2);
+            self.slope += slope;
+        }
+        if let Some(slot) = self.sensor {
+            let p = simulation.backend.pressures(&[slot])?;
+            self.sensed.push(p.first().map_or(f64::NAN, |p| p / (self.weight * depth)));
+        }
+        if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::Draft)) {
+            self.sample_draft(simulation, fields);
+        }
+        Ok(())
+    }
+
+    fn sample_draft(&mut self, simulation: &Simulation, fields: &Fields) {
+        let pose = &simulation.solids.poses()[0];
+        let params = &simulation.params;
+        // The level where the body is not: a quarter of the way from the tank's corner to its middle.
+        let at = simulation
+            .case
+            .tank
+            .as_ref()
+            .map_or([0.0, 0.0], |t| [0, 1].map(|k| t.min[k] + 0.125 * (t.max[k] - t.min[k])));
+        let (reach, l0) = (params.effective_radius, params.spacing);
+        let level = level(fields, &simulation.groups, at, params.dimensions, reach, l0);
+        self.draft.push([level.unwrap_or(f64::NAN), pose.position.z]);
+        let up = pose.orientation * DVec3::Z;
+        self.tilt = self.tilt.max(up.z.clamp(-1.0, 1.0).acos().to_degrees());
+        self.speed_body = self.speed_body.max(pose.velocity.length());
+    }
+
+    /// The results.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn finish(mut self, simulation: &mut Simulation) -> Result<Measured> {
+        let mut out = Measured::default();
+        let mean = |sum: f64| sum / self.samples;
+        let (depth, gravity) = (simulation.params.depth, simulation.params.gravity.length());
+        if simulation.plan.wet() {
+            let counters = simulation.backend.counters()?;
+            out.put("lost particles [-]", counters.lost as f64);
+            out.put("most neighbours [-]", f64::from(counters.neighbours_max));
+            out.put("most iterations [-]", f64::from(self.iterations_max));
+            out.put("energy rise [-]", self.rise);
+            out.put("density error [-]", mean(self.density_error).abs());
+            out.limit("lost particles [-]", 0.0);
+        }
+        if self.has(Measure::HydrostaticPressure) {
+            out.put("pressure error [-]", mean(self.square).sqrt());
+            out.put("slope error [-]", (mean(self.slope) - 1.0).abs());
+            out.put("slope [-]", mean(self.slope));
+        }
+        if self.has(Measure::Sensor) {
+            let n = self.sensed.len() as f64;
+            let average = self.sensed.iter().sum::<f64>() / n;
+            let square = self.sensed.iter().map(|p| (p - average).powi(2)).sum::<f64>() / n;
+            let jumps = self.sensed.windows(2).map(|p| (p[1] - p[0]).powi(2)).sum::<f64>() / (n - 1.0);
+            out.put("sensor mean [-]", average);
+            out.put("sensor noise [-]", square.sqrt());
+            out.put("sensor jump [-]", jumps.sqrt());
+        }
+        if self.has(Measure::KineticEnergy) {
+            let mass = simulation.groups.fluid as f64 * simulation.params.particle_mass();
+            let speed = (2.0 * mean(self.kinetic) / mass).sqrt();
+            out.put("kinetic energy [J]", mean(self.kinetic));
+            out.put("spurious speed [-]", speed / (gravity * depth).sqrt());
+        }
+        if self.has(Measure::Volume) {
+            out.put("volume [-]", mean(self.depth));
+            out.put("volume error [-]", (mean(self.depth) - 1.0).abs());
+        }
+        if self.has(Measure::Draft) {
+            self.finish_draft(simulation, &mut out);
+        }
+        if self.has(Measure::Front) {
+            // T = t sqrt(2 g / L), Z = x / L as in the experiments.
+            let scale = (2.0 * gravity / self.width).sqrt();
+            // The front is a particle's centre; its surface lies half a spacing further on.
+            let half = 0.5 * simulation.params.spacing / self.width;
+            let scaled = self.front.iter().map(|[t, x]| [t * scale, (x - self.left) / self.width + half]);
+            out.curves.insert("front scaled".into(), scaled.collect());
+            out.curves.insert("front".into(), std::mem::take(&mut self.front));
+        }
+        if self.has(Measure::Energy) {
+            out.put("energy left [-]", self.energy.last().map_or(f64::NAN, |e| e[1]));
+            out.curves.insert("energy".into(), std::mem::take(&mut self.energy));
+        }
+        if self.has(Measure::BodyHeight) {
+            out.curves.insert("height".into(), std::mem::take(&mut self.height));
+        }
+        Ok(out)
+    }
+
+    fn finish_draft(&self, simulation: &Simulation, out: &mut Measured) {
+        let Some(body) = simulation.case.body.first() else { return };
+        let n = self.draft.len() as f64;
+        let level = self.draft.iter().map(|d| d[0]).sum::<f64>() / n;
+        let centre = self.draft.iter().map(|d| d[1]).sum::<f64>() / n;
+        let swing = self.draft.iter().map(|d| (d[1] - centre).abs()).fold(0.0, f64::max);
+        let height = body.size[2];
+        let density = simulation.params.density;
+        let volume: f64 = body.size.iter().product();
+        let ratio = body.density.or(body.mass.map(|m| m / volume)).unwrap_or(f64::NAN) / density;
+        let draft = level - (centre - 0.5 * height);
+        out.put("draft [m]", draft);
+        out.put("draft of Archimedes [m]", ratio * height);
+        out.put("draft error [-]", (draft / height - ratio).abs());
+        out.put(
+            "draft error from P = 0 [-]",
+            ((draft - 0.5 * simulation.params.spacing) / height - ratio).abs(),
+        );
+        out.put("draft offset over l0 [-]", (draft - ratio * height) / simulation.params.spacing);
+        out.put("swing over height [-]", swing / height);
+        out.put("tilt [deg]", self.tilt);
+        out.put("speed of the body [m/s]", self.speed_body);
+    }
+}
+
+/// 99.9th percentile of x of the live fluid particles [m].
+pub fn front(fields: &Fields, fluid: usize) -> f64 {
+    let live = (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid);
+    let mut x: Vec<f64> = live.map(|i| fields.position[i].x).collect();
+    x.sort_by(f64::total_cmp);
+    x.get((0.999 * x.len() as f64) as usize).copied().unwrap_or(f64::NAN)
+}
+
+/// Rms of P - rho g (surface - z) [Pa] and slope -dP/dz over rho g [-], over inner fluid particles.
+pub fn hydrostatics(fields: &Fields, fluid: usize, surface: f64, weight: f64) -> (f64, f64) {
+    let [mut e, mut n, mut z, mut p, mut zz, mut zp] = [0.0; 6];
+    for i in (0..fluid).filter(|&i| fields.state[i] == State::Inner) {
+        let (zi, pi) = (fields.position[i].z, fields.pressure[i]);
+        e += (pi - weight * (surface - zi).max(0.0)).powi(2);
+        n += 1.0;
+        z += zi;
+        p += pi;
+        zz += zi * zi;
+        zp += zi * pi;
+    }
+    ((e / n).sqrt(), -(zp / n - z / n * p / n) / (zz / n - (z / n).powi(2)) / weight)
+}
+
+/// Volume of a solid's shape [m3].
+pub fn volume(shape: &Shape) -> f64 {
+    let Shape::Box { half } = shape;
+    8.0 * half.x * half.y * half.z
+}

@@ -1,0 +1,218 @@
+//! A point of a study: what was asked, how it ended, what was measured.
+
+use seixo::error::Error;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version of the files of finished points. A change of meaning of any measure raises it, so that older points
+/// are computed again.
+pub const FORMAT: u32 = 1;
+
+/// How a point ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// It reached its end and no measure is out of its limit.
+    #[default]
+    Ok,
+    /// It reached its end, with a measure beyond its limit: the reason names it.
+    Degraded,
+    /// A guard stopped it: the reason is the guard's.
+    Failed,
+    /// It could not be tried here, e.g. without a GPU.
+    Skipped,
+}
+
+impl Class {
+    /// As in the tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Degraded => "degraded",
+            Self::Failed => "failed",
+            Self::Skipped => "skipped",
+        }
+    }
+}
+
+/// Wall-clock time of the solver alone: no set-up, no measuring, no output.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Median over the repetitions [s].
+    pub median_s: f64,
+    /// Shortest [s].
+    pub shortest_s: f64,
+    /// Longest [s].
+    pub longest_s: f64,
+    /// Number of repetitions.
+    pub repetitions: u32,
+}
+
+impl Timing {
+    /// Of `seconds` [s]; `None` without any.
+    pub fn of(mut seconds: Vec<f64>) -> Option<Self> {
+        seconds.sort_by(f64::total_cmp);
+        let (&shortest_s, &longest_s) = (seconds.first()?, seconds.last()?);
+        let n = seconds.len();
+        let median_s = 0.5 * (seconds[(n - 1) / 2] + seconds[n / 2]);
+        Some(Self { median_s, shortest_s, longest_s, repetitions: n as u32 })
+    }
+}
+
+/// What a point cost, in units that do not depend on the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    /// Particles of all kinds.
+    pub particles: u64,
+    /// Steps.
+    pub steps: u64,
+    /// Particles times steps.
+    pub particle_steps: u64,
+    /// Iterations of the pressure solver, all steps.
+    pub iterations: u64,
+    /// Products with the fine matrix that these amount to, preconditioner included.
+    pub products: f64,
+}
+
+/// What a point measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// How it ended.
+    pub class: Class,
+    /// Why it is not `ok`.
+    pub reason: String,
+    /// Numbers by name, `name [unit]`; only finite ones.
+    pub values: BTreeMap<String, f64>,
+    /// Curves by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub curves: BTreeMap<String, Vec<[f64; 2]>>,
+    /// Wall-clock time.
+    pub timing: Option<Timing>,
+    /// Work.
+    pub work: Work,
+    /// Processor, e.g. `CPU, 2 threads, f64`.
+    pub machine: String,
+}
+
+impl Measured {
+    /// A point that `error` ended.
+    pub fn failed(error: &Error) -> Self {
+        let class = if matches!(error, Error::Gpu(_)) { Class::Skipped } else { Class::Failed };
+        Self { class, reason: error.to_string(), ..Self::default() }
+    }
+
+    /// Keep `value` as `name`; what is not finite is not kept, and makes a point that was fine degraded.
+    pub fn put(&mut self, name: &str, value: f64) {
+        if value.is_finite() {
+            self.values.insert(name.into(), value);
+        } else {
+            self.degrade(&format!("{name} is not a number"));
+        }
+    }
+
+    /// Call the point degraded, unless it is worse already.
+    pub fn degrade(&mut self, reason: &str) {
+        if self.class <= Class::Degraded {
+            self.class = Class::Degraded;
+            if !self.reason.is_empty() {
+                self.reason.push_str("; ");
+            }
+            self.reason.push_str(reason);
+        }
+    }
+
+    /// Degraded if `name` was measured above `most`.
+    pub fn limit(&mut self, name: &str, most: f64) {
+        if let Some(&value) = self.values.get(name).filter(|v| **v > most) {
+            self.degrade(&format!("{name} = {value:.3e} > {most:.3e}"));
+        }
+    }
+
+    /// A value.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.values.get(name).copied()
+    }
+}
+
+/// A point of a study, as in `points/HASH.json`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// Name of the study.
+    pub study: String,
+    /// Place in the sweep, from 0.
+    pub index: usize,
+    /// Hash of everything that the result depends on.
+    pub hash: String,
+    /// Line of the plot that it belongs to.
+    pub method: String,
+    /// What was varied.
+    pub parameters: BTreeMap<String, String>,
+    /// What was measured.
+    #[serde(flatten)]
+    pub measured: Measured,
+}
+
+impl Row {
+    /// A parameter as a number.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.parameters.get(name)?.parse().ok()
+    }
+
+    /// The parameters in words.
+    pub fn setting(&self) -> String {
+        let parts: Vec<String> = self.parameters.iter().map(|(k, v)| format!("{k} = {v}")).collect();
+        parts.join(", ")
+    }
+
+    /// Method and parameters in words, without what the method says already.
+    pub fn label(&self) -> String {
+        let more = self.parameters.iter().filter(|(_, v)| !self.method.contains(v.as_str()));
+        let parts: Vec<String> = more.map(|(k, v)| format!("{k} = {v}")).collect();
+        if parts.is_empty() { self.method.clone() } else { format!("{}, {}", self.method, parts.join(", ")) }
+    }
+}
+
+/// 64-bit FNV-1a, as 16 hexadecimal digits: the same on every machine and in every version of the compiler.
+pub fn hash(parts: &[&str]) -> String {
+    let mut h = 0xcbf2_9ce4_8422_2325_u64;
+    for part in parts {
+        // The length keeps ("ab", "c") from ("a", "bc").
+        for byte in part.len().to_le_bytes().iter().chain(part.as_bytes()) {
+            h = (h ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    format!("{h:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Class, Measured, Row, Timing, hash};
+
+    #[test]
+    fn median_and_spread() {
+        let t = Timing::of(vec![3.0, 1.0, 2.0, 10.0]).unwrap();
+        assert_eq!((t.median_s, t.shortest_s, t.longest_s, t.repetitions), (2.5, 1.0, 10.0, 4));
+        assert!(Timing::of(Vec::new()).is_none());
+    }
+
+    #[test]
+    fn a_row_comes_back_from_its_file_to_the_last_bit() {
+        let mut measured = Measured { timing: Timing::of(vec![0.1, 0.3]), ..Measured::default() };
+        measured.put("error [-]", 0.1 + 0.2);
+        measured.put("bad [-]", f64::NAN);
+        measured.curves.insert("front".into(), vec![[0.0, 1.0 / 3.0]]);
+        assert_eq!(measured.class, Class::Degraded);
+        let row = Row { study: "s".into(), measured, ..Row::default() };
+        let text = serde_json::to_string(&row).unwrap();
+        assert_eq!(serde_json::from_str::<Row>(&text).unwrap(), row);
+    }
+
+    #[test]
+    fn the_hash_is_fixed_and_keeps_parts_apart() {
+        assert_eq!(hash(&["a"]), hash(&["a"]));
+        assert_ne!(hash(&["ab", "c"]), hash(&["a", "bc"]));
+        assert_eq!(hash(&[]), "cbf29ce484222325");
+    }
+}

@@ -1,0 +1,229 @@
+//! Error against wall time and against particle-steps: charts, Pareto front, recommendation in words.
+
+use super::pareto::{Candidate, Recommendation, front, recommend};
+use super::report::{Report, short};
+use super::row::{Class, Row};
+use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
+
+/// What is on the horizontal axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// Median wall-clock time of the solver [s].
+    WallTime,
+    /// Particles times steps; the same on every machine.
+    ParticleSteps,
+    /// Products with the fine matrix of the pressure equation.
+    Products,
+}
+
+impl Cost {
+    fn of(self, row: &Row) -> Option<f64> {
+        match self {
+            Self::WallTime => row.measured.timing.map(|t| t.median_s),
+            Self::ParticleSteps => Some(row.measured.work.particle_steps as f64),
+            Self::Products => Some(row.measured.work.products),
+        }
+        .filter(|c| *c > 0.0)
+    }
+
+    fn label(self) -> &'static str {
+        match self {
+            Self::WallTime => "wall time of the solver [s]",
+            Self::ParticleSteps => "particles x steps [-]",
+            Self::Products => "products with the fine matrix [-]",
+        }
+    }
+
+    fn file(self) -> &'static str {
+        match self {
+            Self::WallTime => "time",
+            Self::ParticleSteps => "work",
+            Self::Products => "products",
+        }
+    }
+}
+
+/// Points that ended well enough to be compared.
+fn candidates(rows: &[Row], error: &str, cost: Cost) -> Vec<Candidate> {
+    let usable = rows.iter().enumerate().filter(|(_, r)| r.measured.class <= Class::Degraded);
+    usable
+        .filter_map(|(row, r)| Some(Candidate { row, cost: cost.of(r)?, error: r.measured.value(error)? }))
+        .collect()
+}
+
+/// Name of the file of a chart: the error's name without units and signs.
+pub fn file_name(study: &str, error: &str, what: &str) -> String {
+    let plain = error.split('[').next().unwrap_or(error).trim();
+    let plain: String = plain.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+    let plain = plain.to_lowercase();
+    let parts: Vec<&str> = plain.split('_').filter(|p| !p.is_empty()).collect();
+    format!("{study}-{}-{what}", parts.join("_"))
+}
+
+/// Processors of `rows`, for the second line of a chart.
+pub fn machines(rows: &[Row]) -> String {
+    let mut names: Vec<&str> =
+        rows.iter().map(|r| r.measured.machine.as_str()).filter(|m| !m.is_empty()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.join("; ")
+}
+
+/// Methods in the order of their first row.
+fn methods(rows: &[Row]) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !names.contains(&row.method.as_str()) {
+            names.push(&row.method);
+        }
+    }
+    names
+}
+
+/// The chart of `error` against `cost`, with one line for each method; `None` without a point.
+pub fn chart(title: &str, rows: &[Row], error: &str, cost: Cost) -> Option<Chart> {
+    let all = candidates(rows, error, cost);
+    if all.is_empty() {
+        return None;
+    }
+    let mut series = Vec::new();
+    let best: Vec<[f64; 2]> = front(&all).iter().map(|c| [c.cost, c.error]).collect();
+    series.push(Series::line("Pareto front", "#bbbbbb", Stroke::Dashed, best.clone()));
+    let marks = [Mark::Circle, Mark::Square, Mark::Triangle];
+    for (k, method) in methods(rows).into_iter().enumerate() {
+        let mut own: Vec<&Candidate> = all.iter().filter(|c| rows[c.row].method == method).collect();
+        own.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let spread =
+            own.iter().filter_map(|c| rows[c.row].measured.timing).map(|t| [t.shortest_s, t.longest_s]);
+        series.push(Series {
+            name: method.into(),
+            color: COLORS[k % COLORS.len()].into(),
+            points: own.iter().map(|c| [c.cost, c.error]).collect(),
+            spread: if cost == Cost::WallTime { spread.collect() } else { Vec::new() },
+            stroke: Some(Stroke::Solid),
+            mark: Some((marks[k / COLORS.len() % marks.len()], 4.5)),
+        });
+    }
+    series.push(Series::marks("on the front", "#000000", Mark::Cross, 6.0, best));
+    Some(Chart {
+        title: format!("{title}: {error}"),
+        subtitle: machines(rows),
+        x: Axis::log(cost.label()),
+        y: Axis::log(error),
+        series,
+    })
+}
+
+/// The setting to take for a wanted error, in words.
+pub fn words(rows: &[Row], error: &str, wanted: f64) -> String {
+    let all = candidates(rows, error, Cost::WallTime);
+    let tell = |c: &Candidate| {
+        let row = &rows[c.row];
+        let time = row.measured.timing.map_or_else(String::new, |t| {
+            format!(
+                "; {} s (median of {}, {} to {} s)",
+                short(t.median_s),
+                t.repetitions,
+                short(t.shortest_s),
+                short(t.longest_s)
+            )
+        });
+        let degraded = if row.measured.class == Class::Degraded {
+            format!(" (degraded: {})", row.measured.reason)
+        } else {
+            String::new()
+        };
+        format!(
+            "{}: error {}{time}, {} particle-steps, on {}{degraded}",
+            row.label(),
+            short(c.error),
+            short(row.measured.work.particle_steps as f64),
+            row.measured.machine
+        )
+    };
+    match recommend(&all, wanted) {
+        Recommendation::Meets(c) => {
+            format!("For a {error} of at most {} take {}.", short(wanted), tell(&c))
+        }
+        Recommendation::Closest(c) => {
+            format!("No setting tried reaches a {error} of {}. The closest is {}.", short(wanted), tell(&c))
+        }
+        Recommendation::Nothing => format!("No point of this study has a {error} and a run time."),
+    }
+}
+
+/// Charts and words for every one of `errors`; `wanted` is the error that the user asks for, or half of the
+/// decades that the points cover.
+pub fn report(name: &str, title: &str, rows: &[Row], errors: &[String], wanted: Option<f64>) -> Report {
+    let mut report = Report::default();
+    for error in errors {
+        for cost in [Cost::WallTime, Cost::ParticleSteps] {
+            if let Some(chart) = chart(title, rows, error, cost) {
+                report.charts.push((file_name(name, error, cost.file()), chart));
+            }
+        }
+        let all = candidates(rows, error, Cost::WallTime);
+        let (least, most) = all
+            .iter()
+            .filter(|c| c.error > 0.0)
+            .fold((f64::INFINITY, 0.0_f64), |(a, b), c| (a.min(c.error), b.max(c.error)));
+        let middle = if most > 0.0 { (least * most).sqrt() } else { 0.0 };
+        report.findings.push(words(rows, error, wanted.unwrap_or(middle)));
+        let best: Vec<String> = front(&all).iter().map(|c| rows[c.row].label()).collect();
+        if best.len() > 1 {
+            report.findings.push(format!("Pareto front of {error}, cheapest first: {}.", best.join(" -> ")));
+        }
+    }
+    report
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::row::{Measured, Timing};
+
+    fn rows() -> Vec<Row> {
+        let row = |method: &str, l0: &str, time: f64, error: f64, class: Class| Row {
+            method: method.into(),
+            parameters: [("spacing".to_string(), l0.to_string())].into(),
+            measured: Measured {
+                class,
+                values: [("e [-]".to_string(), error)].into(),
+                timing: Timing::of(vec![time]),
+                machine: "CPU".into(),
+                ..Measured::default()
+            },
+            ..Row::default()
+        };
+        vec![
+            row("paper", "0.05", 1.0, 0.2, Class::Ok),
+            row("paper", "0.025", 8.0, 0.1, Class::Ok),
+            row("accurate", "0.05", 1.1, 0.05, Class::Ok),
+            row("accurate", "0.025", 9.0, 0.01, Class::Ok),
+            row("accurate", "0.1", 0.1, 0.001, Class::Failed),
+        ]
+    }
+
+    #[test]
+    fn the_recommendation_names_setting_error_and_time_and_passes_over_what_failed() {
+        let rows = rows();
+        let text = words(&rows, "e [-]", 0.06);
+        assert!(
+            text.starts_with("For a e [-] of at most 0.06 take accurate, spacing = 0.05: error 0.05; 1.1 s"),
+            "{text}"
+        );
+        assert!(words(&rows, "e [-]", 1e-9).contains("closest is accurate, spacing = 0.025"));
+        assert!(words(&rows, "f [-]", 0.1).starts_with("No point"));
+    }
+
+    #[test]
+    fn a_chart_has_one_line_a_method_and_the_front() {
+        let rows = rows();
+        let chart = chart("t", &rows, "e [-]", Cost::WallTime).unwrap();
+        let names: Vec<&str> = chart.series.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["Pareto front", "paper", "accurate", "on the front"]);
+        // 0.2 at 1 s, 0.05 at 1.1 s, 0.01 at 9 s; the paper's fine run is beaten.
+        assert_eq!(chart.series[0].points, [[1.0, 0.2], [1.1, 0.05], [9.0, 0.01]]);
+        assert_eq!(file_name("s", "pressure error [-]", "time"), "s-pressure_error-time");
+    }
+}

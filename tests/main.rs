@@ -1,0 +1,24 @@
+//! The integration tests: the solver against analytic results and against itself on the device, the studies, the
+//! program as a user meets it. One binary, linked once; `cargo test --release --test seixo NAME` runs a part.
+#![allow(missing_docs)]
+
+mod common;
+
+mod allocation;
+mod case;
+mod cases;
+mod cli;
+mod compare;
+mod contact;
+mod contact_device;
+mod device;
+mod fluid;
+mod immersed;
+mod kernels;
+mod ledger;
+mod output;
+mod scene;
+mod shaders;
+mod stability;
+mod study;
+mod twins;
