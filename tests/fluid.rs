@@ -8,7 +8,7 @@ use seixo::backend::cpu::Cpu;
 use seixo::fields::State;
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Lattice, Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::cg::{Jacobi, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
@@ -33,7 +33,12 @@ fn prepared(text: &seixo::case::Case, shake: f64) -> (Cpu, Params, Step) {
     let plan = Plan::new(text, &scene, &params);
     let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
     let step = params.step(0.0, text.run.time_step, 1.0);
-    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+    for stage in [
+        ParticleStage::CellList,
+        ParticleStage::NeighbourList,
+        ParticleStage::NumberDensity,
+        ParticleStage::PressureSource,
+    ] {
         cpu.run(stage, &step).unwrap();
     }
     (cpu, params, step)
@@ -97,8 +102,8 @@ fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pr
         fields.pressure[i] = 1e4 + gradient.dot(fields.position[i]);
     }
     *cpu.fields_mut() = fields.clone();
-    cpu.run(Stage::PressureSource, &step).unwrap();
-    cpu.run(Stage::PressureGradient, &step).unwrap();
+    cpu.run(ParticleStage::PressureSource, &step).unwrap();
+    cpu.run(ParticleStage::PressureGradient, &step).unwrap();
     let expected = -(0.3 + 0.5 + 1.1) * params.density / step.dt;
     let mut checked = 0;
     for i in 0..cpu.groups().fluid {
@@ -140,7 +145,7 @@ fn the_corrected_gradient_stays_exact_on_shaken_positions() {
         }
         fields.pressure[i] = 1e4;
         *cpu.fields_mut() = fields.clone();
-        cpu.run(Stage::PressureGradient, &step).unwrap();
+        cpu.run(ParticleStage::PressureGradient, &step).unwrap();
         let minimum = row_minimum(&fields.pressure, i, &cpu);
         let m = moment(&fields.position, i, &cpu, &params);
         let shift = (1e4 - minimum) * (m.1.inverse() * m.0);
@@ -435,7 +440,7 @@ fn deviation_of_stretched(factors: DVec3) -> f64 {
     let plan = Plan::new(&text, &scene, &params);
     let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
     let step = params.step(0.0, text.run.time_step, 1.0);
-    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList, ParticleStage::NumberDensity, ParticleStage::PressureSource] {
         cpu.run(stage, &step).unwrap();
     }
     let at = |i: &usize| cpu.fields().position[*i].distance(middle);
@@ -474,7 +479,7 @@ fn the_divergence_stays_exact_and_still_water_balanced_on_shaken_positions() {
         let still: Vec<f64> = x.iter().take(cpu.groups().pressure()).map(|&x| depth(x)).collect();
         let fields = cpu.fields_mut();
         fields.velocity.fill(DVec3::ZERO);
-        cpu.run(Stage::PressureSource, &step).unwrap();
+        cpu.run(ParticleStage::PressureSource, &step).unwrap();
         let a = system(&cpu, &params);
         let (mut q, mut sums) = (vec![0.0; still.len()], Vec::new());
         a.multiply(&still, &mut q, &mut sums);
@@ -497,7 +502,7 @@ fn the_divergence_stays_exact_and_still_water_balanced_on_shaken_positions() {
         fields.velocity[i] = gradient * fields.position[i];
     }
     let before = cpu.fields().source.clone();
-    cpu.run(Stage::PressureSource, &step).unwrap();
+    cpu.run(ParticleStage::PressureSource, &step).unwrap();
     let expected = -(0.3 - 0.5 + 1.1) * params.density / step.dt;
     let mut checked = 0;
     for i in 0..cpu.groups().fluid {

@@ -12,7 +12,7 @@ use seixo::kernels::cell_list::{CellList, Scratch};
 use seixo::kernels::neighbour_list::{Candidates, neighbour_list};
 use seixo::kernels::{Particles, number_density, pressure_gradient, pressure_source, viscosity};
 use seixo::params::{Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::scene::{Groups, Scene};
 
@@ -40,12 +40,12 @@ impl Water {
         let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
         cpu.move_solids(&common::poses(&scene, 0.01)).expect("moves");
         let step = params.step(0.0, 1e-3, 2.0);
-        cpu.run(Stage::CellList, &step).expect("runs");
-        cpu.run(Stage::NeighbourList, &step).expect("runs");
+        cpu.run(ParticleStage::CellList, &step).expect("runs");
+        cpu.run(ParticleStage::NeighbourList, &step).expect("runs");
         Self { cpu, params, scene, step }
     }
 
-    fn run(&mut self, stage: Stage) {
+    fn run(&mut self, stage: ParticleStage) {
         self.cpu.run(stage, &self.step).expect("the CPU runs");
     }
 
@@ -122,7 +122,7 @@ fn the_fast_search_finds_the_plain_rows() {
 #[test]
 fn the_fast_viscosity_is_the_plain_one() {
     each(|s| {
-        s.run(Stage::Viscosity);
+        s.run(ParticleStage::Viscosity);
         let on = s.particles();
         let row = |i: usize| s.cpu.neighbours().pressure(i).neighbour;
         let g = s.groups();
@@ -137,7 +137,7 @@ fn the_fast_viscosity_is_the_plain_one() {
 #[test]
 fn the_fast_number_density_is_the_plain_one() {
     each(|s| {
-        s.run(Stage::NumberDensity);
+        s.run(ParticleStage::NumberDensity);
         let f = s.cpu.fields();
         for i in 0..s.groups().pressure() {
             let row = s.cpu.neighbours().all(i);
@@ -159,8 +159,8 @@ fn the_fast_number_density_is_the_plain_one() {
 #[test]
 fn the_fast_pressure_source_is_the_plain_one() {
     each(|s| {
-        s.run(Stage::NumberDensity);
-        s.run(Stage::PressureSource);
+        s.run(ParticleStage::NumberDensity);
+        s.run(ParticleStage::PressureSource);
         let f = s.cpu.fields();
         let scale = f.source.iter().fold(0.0_f64, |s, b| s.max(b.abs()));
         let (mut rows, mut walls) = (0, 0);
@@ -180,11 +180,11 @@ fn the_fast_pressure_source_is_the_plain_one() {
 #[test]
 fn the_fast_pressure_gradient_is_the_plain_one() {
     each(|s| {
-        s.run(Stage::NumberDensity);
+        s.run(ParticleStage::NumberDensity);
         for (i, p) in s.cpu.fields_mut().pressure.iter_mut().enumerate() {
             *p = 1000.0 * (1.0 + common::noise(i));
         }
-        s.run(Stage::PressureGradient);
+        s.run(ParticleStage::PressureGradient);
         let f = s.cpu.fields();
         let plain = |i: usize| {
             let row = s.cpu.neighbours().parts(i);

@@ -17,7 +17,7 @@ pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, params:
 /// What the pressure lacks at the water's surface [Pa]. With the source of Eq. (8) P = 0 holds at the centres of the
 /// surface particles, half a spacing below the surface. The balanced source carries the whole weight of the water:
 /// they rest on a pressure that stands half a spacing higher.
-fn missing_head(params: &Params) -> f64 {
+pub fn missing_head(params: &Params) -> f64 {
     match params.source {
         Source::NumberDensity => 0.5 * params.spacing * params.density * params.gravity.length(),
         Source::Mixed => 0.0,

@@ -17,7 +17,6 @@
 pub mod folder;
 pub mod particles;
 pub mod picture;
-pub mod plot;
 pub mod pvd;
 pub mod render;
 pub mod result;

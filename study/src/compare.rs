@@ -2,8 +2,8 @@
 
 use super::definition::{Definition, ErrorMeasure, Files};
 use super::row::{Class, Row};
+use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use seixo::error::{Error, Result};
-use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 
 impl ErrorMeasure {
     /// Name of the error, as in the tables.

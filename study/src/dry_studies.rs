@@ -10,9 +10,9 @@ use super::spring_static::{
     DAMPING_RATIOS, PAPER_LARGEST, PAPER_LIMIT, SPRINGS, amplitude, oscillation, oscillation_error,
 };
 use super::{Study, work_precision};
+use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use seixo::case::Law;
 use seixo::error::Result;
-use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use std::time::Instant;
 
 /// Runs of a point for its time. Set-up is in it, which takes microseconds.

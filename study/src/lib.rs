@@ -9,7 +9,7 @@
 //! | `points/HASH.json` | a finished point; the hash is that of everything it depends on |
 //! | `results.csv`, `results.json` | all points |
 //! | `report.md` | findings in words, charts, the table |
-//! | `NAME.svg`, `NAME.png` | charts |
+//! | `NAME.svg` | charts |
 
 pub mod bench;
 pub mod builtin;
@@ -30,6 +30,8 @@ pub mod incline;
 pub mod measure;
 pub mod needs;
 pub mod pareto;
+pub mod plot;
+mod plot_svg;
 pub mod pressure_size;
 pub mod pressure_solve;
 pub mod report;

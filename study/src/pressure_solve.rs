@@ -9,6 +9,7 @@ use super::row::{Measured, Row, Timing, Work};
 use super::run_point::products;
 use super::single::Matrix;
 use super::work_precision::{Cost, chart, machines, words};
+use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use glam::DVec3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -16,9 +17,8 @@ use seixo::case::Preconditioner;
 use seixo::case::file::parse;
 use seixo::error::Result;
 use seixo::kernels::pressure_source::laplacian_coefficient;
-use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use seixo::params::{Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::pressure::cg::{Jacobi, Precondition, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
@@ -87,7 +87,12 @@ impl Column {
 
     /// `backend`, stopped before the solve.
     pub(super) fn prepare(&self, backend: &mut dyn Backend) -> Result<()> {
-        for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+        for stage in [
+            ParticleStage::CellList,
+            ParticleStage::NeighbourList,
+            ParticleStage::NumberDensity,
+            ParticleStage::PressureSource,
+        ] {
             backend.run(stage, &self.step)?;
         }
         Ok(())

@@ -1,8 +1,8 @@
-//! What a study leaves: results.csv, results.json, report.md, and its charts as SVG and PNG.
+//! What a study leaves: results.csv, results.json, report.md, and its charts as SVG.
 
 use super::row::{Class, Row};
+use crate::plot::Chart;
 use seixo::error::{Error, Result};
-use seixo::output::plot::Chart;
 use seixo::output::table::{Cell, Table};
 use seixo::output::write_whole;
 use serde::Serialize;

@@ -8,8 +8,8 @@ use super::report::{Report, short};
 use super::row::{Class, Row};
 use super::work_precision::machines;
 use super::{Study, stability_contact, stability_fluid};
+use crate::plot::{Axis, Chart, Mark, Series, Stroke};
 use seixo::error::Result;
-use seixo::output::plot::{Axis, Chart, Mark, Series, Stroke};
 
 /// A map: rows of one method prefix over two parameters.
 pub struct Map {

@@ -7,7 +7,7 @@ use super::definition::Setup;
 use super::engine::Job;
 use super::report::{Report, short};
 use super::row::{Measured, Row, Timing};
-use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
+use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 
 const PEAK: &str = "largest overlap during the hit, over l0 [-]";
 const REST: &str = "largest overlap in the last second, over l0 [-]";

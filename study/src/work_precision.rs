@@ -3,7 +3,7 @@
 use super::pareto::{Candidate, Recommendation, front, recommend};
 use super::report::{Report, short};
 use super::row::{Class, Row};
-use seixo::output::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
+use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 
 /// What is on the horizontal axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
