@@ -1,11 +1,12 @@
 //! Which stages and arrays a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{Case, ContactDevice, Law, Preconditioner, Source};
+use crate::case::{self, Case, ContactDevice, Law};
 use crate::compute::Program;
 use crate::contact::device::{paper, smooth};
 use crate::params::Params;
 use crate::scene::{Drive, Scene};
+use crate::scheme::{Preconditioner, Source};
 
 macro_rules! stages {
     ($($(#[$doc:meta])* $name:ident = $text:literal [$($particles:ident)?];)*) => {
@@ -169,7 +170,7 @@ impl ContactPlan {
 pub struct Plan {
     /// For each stage of [`Stage::ALL`]: why it runs (`Ok`) or why it is left out (`Err`).
     pub reasons: Vec<(Stage, Result<&'static str, &'static str>)>,
-    /// Preconditioner of the PPE: [`Preconditioner::Jacobi`] or [`Preconditioner::Multigrid`].
+    /// Preconditioner of the PPE.
     pub preconditioner: Preconditioner,
     /// Under-relaxation of the fluid's force on bodies: F <- s F + (1 - s) F_old with this s; 1 for none.
     pub force_relaxation: f64,
@@ -209,11 +210,11 @@ impl Plan {
             (stage, reason)
         });
         let unknowns = scene.groups.fluid;
-        let asked = case.fluid.as_ref().map_or(Preconditioner::Jacobi, |f| f.solver.preconditioner);
+        let asked = case.fluid.as_ref().map_or(case::Preconditioner::Jacobi, |f| f.solver.preconditioner);
         let preconditioner = match asked {
-            Preconditioner::Auto if unknowns >= MULTIGRID_UNKNOWNS => Preconditioner::Multigrid,
-            Preconditioner::Auto => Preconditioner::Jacobi,
-            typed => typed,
+            case::Preconditioner::Multigrid => Preconditioner::Multigrid,
+            case::Preconditioner::Auto if unknowns >= MULTIGRID_UNKNOWNS => Preconditioner::Multigrid,
+            case::Preconditioner::Auto | case::Preconditioner::Jacobi => Preconditioner::Jacobi,
         };
         // With the velocity in the source, a body much lighter than the water it moves is thrown to and fro by
         // its own added mass; the plain number density source is slow enough not to.
@@ -258,11 +259,6 @@ impl Plan {
             }
             Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,
         }
-    }
-
-    /// `jacobi` or `multigrid`.
-    pub fn preconditioner_name(&self) -> &'static str {
-        if self.preconditioner == Preconditioner::Multigrid { "multigrid" } else { "jacobi" }
     }
 
     /// Whether the scene has fluid to compute.

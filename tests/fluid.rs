@@ -7,7 +7,8 @@ use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::fields::State;
 use seixo::kernels::pressure_source::laplacian_coefficient;
-use seixo::params::{Lattice, Params, Step};
+use seixo::lattice::Lattice;
+use seixo::params::{Params, Step};
 use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::cg::{Jacobi, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
@@ -440,7 +441,12 @@ fn deviation_of_stretched(factors: DVec3) -> f64 {
     let plan = Plan::new(&text, &scene, &params);
     let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
     let step = params.step(0.0, text.run.time_step, 1.0);
-    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList, ParticleStage::NumberDensity, ParticleStage::PressureSource] {
+    for stage in [
+        ParticleStage::CellList,
+        ParticleStage::NeighbourList,
+        ParticleStage::NumberDensity,
+        ParticleStage::PressureSource,
+    ] {
         cpu.run(stage, &step).unwrap();
     }
     let at = |i: &usize| cpu.fields().position[*i].distance(middle);

@@ -5,13 +5,13 @@ use crate::common::moving as common;
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
 use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, WallParticle, counter};
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
-use seixo::case::Preconditioner;
 use seixo::compute::{Host, Program};
 use seixo::contact::device::paper::{self, PaperLaw, PaperPair, PaperPose};
 use seixo::contact::device::smooth::{self, SmoothPair, SmoothPose};
 use seixo::params::Params;
 use seixo::plan::{ContactPlan, Plan};
 use seixo::pressure::Settings;
+use seixo::scheme::Preconditioner;
 use std::collections::BTreeSet;
 use std::mem::offset_of;
 

@@ -11,7 +11,6 @@ use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
 use seixo::body::Pose;
-use seixo::case::Preconditioner;
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Params, Step};
@@ -20,6 +19,7 @@ use seixo::pressure::cg::System;
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::{Kind, Scene};
+use seixo::scheme::Preconditioner;
 use seixo::simulation::Simulation;
 use seixo_study::device_compare::{self as compare, StageError};
 
@@ -499,9 +499,9 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
             .expect("the simulation starts");
             (0..4).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
         };
-        let gpu = iterations(Preconditioner::Multigrid, true);
-        let cpu = iterations(Preconditioner::Multigrid, false);
-        let diagonal = iterations(Preconditioner::Jacobi, true);
+        let gpu = iterations(seixo::case::Preconditioner::Multigrid, true);
+        let cpu = iterations(seixo::case::Preconditioner::Multigrid, false);
+        let diagonal = iterations(seixo::case::Preconditioner::Jacobi, true);
         println!(
             "l0 = {spacing}: at most {gpu} on the device, {cpu} on the CPU, {diagonal} with the diagonal"
         );

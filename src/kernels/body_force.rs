@@ -2,8 +2,8 @@
 //! viscosity and collisions.
 //! GPU twin: shaders/body_force.wgsl
 
-use crate::case::Source;
 use crate::params::Params;
+use crate::scheme::Source;
 use glam::DVec3;
 
 /// Pressure on the true surface of the solid [Pa]. A wall-layer particle's centre lies half a spacing inside the surface

@@ -2,9 +2,10 @@
 //! GPU twin: shaders/number_density.wgsl
 
 use super::Particles;
-use crate::case::FreeSurface;
 use crate::fields::State;
-use crate::params::{Params, weight};
+use crate::lattice::weight;
+use crate::params::Params;
+use crate::scheme::FreeSurface;
 use glam::DVec3;
 
 /// Distance of the neighbours' centroid, over l0, from which a thin particle counts as surface.

@@ -1,15 +1,15 @@
 //! Pressure gradient against the smallest pressure in the neighbourhood, Eq. (9), as an acceleration.
 //! GPU twin: shaders/pressure_gradient.wgsl
 //!
-//! Where the source of the PPE is balanced ([`crate::case::Source::Mixed`]), gravity acts together with the pressure
+//! Where the source of the PPE is balanced ([`crate::scheme::Source::Mixed`]), gravity acts together with the pressure
 //! that carries it, in this stage, and not in `predict`.
 
 use super::Particles;
 use super::moment::{inverse, moment, pair_vector};
-use crate::case::{Gradient, Source};
 use crate::fields::State;
 use crate::neighbours::Row;
 use crate::params::Params;
+use crate::scheme::{Gradient, Source};
 use glam::DVec3;
 
 /// Whether the gradient of a particle is multiplied by the inverse of its moment matrix.

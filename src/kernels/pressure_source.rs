@@ -11,9 +11,10 @@
 
 use super::Particles;
 use super::moment::{inverse, moment, pair_vector};
-use crate::case::Source;
+use crate::lattice::wendland;
 use crate::neighbours::Row;
-use crate::params::{Params, Step, wendland};
+use crate::params::{Params, Step};
+use crate::scheme::Source;
 use glam::{DMat3, DVec3};
 
 /// Coefficient c of the Laplacian, Eq. (6) [1/m2].

@@ -5,7 +5,8 @@
 //! The particles have moved since the list was made: weights are made afresh.
 
 use super::Particles;
-use crate::params::{Params, weight};
+use crate::lattice::weight;
+use crate::params::Params;
 use glam::DVec3;
 
 /// 2 d nu / (lambda n0) [1/s], Eq. (6).

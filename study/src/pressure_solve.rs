@@ -13,7 +13,6 @@ use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use glam::DVec3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
-use seixo::case::Preconditioner;
 use seixo::case::file::parse;
 use seixo::error::Result;
 use seixo::kernels::pressure_source::laplacian_coefficient;
@@ -23,6 +22,7 @@ use seixo::pressure::Settings;
 use seixo::pressure::cg::{Jacobi, Precondition, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
 use seixo::scene::Scene;
+use seixo::scheme::Preconditioner;
 use std::time::Instant;
 
 /// How the equation is solved.

@@ -21,7 +21,6 @@ use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
-use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
@@ -37,6 +36,7 @@ use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
+use crate::scheme::Preconditioner;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -402,8 +402,7 @@ impl Backend for Cpu {
                 let area = pose.orientation * solid.wall_area[k];
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let unknown = fields.state[i] == State::Inner;
-                let pressure =
-                    body_force::surface_pressure(fields.pressure[i], unknown, to_surface, params);
+                let pressure = body_force::surface_pressure(fields.pressure[i], unknown, to_surface, params);
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;

@@ -3,13 +3,14 @@
 use super::moment::{moment, pair_vectors};
 use super::row_arrays::{Columns, RowArrays, sum};
 use super::wide::wide;
-use crate::case::Source;
 use crate::fields::State;
 use crate::kernels::Particles;
 use crate::kernels::moment::{inverse, scale};
 use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source};
+use crate::lattice::wendland;
 use crate::neighbours::{Chunk, Row};
-use crate::params::{Step, wendland};
+use crate::params::Step;
+use crate::scheme::Source;
 use glam::{DMat3, DVec3};
 
 wide! {

@@ -4,8 +4,8 @@ use super::row_arrays::RowArrays;
 use super::wide::wide;
 use crate::kernels::Particles;
 use crate::kernels::viscosity::coefficient;
+use crate::lattice::weight;
 use crate::neighbours::Chunk;
-use crate::params::weight;
 use glam::DVec3;
 
 wide! {

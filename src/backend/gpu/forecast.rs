@@ -140,8 +140,8 @@ impl Forecast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Preconditioner;
     use crate::plan::Stage;
+    use crate::scheme::Preconditioner;
 
     fn sizes() -> Sizes {
         // The transport case at l0 = 7.5 mm.

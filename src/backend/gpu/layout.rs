@@ -384,8 +384,8 @@ impl Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Preconditioner;
     use crate::plan::Stage;
+    use crate::scheme::Preconditioner;
 
     /// The transport case at l0 = 7.5 mm, and nine times as many particles; a good half carries pressure.
     #[test]

@@ -1,9 +1,9 @@
 //! The shaders' sources, the switches that shape them, and what they bind.
 
-use crate::case::{FreeSurface, Gradient, Source};
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Arrays, Plan, Stage};
+use crate::scheme::{FreeSurface, Gradient, Source};
 
 /// Appended to every kernel.
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
