@@ -38,6 +38,15 @@ pub enum FreeSurface {
     ThresholdOffset,
 }
 
+/// How pairs of particles that collide at once share their impulses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Collision {
+    /// The paper's Eq. (18): each as if it were the only one.
+    Single,
+    /// A particle takes part in each of its pairs with a part of its mass.
+    Shared,
+}
+
 /// Preconditioner of the conjugate gradients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preconditioner {

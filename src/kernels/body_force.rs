@@ -3,7 +3,6 @@
 //! GPU twin: shaders/body_force.wgsl
 
 use crate::params::Params;
-use crate::scheme::Source;
 use glam::DVec3;
 
 /// Pressure on the true surface of the solid [Pa]. A wall-layer particle's centre lies half a spacing inside the surface
@@ -14,14 +13,9 @@ pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, params:
     if unknown { (pressure + head).max(0.0) } else { 0.0 }
 }
 
-/// What the pressure lacks at the water's surface [Pa]. With the source of Eq. (8) P = 0 holds at the centres of the
-/// surface particles, half a spacing below the surface. The balanced source carries the whole weight of the water:
-/// they rest on a pressure that stands half a spacing higher.
+/// What the pressure lacks at the water's surface [Pa].
 pub fn missing_head(params: &Params) -> f64 {
-    match params.source {
-        Source::NumberDensity => 0.5 * params.spacing * params.density * params.gravity.length(),
-        Source::Mixed => 0.0,
-    }
+    params.density * params.gravity.length() * params.zero_pressure_depth()
 }
 
 /// Force of one wall-layer particle [N]: -P A + reaction, with `area` in world axes [m2].

@@ -225,23 +225,20 @@ impl Cpu {
 
     fn collision(&mut self, step: &Step) {
         let Self { fields, neighbours, params, groups, .. } = self;
-        let (x, v) = (&fields.position, &fields.velocity);
-        let close = |i: usize| {
-            let chunk = &neighbours.chunks[i / CHUNK];
-            chunk.close[i % CHUNK].then(|| chunk.all(i % CHUNK))
-        };
+        let (position, velocity) = (&fields.position, &fields.velocity);
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let close = |i: usize| neighbours.chunks[i / CHUNK].close[i % CHUNK];
         fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
-            let change = close(i).map(|row| collision::collision(i, row, params, groups.fluid, x, v));
-            *a = change.unwrap_or(DVec3::ZERO) / step.dt;
+            let change = if close(i) { collision::collision(i, neighbours, on) } else { DVec3::ZERO };
+            *a = change / step.dt;
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if let Some(row) = close(i) {
-                *f += collision::reaction(i, row, params, groups.fluid, x, v, step.dt);
+            if close(i) {
+                *f += collision::reaction(i, neighbours, on, step.dt);
             }
         });
         if let Some(ledger) = &mut self.ledger {
-            let on = Particles { params, position: x, velocity: v, fluid: groups.fluid };
             ledger.collision(self.live, on, &fields.acceleration, step.dt);
         }
         self.correct(step.dt);
