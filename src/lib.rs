@@ -19,6 +19,7 @@ pub mod pressure;
 pub mod run;
 pub mod scene;
 pub mod scheme;
+pub mod shape;
 pub mod simulation;
 mod step;
 pub mod time_step;

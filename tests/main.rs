@@ -19,6 +19,7 @@ mod ledger;
 mod output;
 mod scene;
 mod shaders;
+mod shapes;
 mod stability;
 mod study;
 mod twins;
