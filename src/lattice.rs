@@ -6,6 +6,13 @@ pub fn weight(r: f64, re: f64) -> f64 {
     re / r - 1.0
 }
 
+/// Weight W of the smooth density sum, Wendland's C2 without its norm, at `q` = r / re [-].
+#[inline(always)]
+pub fn wendland(q: f64) -> f64 {
+    let rest = (1.0 - q).max(0.0);
+    rest * rest * (rest * rest) * (1.0 + 4.0 * q)
+}
+
 /// Sums over the full cubic (or square) lattice around one particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
@@ -13,6 +20,8 @@ pub struct Lattice {
     pub number_density: f64,
     /// Laplacian correction lambda, Eq. (7), over l0^2 [-].
     pub laplacian: f64,
+    /// Sum W0 of [`wendland`], the particle itself among them [-].
+    pub wendland: f64,
     /// Neighbours closer than the effective radius.
     pub neighbours: u32,
 }
@@ -21,7 +30,7 @@ impl Lattice {
     /// Sums for an effective radius of `radius` spacings in `dimensions` dimensions.
     pub fn new(dimensions: u32, radius: f64) -> Self {
         let m = radius.ceil() as i32;
-        let (mut n, mut s, mut count) = (0.0, 0.0, 0);
+        let (mut n, mut s, mut smooth, mut count) = (0.0, 0.0, wendland(0.0), 0);
         for x in -m..=m {
             for y in if dimensions == 3 { -m..=m } else { 0..=0 } {
                 for z in -m..=m {
@@ -30,12 +39,13 @@ impl Lattice {
                         let w = weight(r2.sqrt(), radius);
                         n += w;
                         s += r2 * w;
+                        smooth += wendland(r2.sqrt() / radius);
                         count += 1;
                     }
                 }
             }
         }
-        Self { number_density: n, laplacian: s / n, neighbours: count }
+        Self { number_density: n, laplacian: s / n, wendland: smooth, neighbours: count }
     }
 }
 

@@ -15,6 +15,8 @@ mod device;
 mod faults;
 mod fluid;
 mod immersed;
+mod kernels;
+mod ledger;
 mod output;
 mod scene;
 mod shaders;

@@ -3,7 +3,7 @@
 use crate::common::moving as common;
 
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
-use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, WallParticle, counter};
+use seixo::backend::gpu::layout::{Coefficients, Constants, FreeBody, MonitorSum, Pose, Solve, WallParticle, counter};
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
 use seixo::compute::{Host, Program};
 use seixo::contact::device::paper::{self, PaperLaw, PaperPair, PaperPose};
@@ -233,6 +233,9 @@ fn structs_lie_the_same_on_both_sides() {
             gradient_scale,
             density,
             tolerance_squared,
+            wendland,
+            surface_head,
+            pad,
         }
     );
     same_layout!(
@@ -251,6 +254,21 @@ fn structs_lie_the_same_on_both_sides() {
     same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
     same_layout!("body_force", WallParticle { area, arm, to_surface });
+    same_layout!(
+        "coupling",
+        FreeBody {
+            inverse_mass,
+            inertia_x,
+            inertia_y,
+            inertia_z,
+            force,
+            torque,
+            first,
+            count,
+            solid,
+            pad,
+        }
+    );
     same_layout!(
         "conjugate_gradient",
         Solve {
@@ -331,7 +349,7 @@ fn constant(text: &str, name: &str) -> f64 {
 fn constants_are_the_same_on_both_sides() {
     use seixo::backend::gpu::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};
     use seixo::fields::State;
-    use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::kernels::{moment::EIGENVALUE_MIN, number_density::CLOSEST, predict::DISPLACEMENT_MAX};
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
     let common = |name: &str| constant(shader::COMMON, name);
@@ -344,6 +362,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(common("INNER"), f64::from(State::Inner as u8));
     assert_eq!(common("DISPLACEMENT_MAX"), DISPLACEMENT_MAX);
     assert_eq!(common("CLOSEST"), CLOSEST);
+    assert_eq!(common("EIGENVALUE_MIN"), EIGENVALUE_MIN);
     for (name, place) in [
         ("LOST", counter::LOST),
         ("DISPLACEMENT_CLAMPS", counter::DISPLACEMENT_CLAMPS),

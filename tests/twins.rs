@@ -6,11 +6,11 @@
 
 use crate::common::moving as common;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
-use seixo::body::Pose;
+use seixo::body::{FreeBody, Pose, Wrench};
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Params, Step};
@@ -424,6 +424,7 @@ fn system<'a>(cpu: &'a Cpu, params: &Params) -> System<'a> {
         state: &f.state,
         diagonal: &f.diagonal,
         coefficient: laplacian_coefficient(params),
+        bodies: &[],
     }
 }
 
@@ -559,6 +560,50 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
             "l0 = {spacing}: at most {gpu} on the device, {cpu} on the CPU, {diagonal} with the diagonal"
         );
         assert!(gpu > 1 && gpu <= 8 && gpu.abs_diff(cpu) <= 1 && diagonal > 2 * gpu);
+    }
+}
+
+#[test]
+fn coupling() {
+    for (dimensions, preconditioner) in
+        [(3, Preconditioner::Jacobi), (2, Preconditioner::Jacobi), (3, Preconditioner::Multigrid)]
+    {
+        let scale = if preconditioner == Preconditioner::Multigrid { 2 } else { [0, 0, 3, 1][dimensions as usize] };
+        let made = Pair::of_size(dimensions, "preset = \"accurate\"", scale, preconditioner);
+        let Some(mut pair) = made else { return };
+        pair.run_all(&LISTS);
+        pair.run_all(&[Stage::Viscosity, Stage::Collision, Stage::NumberDensity, Stage::PressureSource]);
+        pair.gpu.solve_pressure(&pair.step).expect("the device solves");
+        pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
+        let alone = pair.cpu.fields().clone();
+        // A body of a twentieth of the water's density, pressed and turned by something else as well.
+        let volume = f64::from(if dimensions == 3 { 27 } else { 9 }) * pair.params.spacing.powi(3);
+        let mass = 0.05 * pair.params.density * volume;
+        let load = Wrench { force: DVec3::new(0.2, 0.0, -3.0), torque: DVec3::new(0.0, 0.01, 0.0) };
+        let turns = DMat3::from_diagonal(DVec3::new(3.0, 2.0, 4.0));
+        let light = FreeBody {
+            inverse_mass: DVec3::splat(1.0 / mass),
+            inverse_inertia: turns / (mass * pair.params.spacing.powi(2)),
+            load,
+        };
+        let bodies = [FreeBody::default(), light];
+        pair.run(Stage::PressureSource);
+        pair.gpu.free_bodies(&bodies).expect("the device takes them");
+        pair.cpu.free_bodies(&bodies).expect("the CPU takes them");
+        let g = pair.gpu.solve_pressure(&pair.step).expect("the device solves");
+        let c = pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
+        println!("{dimensions}D, {preconditioner:?}\ndevice {g:?}\nCPU    {c:?}");
+        assert_eq!((g.outcome, c.outcome, g.unknowns), (Outcome::Converged, Outcome::Converged, c.unknowns));
+        assert!(g.iterations.abs_diff(c.iterations) <= 2 && g.residual < 2e-4, "{g:?} {c:?}");
+        for e in pair.errors(Stage::ConjugateGradient) {
+            assert!(e.l2_relative < SOLVE, "{:e}", e.l2_relative);
+        }
+        // It takes up what presses on it: the pressure of a body that gives way is another one.
+        let slots = pair.scene.solids[1].wall_slots.clone();
+        let (held, free) = (&alone.pressure[slots.clone()], &pair.cpu.fields().pressure[slots]);
+        let (sum, difference) = held.iter().zip(free).fold((0.0, 0.0), |(s, d), (a, b)| (s + a, d + (a - b).abs()));
+        println!("{sum:.1} Pa held, changed by {difference:.1}");
+        assert!(difference > 0.1 * sum && sum > 0.0);
     }
 }
 

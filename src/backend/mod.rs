@@ -2,14 +2,14 @@
 
 pub mod cpu;
 pub mod gpu;
-mod rows;
 pub mod traffic;
 
 use self::traffic::Traffic;
-use crate::body::{Pose, Wrench};
+use crate::body::{FreeBody, Pose, Wrench};
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{ParticleStage, Stage};
@@ -91,6 +91,9 @@ pub trait Backend: Send {
     fn precision(&self) -> &'static str;
     /// Run one stage.
     fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()>;
+    /// How the moving solids answer forces in the next solve, in the pose given last; needed where the plan has
+    /// [`crate::plan::Arrays::Coupling`].
+    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()>;
     /// Solve the PPE.
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport>;
     /// Give the particles of moving solids the poses of their solids.
@@ -99,6 +102,10 @@ pub trait Backend: Send {
     fn body_force(&mut self) -> Result<Vec<Wrench>>;
     /// What the guards have seen.
     fn counters(&mut self) -> Result<Counters>;
+    /// Work of the stages on the water since the start, if the plan asks for the ledger and the backend keeps one.
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        Ok(None)
+    }
     /// Sums over the fluid.
     fn monitor(&mut self) -> Result<FluidMonitor>;
     /// Both of these, with one wait on a device; [`Self::stage_seconds`] is up to date then.

@@ -1,12 +1,15 @@
 //! One kernel, one name: `shaders/NAME.wgsl` runs on the device, `src/kernels/NAME.rs` is its twin, a
-//! plain function in f64 that says what the shader must do. The CPU backend runs the twins over all
-//! particles; it is the reference that device results are measured against.
+//! plain function in f64 that says what the shader must do. [`crate::backend::cpu`] has faster versions of some,
+//! which are tested against the twins, and runs them over all particles; device results are measured against it.
 
 pub mod body_force;
 pub mod cell_list;
 pub mod collision;
 pub mod conjugate_gradient;
 pub mod correct;
+pub mod coupling;
+pub mod ledger;
+pub mod moment;
 pub mod monitor;
 pub mod move_solids;
 pub mod multigrid;
@@ -17,3 +20,19 @@ pub mod predict;
 pub mod pressure_gradient;
 pub mod pressure_source;
 pub mod viscosity;
+
+use crate::params::Params;
+use glam::DVec3;
+
+/// What sums over neighbours read.
+#[derive(Clone, Copy)]
+pub struct Particles<'a> {
+    /// Constants.
+    pub params: &'a Params,
+    /// Positions [m].
+    pub position: &'a [DVec3],
+    /// Velocities [m/s].
+    pub velocity: &'a [DVec3],
+    /// Fluid slots: those below are fluid, the others solid.
+    pub fluid: usize,
+}

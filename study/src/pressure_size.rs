@@ -65,7 +65,8 @@ impl Moment {
             simulation.step()?;
         }
         let step = simulation.next_step();
-        let poses = simulation.solids.predict(step.time, step.dt).to_vec();
+        let gravity = simulation.params.explicit_gravity();
+        let poses = simulation.solids.predict(step.time, step.dt, gravity, !simulation.plan.coupled).to_vec();
         let fields = simulation.backend.read()?;
         let (params, plan) = (simulation.params.clone(), simulation.plan.clone());
         Ok(Self { params, plan, step, poses, fields, scene })
@@ -124,6 +125,7 @@ fn on_cpu(moment: &Moment, kind: Preconditioner, tolerance: f64) -> Result<Measu
         state: &fields.state,
         diagonal: &fields.diagonal,
         coefficient: laplacian_coefficient(&moment.params),
+        bodies: &[],
     };
     let (b, settings) = (&fields.source, Settings { tolerance, ..TIGHT });
     let (grid, mut multigrid) = (Grid::new(&moment.params)?, Multigrid::default());
@@ -209,6 +211,7 @@ fn residual_in_double(moment: &Moment, device: &Fields, x: &[f64]) -> Result<f64
         state: &state,
         diagonal: &diagonal,
         coefficient: laplacian_coefficient(&moment.params),
+        bodies: &[],
     };
     Ok(true_residual(&system, &b, &x))
 }

@@ -165,7 +165,7 @@ mod tests {
         Plan {
             reasons,
             preconditioner: Preconditioner::Multigrid,
-            force_relaxation: 1.0,
+            coupled: true,
             contact: Default::default(),
             fixed_walls: true,
         }

@@ -4,6 +4,7 @@ use super::buffers::TABLE;
 use super::hierarchy::Levels;
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
+use crate::kernels::body_force::missing_head;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
 use crate::params::{Params, Step};
@@ -79,6 +80,9 @@ pub struct Constants {
     pub gradient_scale: f32,
     pub density: f32,
     pub tolerance_squared: f32,
+    pub wendland: f32,
+    pub surface_head: f32,
+    pub pad: [f32; 2],
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -130,6 +134,23 @@ pub struct WallParticle {
     pub area: [f32; 4],
     pub arm: [f32; 4],
     pub to_surface: [f32; 4],
+}
+
+/// A free body in the pressure equation; see `FreeBody` in shaders/coupling.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct FreeBody {
+    pub inverse_mass: [f32; 4],
+    pub inertia_x: [f32; 4],
+    pub inertia_y: [f32; 4],
+    pub inertia_z: [f32; 4],
+    pub force: [f32; 4],
+    pub torque: [f32; 4],
+    pub first: u32,
+    pub count: u32,
+    pub solid: u32,
+    pub pad: u32,
 }
 
 /// Sums of one workgroup of the monitor; see `MonitorSum` in shaders/monitor.wgsl.
@@ -191,6 +212,9 @@ impl Constants {
             gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
             density: params.density as f32,
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
+            wendland: params.wendland as f32,
+            surface_head: missing_head(params) as f32,
+            pad: [0.0; 2],
         }
     }
 }
@@ -399,9 +423,10 @@ mod tests {
         let plan = Plan {
             reasons,
             preconditioner: Preconditioner::Multigrid,
-            force_relaxation: 1.0,
+            coupled: true,
             contact: Default::default(),
             fixed_walls: true,
+            ledger: false,
         };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
         assert!(middle.total() < 200_000_000, "{}", middle.total());
@@ -418,9 +443,10 @@ mod tests {
         let plan = Plan {
             reasons,
             preconditioner: Preconditioner::Jacobi,
-            force_relaxation: 1.0,
+            coupled: false,
             contact: Default::default(),
             fixed_walls: false,
+            ledger: false,
         };
         assert_eq!(Memory::new(&Sizes::default(), &plan).total(), 0);
     }
