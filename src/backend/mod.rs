@@ -3,6 +3,7 @@
 pub mod compute;
 pub mod cpu;
 pub mod gpu;
+mod processor;
 mod rows;
 pub mod traffic;
 
@@ -15,6 +16,7 @@ use crate::params::Step;
 use crate::plan::Stage;
 use crate::pressure::PressureReport;
 pub use compute::Compute;
+pub use processor::Processor;
 use std::collections::BTreeMap;
 
 /// What the guards have seen since the start of the run.

@@ -5,18 +5,17 @@
 //! wrote, and says in `result.json` how it ended.
 
 pub mod frames;
-pub mod gauges;
 pub mod summary;
 pub mod tables;
 
 use crate::error::{Error, Result};
+use crate::gauges::Gauges;
 use crate::output::folder::Folder;
 use crate::output::result::{Status, Summary, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 use frames::Frames;
-use gauges::Gauges;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
