@@ -65,6 +65,7 @@ pub mod backend;
 pub mod body;
 pub mod case;
 pub mod cells;
+pub mod compute;
 pub mod contact;
 pub mod error;
 pub mod fields;

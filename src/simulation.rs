@@ -8,7 +8,7 @@ use crate::contact::{ContactReport, Solids};
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
 use crate::params::{Params, Step};
-use crate::plan::{Plan, Stage};
+use crate::plan::{ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
@@ -96,7 +96,7 @@ impl Simulation {
         let settings = settings(case);
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
-        if device == ContactDevice::Gpu && plan.contact.kernel.is_some() && backend.compute().is_none() {
+        if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
                         what there is) or leave contact.device out";
             return Err(crate::error::Error::Case(text.into()));
@@ -162,11 +162,11 @@ impl Simulation {
         Ok(seen)
     }
 
-    pub(crate) fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
-        if !self.plan.has(stage) {
+    pub(crate) fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
+        if !self.plan.has(stage.into()) {
             return Ok(());
         }
-        self.timed(stage, |s| s.backend.run(stage, step))
+        self.timed(stage.into(), |s| s.backend.run(stage, step))
     }
 
     /// Solids move as they would without the fluid's force in this step.

@@ -13,7 +13,7 @@ use seixo::cells::Grid;
 use seixo::contact::Solids;
 use seixo::error::Result;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
 use seixo::run::summary::particles;
 use seixo::scene::Drive;
@@ -175,7 +175,7 @@ fn report(seen: &Seen) -> Result<Report> {
         particles: count,
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
-        contact: ContactLine { device: plan.contact.kernel.is_some(), reason: plan.contact.reason.clone() },
+        contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
     })
@@ -188,7 +188,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
     let settings = Settings { tolerance: 1e-3, max_iterations: 1, warm_start: false };
     let own = Params::new(&seen.setup.loaded.case, scene)?;
     let mut cpu = Cpu::new(scene, &own, plan, settings)?;
-    for stage in [Stage::CellList, Stage::NeighbourList] {
+    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
         cpu.run(stage, &step)?;
     }
     let sizes: Sizes = sizes(scene, &own, plan)?;

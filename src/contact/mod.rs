@@ -24,9 +24,9 @@ pub use probe::{Probe, ProbePatch};
 pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 
-use crate::backend::Compute;
 use crate::body::{Body, Pose, Wrench};
 use crate::case;
+use crate::compute::Compute;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use candidates::Candidates;
