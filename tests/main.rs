@@ -14,6 +14,7 @@ mod contact_device;
 mod device;
 mod fluid;
 mod immersed;
+mod layers;
 mod output;
 mod scene;
 mod shaders;
