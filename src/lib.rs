@@ -83,6 +83,7 @@ pub mod row_arrays;
 pub mod run;
 pub mod scene;
 pub mod scheme;
+pub mod shape;
 pub mod simulation;
 mod step;
 pub mod time_step;

@@ -147,6 +147,10 @@ impl ContactPlan {
         let program = match case.contact.as_ref().map(|c| c.law) {
             None => return host("no contact"),
             Some(Law::Pressure) => return host("the baseline's impulses follow one another"),
+            // the kernel presses the points of boxes into boxes
+            Some(Law::Smooth) if scene.solids.iter().any(|s| s.shape.as_cuboid().is_none()) => {
+                return host("the device has no kernel of law \"smooth\" for round bodies");
+            }
             Some(Law::Smooth) => Some(&smooth::PROGRAM),
             Some(Law::Paper) => Some(&paper::PROGRAM),
         };
@@ -219,12 +223,9 @@ impl Plan {
         let lightest = scene
             .solids
             .iter()
-            .filter_map(|s| match (&s.drive, s.shape) {
-                (Drive::Free(b), crate::scene::Shape::Box { half }) => {
-                    let depth = if scene.dimensions == 2 { scene.spacing } else { 2.0 * half.y };
-                    Some(b.mass / (4.0 * half.x * half.z * depth * params.density))
-                }
-                _ => None,
+            .filter_map(|s| match &s.drive {
+                Drive::Free(b) => Some(b.mass / (s.shape.volume() * params.density)),
+                Drive::Prescribed(_) => None,
             })
             .fold(f64::INFINITY, f64::min);
         let light = if scene.dimensions == 2 { LIGHT_2D } else { LIGHT_3D };

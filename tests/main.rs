@@ -18,6 +18,7 @@ mod layers;
 mod output;
 mod scene;
 mod shaders;
+mod shapes;
 mod stability;
 mod study;
 mod twins;

@@ -311,21 +311,46 @@ pub enum Freedom {
     RotationZ,
 }
 
-/// A rigid box.
+/// Shape of a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyShape {
+    /// A box of `size`.
+    #[default]
+    Box,
+    /// A sphere of `radius` (three dimensions).
+    Sphere,
+    /// A cylinder of `radius` and `height` with flat ends, along `axis`; in two dimensions a disc.
+    Cylinder,
+}
+
+/// A rigid body.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Name, for messages and tables.
     pub name: String,
-    /// Edge lengths [m].
-    pub size: Vector,
+    /// Shape.
+    #[serde(default)]
+    pub shape: BodyShape,
+    /// Edge lengths of a box [m].
+    pub size: Option<Vector>,
+    /// Radius of a sphere or cylinder [m].
+    pub radius: Option<f64>,
+    /// Length of a cylinder along its axis [m].
+    pub height: Option<f64>,
+    /// Direction of a cylinder's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In two
+    /// dimensions it is [0, 1, 0].
+    pub axis: Option<Vector>,
     /// Centre of mass at t = 0 [m].
     pub center: Vector,
-    /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share l0 / size y of it.
+    /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share of it: l0 over size y
+    /// or over the cylinder's height.
     pub mass: Option<f64>,
     /// Density [kg/m3].
     pub density: Option<f64>,
-    /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform box if absent.
+    /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform body if absent.
+    /// A cylinder's third axis is its own.
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.
     pub orientation: Option<Turn>,

@@ -12,7 +12,7 @@ use seixo::fields::{Fields, State};
 use seixo::neighbours::Neighbours;
 use seixo::params::Params;
 use seixo::plan::{ContactPlan, ParticleStage, Stage};
-use seixo::scene::{Drive, Scene, Shape, Solid};
+use seixo::scene::{Drive, Scene, Solid};
 use seixo::simulation::Simulation;
 use serde::Serialize;
 use std::sync::Arc;
@@ -180,9 +180,7 @@ fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
 /// the largest solid.
 fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid], weight: f64) -> Vec<StageError> {
     let most = |f: fn(&Wrench) -> DVec3| cpu.iter().map(|w| f(w).length()).fold(0.0, f64::max);
-    let sizes = solids.iter().map(|s| match s.shape {
-        Shape::Box { half } => half.length(),
-    });
+    let sizes = solids.iter().map(|s| s.shape.radius());
     let force = most(|w| w.force).max(weight);
     let scale = most(|w| w.torque).max(force * sizes.fold(0.0, f64::max));
     let pairs =

@@ -5,9 +5,9 @@ use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
 use crate::contact::Limits;
 use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
-use crate::contact::geometry::Surface;
 use crate::contact::smooth::{Contact, DeviceSums, Other, Pair, Patch};
 use crate::error::Result;
+use crate::shape::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -183,7 +183,7 @@ impl Smooth {
                 high_a: three(own.high),
                 low_b: three(theirs.low),
                 high_b: three(theirs.high),
-                half_a: three(body.half),
+                half_a: three(body.shape.extent(DMat3::IDENTITY)),
                 first: [own.first, theirs.first],
                 count: [own.count, theirs.count],
                 faces: [u32::from(faces_b), u32::from(model.surfaces[pair.a].all_faces)],
@@ -377,8 +377,9 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Bod
     let still = a.rotation.transpose();
     let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
-            let Body { pose, rotation, half, .. } = &bodies[b];
-            (pose.position, *rotation, *half, pose.velocity_at(a.pose.position), pose.angular_velocity)
+            let Body { pose, rotation, shape, .. } = &bodies[b];
+            let half = shape.extent(DMat3::IDENTITY);
+            (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
         }
         Other::Wall(w) => {
             let wall = &model.walls[w];
@@ -389,7 +390,8 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Bod
     let back = axes.transpose();
     let turn = back * a.rotation;
     let (below_b, above_b) = clearances(turn, back * (a.pose.position - center), half, &clouds[pair.a]);
-    let (below_a, above_a) = clearances(still * axes, still * (center - a.pose.position), a.half, &theirs);
+    let half_a = a.shape.extent(DMat3::IDENTITY);
+    let (below_a, above_a) = clearances(still * axes, still * (center - a.pose.position), half_a, &theirs);
     let u = still * (a.pose.velocity - velocity);
     SmoothPose {
         row_x: four(turn.row(0), u.x),
