@@ -49,7 +49,10 @@ fn graph() -> BTreeMap<String, BTreeSet<String>> {
         let module = first.trim_end_matches(".rs").to_string();
         if module != "lib" {
             let text = std::fs::read_to_string(&file).expect("readable");
-            graph.entry(module.clone()).or_default().extend(imports(&text).into_iter().filter(|m| *m != module));
+            graph
+                .entry(module.clone())
+                .or_default()
+                .extend(imports(&text).into_iter().filter(|m| *m != module));
         }
     }
     graph
