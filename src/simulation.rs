@@ -80,6 +80,9 @@ const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.
 const LOST_MAX: f64 = 0.02;
 
+/// An adaptive step this much shorter than the typed one is that of a run that will not end.
+const SHORTEST_STEP: f64 = 1e-6;
+
 impl Simulation {
     /// Set up `scene` of `case` on the backend that `make` returns.
     ///
@@ -94,6 +97,8 @@ impl Simulation {
         let params = Params::new(case, &scene)?;
         let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
+        let solids = Solids::new(&scene, case.contact.as_ref())?;
+        crate::sense::refuse(case, &scene, &params, &solids)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
@@ -103,7 +108,7 @@ impl Simulation {
         }
         Ok(Self {
             backend,
-            solids: Solids::new(&scene, case.contact.as_ref())?,
+            solids,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
             groups: scene.groups,
@@ -129,11 +134,23 @@ impl Simulation {
         self.speed.max(collapse_speed(&self.params))
     }
 
-    /// Coefficients of the next step, with the time step that the case and the flow allow.
+    /// Coefficients of the next step, with the time step that the case, the flow and the solids allow.
     pub fn next_step(&self) -> Step {
-        let adaptive = self.case.run.adaptive && self.plan.wet();
-        let dt = time_step(&self.params, self.case.run.time_step, adaptive, self.expected_speed());
-        self.params.step(self.time, dt, self.expected_speed())
+        let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
+        let typed = self.case.run.time_step;
+        let fastest = if adaptive { self.solids.fastest(self.time, typed) } else { 0.0 };
+        let dt = time_step(&self.params, typed, adaptive, flow.max(fastest));
+        self.params.step(self.time, dt, flow)
+    }
+
+    /// An error if a step has become so short that the run would not end.
+    pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
+        if step.dt < SHORTEST_STEP * self.case.run.time_step {
+            let what =
+                format!("the flow or a solid asks for steps of {:.1e} s, the run would not end", step.dt);
+            return Err(self.diverged(step, Stage::Predict, what));
+        }
+        Ok(())
     }
 
     fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {

@@ -18,6 +18,7 @@ impl Simulation {
 
     fn advance(&mut self) -> Result<StepReport> {
         let step = self.next_step();
+        self.check_length(&step)?;
         let (t, dt) = (step.time, step.dt);
         let mut report = StepReport { step: self.steps, time: t, dt, ..Default::default() };
 

@@ -12,6 +12,7 @@ mod compare;
 mod contact;
 mod contact_device;
 mod device;
+mod faults;
 mod fluid;
 mod immersed;
 mod layers;

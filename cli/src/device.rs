@@ -1,16 +1,9 @@
 //! The choice of a processor.
 
-use super::{BackendName, DeviceArgs, Exit, say, say_json};
+use super::{BackendName, DeviceArgs, Exit};
 use seixo::backend::gpu::adapters;
+use seixo::console::{remark, say, say_json};
 use seixo::{Error, Processor, Result};
-
-/// Use this many threads from now on.
-pub fn set_threads(args: &DeviceArgs) {
-    if let Some(threads) = args.threads {
-        // Fails only if the pool exists already, and nothing parallel has run yet.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-    }
-}
 
 /// The processor that `args` ask for.
 ///
@@ -35,8 +28,8 @@ pub fn list(json: bool) -> Exit {
     if json {
         say_json(&adapters);
     } else if adapters.is_empty() {
-        eprintln!(
-            "no adapter was found: no driver, or on Linux no Vulkan loader (libvulkan1); --backend cpu needs neither"
+        remark(
+            "no adapter was found: no driver, or on Linux no Vulkan loader (libvulkan1); --backend cpu needs neither",
         );
     }
     for (k, a) in adapters.iter().enumerate().filter(|_| !json) {

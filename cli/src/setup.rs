@@ -2,6 +2,7 @@
 
 use super::{CaseArgs, DeviceArgs, device};
 use seixo::case::file::{Loaded, load};
+use seixo::console::remark;
 use seixo::error::Result;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
@@ -26,8 +27,8 @@ impl Setup {
         let loaded = load(&args.case, args.spacing, &args.all_sets())?;
         let scene = Arc::new(Scene::build(&loaded.case)?);
         if !quiet {
-            loaded.warnings.iter().for_each(|w| eprintln!("{w}"));
-            scene.notes.iter().for_each(|n| eprintln!("note: {n}"));
+            loaded.warnings.iter().for_each(|w| remark(w));
+            scene.notes.iter().for_each(|n| remark(&format!("note: {n}")));
         }
         let name = args.case.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned());
         Ok(Self { name, loaded, scene })

@@ -2,6 +2,7 @@
 
 use super::check::{Problem, check};
 use super::report::{Message, closest, explain, render, span_of};
+use super::surplus::surplus;
 use super::{Case, overrides};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -76,7 +77,14 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
         remedy: Some(p.remedy.clone()),
         warning: p.warning,
     };
-    let (warnings, errors): (Vec<_>, Vec<_>) = check(&case).into_iter().partition(|p| p.warning);
+    let too_long = surplus(table.get_ref(), &case).into_iter().map(|s| Problem {
+        message: format!("{} elements, of which only the first {} would be read", s.written, s.read),
+        remedy: format!("write {} elements", s.read),
+        path: s.path,
+        warning: false,
+    });
+    let problems = too_long.chain(check(&case));
+    let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
     if !errors.is_empty() {
         return Err(Error::Case(wrong(&errors.iter().map(located).collect::<Vec<_>>())));
     }
