@@ -1,4 +1,5 @@
-//! A scene in motion: backend, solids and clock. [`Simulation::step`] is in `step.rs`.
+//! A scene in motion: backend, solids and clock. How it is opened and read is in `open.rs`, [`Simulation::step`] in
+//! `step.rs`.
 
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::{Pose, Wrench};
@@ -12,20 +13,10 @@ use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
+use rayon::ThreadPool;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
-
-/// Which backend to use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum BackendChoice {
-    /// A hardware GPU if there is one, else the CPU.
-    #[default]
-    Auto,
-    /// A GPU, or an error.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
 
 /// What a step did.
 #[derive(Clone, Debug, Default)]
@@ -48,6 +39,8 @@ pub struct StepReport {
 pub struct Simulation {
     /// The case.
     pub case: Case,
+    /// What it was built into; particles as they were at t = 0.
+    pub scene: Arc<Scene>,
     /// Constants.
     pub params: Params,
     /// Stages.
@@ -72,6 +65,7 @@ pub struct Simulation {
     /// Work of and on the solids, and the energy of the free ones [J], if the ledger is kept.
     solids_ledger: Option<(Ledger, f64)>,
     speed: f64,
+    pub(crate) threads: Option<ThreadPool>,
 }
 
 /// When the PPE's solver stops.
@@ -93,18 +87,22 @@ const LOST_MAX: f64 = 0.02;
 const SHORTEST_STEP: f64 = 1e-6;
 
 impl Simulation {
-    /// Set up `scene` of `case` on `backend`.
-    pub fn new(
+    /// Set up `scene` of `case` on the backend that `make` returns.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and those of `make`.
+    pub fn with_backend(
         case: &Case,
-        scene: &Scene,
+        scene: impl Into<Arc<Scene>>,
         make: impl FnOnce(&Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
     ) -> Result<Self> {
-        let params = Params::new(case, scene)?;
-        let plan = Plan::new(case, scene, &params);
+        let scene: Arc<Scene> = scene.into();
+        let params = Params::new(case, &scene)?;
+        let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
-        let solids = Solids::new(scene, case.contact.as_ref())?;
-        crate::sense::refuse(case, scene, &params, &solids)?;
-        let mut backend = make(scene, &params, &plan, settings)?;
+        let solids = Solids::new(&scene, case.contact.as_ref())?;
+        crate::sense::refuse(case, &scene, &params, &solids)?;
+        let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
@@ -124,6 +122,7 @@ impl Simulation {
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
             groups: scene.groups,
+            scene,
             params,
             plan,
             time: 0.0,
@@ -131,6 +130,7 @@ impl Simulation {
             stages: BTreeMap::new(),
             wait_for_stages: false,
             speed: 0.0,
+            threads: None,
         })
     }
 

@@ -94,7 +94,9 @@ fn water_loses_the_momentum_that_a_body_gains() {
             sim.step().expect("the cube moves freely");
         }
         let (last, later) = (total(&mut sim), sim.solids.poses()[0].velocity.x / 0.2);
-        println!("s {s}: momentum {first:.4} after a step, {last:.4} after 100; cube's speed {speed:.3}, {later:.3}");
+        println!(
+            "s {s}: momentum {first:.4} after a step, {last:.4} after 100; cube's speed {speed:.3}, {later:.3}"
+        );
         assert!((first - 1.0).abs() < 0.05 && (last - 1.0).abs() < 0.05, "s {s}: {first} {last}");
     }
 }
@@ -122,7 +124,10 @@ fn the_floor_carries_a_light_cube_and_a_heavy_one_on_it() {
     let (light, heavy) = (light / count, heavy / count);
     let z = [0, 1].map(|k| sim.solids.poses()[k].position.z);
     // Buoyancy acts where water is below: on the upper cube only if the water comes between.
-    println!("contact {light:.2} N on the light cube, {heavy:.2} N on the heavy one; floor {:.2} N; at {z:?}", light + heavy);
+    println!(
+        "contact {light:.2} N on the light cube, {heavy:.2} N on the heavy one; floor {:.2} N; at {z:?}",
+        light + heavy
+    );
 }
 
 #[test]

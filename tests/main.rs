@@ -16,6 +16,7 @@ mod faults;
 mod fluid;
 mod immersed;
 mod kernels;
+mod layers;
 mod ledger;
 mod output;
 mod scene;

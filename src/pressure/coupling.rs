@@ -70,7 +70,11 @@ mod tests {
     fn body() -> FreeBody {
         FreeBody {
             inverse_mass: DVec3::new(2.0, 0.0, 3.0),
-            inverse_inertia: DMat3::from_cols(DVec3::new(2.0, 0.1, 0.0), DVec3::new(0.1, 1.0, 0.2), DVec3::new(0.0, 0.2, 3.0)),
+            inverse_inertia: DMat3::from_cols(
+                DVec3::new(2.0, 0.1, 0.0),
+                DVec3::new(0.1, 1.0, 0.2),
+                DVec3::new(0.0, 0.2, 3.0),
+            ),
             load: Wrench::default(),
         }
     }

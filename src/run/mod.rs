@@ -5,19 +5,18 @@
 //! wrote, and says in `result.json` how it ended.
 
 pub mod frames;
-pub mod gauges;
 pub mod summary;
 pub mod tables;
 pub mod verdict;
 
 use crate::error::{Error, Result};
+use crate::gauges::Gauges;
 use crate::output::folder::{Folder, Mode};
 use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 use frames::Frames;
-use gauges::Gauges;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};

@@ -1,11 +1,11 @@
 //! The tables over time: monitors.csv, bodies.csv and gauges.csv.
 
 use super::Due;
-use super::gauges::Gauges;
 use super::summary::Totals;
 use crate::backend::{Counters, Timing};
 use crate::contact::Energy;
 use crate::error::Result;
+use crate::gauges::Gauges;
 use crate::ledger::Entry;
 use crate::monitor::FluidMonitor;
 use crate::output::folder::Folder;

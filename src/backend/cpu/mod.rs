@@ -32,8 +32,8 @@ use crate::monitor::FluidMonitor;
 use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan};
-use crate::pressure::coupling::CoupledBody;
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve_or_fall_back};
+use crate::pressure::coupling::CoupledBody;
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
@@ -302,7 +302,9 @@ impl Cpu {
             coupled.subtract_known(known, source);
             coupled
         };
-        free.filter(|(_, body)| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO).map(&mut couple).collect()
+        free.filter(|(_, body)| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO)
+            .map(&mut couple)
+            .collect()
     }
 
     fn pressure_gradient(&mut self) {

@@ -93,12 +93,16 @@ impl Gpu {
         let residual = equation + lists + z * u + r * slots;
         let pack = equation + 2 * p * slots + 2 * z * slots;
         let start = equation + u * (r + 2 * z);
-        let ends = work(pack + 2 * residual + start + slots * (p + 2 * z) + 2 * p * slots, 6 + prepare + 2 * respond);
+        let ends = work(
+            pack + 2 * residual + start + slots * (p + 2 * z) + 2 * p * slots,
+            6 + prepare + 2 * respond,
+        );
         // Rows of the bodies: read by `respond` beside the z there, and by `multiply`.
         let coupled = respond * self.sizes.moving_wall * (4 * buffers::coupling.size() + z);
         let multiply = equation + lists + u * (z + 2 * search);
         let advance = equation + u * (search + 2 * p + 2 * r + 2 * z);
-        let mut out = Solve { ends, iteration: work(multiply + advance + coupled, 2 + respond), ..Solve::default() };
+        let mut out =
+            Solve { ends, iteration: work(multiply + advance + coupled, 2 + respond), ..Solve::default() };
         if let Some(levels) = self.levels.clone() {
             out.build = work(self.build_bytes(&levels, rows, u)?, levels.build().len() as u64);
             let cycle = levels.cycle(1).len() as u64 + 2;
