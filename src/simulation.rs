@@ -100,7 +100,7 @@ impl Simulation {
         let params = Params::new(case, &scene)?;
         let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
-        let solids = Solids::new(&scene, case.contact.as_ref())?;
+        let mut solids = Solids::new(&scene, case.contact.as_ref())?;
         crate::sense::refuse(case, &scene, &params, &solids)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
@@ -114,7 +114,6 @@ impl Simulation {
                 "output.ledger = true: this backend keeps no ledger; use --backend cpu or leave it out";
             return Err(crate::error::Error::Case(text.into()));
         }
-        let mut solids = Solids::new(scene, case.contact.as_ref())?;
         Ok(Self {
             backend,
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),

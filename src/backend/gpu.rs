@@ -395,6 +395,9 @@ impl Backend for Gpu {
         let free = of.filter(|(_, (b, _))| b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO);
         let free: Vec<_> = free.map(device).collect();
         self.coupled = free.len() as u64;
+        if free.is_empty() {
+            return Ok(());
+        }
         self.context.begin(Some(Stage::ConjugateGradient));
         self.context.upload(buffers::free_body, &free)
     }

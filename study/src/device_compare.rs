@@ -271,6 +271,12 @@ pub fn compare_stages(
                 pair.gpu.move_solids(&poses)?;
             }
             Stage::ConjugateGradient => {
+                if plan.coupled {
+                    let rest = pair.params.gravity - pair.params.explicit_gravity();
+                    let bodies = simulation.solids.free_bodies(rest);
+                    pair.cpu.free_bodies(&bodies)?;
+                    pair.gpu.free_bodies(&bodies)?;
+                }
                 pair.cpu.solve_pressure(&step)?;
                 pair.gpu.solve_pressure(&step)?;
             }

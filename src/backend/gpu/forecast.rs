@@ -168,6 +168,7 @@ mod tests {
             coupled: true,
             contact: Default::default(),
             fixed_walls: true,
+            ledger: false,
         }
     }
 
