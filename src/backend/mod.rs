@@ -27,6 +27,8 @@ pub struct Counters {
     pub displacement_clamps: u64,
     /// Pressures that were cut at the upper bound.
     pub pressure_clamps: u64,
+    /// Negative pressures that were set to zero: water bears no tension.
+    pub negative_pressures: u64,
     /// Most neighbours of a particle so far.
     pub neighbours_max: u32,
     /// First particle (scene number) whose velocity became non-finite in `correct`.
