@@ -10,6 +10,7 @@ pub mod fields;
 pub mod kernels;
 pub mod lattice;
 pub mod ledger;
+pub mod moment;
 pub mod monitor;
 pub mod neighbours;
 pub mod output;

@@ -35,7 +35,7 @@ pub struct Params {
     /// lambda, Eq. (7) [m2].
     pub laplacian: f64,
     /// Sum W0 of the smooth density on the full lattice [-].
-    pub wendland: f64,
+    pub smooth_density: f64,
     /// Neighbours of a particle on the full lattice.
     pub neighbours: u32,
     /// Gravity [m/s2].
@@ -118,7 +118,7 @@ impl Params {
             effective_radius: run.effective_radius * l0,
             number_density: lattice.number_density,
             laplacian: lattice.laplacian * l0 * l0,
-            wendland: lattice.wendland,
+            smooth_density: lattice.smooth_density,
             neighbours: lattice.neighbours,
             gravity: scene.gravity,
             density: fluid.map_or(1000.0, |f| f.density),

@@ -154,7 +154,7 @@ fn structs_lie_the_same_on_both_sides() {
             gradient_scale,
             density,
             tolerance_squared,
-            wendland,
+            smooth_density,
             surface_head,
             pad,
         }
@@ -255,7 +255,8 @@ fn constant(text: &str, name: &str) -> f64 {
 fn constants_are_the_same_on_both_sides() {
     use seixo::backend::gpu::layout::{MONITOR_WIDTH, WORKGROUP};
     use seixo::fields::State;
-    use seixo::kernels::{moment::EIGENVALUE_MIN, number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::moment::EIGENVALUE_MIN;
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
     let common = |name: &str| constant(shader::COMMON, name);

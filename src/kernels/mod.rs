@@ -7,8 +7,6 @@ pub mod cell_list;
 pub mod collision;
 pub mod conjugate_gradient;
 pub mod correct;
-pub mod ledger;
-pub mod moment;
 pub mod monitor;
 pub mod move_solids;
 pub mod multigrid;

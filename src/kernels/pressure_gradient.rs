@@ -5,8 +5,8 @@
 //! that carries it, in this stage, and not in `predict`.
 
 use super::Particles;
-use super::moment::{inverse, moment, pair_vector};
 use crate::fields::State;
+use crate::moment::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::Params;
 use crate::scheme::{Gradient, Source};

@@ -2,7 +2,7 @@
 //! pressure and the divergence of a linear velocity exact on any arrangement of particles.
 //! The shaders pressure_source and pressure_gradient sum it as well; see shaders/common.wgsl.
 
-use super::Particles;
+use crate::kernels::Particles;
 use crate::neighbours::Row;
 use glam::{DMat3, DVec3};
 

@@ -1,8 +1,7 @@
 //! What a stage does to the energy v^2 / 2 - g . x of a particle, per mass [m2/s2], from the state before the stage.
-//! GPU twin: shaders/ledger.wgsl
 
-use super::correct::correct;
-use super::predict::predict;
+use crate::kernels::correct::correct;
+use crate::kernels::predict::predict;
 use crate::params::Params;
 use glam::DVec3;
 
