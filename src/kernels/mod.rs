@@ -18,18 +18,4 @@ pub mod pressure_gradient;
 pub mod pressure_source;
 pub mod viscosity;
 
-use crate::params::Params;
-use glam::DVec3;
-
-/// What sums over neighbours read.
-#[derive(Clone, Copy)]
-pub struct Particles<'a> {
-    /// Constants.
-    pub params: &'a Params,
-    /// Positions [m].
-    pub position: &'a [DVec3],
-    /// Velocities [m/s].
-    pub velocity: &'a [DVec3],
-    /// Fluid slots: those below are fluid, the others solid.
-    pub fluid: usize,
-}
+pub use crate::neighbourhood::Particles;

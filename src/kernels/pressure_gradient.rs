@@ -6,7 +6,7 @@
 
 use super::Particles;
 use crate::fields::State;
-use crate::moment::{inverse, moment, pair_vector};
+use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::Params;
 use crate::scheme::{Gradient, Source};

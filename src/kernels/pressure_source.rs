@@ -11,7 +11,7 @@
 
 use super::Particles;
 use crate::lattice::smooth_weight;
-use crate::moment::{inverse, moment, pair_vector};
+use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::{Params, Step};
 use crate::scheme::Source;

@@ -4,9 +4,9 @@ use super::Study;
 use super::builtin::{self, ENTRIES};
 use super::definition::{Setup, files_of};
 use super::engine::{Context, Make, Options, Processor, Shard};
-use seixo::backend::Backend;
-use seixo::backend::cpu::Cpu;
+use seixo::backend;
 use seixo::backend::gpu::Gpu;
+use seixo::console::say;
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
 use serde::{Deserialize, Serialize};
@@ -42,10 +42,10 @@ pub struct StudyArgs {
     pub backend: Processor,
     /// Adapter of the GPU's points, a number or a part of a name as `seixo adapters` lists them. Without it a
     /// hardware GPU is taken, and no software one.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub adapter: Option<String>,
     /// Threads of the CPU's points; all cores if absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
     pub threads: Option<u16>,
     /// List the points and compute nothing.
     #[arg(long)]
@@ -125,22 +125,20 @@ impl Manifest {
 /// # Errors
 /// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
 pub fn command(args: &StudyArgs) -> Result<()> {
-    if let Some(threads) = args.threads {
-        // Fails only if the pool exists already, and nothing parallel has run yet.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-    }
+    seixo::threads::start(args.threads)?;
     // Drivers are asked only when the first point wants one.
     let hardware = std::sync::LazyLock::new(|| args.adapter.is_some() || Gpu::hardware_available());
+    let gpu = backend::Processor::Gpu { adapter: args.adapter.clone() };
     let make: &Make = &|processor, scene, params, plan, settings| match processor {
-        Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?) as Box<dyn Backend>),
+        Processor::Cpu => backend::Processor::Cpu.open(scene, params, plan, settings),
         Processor::Gpu if !*hardware => Err(Error::Gpu(
             "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
         )),
-        Processor::Gpu => Ok(Box::new(Gpu::new(scene, params, plan, settings, args.adapter.as_deref())?)),
+        Processor::Gpu => gpu.open(scene, params, plan, settings),
     };
     if args.what == "list" {
         for entry in ENTRIES {
-            println!("{:16} {}", entry.name, entry.about);
+            say(&format!("{:16} {}", entry.name, entry.about));
         }
         return Ok(());
     }
@@ -159,7 +157,7 @@ pub fn command(args: &StudyArgs) -> Result<()> {
     if args.dry_run {
         for (k, job) in study.jobs.iter().enumerate() {
             let parts: Vec<String> = job.parameters.iter().map(|(k, v)| format!("{k} = {v}")).collect();
-            println!("{k:4}  {}  {} ({})", job.hash(&study.name), job.method, parts.join(", "));
+            say(&format!("{k:4}  {}  {} ({})", job.hash(&study.name), job.method, parts.join(", ")));
         }
         return Ok(());
     }
@@ -174,11 +172,11 @@ pub fn command(args: &StudyArgs) -> Result<()> {
     };
     let context = Context { make, repetitions: args.repetitions };
     let (rows, text) = study.run(&options, &context, args.error)?;
-    print!("{text}");
+    say(text.trim_end_matches('\n'));
     let missing = study.jobs.len() - rows.len();
     if missing > 0 {
-        println!("{missing} of {} points are still to be computed.", study.jobs.len());
+        say(&format!("{missing} of {} points are still to be computed.", study.jobs.len()));
     }
-    println!("Results: {}", out.join("report.md").display());
+    say(&format!("Results: {}", out.join("report.md").display()));
     Ok(())
 }

@@ -210,6 +210,13 @@ impl Definition {
                 return Err(Error::Case(format!("{name}: error: give `value`, or `curve` and `against`")));
             }
         }
+        let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+        if study.name.is_empty() || study.name.starts_with('.') || !study.name.chars().all(plain) {
+            return Err(Error::Case(format!(
+                "{name}: name: `{}` becomes the name of files: use letters, digits, _, - and dots inside of it",
+                study.name.escape_debug()
+            )));
+        }
         if study.case.is_some() == study.text.is_some() {
             return Err(Error::Case(format!("{name}: give `case` or `text`, one of them")));
         }

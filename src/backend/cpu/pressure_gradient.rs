@@ -6,7 +6,7 @@ use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
 use crate::kernels::pressure_gradient::{acceleration, is_corrected};
-use crate::moment::{inverse, scale};
+use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use glam::DVec3;
 

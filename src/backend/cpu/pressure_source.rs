@@ -7,7 +7,7 @@ use crate::fields::State;
 use crate::kernels::Particles;
 use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source};
 use crate::lattice::smooth_weight;
-use crate::moment::{inverse, scale};
+use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use crate::params::Step;
 use crate::scheme::Source;

@@ -1,10 +1,23 @@
-//! Moment matrix of a neighbourhood, M = (d / n0) sum w r r^T / r^2: its inverse makes the gradient of a linear
-//! pressure and the divergence of a linear velocity exact on any arrangement of particles.
+//! What sums over a particle's neighbourhood read, and its moment matrix, M = (d / n0) sum w r r^T / r^2: the inverse makes
+//! the gradient of a linear pressure and the divergence of a linear velocity exact on any arrangement of particles.
 //! The shaders pressure_source and pressure_gradient sum it as well; see shaders/common.wgsl.
 
-use crate::kernels::Particles;
 use crate::neighbours::Row;
+use crate::params::Params;
 use glam::{DMat3, DVec3};
+
+/// What sums over neighbours read.
+#[derive(Clone, Copy)]
+pub struct Particles<'a> {
+    /// Constants.
+    pub params: &'a Params,
+    /// Positions [m].
+    pub position: &'a [DVec3],
+    /// Velocities [m/s].
+    pub velocity: &'a [DVec3],
+    /// Fluid slots: those below are fluid, the others solid.
+    pub fluid: usize,
+}
 
 /// Smallest eigenvalue, by a lower bound of it, at which the inverse is used: below, the neighbourhood is too
 /// one-sided or too flat for a linear fit.
