@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub enum Source {
     /// The paper's Eq. (8): deviation of the number density alone.
     NumberDensity,
-    /// Divergence of the predicted velocity plus gamma times the deviation.
+    /// Divergence of the predicted velocity, corrected by the moment matrix, gamma times the deviation of a smooth
+    /// density sum, and the weight of the water, which the pressure at rest balances on any arrangement.
     Mixed,
 }
 
@@ -35,6 +36,15 @@ pub enum FreeSurface {
     Threshold,
     /// n < 0.8 beta n0, or n < beta n0 and the neighbours' centroid lies more than 0.1 l0 away.
     ThresholdOffset,
+}
+
+/// How pairs of particles that collide at once share their impulses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Collision {
+    /// The paper's Eq. (18): each as if it were the only one.
+    Single,
+    /// A particle takes part in each of its pairs with a part of its mass.
+    Shared,
 }
 
 /// Preconditioner of the conjugate gradients.

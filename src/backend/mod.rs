@@ -3,7 +3,6 @@
 pub mod cpu;
 pub mod gpu;
 mod processor;
-mod rows;
 pub mod traffic;
 
 use self::traffic::Traffic;
@@ -11,6 +10,7 @@ use crate::body::{Pose, Wrench};
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{ParticleStage, Stage};
@@ -101,6 +101,10 @@ pub trait Backend: Send {
     fn body_force(&mut self) -> Result<Vec<Wrench>>;
     /// What the guards have seen.
     fn counters(&mut self) -> Result<Counters>;
+    /// Work of the stages on the water since the start, if the plan asks for the ledger and the backend keeps one.
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        Ok(None)
+    }
     /// Sums over the fluid.
     fn monitor(&mut self) -> Result<FluidMonitor>;
     /// Both of these, with one wait on a device; [`Self::stage_seconds`] is up to date then.

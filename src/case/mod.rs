@@ -521,6 +521,8 @@ pub struct Output {
     pub encoding: Encoding,
     /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
     pub table_every: Option<f64>,
+    /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.
+    pub ledger: bool,
 }
 
 impl Default for Output {
@@ -530,6 +532,7 @@ impl Default for Output {
             kinds: vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall],
             encoding: Encoding::Base64,
             table_every: None,
+            ledger: false,
         }
     }
 }

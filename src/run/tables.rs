@@ -6,6 +6,7 @@ use crate::backend::{Counters, Timing};
 use crate::contact::Energy;
 use crate::error::Result;
 use crate::gauges::Gauges;
+use crate::ledger::Entry;
 use crate::monitor::FluidMonitor;
 use crate::output::folder::Folder;
 use crate::output::table::{Cell, Table, vector_cells, vector_columns};
@@ -77,7 +78,10 @@ impl Tables {
             Some(Table::create(&folder.file("bodies.csv"), &body_header())?)
         };
         Ok(Self {
-            monitors: Table::create(&folder.file("monitors.csv"), &monitor_header(&stages))?,
+            monitors: Table::create(
+                &folder.file("monitors.csv"),
+                &monitor_header(&stages, simulation.plan.ledger),
+            )?,
             bodies,
             gauges,
             due: Due::new(every),
@@ -155,7 +159,10 @@ impl Tables {
         let bodies = simulation.solids.energy();
         totals.look(&fluid, &counters, bodies.total(), report.dt, simulation.params.spacing);
         let since = std::mem::take(&mut self.since);
-        let row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
+        let mut row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
+        let ledger = simulation.ledger()?;
+        row.extend(ledger.iter().flat_map(|l| Entry::ALL.map(|entry| Cell::from(l.get(entry)))));
+        totals.ledger = ledger;
         self.since.stages = simulation.stages.clone();
         self.monitors.row(&row)?;
         self.monitors.flush()?;
@@ -238,7 +245,7 @@ impl Tables {
     }
 }
 
-fn monitor_header(stages: &[Stage]) -> Vec<String> {
+fn monitor_header(stages: &[Stage], ledger: bool) -> Vec<String> {
     let fixed = "step [-],time [s],dt [s],courant [-],speed_max [m/s],density_error_mean [-],density_error_max [-],\
                  kinetic [J],potential [J],body_kinetic [J],body_potential [J],body_contact [J],energy [J]";
     let mut header: Vec<String> = fixed.split(',').map(String::from).collect();
@@ -250,6 +257,9 @@ fn monitor_header(stages: &[Stage]) -> Vec<String> {
                 negative_pressures [-],neighbours_max [-]";
     header.extend(rest.split(',').map(String::from));
     header.extend(stages.iter().map(|s| format!("wall_{} [s]", s.name())));
+    if ledger {
+        header.extend(Entry::ALL.map(|entry| format!("work_{} [J]", entry.name())));
+    }
     header
 }
 

@@ -3,19 +3,20 @@
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Arrays, Plan, Stage};
-use crate::scheme::{FreeSurface, Gradient, Source};
+use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 
 /// Appended to every kernel.
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 10] = [
+pub const SWITCHES: [&str; 11] = [
     "CORRECTED",
     "CORRECTED_SURFACE",
     "MIXED",
     "MOVING",
     "MULTIGRID",
     "REACTION",
+    "SHARED_COLLISIONS",
     "STATIC",
     "THRESHOLD_OFFSET",
     "TWO_DIMENSIONS",
@@ -31,6 +32,7 @@ pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
         plan.needs(Arrays::Reaction),
+        params.collision == Collision::Shared,
         plan.needs(Arrays::FixedWalls),
         params.free_surface == FreeSurface::ThresholdOffset,
         params.dimensions == 2,
