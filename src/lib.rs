@@ -3,6 +3,7 @@ pub mod backend;
 pub mod body;
 pub mod case;
 pub mod cells;
+pub mod checkpoint;
 pub mod compute;
 pub mod console;
 pub mod contact;

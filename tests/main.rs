@@ -16,6 +16,7 @@ mod faults;
 mod fluid;
 mod immersed;
 mod output;
+mod restart;
 mod scene;
 mod shaders;
 mod shapes;

@@ -1,6 +1,6 @@
 //! `seixo plan`: what a run would compute.
 
-use super::setup::Setup;
+use super::setup::{self, Setup};
 use super::{CaseArgs, Exit};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -8,7 +8,6 @@ use seixo::backend::gpu::forecast::{Forecast, Group, groups};
 use seixo::backend::gpu::layout::{Memory, Sizes};
 use seixo::backend::gpu::sizes;
 use seixo::case::Case;
-use seixo::case::file::load;
 use seixo::cells::Grid;
 use seixo::console::{say, say_json};
 use seixo::contact::Solids;
@@ -106,18 +105,18 @@ struct Seen {
 
 impl Seen {
     fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let mut case = load(&args.case, args.spacing, &args.all_sets())?.case;
+        let mut case = setup::read(args)?.case;
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
         let blocks = case.fluid.iter().flat_map(|f| &f.block);
         let extent = |b: &seixo::case::Block, k: usize| (b.max[k] - b.min[k]).abs();
         let fluid = |b| extent(b, 0) * extent(b, 2) * if d == 3.0 { extent(b, 1) } else { 1.0 } / l0.powf(d);
         let fluid: f64 = blocks.map(fluid).sum();
         let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
-        let mut sets = args.sets.clone();
+        let mut changes = args.changes.clone();
         if coarser > 1.0 {
-            sets.push(format!("run.spacing={:?}", coarser * l0));
+            changes.sets.push(format!("run.spacing={:?}", coarser * l0));
         }
-        let typed = CaseArgs { sets, case: args.case.clone(), ..*args };
+        let typed = CaseArgs { changes, case: args.case.clone() };
         // What the coarser lattice rounds is no news.
         let setup = Setup::new(&typed, quiet || coarser > 1.0)?;
         if coarser == 1.0 {

@@ -139,6 +139,10 @@ impl Checker<'_> {
                 "allowed: 2, 3",
             );
         }
+        self.not_negative("run.checkpoint.wall", run.checkpoint.wall, "s (0: no checkpoints by the clock)");
+        if let Some(every) = run.checkpoint.every {
+            self.positive("run.checkpoint.every", every, "s");
+        }
         if let Some([min, max]) = &run.domain {
             self.box_edges("run.domain", "run.domain", min, max);
         }

@@ -40,12 +40,15 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
         all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
     }
     all.extend_from_slice(sets);
-    parse(&path.display().to_string(), text, &all).map(|(case, text, warnings)| Loaded {
-        case,
-        text,
-        path: path.to_owned(),
-        warnings,
-    })
+    let name = path.display().to_string();
+    let (mut case, mut text, warnings) = parse(&name, text, &all)?;
+    // What a case says of its place holds no more for its copy beside the results.
+    if let Some(from) = case.run.from.as_ref().map(PathBuf::from).filter(|p| p.is_relative()) {
+        let from = std::path::absolute(path.with_file_name("").join(from)).map_err(Error::io(path))?;
+        let from = toml_edit::Value::from(from.display().to_string());
+        (case, text, _) = parse(&name, text, &[format!("run.from={from}")])?;
+    }
+    Ok(Loaded { case, text, path: path.to_owned(), warnings })
 }
 
 /// Parses and checks the text of a case; `name` stands for the file in messages. Returns the case, the text
