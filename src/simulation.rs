@@ -1,4 +1,5 @@
-//! A scene in motion: backend, solids and clock. [`Simulation::step`] is in `step.rs`.
+//! A scene in motion: backend, solids and clock. How it is opened and read is in `open.rs`, [`Simulation::step`] in
+//! `step.rs`.
 
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::Wrench;
@@ -13,20 +14,10 @@ use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
 use glam::DVec3;
+use rayon::ThreadPool;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
-
-/// Which backend to use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum BackendChoice {
-    /// A hardware GPU if there is one, else the CPU.
-    #[default]
-    Auto,
-    /// A GPU, or an error.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
 
 /// What a step did.
 #[derive(Clone, Debug, Default)]
@@ -49,6 +40,8 @@ pub struct StepReport {
 pub struct Simulation {
     /// The case.
     pub case: Case,
+    /// What it was built into; particles as they were at t = 0.
+    pub scene: Arc<Scene>,
     /// Constants.
     pub params: Params,
     /// Stages.
@@ -71,6 +64,7 @@ pub struct Simulation {
     /// Sizes of the particle groups.
     pub groups: Groups,
     speed: f64,
+    pub(crate) threads: Option<ThreadPool>,
 }
 
 /// When the PPE's solver stops.
@@ -92,18 +86,22 @@ const LOST_MAX: f64 = 0.02;
 const SHORTEST_STEP: f64 = 1e-6;
 
 impl Simulation {
-    /// Set up `scene` of `case` on `backend`.
-    pub fn new(
+    /// Set up `scene` of `case` on the backend that `make` returns.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and those of `make`.
+    pub fn with_backend(
         case: &Case,
-        scene: &Scene,
+        scene: impl Into<Arc<Scene>>,
         make: impl FnOnce(&Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
     ) -> Result<Self> {
-        let params = Params::new(case, scene)?;
-        let plan = Plan::new(case, scene, &params);
+        let scene: Arc<Scene> = scene.into();
+        let params = Params::new(case, &scene)?;
+        let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
-        let solids = Solids::new(scene, case.contact.as_ref())?;
-        crate::sense::refuse(case, scene, &params, &solids)?;
-        let mut backend = make(scene, &params, &plan, settings)?;
+        let solids = Solids::new(&scene, case.contact.as_ref())?;
+        crate::sense::refuse(case, &scene, &params, &solids)?;
+        let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
@@ -116,6 +114,7 @@ impl Simulation {
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
             groups: scene.groups,
+            scene,
             params,
             plan,
             time: 0.0,
@@ -123,6 +122,7 @@ impl Simulation {
             stages: BTreeMap::new(),
             wait_for_stages: false,
             speed: 0.0,
+            threads: None,
         })
     }
 
@@ -134,10 +134,12 @@ impl Simulation {
         let Self {
             // Follows from the case.
             case: _,
+            scene: _,
             params: _,
             plan: _,
             groups,
             wait_for_stages: _,
+            threads: _,
             // Times by the clock are those of each process.
             stages: _,
             backend,

@@ -8,10 +8,10 @@ use seixo::scene::Scene;
 use std::path::Path;
 
 fn steps_of(name: &str, spacing: Option<f64>, steps: u64) {
-    let path = format!("cases/{name}.toml");
+    let path = format!("{}/cases/{name}.toml", common::ROOT);
     let loaded = load(Path::new(&path), spacing, &[]).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(&loaded.case).unwrap_or_else(|e| panic!("{e}"));
-    let mut sim = common::cpu_simulation(&loaded.case, &scene);
+    let mut sim = common::cpu_simulation(&loaded.case, scene);
     let wet = sim.plan.wet();
     let energy = |sim: &mut seixo::simulation::Simulation| {
         let water = sim.backend.monitor().expect("readable");

@@ -15,6 +15,7 @@ mod device;
 mod faults;
 mod fluid;
 mod immersed;
+mod layers;
 mod output;
 mod restart;
 mod scene;

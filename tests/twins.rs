@@ -7,9 +7,9 @@
 use crate::common::moving as common;
 
 use glam::DVec3;
-use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::{Backend, Processor};
 use seixo::body::Pose;
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
@@ -22,6 +22,7 @@ use seixo::scene::{Kind, Scene};
 use seixo::scheme::Preconditioner;
 use seixo::simulation::Simulation;
 use seixo_study::device_compare::{self as compare, StageError};
+use std::sync::Arc;
 
 /// Largest error of a particle stage, relative to the largest value (to l0 for positions).
 const PARTICLE: f64 = 1e-5;
@@ -486,17 +487,12 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
         toml::from_str(include_str!("../cases/dam_break.toml")).expect("a valid case");
     for spacing in [0.03, 0.02] {
         case.run.spacing = spacing;
-        let scene = Scene::build(&case).expect("a valid scene");
+        let scene = Arc::new(Scene::build(&case).expect("a valid scene"));
         let mut iterations = |preconditioner, on_device: bool| {
             case.fluid.as_mut().expect("it has fluid").solver.preconditioner = preconditioner;
-            let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
-                Ok(if on_device {
-                    Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>
-                } else {
-                    Box::new(Cpu::new(s, p, plan, settings)?)
-                })
-            })
-            .expect("the simulation starts");
+            let processor = if on_device { Processor::Gpu { adapter: None } } else { Processor::Cpu };
+            let mut simulation =
+                Simulation::on(&case, scene.clone(), &processor).expect("the simulation starts");
             (0..4).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
         };
         let gpu = iterations(seixo::case::Preconditioner::Multigrid, true);

@@ -92,7 +92,8 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
     remark(&format!("l0 = {spacing}: {particles} particles, {backend:?} ..."));
     // Software acts as a GPU for correctness, not speed: a tenth of the steps will do.
     let steps = if software { (args.steps / 10).max(3) } else { args.steps };
-    let make = |s: &_, p: &_, plan: &_, settings| device::backend(&device, s, p, plan, settings);
+    let processor = device::processor(&device)?;
+    let make = |s: &_, p: &_, plan: &_, settings| processor.open(s, p, plan, settings);
     measure(&setup.loaded.case, args.from, steps, bandwidth, &make).map(Some)
 }
 

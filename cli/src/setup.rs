@@ -7,6 +7,7 @@ use seixo::error::Result;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A case, read and built.
 pub struct Setup {
@@ -15,7 +16,7 @@ pub struct Setup {
     /// The case.
     pub loaded: Loaded,
     /// Its particles.
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
 }
 
 impl Setup {
@@ -32,7 +33,7 @@ impl Setup {
     /// # Errors
     /// What is wrong with it.
     pub fn build(loaded: Loaded, name: String, quiet: bool) -> Result<Self> {
-        let scene = Scene::build(&loaded.case)?;
+        let scene = Arc::new(Scene::build(&loaded.case)?);
         if !quiet {
             loaded.warnings.iter().for_each(|w| remark(w));
             scene.notes.iter().for_each(|n| remark(&format!("note: {n}")));
@@ -45,9 +46,7 @@ impl Setup {
     /// # Errors
     /// No suitable device, or a scene that does not fit it.
     pub fn simulation(&self, args: &DeviceArgs) -> Result<Simulation> {
-        Simulation::new(&self.loaded.case, &self.scene, |scene, params, plan, settings| {
-            device::backend(args, scene, params, plan, settings)
-        })
+        Simulation::on(&self.loaded.case, self.scene.clone(), &device::processor(args)?)
     }
 }
 

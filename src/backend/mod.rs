@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod gpu;
+mod processor;
 mod rows;
 pub mod traffic;
 
@@ -15,6 +16,7 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{ParticleStage, Stage};
 use crate::pressure::PressureReport;
+pub use processor::Processor;
 use std::collections::BTreeMap;
 
 /// What the guards have seen since the start of the run.

@@ -112,11 +112,28 @@ fn missing(path: &Path) -> String {
 }
 
 impl Case {
+    /// The case in the file `path`.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Ok(load(path.as_ref(), None, &[])?.case)
+    }
+
     /// The JSON schema of a case file, for editors (`#:schema` in the first line) and for `seixo schema`.
     pub fn schema() -> String {
         let schema = schemars::schema_for!(Case);
         let mut text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
         text.push('\n');
         text
+    }
+}
+
+impl std::str::FromStr for Case {
+    type Err = Error;
+
+    /// A case from the text of a file.
+    fn from_str(text: &str) -> Result<Self> {
+        Ok(parse("case", text.to_owned(), &[])?.0)
     }
 }

@@ -7,7 +7,6 @@
 
 mod due;
 pub mod frames;
-pub mod gauges;
 pub mod resume;
 pub mod summary;
 pub mod tables;
@@ -15,6 +14,7 @@ pub mod verdict;
 
 use crate::checkpoint::{Archive, Found, Origin, file};
 use crate::error::{Error, Result};
+use crate::gauges::Gauges;
 use crate::output::folder::{Folder, Mode, checkpoints};
 use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
 use crate::output::write_whole;
@@ -22,7 +22,6 @@ use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 pub use due::Due;
 use frames::Frames;
-use gauges::Gauges;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};

@@ -1,12 +1,12 @@
 //! The tables over time: monitors.csv, bodies.csv and gauges.csv.
 
 use super::due::Due;
-use super::gauges::Gauges;
 use super::summary::Totals;
 use crate::backend::{Counters, Timing};
 use crate::checkpoint::Archive;
 use crate::contact::Energy;
 use crate::error::Result;
+use crate::gauges::Gauges;
 use crate::monitor::FluidMonitor;
 use crate::output::folder::Folder;
 use crate::output::table::{Cell, Table, vector_cells, vector_columns};

@@ -4,8 +4,7 @@ use super::Study;
 use super::builtin::{self, ENTRIES};
 use super::definition::{Setup, files_of};
 use super::engine::{Context, Make, Options, Processor, Shard};
-use seixo::backend::Backend;
-use seixo::backend::cpu::Cpu;
+use seixo::backend;
 use seixo::backend::gpu::Gpu;
 use seixo::console::say;
 use seixo::error::{Error, Result};
@@ -129,12 +128,13 @@ pub fn command(args: &StudyArgs) -> Result<()> {
     seixo::threads::start(args.threads)?;
     // Drivers are asked only when the first point wants one.
     let hardware = std::sync::LazyLock::new(|| args.adapter.is_some() || Gpu::hardware_available());
+    let gpu = backend::Processor::Gpu { adapter: args.adapter.clone() };
     let make: &Make = &|processor, scene, params, plan, settings| match processor {
-        Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?) as Box<dyn Backend>),
+        Processor::Cpu => backend::Processor::Cpu.open(scene, params, plan, settings),
         Processor::Gpu if !*hardware => Err(Error::Gpu(
             "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
         )),
-        Processor::Gpu => Ok(Box::new(Gpu::new(scene, params, plan, settings, args.adapter.as_deref())?)),
+        Processor::Gpu => gpu.open(scene, params, plan, settings),
     };
     if args.what == "list" {
         for entry in ENTRIES {

@@ -1,6 +1,5 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
-use super::frames::read;
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
@@ -103,13 +102,11 @@ impl Gauges {
             at += slots.len();
         }
         if !self.level.is_empty() {
-            let fields = read(simulation)?;
+            let fields = simulation.fields()?;
             let params = &simulation.params;
             for &(_, line) in &self.level {
-                let level = fields.as_ref().and_then(|f| {
-                    let (reach, l0) = (params.effective_radius, params.spacing);
-                    level(f, &simulation.groups, line, params.dimensions, reach, l0)
-                });
+                let (reach, l0) = (params.effective_radius, params.spacing);
+                let level = level(&fields, &simulation.groups, line, params.dimensions, reach, l0);
                 row.push(Cell::from(level.unwrap_or(f64::NAN)));
             }
         }
