@@ -14,6 +14,7 @@ mod contact_device;
 mod device;
 mod faults;
 mod fluid;
+mod fuzz;
 mod immersed;
 mod layers;
 mod output;

@@ -79,6 +79,7 @@ impl Case {
 
     fn args<'a>(&'a self, root: &'a str, more: &[&'a str]) -> Vec<&'a str> {
         let mut args = vec!["run", &self.path, "--backend", self.backend, "-q", "--threads", "1", "-o", root];
+        args.push("--force-disk");
         args.extend(self.sets.iter().map(String::as_str));
         args.extend(more);
         args

@@ -12,7 +12,9 @@ use seixo::cells::Grid;
 use seixo::console::{say, say_json};
 use seixo::contact::Solids;
 use seixo::error::Result;
+use seixo::estimate::{Estimate, bytes};
 use seixo::gauges::Gauges;
+use seixo::machine;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
@@ -82,6 +84,8 @@ struct Report {
     stages: Vec<StageLine>,
     contact: ContactLine,
     scheme: Option<Scheme>,
+    /// From the case alone, as `run` judges it.
+    estimate: Estimate,
     advice: Vec<String>,
 }
 
@@ -154,6 +158,17 @@ fn report(seen: &Seen) -> Result<Report> {
     } else if plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
+    let estimate = Estimate::new(case);
+    let free = |n: Option<u64>| n.map_or(f64::INFINITY, |n| n as f64);
+    if estimate.memory_beside_device > free(machine::memory()) {
+        advice.push("memory: this machine has less free than the run takes; `seixo run` refuses it".into());
+    }
+    if estimate.disk() > free(machine::disk(std::path::Path::new("."))) {
+        advice.push(
+            "disk: the results take more room than is free here; raise output.every or output.table_every"
+                .into(),
+        );
+    }
     let stages = plan.reasons.iter().map(|(stage, reason)| StageLine {
         stage: stage.name(),
         planned: reason.is_ok(),
@@ -182,6 +197,7 @@ fn report(seen: &Seen) -> Result<Report> {
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
+        estimate,
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
     })
@@ -326,6 +342,24 @@ fn words(report: &Report) -> String {
             s.gpu_forecasts.iter().enumerate().flat_map(|(k, f)| forecast(f, k > 0, report.spacing_m)),
         );
     }
+    let e = &report.estimate;
+    lines.extend([
+        String::new(),
+        "estimates".to_string(),
+        format!(
+            "  memory on the host: {} on the CPU, {} beside a GPU",
+            bytes(e.memory_cpu),
+            bytes(e.memory_beside_device)
+        ),
+        format!(
+            "  results: {:.0} frames of {}, tables {}, checkpoints {}: {}",
+            e.frames,
+            bytes(e.frame_bytes),
+            bytes(e.table_bytes),
+            bytes(e.checkpoint_bytes),
+            bytes(e.disk())
+        ),
+    ]);
     if !report.advice.is_empty() {
         lines.extend([String::new(), "advice".to_string()]);
         lines.extend(report.advice.iter().map(|a| format!("  {a}")));

@@ -3,9 +3,13 @@
 use super::progress::{Display, clock};
 use super::setup::{self, Setup};
 use super::signals::{self, RESUME};
-use super::{CaseArgs, Changes, DeviceArgs, Exit};
+use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
+use seixo::backend::gpu::Gpu;
+use seixo::case::Case;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
+use seixo::estimate::{Estimate, bytes};
+use seixo::machine;
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
 use seixo::run::resume::{Standing, standing};
@@ -38,6 +42,12 @@ pub struct RunArgs {
     /// Stop after this many steps.
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
+    /// Memory that the run may take, e.g. 8G, instead of what the machine has free.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    memory_limit: Option<u64>,
+    /// Run even if the disk seems too small for the results.
+    #[arg(long)]
+    force_disk: bool,
     /// Draw a picture of every frame, and of the end.
     #[arg(long)]
     picture: bool,
@@ -73,6 +83,59 @@ fn duration(text: &str) -> std::result::Result<Duration, String> {
     }
     let time = Duration::try_from_secs_f64(total).map_err(|_| wrong())?;
     if time.is_zero() { Err(wrong()) } else { Ok(time) }
+}
+
+/// Bytes: `8G`, `500M`, or a number.
+fn size(text: &str) -> std::result::Result<u64, String> {
+    let text = text.trim();
+    let (number, unit) = match text.char_indices().next_back() {
+        Some((at, 'k' | 'K')) => (&text[..at], 1e3),
+        Some((at, 'M')) => (&text[..at], 1e6),
+        Some((at, 'G')) => (&text[..at], 1e9),
+        Some((at, 'T')) => (&text[..at], 1e12),
+        _ => (text, 1.0),
+    };
+    let bytes = number.parse::<f64>().map_err(|_| "write a size like 8G or 500M")? * unit;
+    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err("write a size like 8G or 500M".into()) }
+}
+
+/// Refuses a case that the machine cannot hold, before anything is built.
+fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool) -> Result<()> {
+    let estimate = Estimate::new(case).at_most(args.steps);
+    let on_cpu = match args.device.backend {
+        BackendName::Cpu => true,
+        BackendName::Gpu => false,
+        BackendName::Auto => args.device.adapter.is_none(),
+    };
+    let needs = |cpu: bool| if cpu { estimate.memory_cpu } else { estimate.memory_beside_device };
+    let limit = args.memory_limit.or_else(machine::memory).map_or(f64::INFINITY, |n| n as f64);
+    // Drivers are asked only if it matters whether there is one.
+    let on_cpu = on_cpu
+        && (args.device.backend == BackendName::Cpu || needs(true) <= limit || !Gpu::hardware_available());
+    if needs(on_cpu) > limit {
+        return Err(Error::Case(format!(
+            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory, {} are {}: use a larger run.spacing \
+             or a smaller domain, or say with --memory-limit what the run may take",
+            asked.name,
+            estimate.particles,
+            estimate.cells,
+            bytes(needs(on_cpu)),
+            bytes(limit),
+            if args.memory_limit.is_some() { "allowed" } else { "free" }
+        )));
+    }
+    let free = machine::disk(&asked.out).map_or(f64::INFINITY, |n| n as f64);
+    if estimate.disk() > free && !args.force_disk && !resumes {
+        return Err(Error::Case(format!(
+            "{}: the results take about {}, {} are free on the disk of {}: raise output.every, output.table_every or \
+             run.spacing, or run all the same with --force-disk",
+            asked.name,
+            bytes(estimate.disk()),
+            bytes(free),
+            asked.out.display()
+        )));
+    }
+    Ok(())
 }
 
 /// Which case to run, where its results go, and whether to go on with what is there.
@@ -150,6 +213,7 @@ pub fn run(args: &RunArgs) -> Exit {
             }
         },
     };
+    fits(args, &asked, &loaded.case, matches!(start, Start::Resume(_)))?;
     let setup = Setup::build(loaded, asked.name, args.quiet)?;
     let mut simulation = setup.simulation(&args.device)?;
     let options = Options {

@@ -145,6 +145,8 @@ impl Checker<'_> {
         }
         if let Some([min, max]) = &run.domain {
             self.box_edges("run.domain", "run.domain", min, max);
+            self.place("run.domain", min);
+            self.place("run.domain", max);
         }
         if run.spacing > 0.0 && run.time_step > 0.0 && run.end.is_finite() && run.end / run.time_step > 1e9 {
             let message = format!("{:.1e} steps of {} s", run.end / run.time_step, run.time_step);

@@ -8,6 +8,9 @@ use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
+/// Problems that are shown; nobody reads a thousand, and each takes its time.
+const MOST_SHOWN: usize = 20;
+
 /// A case that was read, and the text that it came from.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -89,9 +92,14 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
     let problems = too_long.chain(check(&case));
     let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
     if !errors.is_empty() {
-        return Err(Error::Case(wrong(&errors.iter().map(located).collect::<Vec<_>>())));
+        let shown: Vec<Message> = errors.iter().take(MOST_SHOWN).map(located).collect();
+        let mut report = wrong(&shown);
+        if errors.len() > MOST_SHOWN {
+            report.push_str(&format!("\n\nerror: and {} more", errors.len() - MOST_SHOWN));
+        }
+        return Err(Error::Case(report));
     }
-    let warnings = warnings.iter().map(|p| wrong(&[located(p)])).collect();
+    let warnings = warnings.iter().take(MOST_SHOWN).map(|p| wrong(&[located(p)])).collect();
     drop(table);
     Ok((case, text, warnings))
 }
