@@ -139,7 +139,7 @@ fn a_second_run_into_a_live_folder_is_refused() {
     let case = small_case(folder.path());
     let out = folder.path().join("results");
     let mut first = Command::new(seixo().get_program())
-        .args(["run", &case, "--backend", "cpu", "-q", "--until", "1e6", "-o"])
+        .args(["run", &case, "--backend", "cpu", "-q", "--until", "1e6", "--force-disk", "-o"])
         .arg(&out)
         .spawn()
         .unwrap();

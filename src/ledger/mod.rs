@@ -7,6 +7,8 @@
 pub mod particle;
 
 use crate::body::{Pose, Wrench};
+use crate::checkpoint::Archive;
+use crate::error::Result;
 
 /// A part of the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +81,12 @@ impl Ledger {
     /// Add `work` [J] to `entry`.
     pub fn add(&mut self, entry: Entry, work: f64) {
         self.0[entry as usize] += work;
+    }
+
+    /// Save the work so far under `name`, or take it over.
+    pub(crate) fn exchange(&mut self, archive: &mut Archive, name: &str) -> Result<()> {
+        let entries = Entry::ALL.iter().zip(&mut self.0);
+        entries.map(|(entry, work)| archive.number(&format!("{name}.{}", entry.name()), work)).collect()
     }
 
     /// Sum of all entries [J].
