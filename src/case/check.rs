@@ -183,6 +183,8 @@ impl Checker<'_> {
                 self.relaxation("fluid.sound_speed", (speed * self.case.run.time_step / l0).powi(2));
             }
         }
+        let jitter = fluid.jitter;
+        self.range("fluid.jitter", jitter, (0.0..=0.3).contains(&jitter), "0 to 0.3 of the spacing");
         if fluid.block.is_empty() {
             self.add(
                 "fluid",

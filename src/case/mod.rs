@@ -181,6 +181,13 @@ pub struct Fluid {
     /// Blocks of water at t = 0.
     #[serde(default)]
     pub block: Vec<Block>,
+    /// Largest displacement of a water particle from its lattice at t = 0, along each axis, over the spacing [-];
+    /// 0 for none. For ensembles: starts with different `seed` differ in nothing else.
+    #[serde(default)]
+    pub jitter: f64,
+    /// Which of the jittered starts.
+    #[serde(default)]
+    pub seed: u32,
     /// The pressure Poisson equation's solver.
     #[serde(default)]
     pub solver: Solver,

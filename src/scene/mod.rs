@@ -14,6 +14,7 @@
 mod bodies;
 mod build;
 mod domain;
+mod jitter;
 mod lattice;
 mod layout;
 mod oriented;
