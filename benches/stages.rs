@@ -11,7 +11,7 @@ use seixo::case::Case;
 use seixo::case::file::load;
 use seixo::contact::Solids;
 use seixo::params::{Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use std::cell::RefCell;
@@ -42,9 +42,13 @@ fn dam_break() -> (Cpu, Step, usize) {
     cpu.write(&sim.backend.read().expect("readable")).expect("writable");
     cpu.move_solids(sim.solids.predict(sim.time, case.run.time_step)).expect("solids move");
     let step = params.step(sim.time, case.run.time_step, 2.0);
-    for stage in
-        [Stage::Predict, Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource]
-    {
+    for stage in [
+        ParticleStage::Predict,
+        ParticleStage::CellList,
+        ParticleStage::NeighbourList,
+        ParticleStage::NumberDensity,
+        ParticleStage::PressureSource,
+    ] {
         cpu.run(stage, &step).expect("the stage runs");
     }
     (cpu, step, scene.groups.total())
@@ -78,9 +82,9 @@ fn dam_break_stage(bencher: Bencher, name: &str) {
     bencher
         .counter(ItemsCount::new(*particles))
         .with_inputs(|| cpu.borrow_mut().fields_mut().clone_from(&fields))
-        .bench_local_values(|()| match stage {
-            Stage::ConjugateGradient => drop(cpu.borrow_mut().solve_pressure(step).expect("the solver runs")),
-            other => cpu.borrow_mut().run(other, step).expect("the stage runs"),
+        .bench_local_values(|()| match stage.over_particles() {
+            Some(stage) => cpu.borrow_mut().run(stage, step).expect("the stage runs"),
+            None => drop(cpu.borrow_mut().solve_pressure(step).expect("the solver runs")),
         });
     cpu.borrow_mut().fields_mut().clone_from(&fields);
 }

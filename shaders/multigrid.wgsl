@@ -17,7 +17,12 @@
 @group(0) @binding(9) var<storage, read_write> coarse: array<f32>; // x, y and b of all rows
 @group(0) @binding(10) var<storage, read> preconditioned: array<vec4f>;
 @group(0) @binding(11) var<storage, read_write> corrected: array<vec4f>;
-@group(0) @binding(12) var<storage, read> solve: array<u32>; // its first word: the iteration is done
+@group(0) @binding(12) var<storage, read> solve: Solve;
+
+// The first word of what crate::backend::gpu::layout::Solve is: the iteration is done.
+struct Solve {
+    done: u32,
+}
 
 // As in shaders/multigrid_levels.wgsl.
 struct Hierarchy {
@@ -133,7 +138,7 @@ fn sweep(level: u32, source: u32, to: u32, id: u32, threads: u32) {
 }
 
 fn stopped() -> bool {
-    return solve[0] != 0u;
+    return solve.done != 0u;
 }
 
 // Residuals of the particles onto the finest level.

@@ -42,13 +42,14 @@ pub struct Fields {
     pub diagonal: Vec<f64>,
     /// Acceleration of the stage in progress (viscosity, collision, pressure gradient) [m/s2], F.
     pub acceleration: Vec<DVec3>,
-    /// Force of viscosity and collisions on the wall layer of moving solids [N], moving-wall slots.
+    /// Force of viscosity and collisions on the wall layer of moving solids [N], moving-wall slots; empty where the
+    /// plan leaves it out.
     pub reaction: Vec<DVec3>,
 }
 
 impl Fields {
-    /// The state at t = 0.
-    pub fn new(scene: &Scene) -> Self {
+    /// The state at t = 0, with a `reaction` or without.
+    pub fn new(scene: &Scene, reaction: bool) -> Self {
         let g = scene.groups;
         let p = g.pressure();
         Self {
@@ -62,7 +63,7 @@ impl Fields {
             source: vec![0.0; p],
             diagonal: vec![1.0; p],
             acceleration: vec![DVec3::ZERO; g.fluid],
-            reaction: vec![DVec3::ZERO; g.moving_wall],
+            reaction: vec![DVec3::ZERO; if reaction { g.moving_wall } else { 0 }],
         }
     }
 }

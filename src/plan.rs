@@ -1,77 +1,103 @@
-//! Which stages a scene needs. The only place where that is judged: what is not planned is not compiled,
+//! Which stages and arrays a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{Case, ContactDevice, Law, Preconditioner, Source};
+use crate::case::{self, Case, ContactDevice, Law};
+use crate::compute::Program;
+use crate::contact::device::{paper, smooth};
 use crate::params::Params;
 use crate::scene::{Drive, Scene};
+use crate::scheme::{Preconditioner, Source};
 
-/// A stage of the time step. Its name is the name of the kernel, of the timing and of the test.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
-pub enum Stage {
-    /// Explicit viscosity.
-    Viscosity,
-    /// v*, r*.
-    Predict,
-    /// Moving solids take their pose.
-    MoveSolids,
-    /// Sort by cell.
-    CellList,
-    /// Neighbour search.
-    NeighbourList,
-    /// Particle collisions.
-    Collision,
-    /// Number density and free surface.
-    NumberDensity,
-    /// Right side and diagonal of the PPE.
-    PressureSource,
-    /// The PPE.
-    ConjugateGradient,
-    /// Pressure gradient.
-    PressureGradient,
-    /// v, r.
-    Correct,
-    /// Force of the fluid on solids.
-    BodyForce,
-    /// Contact and motion of the bodies; sums, friction and motion on the host.
-    Contact,
+macro_rules! stages {
+    ($($(#[$doc:meta])* $name:ident = $text:literal [$($particles:ident)?];)*) => {
+        /// A stage of the time step. Its name is the name of the kernel, of the timing and of the test.
+        #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+        pub enum Stage {
+            $($(#[$doc])* $name,)*
+        }
+
+        /// A stage that sweeps over the particles and needs nothing but the step's coefficients: what
+        /// [`crate::backend::Backend::run`] takes. The others have calls of their own.
+        #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+        pub enum ParticleStage {
+            $($(#[doc = concat!("`", $text, "`")] $particles,)?)*
+        }
+
+        impl Stage {
+            /// All stages, in the order of the step.
+            pub const ALL: [Self; [$($text),*].len()] = [$(Self::$name),*];
+
+            /// Name, as in the kernel's file.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $text,)*
+                }
+            }
+
+            /// The stage as one that sweeps over the particles, if it is one.
+            pub fn over_particles(self) -> Option<ParticleStage> {
+                match self {
+                    $($(Self::$particles => Some(ParticleStage::$particles),)?)*
+                    _ => None,
+                }
+            }
+        }
+
+        impl From<ParticleStage> for Stage {
+            fn from(stage: ParticleStage) -> Self {
+                match stage {
+                    $($(ParticleStage::$particles => Self::$particles,)?)*
+                }
+            }
+        }
+    };
 }
 
-impl Stage {
-    /// All stages, in the order of the step.
-    pub const ALL: [Self; 13] = [
-        Self::Viscosity,
-        Self::Predict,
-        Self::MoveSolids,
-        Self::CellList,
-        Self::NeighbourList,
-        Self::Collision,
-        Self::NumberDensity,
-        Self::PressureSource,
-        Self::ConjugateGradient,
-        Self::PressureGradient,
-        Self::Correct,
-        Self::BodyForce,
-        Self::Contact,
-    ];
+// In brackets: once more if the stage sweeps over the particles.
+stages! {
+    /// Explicit viscosity.
+    Viscosity = "viscosity" [Viscosity];
+    /// v*, r*.
+    Predict = "predict" [Predict];
+    /// Moving solids take their pose.
+    MoveSolids = "move_solids" [];
+    /// Sort by cell.
+    CellList = "cell_list" [CellList];
+    /// Neighbour search.
+    NeighbourList = "neighbour_list" [NeighbourList];
+    /// Particle collisions.
+    Collision = "collision" [Collision];
+    /// Number density and free surface.
+    NumberDensity = "number_density" [NumberDensity];
+    /// Right side and diagonal of the PPE.
+    PressureSource = "pressure_source" [PressureSource];
+    /// The PPE.
+    ConjugateGradient = "conjugate_gradient" [];
+    /// Pressure gradient.
+    PressureGradient = "pressure_gradient" [PressureGradient];
+    /// v, r.
+    Correct = "correct" [Correct];
+    /// Force of the fluid on solids.
+    BodyForce = "body_force" [];
+    /// Contact and motion of the bodies; sums, friction and motion on the host.
+    Contact = "contact" [];
+}
 
-    /// Name, as in the kernel's file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Viscosity => "viscosity",
-            Self::Predict => "predict",
-            Self::MoveSolids => "move_solids",
-            Self::CellList => "cell_list",
-            Self::NeighbourList => "neighbour_list",
-            Self::Collision => "collision",
-            Self::NumberDensity => "number_density",
-            Self::PressureSource => "pressure_source",
-            Self::ConjugateGradient => "conjugate_gradient",
-            Self::PressureGradient => "pressure_gradient",
-            Self::Correct => "correct",
-            Self::BodyForce => "body_force",
-            Self::Contact => "contact",
-        }
-    }
+/// Arrays that go together: a scene has all of a group or none.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+pub enum Arrays {
+    /// Of the fluid and its search.
+    Fluid,
+    /// Of solids that move in the fluid.
+    Solids,
+    /// Of walls that never move.
+    FixedWalls,
+    /// Of the fluid's force on solids.
+    Force,
+    /// Force of viscosity and collisions on the wall layer of moving solids, which the fluid's force takes in.
+    Reaction,
+    /// Levels of the multigrid preconditioner.
+    Multigrid,
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
@@ -101,8 +127,8 @@ fn relaxation(ratio: f64) -> f64 {
 /// host.
 #[derive(Clone, Debug, Default)]
 pub struct ContactPlan {
-    /// The device's kernel; `None`: on the host.
-    pub kernel: Option<&'static str>,
+    /// What the device runs; `None`: contact is computed on the host.
+    pub program: Option<&'static Program>,
     /// Why.
     pub reason: String,
 }
@@ -115,25 +141,29 @@ impl ContactPlan {
     }
 
     fn judge(case: &Case, scene: &Scene, asked: ContactDevice) -> Self {
-        let host = |reason: &str| Self { kernel: None, reason: reason.into() };
+        let host = |reason: &str| Self { program: None, reason: reason.into() };
         let free = |s: &&crate::scene::Solid| matches!(s.drive, Drive::Free(_));
         let points: usize = scene.solids.iter().filter(free).map(|s| s.wall_offset.len()).sum();
-        let kernel = match case.contact.as_ref().map(|c| c.law) {
+        let program = match case.contact.as_ref().map(|c| c.law) {
             None => return host("no contact"),
             Some(Law::Pressure) => return host("the baseline's impulses follow one another"),
-            Some(Law::Smooth) => Some("contact_smooth"),
-            Some(Law::Paper) => Some("contact_paper"),
+            // the kernel presses the points of boxes into boxes
+            Some(Law::Smooth) if scene.solids.iter().any(|s| s.shape.as_cuboid().is_none()) => {
+                return host("the device has no kernel of law \"smooth\" for round bodies");
+            }
+            Some(Law::Smooth) => Some(&smooth::PROGRAM),
+            Some(Law::Paper) => Some(&paper::PROGRAM),
         };
         let most = DEVICE_CONTACT_POINTS;
         match asked {
             _ if points == 0 => host("no body is free"),
             ContactDevice::Host => host("contact.device = \"host\""),
-            ContactDevice::Gpu => Self { kernel, reason: "contact.device = \"gpu\"".into() },
+            ContactDevice::Gpu => Self { program, reason: "contact.device = \"gpu\"".into() },
             ContactDevice::Auto if points < most => {
                 host(&format!("{points} surface points, below {most} a round trip to a device costs more"))
             }
             ContactDevice::Auto => {
-                Self { kernel, reason: format!("{points} surface points, {most} or more") }
+                Self { program, reason: format!("{points} surface points, {most} or more") }
             }
         }
     }
@@ -144,12 +174,14 @@ impl ContactPlan {
 pub struct Plan {
     /// For each stage of [`Stage::ALL`]: why it runs (`Ok`) or why it is left out (`Err`).
     pub reasons: Vec<(Stage, Result<&'static str, &'static str>)>,
-    /// Preconditioner of the PPE: [`Preconditioner::Jacobi`] or [`Preconditioner::Multigrid`].
+    /// Preconditioner of the PPE.
     pub preconditioner: Preconditioner,
     /// Under-relaxation of the fluid's force on bodies: F <- s F + (1 - s) F_old with this s; 1 for none.
     pub force_relaxation: f64,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
+    /// Whether walls that never move line the fluid.
+    pub fixed_walls: bool,
 }
 
 impl Plan {
@@ -180,23 +212,20 @@ impl Plan {
             (stage, reason)
         });
         let unknowns = scene.groups.fluid;
-        let asked = case.fluid.as_ref().map_or(Preconditioner::Jacobi, |f| f.solver.preconditioner);
+        let asked = case.fluid.as_ref().map_or(case::Preconditioner::Jacobi, |f| f.solver.preconditioner);
         let preconditioner = match asked {
-            Preconditioner::Auto if unknowns >= MULTIGRID_UNKNOWNS => Preconditioner::Multigrid,
-            Preconditioner::Auto => Preconditioner::Jacobi,
-            typed => typed,
+            case::Preconditioner::Multigrid => Preconditioner::Multigrid,
+            case::Preconditioner::Auto if unknowns >= MULTIGRID_UNKNOWNS => Preconditioner::Multigrid,
+            case::Preconditioner::Auto | case::Preconditioner::Jacobi => Preconditioner::Jacobi,
         };
         // With the velocity in the source, a body much lighter than the water it moves is thrown to and fro by
         // its own added mass; the plain number density source is slow enough not to.
         let lightest = scene
             .solids
             .iter()
-            .filter_map(|s| match (&s.drive, s.shape) {
-                (Drive::Free(b), crate::scene::Shape::Box { half }) => {
-                    let depth = if scene.dimensions == 2 { scene.spacing } else { 2.0 * half.y };
-                    Some(b.mass / (4.0 * half.x * half.z * depth * params.density))
-                }
-                _ => None,
+            .filter_map(|s| match &s.drive {
+                Drive::Free(b) => Some(b.mass / (s.shape.volume() * params.density)),
+                Drive::Prescribed(_) => None,
             })
             .fold(f64::INFINITY, f64::min);
         let light = if scene.dimensions == 2 { LIGHT_2D } else { LIGHT_3D };
@@ -207,7 +236,8 @@ impl Plan {
         };
         let asked = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         let contact = ContactPlan::judge(case, scene, asked);
-        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation, contact }
+        let fixed_walls = fluid && !scene.groups.static_range().is_empty();
+        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation, contact, fixed_walls }
     }
 
     /// Whether `stage` runs.
@@ -215,9 +245,18 @@ impl Plan {
         self.reasons.iter().any(|(s, why)| *s == stage && why.is_ok())
     }
 
-    /// `jacobi` or `multigrid`.
-    pub fn preconditioner_name(&self) -> &'static str {
-        if self.preconditioner == Preconditioner::Multigrid { "multigrid" } else { "jacobi" }
+    /// Whether the scene has `arrays`.
+    pub fn needs(&self, arrays: Arrays) -> bool {
+        match arrays {
+            Arrays::Fluid => self.wet(),
+            Arrays::Solids => self.has(Stage::MoveSolids),
+            Arrays::FixedWalls => self.fixed_walls,
+            Arrays::Force => self.has(Stage::BodyForce),
+            Arrays::Reaction => {
+                self.has(Stage::BodyForce) && (self.has(Stage::Viscosity) || self.has(Stage::Collision))
+            }
+            Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,
+        }
     }
 
     /// Whether the scene has fluid to compute.

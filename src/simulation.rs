@@ -6,10 +6,11 @@ use crate::case::{Case, ContactDevice, Fluid};
 use crate::contact::{ContactReport, Solids};
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
-use crate::params::{Lattice, Params, Step};
-use crate::plan::{Plan, Stage};
+use crate::params::{Params, Step};
+use crate::plan::{ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
+use crate::time_step::{collapse_speed, time_step};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -80,12 +81,6 @@ fn settings(case: &Case) -> Settings {
     }
 }
 
-/// Displacement of the fastest particles in a step, over l0.
-pub const COURANT_MAX: f64 = 0.35;
-/// c_s dt / l0 at most.
-pub const SOUND_MAX: f64 = 0.7;
-/// nu dt / l0^2 at most, as a part of the limit of explicit viscosity.
-pub const VISCOUS_MAX: f64 = 0.5;
 /// Steps between looks at the counters and the fastest particles.
 const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.
@@ -103,7 +98,7 @@ impl Simulation {
         let settings = settings(case);
         let mut backend = make(scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
-        if device == ContactDevice::Gpu && plan.contact.kernel.is_some() && backend.compute().is_none() {
+        if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
                         what there is) or leave contact.device out";
             return Err(crate::error::Error::Case(text.into()));
@@ -131,24 +126,13 @@ impl Simulation {
 
     /// Largest speed to expect in the fluid [m/s]: of the collapse from rest, or measured.
     fn expected_speed(&self) -> f64 {
-        self.speed.max(2.0 * (self.params.gravity.length() * self.params.depth).sqrt())
+        self.speed.max(collapse_speed(&self.params))
     }
 
     /// Coefficients of the next step, with the time step that the case and the flow allow.
-    pub fn next_step(&mut self) -> Step {
-        let mut dt = self.case.run.time_step;
-        if self.case.run.adaptive && self.plan.wet() {
-            let l0 = self.params.spacing;
-            dt = dt.min(COURANT_MAX * l0 / self.expected_speed().max(1e-9));
-            if let crate::params::Relaxation::Speed(c) = self.params.relaxation {
-                dt = dt.min(SOUND_MAX * l0 / c);
-            }
-            if self.params.viscosity > 0.0 {
-                let lattice = Lattice::new(self.params.dimensions, self.params.effective_radius / l0);
-                let most = VISCOUS_MAX * lattice.viscous_limit(self.params.dimensions);
-                dt = dt.min(most * l0 * l0 / self.params.viscosity);
-            }
-        }
+    pub fn next_step(&self) -> Step {
+        let adaptive = self.case.run.adaptive && self.plan.wet();
+        let dt = time_step(&self.params, self.case.run.time_step, adaptive, self.expected_speed());
         self.params.step(self.time, dt, self.expected_speed())
     }
 
@@ -178,11 +162,11 @@ impl Simulation {
         Ok(seen)
     }
 
-    pub(crate) fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
-        if !self.plan.has(stage) {
+    pub(crate) fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
+        if !self.plan.has(stage.into()) {
             return Ok(());
         }
-        self.timed(stage, |s| s.backend.run(stage, step))
+        self.timed(stage.into(), |s| s.backend.run(stage, step))
     }
 
     /// Solids move as they would without the fluid's force in this step.

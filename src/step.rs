@@ -1,7 +1,7 @@
 //! One time step: the algorithm of the paper's section 2, with the solids of section 3.
 
 use crate::error::{Error, Result};
-use crate::plan::Stage;
+use crate::plan::{ParticleStage, Stage};
 use crate::simulation::{Simulation, StepReport};
 
 impl Simulation {
@@ -14,20 +14,20 @@ impl Simulation {
         if self.plan.wet() {
             // Explicit part of Eq. (2): viscosity and gravity move particles to r*; solids go where they would
             // go without the fluid.
-            self.run(Stage::Viscosity, &step)?;
-            self.run(Stage::Predict, &step)?;
+            self.run(ParticleStage::Viscosity, &step)?;
+            self.run(ParticleStage::Predict, &step)?;
             self.move_solids(t, dt)?;
             // Neighbours at r*; particles that come too close rebound, Eq. (18).
-            self.run(Stage::CellList, &step)?;
-            self.run(Stage::NeighbourList, &step)?;
-            self.run(Stage::Collision, &step)?;
+            self.run(ParticleStage::CellList, &step)?;
+            self.run(ParticleStage::NeighbourList, &step)?;
+            self.run(ParticleStage::Collision, &step)?;
             // Number density, Eq. (4); free surface; pressure Poisson equation, Eq. (8).
-            self.run(Stage::NumberDensity, &step)?;
-            self.run(Stage::PressureSource, &step)?;
+            self.run(ParticleStage::NumberDensity, &step)?;
+            self.run(ParticleStage::PressureSource, &step)?;
             report.pressure = self.solve_pressure(&step)?;
             // Pressure gradient, Eq. (9), corrects velocity and position.
-            self.run(Stage::PressureGradient, &step)?;
-            self.run(Stage::Correct, &step)?;
+            self.run(ParticleStage::PressureGradient, &step)?;
+            self.run(ParticleStage::Correct, &step)?;
         }
         // Solids: fluid force, gravity and contact, Eqs. (10) to (14).
         report.contact = self.advance_solids(&step)?;

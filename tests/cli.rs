@@ -269,6 +269,28 @@ fn plan_tells_what_is_left_out_and_why() {
     }
 }
 
+/// The time step that `plan` advises is the one that `run` takes, whatever sets it; and where no body is free there is
+/// nothing to say of contact.
+#[test]
+fn plan_and_run_know_the_same_bounds_of_the_time_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("honey.toml");
+    let text = "[run]\nspacing = 0.02\ntime_step = 1.0\nadaptive = true\nend = 1.0\n[fluid]\nviscosity = 1.0\n\
+                [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.1]\n[tank]\nmin = [0, 0, 0]\n\
+                max = [0.2, 0.2, 0.2]\n[contact]\nspring = 1e5\n";
+    std::fs::write(&path, text).unwrap();
+    let case = path.display().to_string();
+    let plan = json(&ran(&["plan", &case, "--json"]).out);
+    let out = folder.path().join("out").display().to_string();
+    let run = ran(&["run", &case, "--steps", "1", "--backend", "cpu", "-o", &out, "--json"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let (planned, taken) =
+        (plan["time_step_s"].as_f64().unwrap(), json(&run.out)["time_s"].as_f64().unwrap());
+    assert!((planned / taken - 1.0).abs() < 1e-12 && planned < 1e-3, "{planned} planned, {taken} taken");
+    let advice = plan["advice"].to_string();
+    assert!(advice.contains("viscosity") && !advice.contains("contact"), "{advice}");
+}
+
 /// Too many particles to build are estimated from a coarser scene, with the limits that they break.
 #[test]
 fn plan_answers_for_scenes_that_nothing_holds() {

@@ -302,12 +302,12 @@ fn the_plan_leaves_few_points_to_the_host_and_many_to_the_device() {
         let (case, scene) = cubes(count, line);
         let params = Params::new(&case, &scene).expect("valid");
         let plan = Plan::new(&case, &scene, &params);
-        assert_eq!(plan.contact.kernel, kernel, "{count} {line}");
+        assert_eq!(plan.contact.program.map(|p| p.name), kernel, "{count} {line}");
         assert!(plan.contact.reason.contains(words), "{}", plan.contact.reason);
         // What is not planned takes nothing.
         let bytes = gpu::memory(&scene, &params, &plan).expect("it can be counted").total();
         assert_eq!(bytes > 0, kernel.is_some(), "{count} {line}: {bytes} bytes");
-        assert_eq!(gpu::shader::kernels(&plan).map(|k| k.0).collect::<Vec<_>>(), Vec::from_iter(kernel));
+        assert_eq!(gpu::kernels::planned(&plan).map(|p| p.name).collect::<Vec<_>>(), Vec::from_iter(kernel));
     }
 }
 

@@ -7,8 +7,9 @@ use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::fields::State;
 use seixo::kernels::pressure_source::laplacian_coefficient;
-use seixo::params::{Lattice, Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::lattice::Lattice;
+use seixo::params::{Params, Step};
+use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::cg::{Jacobi, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
@@ -33,7 +34,12 @@ fn prepared(text: &seixo::case::Case, shake: f64) -> (Cpu, Params, Step) {
     let plan = Plan::new(text, &scene, &params);
     let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
     let step = params.step(0.0, text.run.time_step, 1.0);
-    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+    for stage in [
+        ParticleStage::CellList,
+        ParticleStage::NeighbourList,
+        ParticleStage::NumberDensity,
+        ParticleStage::PressureSource,
+    ] {
         cpu.run(stage, &step).unwrap();
     }
     (cpu, params, step)
@@ -97,8 +103,8 @@ fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pr
         fields.pressure[i] = 1e4 + gradient.dot(fields.position[i]);
     }
     *cpu.fields_mut() = fields.clone();
-    cpu.run(Stage::PressureSource, &step).unwrap();
-    cpu.run(Stage::PressureGradient, &step).unwrap();
+    cpu.run(ParticleStage::PressureSource, &step).unwrap();
+    cpu.run(ParticleStage::PressureGradient, &step).unwrap();
     let expected = -(0.3 + 0.5 + 1.1) * params.density / step.dt;
     let mut checked = 0;
     for i in 0..cpu.groups().fluid {
@@ -140,7 +146,7 @@ fn the_corrected_gradient_stays_exact_on_shaken_positions() {
         }
         fields.pressure[i] = 1e4;
         *cpu.fields_mut() = fields.clone();
-        cpu.run(Stage::PressureGradient, &step).unwrap();
+        cpu.run(ParticleStage::PressureGradient, &step).unwrap();
         let minimum = row_minimum(&fields.pressure, i, &cpu);
         let m = moment(&fields.position, i, &cpu, &params);
         let shift = (1e4 - minimum) * (m.1.inverse() * m.0);

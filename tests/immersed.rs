@@ -156,3 +156,26 @@ fn a_closed_box_full_of_water_keeps_a_finite_pressure() {
     let f = sim.backend.read().expect("readable");
     assert!(f.pressure.iter().all(|p| p.is_finite()));
 }
+
+#[test]
+fn a_sphere_under_water_is_carried_by_its_volume_and_slowed_by_half_of_it() {
+    // a = g (1 - s) / (s + 1/2): the added mass of a sphere is half of the water that it displaces
+    let tank = |s: f64, z: f64| {
+        case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+             [fluid]\nsound_speed = 4\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.42, 0.42, 0.4]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.42, 0.42, 0.6]\nopen = [\"z_max\"]\n\
+             [contact]\nspring = 1e5\ndamping_ratio = 0.3\n\
+             [[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 0.07\ncenter = [0.21, 0.21, {z}]\n\
+             density = {}\ndisplaces_fluid = true\n",
+            1000.0 * s
+        ))
+    };
+    for (s, z) in [(5.0, 0.25)] {
+        let a = accelerations(&tank(s, z), 80);
+        let mean = a[30..].iter().sum::<f64>() / 50.0;
+        let expected = 9.81 * (1.0 - s) / (s + 0.5);
+        println!("ratio {s}: {mean:.3} m/s2 for {expected:.3}");
+        assert!((mean / expected - 1.0).abs() < 0.15, "{s}: {mean} for {expected}");
+    }
+}

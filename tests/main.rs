@@ -17,6 +17,7 @@ mod immersed;
 mod output;
 mod scene;
 mod shaders;
+mod shapes;
 mod stability;
 mod study;
 mod twins;

@@ -272,7 +272,7 @@ fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
     let blue = |[r, g, b]: [u8; 3]| b > r && b > g && b - g > 20;
     let draw = |scene: &Scene| {
         let poses = seixo::contact::Solids::new(scene, Some(&contact())).unwrap();
-        Picture::new(scene).draw(scene, poses.poses(), Some(&Fields::new(scene)))
+        Picture::new(scene).draw(scene, poses.poses(), Some(&Fields::new(scene, true)))
     };
     let open = scene("");
     let picture = draw(&open);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use seixo::case::{Case, file};
-use seixo::scene::{Drive, Kind, Scene, Shape};
+use seixo::scene::{Drive, Kind, Scene};
 use std::path::Path;
 
 fn case(name: &str, sets: &[&str]) -> Case {
@@ -101,7 +101,7 @@ fn area_and_surface_of_a_cube() {
     assert!(total.length() < 1e-14);
     let up: f64 = cube.wall_area.iter().map(|a| a.z.max(0.0)).sum();
     assert!((up - 0.04).abs() < 1e-12);
-    let Shape::Box { half } = cube.shape;
+    let half = cube.shape.as_cuboid().unwrap().half;
     for (&offset, &to) in cube.wall_offset.iter().zip(&cube.wall_to_surface) {
         let on = (offset + to).abs();
         assert!((on - half).abs().min_element() < 1e-12 && (on - half).max_element() < 1e-12);

@@ -3,17 +3,17 @@
 use crate::common::moving as common;
 
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
-use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, counter};
-use seixo::backend::gpu::{Gpu, shader};
-use seixo::case::Preconditioner;
-use seixo::contact::device::paper::{PaperLaw, PaperPair, PaperPose};
-use seixo::contact::device::smooth::{SmoothPair, SmoothPose};
+use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, WallParticle, counter};
+use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
+use seixo::compute::{Host, Program};
+use seixo::contact::device::paper::{self, PaperLaw, PaperPair, PaperPose};
+use seixo::contact::device::smooth::{self, SmoothPair, SmoothPose};
 use seixo::params::Params;
 use seixo::plan::{ContactPlan, Plan};
 use seixo::pressure::Settings;
+use seixo::scheme::Preconditioner;
 use std::collections::BTreeSet;
 use std::mem::offset_of;
-use wgpu::naga;
 
 /// Names of the files in `folder` that end in `extension`, but for `except`.
 fn files(folder: &str, extension: &str, except: &str) -> BTreeSet<String> {
@@ -36,9 +36,9 @@ fn every_shader_has_a_twin_and_every_twin_a_shader() {
     let of_particles: BTreeSet<String> =
         shaders.iter().filter(|s| !s.starts_with("contact_")).cloned().collect();
     assert_eq!(of_particles, files("src/kernels", ".rs", "mod"));
-    let listed: BTreeSet<String> = shader::KERNELS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    let listed: BTreeSet<String> = kernels::programs().map(|p| p.name.to_owned()).collect();
     assert_eq!(shaders, listed);
-    for (name, text) in shader::KERNELS {
+    for Program { name, text, .. } in kernels::programs() {
         let path = twin(name);
         assert!(text.contains(&format!("// Twin: {path}")), "{name}: head comment names no twin");
         assert!(text.starts_with("// "), "{name}: no head comment");
@@ -59,13 +59,22 @@ fn combinations(text: &str) -> impl Iterator<Item = Vec<&'static str>> {
         .map(move |k| names.iter().enumerate().filter(|(i, _)| k >> i & 1 == 1).map(|(_, &n)| n).collect())
 }
 
+/// The text of a shader.
+fn text(name: &str) -> &'static str {
+    kernels::programs().find(|p| p.name == name).expect("listed").text
+}
+
 #[test]
-fn every_shader_is_valid_with_every_switch_and_binds_what_every_device_allows() {
+fn every_shader_is_valid_with_every_switch_and_agrees_with_the_tables() {
     let allowed = wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize;
-    for (name, text) in shader::KERNELS {
+    let mut bound = BTreeSet::new();
+    for program in kernels::programs() {
+        let Program { name, text, .. } = program;
         let directives = text.lines().filter(|l| l.trim().starts_with("//#if ")).count();
         let known = asked(text).iter().map(|s| text.matches(&format!("//#if {s}\n")).count()).sum::<usize>();
         assert_eq!(directives, known, "{name}: a switch is not in the list");
+        let table = || buffers::TABLE.iter().map(|row| row.spec).chain(program.buffers.iter().copied());
+        let mut seen = BTreeSet::new();
         for switches in combinations(text) {
             let source = shader::source(text, &switches);
             assert_eq!(source.lines().count(), text.lines().count() + shader::COMMON.lines().count());
@@ -73,11 +82,28 @@ fn every_shader_is_valid_with_every_switch_and_binds_what_every_device_allows() 
                 shader::entries(name, &source).unwrap_or_else(|e| panic!("{name} {switches:?}: {e}"));
             assert!(!entries.is_empty(), "{name} {switches:?}: no entry point");
             for entry in entries {
-                let storage = entry.bindings.iter().filter(|(.., storage)| *storage).count();
-                assert!(storage <= allowed, "{name}.{}: {storage} storage buffers", entry.name);
+                let of = format!("{name}.{}", entry.name);
+                let kernel = program.kernels.iter().find(|k| k.entry == entry.name);
+                let kernel = kernel.unwrap_or_else(|| panic!("{of} is in no list"));
+                assert_eq!((kernel.file, entry.workgroup), (*name, [kernel.width, 1, 1]), "{of}");
+                let storage = entry.bindings.iter().filter(|b| b.storage).count();
+                assert!(storage <= allowed, "{of}: {storage} storage buffers");
+                for binding in &entry.bindings {
+                    let spec = table().find(|s| s.id.name() == binding.name);
+                    let spec = spec.unwrap_or_else(|| panic!("{of}: {} is in no table", binding.name));
+                    assert_eq!(binding.element, spec.element, "{of}: elements of {}", binding.name);
+                    assert_eq!(binding.storage, spec.host != Host::Uniform, "{of}: {}", binding.name);
+                    bound.insert(binding.name.clone());
+                }
+                seen.insert(entry.name);
             }
         }
+        let listed: BTreeSet<String> = program.kernels.iter().map(|k| k.entry.to_owned()).collect();
+        assert_eq!(seen, listed, "{name}: kernels");
     }
+    let of_contact = kernels::programs().flat_map(|p| p.buffers);
+    let listed = buffers::TABLE.iter().map(|row| &row.spec).chain(of_contact).map(|s| s.id.name().to_owned());
+    assert_eq!(bound, listed.collect(), "buffers that no shader binds, or the other way");
 }
 
 /// Name and offset of the members of a struct of a shader, and its size.
@@ -92,9 +118,8 @@ fn members(text: &str, name: &str) -> (Vec<(String, usize)>, usize) {
 
 macro_rules! same_layout {
     ($file:literal, $rust:ident { $($field:ident),* $(,)? }) => {{
-        let text = shader::KERNELS.iter().find(|(n, _)| *n == $file).expect("listed").1;
         let rust = vec![$((stringify!($field).to_owned(), offset_of!($rust, $field))),*];
-        let (wgsl, span) = members(text, stringify!($rust));
+        let (wgsl, span) = members(text($file), stringify!($rust));
         assert_eq!(wgsl, rust);
         assert_eq!(span, size_of::<$rust>());
     }};
@@ -146,6 +171,7 @@ fn structs_lie_the_same_on_both_sides() {
     same_layout!("multigrid_levels", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
+    same_layout!("body_force", WallParticle { area, arm, to_surface });
     same_layout!(
         "conjugate_gradient",
         Solve {
@@ -229,7 +255,6 @@ fn constants_are_the_same_on_both_sides() {
     use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
-    let text = |name: &str| shader::KERNELS.iter().find(|(n, _)| *n == name).expect("listed").1;
     let common = |name: &str| constant(shader::COMMON, name);
     assert_eq!(common("WORKGROUP"), WORKGROUP as f64);
     assert_eq!(common("FLUID"), f64::from(Kind::Fluid as u8));
@@ -303,12 +328,12 @@ fn pipelines_and_bindings_fit_together_for_every_kind_of_scene() {
                 }
                 let params = Params::new(&case, &scene).expect("valid");
                 let settings = Settings { tolerance: 1e-3, max_iterations: 100, warm_start: true };
-                for (preconditioner, kernel) in [
+                for (preconditioner, program) in [
                     (Preconditioner::Jacobi, None),
-                    (Preconditioner::Jacobi, Some("contact_paper")),
-                    (Preconditioner::Multigrid, Some("contact_smooth")),
+                    (Preconditioner::Jacobi, Some(&paper::PROGRAM)),
+                    (Preconditioner::Multigrid, Some(&smooth::PROGRAM)),
                 ] {
-                    let contact = ContactPlan { kernel, reason: String::new() };
+                    let contact = ContactPlan { program, reason: String::new() };
                     let plan = Plan { preconditioner, contact, ..Plan::new(&case, &scene, &params) };
                     let built = Gpu::dry_run(&scene, &params, &plan, settings);
                     if let Err(e) = built {

@@ -11,15 +11,15 @@ use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
 use seixo::body::Pose;
-use seixo::case::Preconditioner;
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::cg::System;
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::{Kind, Scene};
+use seixo::scheme::Preconditioner;
 use seixo::simulation::Simulation;
 use seixo_study::device_compare::{self as compare, StageError};
 
@@ -76,12 +76,12 @@ impl Pair {
             let t = f64::from(k) * dt;
             let step = params.step(t, dt, 2.0);
             for stage in Stage::ALL {
-                let done = match stage {
+                let done = match (stage, stage.over_particles()) {
                     _ if !plan.has(stage) => Ok(()),
-                    Stage::MoveSolids => cpu.move_solids(&common::poses(&scene, t + dt)),
-                    Stage::ConjugateGradient => cpu.solve_pressure(&step).map(|_| ()),
-                    Stage::BodyForce | Stage::Contact => Ok(()),
-                    other => cpu.run(other, &step),
+                    (_, Some(stage)) => cpu.run(stage, &step),
+                    (Stage::MoveSolids, _) => cpu.move_solids(&common::poses(&scene, t + dt)),
+                    (Stage::ConjugateGradient, _) => cpu.solve_pressure(&step).map(|_| ()),
+                    _ => Ok(()),
                 };
                 done.expect("the warm-up runs");
             }
@@ -117,6 +117,7 @@ impl Pair {
     }
 
     fn run(&mut self, stage: Stage) {
+        let stage = stage.over_particles().expect("a stage over the particles");
         self.cpu.run(stage, &self.step).expect("the CPU runs");
         self.gpu.run(stage, &self.step).expect("the device runs");
     }
@@ -351,7 +352,12 @@ fn conjugate_gradient_from_zero_and_from_a_bad_start() {
     let few = Settings { max_iterations: 3, ..pair.settings };
     let mut gpu = Gpu::new(&pair.scene, &pair.params, &pair.plan, few, None).expect("the device can");
     gpu.write(&bad).expect("writable");
-    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+    for stage in [
+        ParticleStage::CellList,
+        ParticleStage::NeighbourList,
+        ParticleStage::NumberDensity,
+        ParticleStage::PressureSource,
+    ] {
         gpu.run(stage, &pair.step).expect("runs");
     }
     let report = gpu.solve_pressure(&pair.step).expect("solves");
@@ -428,15 +434,15 @@ fn multigrid() {
             let mut gpu = Gpu::new(&pair.scene, &pair.params, &pair.plan, one, None).expect("the device can");
             gpu.write(&fields).expect("writable");
             gpu.split_levels(large).expect("the device can");
-            gpu.run(Stage::CellList, &pair.step).expect("runs");
-            gpu.run(Stage::NeighbourList, &pair.step).expect("runs");
+            gpu.run(ParticleStage::CellList, &pair.step).expect("runs");
+            gpu.run(ParticleStage::NeighbourList, &pair.step).expect("runs");
             let report = gpu.solve_pressure(&pair.step).expect("solves");
             assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, 1));
             let mut cpu = Cpu::new(&pair.scene, &pair.params, &pair.plan, one).expect("the CPU can");
             cpu.write(&fields).expect("writable");
-            cpu.run(Stage::CellList, &pair.step).expect("runs");
-            cpu.run(Stage::NeighbourList, &pair.step).expect("runs");
-            cpu.run(Stage::NumberDensity, &pair.step).expect("runs"); // makes the weights
+            cpu.run(ParticleStage::CellList, &pair.step).expect("runs");
+            cpu.run(ParticleStage::NeighbourList, &pair.step).expect("runs");
+            cpu.run(ParticleStage::NumberDensity, &pair.step).expect("runs"); // makes the weights
             cpu.solve_pressure(&pair.step).expect("solves");
             (gpu.read().expect("readable").pressure, cpu.fields().pressure.clone())
         };
@@ -461,8 +467,8 @@ fn multigrid() {
         let jacobi = Plan { preconditioner: Preconditioner::Jacobi, ..pair.plan.clone() };
         let mut diagonal = Gpu::new(&pair.scene, &pair.params, &jacobi, pair.settings, None).expect("can");
         diagonal.write(&before).expect("writable");
-        diagonal.run(Stage::CellList, &pair.step).expect("runs");
-        diagonal.run(Stage::NeighbourList, &pair.step).expect("runs");
+        diagonal.run(ParticleStage::CellList, &pair.step).expect("runs");
+        diagonal.run(ParticleStage::NeighbourList, &pair.step).expect("runs");
         let d = diagonal.solve_pressure(&pair.step).expect("solves");
         assert!(g.iterations < 12 && d.iterations > 2 * g.iterations, "{} {}", d.iterations, g.iterations);
         let (got, want) = (pair.gpu.read().expect("readable"), diagonal.read().expect("readable"));
@@ -493,9 +499,9 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
             .expect("the simulation starts");
             (0..4).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
         };
-        let gpu = iterations(Preconditioner::Multigrid, true);
-        let cpu = iterations(Preconditioner::Multigrid, false);
-        let diagonal = iterations(Preconditioner::Jacobi, true);
+        let gpu = iterations(seixo::case::Preconditioner::Multigrid, true);
+        let cpu = iterations(seixo::case::Preconditioner::Multigrid, false);
+        let diagonal = iterations(seixo::case::Preconditioner::Jacobi, true);
         println!(
             "l0 = {spacing}: at most {gpu} on the device, {cpu} on the CPU, {diagonal} with the diagonal"
         );
@@ -636,12 +642,12 @@ fn bytes(scheme: &str, preconditioner: Preconditioner) -> Vec<u64> {
     for _ in 0..4 {
         for stage in Stage::ALL {
             let (gpu, step) = (&mut pair.gpu, &pair.step);
-            let done = match stage {
-                Stage::MoveSolids => gpu.move_solids(&pair.poses),
-                Stage::ConjugateGradient => gpu.solve_pressure(step).map(|_| ()),
-                Stage::BodyForce => gpu.body_force().map(|_| ()),
-                Stage::Contact => Ok(()),
-                other => gpu.run(other, step),
+            let done = match (stage, stage.over_particles()) {
+                (_, Some(stage)) => gpu.run(stage, step),
+                (Stage::MoveSolids, _) => gpu.move_solids(&pair.poses),
+                (Stage::ConjugateGradient, _) => gpu.solve_pressure(step).map(|_| ()),
+                (Stage::BodyForce, _) => gpu.body_force().map(|_| ()),
+                _ => Ok(()),
             };
             done.expect("the step runs");
         }
@@ -667,7 +673,7 @@ fn two_runs_give_the_same_bytes() {
 #[test]
 fn every_stage_has_a_test() {
     let text = [include_str!("twins.rs"), include_str!("contact_device.rs")].concat();
-    for (name, _) in gpu::shader::KERNELS {
+    for name in gpu::kernels::programs().map(|p| p.name) {
         assert!(text.contains(&format!("#[test]\nfn {name}()")), "no test is called {name}");
     }
 }

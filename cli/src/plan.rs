@@ -13,10 +13,11 @@ use seixo::cells::Grid;
 use seixo::contact::Solids;
 use seixo::error::Result;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
 use seixo::run::summary::particles;
-use seixo::simulation::{COURANT_MAX, SOUND_MAX};
+use seixo::scene::Drive;
+use seixo::time_step::{Bounds, collapse_speed, time_step};
 use serde::Serialize;
 
 #[derive(Debug, clap::Args)]
@@ -138,12 +139,13 @@ fn report(seen: &Seen) -> Result<Report> {
     let (case, scene, built) = (&seen.case, &seen.setup.scene, seen.coarser == 1.0);
     let params = Params::new(case, scene)?;
     let plan = Plan::new(case, scene, &params);
-    let dt = longest_step(&params, case.run.time_step, case.run.adaptive && plan.wet());
+    let dt = time_step(&params, case.run.time_step, case.run.adaptive && plan.wet(), collapse_speed(&params));
     let mut advice =
         if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive) } else { vec![] };
-    if built {
+    let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
+    if built && free {
         advice.extend(Solids::new(scene, case.contact.as_ref())?.advice(dt).words);
-    } else if plan.has(Stage::Contact) {
+    } else if !built && plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
     let stages = plan.reasons.iter().map(|(stage, reason)| StageLine {
@@ -173,20 +175,20 @@ fn report(seen: &Seen) -> Result<Report> {
         particles: count,
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
-        contact: ContactLine { device: plan.contact.kernel.is_some(), reason: plan.contact.reason.clone() },
+        contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
     })
 }
 
 fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> {
-    let step = params.step(0.0, dt, expected_speed(params));
+    let step = params.step(0.0, dt, collapse_speed(params));
     let (scene, built) = (&seen.setup.scene, seen.coarser == 1.0);
     // The lists at t = 0 tell the memory and, of the scene itself, whether the lattice is sound.
     let settings = Settings { tolerance: 1e-3, max_iterations: 1, warm_start: false };
     let own = Params::new(&seen.setup.loaded.case, scene)?;
     let mut cpu = Cpu::new(scene, &own, plan, settings)?;
-    for stage in [Stage::CellList, Stage::NeighbourList] {
+    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
         cpu.run(stage, &step)?;
     }
     let sizes: Sizes = sizes(scene, &own, plan)?;
@@ -198,7 +200,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
         number_density: params.number_density,
         laplacian_over_l0_squared: params.laplacian / params.spacing.powi(2),
         neighbours: params.neighbours,
-        preconditioner: format!("{:?}", plan.preconditioner).to_lowercase(),
+        preconditioner: plan.preconditioner.name().into(),
         sound_speed_m_s: params.sound_speed(dt),
         relaxation: step.relaxation,
         compressibility_1_pa: step.compressibility,
@@ -212,34 +214,17 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
     })
 }
 
-/// Speed of the collapse from rest [m/s], as the adaptive time step expects it.
-fn expected_speed(params: &Params) -> f64 {
-    2.0 * (params.gravity.length() * params.depth).sqrt()
-}
-
-/// Bounds of the time step [s] by flow and by sound.
-fn bounds(params: &Params) -> (f64, f64) {
-    let flow = COURANT_MAX * params.spacing / expected_speed(params).max(1e-9);
-    let sound = match params.relaxation {
-        Relaxation::Speed(c) => SOUND_MAX * params.spacing / c,
-        Relaxation::Fixed(_) => f64::INFINITY,
-    };
-    (flow, sound)
-}
-
-fn longest_step(params: &Params, typed: f64, adaptive: bool) -> f64 {
-    let (flow, sound) = bounds(params);
-    if adaptive { typed.min(flow).min(sound) } else { typed }
-}
-
 fn step_advice(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
-    let (flow, sound) = bounds(params);
-    let speed = expected_speed(params);
+    let speed = collapse_speed(params);
+    let bounds = Bounds::new(params, speed);
+    let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous)];
+    let further = further.iter().filter(|(_, dt)| dt.is_finite());
+    let further: String = further.map(|(what, dt)| format!(", {what} {dt:.3e} s")).collect();
     let mut advice = vec![format!(
-        "time step: typed {typed:.3e} s; the flow (up to {speed:.2} m/s) allows {flow:.3e} s{}",
-        if sound.is_finite() { format!(", the sound speed {sound:.3e} s") } else { String::new() }
+        "time step: typed {typed:.3e} s; the flow (up to {speed:.2} m/s) allows {:.3e} s{further}",
+        bounds.flow
     )];
-    let bound = flow.min(sound);
+    let bound = bounds.shortest();
     if typed > bound {
         advice.push(if adaptive {
             format!("the adaptive time step starts at {bound:.3e} s")
@@ -249,7 +234,7 @@ fn step_advice(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
             )
         });
     }
-    let dt = longest_step(params, typed, adaptive);
+    let dt = time_step(params, typed, adaptive, speed);
     let wanted = match params.relaxation {
         Relaxation::Fixed(gamma) => gamma,
         Relaxation::Speed(c) => (c * dt / params.spacing).powi(2),

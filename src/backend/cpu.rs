@@ -4,7 +4,6 @@ use super::rows::{Shared, density_rows, gradient_rows, viscosity_rows};
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
-use crate::case::Preconditioner;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
@@ -16,12 +15,13 @@ use crate::kernels::{
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CAPACITY, CHUNK, Chunk, Neighbours};
 use crate::params::{Params, Step};
-use crate::plan::{Plan, Stage};
+use crate::plan::{Arrays, ParticleStage, Plan};
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::row_arrays::RowArrays;
 use crate::scene::{Groups, Kind, Scene, Solid};
+use crate::scheme::Preconditioner;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -70,7 +70,7 @@ impl Cpu {
             groups,
             solids: scene.solids.clone(),
             poses: Vec::new(),
-            fields: if wet { Fields::new(scene) } else { Fields::default() },
+            fields: if wet { Fields::new(scene, plan.needs(Arrays::Reaction)) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
             coordinates: Coordinates::default(),
@@ -294,21 +294,18 @@ impl Backend for Cpu {
         "f64"
     }
 
-    fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
+    fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
         self.dt = step.dt;
         match stage {
-            Stage::Viscosity => self.viscosity(),
-            Stage::Predict => self.predict(step.dt),
-            Stage::CellList => self.cell_list(),
-            Stage::NeighbourList => self.neighbour_list(),
-            Stage::Collision => self.collision(step),
-            Stage::NumberDensity => self.number_density(),
-            Stage::PressureSource => self.pressure_source(step),
-            Stage::PressureGradient => self.pressure_gradient(),
-            Stage::Correct => self.correct(step.dt),
-            Stage::ConjugateGradient | Stage::MoveSolids | Stage::BodyForce | Stage::Contact => {
-                unreachable!("{} has a call of its own", stage.name())
-            }
+            ParticleStage::Viscosity => self.viscosity(),
+            ParticleStage::Predict => self.predict(step.dt),
+            ParticleStage::CellList => self.cell_list(),
+            ParticleStage::NeighbourList => self.neighbour_list(),
+            ParticleStage::Collision => self.collision(step),
+            ParticleStage::NumberDensity => self.number_density(),
+            ParticleStage::PressureSource => self.pressure_source(step),
+            ParticleStage::PressureGradient => self.pressure_gradient(),
+            ParticleStage::Correct => self.correct(step.dt),
         }
         Ok(())
     }
@@ -366,7 +363,8 @@ impl Backend for Cpu {
                 let unknown = fields.state[i] == State::Inner;
                 let pressure =
                     body_force::surface_pressure(fields.pressure[i], unknown, to_surface, weight, spacing);
-                let force = body_force::body_force(pressure, area, fields.reaction[i - fluid]);
+                let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
+                let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;
                 total.torque += (pose.orientation * solid.wall_offset[k] + to_surface).cross(force);
             }

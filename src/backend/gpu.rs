@@ -7,11 +7,13 @@
 
 mod adapter;
 mod bandwidth;
+pub mod buffers;
 mod clock;
 mod context;
 mod exchange;
 pub mod forecast;
 pub mod hierarchy;
+pub mod kernels;
 pub mod layout;
 pub mod shader;
 mod solve;
@@ -22,23 +24,25 @@ pub use adapter::{AdapterInfo, adapters};
 pub use bandwidth::bandwidth;
 
 use super::traffic::Traffic;
-use super::{Backend, Commands, Compute, Counters, Timing};
+use super::{Backend, Commands, Counters, Timing};
 use crate::body::{Pose, Wrench};
-use crate::case::Preconditioner;
 use crate::cells::Grid;
+use crate::compute::{Compute, Id, Kernel};
 use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::kernels::monitor::{speed_most, speed_range};
 use crate::monitor::{FluidMonitor, SPEED_BINS};
 use crate::params::{Params, Step};
-use crate::plan::{Plan, Stage};
+use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use context::Context;
 use glam::{DVec3, Vec3};
 use hierarchy::Levels;
+use kernels::Over;
 use layout::{
-    Coefficients, Constants, Memory, MonitorSum, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, counter,
+    Coefficients, Constants, Memory, MonitorSum, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, WallParticle,
+    counter,
 };
 use std::collections::BTreeMap;
 
@@ -46,14 +50,12 @@ use std::collections::BTreeMap;
 pub struct Gpu {
     context: Context,
     params: Params,
+    plan: Plan,
     settings: Settings,
     groups: Groups,
     grid: Grid,
     sizes: Sizes,
     middle: DVec3,
-    wet: bool,
-    /// Contact searches and presses its pairs here.
-    contact: bool,
     /// Solid of each chunk of wall-layer particles.
     chunk_solid: Vec<usize>,
     solids: usize,
@@ -63,8 +65,6 @@ pub struct Gpu {
     last_iterations: u32,
     /// Levels of the multigrid preconditioner, if that is planned.
     levels: Option<Levels>,
-    /// Stages that run.
-    stages: Vec<Stage>,
 }
 
 /// Numbers of things of `scene` on a device.
@@ -160,34 +160,32 @@ impl Gpu {
             sizes.rows_per_thread = 4;
         }
         let memory = Memory::new(&sizes, plan);
-        let switches = shader::switches(params, &groups, plan);
+        let switches = shader::switches(params, plan);
+        let levels = plan.needs(Arrays::Multigrid).then(|| Levels::new(&sizes));
         let mut gpu = Self {
-            context: Context::new(device, info, &memory, shader::kernels(plan), &switches)?,
+            context: Context::new(device, info, &memory, kernels::planned(plan), &switches)?,
             params: params.clone(),
+            plan: plan.clone(),
             settings,
             groups,
             grid,
             sizes,
             middle: layout::middle(params),
-            wet: plan.wet(),
-            contact: plan.contact.kernel.is_some(),
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
             counters: Counters::default(),
             coefficients: Coefficients::default(),
             dt: 0.0,
-            last_iterations: if plan.preconditioner == Preconditioner::Multigrid { 5 } else { 30 },
-            levels: (plan.wet() && plan.preconditioner == Preconditioner::Multigrid)
-                .then(|| Levels::new(&sizes)),
-            stages: Stage::ALL.into_iter().filter(|&s| plan.has(s)).collect(),
+            last_iterations: if levels.is_some() { 5 } else { 30 },
+            levels,
         };
-        if gpu.wet {
+        if plan.wet() {
             let constants = Constants::new(params, &groups, &gpu.grid, &gpu.settings, &gpu.sizes);
-            gpu.context.upload("params", &[constants])?;
+            gpu.context.upload(buffers::params, &[constants])?;
             if let Some(levels) = &gpu.levels {
-                gpu.context.upload("hierarchy", &[levels.hierarchy()])?;
+                gpu.context.upload(buffers::hierarchy, &[levels.hierarchy()])?;
             }
-            gpu.write_fields(&Fields::new(scene))?;
+            gpu.write_fields(&Fields::new(scene, plan.needs(Arrays::Reaction)))?;
             gpu.write_solids(scene)?;
         }
         Ok(gpu)
@@ -205,7 +203,7 @@ impl Gpu {
             [x, y, z, w]
         };
         let g = self.groups;
-        if self.context.has("solid_offset") {
+        if self.plan.needs(Arrays::Solids) {
             let mut offset = vec![[0.0; 4]; g.moving_wall + g.moving_dummy];
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first_dummy = g.moving_dummy_range().start;
@@ -215,17 +213,20 @@ impl Gpu {
                     offset[p] = four(o, k as f32);
                 }
             }
-            self.context.upload("solid_offset", &offset)?;
+            self.context.upload(buffers::solid_offset, &offset)?;
         }
-        if self.context.has("wrench") {
-            let mut layer = vec![[[0.0; 4]; 3]; g.moving_wall];
+        if self.plan.needs(Arrays::Force) {
+            let mut layer = vec![WallParticle::default(); g.moving_wall];
             let mut chunks: Vec<[u32; 4]> = Vec::new();
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
-                    layer[first + p] = [solid.wall_area[p], solid.wall_offset[p] + to_surface, to_surface]
-                        .map(|v| four(v, 0.0));
+                    layer[first + p] = WallParticle {
+                        area: four(solid.wall_area[p], 0.0),
+                        arm: four(solid.wall_offset[p] + to_surface, 0.0),
+                        to_surface: four(to_surface, 0.0),
+                    };
                 }
                 for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {
                     let count = (solid.wall_slots.len() - p).min(WORKGROUP as usize);
@@ -233,8 +234,8 @@ impl Gpu {
                 }
             }
             self.chunk_solid = chunks.iter().map(|c| c[2] as usize).collect();
-            self.context.upload("wall_layer", &layer)?;
-            self.context.upload("force_chunk", &chunks)?;
+            self.context.upload(buffers::wall_layer, &layer)?;
+            self.context.upload(buffers::force_chunk, &chunks)?;
         }
         Ok(())
     }
@@ -244,27 +245,33 @@ impl Gpu {
         let coefficients = Coefficients::new(&self.params, step);
         if coefficients != self.coefficients {
             self.coefficients = coefficients;
-            self.context.upload("now", &[coefficients])?;
+            self.context.upload(buffers::now, &[coefficients])?;
         }
         Ok(())
+    }
+
+    /// Wall-layer particles that keep what viscosity and collisions do to them.
+    fn felt(&self) -> u64 {
+        if self.plan.needs(Arrays::Reaction) { self.sizes.moving_wall } else { 0 }
     }
 
     fn cell_list(&mut self) -> Result<()> {
         let Sizes { fluid, moving, .. } = self.sizes;
         let particles = groups(fluid + moving);
         let blocks = self.sizes.keys().div_ceil(SCAN_BLOCK).min(SCAN_GROUPS_MAX);
-        self.context.clear("cell_count")?;
+        self.context.clear(buffers::cell_count)?;
         self.context.pass([
-            ("cell_list.count", particles),
-            ("cell_list.scan_blocks", blocks),
-            ("cell_list.scan_sums", 1),
-            ("cell_list.scan_add", blocks),
-            ("cell_list.scatter", particles),
-            ("cell_list.place", particles),
+            (kernels::cell_list::count, particles),
+            (kernels::cell_list::scan_blocks, blocks),
+            (kernels::cell_list::scan_sums, 1),
+            (kernels::cell_list::scan_add, blocks),
+            (kernels::cell_list::scatter, particles),
+            (kernels::cell_list::place, particles),
         ])?;
-        self.context.copy(("sorted", 0), "position", 16 * fluid)?;
-        self.context.copy(("sorted", 16 * fluid), "velocity", 16 * fluid)?;
-        self.context.copy(("sorted", 32 * fluid), "pressure", 4 * fluid)
+        let (vectors, numbers) = (buffers::position.size() * fluid, buffers::pressure.size() * fluid);
+        self.context.copy(buffers::sorted, 0, buffers::position, vectors)?;
+        self.context.copy(buffers::sorted, vectors, buffers::velocity, vectors)?;
+        self.context.copy(buffers::sorted, 2 * vectors, buffers::pressure, numbers)
     }
 
     /// Take in the counters that were read; the device counts from zero again, so that 32 bits last for any run.
@@ -281,7 +288,7 @@ impl Gpu {
         if seen[..counter::NEIGHBOURS_MAX].iter().any(|&n| n > 0) {
             let mut reset = seen.to_vec();
             reset[..counter::NEIGHBOURS_MAX].fill(0);
-            self.context.upload("counters", &reset)?;
+            self.context.upload(buffers::counters, &reset)?;
         }
         Ok(out)
     }
@@ -333,28 +340,22 @@ impl Backend for Gpu {
         "f32"
     }
 
-    fn run(&mut self, stage: Stage, step: &Step) -> Result<()> {
-        self.context.begin(Some(stage));
+    fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
+        self.context.begin(Some(stage.into()));
         self.set_step(step)?;
-        let (fluid, rows) = (groups(self.sizes.fluid), groups(self.sizes.pressure));
-        let felt = if self.context.has("reaction") { self.sizes.moving_wall } else { 0 };
-        let and_walls = groups(self.sizes.fluid + felt);
-        match stage {
-            Stage::Viscosity => self.context.pass([("viscosity.viscosity", and_walls)]),
-            Stage::Predict => self.context.pass([("predict.predict", fluid)]),
-            Stage::CellList => self.cell_list(),
-            Stage::NeighbourList => self.context.pass([("neighbour_list.neighbour_list_main", rows)]),
-            Stage::Collision => {
-                self.context.pass([("collision.collision", and_walls), ("correct.correct", fluid)])
-            }
-            Stage::NumberDensity => self.context.pass([("number_density.number_density_main", rows)]),
-            Stage::PressureSource => self.context.pass([("pressure_source.pressure_source", rows)]),
-            Stage::PressureGradient => self.context.pass([("pressure_gradient.pressure_gradient", fluid)]),
-            Stage::Correct => self.context.pass([("correct.correct", fluid)]),
-            Stage::ConjugateGradient | Stage::MoveSolids | Stage::BodyForce | Stage::Contact => {
-                unreachable!("{} has a call of its own", stage.name())
-            }
+        let Some((kernel, over)) = kernels::of(stage) else { return self.cell_list() };
+        let s = &self.sizes;
+        let threads = match over {
+            Over::Fluid | Over::Own => s.fluid,
+            Over::FluidAndReaction => s.fluid + self.felt(),
+            Over::Rows => s.pressure,
+        };
+        self.context.pass([(kernel, groups(threads))])?;
+        if stage == ParticleStage::Collision {
+            // What it found is applied as any acceleration is.
+            self.context.pass([(kernels::correct::correct, groups(s.fluid))])?;
         }
+        Ok(())
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
@@ -364,7 +365,7 @@ impl Backend for Gpu {
     }
 
     fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
-        if !self.context.has("poses") {
+        if !self.plan.needs(Arrays::Solids) {
             return Ok(());
         }
         let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
@@ -376,8 +377,8 @@ impl Backend for Gpu {
         };
         let poses: Vec<_> = poses.iter().map(device).collect();
         self.context.begin(Some(Stage::MoveSolids));
-        self.context.upload("poses", &poses)?;
-        self.context.pass([("move_solids.move_solids", groups(self.sizes.moving))])
+        self.context.upload(buffers::poses, &poses)?;
+        self.context.pass([(kernels::move_solids::move_solids, groups(self.sizes.moving))])
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
@@ -387,8 +388,8 @@ impl Backend for Gpu {
         }
         let chunks = self.chunk_solid.len();
         self.context.begin(Some(Stage::BodyForce));
-        self.context.pass([("body_force.body_force", chunks as u64)])?;
-        let parts = self.context.download::<[f32; 4]>("wrench", 2 * chunks)?;
+        self.context.pass([(kernels::body_force::body_force, chunks as u64)])?;
+        let parts = self.context.download(buffers::wrench, 2 * chunks)?;
         let vector = |v: &[f32; 4]| Vec3::new(v[0], v[1], v[2]).as_dvec3();
         for (&solid, part) in self.chunk_solid.iter().zip(parts.chunks_exact(2)) {
             total[solid].force += vector(&part[0]);
@@ -398,10 +399,10 @@ impl Backend for Gpu {
     }
 
     fn counters(&mut self) -> Result<Counters> {
-        if !self.wet {
+        if !self.plan.wet() {
             return Ok(Counters::default());
         }
-        let seen = self.context.download("counters", counter::WORDS)?;
+        let seen = self.context.download(buffers::counters, counter::WORDS)?;
         self.take_counters(&seen)
     }
 
@@ -410,16 +411,20 @@ impl Backend for Gpu {
     }
 
     fn look(&mut self) -> Result<(FluidMonitor, Counters)> {
-        if !self.wet {
+        if !self.plan.wet() {
             return Ok(Default::default());
         }
         let groups = self.sizes.monitor_groups();
         self.context.begin(None);
-        self.context.clear("speed_bin")?;
-        self.context.pass([("monitor.monitor", groups)])?;
+        self.context.clear(buffers::speed_bin)?;
+        self.context.pass([(kernels::monitor::monitor, groups)])?;
         let sums = groups * size_of::<MonitorSum>() as u64;
         let (bins, seen) = (4 * SPEED_BINS as u64, 4 * counter::WORDS as u64);
-        let parts = [("monitor_sum", 0, sums), ("speed_bin", 0, bins), ("counters", 0, seen)];
+        let parts = [
+            (buffers::monitor_sum.id(), 0, sums),
+            (buffers::speed_bin.id(), 0, bins),
+            (buffers::counters.id(), 0, seen),
+        ];
         let bytes = self.context.download_bytes(&parts, true)?;
         let (sums, rest) = bytes.split_at(sums as usize);
         let (bins, seen) = rest.split_at(bins as usize);
@@ -437,26 +442,26 @@ impl Backend for Gpu {
     }
 
     fn solution(&mut self) -> Result<Option<Vec<f64>>> {
-        if !self.wet {
+        if !self.plan.wet() {
             return Ok(None);
         }
         // Beside the positions, where the last residual was computed from.
-        let packed = self.context.download::<[f32; 4]>("preconditioned", self.groups.pressure())?;
+        let packed = self.context.download(buffers::preconditioned, self.groups.pressure())?;
         Ok(Some(packed.into_iter().map(|x| f64::from(x[3])).collect()))
     }
 
     fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
         let parts: Vec<_> = slots.iter().map(|&s| (s, 1)).collect();
-        let pressures = self.context.download_parts::<f32>("pressure", &parts)?;
+        let pressures = self.context.download_parts(buffers::pressure, &parts)?;
         Ok(pressures.into_iter().map(f64::from).collect())
     }
 
     fn read(&mut self) -> Result<Fields> {
-        if self.wet { self.read_fields() } else { Ok(Fields::default()) }
+        if self.plan.wet() { self.read_fields() } else { Ok(Fields::default()) }
     }
 
     fn write(&mut self, fields: &Fields) -> Result<()> {
-        if self.wet { self.write_fields(fields) } else { Ok(()) }
+        if self.plan.wet() { self.write_fields(fields) } else { Ok(()) }
     }
 
     fn wait(&mut self) -> Result<()> {
@@ -468,11 +473,11 @@ impl Backend for Gpu {
     }
 
     fn traffic(&mut self) -> Result<Traffic> {
-        if self.wet { self.count_traffic() } else { Ok(Traffic::default()) }
+        if self.plan.wet() { self.count_traffic() } else { Ok(Traffic::default()) }
     }
 
     fn compute(&mut self) -> Option<&mut dyn Compute> {
-        if self.contact { Some(self) } else { None }
+        if self.plan.contact.program.is_some() { Some(self) } else { None }
     }
 
     fn commands(&self) -> Commands {
@@ -481,17 +486,17 @@ impl Backend for Gpu {
 }
 
 impl Compute for Gpu {
-    fn reserve(&mut self, buffer: &'static str, bytes: u64) -> Result<()> {
+    fn reserve(&mut self, buffer: Id, bytes: u64) -> Result<()> {
         self.context.reserve(buffer, bytes)
     }
 
-    fn upload(&mut self, buffer: &'static str, data: &[u8]) -> Result<()> {
+    fn upload(&mut self, buffer: Id, data: &[u8]) -> Result<()> {
         self.context.begin(Some(Stage::Contact));
         self.context.reserve(buffer, data.len() as u64)?;
-        if data.is_empty() { Ok(()) } else { self.context.upload(buffer, data) }
+        if data.is_empty() { Ok(()) } else { self.context.upload_bytes(buffer, data) }
     }
 
-    fn dispatch(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
+    fn dispatch(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
         let most = self.context.workgroups_max();
         if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
             return Err(Error::Gpu(format!(
@@ -503,9 +508,9 @@ impl Compute for Gpu {
         self.context.pass(kernels.iter().copied())
     }
 
-    fn download(&mut self, buffer: &'static str, bytes: u64) -> Result<Vec<u8>> {
+    fn download(&mut self, buffer: Id, bytes: u64) -> Result<Vec<u8>> {
         self.context.begin(Some(Stage::Contact));
-        self.context.download(buffer, bytes as usize)
+        self.context.download_bytes(&[(buffer, 0, bytes)], false)
     }
 }
 
@@ -525,10 +530,10 @@ mod tests {
         let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
         let mut gpu = Gpu::dry_run(&scene, &params, &plan, settings).expect("it can be built");
         let step = params.step(0.0, 1e-3, 1.0);
-        gpu.run(Stage::CellList, &step).expect("a step can be recorded");
+        gpu.run(ParticleStage::CellList, &step).expect("a step can be recorded");
         gpu.read().expect("the device is there");
         gpu.context.destroy();
-        let lost = gpu.run(Stage::CellList, &step).and_then(|()| gpu.read().map(|_| ()));
+        let lost = gpu.run(ParticleStage::CellList, &step).and_then(|()| gpu.read().map(|_| ()));
         let text = lost.expect_err("the device is gone").to_string();
         assert!(text.starts_with("noop: "), "{text}");
     }

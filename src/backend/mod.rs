@@ -1,6 +1,5 @@
 //! Where the particle stages run: the CPU in f64 ([`cpu`]) or a device in f32 ([`gpu`]).
 
-pub mod compute;
 pub mod cpu;
 pub mod gpu;
 mod rows;
@@ -8,13 +7,13 @@ pub mod traffic;
 
 use self::traffic::Traffic;
 use crate::body::{Pose, Wrench};
+use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
-use crate::plan::Stage;
+use crate::plan::{ParticleStage, Stage};
 use crate::pressure::PressureReport;
-pub use compute::Compute;
 use std::collections::BTreeMap;
 
 /// What the guards have seen since the start of the run.
@@ -88,9 +87,8 @@ pub trait Backend: Send {
     fn description(&self) -> String;
     /// `f64` or `f32`.
     fn precision(&self) -> &'static str;
-    /// Run one stage (every one but `ConjugateGradient`, `MoveSolids`, `BodyForce` and `Contact`, which have calls
-    /// of their own).
-    fn run(&mut self, stage: Stage, step: &Step) -> Result<()>;
+    /// Run one stage.
+    fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()>;
     /// Solve the PPE.
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport>;
     /// Give the particles of moving solids the poses of their solids.

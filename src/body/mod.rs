@@ -4,7 +4,8 @@
 //! follows from the momentum and the orientation, so that a free body keeps its momentum to round-off
 //! while it tumbles. A prescribed solid is a body of infinite mass that follows its table.
 
-use crate::scene::{Drive, Motion, Shape, Solid};
+use crate::scene::{Drive, Motion, Solid};
+use crate::shape::Shape;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Position and velocity of a solid, world axes.
@@ -74,8 +75,8 @@ pub(crate) struct Body {
     pub principal: DVec3,
     /// `true` for rotations about world axes that are locked.
     pub locked_rotation: [bool; 3],
-    /// Half edges [m].
-    pub half: DVec3,
+    /// Shape, in the body's frame.
+    pub shape: Shape,
     /// Table of motion, of a prescribed solid.
     motion: Option<(DVec3, Motion)>,
     /// The inertia does not depend on the orientation.
@@ -85,7 +86,6 @@ pub(crate) struct Body {
 impl Body {
     /// The body of `solid` at t = 0. In two dimensions it stays in the plane y = 0.
     pub fn new(solid: &Solid, dimensions: u32) -> Self {
-        let Shape::Box { half } = solid.shape;
         let mut body = Self {
             pose: Pose {
                 position: solid.position,
@@ -100,7 +100,7 @@ impl Body {
             mass: f64::INFINITY,
             principal: DVec3::INFINITY,
             locked_rotation: [true; 3],
-            half,
+            shape: solid.shape,
             motion: None,
             isotropic: false,
         };
@@ -133,12 +133,12 @@ impl Body {
 
     /// Radius of the sphere about the centre that holds the body [m].
     pub fn radius(&self) -> f64 {
-        self.half.length()
+        self.shape.radius()
     }
 
     /// World half extents of the bounding box [m].
     pub fn extent(&self) -> DVec3 {
-        self.rotation.abs() * self.half
+        self.shape.extent(self.rotation)
     }
 
     /// Diagonal of ones, zeros about locked axes.
@@ -241,7 +241,7 @@ mod tests {
         let solid = Solid {
             name: "brick".into(),
             is_body: true,
-            shape: Shape::Box { half: DVec3::new(0.3, 0.2, 0.1) },
+            shape: Shape::cuboid(DVec3::new(0.6, 0.4, 0.2)),
             position: DVec3::ZERO,
             orientation: DQuat::from_rotation_x(0.4),
             drive: Drive::Free(FreeBody {

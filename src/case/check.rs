@@ -4,7 +4,7 @@
 
 use super::{Case, Face, Gauges, Vector};
 use crate::error::{Error, Result};
-use crate::params::Lattice;
+use crate::lattice::Lattice;
 
 /// Something wrong, or worth a warning, about a key.
 #[derive(Clone, Debug, PartialEq)]

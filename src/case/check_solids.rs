@@ -1,17 +1,12 @@
 //! The part of the check that judges bodies and their contact.
 
 use super::check::{Checker, length};
-use super::{Body, ContactDevice, Law};
+use super::{Body, BodyShape, ContactDevice, Law};
 
 impl Checker<'_> {
     pub(super) fn body(&mut self, k: usize, body: &Body) {
         let path = |key: &str| format!("body.{k}.{key}");
-        for (axis, &length) in body.size.iter().enumerate() {
-            self.positive(&path(&format!("size.{axis}")), length, "m");
-        }
-        if body.size.iter().all(|&l| l > 0.0) {
-            self.fits(&path("size"), &format!("body `{}`", body.name), &[0.0; 3], &body.size);
-        }
+        self.shape(k, body);
         let given = self.one_of(
             &format!("body.{k}"),
             &[("mass", body.mass.is_some()), ("density", body.density.is_some())],
@@ -36,7 +31,7 @@ impl Checker<'_> {
                 self.add(
                     path("inertia"),
                     "one moment exceeds the sum of the other two, no mass has that",
-                    "correct it or leave it out for a uniform box",
+                    "correct it or leave it out for a uniform body",
                 );
             }
         }
@@ -83,6 +78,75 @@ impl Checker<'_> {
         }
     }
 
+    /// The keys that the shape needs, no others, and a particle across at least.
+    fn shape(&mut self, k: usize, body: &Body) {
+        let path = |key: &str| format!("body.{k}.{key}");
+        let (name, needed): (_, &[&str]) = match body.shape {
+            BodyShape::Box => ("box", &["size"]),
+            BodyShape::Sphere => ("sphere", &["radius"]),
+            BodyShape::Cylinder => ("cylinder", &["radius", "height"]),
+        };
+        let keys = [
+            ("size", body.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
+            ("radius", body.radius.is_some(), "0.1", "[m]"),
+            ("height", body.height.is_some(), "0.2", "the length along the axis [m]"),
+        ];
+        let mut complete = true;
+        for (key, given, example, what) in keys {
+            if needed.contains(&key) && !given {
+                complete = false;
+                let message = format!("body `{}` is a {name} without `{key}`", body.name);
+                self.add(format!("body.{k}"), message, format!("add `{key} = {example}`, {what}"));
+            } else if given && !needed.contains(&key) {
+                let other = if key == "size" { "box" } else { "cylinder" };
+                self.add(
+                    path(key),
+                    format!("body `{}` is a {name}: `{key}` does not belong to it", body.name),
+                    format!("remove `{key}`, or set shape = \"{other}\""),
+                );
+            }
+        }
+        for (axis, &length) in body.size.iter().flatten().enumerate() {
+            self.positive(&path(&format!("size.{axis}")), length, "m");
+        }
+        for (key, length) in [("radius", body.radius), ("height", body.height)] {
+            if let Some(length) = length {
+                self.positive(&path(key), length, "m");
+            }
+        }
+        let flat = self.flat();
+        if flat && body.shape == BodyShape::Sphere {
+            let message = format!("body `{}`: there are no spheres in two dimensions", body.name);
+            self.add(
+                path("shape"),
+                message,
+                "set shape = \"cylinder\" with `radius` and `height`: it lies along y",
+            );
+        }
+        if let Some(axis) = body.axis {
+            if body.shape != BodyShape::Cylinder {
+                let message = format!("body `{}` is a {name}: it has no `axis`", body.name);
+                self.add(path("axis"), message, "remove `axis`; `orientation` turns a body");
+            } else if length(&axis) == 0.0 {
+                self.add(path("axis"), "the axis has no length", "give a direction, e.g. [0, 1, 0]");
+            } else if flat && (axis[0] != 0.0 || axis[2] != 0.0) {
+                let message = "in two dimensions a cylinder lies along y";
+                self.add(path("axis"), message, "set axis = [0, 1, 0], or leave it out");
+            }
+        }
+        let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
+        let (key, size) = match body.shape {
+            BodyShape::Box => ("size", body.size.unwrap_or_default()),
+            BodyShape::Sphere => ("radius", [2.0 * radius; 3]),
+            BodyShape::Cylinder if flat => ("radius", [2.0 * radius; 3]),
+            BodyShape::Cylinder if height < 2.0 * radius => ("height", [2.0 * radius, 2.0 * radius, height]),
+            BodyShape::Cylinder => ("radius", [2.0 * radius, 2.0 * radius, height]),
+        };
+        if complete && size.iter().all(|&l| l > 0.0) {
+            self.fits(&path(key), &format!("body `{}`", body.name), &[0.0; 3], &size);
+        }
+    }
+
     pub(super) fn contact(&mut self) {
         let moves = |b: &&Body| b.motion.is_none() && b.locked.len() < 6;
         let Some(contact) = &self.case.contact else {
@@ -122,6 +186,16 @@ impl Checker<'_> {
         if contact.device == ContactDevice::Gpu && contact.law == Law::Pressure {
             let remedy = "leave `device` out or set law = \"smooth\" or \"paper\"";
             self.add("contact.device", "law = \"pressure\" runs on the host only", remedy);
+        }
+        let round = self.case.body.iter().find(|b| b.shape != BodyShape::Box);
+        if let Some(body) =
+            round.filter(|_| contact.device == ContactDevice::Gpu && contact.law == Law::Smooth)
+        {
+            let message = format!(
+                "body `{}` is round: its contact by law = \"smooth\" runs on the host only",
+                body.name
+            );
+            self.add("contact.device", message, "leave `device` out");
         }
         if contact.viscous_friction != 0.0 && contact.law == Law::Pressure {
             let message = "`viscous_friction` belongs to law = \"paper\" or \"smooth\"";

@@ -9,6 +9,7 @@ pub mod file;
 mod overrides;
 mod report;
 
+use crate::scheme::{FreeSurface, Gradient, Source};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -84,40 +85,6 @@ impl Run {
     fn default_effective_radius() -> f64 {
         2.1
     }
-}
-
-/// Source term of the pressure Poisson equation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Source {
-    /// The paper's Eq. (8): deviation of the number density alone.
-    NumberDensity,
-    /// Divergence of the predicted velocity plus gamma times the deviation.
-    Mixed,
-}
-
-/// Pressure gradient.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Gradient {
-    /// The paper's Eq. (9): against the smallest pressure in the neighbourhood.
-    Minimum,
-    /// Eq. (9) times the inverse of the particle's moment matrix: exact for linear fields.
-    MinimumCorrected,
-    /// The same at the free surface too, where the one-sided sum carries half the weight of a particle. Still
-    /// water stays three times calmer and small bodies float steadily; a collapse gains up to 0.5 % of energy
-    /// before it loses any.
-    CorrectedSurface,
-}
-
-/// Which particles lie on the free surface (P = 0).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum FreeSurface {
-    /// The paper's: n < beta n0.
-    Threshold,
-    /// n < 0.8 beta n0, or n < beta n0 and the neighbours' centroid lies more than 0.1 l0 away.
-    ThresholdOffset,
 }
 
 /// Sets of scheme switches.
@@ -351,21 +318,46 @@ pub enum Freedom {
     RotationZ,
 }
 
-/// A rigid box.
+/// Shape of a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyShape {
+    /// A box of `size`.
+    #[default]
+    Box,
+    /// A sphere of `radius` (three dimensions).
+    Sphere,
+    /// A cylinder of `radius` and `height` with flat ends, along `axis`; in two dimensions a disc.
+    Cylinder,
+}
+
+/// A rigid body.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Name, for messages and tables.
     pub name: String,
-    /// Edge lengths [m].
-    pub size: Vector,
+    /// Shape.
+    #[serde(default)]
+    pub shape: BodyShape,
+    /// Edge lengths of a box [m].
+    pub size: Option<Vector>,
+    /// Radius of a sphere or cylinder [m].
+    pub radius: Option<f64>,
+    /// Length of a cylinder along its axis [m].
+    pub height: Option<f64>,
+    /// Direction of a cylinder's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In two
+    /// dimensions it is [0, 1, 0].
+    pub axis: Option<Vector>,
     /// Centre of mass at t = 0 [m].
     pub center: Vector,
-    /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share l0 / size y of it.
+    /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share of it: l0 over size y
+    /// or over the cylinder's height.
     pub mass: Option<f64>,
     /// Density [kg/m3].
     pub density: Option<f64>,
-    /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform box if absent.
+    /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform body if absent.
+    /// A cylinder's third axis is its own.
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.
     pub orientation: Option<Turn>,

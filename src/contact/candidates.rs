@@ -5,11 +5,12 @@
 
 use super::broad::{Bounds, PointGrid, meeting};
 use super::friction::Friction;
-use super::geometry::{self, Surface, WallBox};
+use super::geometry::{self, WallBox};
 use super::stiffness::{self, Damping, MOST_SUBSTEPS};
 use super::{Limits, paper, smooth};
 use crate::body::Body;
 use crate::scene::Scene;
+use crate::shape::{Cuboid, Geometry, Surface};
 use rayon::prelude::*;
 
 /// Pairs from which the evaluation is spread over threads.
@@ -106,13 +107,18 @@ pub(crate) struct Smooth {
 impl Smooth {
     pub fn new(scene: &Scene) -> Self {
         Self {
-            surfaces: scene.solids.iter().map(|s| Surface::new(s, scene.dimensions)).collect(),
+            surfaces: scene.solids.iter().map(|s| s.surface(scene.spacing, scene.dimensions)).collect(),
             walls: geometry::walls(scene),
             pairs: vec![],
             friction: Friction::default(),
             spacing: scene.spacing,
             generation: 0,
         }
+    }
+
+    /// Whether any solid is round somewhere.
+    pub fn is_round(&self) -> bool {
+        self.surfaces.iter().any(Surface::is_round)
     }
 
     /// Whether the lists are those of `candidates`.
@@ -126,8 +132,8 @@ impl Smooth {
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             for (w, wall) in self.walls.iter().enumerate() {
                 let q = wall.axes.transpose() * (body.pose.position - wall.center);
-                let extent = (wall.axes.transpose() * body.rotation).abs() * body.half;
-                if geometry::outside(q, wall.half + extent) < candidates.skin(a) {
+                let extent = body.shape.extent(wall.axes.transpose() * body.rotation);
+                if (Cuboid { half: wall.half + extent }).outside(q) < candidates.skin(a) {
                     pairs.push((smooth::Pair::new(a, smooth::Other::Wall(w)), candidates.skin(a)));
                 }
             }

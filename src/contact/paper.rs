@@ -99,7 +99,7 @@ impl Pair {
                 let near = |own: &Body, layer: &Layer, other: &Body| {
                     let inside = |x: &DVec3| {
                         let q = other.rotation.transpose() * (*x - other.pose.position);
-                        super::geometry::outside(q, other.half) < reach
+                        other.shape.outside(q) < reach
                     };
                     let points = layer.offsets.iter().enumerate().map(|(k, o)| (k as u32, at(own, *o)));
                     points.filter(|(_, x)| inside(x)).collect::<Vec<_>>()

@@ -3,8 +3,8 @@
 use super::device::Link;
 use super::smooth::Other;
 use super::{Model, OnDevice, Solids};
-use crate::backend::Compute;
 use crate::body::Wrench;
+use crate::compute::Compute;
 use crate::error::Result;
 use glam::DVec3;
 

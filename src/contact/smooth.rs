@@ -18,9 +18,10 @@
 //! Beyond a quarter spacing a second spring joins, stiff enough to stop the fastest body of the scene
 //! within half a spacing more; it is never reached with a sensible K, and it is conservative too.
 
-use super::edges::{self, Line};
-use super::geometry::{self, Faces, Inside, Surface, WallBox};
+use super::geometry::WallBox;
+use super::round;
 use crate::body::{Body, Wrench};
+use crate::shape::{Faces, Inside, Line, Shape, Surface};
 use glam::{DMat3, DVec3};
 
 /// What a free solid touches.
@@ -100,34 +101,48 @@ fn felt(steps: f64) -> f64 {
 /// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
 const ALONG_NORMAL: f64 = 0.95;
 
-/// Where a box stands.
+/// Where a shape stands.
 #[derive(Clone, Copy, Debug)]
-struct Frame {
-    center: DVec3,
-    axes: DMat3,
-    half: DVec3,
+pub(super) struct Frame {
+    pub center: DVec3,
+    pub axes: DMat3,
+    pub shape: Shape,
+    /// Faces that can be reached.
+    pub faces: Faces,
 }
 
-/// Where the edges of walls are given.
-const WORLD: Frame = Frame { center: DVec3::ZERO, axes: DMat3::IDENTITY, half: DVec3::ZERO };
+impl Frame {
+    pub fn body(body: &Body, faces: Faces) -> Self {
+        Self { center: body.pose.position, axes: body.rotation, shape: body.shape, faces }
+    }
 
-/// A box as the edges of another frame see it.
+    pub fn wall(wall: &WallBox) -> Self {
+        Self { center: wall.center, axes: wall.axes, shape: wall.shape(), faces: wall.faces }
+    }
+
+    /// `x` [m] of the world in its own frame.
+    pub fn local(&self, x: DVec3) -> DVec3 {
+        self.axes.transpose() * (x - self.center)
+    }
+}
+
+/// A shape as the edges of another frame see it.
 #[derive(Clone, Copy, Debug)]
 struct View {
     other: Frame,
-    faces: Faces,
-    /// Turns the edges' frame into the box's.
+    /// Turns the edges' frame into the shape's.
     turn: DMat3,
-    /// The edges' frame in the box's.
+    /// The edges' frame in the shape's.
     shift: DVec3,
     /// Weight times depth^8 below which an edge is left out [m8].
     least: f64,
 }
 
 impl View {
-    fn new(own: Frame, other: Frame, faces: Faces, least: f64) -> Self {
+    /// `other` as seen from the frame of `axes` about `center`.
+    fn new(center: DVec3, axes: DMat3, other: Frame, least: f64) -> Self {
         let still = other.axes.transpose();
-        Self { other, faces, turn: still * own.axes, shift: still * (own.center - other.center), least }
+        Self { other, turn: still * axes, shift: still * (center - other.center), least }
     }
 }
 
@@ -148,6 +163,11 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
+    /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
+    pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
+        Self { at, normal, depth, weight, speed, force: 0.0, patch }
+    }
+
     /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
     /// cross.
     pub fn face(&self) -> Option<u8> {
@@ -224,6 +244,8 @@ pub(crate) struct Pair {
     pub edges_a: Vec<u32>,
     /// Edges of `b`, a solid or a wall, near `a`.
     pub edges_b: Vec<u32>,
+    /// Whether round parts of one of both are near the other.
+    pub round: bool,
     pub constants: Constants,
     contacts: Vec<Contact>,
     /// Contacts for the device to take in.
@@ -251,6 +273,7 @@ impl Pair {
             samples: vec![],
             edges_a: vec![],
             edges_b: vec![],
+            round: false,
             constants: Constants::default(),
             contacts: vec![],
             given: vec![],
@@ -326,60 +349,66 @@ impl Pair {
         self.patches.extend(&sums.patches);
     }
 
-    /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's box.
+    /// The second solid.
+    fn other(&self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Frame {
+        match self.b {
+            Other::Solid(b) => Frame::body(&bodies[b], surfaces[b].all_faces),
+            Other::Wall(w) => Frame::wall(&walls[w]),
+        }
+    }
+
+    /// Velocity [m/s] of the second solid at the world point `at` [m].
+    fn velocity_b(&self, bodies: &[Body], at: DVec3) -> DVec3 {
+        self.b.solid().map_or(DVec3::ZERO, |b| bodies[b].pose.velocity_at(at))
+    }
+
+    /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's shape.
     pub fn collect(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
-        let near = |surface: &Surface, own: &Body, center: DVec3, axes: DMat3, half: DVec3| {
-            let turn = axes.transpose() * own.rotation;
-            let shift = axes.transpose() * (own.pose.position - center);
+        let near = |surface: &Surface, own: &Body, to: Frame| {
+            let turn = to.axes.transpose() * own.rotation;
+            let shift = to.local(own.pose.position);
             let points = surface.points.iter().enumerate();
-            let points = points.filter(|(_, p)| geometry::outside(turn * **p + shift, half) < skin);
+            let points = points.filter(|(_, p)| to.shape.outside(turn * **p + shift) < skin);
             points.map(|(k, _)| k as u32).collect::<Vec<u32>>()
         };
-        match self.b {
-            Other::Solid(b) => {
-                let other = &bodies[b];
-                self.points_a =
-                    near(&surfaces[self.a], body, other.pose.position, other.rotation, other.half);
-                self.points_b = near(&surfaces[b], other, body.pose.position, body.rotation, body.half);
-            }
-            Other::Wall(w) => {
-                let wall = &walls[w];
-                self.points_a = near(&surfaces[self.a], body, wall.center, wall.axes, wall.half);
-            }
+        let other = self.other(bodies, surfaces, walls);
+        let own = Frame::body(body, surfaces[self.a].all_faces);
+        let theirs = self.b.solid().map(|b| &surfaces[b]);
+        self.round = surfaces[self.a].is_round() || theirs.is_some_and(Surface::is_round);
+        self.round &= other.shape.outside(other.local(own.center)) < own.shape.radius() + skin
+            && own.shape.outside(own.local(other.center)) < other.shape.radius() + skin;
+        if surfaces[self.a].ball.is_some() || theirs.is_some_and(|s| s.ball.is_some()) {
+            return;
+        }
+        self.points_a = near(&surfaces[self.a], body, other);
+        if let Other::Solid(b) = self.b {
+            self.points_b = near(&surfaces[b], &bodies[b], own);
         }
         self.collect_edges(bodies, surfaces, walls, skin);
     }
 
-    /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's box.
+    /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's shape.
     pub fn collect_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
-        let own = Frame { center: body.pose.position, axes: body.rotation, half: body.half };
-        let near = |lines: &[Line], of: Frame, to: Frame| {
-            let turn = to.axes.transpose() * of.axes;
-            let shift = to.axes.transpose() * (of.center - to.center);
+        let own = Frame::body(body, surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let near = |lines: &[Line], center: DVec3, axes: DMat3, to: Frame| {
+            let turn = to.axes.transpose() * axes;
+            let shift = to.axes.transpose() * (center - to.center);
             let lines = lines.iter().enumerate().filter(|(_, e)| {
-                edges::clip(turn * e.start + shift, turn * e.along, e.length, to.half + skin).is_some()
+                to.shape.line_is_near(turn * e.start + shift, turn * e.along, e.length, skin)
             });
             lines.map(|(k, _)| k as u32).collect::<Vec<u32>>()
         };
         self.samples.clear();
+        self.edges_a = near(&surfaces[self.a].edges, own.center, own.axes, other);
         match self.b {
-            Other::Solid(b) => {
-                let other = &bodies[b];
-                let other = Frame { center: other.pose.position, axes: other.rotation, half: other.half };
-                self.edges_a = near(&surfaces[self.a].edges, own, other);
-                self.edges_b = near(&surfaces[b].edges, other, own);
-            }
+            Other::Solid(b) => self.edges_b = near(&surfaces[b].edges, other.center, other.axes, own),
             Other::Wall(w) => {
-                let wall = &walls[w];
-                let other = Frame { center: wall.center, axes: wall.axes, half: wall.half };
-                self.edges_a = near(&surfaces[self.a].edges, own, other);
-                self.edges_b = near(&wall.edges, WORLD, own);
-                let near = |x: &&DVec3| {
-                    geometry::outside(own.axes.transpose() * (**x - own.center), own.half) < skin
-                };
-                self.samples.extend(wall.corners.iter().filter(near));
+                self.edges_b = near(&walls[w].edges, DVec3::ZERO, DMat3::IDENTITY, own);
+                let near = |x: &&DVec3| own.shape.outside(own.local(**x)) < skin;
+                self.samples.extend(walls[w].corners.iter().filter(near));
             }
         }
     }
@@ -387,7 +416,7 @@ impl Pair {
     /// Whether any candidate is left.
     pub fn is_empty(&self) -> bool {
         let points = self.points_a.len() + self.points_b.len() + self.samples.len();
-        points + self.edges_a.len() + self.edges_b.len() == 0
+        points + self.edges_a.len() + self.edges_b.len() == 0 && !self.round
     }
 
     /// Forces, energy and friction patches at the bodies' poses and velocities.
@@ -399,6 +428,9 @@ impl Pair {
         self.find(bodies, surfaces, walls);
         self.points = self.contacts.len();
         self.find_edges(bodies, surfaces, walls, spacing);
+        if self.round {
+            self.find_round(bodies, surfaces, walls);
+        }
         self.count = self.contacts.len();
         if !self.contacts.is_empty() {
             self.press();
@@ -409,36 +441,30 @@ impl Pair {
     /// The points inside the other solid, with depth, normal and separating speed.
     fn find(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
         let a = &bodies[self.a];
+        let own = Frame::body(a, surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
         let still = a.rotation.transpose();
-        let (center, axes, half, faces, share) = match self.b {
-            Other::Solid(b) => {
-                (bodies[b].pose.position, bodies[b].rotation, bodies[b].half, surfaces[b].all_faces, 0.5)
-            }
-            Other::Wall(w) => (walls[w].center, walls[w].axes, walls[w].half, walls[w].faces, 1.0),
-        };
-        let velocity_b = |at: DVec3| match self.b {
-            Other::Solid(b) => bodies[b].pose.velocity_at(at),
-            Other::Wall(_) => DVec3::ZERO,
-        };
-        let turn = axes.transpose() * a.rotation;
-        let shift = axes.transpose() * (a.pose.position - center);
+        let turn = other.axes.transpose() * a.rotation;
+        let shift = other.axes.transpose() * (a.pose.position - other.center);
+        let b = self.b.solid().map(|b| &bodies[b]);
+        let velocity_b = |at: DVec3| b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
         for &k in &self.points_a {
             let p = surfaces[self.a].points[k as usize];
-            if let Some(Inside { depth, outward, face }) = geometry::depth(turn * p + shift, half, faces) {
+            if let Some(Inside { depth, outward, face }) = other.shape.depth(turn * p + shift, other.faces) {
                 let at = a.pose.position + a.rotation * p;
-                let normal = axes * outward;
+                let normal = other.axes * outward;
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
                 let weight = share * surfaces[self.a].weights[k as usize];
-                self.contacts.push(Contact { at, normal, depth, weight, speed, force: 0.0, patch: face });
+                self.contacts.push(Contact::new(at, normal, depth, weight, speed, face));
             }
         }
         let mut pushed = |at: DVec3, weight: f64| {
-            let faces = surfaces[self.a].all_faces;
             let q = still * (at - a.pose.position);
-            if let Some(Inside { depth, outward, face }) = geometry::depth(q, a.half, faces) {
+            if let Some(Inside { depth, outward, face }) = own.shape.depth(q, own.faces) {
                 let normal = -(a.rotation * outward);
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
-                self.contacts.push(Contact { at, normal, depth, weight, speed, force: 0.0, patch: 8 + face });
+                self.contacts.push(Contact::new(at, normal, depth, weight, speed, 8 + face));
             }
         };
         if let Other::Solid(b) = self.b {
@@ -456,38 +482,27 @@ impl Pair {
     /// Nodes of the edges inside the other solid, after the points.
     fn find_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
         let (edges_a, edges_b) = (std::mem::take(&mut self.edges_a), std::mem::take(&mut self.edges_b));
-        let a = &bodies[self.a];
-        let own = Frame { center: a.pose.position, axes: a.rotation, half: a.half };
-        let (other, faces, share) = match self.b {
-            Other::Solid(b) => {
-                let (b, surface) = (&bodies[b], &surfaces[b]);
-                let frame = Frame { center: b.pose.position, axes: b.rotation, half: b.half };
-                (frame, surface.all_faces, 0.5)
-            }
-            Other::Wall(w) => {
-                let wall = &walls[w];
-                (Frame { center: wall.center, axes: wall.axes, half: wall.half }, wall.faces, 1.0)
-            }
-        };
+        let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
         // the end of an upright edge adds nothing to a face: what is a millionth of the sum is left out
         let eighths: f64 = self.contacts.iter().map(|c| c.weight * c.depth.powi(8)).sum();
         let least = 1e-6 * eighths;
-        let view = View::new(own, other, faces, least);
+        let view = View::new(own.center, own.axes, other, least);
         for &k in &edges_a {
             let line = surfaces[self.a].edges[k as usize];
             self.press_edge(line, &view, share * line.density, 1.0, 32 + k as u8, bodies);
         }
-        let all = surfaces[self.a].all_faces;
         match self.b {
             Other::Solid(b) => {
-                let view = View::new(other, own, all, least);
+                let view = View::new(other.center, other.axes, own, least);
                 for &k in &edges_b {
                     let line = surfaces[b].edges[k as usize];
                     self.press_edge(line, &view, share * line.density, -1.0, 64 + k as u8, bodies);
                 }
             }
             Other::Wall(w) => {
-                let view = View::new(WORLD, own, all, least);
+                let view = View::new(DVec3::ZERO, DMat3::IDENTITY, own, least);
                 let density = surfaces[self.a].smallest_weight / spacing;
                 for &k in &edges_b {
                     self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, 64 + k as u8, bodies);
@@ -497,7 +512,33 @@ impl Pair {
         (self.edges_a, self.edges_b) = (edges_a, edges_b);
     }
 
-    /// Nodes of one edge inside a box. `sign` turns outward of that box into the direction of the force
+    /// Balls, rings and round sides of both inside the other one.
+    fn find_round(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+        let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let theirs = self.b.solid().map(|b| &surfaces[b]);
+        let mut contacts = std::mem::take(&mut self.contacts);
+        let mut add = |sign: f64, p: round::Pressed| {
+            let normal = sign * p.normal;
+            let speed = (bodies[self.a].pose.velocity_at(p.at) - self.velocity_b(bodies, p.at)).dot(normal);
+            let patch = if sign > 0.0 { p.face } else { 8 + p.face };
+            contacts.push(Contact::new(p.at, normal, p.depth, p.weight, speed, patch));
+        };
+        let share = if theirs.is_some() { 0.5 } else { 1.0 };
+        match (surfaces[self.a].ball, theirs.and_then(|s| s.ball)) {
+            (Some(radius), _) => round::ball(&own, radius, &other, &mut |p| add(1.0, p)),
+            (None, Some(radius)) => round::ball(&other, radius, &own, &mut |p| add(-1.0, p)),
+            (None, None) => {
+                round::press(&own, &surfaces[self.a], &other, share, &mut |p| add(1.0, p));
+                if let Some(theirs) = theirs {
+                    round::press(&other, theirs, &own, share, &mut |p| add(-1.0, p));
+                }
+            }
+        }
+        self.contacts = contacts;
+    }
+
+    /// Nodes of one edge inside a shape. `sign` turns outward of that shape into the direction of the force
     /// on the pair's first solid.
     ///
     /// An edge that lies in a face belongs to the face's patch; one that crosses an edge makes its own,
@@ -511,14 +552,13 @@ impl Pair {
         let a = &bodies[self.a];
         let b = self.b.solid().map(|b| &bodies[b]);
         let least = view.least / density;
-        edges::nodes(start, along, line.length, other.half, view.faces, least, |s, width, inside| {
+        other.shape.nodes((start, along, line.length), other.faces, least, &mut |s, width, inside| {
             let at = other.center + other.axes * (start + s * along);
             let normal = sign * (other.axes * inside.outward);
             let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
             let speed = (a.pose.velocity_at(at) - velocity_b).dot(normal);
             push += width * inside.depth.powi(7) * inside.outward;
-            let (depth, weight) = (inside.depth, density * width);
-            self.contacts.push(Contact { at, normal, depth, weight, speed, force: 0.0, patch: key });
+            self.contacts.push(Contact::new(at, normal, inside.depth, density * width, speed, key));
         });
         let toward = push.abs();
         let axis = toward.max_position();

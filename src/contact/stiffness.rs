@@ -5,10 +5,10 @@
 //! can touch (a corner, an edge, a face that bounces or rocks): omega^2 = lambda K, so 1 / lambda is the
 //! effective mass m_e.
 
-use super::geometry::Surface;
 use crate::body::Body;
 use crate::case;
 use crate::error::{Error, Result};
+use crate::shape::Surface;
 use glam::DVec3;
 
 /// Exponent p of the effective depth of the smooth law.

@@ -1,10 +1,11 @@
 //! Particle number density, Eq. (4), and the free surface.
 //! GPU twin: shaders/number_density.wgsl
 
-use crate::case::FreeSurface;
 use crate::fields::State;
-use crate::params::{Params, weight};
+use crate::lattice::weight;
+use crate::params::Params;
 use crate::row_arrays::{LANES, RowArrays, sum};
+use crate::scheme::FreeSurface;
 use glam::DVec3;
 
 /// Distance of the neighbours' centroid, over l0, from which a thin particle counts as surface.

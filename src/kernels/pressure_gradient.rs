@@ -1,11 +1,11 @@
 //! Pressure gradient against the smallest pressure in the neighbourhood, Eq. (9), as an acceleration.
 //! GPU twin: shaders/pressure_gradient.wgsl
 
-use crate::case::Gradient;
 use crate::fields::State;
 use crate::neighbours::Row;
 use crate::params::Params;
 use crate::row_arrays::{Columns, RowArrays, dot};
+use crate::scheme::Gradient;
 use glam::{DMat3, DVec3};
 
 /// Smallest determinant of the moment matrix at which its inverse is used; below, the neighbourhood is

@@ -5,9 +5,9 @@
 //! over neighbours that carry pressure (dummies: no flux; surface particles: P = 0).
 //! GPU twin: shaders/pressure_source.wgsl
 
-use crate::case::Source;
 use crate::neighbours::Row;
 use crate::params::{Params, Step};
+use crate::scheme::Source;
 use glam::DVec3;
 
 /// Coefficient c of the Laplacian, Eq. (6) [1/m2].

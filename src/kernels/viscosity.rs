@@ -3,8 +3,9 @@
 //!
 //! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction.
 
+use crate::lattice::weight;
 use crate::neighbours::Row;
-use crate::params::{Params, weight};
+use crate::params::Params;
 use crate::row_arrays::RowArrays;
 use glam::DVec3;
 

@@ -7,10 +7,10 @@ use super::lattice::{Cells, Grid, Lattice};
 use super::placement::{Surroundings, point};
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::Water;
-use super::{Scene, Shape, Solid};
+use super::{Scene, Solid};
 use crate::case::{Case, Law};
 use crate::error::{Error, Result};
-use glam::{DVec3, IVec3};
+use glam::{DMat3, DVec3, IVec3};
 
 impl Scene {
     /// Builds the scene of a case: particles on their lattices, solids with their geometry, the domain.
@@ -126,7 +126,7 @@ impl<'a> Builder<'a> {
             let label = format!("moving wall `{}`", wall.name);
             self.rounded(&label, wall.min.into(), wall.max.into());
             self.taken(&label, taken);
-            let Shape::Box { half } = solid.shape;
+            let half = solid.shape.extent(DMat3::IDENTITY);
             let thin = (0..3).any(|k| 2.0 * half[k] < 1.5 * lattice.spacing && !(lattice.plane && k == 1));
             if thin {
                 self.notes
@@ -191,7 +191,7 @@ impl<'a> Builder<'a> {
                 Ok(note) => self.notes.extend(note),
                 Err(problem) => self.problems.push(problem),
             }
-            let shape = solid.oriented_box();
+            let shape = solid.placed();
             let wet = self.water.inside(&shape, &self.lattice);
             if wet > 0 && body.displaces_fluid {
                 self.water.remove(&shape, &self.lattice, &mut self.grid);

@@ -2,7 +2,7 @@
 
 use super::Drive;
 use super::build::{AXES, Builder};
-use super::oriented::OrientedBox;
+use super::oriented::Placed;
 use glam::{DVec3, IVec3};
 
 impl Builder<'_> {
@@ -11,11 +11,11 @@ impl Builder<'_> {
         let l0 = self.lattice.spacing;
         let mut bounds = Bounds::default();
         for wall in &self.fixed.shapes {
-            let reach = OrientedBox::from(wall).bounds();
+            let reach = Placed::from(wall).bounds();
             bounds.add(&format!("wall `{}`", wall.name), wall.center - reach, wall.center + reach);
         }
         for solid in self.moving_walls.iter().chain(&self.bodies) {
-            let shape = solid.oriented_box();
+            let shape = solid.placed();
             let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
             let label = format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name);
             bounds.add(&label, lo, hi);

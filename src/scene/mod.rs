@@ -22,6 +22,9 @@ mod placement;
 mod walls;
 mod water;
 
+pub use crate::shape::Shape;
+
+use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::Range;
 
@@ -83,16 +86,6 @@ impl Groups {
     pub fn moving_dummy_range(&self) -> Range<usize> {
         self.total() - self.moving_dummy..self.total()
     }
-}
-
-/// A solid's shape in its own frame, centred on its centre of mass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// A box of half edge lengths [m].
-    Box {
-        /// Half of the edge lengths [m].
-        half: DVec3,
-    },
 }
 
 /// Geometry of a fixed wall, for contact and for the checks at t = 0. Surfaces lie where the wall
@@ -198,6 +191,14 @@ pub struct Solid {
     /// For each wall-layer particle, the vector from its centre to the true surface (to the edge or
     /// corner where it belongs to two or three faces), solid's frame [m].
     pub wall_to_surface: Vec<DVec3>,
+}
+
+impl Solid {
+    /// What of its surface presses into others.
+    pub(crate) fn surface(&self, spacing: f64, dimensions: u32) -> Surface {
+        let wall = WallLayer { offset: &self.wall_offset, to_surface: &self.wall_to_surface };
+        self.shape.surface(&wall, spacing, dimensions)
+    }
 }
 
 /// The scene.

@@ -4,7 +4,7 @@
 //! closer than d_c = sqrt(1.5) l0 (section 3 of the paper); otherwise two solids touch when their true
 //! surfaces meet.
 
-use super::oriented::OrientedBox;
+use super::oriented::Placed;
 use super::walls::Fixed;
 use super::{Drive, Solid};
 use crate::case::Law;
@@ -41,7 +41,7 @@ impl Surroundings<'_> {
         let lift = self
             .up
             .map(|up| (self.lift(body, up), up))
-            .filter(|(lift, up)| *lift <= body.oriented_box().reach(*up).max(2.0 * self.spacing));
+            .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
         let says = format!("body `{}` overlaps {with} by {overlap:.6} m at t = 0", body.name);
         let Some((lift, up)) = lift else {
             return Err(format!("{says}: move it away, lifting it would take more than half its height"));
@@ -65,21 +65,21 @@ impl Surroundings<'_> {
         )))
     }
 
-    /// Fixed walls and earlier solids as boxes. Prescribed bodies may reach into what does not move under
+    /// Shapes of the fixed walls and earlier solids. Prescribed bodies may reach into what does not move under
     /// forces: a table of motion is the user's word.
-    fn boxes(&self, body: &Solid) -> Vec<(String, OrientedBox)> {
+    fn boxes(&self, body: &Solid) -> Vec<(String, Placed)> {
         let free = |s: &Solid| matches!(s.drive, Drive::Free(_));
         let mut boxes = Vec::new();
         if free(body) {
             boxes.extend(self.fixed.shapes.iter().map(|w| (format!("wall `{}`", w.name), w.into())));
         }
         let solids = self.earlier.iter().filter(|s| free(body) || free(s));
-        boxes.extend(solids.map(|s| (solid_name(s), s.oriented_box())));
+        boxes.extend(solids.map(|s| (solid_name(s), s.placed())));
         boxes
     }
 
     fn deepest(&self, body: &Solid) -> Option<Contact> {
-        let own = body.oriented_box();
+        let own = body.placed();
         // Lattices need not be in register, so that "paper" lets true surfaces overlap a little.
         let tolerance = if self.law == Law::Paper { 0.5 } else { 1e-6 } * self.spacing;
         let boxes = self.boxes(body);
@@ -111,11 +111,11 @@ impl Surroundings<'_> {
 
     fn lift_surfaces(&self, body: &Solid, up: DVec3) -> f64 {
         let boxes = self.boxes(body);
-        let start = body.oriented_box();
+        let start = body.placed();
         let mut total = 0.0;
         // Each round clears at least one box for good: `up` never leads back into one.
         for _ in 0..=boxes.len() {
-            let own = OrientedBox { center: start.center + total * up, ..start };
+            let own = Placed { center: start.center + total * up, ..start };
             let overlaps = boxes.iter().filter(|(_, b)| own.overlap(b) > 1e-9 * self.spacing);
             let lift = overlaps.map(|(_, b)| own.lift(b, up)).fold(0.0, f64::max);
             if lift == 0.0 {
@@ -129,7 +129,7 @@ impl Surroundings<'_> {
     /// Each pair forbids an interval of lifts; the answer is the end of the chain of intervals that holds 0.
     fn lift_pairs(&self, body: &Solid, up: DVec3) -> f64 {
         let d_c = CONTACT_DISTANCE * self.spacing;
-        let most = body.oriented_box().reach(up) * 2.0 + 2.0 * self.spacing;
+        let most = body.placed().reach(up) * 2.0 + 2.0 * self.spacing;
         let mut forbidden: Vec<(f64, f64)> = self
             .pairs(body, up, most)
             .into_iter()
@@ -156,7 +156,7 @@ impl Surroundings<'_> {
     /// Pairs of wall-layer particles that come closer than d_c while the body rises by `most`.
     fn pairs(&self, body: &Solid, up: DVec3, most: f64) -> Vec<Pair> {
         let d_c = CONTACT_DISTANCE * self.spacing;
-        let own = body.oriented_box();
+        let own = body.placed();
         let (lo, hi) = {
             let (a, b) = (own.center, own.center + most * up);
             let reach = own.bounds() + d_c;

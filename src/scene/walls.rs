@@ -1,7 +1,7 @@
 //! Fixed and prescribed walls: the tank, obstacles, moving walls and planes, as particles and as boxes.
 
 use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
-use super::oriented::OrientedBox;
+use super::oriented::Placed;
 use super::{Drive, Motion, Shape, Solid, WallShape};
 use crate::case::{self, Face};
 use glam::{DMat3, DQuat, DVec3, IVec3};
@@ -123,13 +123,13 @@ impl Fixed {
         let frame = PlaneFrame::new(plane, lattice);
         let slab = frame.slab(layers);
         let l0 = lattice.spacing;
-        let earlier: Vec<OrientedBox> = self.shapes[..].iter().map(OrientedBox::from).collect();
+        let earlier: Vec<Placed> = self.shapes[..].iter().map(Placed::from).collect();
         let on_lattice: Vec<bool> = self.shapes.iter().map(|s| s.axes == DMat3::IDENTITY).collect();
         let of = self.shapes.len() as u32;
         self.shapes.push(WallShape {
             name: plane.name.clone(),
             center: slab.center,
-            half: slab.half,
+            half: frame.half(layers),
             axes: slab.axes,
         });
         let mut left_out = 0;
@@ -156,7 +156,7 @@ impl Fixed {
             }
         }
         // Water keeps out of the layers, and no closer than about 3/4 l0 to the wall layer's centres.
-        let grown = OrientedBox { half: slab.half + 0.25 * l0, ..slab };
+        let grown = Placed::cuboid(slab.center, frame.half(layers) + 0.25 * l0, slab.axes);
         let reach = grown.bounds();
         let range = lattice.cells(slab.center - reach, slab.center + reach);
         let range = Cells { lo: range.lo.max(grid.cells.lo), hi: range.hi.min(grid.cells.hi) };
@@ -236,7 +236,7 @@ pub(super) fn moving_wall(
     let mut solid = Solid {
         name: wall.name.clone(),
         is_body: false,
-        shape: Shape::Box { half: 0.5 * (hi - lo) },
+        shape: Shape::cuboid(hi - lo),
         position,
         orientation: DQuat::IDENTITY,
         drive: Drive::Prescribed(motion(&wall.motion, lattice.plane)),
@@ -296,10 +296,14 @@ impl PlaneFrame {
             spacing: lattice.spacing,
         }
     }
+    /// Half of the edges of the box of the layers [m].
+    pub fn half(&self, layers: i32) -> DVec3 {
+        0.5 * self.spacing * DVec3::new(self.n[0].into(), self.n[1].into(), layers.into())
+    }
     /// The layers as a box.
-    pub fn slab(&self, layers: i32) -> OrientedBox {
-        let half = 0.5 * self.spacing * DVec3::new(self.n[0].into(), self.n[1].into(), layers.into());
-        OrientedBox { center: self.center - self.axes.z_axis * half.z, half, axes: self.axes }
+    pub fn slab(&self, layers: i32) -> Placed {
+        let half = self.half(layers);
+        Placed::cuboid(self.center - self.axes.z_axis * half.z, half, self.axes)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Water at t = 0: filling the free cells, making room for bodies, and looking for leaks.
 
 use super::lattice::{Cells, FLUID, FREE, Grid, Lattice, REACHED};
-use super::oriented::OrientedBox;
+use super::oriented::Placed;
 use super::placement::point;
 use super::walls::face_name;
 use crate::case;
@@ -32,15 +32,15 @@ impl Water {
         self.cell.len() - before
     }
 
-    /// Number of particles whose centres lie inside a box or on its faces.
-    pub fn inside(&self, body: &OrientedBox, lattice: &Lattice) -> usize {
-        let margin = -1e-6 * lattice.spacing;
+    /// Number of particles whose centres lie inside a shape or on its faces.
+    pub fn inside(&self, body: &Placed, lattice: &Lattice) -> usize {
+        let margin = margin(body, lattice.spacing);
         self.cell.iter().filter(|&&c| body.holds(lattice.center(c), margin)).count()
     }
 
-    /// Removes the particles whose centres lie inside a box or on its faces.
-    pub fn remove(&mut self, body: &OrientedBox, lattice: &Lattice, grid: &mut Grid) {
-        let margin = -1e-6 * lattice.spacing;
+    /// Removes the particles whose centres lie inside a shape or on its faces.
+    pub fn remove(&mut self, body: &Placed, lattice: &Lattice, grid: &mut Grid) {
+        let margin = margin(body, lattice.spacing);
         let keep: Vec<bool> = self.cell.iter().map(|&c| !body.holds(lattice.center(c), margin)).collect();
         for (&c, _) in self.cell.iter().zip(&keep).filter(|(_, keep)| !**keep) {
             grid.set(c, FREE);
@@ -118,6 +118,12 @@ impl Water {
         }
         None
     }
+}
+
+/// How far inside a shape water may stand [m]. The lattice of a round body's layers is never the water's: as
+/// with planes, water keeps 3/4 of a spacing from their centres.
+fn margin(body: &Placed, spacing: f64) -> f64 {
+    if body.shape.as_cuboid().is_some() { -1e-6 * spacing } else { -0.25 * spacing }
 }
 
 /// The message of a leak: where the path crosses the tank's interior, if there is one.

@@ -257,7 +257,7 @@ pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) 
         seconds_per_step: mean,
         quartiles: [quartile(0.25), quartile(0.75)],
         particles_per_second: total as f64 / mean,
-        preconditioner: sim.plan.preconditioner_name(),
+        preconditioner: sim.plan.preconditioner.name(),
         tolerance: sim.settings().tolerance,
         iterations,
         density_error_max: monitor.density_error_max,

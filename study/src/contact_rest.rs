@@ -3,9 +3,10 @@
 use super::contact_checks::{DAM_BREAK_CUBE, Random, lowest, none, smooth};
 use super::dry::{DryScene, FreeBox, GRAVITY};
 use glam::{DQuat, DVec3};
-use seixo::backend::{Backend, Compute};
+use seixo::backend::Backend;
 use seixo::body::Pose;
 use seixo::case::Contact;
+use seixo::compute::Compute;
 use seixo::contact::{ContactReport, Solids};
 use seixo::error::Result;
 use seixo::scene::Scene;

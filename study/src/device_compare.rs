@@ -11,8 +11,8 @@ use seixo::error::Result;
 use seixo::fields::{Fields, State};
 use seixo::neighbours::Neighbours;
 use seixo::params::Params;
-use seixo::plan::{ContactPlan, Stage};
-use seixo::scene::{Drive, Scene, Shape, Solid};
+use seixo::plan::{ContactPlan, ParticleStage, Stage};
+use seixo::scene::{Drive, Scene, Solid};
 use seixo::simulation::Simulation;
 use serde::Serialize;
 use std::time::Instant;
@@ -179,9 +179,7 @@ fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
 /// the largest solid.
 fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid], weight: f64) -> Vec<StageError> {
     let most = |f: fn(&Wrench) -> DVec3| cpu.iter().map(|w| f(w).length()).fold(0.0, f64::max);
-    let sizes = solids.iter().map(|s| match s.shape {
-        Shape::Box { half } => half.length(),
-    });
+    let sizes = solids.iter().map(|s| s.shape.radius());
     let force = most(|w| w.force).max(weight);
     let scale = most(|w| w.torque).max(force * sizes.fold(0.0, f64::max));
     let pairs =
@@ -241,7 +239,7 @@ pub fn compare_stages(
     plan.contact = ContactPlan::on_device(case, scene);
     let settings = simulation.settings();
     if !plan.wet() {
-        if plan.contact.kernel.is_none() {
+        if plan.contact.program.is_none() {
             return Ok(Vec::new());
         }
         let mut gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
@@ -256,12 +254,16 @@ pub fn compare_stages(
     let step = simulation.next_step();
     let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt).to_vec();
     // Viscosity takes the neighbours of the step before.
-    for stage in [Stage::CellList, Stage::NeighbourList] {
+    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
         pair.cpu.run(stage, &step)?;
         pair.gpu.run(stage, &step)?;
     }
     let mut out = Vec::new();
     for stage in Stage::ALL.into_iter().filter(|&s| plan.has(s)) {
+        if let Some(sweep) = stage.over_particles() {
+            pair.cpu.run(sweep, &step)?;
+            pair.gpu.run(sweep, &step)?;
+        }
         match stage {
             Stage::Contact => continue,
             Stage::MoveSolids => {
@@ -277,10 +279,7 @@ pub fn compare_stages(
                 out.extend(wrenches(stage, &gpu, &cpu, &scene.solids, 0.0));
                 continue;
             }
-            _ => {
-                pair.cpu.run(stage, &step)?;
-                pair.gpu.run(stage, &step)?;
-            }
+            _ => {}
         }
         out.extend(pair.errors(stage)?);
     }

@@ -188,7 +188,7 @@ fn lattice_box(
     Solid {
         name,
         is_body: matches!(drive, Drive::Free(_)),
-        shape: Shape::Box { half: 0.5 * size },
+        shape: Shape::cuboid(size),
         position,
         orientation,
         drive,

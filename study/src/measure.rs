@@ -289,13 +289,14 @@ impl Sampler {
 
     fn finish_draft(&self, simulation: &Simulation, out: &mut Measured) {
         let Some(body) = simulation.case.body.first() else { return };
+        let Some(size) = body.size else { return };
         let n = self.draft.len() as f64;
         let level = self.draft.iter().map(|d| d[0]).sum::<f64>() / n;
         let centre = self.draft.iter().map(|d| d[1]).sum::<f64>() / n;
         let swing = self.draft.iter().map(|d| (d[1] - centre).abs()).fold(0.0, f64::max);
-        let height = body.size[2];
+        let height = size[2];
         let density = simulation.params.density;
-        let volume: f64 = body.size.iter().product();
+        let volume: f64 = size.iter().product();
         let ratio = body.density.or(body.mass.map(|m| m / volume)).unwrap_or(f64::NAN) / density;
         let draft = level - (centre - 0.5 * height);
         out.put("draft [m]", draft);
@@ -337,6 +338,5 @@ pub fn hydrostatics(fields: &Fields, fluid: usize, surface: f64, weight: f64) ->
 
 /// Volume of a solid's shape [m3].
 pub fn volume(shape: &Shape) -> f64 {
-    let Shape::Box { half } = shape;
-    8.0 * half.x * half.y * half.z
+    shape.volume()
 }

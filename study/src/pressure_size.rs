@@ -13,18 +13,18 @@ use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::body::Pose;
-use seixo::case::Preconditioner;
 use seixo::case::file::parse;
 use seixo::cells::Grid;
 use seixo::error::{Error, Result};
 use seixo::fields::{Fields, State};
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
 use seixo::pressure::multigrid::Multigrid;
 use seixo::scene::Scene;
+use seixo::scheme::Preconditioner;
 use seixo::simulation::Simulation;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -74,9 +74,14 @@ impl Moment {
     /// `backend`, stopped before the solve. Collisions are left out: the lists stay those of the positions.
     fn prepare(&self, backend: &mut dyn Backend) -> Result<()> {
         backend.write(&self.fields)?;
-        backend.run(Stage::Predict, &self.step)?;
+        backend.run(ParticleStage::Predict, &self.step)?;
         backend.move_solids(&self.poses)?;
-        for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+        for stage in [
+            ParticleStage::CellList,
+            ParticleStage::NeighbourList,
+            ParticleStage::NumberDensity,
+            ParticleStage::PressureSource,
+        ] {
             backend.run(stage, &self.step)?;
         }
         Ok(())
@@ -188,7 +193,7 @@ fn on_device(moment: &Moment, kind: Preconditioner, tolerance: f64, context: &Co
 fn residual_in_double(moment: &Moment, device: &Fields, x: &[f64]) -> Result<f64> {
     let mut cpu = moment.cpu()?;
     cpu.write(device)?;
-    for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity] {
+    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList, ParticleStage::NumberDensity] {
         cpu.run(stage, &moment.step)?;
     }
     // Particles on a border of cells may have been sorted to the other side.

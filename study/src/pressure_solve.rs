@@ -13,16 +13,16 @@ use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use glam::DVec3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
-use seixo::case::Preconditioner;
 use seixo::case::file::parse;
 use seixo::error::Result;
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::{Params, Step};
-use seixo::plan::{Plan, Stage};
+use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::pressure::cg::{Jacobi, Precondition, System, Workspace, dot, solve};
 use seixo::pressure::multigrid::Multigrid;
 use seixo::scene::Scene;
+use seixo::scheme::Preconditioner;
 use std::time::Instant;
 
 /// How the equation is solved.
@@ -87,7 +87,12 @@ impl Column {
 
     /// `backend`, stopped before the solve.
     pub(super) fn prepare(&self, backend: &mut dyn Backend) -> Result<()> {
-        for stage in [Stage::CellList, Stage::NeighbourList, Stage::NumberDensity, Stage::PressureSource] {
+        for stage in [
+            ParticleStage::CellList,
+            ParticleStage::NeighbourList,
+            ParticleStage::NumberDensity,
+            ParticleStage::PressureSource,
+        ] {
             backend.run(stage, &self.step)?;
         }
         Ok(())

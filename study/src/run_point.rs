@@ -3,10 +3,10 @@
 use super::engine::{Context, Processor};
 use super::measure::{Sampler, Spec};
 use super::row::{Measured, Timing, Work};
-use seixo::case::Preconditioner;
 use seixo::case::file::parse;
 use seixo::error::Result;
 use seixo::scene::Scene;
+use seixo::scheme::Preconditioner;
 use seixo::simulation::Simulation;
 use std::time::Instant;
 

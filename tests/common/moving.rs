@@ -128,7 +128,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         solids.push(Solid {
             name: if is_body { "body" } else { "gate" }.into(),
             is_body,
-            shape: Shape::Box { half: 0.5 * (high - low) + 0.5 * SPACING },
+            shape: Shape::cuboid(high - low + SPACING),
             position: middle,
             orientation: DQuat::IDENTITY,
             drive,

@@ -136,11 +136,14 @@ pub(super) fn limits(memory: &Memory, have: &wgpu::Limits, name: &str) -> Result
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::{Buffer, Host};
+    use super::super::buffers;
+    use super::super::layout::Allocation;
     use super::*;
+    use crate::compute::Host;
 
     fn memory(bytes: u64, workgroups: u64) -> Memory {
-        Memory { buffers: vec![Buffer { name: "neighbour_list", bytes, host: Host::None }], workgroups }
+        let id = buffers::neighbour_list.id();
+        Memory { buffers: vec![Allocation { id, bytes, host: Host::None, purpose: "lists" }], workgroups }
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use super::adapter::AdapterInfo;
 use super::clock::Clock;
-use super::layout::{Host, Memory};
+use super::layout::{Allocation, Memory};
 use super::shader;
 use crate::backend::Commands;
+use crate::compute::{Host, Id, Kernel, Program};
 use crate::error::{Error, Result};
 use crate::plan::Stage;
 use std::collections::HashMap;
@@ -19,7 +20,7 @@ struct Pipeline {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
     /// Number and buffer of each binding.
-    bound: Vec<(u32, String)>,
+    bound: Vec<(u32, Id)>,
 }
 
 /// A device at work.
@@ -27,8 +28,8 @@ pub(super) struct Context {
     pub info: AdapterInfo,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
-    buffers: HashMap<&'static str, wgpu::Buffer>,
-    pipelines: HashMap<String, Pipeline>,
+    buffers: HashMap<Id, wgpu::Buffer>,
+    pipelines: HashMap<Kernel, Pipeline>,
     pub(super) staging: wgpu::Buffer,
     /// Small uploads on their way, and the bytes of it that are in use.
     pub(super) mail: (wgpu::Buffer, u64),
@@ -43,12 +44,12 @@ pub(super) struct Context {
 }
 
 impl Context {
-    /// Allocate `memory` and build the pipelines of `kernels` with `switches` on.
-    pub fn new<'a>(
+    /// Allocate `memory` and build the pipelines of `programs` with `switches` on.
+    pub fn new(
         (device, queue): (wgpu::Device, wgpu::Queue),
         info: AdapterInfo,
         memory: &Memory,
-        kernels: impl Iterator<Item = (&'a str, &'a str)>,
+        programs: impl Iterator<Item = &'static Program>,
         switches: &[&str],
     ) -> Result<Self> {
         let fault = Arc::new(Mutex::new(None));
@@ -86,10 +87,10 @@ impl Context {
                 Host::Both => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
                 Host::Uniform => Usage::UNIFORM | Usage::COPY_DST,
             };
-            (b.name, create(b.name, b.bytes, usage))
+            (b.id, create(b.id.name(), b.bytes, usage))
         });
         let buffers: HashMap<_, _> = buffers.collect();
-        let readable = |b: &&super::layout::Buffer| matches!(b.host, Host::Reads | Host::Both);
+        let readable = |b: &&Allocation| matches!(b.host, Host::Reads | Host::Both);
         let largest = memory.buffers.iter().filter(readable).map(|b| b.bytes).max().unwrap_or(16);
         let staging_bytes = largest.clamp(STAGING.0, STAGING.1);
         let staging = create("staging", staging_bytes, Usage::MAP_READ | Usage::COPY_DST);
@@ -121,14 +122,15 @@ impl Context {
             stage: None,
             commands: Commands::default(),
         };
-        for (file, text) in kernels {
-            context.compile(file, &shader::source(text, switches))?;
+        for program in programs {
+            context.compile(program, &shader::source(program.text, switches))?;
         }
         context.check()?;
         Ok(context)
     }
 
-    fn compile(&mut self, file: &str, source: &str) -> Result<()> {
+    fn compile(&mut self, program: &Program, source: &str) -> Result<()> {
+        let file = program.name;
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(file),
@@ -147,6 +149,8 @@ impl Context {
         };
         for entry in shader::entries(file, source)? {
             let name = format!("{file}.{}", entry.name);
+            let listed = program.kernels.iter().find(|k| k.entry == entry.name);
+            let kernel = *listed.ok_or_else(|| Error::Gpu(format!("{name} is in no list of kernels")))?;
             let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&name),
                 layout: None,
@@ -159,10 +163,14 @@ impl Context {
                 },
                 cache: None,
             });
-            let bound: Vec<_> =
-                entry.bindings.into_iter().map(|(binding, field, _)| (binding, field)).collect();
+            let find = |field: &str| {
+                let found = self.buffers.keys().find(|id| id.name() == field).copied();
+                found.ok_or_else(|| Error::Gpu(format!("{name} binds {field}, which the plan leaves out")))
+            };
+            let bound = entry.bindings.iter().map(|b| Ok((b.number, find(&b.name)?)));
+            let bound = bound.collect::<Result<Vec<_>>>()?;
             let group = self.group(&name, &pipeline, &bound)?;
-            self.pipelines.insert(name, Pipeline { pipeline, group, bound });
+            self.pipelines.insert(kernel, Pipeline { pipeline, group, bound });
         }
         match pollster::block_on(scope.pop()) {
             Some(e) => Err(Error::Gpu(format!("shaders/{file}.wgsl on {}: {e}", self.info.name))),
@@ -175,15 +183,11 @@ impl Context {
         &self,
         name: &str,
         pipeline: &wgpu::ComputePipeline,
-        bound: &[(u32, String)],
+        bound: &[(u32, Id)],
     ) -> Result<wgpu::BindGroup> {
         let mut entries = Vec::with_capacity(bound.len());
-        for (binding, field) in bound {
-            let buffer = self
-                .buffers
-                .get(field.as_str())
-                .ok_or_else(|| Error::Gpu(format!("{name} binds {field}, which the plan leaves out")))?;
-            entries.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
+        for &(binding, id) in bound {
+            entries.push(wgpu::BindGroupEntry { binding, resource: self.buffer(id)?.as_entire_binding() });
         }
         Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(name),
@@ -194,8 +198,8 @@ impl Context {
 
     /// Make a buffer hold at least `bytes`; by half more than asked, so that it does not grow every time. What
     /// it held is lost if it grows.
-    pub fn reserve(&mut self, name: &'static str, bytes: u64) -> Result<()> {
-        let old = self.buffer(name)?;
+    pub fn reserve(&mut self, id: Id, bytes: u64) -> Result<()> {
+        let (old, name) = (self.buffer(id)?, id.name());
         let (have, usage) = (old.size(), old.usage());
         if bytes <= have {
             return Ok(());
@@ -237,16 +241,16 @@ impl Context {
             self.bytes += wanted - staging;
             self.staging = larger;
         }
-        self.buffers.insert(name, buffer);
-        let users: Vec<String> = self
+        self.buffers.insert(id, buffer);
+        let users: Vec<Kernel> = self
             .pipelines
             .iter()
-            .filter(|(_, p)| p.bound.iter().any(|(_, field)| field == name))
-            .map(|(kernel, _)| kernel.clone())
+            .filter(|(_, p)| p.bound.iter().any(|(_, bound)| *bound == id))
+            .map(|(kernel, _)| *kernel)
             .collect();
         for kernel in users {
             let of = &self.pipelines[&kernel];
-            let group = self.group(&kernel, &of.pipeline, &of.bound)?;
+            let group = self.group(kernel.entry, &of.pipeline, &of.bound)?;
             if let Some(of) = self.pipelines.get_mut(&kernel) {
                 of.group = group;
             }
@@ -276,12 +280,9 @@ impl Context {
         fault.map_or(Ok(()), |what| Err(Error::Gpu(format!("{}: {what}", self.info.name))))
     }
 
-    pub fn has(&self, buffer: &str) -> bool {
-        self.buffers.contains_key(buffer)
-    }
-
-    pub(super) fn buffer(&self, name: &str) -> Result<&wgpu::Buffer> {
-        self.buffers.get(name).ok_or_else(|| Error::Gpu(format!("there is no buffer {name}")))
+    pub(super) fn buffer(&self, id: Id) -> Result<&wgpu::Buffer> {
+        let missing = || Error::Gpu(format!("there is no buffer {}: the plan leaves it out", id.name()));
+        self.buffers.get(&id).ok_or_else(missing)
     }
 
     /// What is recorded from here on belongs to `stage`.
@@ -307,31 +308,32 @@ impl Context {
     }
 
     /// Record a pass over kernels, each with its number of workgroups.
-    pub fn pass<'a>(&mut self, kernels: impl IntoIterator<Item = (&'a str, u64)>) -> Result<()> {
+    pub fn pass(&mut self, kernels: impl IntoIterator<Item = (Kernel, u64)>) -> Result<()> {
         self.record();
         let Self { encoder: Some(encoder), pipelines, commands, stage, .. } = self else { return Ok(()) };
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        for (name, groups) in kernels {
-            let kernel = pipelines
-                .get(name)
-                .ok_or_else(|| Error::Gpu(format!("there is no kernel {name}: the plan leaves it out")))?;
-            pass.set_pipeline(&kernel.pipeline);
-            pass.set_bind_group(0, &kernel.group, &[]);
+        for (kernel, groups) in kernels {
+            let Kernel { file, entry, .. } = kernel;
+            let missing = || Error::Gpu(format!("there is no kernel {file}.{entry}: the plan leaves it out"));
+            let Pipeline { pipeline, group, .. } = pipelines.get(&kernel).ok_or_else(missing)?;
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
             pass.dispatch_workgroups(groups as u32, 1, 1);
             commands.add(*stage);
         }
         Ok(())
     }
 
-    pub fn clear(&mut self, name: &str) -> Result<()> {
-        let buffer = self.buffer(name)?.clone();
+    pub fn clear(&mut self, buffer: impl Into<Id>) -> Result<()> {
+        let buffer = self.buffer(buffer.into())?.clone();
         self.record().clear_buffer(&buffer, 0, None);
         Ok(())
     }
 
-    pub fn copy(&mut self, from: (&str, u64), to: &str, bytes: u64) -> Result<()> {
-        let (source, target) = (self.buffer(from.0)?.clone(), self.buffer(to)?.clone());
-        self.record().copy_buffer_to_buffer(&source, from.1, &target, 0, bytes);
+    /// Copy `bytes` from byte `first` of a buffer to the start of another.
+    pub fn copy(&mut self, from: impl Into<Id>, first: u64, to: impl Into<Id>, bytes: u64) -> Result<()> {
+        let (source, target) = (self.buffer(from.into())?.clone(), self.buffer(to.into())?.clone());
+        self.record().copy_buffer_to_buffer(&source, first, &target, 0, bytes);
         Ok(())
     }
 }

@@ -1,12 +1,12 @@
 //! Data between host and device, and the submissions that they take.
 
 use super::context::Context;
+use crate::compute::{Buffer, Element, Id};
 use crate::error::{Error, Result};
-use bytemuck::Pod;
 use std::sync::mpsc;
 
-/// A part of a buffer: name, first byte, bytes.
-pub(super) type Part<'a> = (&'a str, u64, u64);
+/// A part of a buffer: which, first byte, bytes.
+pub(super) type Part = (Id, u64, u64);
 
 impl Context {
     /// Hand what is recorded to the device.
@@ -23,11 +23,15 @@ impl Context {
 
     /// Write to the start of a buffer; what was recorded before still sees the old content. Little data goes with
     /// the next submission, much causes one.
-    pub fn upload<T: Pod>(&mut self, name: &str, data: &[T]) -> Result<()> {
-        let data: &[u8] = bytemuck::cast_slice(data);
+    pub fn upload<T: Element>(&mut self, buffer: Buffer<T>, data: &[T]) -> Result<()> {
+        self.upload_bytes(buffer.id(), bytemuck::cast_slice(data))
+    }
+
+    /// [`Context::upload`] of bytes.
+    pub fn upload_bytes(&mut self, buffer: Id, data: &[u8]) -> Result<()> {
         let (mail, at) = (self.mail.0.clone(), self.mail.1);
         let end = at + data.len() as u64;
-        let target = self.buffer(name)?.clone();
+        let target = self.buffer(buffer)?.clone();
         if end > mail.size() {
             self.submit();
             self.queue.write_buffer(&target, 0, data);
@@ -41,14 +45,18 @@ impl Context {
     }
 
     /// Read the first `count` elements of a buffer.
-    pub fn download<T: Pod>(&mut self, name: &str, count: usize) -> Result<Vec<T>> {
-        self.download_parts(name, &[(0, count)])
+    pub fn download<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<Vec<T>> {
+        self.download_parts(buffer, &[(0, count)])
     }
 
     /// Read parts of a buffer, given as offset and length in elements, one after the other.
-    pub fn download_parts<T: Pod>(&mut self, name: &str, parts: &[(usize, usize)]) -> Result<Vec<T>> {
-        let size = size_of::<T>() as u64;
-        let part = |&(first, count): &(usize, usize)| (name, first as u64 * size, count as u64 * size);
+    pub fn download_parts<T: Element>(
+        &mut self,
+        buffer: Buffer<T>,
+        parts: &[(usize, usize)],
+    ) -> Result<Vec<T>> {
+        let (id, size) = (buffer.id(), buffer.size());
+        let part = |&(first, count): &(usize, usize)| (id, first as u64 * size, count as u64 * size);
         let bytes = self.download_bytes(&parts.iter().map(part).collect::<Vec<_>>(), false)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
@@ -60,8 +68,8 @@ impl Context {
         let mut out = Vec::with_capacity(total as usize);
         let mut filled = 0;
         let staging = self.staging.clone();
-        for &(name, first, bytes) in parts {
-            let buffer = self.buffer(name)?.clone();
+        for &(id, first, bytes) in parts {
+            let buffer = self.buffer(id)?.clone();
             let (mut at, end) = (first, first + bytes);
             while at < end {
                 if filled == staging.size() {

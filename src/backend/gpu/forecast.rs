@@ -1,7 +1,8 @@
 //! Memory of a scene by groups of buffers, and of the same scene with finer particles: what fits, and which limit
 //! comes first.
 
-use super::layout::{Buffer, FLUID_MAX, Memory, Sizes};
+use super::buffers;
+use super::layout::{Allocation, FLUID_MAX, Memory, Sizes};
 use crate::plan::Plan;
 use serde::Serialize;
 
@@ -21,35 +22,16 @@ pub struct Group {
     pub largest: &'static str,
 }
 
-/// Purpose of a buffer.
-fn purpose(buffer: &Buffer) -> &'static str {
-    match buffer.name {
-        "position" | "velocity" | "pressure" | "number_density" | "state" | "acceleration" => "particles",
-        "neighbour_list" | "neighbour_count" => "neighbour lists",
-        "source_diagonal" | "preconditioned" | "residual" | "search" | "partial_sum" | "solve" => {
-            "pressure solver"
-        }
-        "hierarchy" | "cell_mark" | "cell_row" | "row_block" | "row_cell" | "member" | "aggregate"
-        | "entry" | "coarse" | "smoothed" | "corrected" => "multigrid",
-        "cell_of" | "cell_count" | "cell_start" | "block_sum" | "unsorted" | "sorted" | "moving_slot"
-        | "static_start" | "static_particle" => "search",
-        "contact_point" | "contact_given" | "smooth_pair" | "smooth_pose" | "contact_count"
-        | "contact_state" | "contact_layer" | "contact_wall" | "paper_pair" | "paper_pose" | "paper_law"
-        | "contact_row" | "contact_list" | "contact_sum" => "contact, to begin with",
-        _ => "solids and the rest",
-    }
-}
-
 /// `memory` by purpose, the largest first.
 pub fn groups(memory: &Memory) -> Vec<Group> {
     let mut out: Vec<Group> = Vec::new();
-    let mut buffers: Vec<&Buffer> = memory.buffers.iter().collect();
+    let mut buffers: Vec<&Allocation> = memory.buffers.iter().collect();
     buffers.sort_by_key(|b| std::cmp::Reverse(b.bytes));
     for buffer in buffers {
-        let name = purpose(buffer);
+        let (name, largest) = (buffer.purpose, buffer.id.name());
         match out.iter_mut().find(|g| g.name == name) {
             Some(group) => group.bytes += buffer.bytes,
-            None => out.push(Group { name, bytes: buffer.bytes, largest: buffer.name }),
+            None => out.push(Group { name, bytes: buffer.bytes, largest }),
         }
     }
     out.sort_by_key(|g| std::cmp::Reverse(g.bytes));
@@ -75,20 +57,20 @@ pub struct Excess {
 pub fn excesses(sizes: &Sizes, memory: &Memory) -> Vec<Excess> {
     let mut out = Vec::new();
     for buffer in &memory.buffers {
-        let (bytes, name) = (buffer.bytes, buffer.name);
+        let (bytes, id) = (buffer.bytes, buffer.id);
         let (limit, allows) = ("max_storage_buffer_binding_size", BINDING_MAX);
         if bytes <= allows {
             continue;
         }
         let parts = bytes.div_ceil(allows);
-        let remedy = match name {
-            "neighbour_list" => {
-                format!("{parts} ranges of slots, each with a list and dispatches of its own")
-            }
-            "entry" => format!("{parts} ranges of the 27 entries of a row"),
-            _ => format!("{parts} ranges of slots, or {parts} devices"),
+        let remedy = if id == buffers::neighbour_list.id() {
+            format!("{parts} ranges of slots, each with a list and dispatches of its own")
+        } else if id == buffers::entry.id() {
+            format!("{parts} ranges of the 27 entries of a row")
+        } else {
+            format!("{parts} ranges of slots, or {parts} devices")
         };
-        out.push(Excess { what: name.into(), needs: bytes, allows, limit, remedy });
+        out.push(Excess { what: id.name().into(), needs: bytes, allows, limit, remedy });
     }
     if memory.workgroups > WORKGROUPS_MAX {
         out.push(Excess {
@@ -158,8 +140,8 @@ impl Forecast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Preconditioner;
     use crate::plan::Stage;
+    use crate::scheme::Preconditioner;
 
     fn sizes() -> Sizes {
         // The transport case at l0 = 7.5 mm.
@@ -185,6 +167,7 @@ mod tests {
             preconditioner: Preconditioner::Multigrid,
             force_relaxation: 1.0,
             contact: Default::default(),
+            fixed_walls: true,
         }
     }
 

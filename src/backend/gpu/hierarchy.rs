@@ -1,7 +1,9 @@
 //! What the plan fixes of the multigrid levels: where the cells of each lie, how many rows are kept, and the
 //! order of operations of the cycle.
 
+use super::kernels::{multigrid, multigrid_levels};
 use super::layout::{SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP};
+use crate::compute::Kernel;
 use crate::kernels::multigrid::{SWEEPS, visits};
 use crate::kernels::multigrid_levels::{LEVELS_MAX, level_cells};
 use bytemuck::{Pod, Zeroable};
@@ -128,45 +130,45 @@ impl Levels {
     }
 
     /// Dispatches that build the levels.
-    pub fn build(&self) -> Vec<(&'static str, u64)> {
+    pub fn build(&self) -> Vec<(Kernel, u64)> {
         let [x, y, z] = self.count[0].map(u64::from);
         let cells = (x * y * z).div_ceil(WORKGROUP).min(GROUPS_MAX);
         let scan = self.blocks().min(SCAN_GROUPS_MAX);
         let mut out = vec![
-            ("multigrid_levels.mark", cells),
-            ("multigrid_levels.scan_blocks", scan),
-            ("multigrid_levels.scan_sums", 1),
-            ("multigrid_levels.number_rows", scan),
-            ("multigrid_levels.members", cells),
-            ("multigrid_levels.galerkin", self.groups(0, 1)),
+            (multigrid_levels::mark, cells),
+            (multigrid_levels::scan_blocks, scan),
+            (multigrid_levels::scan_sums, 1),
+            (multigrid_levels::number_rows, scan),
+            (multigrid_levels::members, cells),
+            (multigrid_levels::galerkin, self.groups(0, 1)),
         ];
         if self.count.len() > 1 {
-            out.push(("multigrid_levels.coarsen_second", self.groups(1, 1)));
+            out.push((multigrid_levels::coarsen_second, self.groups(1, 1)));
         }
         if self.count.len() > 2 {
-            out.push(("multigrid_levels.coarsen_rest", 1));
+            out.push((multigrid_levels::coarsen_rest, 1));
         }
         out
     }
 
     /// Dispatches between the sweeps over the particles, which takes `rows` workgroups to read.
-    pub fn cycle(&self, rows: u64) -> Vec<(&'static str, u64)> {
-        let mut out = vec![("multigrid.gather", self.groups(0, 1))];
+    pub fn cycle(&self, rows: u64) -> Vec<(Kernel, u64)> {
+        let mut out = vec![(multigrid::gather, self.groups(0, 1))];
         self.push_cycle(0, &mut out);
-        out.push(("multigrid.spread", rows));
+        out.push((multigrid::spread, rows));
         out
     }
 
-    fn push_cycle(&self, level: usize, out: &mut Vec<(&'static str, u64)>) {
-        const DOWN: [&str; LARGE_MAX] = ["multigrid.down_first", "multigrid.down_second"];
-        const UP: [&str; LARGE_MAX] = ["multigrid.up_first", "multigrid.up_second"];
+    fn push_cycle(&self, level: usize, out: &mut Vec<(Kernel, u64)>) {
+        const DOWN: [Kernel; LARGE_MAX] = [multigrid::down_first, multigrid::down_second];
+        const UP: [Kernel; LARGE_MAX] = [multigrid::up_first, multigrid::up_second];
         if level == self.large {
-            return out.push(("multigrid.small", 1));
+            return out.push((multigrid::small, 1));
         }
         for visit in 0..visits(level) {
             if visit > 0 {
                 // Level 0 alone is visited twice.
-                out.push(("multigrid.back_first", self.groups(level, 1)));
+                out.push((multigrid::back_first, self.groups(level, 1)));
             }
             out.push((DOWN[level], self.groups(level + 1, 8)));
             self.push_cycle(level + 1, out);

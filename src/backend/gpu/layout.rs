@@ -1,11 +1,12 @@
-//! What the device holds: the structs shared with the shaders and the one table of buffers.
+//! What the device holds: the structs shared with the shaders, and how much of everything a scene takes.
 
-use super::hierarchy::{Hierarchy, Levels};
-use crate::case::Preconditioner;
+use super::buffers::TABLE;
+use super::hierarchy::Levels;
 use crate::cells::Grid;
+use crate::compute::{Host, Id, Spec};
 use crate::monitor::SPEED_BINS;
 use crate::params::{Params, Step};
-use crate::plan::{Plan, Stage};
+use crate::plan::Plan;
 use crate::pressure::Settings;
 use crate::scene::{Groups, Scene};
 use bytemuck::{Pod, Zeroable};
@@ -114,6 +115,16 @@ pub struct Pose {
     pub orientation: [f32; 4],
     pub velocity: [f32; 4],
     pub angular_velocity: [f32; 4],
+}
+
+/// A wall-layer particle of a moving solid; see `WallParticle` in shaders/body_force.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct WallParticle {
+    pub area: [f32; 4],
+    pub arm: [f32; 4],
+    pub to_surface: [f32; 4],
 }
 
 /// Sums of one workgroup of the monitor; see `MonitorSum` in shaders/monitor.wgsl.
@@ -275,6 +286,11 @@ impl Sizes {
         }
     }
 
+    /// Particles that the counting sort takes.
+    pub fn sorted(&self) -> u64 {
+        self.fluid + self.moving
+    }
+
     /// Keys of the counting sort.
     pub fn keys(&self) -> u64 {
         self.cells + 1 + if self.moving > 0 { self.cells } else { 0 }
@@ -291,86 +307,39 @@ impl Sizes {
     }
 
     /// Chunks of up to [`WORKGROUP`] wall-layer particles of one solid, at most.
-    fn force_chunks(&self) -> u64 {
+    pub fn force_chunks(&self) -> u64 {
         self.moving_wall.div_ceil(WORKGROUP) + self.solids
     }
 }
 
-/// A buffer.
+/// A buffer as it is to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Buffer {
-    /// Name, as in the shaders.
-    pub name: &'static str,
+pub struct Allocation {
+    /// Which one.
+    pub id: Id,
     /// Size.
     pub bytes: u64,
     /// Who else than the shaders touches it.
     pub host: Host,
+    /// What it serves.
+    pub purpose: &'static str,
 }
 
-/// Who else than the shaders touches a buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Host {
-    /// Nobody.
-    None,
-    /// The host writes it, or it is cleared.
-    Writes,
-    /// The host reads it, or it is copied from.
-    Reads,
-    /// Both.
-    Both,
-    /// A uniform that the host writes.
-    Uniform,
-}
-
-/// The buffers of the multigrid preconditioner, as the table of [`Memory::new`] holds them.
-fn multigrid_buffers(s: &Sizes, levels: &Levels) -> [(&'static str, u64, Host, bool); 11] {
-    let (cells, rows) = (levels.cells, levels.capacity);
-    [
-        ("hierarchy", size_of::<Hierarchy>() as u64, Host::Uniform, true),
-        ("cell_mark", 4 * cells, Host::Writes, true),
-        ("cell_row", 8 * cells, Host::None, true),
-        ("row_block", 8 * levels.blocks(), Host::None, true),
-        ("row_cell", 16 * (rows + 1 + levels.count.len() as u64), Host::Reads, true),
-        ("member", 8 * s.pressure, Host::None, true),
-        ("aggregate", 8 * s.pressure, Host::Writes, true),
-        ("entry", 8 * 27 * rows, Host::Reads, true),
-        ("coarse", 12 * rows, Host::None, true),
-        ("smoothed", 4 * s.pressure, Host::None, true),
-        ("corrected", 16 * s.pressure, Host::None, true),
-    ]
+impl Allocation {
+    /// Of `length` elements; of 16 bytes at least, since devices bind no empty buffers.
+    fn new(spec: &Spec, length: u64, purpose: &'static str) -> Self {
+        Self { id: spec.id, bytes: (spec.size * length).max(16), host: spec.host, purpose }
+    }
 }
 
 /// Bytes that the buffers of contact start with; they grow with the pairs of solids that come close.
 const CONTACT_START: u64 = 4096;
 
-/// The buffers of contact, as the table of [`Memory::new`] holds them.
-fn contact_buffers(kernel: Option<&str>) -> Vec<(&'static str, u64, Host, bool)> {
-    let (smooth, paper) = (kernel == Some("contact_smooth"), kernel == Some("contact_paper"));
-    [
-        ("contact_point", Host::Writes, smooth),
-        ("smooth_pair", Host::Writes, smooth),
-        ("smooth_pose", Host::Writes, smooth),
-        ("contact_given", Host::Writes, smooth),
-        ("contact_count", Host::Reads, smooth),
-        ("contact_state", Host::None, smooth),
-        ("contact_layer", Host::Writes, paper),
-        ("contact_wall", Host::Writes, paper),
-        ("paper_pair", Host::Writes, paper),
-        ("paper_pose", Host::Writes, paper),
-        ("paper_law", Host::Writes, paper),
-        ("contact_row", Host::Reads, paper),
-        ("contact_list", Host::Reads, smooth || paper),
-        ("contact_sum", Host::Reads, smooth || paper),
-    ]
-    .map(|(name, host, needed)| (name, CONTACT_START, host, needed))
-    .to_vec()
-}
-
 /// What a scene takes on a device.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
     /// Every buffer.
-    pub buffers: Vec<Buffer>,
+    pub buffers: Vec<Allocation>,
     /// Workgroups of the largest dispatch.
     pub workgroups: u64,
 }
@@ -378,58 +347,20 @@ pub struct Memory {
 impl Memory {
     /// The buffers of `sizes` for the planned stages; of a dry scene only those of contact, if it is planned there.
     pub fn new(s: &Sizes, plan: &Plan) -> Self {
-        let contact = contact_buffers(plan.contact.kernel);
-        let listed = |table: Vec<(&'static str, u64, Host, bool)>| -> Vec<Buffer> {
-            let needed = table.into_iter().filter(|&(.., needed)| needed);
-            needed.map(|(name, bytes, host, _)| Buffer { name, bytes: bytes.max(16), host }).collect()
-        };
+        let of_contact = plan.contact.program.map_or(&[][..], |p| p.buffers).iter();
+        let contact = of_contact.map(|spec| Allocation {
+            bytes: CONTACT_START,
+            ..Allocation::new(spec, 0, "contact, to begin with")
+        });
         if !plan.wet() {
-            return Self { buffers: listed(contact), workgroups: 0 };
+            return Self { buffers: contact.collect(), workgroups: 0 };
         }
-        let (moving, force) = (s.moving > 0, plan.has(Stage::BodyForce) && s.moving_wall > 0);
-        let reaction = force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision));
-        let sorted = s.fluid + s.moving;
-        let blocks = s.keys().div_ceil(SCAN_BLOCK);
-        let table = [
-            ("params", size_of::<Constants>() as u64, Host::Uniform, true),
-            ("now", size_of::<Coefficients>() as u64, Host::Uniform, true),
-            ("position", 16 * s.total, Host::Both, true),
-            ("velocity", 16 * s.total, Host::Both, true),
-            ("pressure", 4 * s.pressure, Host::Both, true),
-            ("number_density", 4 * s.pressure, Host::Both, true),
-            ("state", 4 * s.pressure, Host::Both, true),
-            ("source_diagonal", 8 * s.pressure, Host::Both, true),
-            ("acceleration", 16 * s.fluid, Host::Both, true),
-            ("reaction", 16 * s.moving_wall, Host::Both, reaction),
-            ("counters", 4 * counter::WORDS as u64, Host::Both, true),
-            ("cell_of", 8 * sorted, Host::None, true),
-            ("cell_count", 4 * s.keys(), Host::Writes, true),
-            ("cell_start", 4 * (s.keys() + 1), Host::None, true),
-            ("block_sum", 4 * blocks, Host::None, true),
-            ("unsorted", 4 * sorted, Host::None, true),
-            ("sorted", 32 * s.fluid + 16 * s.fluid.div_ceil(4), Host::Reads, true),
-            ("moving_slot", 4 * s.moving, Host::None, moving),
-            ("static_start", 4 * (s.cells + 1), Host::Writes, s.fixed > 0),
-            ("static_particle", 16 * s.fixed, Host::Writes, s.fixed > 0),
-            ("neighbour_list", 4 * s.capacity * s.pressure, Host::Reads, true),
-            ("neighbour_count", 4 * s.pressure, Host::Both, true),
-            ("preconditioned", 16 * s.pressure, Host::Reads, true),
-            ("residual", 4 * s.pressure, Host::None, true),
-            ("search", 8 * s.pressure, Host::None, true),
-            ("partial_sum", 32 * s.reduction_groups(), Host::None, true),
-            ("solve", size_of::<Solve>() as u64, Host::Both, true),
-            ("solid_offset", 16 * s.moving, Host::Writes, moving),
-            ("poses", size_of::<Pose>() as u64 * s.solids, Host::Writes, moving),
-            ("wall_layer", 48 * s.moving_wall, Host::Writes, force),
-            ("force_chunk", 16 * s.force_chunks(), Host::Writes, force),
-            ("wrench", 32 * s.force_chunks(), Host::Reads, force),
-            ("monitor_sum", size_of::<MonitorSum>() as u64 * s.monitor_groups(), Host::Reads, true),
-            ("speed_bin", 4 * SPEED_BINS as u64, Host::Both, true),
-        ];
-        let levels = (plan.preconditioner == Preconditioner::Multigrid).then(|| Levels::new(s));
-        let rest = levels.iter().flat_map(|l| multigrid_buffers(s, l)).chain(contact);
-        let buffers = listed(table.into_iter().chain(rest).collect());
-        Self { buffers, workgroups: s.pressure.max(sorted).div_ceil(WORKGROUP) }
+        let levels = Levels::new(s);
+        let planned = TABLE.iter().filter(|row| plan.needs(row.arrays));
+        let of_particles =
+            planned.map(|row| Allocation::new(&row.spec, (row.length)(s, &levels), row.purpose));
+        let workgroups = s.pressure.max(s.sorted()).div_ceil(WORKGROUP);
+        Self { buffers: of_particles.chain(contact).collect(), workgroups }
     }
 
     /// All bytes.
@@ -439,13 +370,15 @@ impl Memory {
 
     /// Name and bytes of the largest buffer.
     pub fn largest(&self) -> (&'static str, u64) {
-        self.buffers.iter().max_by_key(|b| b.bytes).map_or(("nothing", 0), |b| (b.name, b.bytes))
+        self.buffers.iter().max_by_key(|b| b.bytes).map_or(("nothing", 0), |b| (b.id.name(), b.bytes))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::Stage;
+    use crate::scheme::Preconditioner;
 
     /// The transport case at l0 = 7.5 mm, and nine times as many particles; a good half carries pressure.
     #[test]
@@ -469,6 +402,7 @@ mod tests {
             preconditioner: Preconditioner::Multigrid,
             force_relaxation: 1.0,
             contact: Default::default(),
+            fixed_walls: true,
         };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
         assert!(middle.total() < 200_000_000, "{}", middle.total());
@@ -484,9 +418,10 @@ mod tests {
         let reasons = Stage::ALL.map(|s| (s, Err("no fluid"))).to_vec();
         let plan = Plan {
             reasons,
-            preconditioner: crate::case::Preconditioner::Jacobi,
+            preconditioner: Preconditioner::Jacobi,
             force_relaxation: 1.0,
             contact: Default::default(),
+            fixed_walls: false,
         };
         assert_eq!(Memory::new(&Sizes::default(), &plan).total(), 0);
     }

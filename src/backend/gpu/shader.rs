@@ -1,38 +1,9 @@
 //! The shaders' sources, the switches that shape them, and what they bind.
 
-use crate::case::{FreeSurface, Gradient, Preconditioner, Source};
 use crate::error::{Error, Result};
 use crate::params::Params;
-use crate::plan::{Plan, Stage};
-use crate::scene::Groups;
-use wgpu::naga;
-
-macro_rules! sources {
-    ($($name:literal),* $(,)?) => {
-        /// The kernels: name and text of shaders/NAME.wgsl, as [`crate::kernels`] lists the twins.
-        pub const KERNELS: &[(&str, &str)] =
-            &[$(($name, include_str!(concat!("../../../shaders/", $name, ".wgsl")))),*];
-    };
-}
-sources!(
-    "body_force",
-    "cell_list",
-    "collision",
-    "conjugate_gradient",
-    "contact_paper",
-    "contact_smooth",
-    "correct",
-    "monitor",
-    "move_solids",
-    "multigrid",
-    "multigrid_levels",
-    "neighbour_list",
-    "number_density",
-    "predict",
-    "pressure_gradient",
-    "pressure_source",
-    "viscosity",
-);
+use crate::plan::{Arrays, Plan, Stage};
+use crate::scheme::{FreeSurface, Gradient, Source};
 
 /// Appended to every kernel.
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
@@ -52,37 +23,20 @@ pub const SWITCHES: [&str; 10] = [
 ];
 
 /// The switches that are on for a scene.
-pub fn switches(params: &Params, groups: &Groups, plan: &Plan) -> Vec<&'static str> {
-    let force = plan.has(Stage::BodyForce) && groups.moving_wall > 0;
+pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         params.gradient != Gradient::Minimum,
         params.gradient == Gradient::CorrectedSurface,
         params.source == Source::Mixed,
-        groups.moving_wall + groups.moving_dummy > 0,
-        plan.preconditioner == Preconditioner::Multigrid,
-        force && (plan.has(Stage::Viscosity) || plan.has(Stage::Collision)),
-        !groups.static_range().is_empty(),
+        plan.needs(Arrays::Solids),
+        plan.needs(Arrays::Multigrid),
+        plan.needs(Arrays::Reaction),
+        plan.needs(Arrays::FixedWalls),
         params.free_surface == FreeSurface::ThresholdOffset,
         params.dimensions == 2,
         plan.has(Stage::Viscosity),
     ];
     SWITCHES.into_iter().zip(on).filter_map(|(name, on)| on.then_some(name)).collect()
-}
-
-/// The kernels that `plan` needs.
-pub fn kernels(plan: &Plan) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
-    KERNELS.iter().copied().filter(|&(name, _)| {
-        if name.starts_with("contact_") {
-            return plan.contact.kernel == Some(name);
-        }
-        // Particle collisions are applied by `correct`; the monitor and the preconditioner are no stages.
-        plan.wet()
-            && match name {
-                "monitor" => true,
-                "multigrid" | "multigrid_levels" => plan.preconditioner == Preconditioner::Multigrid,
-                _ => Stage::ALL.iter().any(|s| s.name() == name && plan.has(*s)),
-            }
-    })
 }
 
 /// Text of a kernel with the lines between `//#if NAME` (or `//#else`) and `//#endif` left out where the
@@ -108,13 +62,45 @@ pub fn source(text: &str, switches: &[&str]) -> String {
     out
 }
 
+/// A buffer as a shader declares it.
+#[derive(Clone, Debug)]
+pub struct Binding {
+    /// Its number.
+    pub number: u32,
+    /// Its name.
+    pub name: String,
+    /// What it holds one or many of: a struct's name, or a plain type as [`crate::compute::Element::NAME`] writes it.
+    pub element: String,
+    /// A storage buffer, as opposed to a uniform.
+    pub storage: bool,
+}
+
 /// An entry point and what it binds.
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// Its name.
     pub name: String,
-    /// Number, name, and whether it is a storage buffer, of each binding that it uses.
-    pub bindings: Vec<(u32, String, bool)>,
+    /// Threads of a workgroup along x, y, z.
+    pub workgroup: [u32; 3],
+    /// The buffers that it uses.
+    pub bindings: Vec<Binding>,
+}
+
+/// Name of the elements of a buffer of type `ty`.
+fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> String {
+    use naga::TypeInner::{Array, Atomic, Scalar, Vector};
+    let scalar = |kind| match kind {
+        naga::ScalarKind::Float => ("f32", "f"),
+        naga::ScalarKind::Sint => ("i32", "i"),
+        _ => ("u32", "u"),
+    };
+    let ty = &module.types[ty];
+    match &ty.inner {
+        Array { base, .. } => element(module, *base),
+        Scalar(s) | Atomic(s) => scalar(s.kind).0.into(),
+        Vector { size, scalar: s } => format!("vec{}{}", *size as u8, scalar(s.kind).1),
+        _ => ty.name.clone().unwrap_or_default(),
+    }
 }
 
 /// Parse and validate `source`; its entry points.
@@ -130,15 +116,19 @@ pub fn entries(file: &str, source: &str) -> Result<Vec<Entry>> {
         let used = info.get_entry_point(k);
         let bound = |(handle, variable): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
             let binding = variable.binding.as_ref().filter(|_| !used[handle].is_empty())?;
-            let storage = matches!(variable.space, naga::AddressSpace::Storage { .. });
-            Some((binding.binding, variable.name.clone().unwrap_or_default(), storage))
+            Some(Binding {
+                number: binding.binding,
+                name: variable.name.clone().unwrap_or_default(),
+                element: element(&module, variable.ty),
+                storage: matches!(variable.space, naga::AddressSpace::Storage { .. }),
+            })
         };
         module.global_variables.iter().filter_map(bound).collect()
     };
-    Ok(module
-        .entry_points
-        .iter()
-        .enumerate()
-        .map(|(k, entry)| Entry { name: entry.name.clone(), bindings: bindings(k) })
-        .collect())
+    let entry = |(k, entry): (usize, &naga::EntryPoint)| Entry {
+        name: entry.name.clone(),
+        workgroup: entry.workgroup_size,
+        bindings: bindings(k),
+    };
+    Ok(module.entry_points.iter().enumerate().map(entry).collect())
 }

@@ -1,7 +1,8 @@
 //! The PPE on the device: the host queues iterations and looks at the verdict now and then.
 
-use super::Gpu;
+use super::kernels::conjugate_gradient as kernel;
 use super::layout::Solve;
+use super::{Gpu, buffers};
 use crate::error::Result;
 use crate::kernels::multigrid_levels::LevelSums;
 use crate::pressure::{Outcome, PressureReport};
@@ -15,38 +16,34 @@ impl Gpu {
     pub(super) fn conjugate_gradient(&mut self) -> Result<PressureReport> {
         self.build_levels()?;
         let groups = self.sizes.reduction_groups();
-        let name = |entry| (entry, groups);
+        let over_rows = |kernel| (kernel, groups);
         let mut iteration = Vec::new();
         // What judges the residual of the last iteration of a chunk; with the diagonal the next chunk does.
         let mut judge = None;
         if let Some(levels) = &self.levels {
-            let descend = name("conjugate_gradient.descend");
+            let descend = over_rows(kernel::descend);
             iteration.push(descend);
             iteration.extend(levels.cycle(groups));
-            iteration.push(name("conjugate_gradient.ascend"));
+            iteration.push(over_rows(kernel::ascend));
             judge = Some(descend);
         }
-        iteration.extend(["conjugate_gradient.multiply", "conjugate_gradient.advance"].map(name));
-        let end =
-            ["conjugate_gradient.end_pack", "conjugate_gradient.end_residual", "conjugate_gradient.end"];
+        iteration.extend([kernel::multiply, kernel::advance].map(over_rows));
+        let end = [kernel::end_pack, kernel::end_residual, kernel::end];
 
         let context = &mut self.context;
-        context.clear("solve")?;
+        context.clear(buffers::solve)?;
         if !self.settings.warm_start {
-            context.clear("pressure")?;
+            context.clear(buffers::pressure)?;
         }
-        context.pass(
-            ["conjugate_gradient.pack", "conjugate_gradient.start_residual", "conjugate_gradient.start"]
-                .map(name),
-        )?;
+        context.pass([kernel::pack, kernel::start_residual, kernel::start].map(over_rows))?;
         // An iteration too many costs empty dispatches, one too few a round trip to the device.
         let multigrid = judge.is_some();
         let spare = if multigrid { 1 } else { self.last_iterations / 8 + 2 };
         let mut chunk = self.last_iterations + spare;
         loop {
             let iterations = (0..chunk).flat_map(|_| iteration.iter().copied());
-            context.pass(iterations.chain(judge).chain(end.map(name)))?;
-            let solve = context.download::<Solve>("solve", 1)?[0];
+            context.pass(iterations.chain(judge).chain(end.map(over_rows)))?;
+            let solve = context.download(buffers::solve, 1)?[0];
             if solve.done != 0 {
                 self.last_iterations = solve.iterations;
                 return Ok(report(&solve));
@@ -60,7 +57,7 @@ impl Gpu {
     pub fn split_levels(&mut self, large: usize) -> Result<()> {
         let Some(levels) = &mut self.levels else { return Ok(()) };
         levels.large = large.min(levels.large_max());
-        self.context.upload("hierarchy", &[levels.hierarchy()])
+        self.context.upload(buffers::hierarchy, &[levels.hierarchy()])
     }
 
     /// Make the levels of multigrid for the system at hand; sums over their operators, finest first. None with the
@@ -69,8 +66,8 @@ impl Gpu {
         self.build_levels()?;
         let Some(levels) = &self.levels else { return Ok(Vec::new()) };
         let (capacity, count) = (levels.capacity as usize, levels.count.len());
-        let rows = self.context.download_parts::<[u32; 4]>("row_cell", &[(capacity, count + 1)])?;
-        let entry = self.context.download::<[u32; 2]>("entry", 27 * capacity)?;
+        let rows = self.context.download_parts(buffers::row_cell, &[(capacity, count + 1)])?;
+        let entry = self.context.download(buffers::entry, 27 * capacity)?;
         let sums = |l: usize| {
             let range = rows[l + 1][0] as usize..rows[l][0] as usize;
             let mut out = LevelSums { rows: range.len(), ..Default::default() };
@@ -87,8 +84,8 @@ impl Gpu {
     /// Make the levels of the multigrid preconditioner for the system at hand.
     fn build_levels(&mut self) -> Result<()> {
         let Some(levels) = &self.levels else { return Ok(()) };
-        self.context.clear("cell_mark")?;
-        self.context.clear("aggregate")?;
+        self.context.clear(buffers::cell_mark)?;
+        self.context.clear(buffers::aggregate)?;
         self.context.pass(levels.build())
     }
 }

@@ -1,11 +1,12 @@
 //! Fields between host (f64, absolute) and device (f32, relative to the middle of the domain).
 
-use super::Gpu;
 use super::layout::{counter, laplacian_coefficient};
+use super::{Gpu, buffers};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::counting_sort;
+use crate::plan::Arrays;
 use crate::scene::Kind;
 use glam::{DVec3, Vec3};
 
@@ -84,29 +85,29 @@ impl Gpu {
             let lower = (self.params.domain_min - self.middle).as_vec3();
             let width = self.params.effective_radius as f32;
             let (start, particle) = index(&self.grid, lower, width, fixed.start, &position[fixed.clone()]);
-            context.upload("static_start", &start)?;
-            context.upload("static_particle", &particle)?;
+            context.upload(buffers::static_start, &start)?;
+            context.upload(buffers::static_particle, &particle)?;
         }
-        context.upload("position", &position)?;
-        context.upload("velocity", &velocity)?;
-        context.upload("pressure", &scalar(&fields.pressure))?;
-        context.upload("number_density", &scalar(&fields.number_density))?;
-        context.upload("state", &state)?;
-        context.upload("source_diagonal", &equations)?;
-        context.upload("acceleration", &packed(&fields.acceleration, DVec3::ZERO, |_| 0.0))?;
-        if context.has("reaction") {
-            context.upload("reaction", &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
+        context.upload(buffers::position, &position)?;
+        context.upload(buffers::velocity, &velocity)?;
+        context.upload(buffers::pressure, &scalar(&fields.pressure))?;
+        context.upload(buffers::number_density, &scalar(&fields.number_density))?;
+        context.upload(buffers::state, &state)?;
+        context.upload(buffers::source_diagonal, &equations)?;
+        context.upload(buffers::acceleration, &packed(&fields.acceleration, DVec3::ZERO, |_| 0.0))?;
+        if self.plan.needs(Arrays::Reaction) {
+            context.upload(buffers::reaction, &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
         }
-        context.upload("counters", &counter::START)?;
-        context.clear("neighbour_count")
+        context.upload(buffers::counters, &counter::START)?;
+        context.clear(buffers::neighbour_count)
     }
 
     /// The neighbour lists: of each pressure-carrying slot those that carry pressure, and dummies.
     pub fn neighbours(&mut self) -> Result<Vec<(Vec<u32>, Vec<u32>)>> {
         let rows = self.groups.pressure();
         let capacity = self.sizes.capacity as usize;
-        let count = self.context.download::<u32>("neighbour_count", rows)?;
-        let list = self.context.download::<u32>("neighbour_list", capacity * rows)?;
+        let count = self.context.download(buffers::neighbour_count, rows)?;
+        let list = self.context.download(buffers::neighbour_list, capacity * rows)?;
         let row = |i: usize| {
             let (near, dummies) = ((count[i] & 0xfff) as usize, (count[i] >> 12 & 0xfff) as usize);
             let at = |k: usize| list[k * rows + i];
@@ -119,11 +120,11 @@ impl Gpu {
     pub(super) fn read_fields(&mut self) -> Result<Fields> {
         let g = self.groups;
         let context = &mut self.context;
-        let position = context.download::<[f32; 4]>("position", g.total())?;
-        let velocity = context.download::<[f32; 4]>("velocity", g.total())?;
-        let equations = context.download::<[f32; 2]>("source_diagonal", g.pressure())?;
+        let position = context.download(buffers::position, g.total())?;
+        let velocity = context.download(buffers::velocity, g.total())?;
+        let equations = context.download(buffers::source_diagonal, g.pressure())?;
         let state: Vec<State> = context
-            .download::<u32>("state", g.pressure())?
+            .download(buffers::state, g.pressure())?
             .into_iter()
             .map(|s| match s {
                 0 => State::Inactive,
@@ -132,14 +133,11 @@ impl Gpu {
             })
             .collect();
         let wide = |v: Vec<f32>| v.into_iter().map(f64::from).collect::<Vec<f64>>();
-        let pressure = wide(context.download("pressure", g.pressure())?);
-        let number_density = wide(context.download("number_density", g.pressure())?);
-        let acceleration = context.download::<[f32; 4]>("acceleration", g.fluid)?;
-        let reaction = if context.has("reaction") {
-            context.download::<[f32; 4]>("reaction", g.moving_wall)?
-        } else {
-            vec![[0.0; 4]; g.moving_wall]
-        };
+        let pressure = wide(context.download(buffers::pressure, g.pressure())?);
+        let number_density = wide(context.download(buffers::number_density, g.pressure())?);
+        let acceleration = context.download(buffers::acceleration, g.fluid)?;
+        let felt = if self.plan.needs(Arrays::Reaction) { g.moving_wall } else { 0 };
+        let reaction = if felt > 0 { context.download(buffers::reaction, felt)? } else { Vec::new() };
         let c = laplacian_coefficient(&self.params);
         let diagonal = |e: &[f32; 2]| if e[1] > 0.0 { f64::from(e[1]) * c } else { 1.0 };
         Ok(Fields {

@@ -11,10 +11,12 @@
 pub mod paper;
 pub mod smooth;
 
-use crate::backend::Compute;
+use crate::compute::{Buffer, Compute, Element, Kernel, Program};
 use crate::error::{Error, Result};
-use bytemuck::Pod;
 use glam::DVec3;
+
+/// The programs of all laws that have one.
+pub const PROGRAMS: [&Program; 2] = [&smooth::PROGRAM, &paper::PROGRAM];
 
 /// What contact has asked of a device so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,21 +38,25 @@ pub(crate) struct Link<'a> {
 }
 
 impl Link<'_> {
-    fn write<T: Pod>(&mut self, buffer: &'static str, data: &[T]) -> Result<()> {
+    fn write<T: Element>(&mut self, buffer: Buffer<T>, data: &[T]) -> Result<()> {
         self.traffic.sent += size_of_val(data) as u64;
-        self.compute.upload(buffer, bytemuck::cast_slice(data))
+        self.compute.upload(buffer.id(), bytemuck::cast_slice(data))
     }
 
-    fn run(&mut self, kernels: &[(&str, u64)]) -> Result<()> {
+    fn reserve<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<()> {
+        self.compute.reserve(buffer.id(), buffer.size() * count as u64)
+    }
+
+    fn run(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
         self.traffic.dispatches += kernels.len() as u64;
         self.compute.dispatch(kernels)
     }
 
-    fn read<T: Pod>(&mut self, buffer: &'static str, count: usize) -> Result<Vec<T>> {
-        let bytes = (count * size_of::<T>()) as u64;
+    fn read<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<Vec<T>> {
+        let bytes = buffer.size() * count as u64;
         self.traffic.round_trips += 1;
         self.traffic.read += bytes;
-        Ok(bytemuck::pod_collect_to_vec(&self.compute.download(buffer, bytes)?))
+        Ok(bytemuck::pod_collect_to_vec(&self.compute.download(buffer.id(), bytes)?))
     }
 }
 

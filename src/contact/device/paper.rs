@@ -2,6 +2,7 @@
 
 use super::{Link, four, place, vector};
 use crate::body::{Body, Wrench};
+use crate::compute::{Program, buffers, kernels, shader_structs};
 use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
 use crate::contact::paper::{Law, Layer, Pair};
 use crate::error::Result;
@@ -57,6 +58,27 @@ pub struct PaperLaw {
     pub fraction: f32,
     pub pad: f32,
 }
+
+shader_structs!(PaperPair, PaperPose, PaperLaw);
+kernels!(contact_paper[64]: count fill force);
+buffers! {
+    contact_layer: [f32; 4], Writes;
+    contact_wall: [f32; 4], Writes;
+    paper_pair: PaperPair, Writes;
+    paper_pose: PaperPose, Writes;
+    paper_law: PaperLaw, Writes;
+    contact_row: u32, Reads;
+    contact_list: [u32; 2], Reads;
+    contact_sum: [f32; 4], Reads;
+}
+
+/// The law on a device.
+pub const PROGRAM: Program = Program {
+    name: "contact_paper",
+    text: contact_paper::TEXT,
+    kernels: contact_paper::ALL,
+    buffers: buffer::ALL,
+};
 
 impl PaperLaw {
     fn new(law: &Law) -> Self {
@@ -137,8 +159,8 @@ impl Paper {
             let both = layer.offsets.iter().zip(&layer.normals);
             all.extend(both.map(|(o, n)| words(*o, *n, size / PARTS)));
         }
-        link.write("contact_layer", &all)?;
-        link.write("paper_law", &[PaperLaw::new(law)])?;
+        link.write(buffer::contact_layer, all.as_flattened())?;
+        link.write(buffer::paper_law, &[PaperLaw::new(law)])?;
         Ok(Self { generation: 0, first, size, entries: vec![], pairs: vec![], poses: vec![] })
     }
 
@@ -186,11 +208,11 @@ impl Paper {
                 e.record.row = place(row)?;
                 row += e.record.count[0] as usize;
             }
-            link.write("contact_wall", &fixed)?;
-            link.compute.reserve("contact_row", 4 * row as u64)?;
+            link.write(buffer::contact_wall, fixed.as_flattened())?;
+            link.reserve(buffer::contact_row, row)?;
             self.send(bodies, link)?;
-            link.run(&[("contact_paper.count", self.entries.len() as u64)])?;
-            let found = link.read::<u32>("contact_row", self.entries.len())?;
+            link.run(&[(contact_paper::count, self.entries.len() as u64)])?;
+            let found = link.read(buffer::contact_row, self.entries.len())?;
             let (mut found, mut list) = (found.into_iter(), 0);
             for e in &mut self.entries {
                 e.record.candidates = found.next().unwrap_or(0);
@@ -198,11 +220,11 @@ impl Paper {
                 list += e.record.candidates as usize;
             }
             self.entries.retain(|e| e.record.candidates > 0);
-            link.compute.reserve("contact_list", 8 * list as u64)?;
-            link.compute.reserve("contact_sum", 48 * self.entries.len() as u64)?;
+            link.reserve(buffer::contact_list, list)?;
+            link.reserve(buffer::contact_sum, 3 * self.entries.len())?;
             if !self.entries.is_empty() {
                 self.send(bodies, link)?;
-                link.run(&[("contact_paper.fill", self.entries.len() as u64)])?;
+                link.run(&[(contact_paper::fill, self.entries.len() as u64)])?;
             }
         }
         self.pairs = self.entries.iter().map(|e| Pair::new(e.a, e.b)).collect();
@@ -212,7 +234,7 @@ impl Paper {
     /// Records and poses of the pairs.
     fn send(&mut self, bodies: &[Body], link: &mut Link) -> Result<()> {
         let records: Vec<PaperPair> = self.entries.iter().map(|e| e.record).collect();
-        link.write("paper_pair", &records)?;
+        link.write(buffer::paper_pair, &records)?;
         self.send_poses(bodies, link)
     }
 
@@ -224,7 +246,7 @@ impl Paper {
             self.poses.clear();
             self.poses.extend(self.entries.iter().map(of));
         }
-        link.write("paper_pose", &self.poses)
+        link.write(buffer::paper_pose, &self.poses)
     }
 
     /// Eq. (14) of all pairs at the bodies' poses and velocities.
@@ -233,9 +255,9 @@ impl Paper {
             return Ok(());
         }
         self.send_poses(bodies, link)?;
-        link.run(&[("contact_paper.force", self.entries.len() as u64)])?;
-        let sums = link.read::<[[f32; 4]; 3]>("contact_sum", self.entries.len())?;
-        for (pair, sum) in self.pairs.iter_mut().zip(&sums) {
+        link.run(&[(contact_paper::force, self.entries.len() as u64)])?;
+        let sums = link.read(buffer::contact_sum, 3 * self.entries.len())?;
+        for (pair, sum) in self.pairs.iter_mut().zip(sums.as_chunks().0) {
             take(pair, sum, law, bodies);
         }
         Ok(())
@@ -244,7 +266,7 @@ impl Paper {
     /// Candidates: the two solids (walls last) and the numbers of the two particles.
     pub fn listed(&self, link: &mut Link) -> Result<Vec<[u64; 4]>> {
         let end = self.entries.iter().map(|e| e.record.list + e.record.candidates).max().unwrap_or(0);
-        let list = link.read::<[u32; 2]>("contact_list", end as usize)?;
+        let list = link.read(buffer::contact_list, end as usize)?;
         let of = |e: &Entry| {
             let PaperPair { list: first, candidates, .. } = e.record;
             let number = |j: u32| e.walls.get(j as usize).copied().unwrap_or(j);

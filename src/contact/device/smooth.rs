@@ -2,11 +2,12 @@
 
 use super::{Link, four, place, three, vector};
 use crate::body::{Body, Wrench};
+use crate::compute::{Program, buffers, kernels, shader_structs};
 use crate::contact::Limits;
 use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
-use crate::contact::geometry::Surface;
 use crate::contact::smooth::{Contact, DeviceSums, Other, Pair, Patch};
 use crate::error::Result;
+use crate::shape::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -60,6 +61,28 @@ pub struct SmoothPose {
     pub found: [f32; 4],
     pub given: [u32; 4],
 }
+
+shader_structs!(SmoothPair, SmoothPose);
+kernels!(contact_smooth[64]: search force);
+buffers! {
+    contact_point: [f32; 4], Writes;
+    smooth_pair: SmoothPair, Writes;
+    smooth_pose: SmoothPose, Writes;
+    contact_list: u32, Reads;
+    contact_count: [u32; 2], Reads;
+    contact_state: [f32; 4], None;
+    contact_sum: [f32; 4], Reads;
+    /// As `contact_state`.
+    contact_given: [f32; 4], Writes;
+}
+
+/// The law on a device.
+pub const PROGRAM: Program = Program {
+    name: "contact_smooth",
+    text: contact_smooth::TEXT,
+    kernels: contact_smooth::ALL,
+    buffers: buffer::ALL,
+};
 
 /// Points in their frame, and the box around them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -117,7 +140,7 @@ impl Smooth {
             .iter()
             .map(|s| Cloud::add(&mut points, &s.points, |k| s.weights[k]))
             .collect::<Result<_>>()?;
-        link.write("contact_point", &points)?;
+        link.write(buffer::contact_point, &points)?;
         Ok(Self {
             generation: 0,
             clouds,
@@ -160,7 +183,7 @@ impl Smooth {
                 high_a: three(own.high),
                 low_b: three(theirs.low),
                 high_b: three(theirs.high),
-                half_a: three(body.half),
+                half_a: three(body.shape.extent(DMat3::IDENTITY)),
                 first: [own.first, theirs.first],
                 count: [own.count, theirs.count],
                 faces: [u32::from(faces_b), u32::from(model.surfaces[pair.a].all_faces)],
@@ -174,14 +197,14 @@ impl Smooth {
         }
         if !self.pairs.is_empty() {
             self.place_poses(model, bodies)?;
-            link.write("smooth_pair", &self.records)?;
-            link.write("smooth_pose", &self.poses)?;
-            link.compute.reserve("contact_list", 4 * list as u64)?;
-            link.compute.reserve("contact_count", 8 * self.pairs.len() as u64)?;
-            link.run(&[("contact_smooth.search", self.pairs.len() as u64)])?;
-            let near = link.read::<[u32; 2]>("contact_count", self.pairs.len())?;
+            link.write(buffer::smooth_pair, &self.records)?;
+            link.write(buffer::smooth_pose, &self.poses)?;
+            link.reserve(buffer::contact_list, list)?;
+            link.reserve(buffer::contact_count, self.pairs.len())?;
+            link.run(&[(contact_smooth::search, self.pairs.len() as u64)])?;
+            let near = link.read(buffer::contact_count, self.pairs.len())?;
             self.keep(&near)?;
-            link.compute.reserve("contact_sum", 16 * self.sums as u64)?;
+            link.reserve(buffer::contact_sum, self.sums)?;
         }
         self.generation = candidates.generation();
         (self.constants, self.sent) = (None, false);
@@ -263,7 +286,7 @@ impl Smooth {
             return Ok(());
         }
         self.place_poses(model, bodies)?;
-        link.compute.reserve("contact_state", 16 * self.states as u64)?;
+        link.reserve(buffer::contact_state, self.states)?;
         if !self.sent {
             for (record, pair) in self.records.iter_mut().zip(&self.pairs) {
                 let c = &pair.constants;
@@ -271,13 +294,13 @@ impl Smooth {
                 (record.stop_depth, record.damping) = (c.stop_depth as f32, c.damping as f32);
                 record.step = c.step as f32;
             }
-            link.write("smooth_pair", &self.records)?;
+            link.write(buffer::smooth_pair, &self.records)?;
             self.sent = true;
         }
-        link.write("smooth_pose", &self.poses)?;
-        link.write("contact_given", &self.given)?;
-        link.run(&[("contact_smooth.force", self.pairs.len() as u64)])?;
-        let sums = link.read::<[f32; 4]>("contact_sum", self.sums)?;
+        link.write(buffer::smooth_pose, &self.poses)?;
+        link.write(buffer::contact_given, self.given.as_flattened())?;
+        link.run(&[(contact_smooth::force, self.pairs.len() as u64)])?;
+        let sums = link.read(buffer::contact_sum, self.sums)?;
         let take = |(pair, record): (&mut Pair, &SmoothPair)| {
             let sums = read(pair, record, &sums[record.sum as usize..], bodies);
             pair.join(&sums, bodies);
@@ -298,7 +321,7 @@ impl Smooth {
         link: &mut Link,
     ) -> Result<Vec<(usize, Other, u8, DVec3)>> {
         let end = self.records.iter().map(|r| r.list + r.count[0] + r.count[1]).max();
-        let list = link.read::<u32>("contact_list", end.unwrap_or(0) as usize)?;
+        let list = link.read(buffer::contact_list, end.unwrap_or(0) as usize)?;
         let mut out = vec![];
         for (pair, record) in self.pairs.iter().zip(&self.records) {
             for (side, solid) in [(0, Some(pair.a)), (1, pair.b.solid())] {
@@ -354,8 +377,9 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Bod
     let still = a.rotation.transpose();
     let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
-            let Body { pose, rotation, half, .. } = &bodies[b];
-            (pose.position, *rotation, *half, pose.velocity_at(a.pose.position), pose.angular_velocity)
+            let Body { pose, rotation, shape, .. } = &bodies[b];
+            let half = shape.extent(DMat3::IDENTITY);
+            (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
         }
         Other::Wall(w) => {
             let wall = &model.walls[w];
@@ -366,7 +390,8 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Bod
     let back = axes.transpose();
     let turn = back * a.rotation;
     let (below_b, above_b) = clearances(turn, back * (a.pose.position - center), half, &clouds[pair.a]);
-    let (below_a, above_a) = clearances(still * axes, still * (center - a.pose.position), a.half, &theirs);
+    let half_a = a.shape.extent(DMat3::IDENTITY);
+    let (below_a, above_a) = clearances(still * axes, still * (center - a.pose.position), half_a, &theirs);
     let u = still * (a.pose.velocity - velocity);
     SmoothPose {
         row_x: four(turn.row(0), u.x),

@@ -12,30 +12,10 @@
 //! with the depth, weight and place that give them exactly. Where faces are blended, five Gauss nodes are
 //! good to 3e-4, of which depth^8 leaves a quarter for the energy.
 
-use super::geometry::{self, Faces, Inside};
+use super::super::{Faces, Inside};
+use super::depth;
+use crate::shape::convex::GAUSS_5;
 use glam::DVec3;
-
-/// An edge.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Line {
-    /// One end [m]; body's frame, world for walls.
-    pub start: DVec3,
-    /// Unit direction.
-    pub along: DVec3,
-    /// Length [m].
-    pub length: f64,
-    /// Weight per length [1/m]; 0 for walls, whose edges get that of the body they touch.
-    pub density: f64,
-}
-
-/// Nodes and weights of Gauss's rule on 0..1.
-const NODES: [(f64, f64); 5] = [
-    (0.046_910_077_030_668, 0.118_463_442_528_094_5),
-    (0.230_765_344_947_158_5, 0.239_314_335_249_683_2),
-    (0.5, 0.284_444_444_444_444_4),
-    (0.769_234_655_052_841_5, 0.239_314_335_249_683_2),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_5),
-];
 
 /// Part of a line, `start` + s `along` with s in 0..`length`, inside the box: range of s.
 #[inline]
@@ -76,7 +56,7 @@ pub(crate) fn nodes(
     half: DVec3,
     faces: Faces,
     least: f64,
-    mut visit: impl FnMut(f64, f64, Inside),
+    visit: &mut dyn FnMut(f64, f64, Inside),
 ) {
     let Some((low, high)) = clip(start, along, length, half) else { return };
     let mut below = [Below::default(); 6];
@@ -131,7 +111,7 @@ pub(crate) fn nodes(
         }
         let place = |t: f64| low + t * (high - low);
         if second >= 2.0 * first {
-            let outward = geometry::face_normal(nearest.face);
+            let outward = depth::face_normal(nearest.face);
             let middle = 0.5 * (from + to);
             for (t0, t1) in [(from, middle), (middle, to)] {
                 let (share, node, depth) = whole(nearest.at(t0).max(0.0), nearest.at(t1).max(0.0));
@@ -142,9 +122,9 @@ pub(crate) fn nodes(
             }
             continue;
         }
-        for (node, weight) in NODES {
+        for (node, weight) in GAUSS_5 {
             let s = place(from + node * (to - from));
-            if let Some(inside) = geometry::depth(start + s * along, half, faces) {
+            if let Some(inside) = depth::depth(start + s * along, half, faces) {
                 visit(s, weight * (to - from) * (high - low), inside);
             }
         }
@@ -175,13 +155,13 @@ fn whole(a: f64, b: f64) -> (f64, f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::geometry::ALL_FACES;
+    use super::super::depth::ALL_FACES;
     use super::*;
 
     /// Integral of depth^8 over the line and of depth^7 times the outward vector.
     fn integrals(start: DVec3, along: DVec3, half: DVec3, faces: Faces) -> (f64, DVec3) {
         let mut sums = (0.0, DVec3::ZERO);
-        nodes(start, along, 3.0, half, faces, 0.0, |_, width, inside| {
+        nodes(start, along, 3.0, half, faces, 0.0, &mut |_, width, inside| {
             sums.0 += width * inside.depth.powi(8);
             sums.1 += width * inside.depth.powi(7) * inside.outward;
         });
@@ -199,7 +179,7 @@ mod tests {
                 let (energy, _) = integrals(start, along, half, faces);
                 let n = 40_000;
                 let points = (0..n).map(|i| start + (f64::from(i) + 0.5) * 3.0 / f64::from(n) * along);
-                let depths = points.filter_map(|q| geometry::depth(q, half, faces));
+                let depths = points.filter_map(|q| depth::depth(q, half, faces));
                 let sum: f64 = depths.map(|d| d.depth.powi(8)).sum::<f64>() * 3.0 / f64::from(n);
                 // a hidden face cuts the line where it is deep, so that the points are off by one there
                 let bound = if faces == ALL_FACES { 3e-4 } else { 2e-3 };

@@ -1,0 +1,102 @@
+//! The table of the particle stages' buffers: what each holds, whom it serves, who needs it and how long it is.
+//! Memory, forecast, bindings, traffic and transfers all read it; contact's buffers stand with its laws.
+
+use super::hierarchy::{Hierarchy, Levels};
+use super::layout::{
+    Coefficients, Constants, MonitorSum, Pose, SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
+};
+use crate::compute::{Buffer, Host, Spec, shader_structs};
+use crate::monitor::SPEED_BINS;
+use crate::plan::Arrays;
+
+shader_structs!(Constants, Coefficients, Hierarchy, MonitorSum, Pose, Solve, WallParticle);
+
+/// A line of the table.
+pub struct Row {
+    /// Name, element and host's use.
+    pub spec: Spec,
+    /// What the buffer serves.
+    pub purpose: &'static str,
+    /// Which scenes need it.
+    pub arrays: Arrays,
+    /// Elements.
+    pub length: fn(&Sizes, &Levels) -> u64,
+}
+
+macro_rules! table {
+    ($($purpose:literal { $($(#[$doc:meta])* $name:ident: $element:ty, $host:ident, $arrays:ident, $length:expr;)* })*) => {
+        $($($(#[$doc])* #[allow(non_upper_case_globals, missing_docs)]
+            pub const $name: Buffer<$element> = Buffer::new(stringify!($name), Host::$host);)*)*
+        /// The table.
+        pub const TABLE: &[Row] = &[$($(Row {
+            spec: $name.spec(),
+            purpose: $purpose,
+            arrays: Arrays::$arrays,
+            length: $length,
+        }),*),*];
+    };
+}
+
+// Name as in the shaders: element, the host's use, the scenes that need it, length of scene `s` with levels `l`.
+table! {
+    "particles" {
+        /// x, y, z and kind.
+        position: [f32; 4], Both, Fluid, |s, _| s.total;
+        /// u, v, w and number.
+        velocity: [f32; 4], Both, Fluid, |s, _| s.total;
+        pressure: f32, Both, Fluid, |s, _| s.pressure;
+        number_density: f32, Both, Fluid, |s, _| s.pressure;
+        state: u32, Both, Fluid, |s, _| s.pressure;
+        acceleration: [f32; 4], Both, Fluid, |s, _| s.fluid;
+    }
+    "neighbour lists" {
+        neighbour_list: u32, Reads, Fluid, |s, _| s.capacity * s.pressure;
+        neighbour_count: u32, Both, Fluid, |s, _| s.pressure;
+    }
+    "pressure solver" {
+        source_diagonal: [f32; 2], Both, Fluid, |s, _| s.pressure;
+        preconditioned: [f32; 4], Reads, Fluid, |s, _| s.pressure;
+        residual: f32, None, Fluid, |s, _| s.pressure;
+        search: [f32; 2], None, Fluid, |s, _| s.pressure;
+        partial_sum: [f32; 4], None, Fluid, |s, _| 2 * s.reduction_groups();
+        solve: Solve, Both, Fluid, |_, _| 1;
+    }
+    "multigrid" {
+        hierarchy: Hierarchy, Uniform, Multigrid, |_, _| 1;
+        cell_mark: u32, Writes, Multigrid, |_, l| l.cells;
+        cell_row: [u32; 2], None, Multigrid, |_, l| l.cells;
+        row_block: [u32; 2], None, Multigrid, |_, l| l.blocks();
+        row_cell: [u32; 4], Reads, Multigrid, |_, l| l.capacity + 1 + l.count.len() as u64;
+        member: [u32; 2], None, Multigrid, |s, _| s.pressure;
+        aggregate: [u32; 2], Writes, Multigrid, |s, _| s.pressure;
+        entry: [u32; 2], Reads, Multigrid, |_, l| 27 * l.capacity;
+        coarse: f32, None, Multigrid, |_, l| 3 * l.capacity;
+        smoothed: f32, None, Multigrid, |s, _| s.pressure;
+        corrected: [f32; 4], None, Multigrid, |s, _| s.pressure;
+    }
+    "search" {
+        cell_of: [u32; 2], None, Fluid, |s, _| s.sorted();
+        cell_count: u32, Writes, Fluid, |s, _| s.keys();
+        cell_start: u32, Reads, Fluid, |s, _| s.keys() + 1;
+        block_sum: u32, None, Fluid, |s, _| s.keys().div_ceil(SCAN_BLOCK);
+        unsorted: u32, None, Fluid, |s, _| s.sorted();
+        /// Positions, velocities and pressures of the fluid, one after the other.
+        sorted: [f32; 4], Reads, Fluid, |s, _| 2 * s.fluid + s.fluid.div_ceil(4);
+        moving_slot: u32, None, Solids, |s, _| s.moving;
+        static_start: u32, Writes, FixedWalls, |s, _| s.cells + 1;
+        static_particle: [u32; 4], Writes, FixedWalls, |s, _| s.fixed;
+    }
+    "solids and the rest" {
+        params: Constants, Uniform, Fluid, |_, _| 1;
+        now: Coefficients, Uniform, Fluid, |_, _| 1;
+        counters: u32, Both, Fluid, |_, _| counter::WORDS as u64;
+        reaction: [f32; 4], Both, Reaction, |s, _| s.moving_wall;
+        solid_offset: [f32; 4], Writes, Solids, |s, _| s.moving;
+        poses: Pose, Writes, Solids, |s, _| s.solids;
+        wall_layer: WallParticle, Writes, Force, |s, _| s.moving_wall;
+        force_chunk: [u32; 4], Writes, Force, |s, _| s.force_chunks();
+        wrench: [f32; 4], Reads, Force, |s, _| 2 * s.force_chunks();
+        monitor_sum: MonitorSum, Reads, Fluid, |s, _| s.monitor_groups();
+        speed_bin: u32, Both, Fluid, |_, _| SPEED_BINS as u64;
+    }
+}

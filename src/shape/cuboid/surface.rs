@@ -1,0 +1,132 @@
+//! The surface of a box: points at its particles, edges, and weights that make a face rock like an even pressure.
+
+use super::super::surface::{Line, Surface};
+use super::super::{Faces, WallLayer};
+use super::ALL_FACES;
+use glam::DVec3;
+
+impl Surface {
+    /// The surface of a box of half edges `half` [m]. A point on several faces gets the mean of its shares of them: constant
+    /// weights are what makes the law conservative, so they may not depend on the face that touches.
+    /// What the particles along an edge would weigh is spread over its length.
+    pub fn cuboid(half: DVec3, wall: &WallLayer, dimensions: u32) -> Self {
+        let points: Vec<DVec3> = wall.offset.iter().zip(wall.to_surface).map(|(o, s)| *o + *s).collect();
+        let faces: Vec<Faces> = wall
+            .to_surface
+            .iter()
+            .map(|s| {
+                (0..3).fold(0, |bits, k| match s[k] {
+                    c if c > 0.0 => bits | 1 << (2 * k + 1),
+                    c if c < 0.0 => bits | 1 << (2 * k),
+                    _ => bits,
+                })
+            })
+            .collect();
+        let on = |face: u8| faces.iter().filter(|f| *f & (1 << face) != 0).count();
+        let share: Vec<f64> = (0..6).map(|face| 1.0 / on(face).max(1) as f64).collect();
+        let weights: Vec<f64> = faces
+            .iter()
+            .map(|f| {
+                let mine: Vec<f64> = (0..6).filter(|k| f & (1 << k) != 0).map(|k| share[k]).collect();
+                mine.iter().sum::<f64>() / mine.len().max(1) as f64
+            })
+            .collect();
+        let all_faces = if dimensions == 2 { 0b11_0011 } else { ALL_FACES };
+        let smallest_weight = weights.iter().copied().fold(1.0, f64::min);
+        let mut surface = Self { points, weights, faces, all_faces, smallest_weight, ..Self::default() };
+        if dimensions == 3 {
+            surface.spread_edges(half);
+        }
+        surface.balance();
+        surface.normalise();
+        surface
+    }
+
+    /// Second moment of the weights of all faces over that of an even pressure, in the mean, with the
+    /// border's weights times `border`.
+    fn moment(samples: &[(DVec3, f64, Faces)], border: f64) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for face in 0..6_u8 {
+            let on = samples.iter().filter(|s| s.2 & (1 << face) != 0);
+            let on: Vec<(DVec3, f64)> =
+                on.map(|s| (s.0, if s.2.count_ones() > 1 { border * s.1 } else { s.1 })).collect();
+            if samples.iter().all(|s| s.2 & (1 << face) == 0 || s.2.count_ones() > 1) {
+                continue; // all border: nothing to balance it with
+            }
+            let all: f64 = on.iter().map(|s| s.1).sum();
+            let axis = usize::from(face / 2);
+            for other in [(axis + 1) % 3, (axis + 2) % 3] {
+                let half = on.iter().map(|s| s.0[other].abs()).fold(0.0, f64::max);
+                let second: f64 = on.iter().map(|s| s.1 * s.0[other].powi(2)).sum();
+                if half > 0.0 {
+                    sum += 3.0 * second / (all * half * half);
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 { sum / count } else { 1.0 }
+    }
+
+    /// Makes edges and corners light enough that a face rocks, and its friction resists a spin, like an
+    /// even pressure: particles stand for cells, whose outermost have been moved to the border.
+    fn balance(&mut self) {
+        let samples = self.samples();
+        if samples.iter().all(|s| s.2.count_ones() > 1) {
+            return;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if Self::moment(&samples, middle) < 1.0 { low = middle } else { high = middle }
+        }
+        let border = self.faces.iter().map(|f| f.count_ones() > 1);
+        self.weights.iter_mut().zip(border).filter(|(_, b)| *b).for_each(|(w, _)| *w *= high);
+        self.edges.iter_mut().for_each(|e| e.density *= high);
+        self.smallest_weight *= high;
+    }
+
+    /// Turns the points along each edge into a line of their weight.
+    fn spread_edges(&mut self, half: DVec3) {
+        for along in 0..3_usize {
+            let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+            for (su, sv) in [(0_u8, 0_u8), (0, 1), (1, 0), (1, 1)] {
+                let both: Faces = 1 << (2 * u as u8 + su) | 1 << (2 * v as u8 + sv);
+                let own = self.faces.iter().zip(&self.weights).filter(|(f, _)| **f == both);
+                let mut weight: f64 = own.map(|(_, w)| w).sum();
+                if weight == 0.0 {
+                    // two particles along it: both are corners
+                    let corners = self.faces.iter().zip(&self.weights).filter(|(f, _)| **f & both == both);
+                    weight = corners.map(|(_, w)| w / 6.0).sum();
+                }
+                let sign = |side: u8| if side == 1 { 1.0 } else { -1.0 };
+                let mut start = -half;
+                start[u] *= -sign(su);
+                start[v] *= -sign(sv);
+                let length = 2.0 * half[along];
+                let line = Line { start, along: DVec3::AXES[along], length, density: weight / length };
+                self.edges.push(line);
+                self.edge_faces.push(both);
+            }
+        }
+        let inner = |f: &Faces| f.count_ones() != 2;
+        let mut kept = self.faces.iter().map(inner);
+        self.points.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = self.faces.iter().map(inner);
+        self.weights.retain(|_| kept.next().unwrap_or(true));
+        self.faces.retain(inner);
+    }
+
+    /// Brings the mean over the faces of their weight to 1: it is off for boxes that are no cubes.
+    fn normalise(&mut self) {
+        let samples = self.samples();
+        let sums =
+            (0..6_u8).map(|face| samples.iter().filter(|s| s.2 & (1 << face) != 0).map(|s| s.1).sum::<f64>());
+        let sums: Vec<f64> = sums.filter(|s| *s > 0.0).collect();
+        let mean = sums.iter().sum::<f64>() / sums.len().max(1) as f64;
+        if mean > 0.0 {
+            self.weights.iter_mut().for_each(|w| *w /= mean);
+            self.edges.iter_mut().for_each(|e| e.density /= mean);
+            self.smallest_weight /= mean;
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Shapes of solids: a shape is one file here and one arm of [`Shape`].
+//!
+//! Everything else asks a shape: the scene for its particles and its volume, a body for its inertia, contact
+//! for its depth below a point and for what of its surface presses into others ([`Surface`]).
+
+mod convex;
+mod cuboid;
+mod cylinder;
+mod disc;
+mod sphere;
+mod surface;
+
+pub(crate) use convex::{along, around};
+pub use cuboid::Cuboid;
+pub(crate) use cuboid::{ALL_FACES, face_normal};
+pub use cylinder::Cylinder;
+pub use disc::Disc;
+pub use sphere::Sphere;
+pub use surface::{Line, Ring, Side, Surface};
+
+use glam::{DMat3, DVec3};
+use std::ops::Deref;
+
+/// Faces of a shape: bit 2 k for the lower face of axis k, bit 2 k + 1 for the upper one.
+pub type Faces = u8;
+
+/// Where a point lies inside a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inside {
+    /// Depth [m].
+    pub depth: f64,
+    /// Minus the gradient of the depth: the outward normal of the nearest face, blended near edges.
+    pub outward: DVec3,
+    /// The nearest face.
+    pub face: u8,
+}
+
+/// A solid's shape in its own frame, centred on its centre of mass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A box.
+    Box(Cuboid),
+    /// A sphere.
+    Sphere(Sphere),
+    /// A cylinder with flat ends.
+    Cylinder(Cylinder),
+    /// A round slice, of two dimensions.
+    Disc(Disc),
+}
+
+impl Deref for Shape {
+    type Target = dyn Geometry;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Box(shape) => shape,
+            Self::Sphere(shape) => shape,
+            Self::Cylinder(shape) => shape,
+            Self::Disc(shape) => shape,
+        }
+    }
+}
+
+impl Shape {
+    /// A box of edge lengths `size` [m].
+    pub fn cuboid(size: DVec3) -> Self {
+        Self::Box(Cuboid { half: 0.5 * size })
+    }
+
+    /// The box, if it is one: what has no particles of its own lattice, and every wall, is a box.
+    pub fn as_cuboid(&self) -> Option<&Cuboid> {
+        match self {
+            Self::Box(shape) => Some(shape),
+            _ => None,
+        }
+    }
+}
+
+/// What is asked of a shape. Points and directions are in its frame.
+pub trait Geometry: std::fmt::Debug + Sync {
+    /// Its name in a case.
+    fn name(&self) -> &'static str;
+
+    /// Volume [m3].
+    fn volume(&self) -> f64;
+
+    /// Principal moments of inertia [kg m2] when filled evenly with `mass` [kg].
+    fn inertia(&self, mass: f64) -> DVec3;
+
+    /// Radius of the sphere about the centre that holds it [m].
+    fn radius(&self) -> f64;
+
+    /// Largest coordinate of its points along the unit vector `n` [m].
+    fn reach(&self, n: DVec3) -> f64;
+
+    /// Half extents of its bounding box along the axes to which `rotation` turns it [m].
+    fn extent(&self, rotation: DMat3) -> DVec3 {
+        let to_shape = rotation.transpose();
+        DVec3::from_array(DVec3::AXES.map(|axis| self.reach(to_shape * axis)))
+    }
+
+    /// A lower bound of the distance of `q` from it [m]; negative inside.
+    fn outside(&self, q: DVec3) -> f64 {
+        self.distance(q).0
+    }
+
+    /// Signed distance of `q` from its surface [m] and the gradient: exact outside, minus the depth inside.
+    fn distance(&self, q: DVec3) -> (f64, DVec3);
+
+    /// Depth of `q` below those of its `faces` that can be reached; `None` outside.
+    fn depth(&self, q: DVec3, faces: Faces) -> Option<Inside>;
+
+    /// Directions among which those are along which it may be told apart from another shape at once.
+    fn axes(&self) -> Vec<DVec3>;
+
+    /// Whether the stretch `start` + s `along`, s in 0..`length`, may come within `margin` [m] of it.
+    fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool;
+
+    /// Calls `visit` with s, the length that it stands for [m] and its depth for every node of the rule that
+    /// integrates depth^8 over the stretch `start` + s `along`, s in 0..`length`. One of which length times
+    /// depth^8 stays below `least` may be left out.
+    fn nodes(
+        &self,
+        line: (DVec3, DVec3, f64),
+        faces: Faces,
+        least: f64,
+        visit: &mut dyn FnMut(f64, f64, Inside),
+    );
+
+    /// Particles about `spacing` [m] apart: the wall layer and what lies below it, hollow beyond `layers`.
+    fn particles(&self, spacing: f64, dimensions: u32, layers: i32) -> Particles;
+
+    /// What of its surface presses into other solids; `particles` are its own.
+    fn surface(&self, particles: &WallLayer, spacing: f64, dimensions: u32) -> Surface;
+}
+
+/// Particles of a shape, in its frame.
+#[derive(Clone, Debug, Default)]
+pub struct Particles {
+    /// Those of the wall layer [m].
+    pub wall: Vec<DVec3>,
+    /// Those below it [m].
+    pub dummy: Vec<DVec3>,
+    /// Outward area of each particle of the wall layer [m2]; they sum to zero.
+    pub area: Vec<DVec3>,
+    /// From each particle of the wall layer to the true surface [m].
+    pub to_surface: Vec<DVec3>,
+}
+
+impl Particles {
+    /// Adds a particle `depth` layers below the wall layer, which is 0.
+    fn add(&mut self, depth: i32, at: DVec3, area: DVec3, to_surface: DVec3) {
+        if depth > 0 {
+            self.dummy.push(at);
+            return;
+        }
+        self.wall.push(at);
+        self.area.push(area);
+        self.to_surface.push(to_surface);
+    }
+}
+
+/// The wall layer of a solid: places and what leads from them to the true surface [m].
+#[derive(Clone, Copy, Debug)]
+pub struct WallLayer<'a> {
+    /// Places.
+    pub offset: &'a [DVec3],
+    /// From each to the surface.
+    pub to_surface: &'a [DVec3],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shapes() -> [Shape; 4] {
+        [
+            Shape::cuboid(DVec3::new(0.4, 0.2, 0.6)),
+            Shape::Sphere(Sphere { radius: 0.3 }),
+            Shape::Cylinder(Cylinder { radius: 0.2, half_height: 0.25 }),
+            Shape::Disc(Disc { radius: 0.3, width: 0.02 }),
+        ]
+    }
+
+    fn pseudo(k: u32, n: f64) -> f64 {
+        (f64::from(k) * n).fract() - 0.5
+    }
+
+    #[test]
+    fn the_gradient_of_the_distance_is_its_slope_and_the_depth_its_inside() {
+        for shape in shapes() {
+            for k in 1..400 {
+                let mut q = DVec3::new(pseudo(k, 0.618_034), pseudo(k, 0.754_877), pseudo(k, 0.569_84));
+                if matches!(shape, Shape::Disc(_)) {
+                    q.y = 0.0;
+                }
+                let (d, gradient) = shape.distance(q);
+                assert_eq!(d < 0.0, shape.depth(q, ALL_FACES).is_some(), "{shape:?} {q}");
+                if let Some(inside) = shape.depth(q, ALL_FACES) {
+                    assert_eq!((inside.depth, inside.outward), (-d, gradient));
+                }
+                let h = 1e-7;
+                let axes = if matches!(shape, Shape::Disc(_)) {
+                    vec![DVec3::X, DVec3::Z]
+                } else {
+                    DVec3::AXES.to_vec()
+                };
+                for e in axes {
+                    let slope = (shape.distance(q + h * e).0 - shape.distance(q - h * e).0) / (2.0 * h);
+                    // three faces of a box within a factor of two of each other keep a kink
+                    let kinked = d < 0.0 && gradient.abs().max_element() < 0.99;
+                    assert!(
+                        kinked || (slope - gradient.dot(e)).abs() < 1e-5,
+                        "{shape:?} {q}: {slope} {gradient}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn areas_close_and_span_the_volume_and_particles_fill_the_shape() {
+        for shape in &shapes()[..3] {
+            let l0 = 0.02;
+            let all = shape.particles(l0, 3, 100);
+            let sum: DVec3 = all.area.iter().sum();
+            let area: f64 = all.area.iter().map(|a| a.length()).sum();
+            assert!(sum.length() < 1e-12 * area, "{shape:?}: {sum}");
+            let at = all.wall.iter().zip(&all.to_surface).map(|(x, s)| *x + *s);
+            for (k, e) in DVec3::AXES.into_iter().enumerate() {
+                let parts = at.clone().zip(&all.area).map(|(x, a)| x[k] * *a);
+                let moment: DVec3 = parts.sum();
+                let exact = shape.volume() * e;
+                // corners of the box's lattice: an area of two faces stands for both at their common edge
+                let bound = if shape.as_cuboid().is_some() { 0.2 } else { 1e-9 };
+                assert!((moment - exact).length() < bound * shape.volume(), "{shape:?}: {moment} {exact}");
+            }
+            let count = (all.wall.len() + all.dummy.len()) as f64 * l0.powi(3);
+            assert!((count / shape.volume() - 1.0).abs() < 0.05, "{shape:?}: {count}");
+            for x in all.wall.iter().chain(&all.dummy) {
+                assert!(shape.distance(*x).0 < -0.3 * l0, "{shape:?}: {x}");
+            }
+        }
+    }
+
+    #[test]
+    fn reach_is_the_largest_coordinate_of_the_surface() {
+        for shape in &shapes()[..3] {
+            let all = shape.particles(0.004, 3, 2);
+            for k in 1..40 {
+                let n =
+                    DVec3::new(pseudo(k, 0.618_034), pseudo(k, 0.754_877), pseudo(k, 0.569_84)).normalize();
+                let at = all.wall.iter().zip(&all.to_surface).map(|(x, s)| (*x + *s).dot(n));
+                let largest = at.fold(f64::NEG_INFINITY, f64::max);
+                let reach = shape.reach(n);
+                assert!(
+                    largest <= reach + 1e-12 && largest > reach - 2e-3,
+                    "{shape:?} {n}: {largest} {reach}"
+                );
+                assert!(reach <= shape.radius() + 1e-12);
+            }
+        }
+    }
+}

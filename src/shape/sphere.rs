@@ -1,0 +1,128 @@
+//! A sphere: one ball of a surface, particles on concentric layers.
+
+use super::surface::Surface;
+use super::{Faces, Geometry, Inside, Particles, WallLayer, convex};
+use glam::{DMat3, DVec3};
+use std::f64::consts::PI;
+
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Radius [m].
+    pub radius: f64,
+}
+
+impl Geometry for Sphere {
+    fn name(&self) -> &'static str {
+        "sphere"
+    }
+
+    fn volume(&self) -> f64 {
+        4.0 / 3.0 * PI * self.radius.powi(3)
+    }
+
+    fn inertia(&self, mass: f64) -> DVec3 {
+        DVec3::splat(0.4 * mass * self.radius * self.radius)
+    }
+
+    fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    fn reach(&self, _: DVec3) -> f64 {
+        self.radius
+    }
+
+    fn distance(&self, q: DVec3) -> (f64, DVec3) {
+        let r = q.length();
+        // at the very centre every way out is as short
+        (r - self.radius, if r > 0.0 { q / r } else { DVec3::Z })
+    }
+
+    fn depth(&self, q: DVec3, _: Faces) -> Option<Inside> {
+        let (distance, outward) = self.distance(q);
+        (distance < 0.0).then_some(Inside { depth: -distance, outward, face: 0 })
+    }
+
+    fn axes(&self) -> Vec<DVec3> {
+        vec![]
+    }
+
+    fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool {
+        let nearest = start + (-start.dot(along)).clamp(0.0, length) * along;
+        nearest.length() < self.radius + margin
+    }
+
+    fn nodes(
+        &self,
+        (start, along, length): (DVec3, DVec3, f64),
+        faces: Faces,
+        _: f64,
+        visit: &mut dyn FnMut(f64, f64, Inside),
+    ) {
+        let distance = |s: f64| {
+            let (d, gradient) = self.distance(start + s * along);
+            (d, gradient.dot(along))
+        };
+        convex::along(length, distance, |s, width| {
+            if let Some(inside) = self.depth(start + s * along, faces) {
+                visit(s, width, inside);
+            }
+        });
+    }
+
+    /// Layers a spacing apart, the outermost half of one below the surface; on each a Fibonacci lattice.
+    fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
+        let mut out = Particles::default();
+        let count = (self.radius / spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
+        let step = self.radius / f64::from(count);
+        let kept = if count >= layers + 1 { layers.max(1) } else { count };
+        for depth in 0..kept {
+            let r = self.radius - (f64::from(depth) + 0.5) * step;
+            // as many as cells of the layer's volume
+            let outer = r + 0.5 * step;
+            let inner = r - 0.5 * step;
+            let volume = 4.0 / 3.0 * PI * (outer.powi(3) - inner.powi(3));
+            let n = (volume / (step * spacing * spacing)).round().max(4.0) as usize;
+            let area = 4.0 * PI * self.radius * self.radius / n as f64;
+            for outward in fibonacci(n) {
+                out.add(depth, r * outward, area * outward, 0.5 * step * outward);
+            }
+        }
+        close(&mut out, self.volume());
+        out
+    }
+
+    fn surface(&self, _: &WallLayer, _: f64, _: u32) -> Surface {
+        Surface::ball(self.radius)
+    }
+}
+
+/// `n` directions spread evenly: a golden spiral.
+fn fibonacci(n: usize) -> impl Iterator<Item = DVec3> {
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    (0..n).map(move |k| {
+        let z = 1.0 - (2.0 * k as f64 + 1.0) / n as f64;
+        let (sin, cos) = (golden * k as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z)
+    })
+}
+
+/// Corrects areas that are even only nearly: an even pressure may not push, and one that grows with depth must
+/// push with the weight of `volume` [m3], so sum A = 0 and sum x A^T = volume.
+fn close(particles: &mut Particles, volume: f64) {
+    let n = particles.area.len() as f64;
+    let mean = particles.area.iter().sum::<DVec3>() / n;
+    particles.area.iter_mut().for_each(|a| *a -= mean);
+    let at = particles.wall.iter().zip(&particles.to_surface).map(|(x, s)| *x + *s);
+    // columns: sum over x_k A
+    let mut moment = DMat3::ZERO;
+    for (x, a) in at.zip(&particles.area) {
+        for k in 0..3 {
+            *moment.col_mut(k) += x[k] * *a;
+        }
+    }
+    let correct = volume * moment.inverse();
+    particles.area.iter_mut().for_each(|a| *a = correct * *a);
+}

@@ -1,0 +1,55 @@
+//! How long a time step may be: one rule for a run and for what is said of it before.
+
+use crate::lattice::Lattice;
+use crate::params::{Params, Relaxation};
+
+/// Displacement of the fastest particles in a step over l0, v dt / l0, at most [-].
+pub const COURANT_MAX: f64 = 0.35;
+/// c_s dt / l0 at most [-].
+pub const SOUND_MAX: f64 = 0.7;
+/// nu dt / l0^2 at most, as a part of the limit of explicit viscosity [-].
+pub const VISCOUS_MAX: f64 = 0.5;
+
+/// Longest time steps that each part of the scheme allows [s]; infinite where it sets no bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Of the displacement in a step.
+    pub flow: f64,
+    /// Of the density error's oscillation.
+    pub sound: f64,
+    /// Of explicit viscosity.
+    pub viscous: f64,
+}
+
+impl Bounds {
+    /// Bounds of a flow whose fastest particles reach `speed` [m/s].
+    pub fn new(params: &Params, speed: f64) -> Self {
+        let l0 = params.spacing;
+        let sound = match params.relaxation {
+            Relaxation::Speed(c) => SOUND_MAX * l0 / c,
+            Relaxation::Fixed(_) => f64::INFINITY,
+        };
+        let viscous = if params.viscosity > 0.0 {
+            let lattice = Lattice::new(params.dimensions, params.effective_radius / l0);
+            VISCOUS_MAX * lattice.viscous_limit(params.dimensions) * l0 * l0 / params.viscosity
+        } else {
+            f64::INFINITY
+        };
+        Self { flow: COURANT_MAX * l0 / speed.max(1e-9), sound, viscous }
+    }
+
+    /// The shortest of them [s].
+    pub fn shortest(&self) -> f64 {
+        self.flow.min(self.sound).min(self.viscous)
+    }
+}
+
+/// Speed of a collapse of the water from rest, 2 sqrt(g H) [m/s].
+pub fn collapse_speed(params: &Params) -> f64 {
+    2.0 * (params.gravity.length() * params.depth).sqrt()
+}
+
+/// The time step [s] of a case whose largest is `typed` [s].
+pub fn time_step(params: &Params, typed: f64, adaptive: bool, speed: f64) -> f64 {
+    if adaptive { typed.min(Bounds::new(params, speed).shortest()) } else { typed }
+}
