@@ -190,6 +190,7 @@ impl Plan {
         let fluid = scene.groups.fluid > 0;
         let moving = !scene.solids.is_empty();
         let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
+        let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| s.name == g.on));
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
@@ -199,8 +200,8 @@ impl Plan {
                 Stage::MoveSolids => wet("solids move in the fluid"),
                 Stage::Collision if params.collision_distance == 0.0 => Err("collision distance is zero"),
                 Stage::Collision => wet("particles may come too close"),
-                Stage::BodyForce if !free && case.gauge.force.is_empty() => {
-                    Err("no body is free and no gauge asks for a force")
+                Stage::BodyForce if !free && !gauged => {
+                    Err("no body is free and no gauge asks for the force on one that moves")
                 }
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
                 Stage::BodyForce => wet("the fluid acts on solids"),

@@ -13,6 +13,7 @@ mod contact;
 mod contact_device;
 mod device;
 mod fluid;
+mod gauges;
 mod immersed;
 mod output;
 mod scene;

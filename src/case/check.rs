@@ -285,16 +285,23 @@ impl Checker<'_> {
             )
             .collect();
         self.unique(&names, "gauge");
-        let solids: Vec<&str> = (self.case.body.iter().map(|b| b.name.as_str()))
-            .chain(self.case.moving_wall.iter().map(|w| w.name.as_str()))
+        let case = self.case;
+        let mut solid: Vec<&str> = (case.body.iter().map(|b| b.name.as_str()))
+            .chain(case.moving_wall.iter().map(|w| w.name.as_str()))
+            .chain(case.obstacle.iter().map(|o| o.name.as_str()))
+            .chain(case.plane.iter().map(|p| p.name.as_str()))
             .collect();
+        if let Some(tank) = &case.tank {
+            let walls = super::TANK_FACES.iter().filter(|(face, _)| !tank.open.contains(face));
+            solid.extend(walls.map(|(_, name)| *name));
+        }
         for (k, gauge) in gauges.force.iter().enumerate() {
-            if !solids.contains(&gauge.on.as_str()) {
-                let message = format!("no body or moving wall is called `{}`", gauge.on);
-                let remedy = match super::report::closest(&gauge.on, &solids) {
+            if !solid.contains(&gauge.on.as_str()) {
+                let message = format!("nothing solid is called `{}`", gauge.on);
+                let remedy = match super::report::closest(&gauge.on, &solid) {
                     Some(name) => format!("did you mean `{name}`?"),
-                    None if solids.is_empty() => "remove the gauge".to_owned(),
-                    None => format!("allowed: {}", solids.join(", ")),
+                    None if solid.is_empty() => "remove the gauge".to_owned(),
+                    None => format!("allowed: {}", solid.join(", ")),
                 };
                 self.add(format!("gauge.force.{k}.on"), message, remedy);
             }

@@ -229,6 +229,16 @@ pub enum Face {
     ZMax,
 }
 
+/// Faces of the tank and the names of their walls, in the order of [`Face`].
+pub const TANK_FACES: [(Face, &str); 6] = [
+    (Face::XMin, "tank.x_min"),
+    (Face::XMax, "tank.x_max"),
+    (Face::YMin, "tank.y_min"),
+    (Face::YMax, "tank.y_max"),
+    (Face::ZMin, "tank.z_min"),
+    (Face::ZMax, "tank.z_max"),
+];
+
 /// A rectangular container; walls outside of `min`..`max`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -452,11 +462,11 @@ impl Contact {
 pub struct Gauges {
     /// Interval between rows [s]; every step if absent.
     pub every: Option<f64>,
-    /// Pressure on a wall: mean over the wall particles within half an effective radius of the point.
+    /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
     pub pressure: Vec<PressureGauge>,
     /// Height of the water surface along a vertical line.
     pub level: Vec<LevelGauge>,
-    /// Force and torque of the fluid on a body or moving wall.
+    /// Force and torque of the fluid on a body or wall.
     pub force: Vec<ForceGauge>,
 }
 
@@ -486,7 +496,8 @@ pub struct LevelGauge {
 pub struct ForceGauge {
     /// Name, used in the header.
     pub name: String,
-    /// Name of the body or moving wall.
+    /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
+    /// the centre of mass, or the middle of a fixed wall.
     pub on: String,
 }
 

@@ -8,6 +8,7 @@ pub mod frames;
 pub mod gauges;
 pub mod summary;
 pub mod tables;
+pub mod wall_force;
 
 use crate::error::{Error, Result};
 use crate::output::folder::Folder;

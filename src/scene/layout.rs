@@ -60,6 +60,7 @@ impl Builder<'_> {
             solids,
             walls: self.fixed.shapes,
             static_wall_normal: self.fixed.normal,
+            static_wall_shape: self.fixed.shape_of,
             domain,
             depth: self.depth,
             notes: self.notes,
