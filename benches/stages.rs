@@ -4,8 +4,8 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
+use seixo::backend::{Backend, Processor};
 use seixo::body::Wrench;
 use seixo::case::Case;
 use seixo::case::file::load;
@@ -16,7 +16,7 @@ use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use std::cell::RefCell;
 use std::path::Path;
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 const STEPS: u64 = 60;
 
@@ -30,9 +30,8 @@ fn case(name: &str, spacing: Option<f64>) -> (Case, Scene) {
 /// The dam break in motion, stopped before the pressure is solved; the step that it is in.
 fn dam_break() -> (Cpu, Step, usize) {
     let (case, scene) = case("dam_break_transport.toml", Some(0.02));
-    let make =
-        |s: &_, p: &_, plan: &_, settings| Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>);
-    let mut sim = Simulation::new(&case, &scene, make).expect("the simulation starts");
+    let scene = Arc::new(scene);
+    let mut sim = Simulation::on(&case, scene.clone(), &Processor::Cpu).expect("the simulation starts");
     for _ in 0..STEPS {
         sim.step().expect("the dam breaks");
     }

@@ -1,9 +1,10 @@
 // Cell list: count, scan, stable scatter. The fluid is reordered by cell, ghosts last; moving solids are indexed by cell.
 // Twin: src/kernels/cell_list.rs
 //
-// One counting sort serves both. Its keys are the cell of a fluid particle, then one key for ghosts, then the cells once
-// more for the particles of moving solids. Atomic arrival order decides where a particle of a cell lands in `unsorted`;
-// `place` then ranks each within its cell by slot, so the final order is the twin's and the same in every run.
+// One counting sort serves both. Its keys are the cell of a fluid particle, then ghosts by their slots, GHOST_BLOCK slots a
+// key, then the cells once more for the particles of moving solids. Atomic arrival order decides where a particle of a key
+// lands in `unsorted`; `place` then ranks each within its key by slot, so the final order is the twin's and the same in
+// every run. Ranking compares all of a key with each other, which is why the ghosts, however many, do not share one.
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
 @group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
@@ -14,7 +15,8 @@
 @group(0) @binding(8) var<storage, read_write> block_sum: array<u32>;
 @group(0) @binding(9) var<storage, read_write> unsorted: array<u32>;
 // Positions, velocities and pressures of the fluid in the new order, one after the other; copied back afterwards.
-@group(0) @binding(10) var<storage, read_write> sorted: array<vec4f>;
+// By numbers: four invocations that each write a component of one vector would race.
+@group(0) @binding(10) var<storage, read_write> sorted: array<f32>;
 @group(0) @binding(11) var<storage, read_write> moving_slot: array<u32>;
 @group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
 
@@ -24,9 +26,9 @@ fn particles() -> u32 {
 
 fn keys() -> u32 {
 //#if MOVING
-    return 2u * params.cell_total + 1u;
+    return moving_key() + params.cell_total;
 //#else
-    return params.cell_total + 1u;
+    return moving_key();
 //#endif
 }
 
@@ -56,9 +58,9 @@ fn count(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[slot_of(k)];
-    var key = params.cell_total;
+    var key = params.cell_total + k / GHOST_BLOCK;
     if k >= params.fluid {
-        key += 1u + cell_index(cell_coordinates(x.xyz));
+        key = moving_key() + cell_index(cell_coordinates(x.xyz));
     } else if x.w == FLUID {
         if inside(x.xyz, velocity[k].xyz) {
             key = cell_index(cell_coordinates(x.xyz));
@@ -170,6 +172,13 @@ fn scatter(@builtin(global_invocation_id) id: vec3u) {
     unsorted[cell_start[cell.x] + cell.y] = id.x;
 }
 
+fn store(at: u32, v: vec4f) {
+    sorted[at] = v.x;
+    sorted[at + 1u] = v.y;
+    sorted[at + 2u] = v.z;
+    sorted[at + 3u] = v.w;
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn place(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= particles() {
@@ -190,14 +199,15 @@ fn place(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
 //#endif
-    let pressures = 2u * params.fluid + to / 4u;
+    let velocities = 4u * params.fluid;
+    let pressures = 2u * velocities;
     if key < params.cell_total {
-        sorted[to] = position[me];
-        sorted[params.fluid + to] = velocity[me];
-        sorted[pressures][to % 4u] = pressure[me];
+        store(4u * to, position[me]);
+        store(velocities + 4u * to, velocity[me]);
+        sorted[pressures + to] = pressure[me];
     } else {
-        sorted[to] = vec4f(params.lower, GHOST);
-        sorted[params.fluid + to] = vec4f(0.0, 0.0, 0.0, velocity[me].w);
-        sorted[pressures][to % 4u] = 0.0;
+        store(4u * to, vec4f(params.lower, GHOST));
+        store(velocities + 4u * to, vec4f(0.0, 0.0, 0.0, velocity[me].w));
+        sorted[pressures + to] = 0.0;
     }
 }

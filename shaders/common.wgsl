@@ -6,6 +6,9 @@
 
 const WORKGROUP: u32 = 256u;
 
+// Fluid slots whose ghosts share a key of the counting sort; as crate::backend::gpu::layout::GHOST_BLOCK.
+const GHOST_BLOCK: u32 = 64u;
+
 // Kind of a particle, in position.w; as crate::scene::Kind.
 const FLUID: f32 = 0.0;
 const GHOST: f32 = 5.0;
@@ -23,9 +26,10 @@ const CLOSEST: f32 = 0.1;
 const LOST: u32 = 0u;
 const DISPLACEMENT_CLAMPS: u32 = 1u;
 const PRESSURE_CLAMPS: u32 = 2u;
-const NEIGHBOURS_MAX: u32 = 3u;
-const NON_FINITE: u32 = 4u;
-const OVERFLOW: u32 = 5u;
+const NEGATIVE_PRESSURES: u32 = 3u;
+const NEIGHBOURS_MAX: u32 = 4u;
+const NON_FINITE: u32 = 5u;
+const OVERFLOW: u32 = 6u;
 
 struct Constants {
     gravity: vec3f,
@@ -118,6 +122,11 @@ fn cell_coordinates(x: vec3f) -> vec3u {
 // z runs fastest, so that three cells above each other are one range.
 fn cell_index(c: vec3u) -> u32 {
     return (c.x * params.cells.y + c.y) * params.cells.z + c.z;
+}
+
+// First key of the counting sort that belongs to moving solids: behind the cells and the ghosts' keys.
+fn moving_key() -> u32 {
+    return params.cell_total + (params.fluid + GHOST_BLOCK - 1u) / GHOST_BLOCK;
 }
 
 // Slot of the k-th particle of moving solids.

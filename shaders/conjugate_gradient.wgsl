@@ -275,7 +275,7 @@ fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
 //#else
     verdict = judge(total.y);
 //#endif
-    if verdict == GO_ON && !(rz > 0.0) {
+    if verdict == GO_ON && !(finite(rz) && rz > 0.0) {
         verdict = BREAKDOWN;
     }
     if group.x == 0u && t == 0u {
@@ -320,7 +320,7 @@ fn advance(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_i
         return;
     }
     let pq = total.x;
-    if !(pq > 0.0) {
+    if !(finite(pq) && pq > 0.0) {
         if group.x == 0u && t == 0u {
             finish(BREAKDOWN);
         }
@@ -380,12 +380,16 @@ fn end(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index
     if !done(t) {
         return;
     }
+    var cut = vec4f(0.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
         let p = pressure[i];
-        if p > now.pressure_max {
-            atomicAdd(&counters[PRESSURE_CLAMPS], 1u);
-        }
+        cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
         pressure[i] = clamp(p, 0.0, now.pressure_max);
+    }
+    cut = workgroup_sum(cut, t);
+    if t == 0u && cut.x + cut.y > 0.0 {
+        atomicAdd(&counters[PRESSURE_CLAMPS], u32(cut.x));
+        atomicAdd(&counters[NEGATIVE_PRESSURES], u32(cut.y));
     }
     if group.x == 0u {
         let sum = sum_of_partials(0u, t);

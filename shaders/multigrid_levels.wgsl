@@ -89,7 +89,7 @@ fn listed(cell: u32) -> Listed {
     out.first.x = cell_start[cell];
     out.count.x = cell_start[cell + 1u] - out.first.x;
 //#if MOVING
-    let moving = params.cell_total + 1u + cell;
+    let moving = moving_key() + cell;
     out.first.y = cell_start[moving] - params.fluid;
     out.count.y = cell_start[moving + 1u] - params.fluid - out.first.y;
 //#endif

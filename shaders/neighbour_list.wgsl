@@ -79,7 +79,7 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
                 see(i, j, position[j].xyz - me.xyz);
             }
 //#if MOVING
-            let moving = params.cell_total + 1u;
+            let moving = moving_key();
             let moving_end = cell_start[moving + last] - params.fluid;
             for (var k = cell_start[moving + first] - params.fluid; k < moving_end; k++) {
                 let j = moving_slot[k];

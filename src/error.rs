@@ -21,6 +21,9 @@ pub enum Error {
         /// What was seen, with the particle or body.
         what: String,
     },
+    /// The end was reached, but what was computed means nothing (exit code 4).
+    #[error("{0}")]
+    Senseless(String),
     /// A file could not be read or written (exit code 5).
     #[error("{path}: {source}")]
     Io {
@@ -40,7 +43,7 @@ impl Error {
         match self {
             Self::Case(_) => 2,
             Self::Gpu(_) => 3,
-            Self::Diverged { .. } => 4,
+            Self::Diverged { .. } | Self::Senseless(_) => 4,
             Self::Io { .. } => 5,
         }
     }

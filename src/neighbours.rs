@@ -8,9 +8,14 @@
 /// Rows of a chunk.
 pub const CHUNK: usize = 512;
 
-/// Most neighbours a row may have. The lattice has 32, healthy runs stay below 60; more than this means
-/// that the fluid has collapsed onto itself.
-pub const CAPACITY: usize = 256;
+/// Neighbours that a row holds at most, `lattice` those of a full lattice: twice as many, 64 for the usual 32. Healthy
+/// runs stay below 1.6 times; more means that the fluid has collapsed onto itself, and ends the run on every backend.
+pub fn capacity(lattice: u32) -> usize {
+    (2 * lattice as usize).next_multiple_of(8).max(24)
+}
+
+/// The largest [`capacity`]: of the largest effective radius that a case may ask for, 4.1 spacings.
+pub const CAPACITY: usize = 512;
 
 /// Rows of [`CHUNK`] particles.
 #[derive(Clone, Default, Debug)]

@@ -1,4 +1,5 @@
-//! A scene in motion: backend, solids and clock. [`Simulation::step`] is in `step.rs`.
+//! A scene in motion: backend, solids and clock. How it is opened and read is in `open.rs`, [`Simulation::step`] in
+//! `step.rs`.
 
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::Wrench;
@@ -11,20 +12,10 @@ use crate::plan::{ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
+use rayon::ThreadPool;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
-
-/// Which backend to use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum BackendChoice {
-    /// A hardware GPU if there is one, else the CPU.
-    #[default]
-    Auto,
-    /// A GPU, or an error.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
 
 /// What a step did.
 #[derive(Clone, Debug, Default)]
@@ -47,6 +38,8 @@ pub struct StepReport {
 pub struct Simulation {
     /// The case.
     pub case: Case,
+    /// What it was built into; particles as they were at t = 0.
+    pub scene: Arc<Scene>,
     /// Constants.
     pub params: Params,
     /// Stages.
@@ -69,6 +62,7 @@ pub struct Simulation {
     /// Sizes of the particle groups.
     pub groups: Groups,
     speed: f64,
+    pub(crate) threads: Option<ThreadPool>,
 }
 
 /// When the PPE's solver stops.
@@ -86,17 +80,26 @@ const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.
 const LOST_MAX: f64 = 0.02;
 
+/// An adaptive step this much shorter than the typed one is that of a run that will not end.
+const SHORTEST_STEP: f64 = 1e-6;
+
 impl Simulation {
-    /// Set up `scene` of `case` on `backend`.
-    pub fn new(
+    /// Set up `scene` of `case` on the backend that `make` returns.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and those of `make`.
+    pub fn with_backend(
         case: &Case,
-        scene: &Scene,
+        scene: impl Into<Arc<Scene>>,
         make: impl FnOnce(&Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
     ) -> Result<Self> {
-        let params = Params::new(case, scene)?;
-        let plan = Plan::new(case, scene, &params);
+        let scene: Arc<Scene> = scene.into();
+        let params = Params::new(case, &scene)?;
+        let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
-        let mut backend = make(scene, &params, &plan, settings)?;
+        let solids = Solids::new(&scene, case.contact.as_ref())?;
+        crate::sense::refuse(case, &scene, &params, &solids)?;
+        let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
@@ -105,10 +108,11 @@ impl Simulation {
         }
         Ok(Self {
             backend,
-            solids: Solids::new(scene, case.contact.as_ref())?,
+            solids,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
             groups: scene.groups,
+            scene,
             params,
             plan,
             time: 0.0,
@@ -116,6 +120,7 @@ impl Simulation {
             stages: BTreeMap::new(),
             wait_for_stages: false,
             speed: 0.0,
+            threads: None,
         })
     }
 
@@ -129,11 +134,23 @@ impl Simulation {
         self.speed.max(collapse_speed(&self.params))
     }
 
-    /// Coefficients of the next step, with the time step that the case and the flow allow.
+    /// Coefficients of the next step, with the time step that the case, the flow and the solids allow.
     pub fn next_step(&self) -> Step {
-        let adaptive = self.case.run.adaptive && self.plan.wet();
-        let dt = time_step(&self.params, self.case.run.time_step, adaptive, self.expected_speed());
-        self.params.step(self.time, dt, self.expected_speed())
+        let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
+        let typed = self.case.run.time_step;
+        let fastest = if adaptive { self.solids.fastest(self.time, typed) } else { 0.0 };
+        let dt = time_step(&self.params, typed, adaptive, flow.max(fastest));
+        self.params.step(self.time, dt, flow)
+    }
+
+    /// An error if a step has become so short that the run would not end.
+    pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
+        if step.dt < SHORTEST_STEP * self.case.run.time_step {
+            let what =
+                format!("the flow or a solid asks for steps of {:.1e} s, the run would not end", step.dt);
+            return Err(self.diverged(step, Stage::Predict, what));
+        }
+        Ok(())
     }
 
     fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {

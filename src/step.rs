@@ -6,8 +6,19 @@ use crate::simulation::{Simulation, StepReport};
 
 impl Simulation {
     /// Advance by one time step.
+    ///
+    /// # Errors
+    /// [`Error::Diverged`], or a device that is lost.
     pub fn step(&mut self) -> Result<StepReport> {
+        let Some(threads) = self.threads.take() else { return self.advance() };
+        let report = threads.install(|| self.advance());
+        self.threads = Some(threads);
+        report
+    }
+
+    fn advance(&mut self) -> Result<StepReport> {
         let step = self.next_step();
+        self.check_length(&step)?;
         let (t, dt) = (step.time, step.dt);
         let mut report = StepReport { step: self.steps, time: t, dt, ..Default::default() };
 

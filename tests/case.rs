@@ -120,6 +120,39 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ("max = [1.0, 1.0, 1.0]", "max = [1e9, 1e9, 1e9]", &["tank: the tank takes up or lies beyond"]),
     ("[0.2, 0.2, 0.2]", "[2e5, 2e5, 2e5]", &["body.0.size: body `cube` takes up"]),
     ("open = [\"z_max\"]", "open = [\"z_max\", \"z_max\"]", &["tank.open.1: `z_max` is listed twice"]),
+    // what would be passed over
+    (
+        "end = 1.0",
+        "end = 1.0\ngravity = [0, 0, 0, -9.81]",
+        &[
+            "test.toml:5:1",
+            "run.gravity: 4 elements, of which only the first 3 would be read",
+            "write 3 elements",
+        ],
+    ),
+    ("[1, 0, 0, 1]]", "[1, 0, 0, 1, 5]]", &["moving_wall.0.motion.1: 5 elements", "first 4"]),
+    ("max = [0.5, 1.0, 0.5]", "max = [0.5, 1.0, 0.5, 1]", &["fluid.block.0.max: 4 elements"]),
+    // motion
+    (
+        "[[0, 0, 0, 0], [1, 0, 0, 1]]",
+        "[[0, 0, 0, 0.3], [1, 0, 0, 1]]",
+        &["moving_wall.0.motion.0: the table is at (0, 0, 0.3) m at t = 0", "begin with [0, 0, 0, 0]"],
+    ),
+    ("[[0, 0, 0, 0], [1, 0, 0, 1]]", "[[-1, 0, 0, 0], [1, 0, 0, 1]]", &["(0, 0, 0.5) m at t = 0"]),
+    ("[[0, 0, 0, 0], [1, 0, 0, 1]]", "[[0.5, 0, 0, 0.1], [1, 0, 0, 1]]", &["(0, 0, 0.1) m at t = 0"]),
+    (
+        "[1, 0, 0, 1]]",
+        "[1, 0, 0, 0], [1.0001, 0, 0, 1]]",
+        &["moving_wall.0.motion.2: 1 m in 1.000e-4 s", "100.0 particles in a time step", "run.adaptive"],
+    ),
+    ("locked = [\"y\"]", "motion = [[0, 1, 0, 0]]", &["body.0.motion.0: the table is at (1, 0, 0) m"]),
+    // steps
+    (
+        "time_step = 1e-3",
+        "time_step = 2.0",
+        &["run.time_step: a step of 2 s is longer than the whole run of 1 s"],
+    ),
+    ("sound_speed = 5.0", "solver.max_iterations = 4000000000", &["fluid.solver.max_iterations: 4000000000"]),
     // bodies and contact
     ("density = 500.0\n", "density = 500.0\nmass = 4.0\n", &["body.0.density: `mass` and `density` exclude"]),
     ("density = 500.0\n", "", &["body.0: body `cube` has neither mass nor density"]),
@@ -149,8 +182,21 @@ const WRONG: &[(&str, &str, &[&str])] = &[
         &["body `cube` can move, but there is no [contact]"],
     ),
     ("damping = 10.0", "substeps = 0", &["contact.substeps: 0 sub-steps"]),
+    ("damping = 10.0", "substeps = 4294967295", &["contact.substeps: 4294967295 sub-steps", "1 to 100000"]),
+    ("spring = 1e4", "spring = 5e-324", &["contact.spring: ", "1e-9 to 1e18 N/m"]),
+    (
+        "spring = 1e4",
+        "spring = 1.0",
+        &[
+            "contact.spring: the weight of body `cube`, 3.923e1 N, presses a spring of 1e0 N/m 3.923e1 m deep",
+            "2.0e4",
+        ],
+    ),
     // names and gauges
     ("name = \"cube\"", "name = \"gate\"", &["body.0.name: the name `gate` is taken by moving_wall.0"]),
+    ("name = \"cube\"", "name = \"=cmd|x\"", &["body.0.name: the name `=cmd|x` begins like a formula"]),
+    ("name = \"force\"", "name = \"\\u001b[2J\"", &["the name `\\u{1b}[2J` holds control characters"]),
+    ("name = \"force\"", "name = \"a\\nb\"", &["the name `a\\nb` holds control characters"]),
     (
         "law = \"smooth\"",
         "law = \"pressure\"\ndevice = \"gpu\"",

@@ -8,10 +8,10 @@ use seixo::scene::Scene;
 use std::path::Path;
 
 fn steps_of(name: &str, spacing: Option<f64>, steps: u64) {
-    let path = format!("cases/{name}.toml");
+    let path = format!("{}/cases/{name}.toml", common::ROOT);
     let loaded = load(Path::new(&path), spacing, &[]).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(&loaded.case).unwrap_or_else(|e| panic!("{e}"));
-    let mut sim = common::cpu_simulation(&loaded.case, &scene);
+    let mut sim = common::cpu_simulation(&loaded.case, scene);
     let wet = sim.plan.wet();
     let energy = |sim: &mut seixo::simulation::Simulation| {
         let water = sim.backend.monitor().expect("readable");
@@ -41,7 +41,7 @@ macro_rules! cases {
         #[test]
         fn every_case_is_run() {
             let listed = [$(stringify!($name)),*];
-            for entry in std::fs::read_dir("cases").expect("the folder is there") {
+            for entry in std::fs::read_dir(format!("{}/cases", common::ROOT)).expect("the folder is there") {
                 let path = entry.expect("readable").path();
                 if path.extension().is_some_and(|e| e == "toml") {
                     let name = path.file_stem().expect("a file").to_string_lossy().into_owned();

@@ -4,19 +4,19 @@ use assert_cmd::Command;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-fn seixo() -> Command {
+pub(crate) fn seixo() -> Command {
     let mut command = Command::cargo_bin("seixo").unwrap();
     command.current_dir(crate::common::ROOT);
     command
 }
 
-struct Ran {
-    code: i32,
-    out: String,
-    err: String,
+pub(crate) struct Ran {
+    pub(crate) code: i32,
+    pub(crate) out: String,
+    pub(crate) err: String,
 }
 
-fn ran(args: &[&str]) -> Ran {
+pub(crate) fn ran(args: &[&str]) -> Ran {
     let output = seixo().args(args).output().unwrap();
     Ran {
         code: output.status.code().unwrap(),
@@ -25,12 +25,12 @@ fn ran(args: &[&str]) -> Ran {
     }
 }
 
-fn json(text: &str) -> serde_json::Value {
+pub(crate) fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
 /// A small case with water, a gate, a free body and gauges, in `folder`.
-fn small_case(folder: &Path) -> String {
+pub(crate) fn small_case(folder: &Path) -> String {
     let path = folder.join("small.toml");
     std::fs::write(
         &path,
@@ -77,7 +77,7 @@ every = 0.02
     path.display().to_string()
 }
 
-fn assert_whole(root: &Path) {
+pub(crate) fn assert_whole(root: &Path) {
     for entry in std::fs::read_dir(root).unwrap().chain(std::fs::read_dir(root.join("vtu")).unwrap()) {
         let path = entry.unwrap().path();
         if path.is_dir() {
@@ -95,12 +95,12 @@ fn assert_whole(root: &Path) {
             }
             Some("json") => drop(json(&text)),
             Some("toml" | "png") => assert!(!text.is_empty()),
-            _ => assert!(name.starts_with(".writing-"), "{name}"),
+            _ => assert!(name.starts_with('.'), "{name}"),
         }
     }
 }
 
-fn files_named_in_pvd_exist(root: &Path, name: &str) -> usize {
+pub(crate) fn files_named_in_pvd_exist(root: &Path, name: &str) -> usize {
     let pvd = std::fs::read_to_string(root.join(format!("{name}.pvd"))).unwrap();
     let files: Vec<&str> = pvd.split("file=\"").skip(1).map(|f| f.split('"').next().unwrap()).collect();
     assert!(files.iter().all(|f| root.join(f).exists()), "{files:?}");

@@ -9,11 +9,11 @@ use seixo_study::device_compare as compare;
 use std::path::Path;
 
 /// The paper's main experiment, coarse: a gate, a cube, two columns.
-fn transport() -> (Case, Scene) {
+fn transport() -> (Case, std::sync::Arc<Scene>) {
     let path = Path::new(crate::common::ROOT).join("cases/dam_break_transport.toml");
     let sets = ["fluid.solver.tolerance=1e-4".to_owned()];
     let case = load(&path, Some(0.03), &sets).expect("the case is valid").case;
-    let scene = Scene::build(&case).expect("the scene builds");
+    let scene = std::sync::Arc::new(Scene::build(&case).expect("the scene builds"));
     (case, scene)
 }
 
@@ -88,7 +88,7 @@ fn contact_of_a_dry_scene_is_compared_too() {
         let text = DRY.replace("\"smooth\"", &format!("\"{law}\""));
         let text = if law == "paper" { text.replace("friction = 0.3\n", "") } else { text };
         let case: Case = toml::from_str(&text).expect("valid");
-        let scene = Scene::build(&case).expect("the scene builds");
+        let scene = std::sync::Arc::new(Scene::build(&case).expect("the scene builds"));
         let errors = compare::compare_stages(&case, &scene, None, 12).expect("both run");
         let value = |field: &str| errors.iter().find(|e| e.field == field).map(|e| e.max_relative);
         println!("{errors:?}");

@@ -2,9 +2,8 @@
 //! f32's last digits wherever the bodies are, and scenes that must come to rest.
 
 use glam::{DMat3, DQuat, DVec3};
-use seixo::backend::Backend;
-use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::{Backend, Processor};
 use seixo::body::Wrench;
 use seixo::case::{Case, Contact, Law};
 use seixo::contact::{Probe, Solids};
@@ -314,18 +313,13 @@ fn the_plan_leaves_few_points_to_the_host_and_many_to_the_device() {
 #[test]
 fn a_dry_case_runs_with_its_contact_on_the_gpu_and_is_refused_on_the_cpu() {
     let (case, scene) = cubes(2, "device = \"gpu\"");
-    let on_cpu = Simulation::new(&case, &scene, |s, p, plan, settings| {
-        Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
-    });
+    let on_cpu = Simulation::on(&case, scene.clone(), &Processor::Cpu);
     let text = on_cpu.err().expect("refused").to_string();
     assert!(text.contains("contact.device") && text.contains("--backend gpu"), "{text}");
     if !device() {
         return;
     }
-    let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
-        Ok(Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>)
-    })
-    .expect("it starts");
+    let mut simulation = Simulation::on(&case, scene, &Processor::Gpu { adapter: None }).expect("it starts");
     for _ in 0..20 {
         simulation.step().expect("it runs");
     }

@@ -3,7 +3,7 @@
 use crate::common;
 
 use seixo::backend::gpu::{self, Gpu};
-use seixo::backend::{Backend, Timing};
+use seixo::backend::{Backend, Processor, Timing};
 use seixo::case::{Case, ContactDevice};
 use seixo::params::Params;
 use seixo::plan::{Plan, Stage};
@@ -20,11 +20,8 @@ fn on_device(case: &Case) -> Option<Simulation> {
         eprintln!("SKIPPED, {text}");
         return None;
     }
-    let make = |s: &_, p: &_, plan: &_, settings| {
-        Ok(Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>)
-    };
     let scene = Scene::build(case).expect("the scene builds");
-    Some(Simulation::new(case, &scene, make).expect("the simulation starts"))
+    Some(Simulation::on(case, scene, &Processor::Gpu { adapter: None }).expect("the simulation starts"))
 }
 
 /// Still water with a gate beside it and, if `free`, a cube above it, both out of its reach.

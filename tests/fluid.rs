@@ -303,7 +303,7 @@ fn bits_after(case: &seixo::case::Case, steps: usize, threads: usize, active_set
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let scene = Scene::build(case).unwrap();
-        let mut sim = seixo::simulation::Simulation::new(case, &scene, |s, p, plan, settings| {
+        let mut sim = seixo::Simulation::with_backend(case, scene, |s, p, plan, settings| {
             let mut cpu = Cpu::new(s, p, plan, settings)?;
             cpu.active_set = active_set;
             Ok(Box::new(cpu) as Box<dyn Backend>)

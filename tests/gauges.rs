@@ -2,10 +2,11 @@
 
 use crate::common;
 use common::*;
+use seixo::gauges::Gauges;
 use seixo::output::table::Cell;
-use seixo::run::gauges::Gauges;
 use seixo::scene::Scene;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The last row by column.
 fn row(gauges: &Gauges, sim: &mut seixo::simulation::Simulation) -> BTreeMap<String, f64> {
@@ -60,9 +61,9 @@ point = [0, 0.12, 0.35]
 fn walls_of_still_water_carry_what_statics_say() {
     for preset in ["", "preset = \"paper\""] {
         let case = case(&STILL.replace("PRESET", preset));
-        let scene = Scene::build(&case).expect("the scene builds");
+        let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
         let gauges = Gauges::new(&case, &scene).expect("the gauges find their walls");
-        let mut sim = cpu_simulation(&case, &scene);
+        let mut sim = cpu_simulation(&case, scene.clone());
         let (mut sum, mut rows) = (BTreeMap::<String, f64>::new(), 0.0);
         for step in 0..60 {
             sim.step().expect("still water stands");
@@ -103,9 +104,9 @@ fn the_viscous_force_on_a_floor_is_the_momentum_that_the_water_loses() {
          [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.6, 0.3]\nopen = [\"z_max\"]\n\
          [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
     );
-    let scene = Scene::build(&case).expect("the scene builds");
+    let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
     let gauges = Gauges::new(&case, &scene).expect("the gauge finds its wall");
-    let mut sim = cpu_simulation(&case, &scene);
+    let mut sim = cpu_simulation(&case, scene.clone());
     let start = sim.backend.monitor().expect("the monitor").momentum[0];
     sim.step().expect("a step");
     let lost = (start - sim.backend.monitor().expect("the monitor").momentum[0]) / 1e-4;

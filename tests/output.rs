@@ -2,7 +2,7 @@
 
 use seixo::case::{Case, Encoding};
 use seixo::fields::Fields;
-use seixo::output::folder::Folder;
+use seixo::output::folder::{Folder, Mode};
 use seixo::output::picture::Picture;
 use seixo::output::pvd::Pvd;
 use seixo::output::table::{Cell, Table};
@@ -200,19 +200,75 @@ fn the_list_of_frames_is_whole_after_every_frame() {
 }
 
 #[test]
-fn a_folder_with_something_in_it_is_refused_and_force_removes_only_earlier_results() {
+fn a_folder_with_something_in_it_is_refused_and_force_removes_only_what_a_run_wrote() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join("a/b");
-    let first = Folder::create(&root, "case", false).unwrap();
-    std::fs::write(first.vtu().join("fluid_0007.vtu"), "old").unwrap();
-    std::fs::write(first.pvd(), "old").unwrap();
-    std::fs::write(first.file("notes.txt"), "mine").unwrap();
-    let refused = Folder::create(&root, "case", false).unwrap_err();
-    assert_eq!(refused.exit_code(), 2);
-    assert!(refused.to_string().contains("--force"), "{refused}");
-    Folder::create(&root, "case", true).unwrap();
-    assert!(!first.vtu().join("fluid_0007.vtu").exists() && !first.pvd().exists());
-    assert!(first.file("notes.txt").exists() && first.vtu().is_dir());
+    let first = Folder::open(&root, "case", Mode::New, &[]).unwrap();
+    std::fs::create_dir(first.pictures()).unwrap();
+    for ours in [first.vtu().join("fluid_0007.vtu"), first.pictures().join("frame_0000.png"), first.pvd()] {
+        std::fs::write(ours, "old").unwrap();
+    }
+    let strangers =
+        [first.file("notes.txt"), first.vtu().join("fluid.vtu"), first.pictures().join("holiday.png")];
+    for stranger in &strangers {
+        std::fs::write(stranger, "mine").unwrap();
+    }
+    for mode in [Mode::New, Mode::Replace] {
+        let busy = Folder::open(&root, "case", mode, &[]).unwrap_err().to_string();
+        assert!(busy.contains(if mode == Mode::New { "not empty" } else { "is in use" }), "{busy}");
+    }
+    let (vtu, pvd) = (first.vtu(), first.pvd());
+    drop(first);
+    let second = Folder::open(&root, "other", Mode::Replace, &[]).unwrap();
+    assert!(
+        !vtu.join("fluid_0007.vtu").exists() && !pvd.exists(),
+        "the list of the earlier case goes as well"
+    );
+    assert!(!second.pictures().join("frame_0000.png").exists());
+    assert!(strangers.iter().all(|s| std::fs::read_to_string(s).unwrap() == "mine"), "{strangers:?}");
+}
+
+#[test]
+fn force_touches_nothing_in_a_folder_that_is_not_marked_and_never_an_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let files = ["case.toml", "result.json", "pictures/frame_0000.png", "vtu/fluid_0000.vtu"];
+    for file in files {
+        std::fs::create_dir_all(root.join(file).parent().unwrap()).unwrap();
+        std::fs::write(root.join(file), "mine").unwrap();
+    }
+    let input = [root.join("case.toml")];
+    for (inputs, word) in [(&[][..], "no folder of results"), (&input[..], "would be overwritten")] {
+        let error = Folder::open(root, "case", Mode::Replace, inputs).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains(word), "{error}");
+    }
+    assert!(files.iter().all(|f| std::fs::read_to_string(root.join(f)).unwrap() == "mine"));
+    // Marked or not: an input stays.
+    let marked = root.join("marked");
+    drop(Folder::open(&marked, "case", Mode::New, &[]).unwrap());
+    std::fs::write(marked.join("case.toml"), "mine").unwrap();
+    let error = Folder::open(&marked, "case", Mode::Replace, &[marked.join("case.toml")]).unwrap_err();
+    assert!(error.to_string().contains("would be overwritten"), "{error}");
+    assert_eq!(std::fs::read_to_string(marked.join("case.toml")).unwrap(), "mine");
+}
+
+#[test]
+fn the_list_of_frames_grows_at_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("case.pvd");
+    let mut pvd = Pvd::new(path.clone());
+    let mut inode = None;
+    for k in 0..3 {
+        pvd.push(0.5 * f64::from(k), &[("fluid", format!("vtu/fluid_{k:04}.vtu"))]).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("<?xml") && text.ends_with("  </Collection>\n</VTKFile>\n"), "{text}");
+        assert_eq!(text.matches("<DataSet").count(), k as usize + 1);
+        #[cfg(unix)]
+        {
+            let now = std::os::unix::fs::MetadataExt::ino(&std::fs::metadata(&path).unwrap());
+            assert_eq!(*inode.get_or_insert(now), now, "the file is not written anew");
+        }
+    }
 }
 
 #[test]

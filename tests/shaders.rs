@@ -106,6 +106,85 @@ fn every_shader_is_valid_with_every_switch_and_agrees_with_the_tables() {
     assert_eq!(bound, listed.collect(), "buffers that no shader binds, or the other way");
 }
 
+/// Whether the pointer `at` leads to a component of a vector in a storage buffer that is chosen while the shader runs.
+fn is_chosen_component(
+    module: &naga::Module,
+    function: &naga::Function,
+    at: naga::Handle<naga::Expression>,
+) -> bool {
+    use naga::{Expression, TypeInner};
+    let Expression::Access { base, .. } = function.expressions[at] else { return false };
+    // Down to the buffer, through the places that lead to it.
+    let mut path = vec![];
+    let mut below = base;
+    let global = loop {
+        match function.expressions[below] {
+            Expression::Access { base, .. } => (below, path) = (base, [path, vec![None]].concat()),
+            Expression::AccessIndex { base, index } => {
+                (below, path) = (base, [path, vec![Some(index)]].concat())
+            }
+            Expression::GlobalVariable(global) => break global,
+            _ => return false,
+        }
+    };
+    let variable = &module.global_variables[global];
+    let mut ty = variable.ty;
+    for index in path.iter().rev() {
+        ty = match (&module.types[ty].inner, index) {
+            (TypeInner::Array { base, .. }, _) => *base,
+            (TypeInner::Struct { members, .. }, Some(index)) => members[*index as usize].ty,
+            _ => return false,
+        };
+    }
+    let storage = matches!(variable.space, naga::AddressSpace::Storage { .. });
+    storage && matches!(module.types[ty].inner, TypeInner::Vector { .. })
+}
+
+/// Stores of `block` and the blocks in it.
+fn stores(block: &naga::Block, out: &mut Vec<naga::Handle<naga::Expression>>) {
+    for statement in block.iter() {
+        match statement {
+            naga::Statement::Store { pointer, .. } => out.push(*pointer),
+            naga::Statement::Block(inner) => stores(inner, out),
+            naga::Statement::If { accept, reject, .. } => {
+                [accept, reject].into_iter().for_each(|b| stores(b, out))
+            }
+            naga::Statement::Loop { body, continuing, .. } => {
+                [body, continuing].into_iter().for_each(|b| stores(b, out))
+            }
+            naga::Statement::Switch { cases, .. } => cases.iter().for_each(|c| stores(&c.body, out)),
+            _ => {}
+        }
+    }
+}
+
+/// A vector is one memory location: invocations that each write a component of it race. A component chosen while the
+/// shader runs is one that another invocation may be writing beside.
+#[test]
+fn no_invocation_writes_a_part_of_a_vector_that_another_may_write() {
+    let chosen = |source: &str| -> Vec<String> {
+        let module = naga::front::wgsl::parse_str(source).expect("valid");
+        let entries = module.entry_points.iter().map(|e| (&e.name, &e.function));
+        let functions = module.functions.iter().filter_map(|(_, f)| Some((f.name.as_ref()?, f)));
+        let is_wrong = |(_, function): &(_, &naga::Function)| {
+            let mut pointers = vec![];
+            stores(&function.body, &mut pointers);
+            pointers.into_iter().any(|p| is_chosen_component(&module, function, p))
+        };
+        entries.chain(functions).filter(is_wrong).map(|(name, _)| name.clone()).collect()
+    };
+    for Program { name, text, .. } in kernels::programs() {
+        for switches in combinations(text) {
+            let found = chosen(&shader::source(text, &switches));
+            assert!(found.is_empty(), "{name} {switches:?}: {found:?}");
+        }
+    }
+    // What it looks for, it finds.
+    let race = "@group(0) @binding(0) var<storage, read_write> a: array<vec4f>;
+                @compute @workgroup_size(4) fn f(@builtin(local_invocation_index) t: u32) { a[t / 4u][t % 4u] = 1.0; }";
+    assert_eq!(chosen(race), ["f"]);
+}
+
 /// Name and offset of the members of a struct of a shader, and its size.
 fn members(text: &str, name: &str) -> (Vec<(String, usize)>, usize) {
     let module = naga::front::wgsl::parse_str(&shader::source(text, &[])).expect("valid");
@@ -250,13 +329,14 @@ fn constant(text: &str, name: &str) -> f64 {
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
-    use seixo::backend::gpu::layout::{MONITOR_WIDTH, WORKGROUP};
+    use seixo::backend::gpu::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};
     use seixo::fields::State;
     use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
     let common = |name: &str| constant(shader::COMMON, name);
     assert_eq!(common("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(common("GHOST_BLOCK"), GHOST_BLOCK as f64);
     assert_eq!(common("FLUID"), f64::from(Kind::Fluid as u8));
     assert_eq!(common("GHOST"), f64::from(Kind::Ghost as u8));
     assert_eq!(common("INACTIVE"), f64::from(State::Inactive as u8));
@@ -268,6 +348,7 @@ fn constants_are_the_same_on_both_sides() {
         ("LOST", counter::LOST),
         ("DISPLACEMENT_CLAMPS", counter::DISPLACEMENT_CLAMPS),
         ("PRESSURE_CLAMPS", counter::PRESSURE_CLAMPS),
+        ("NEGATIVE_PRESSURES", counter::NEGATIVE_PRESSURES),
         ("NEIGHBOURS_MAX", counter::NEIGHBOURS_MAX),
         ("NON_FINITE", counter::NON_FINITE),
         ("OVERFLOW", counter::OVERFLOW),

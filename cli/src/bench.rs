@@ -1,9 +1,10 @@
 //! `seixo bench`.
 
 use super::setup::Setup;
-use super::{BackendName, CaseArgs, DeviceArgs, Exit, device, say, say_json};
+use super::{BackendName, CaseArgs, DeviceArgs, Exit, device};
 use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
 use seixo::backend::traffic::Solve;
+use seixo::console::{remark, say, say_json};
 use seixo::error::{Error, Result};
 use seixo_study::bench::{Growth, Row, host_bandwidth, measure};
 use serde::Serialize;
@@ -83,18 +84,21 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
     let device = DeviceArgs { backend, ..args.device.clone() };
     let software = backend == BackendName::Gpu && !adapters().iter().any(|a| a.is_hardware());
     if software && particles > 1000 * args.software_limit {
-        eprintln!("l0 = {spacing}: {particles} particles left out on a software GPU (--software-limit)");
+        remark(&format!(
+            "l0 = {spacing}: {particles} particles left out on a software GPU (--software-limit)"
+        ));
         return Ok(None);
     }
-    eprintln!("l0 = {spacing}: {particles} particles, {backend:?} ...");
+    remark(&format!("l0 = {spacing}: {particles} particles, {backend:?} ..."));
     // Software acts as a GPU for correctness, not speed: a tenth of the steps will do.
     let steps = if software { (args.steps / 10).max(3) } else { args.steps };
-    let make = |s: &_, p: &_, plan: &_, settings| device::backend(&device, s, p, plan, settings);
+    let processor = device::processor(&device)?;
+    let make = |s: &_, p: &_, plan: &_, settings| processor.open(s, p, plan, settings);
     measure(&setup.loaded.case, args.from, steps, bandwidth, &make).map(Some)
 }
 
 pub fn bench(args: &BenchArgs) -> Exit {
-    device::set_threads(&args.device);
+    seixo::threads::start(args.device.threads)?;
     let host = host_bandwidth();
     let (mut rows, mut growth) = (Vec::new(), Vec::new());
     for backend in choices(&args.device) {

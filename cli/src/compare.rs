@@ -1,7 +1,8 @@
 //! `seixo compare`.
 
 use super::setup::Setup;
-use super::{CaseArgs, Exit, say, say_json};
+use super::{CaseArgs, Exit};
+use seixo::console::{say, say_json};
 use seixo_study::device_compare::{Drift, StageError, compare_stages, drift};
 
 #[derive(Debug, clap::Args)]
@@ -31,6 +32,7 @@ struct Report {
 }
 
 pub fn compare(args: &CompareArgs) -> Exit {
+    seixo::threads::start(None)?;
     let setup = Setup::new(&args.case, args.json)?;
     let (case, scene, adapter) = (&setup.loaded.case, &setup.scene, args.adapter.as_deref());
     let report = Report {

@@ -10,8 +10,8 @@ mod run;
 mod setup;
 
 use clap::{Parser, Subcommand, ValueEnum};
+use seixo::console::{lost, remark, say};
 use seixo::error::Error;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -19,8 +19,8 @@ const EXIT_CODES: &str = "Exit codes:
   0    done
   2    the case or the command line is wrong
   3    no suitable GPU, or the device was lost
-  4    the computation diverged (its last state is kept)
-  5    a file could not be read or written
+  4    the computation diverged (its last state is kept), or its result means nothing
+  5    a file could not be read or written, or a result not be printed
   130  interrupted by SIGINT (Ctrl-C)
   143  interrupted by SIGTERM";
 
@@ -63,13 +63,13 @@ struct CaseArgs {
     /// The case file (TOML).
     case: PathBuf,
     /// Particle spacing l0 [m], instead of run.spacing.
-    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = finite)]
     spacing: Option<f64>,
     /// Change a value of the case, e.g. --set fluid.preset=paper --set body.0.density=800; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     /// End of the run [s], instead of run.end.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = finite)]
     until: Option<f64>,
 }
 
@@ -81,6 +81,12 @@ impl CaseArgs {
     }
 }
 
+/// A number that is one.
+fn finite(text: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| "not a number".to_owned())?;
+    if number.is_finite() { Ok(number) } else { Err("write a finite number".into()) }
+}
+
 /// Where to compute.
 #[derive(Clone, Debug, clap::Args)]
 struct DeviceArgs {
@@ -88,10 +94,10 @@ struct DeviceArgs {
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
     /// Number of the adapter as `seixo adapters` lists it, or a part of its name; implies --backend gpu.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     adapter: Option<String>,
     /// Threads of the CPU path; all cores if absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
     threads: Option<u16>,
 }
 
@@ -120,26 +126,14 @@ fn main() -> ExitCode {
             Ok(0)
         }
     };
-    match exit {
+    // Only a command that did what it was asked for can fail at being heard.
+    match exit.and_then(|code| if code == 0 { lost().map(|()| 0) } else { Ok(code) }) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             let text = error.to_string();
             // Reports on case files come with their own heading.
-            eprintln!("{}{text}", if text.starts_with("error") { "" } else { "error: " });
+            remark(&format!("{}{text}", if text.starts_with("error") { "" } else { "error: " }));
             ExitCode::from(error.exit_code())
         }
-    }
-}
-
-/// Print a result. A reader that has gone away (`seixo ... | head`) is no error.
-fn say(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
-}
-
-/// Print a JSON value.
-fn say_json(value: &impl serde::Serialize) {
-    match serde_json::to_string_pretty(value) {
-        Ok(text) => say(&text),
-        Err(error) => eprintln!("error: {error}"),
     }
 }

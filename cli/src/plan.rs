@@ -1,7 +1,7 @@
 //! `seixo plan`: what a run would compute.
 
 use super::setup::Setup;
-use super::{CaseArgs, Exit, say, say_json};
+use super::{CaseArgs, Exit};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::forecast::{Forecast, Group, groups};
@@ -10,8 +10,10 @@ use seixo::backend::gpu::sizes;
 use seixo::case::Case;
 use seixo::case::file::load;
 use seixo::cells::Grid;
+use seixo::console::{say, say_json};
 use seixo::contact::Solids;
 use seixo::error::Result;
+use seixo::gauges::Gauges;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
@@ -126,6 +128,7 @@ impl Seen {
 }
 
 pub fn plan(args: &PlanArgs) -> Exit {
+    seixo::threads::start(None)?;
     let report = report(&Seen::new(&args.case, args.json)?)?;
     if args.json {
         say_json(&report);
@@ -143,9 +146,13 @@ fn report(seen: &Seen) -> Result<Report> {
     let mut advice =
         if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive) } else { vec![] };
     let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
-    if built && free {
-        advice.extend(Solids::new(scene, case.contact.as_ref())?.advice(dt).words);
-    } else if !built && plan.has(Stage::Contact) {
+    if built {
+        // What `run` refuses.
+        let solids = Solids::new(scene, case.contact.as_ref())?;
+        seixo::sense::refuse(case, scene, &params, &solids)?;
+        Gauges::new(case, scene)?;
+        advice.extend(if free { solids.advice(dt).words } else { Vec::new() });
+    } else if plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
     let stages = plan.reasons.iter().map(|(stage, reason)| StageLine {

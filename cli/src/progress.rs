@@ -1,6 +1,7 @@
 //! How far a run is: a bar on a terminal; in a log a line a frame, but no more than one a second.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use seixo::console::remark;
 use seixo::run::Progress;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -43,7 +44,7 @@ impl Display {
             let silence = self.last.elapsed();
             if silence > LINE_EVERY || progress.frame && silence > LINE_AFTER {
                 self.last = Instant::now();
-                eprintln!("{}", self.line(progress));
+                remark(&self.line(progress));
             }
         }
     }

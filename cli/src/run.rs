@@ -2,9 +2,10 @@
 
 use super::progress::{Display, clock};
 use super::setup::Setup;
-use super::{CaseArgs, DeviceArgs, Exit, device, say};
+use super::{CaseArgs, DeviceArgs, Exit};
+use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
-use seixo::output::result::{Status, Summary};
+use seixo::output::result::{Grade, Status, Summary};
 use seixo::run::{Options, run as run_simulation};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::path::{Path, PathBuf};
@@ -39,8 +40,7 @@ pub struct RunArgs {
 }
 
 pub fn run(args: &RunArgs) -> Exit {
-    device::set_threads(&args.device);
-    let stop = watch_signals()?;
+    seixo::threads::start(args.device.threads)?;
     let setup = Setup::new(&args.case, args.quiet)?;
     let mut simulation = setup.simulation(&args.device)?;
     let options = Options {
@@ -49,17 +49,29 @@ pub fn run(args: &RunArgs) -> Exit {
         force: args.force,
         steps: args.steps,
         pictures: args.picture,
+        inputs: vec![args.case.case.clone()],
     };
     if !args.quiet {
         let groups = simulation.groups;
         let device = simulation.backend.description();
-        eprintln!("{}: {} particles, {} of water, on {device}", setup.name, groups.total(), groups.fluid);
+        remark(&format!(
+            "{}: {} particles, {} of water, on {device}",
+            setup.name,
+            groups.total(),
+            groups.fluid
+        ));
     }
+    // Until here there is nothing to save, and a signal ends the program at once.
+    let stop = watch_signals()?;
     let mut display = Display::new(args.quiet, simulation.plan.wet());
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
     let finished =
         run_simulation(&mut simulation, &setup.scene, &setup.loaded.text, &options, &stop, &mut observe)?;
     display.finish();
+    let verdict = &finished.summary.verdict;
+    if finished.error.is_none() && verdict.grade != Grade::Fine {
+        remark(&format!("verdict: {verdict}"));
+    }
     if args.json {
         say(&finished.summary.json());
     } else if !args.quiet {
@@ -120,6 +132,9 @@ fn words(summary: &Summary, out: &Path) -> String {
     for body in &summary.bodies {
         let [x, y, z] = body.position_m;
         lines.push(format!("{}: at ({x:.4}, {y:.4}, {z:.4}) m", body.name));
+    }
+    if summary.verdict.grade == Grade::Fine {
+        lines.push("verdict: fine".into());
     }
     lines.push(format!("results in {}", out.display()));
     lines.join("\n")

@@ -2,9 +2,11 @@
 
 use super::{CaseArgs, DeviceArgs, device};
 use seixo::case::file::{Loaded, load};
+use seixo::console::remark;
 use seixo::error::Result;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::sync::Arc;
 
 /// A case, read and built.
 pub struct Setup {
@@ -13,7 +15,7 @@ pub struct Setup {
     /// The case.
     pub loaded: Loaded,
     /// Its particles.
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
 }
 
 impl Setup {
@@ -23,10 +25,10 @@ impl Setup {
     /// What is wrong with the case.
     pub fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
         let loaded = load(&args.case, args.spacing, &args.all_sets())?;
-        let scene = Scene::build(&loaded.case)?;
+        let scene = Arc::new(Scene::build(&loaded.case)?);
         if !quiet {
-            loaded.warnings.iter().for_each(|w| eprintln!("{w}"));
-            scene.notes.iter().for_each(|n| eprintln!("note: {n}"));
+            loaded.warnings.iter().for_each(|w| remark(w));
+            scene.notes.iter().for_each(|n| remark(&format!("note: {n}")));
         }
         let name = args.case.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned());
         Ok(Self { name, loaded, scene })
@@ -37,8 +39,6 @@ impl Setup {
     /// # Errors
     /// No suitable device, or a scene that does not fit it.
     pub fn simulation(&self, args: &DeviceArgs) -> Result<Simulation> {
-        Simulation::new(&self.loaded.case, &self.scene, |scene, params, plan, settings| {
-            device::backend(args, scene, params, plan, settings)
-        })
+        Simulation::on(&self.loaded.case, self.scene.clone(), &device::processor(args)?)
     }
 }

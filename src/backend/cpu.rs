@@ -13,10 +13,10 @@ use crate::kernels::{
     body_force, collision, correct, monitor, move_solids, predict, pressure_source, viscosity,
 };
 use crate::monitor::FluidMonitor;
-use crate::neighbours::{CAPACITY, CHUNK, Chunk, Neighbours};
+use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan};
-use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve};
+use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve_or_fall_back};
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::row_arrays::RowArrays;
@@ -196,8 +196,12 @@ impl Cpu {
             })
             .reduce(|| (0, 0), |a, b| a.max(b));
         self.counters.neighbours_max = self.counters.neighbours_max.max(largest as u32);
-        if largest > CAPACITY {
-            self.counters.overflow.get_or_insert((slot as u32, largest as u32));
+        let most = capacity(params.neighbours);
+        if largest > most && self.counters.overflow.is_none() {
+            // The first slot with too many, as a device names it.
+            let too_many = |i: &usize| self.neighbours.all(*i).neighbour.len() > most;
+            let first = (0..groups.pressure()).find(too_many).unwrap_or(slot);
+            self.counters.overflow = Some((first as u32, self.counters.neighbours_max));
         }
     }
 
@@ -325,14 +329,18 @@ impl Backend for Cpu {
             }
             None => &mut Jacobi,
         };
-        let report = solve(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
-        let clamp = |p: &mut f64| {
-            let high = *p > step.pressure_max;
+        let report =
+            solve_or_fall_back(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
+        let cut = |p: &mut f64| {
+            let (high, low) = (*p > step.pressure_max, *p < 0.0);
             *p = p.clamp(0.0, step.pressure_max);
-            u64::from(high)
+            [u64::from(high), u64::from(low)]
         };
-        let clamps = |p: &mut [f64]| p.iter_mut().map(clamp).sum::<u64>();
-        self.counters.pressure_clamps += fields.pressure.par_chunks_mut(CHUNK).map(clamps).sum::<u64>();
+        let add = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
+        let cuts = |p: &mut [f64]| p.iter_mut().map(cut).fold([0; 2], add);
+        let [high, low] = fields.pressure.par_chunks_mut(CHUNK).map(cuts).reduce(|| [0; 2], add);
+        self.counters.pressure_clamps += high;
+        self.counters.negative_pressures += low;
         Ok(report)
     }
 

@@ -191,6 +191,11 @@ impl Gpu {
         Ok(gpu)
     }
 
+    /// Where each key of the counting sort begins, as the last sort left it.
+    pub fn key_starts(&mut self) -> Result<Vec<u32>> {
+        self.context.download(buffers::cell_start, self.sizes.keys() as usize + 1)
+    }
+
     /// Bytes that the driver's allocator has given out for this device, where it tells.
     pub fn allocated(&self) -> Option<u64> {
         self.context.allocated()
@@ -280,6 +285,7 @@ impl Gpu {
         c.lost += u64::from(seen[counter::LOST]);
         c.displacement_clamps += u64::from(seen[counter::DISPLACEMENT_CLAMPS]);
         c.pressure_clamps += u64::from(seen[counter::PRESSURE_CLAMPS]);
+        c.negative_pressures += u64::from(seen[counter::NEGATIVE_PRESSURES]);
         c.neighbours_max = c.neighbours_max.max(seen[counter::NEIGHBOURS_MAX]);
         let first = |k: usize| Some(seen[k]).filter(|&n| n != u32::MAX);
         c.non_finite = c.non_finite.or(first(counter::NON_FINITE));

@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod gpu;
+mod processor;
 mod rows;
 pub mod traffic;
 
@@ -14,6 +15,7 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{ParticleStage, Stage};
 use crate::pressure::PressureReport;
+pub use processor::Processor;
 use std::collections::BTreeMap;
 
 /// What the guards have seen since the start of the run.
@@ -25,6 +27,8 @@ pub struct Counters {
     pub displacement_clamps: u64,
     /// Pressures that were cut at the upper bound.
     pub pressure_clamps: u64,
+    /// Negative pressures that were set to zero: water bears no tension.
+    pub negative_pressures: u64,
     /// Most neighbours of a particle so far.
     pub neighbours_max: u32,
     /// First particle (scene number) whose velocity became non-finite in `correct`.

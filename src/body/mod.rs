@@ -212,6 +212,14 @@ impl Body {
         self.motion.as_ref().map(|(start, m)| *start + m.displacement(t))
     }
 
+    /// Speed of its fastest point [m/s] within the step from `t` to `t + dt`, forces left aside.
+    pub fn fastest(&self, t: f64, dt: f64) -> f64 {
+        match &self.motion {
+            Some((_, motion)) => motion.fastest(t, t + dt),
+            None => self.pose.velocity.length() + self.pose.angular_velocity.length() * self.radius(),
+        }
+    }
+
     /// Continues from a pose and an angular momentum [kg m2/s].
     pub fn restore(&mut self, pose: Pose, momentum: DVec3) {
         self.pose = pose;

@@ -6,6 +6,9 @@ use super::{Case, Face, Gauges, Vector};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 
+/// Most iterations of a solve: beyond, a step would not come to its end.
+const MOST_ITERATIONS: u32 = 1_000_000;
+
 /// Something wrong, or worth a warning, about a key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
@@ -143,6 +146,13 @@ impl Checker<'_> {
             let message = format!("{:.1e} steps of {} s", run.end / run.time_step, run.time_step);
             self.add("run.time_step", message, "shorten run.end or use a larger run.time_step");
         }
+        // The flow shortens an adaptive step; nothing else does.
+        let adapts = run.adaptive && self.case.fluid.is_some();
+        if run.time_step > run.end && run.end > 0.0 && run.time_step.is_finite() && !adapts {
+            let message =
+                format!("a step of {} s is longer than the whole run of {} s", run.time_step, run.end);
+            self.add("run.time_step", message, "use a smaller run.time_step or a larger run.end");
+        }
     }
 
     fn fluid(&mut self) {
@@ -207,6 +217,9 @@ impl Checker<'_> {
         );
         if fluid.solver.max_iterations == 0 {
             self.add("fluid.solver.max_iterations", "0 iterations solve nothing", "allowed: 1 or more");
+        } else if fluid.solver.max_iterations > MOST_ITERATIONS {
+            let message = format!("{} iterations in a step never end", fluid.solver.max_iterations);
+            self.add("fluid.solver.max_iterations", message, format!("allowed: 1 to {MOST_ITERATIONS}"));
         }
     }
 

@@ -137,7 +137,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A table of motion: at least one row, times increasing.
+    /// A table of motion: at least one row, times increasing, at rest where the case puts it at t = 0, no jumps.
     pub(super) fn motion(&mut self, path: &str, rows: &[[f64; 4]]) {
         if rows.is_empty() {
             self.add(
@@ -150,6 +150,59 @@ impl Checker<'_> {
             if pair[1][0] <= pair[0][0] {
                 let message = format!("time {} does not come after {}", pair[1][0], pair[0][0]);
                 self.add(format!("{path}.{}.0", k + 1), message, "times must increase from row to row");
+                return;
+            }
+        }
+        if !rows.is_empty() && rows.iter().flatten().all(|x| x.is_finite()) {
+            self.motion_start(path, rows);
+            self.motion_jumps(path, rows);
+        }
+    }
+
+    /// Displacements count from where the case puts the solid: at t = 0 there is none.
+    fn motion_start(&mut self, path: &str, rows: &[[f64; 4]]) {
+        let after = rows.iter().position(|r| r[0] > 0.0).unwrap_or(rows.len());
+        let at = |axis: usize| match (after.checked_sub(1).map(|k| rows[k]), rows.get(after)) {
+            (Some(a), Some(b)) => a[axis] - (b[axis] - a[axis]) * a[0] / (b[0] - a[0]),
+            (Some(a), None) => a[axis],
+            (None, first) => first.map_or(0.0, |r| r[axis]),
+        };
+        let start = [at(1), if self.flat() { 0.0 } else { at(2) }, at(3)];
+        let l0 = self.spacing().unwrap_or(0.0);
+        if length(&start) > 1e-6 * l0 {
+            let message = format!(
+                "the table is at ({}, {}, {}) m at t = 0, so that the solid would jump there in the first step",
+                start[0], start[1], start[2]
+            );
+            let remedy = "displacements count from the place given by the case: begin with [0, 0, 0, 0]";
+            self.add(format!("{path}.0"), message, remedy);
+        }
+    }
+
+    /// A solid that crosses whole particles within a step passes through the water instead of pushing it.
+    fn motion_jumps(&mut self, path: &str, rows: &[[f64; 4]]) {
+        let run = &self.case.run;
+        let Some(l0) = self.spacing().filter(|_| run.time_step > 0.0) else { return };
+        // An adaptive step follows a fast wall; nothing follows one that is there at once.
+        let adapts = run.adaptive && self.case.fluid.is_some();
+        let most = if adapts { 100.0 } else { 1.0 };
+        for (k, pair) in rows.windows(2).enumerate() {
+            let across = if self.flat() { 0.0 } else { pair[1][2] - pair[0][2] };
+            let way = length(&[pair[1][1] - pair[0][1], across, pair[1][3] - pair[0][3]]);
+            let speed = way / (pair[1][0] - pair[0][0]);
+            let spacings = speed * run.time_step / l0;
+            if way > l0 && spacings > most {
+                let message = format!(
+                    "{way} m in {:.3e} s is {speed:.3e} m/s, {spacings:.1} particles in a time step: the solid would \
+                     jump through what is in its way",
+                    pair[1][0] - pair[0][0]
+                );
+                let adaptive = if adapts { "" } else { ", or run.adaptive = true" };
+                let remedy = format!(
+                    "give the motion more time, or use run.time_step = {:.1e} or less{adaptive}",
+                    l0 / speed
+                );
+                self.add(format!("{path}.{}", k + 1), message, remedy);
             }
         }
     }
@@ -176,6 +229,12 @@ impl Checker<'_> {
         for (k, (path, name)) in names.iter().enumerate() {
             if name.trim().is_empty() {
                 self.add(path.clone(), "the name is empty", "give it a name");
+            } else if let Some(why) = unfit(name) {
+                self.add(
+                    path.clone(),
+                    format!("the name `{}` {why}", name.escape_debug()),
+                    "names stand in tables and on terminals: use letters, digits, spaces, _ and -",
+                );
             } else if let Some((first, _)) = names[..k].iter().find(|(_, n)| n == name) {
                 self.add(
                     path.clone(),
@@ -185,6 +244,22 @@ impl Checker<'_> {
             }
         }
     }
+}
+
+/// Longest name.
+const LONGEST_NAME: usize = 80;
+
+/// Why a name cannot stand in a table or on a terminal.
+fn unfit(name: &str) -> Option<String> {
+    if name.chars().any(|c| c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'))
+    {
+        return Some("holds control characters".into());
+    }
+    if name.chars().count() > LONGEST_NAME {
+        return Some(format!("is longer than {LONGEST_NAME} characters"));
+    }
+    // Spreadsheets take such a cell for a formula.
+    name.trim_start().starts_with(['=', '+', '-', '@']).then(|| "begins like a formula".into())
 }
 
 /// A length rounded down to three digits, for a remedy that works when it is copied.

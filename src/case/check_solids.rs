@@ -3,6 +3,25 @@
 use super::check::{Checker, length};
 use super::{Body, BodyShape, ContactDevice, Law};
 
+/// Most sub-steps of a step that a case can ask for.
+const MOST_SUBSTEPS: u32 = 100_000;
+/// Springs outside of this range overflow, or vanish in rounding [N/m].
+const SPRING_LEAST: f64 = 1e-9;
+const SPRING_MOST: f64 = 1e18;
+
+/// Volume of a whole body [m3], and its extent along y in two dimensions [m].
+fn whole(body: &Body) -> (f64, f64) {
+    let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
+    match body.shape {
+        BodyShape::Box => {
+            let [x, y, z] = body.size.unwrap_or_default();
+            (x * y * z, y)
+        }
+        BodyShape::Sphere => (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3), 2.0 * radius),
+        BodyShape::Cylinder => (std::f64::consts::PI * radius.powi(2) * height, height),
+    }
+}
+
 impl Checker<'_> {
     pub(super) fn body(&mut self, k: usize, body: &Body) {
         let path = |key: &str| format!("body.{k}.{key}");
@@ -75,6 +94,42 @@ impl Checker<'_> {
         }
         if body.displaces_fluid && self.case.fluid.is_none() {
             self.add(path("displaces_fluid"), "there is no [fluid]", "remove `displaces_fluid`");
+        }
+    }
+
+    /// A spring that a body's own weight presses through is none.
+    fn soft_spring(&mut self, spring: f64) {
+        let run = &self.case.run;
+        if !(spring.is_finite() && spring > 0.0) {
+            return;
+        }
+        if !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
+            let allowed = format!("{SPRING_LEAST:e} to {SPRING_MOST:e} N/m");
+            self.range("contact.spring", spring, false, &allowed);
+            return;
+        }
+        let weight = |body: &Body| {
+            let (volume, depth) = whole(body);
+            let share = if self.flat() { run.spacing / depth } else { 1.0 };
+            body.mass.or(body.density.map(|d| d * volume)).unwrap_or(0.0) * share * length(&run.gravity)
+        };
+        let smallest = |body: &Body| {
+            let edges = body.size.unwrap_or([f64::INFINITY; 3]);
+            let across = 2.0 * body.radius.unwrap_or(f64::INFINITY);
+            let along =
+                if self.flat() { f64::INFINITY } else { edges[1].min(body.height.unwrap_or(f64::INFINITY)) };
+            edges[0].min(edges[2]).min(across).min(along)
+        };
+        let free = self.case.body.iter().filter(|b| b.motion.is_none() && b.locked.len() < 6);
+        let sinks = |b: &&Body| weight(b) / spring > smallest(b);
+        let found = free.filter(sinks).max_by(|a, b| weight(a).total_cmp(&weight(b)));
+        if let Some((name, weight, edge)) = found.map(|b| (b.name.clone(), weight(b), smallest(b))) {
+            let message = format!(
+                "the weight of body `{name}`, {weight:.3e} N, presses a spring of {spring:e} N/m {:.3e} m deep, more \
+                 than the body's {edge} m",
+                weight / spring
+            );
+            self.add("contact.spring", message, format!("use {:.1e} N/m or more", 100.0 * weight / edge));
         }
     }
 
@@ -180,8 +235,17 @@ impl Checker<'_> {
         }
         self.not_negative("contact.viscous_friction", contact.viscous_friction, "kg/s");
         self.not_negative("contact.friction", contact.friction, "");
-        if contact.substeps == Some(0) {
-            self.add("contact.substeps", "0 sub-steps", "allowed: 1 or more, or leave it out");
+        if contact.law != Law::Pressure {
+            self.soft_spring(contact.spring);
+        }
+        match contact.substeps {
+            Some(0) => self.add("contact.substeps", "0 sub-steps", "allowed: 1 or more, or leave it out"),
+            Some(n) if n > MOST_SUBSTEPS => self.add(
+                "contact.substeps",
+                format!("{n} sub-steps a step never end"),
+                format!("allowed: 1 to {MOST_SUBSTEPS}, or leave it out for as many as stability asks for"),
+            ),
+            _ => {}
         }
         if contact.device == ContactDevice::Gpu && contact.law == Law::Pressure {
             let remedy = "leave `device` out or set law = \"smooth\" or \"paper\"";

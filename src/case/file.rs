@@ -2,6 +2,7 @@
 
 use super::check::{Problem, check};
 use super::report::{Message, closest, explain, render, span_of};
+use super::surplus::surplus;
 use super::{Case, overrides};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -76,7 +77,14 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
         remedy: Some(p.remedy.clone()),
         warning: p.warning,
     };
-    let (warnings, errors): (Vec<_>, Vec<_>) = check(&case).into_iter().partition(|p| p.warning);
+    let too_long = surplus(table.get_ref(), &case).into_iter().map(|s| Problem {
+        message: format!("{} elements, of which only the first {} would be read", s.written, s.read),
+        remedy: format!("write {} elements", s.read),
+        path: s.path,
+        warning: false,
+    });
+    let problems = too_long.chain(check(&case));
+    let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
     if !errors.is_empty() {
         return Err(Error::Case(wrong(&errors.iter().map(located).collect::<Vec<_>>())));
     }
@@ -101,11 +109,28 @@ fn missing(path: &Path) -> String {
 }
 
 impl Case {
+    /// The case in the file `path`.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Ok(load(path.as_ref(), None, &[])?.case)
+    }
+
     /// The JSON schema of a case file, for editors (`#:schema` in the first line) and for `seixo schema`.
     pub fn schema() -> String {
         let schema = schemars::schema_for!(Case);
         let mut text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
         text.push('\n');
         text
+    }
+}
+
+impl std::str::FromStr for Case {
+    type Err = Error;
+
+    /// A case from the text of a file.
+    fn from_str(text: &str) -> Result<Self> {
+        Ok(parse("case", text.to_owned(), &[])?.0)
     }
 }

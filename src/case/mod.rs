@@ -8,6 +8,7 @@ mod check_solids;
 pub mod file;
 mod overrides;
 mod report;
+mod surplus;
 
 use crate::scheme::{FreeSurface, Gradient, Source};
 use schemars::JsonSchema;

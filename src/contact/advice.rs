@@ -110,6 +110,11 @@ impl Solids {
         Ok(ContactReport { substeps, omega_dt, ..ContactReport::default() })
     }
 
+    /// Why contact cannot be computed with steps of `dt` [s], if so.
+    pub(crate) fn refuses(&self, dt: f64) -> Option<String> {
+        self.substeps(&self.worst(dt)).err().map(|e| e.to_string())
+    }
+
     fn substeps(&self, worst: &Worst) -> Result<u32> {
         if matches!(self.model, Model::None | Model::Collision(_)) {
             return Ok(1);

@@ -178,6 +178,11 @@ impl Solids {
         &self.names[k]
     }
 
+    /// Speed of the fastest point of any solid [m/s] within the step from `t` to `t + dt`.
+    pub fn fastest(&self, t: f64, dt: f64) -> f64 {
+        self.bodies.iter().map(|b| b.fastest(t, dt)).fold(0.0, f64::max)
+    }
+
     /// Mean contact wrench over the last step, one per solid (friction included).
     pub fn contact_wrenches(&self) -> &[Wrench] {
         &self.contact

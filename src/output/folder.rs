@@ -1,55 +1,198 @@
-//! The folder of a run: where each file goes, and that nobody's files are overwritten unasked.
+//! The folder of a run: where each file goes, who writes there, and that nobody else's files are touched.
+//!
+//! A file `.seixo` marks a folder as one of seixo's own and is locked as long as a run writes there. Only in a
+//! marked folder does `--force` remove anything, and only files with the names that a run gives.
 
+use super::write_whole;
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs::{File, TryLockError};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// Files of an earlier run that a new one replaces; anything else in the folder is left alone.
-const OURS: [&str; 8] =
-    ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", "vtu", "pictures"];
+/// Marks a folder of results, and holds the lock of the run that writes there.
+const MARKER: &str = ".seixo";
+/// Room that is given free for `result.json` when the disk is full.
+const RESERVE: &str = ".reserve";
+/// Bytes of it.
+const RESERVED: usize = 32 << 10;
+/// Files of a run in the folder itself, beside `NAME.pvd`.
+const FILES: [&str; 7] =
+    ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", RESERVE];
+
+/// What the marker says.
+#[derive(Debug, Serialize, Deserialize)]
+struct Marker {
+    /// Version of the program.
+    seixo: String,
+    /// Name of the case: its list of frames is `NAME.pvd`.
+    name: String,
+}
+
+/// What to do with what a folder holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Refuse a folder with anything in it.
+    New,
+    /// Remove the files of an earlier run first.
+    Replace,
+    /// Keep them and go on.
+    Continue,
+}
 
 /// The folder of a run.
 #[derive(Clone, Debug)]
 pub struct Folder {
     root: PathBuf,
     name: String,
+    /// Held until the last clone is gone.
+    lock: Arc<Option<File>>,
 }
 
 impl Folder {
-    /// Make `root` for a run of the case `name`. A folder with something in it is refused unless `force`;
-    /// then the files of an earlier run are removed, so that none of its frames is taken for a new one.
+    /// Make or take over `root` for a run of the case `name`, as `mode` says, and lock it. `inputs` are files that
+    /// the run was made from: none of them is ever overwritten or removed.
     ///
     /// # Errors
-    /// [`Error::Case`] if the folder is not empty, [`Error::Io`] if it cannot be made.
-    pub fn create(root: &Path, name: &str, force: bool) -> Result<Self> {
-        let folder = Self { root: root.to_path_buf(), name: name.to_string() };
-        let mut entries = match std::fs::read_dir(root) {
-            Ok(entries) => entries,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                std::fs::create_dir_all(folder.vtu()).map_err(Error::io(folder.vtu()))?;
-                return Ok(folder);
-            }
+    /// [`Error::Case`] if the folder is not empty, is no folder of seixo's, is in use by another run, or if a
+    /// result would take the place of an input; [`Error::Io`] if it cannot be made.
+    pub fn open(root: &Path, name: &str, mode: Mode, inputs: &[PathBuf]) -> Result<Self> {
+        let mut folder = Self { root: root.to_path_buf(), name: name.to_string(), lock: Arc::new(None) };
+        folder.spare(inputs)?;
+        let filled = match std::fs::read_dir(root) {
+            Ok(mut entries) => entries.next().is_some(),
+            Err(e) if e.kind() == ErrorKind::NotFound => false,
             Err(e) => return Err(Error::io(root)(e)),
         };
-        if entries.next().is_some() {
-            if !force {
-                return Err(Error::Case(format!(
-                    "{} is not empty; choose another folder with --out, or replace the results in it with --force",
-                    root.display()
-                )));
-            }
-            folder.clear()?;
+        let shown = root.display();
+        if filled && mode == Mode::New {
+            return Err(Error::Case(format!(
+                "{shown} is not empty; choose another folder with --out, or replace the results in it with --force"
+            )));
+        }
+        let earlier = folder.marker()?;
+        if filled && earlier.is_none() {
+            return Err(Error::Case(format!(
+                "{shown} holds files and no `{MARKER}`, so that it is no folder of results: nothing in it is touched; \
+                 choose another folder with --out"
+            )));
+        }
+        std::fs::create_dir_all(root).map_err(Error::io(root))?;
+        folder.lock = Arc::new(folder.take()?);
+        if let (Mode::Replace, Some(earlier)) = (mode, earlier) {
+            folder.clear(&earlier.name)?;
         }
         std::fs::create_dir_all(folder.vtu()).map_err(Error::io(folder.vtu()))?;
+        folder.reserve()?;
         Ok(folder)
     }
 
-    fn clear(&self) -> Result<()> {
-        for path in OURS.map(|f| self.root.join(f)).into_iter().chain([self.pvd()]) {
-            let gone =
-                if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
-            match gone {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path)(e)),
-                _ => {}
+    /// Refuses inputs that stand where a result goes.
+    fn spare(&self, inputs: &[PathBuf]) -> Result<()> {
+        let Ok(root) = self.root.canonicalize() else { return Ok(()) };
+        for input in inputs.iter().filter_map(|p| p.canonicalize().ok()) {
+            let name = input.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+            if input.parent() == Some(&root) && self.is_ours(name, &self.name) {
+                return Err(Error::Case(format!(
+                    "{} would be overwritten by the results: choose another folder with --out",
+                    input.display()
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn marker(&self) -> Result<Option<Marker>> {
+        let path = self.file(MARKER);
+        match std::fs::read(&path) {
+            Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
+            Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
+            Err(e) => Err(Error::io(&path)(e)),
+        }
+    }
+
+    /// Writes the marker and locks it; nothing where the file system knows no locks.
+    fn take(&self) -> Result<Option<File>> {
+        let path = self.file(MARKER);
+        let options = File::options().read(true).write(true).create(true).truncate(false).open(&path);
+        let file = options.map_err(Error::io(&path))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(Error::Case(format!(
+                    "{} is in use: another run writes there; wait for its end, or choose another folder with --out",
+                    self.root.display()
+                )));
+            }
+            // Some network file systems have no locks; then it is the user who keeps runs apart.
+            Err(TryLockError::Error(e)) if matches!(e.kind(), ErrorKind::Unsupported) => return Ok(None),
+            Err(TryLockError::Error(e)) => return Err(Error::io(&path)(e)),
+        }
+        let marker = Marker { seixo: env!("CARGO_PKG_VERSION").into(), name: self.name.clone() };
+        let text = serde_json::to_string(&marker).unwrap_or_default() + "\n";
+        // Written in place: a rename would leave the lock on a file that is gone.
+        file.set_len(0)
+            .and_then(|()| std::io::Write::write_all(&mut &file, text.as_bytes()))
+            .map_err(Error::io(&path))?;
+        Ok(Some(file))
+    }
+
+    fn reserve(&self) -> Result<()> {
+        write_whole(&self.file(RESERVE), &[b'\n'; RESERVED])
+    }
+
+    /// Gives the reserved room free, for the last file of a run.
+    pub fn release(&self) {
+        // If it is gone already there is nothing to give.
+        let _ = std::fs::remove_file(self.file(RESERVE));
+    }
+
+    /// Whether a run of the case `name` gives files of the folder itself this name.
+    fn is_ours(&self, file: &str, name: &str) -> bool {
+        FILES.contains(&file) || file == format!("{name}.pvd") || file.starts_with(".writing-")
+    }
+
+    /// Removes the files of an earlier run of the case `name`; folders go if nothing else was in them.
+    fn clear(&self, name: &str) -> Result<()> {
+        self.remove(&self.root, |file| self.is_ours(file, name) || self.is_ours(file, &self.name))?;
+        let numbered = |file: &str, before: &str, after: &str| {
+            let number = file.strip_prefix(before).and_then(|f| f.strip_suffix(after));
+            number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
+        };
+        let frame = |file: &str| {
+            ["walls.vtu", "last_fluid.vtu", "last_solids.vtu"].contains(&file)
+                || numbered(file, "fluid_", ".vtu")
+                || numbered(file, "solids_", ".vtu")
+                || file.starts_with(".writing-")
+        };
+        self.remove(&self.vtu(), frame)?;
+        self.remove(&self.pictures(), |file| {
+            numbered(file, "frame_", ".png") || file.starts_with(".writing-")
+        })?;
+        for folder in [self.vtu(), self.pictures()] {
+            // Somebody else's files keep their folder.
+            let _ = std::fs::remove_dir(folder);
+        }
+        Ok(())
+    }
+
+    /// Removes the plain files of `folder` that are `ours`; links and folders are left alone.
+    fn remove(&self, folder: &Path, ours: impl Fn(&str) -> bool) -> Result<()> {
+        if folder != self.root && folder.is_symlink() {
+            return Ok(());
+        }
+        let entries = match std::fs::read_dir(folder) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(e) => return Err(Error::io(folder)(e)),
+        };
+        for entry in entries {
+            let entry = entry.map_err(Error::io(folder))?;
+            let plain = entry.file_type().is_ok_and(|t| t.is_file());
+            if plain && entry.file_name().to_str().is_some_and(&ours) {
+                let path = entry.path();
+                std::fs::remove_file(&path).map_err(Error::io(&path))?;
             }
         }
         Ok(())
@@ -58,6 +201,11 @@ impl Folder {
     /// The folder itself.
     pub fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// Whether other runs are kept out; not on file systems without locks.
+    pub fn is_locked(&self) -> bool {
+        self.lock.is_some()
     }
 
     /// A file directly in the folder.

@@ -1,40 +1,63 @@
 //! The PVD file: which VTU files make up which moment.
 
 use super::write_whole;
-use crate::error::Result;
-use std::fmt::Write;
+use crate::error::{Error, Result};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-/// A list of frames that is on disk after every change.
-#[derive(Clone, Debug)]
+const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" \
+                    byte_order=\"LittleEndian\">\n  <Collection>\n";
+const FOOT: &str = "  </Collection>\n</VTKFile>\n";
+
+/// A list of frames that is on disk after every change, and grows at its end.
+#[derive(Debug)]
 pub struct Pvd {
     path: PathBuf,
-    entries: String,
+    file: Option<File>,
+    /// Bytes before the end tags.
+    entries: u64,
 }
 
 impl Pvd {
     /// A list without frames; nothing is written yet.
     pub fn new(path: PathBuf) -> Self {
-        Self { path, entries: String::new() }
+        Self { path, file: None, entries: HEAD.len() as u64 }
     }
 
     /// Add the frame at `time` [s]: names of its parts and their files, relative to the PVD. A part that does
     /// not change may name the same file in every frame.
     ///
     /// # Errors
-    /// [`crate::error::Error::Io`].
+    /// [`crate::error::Error::Io`]; the list is then as it was before.
     pub fn push(&mut self, time: f64, parts: &[(&str, String)]) -> Result<()> {
+        let mut text = String::new();
         for (part, (name, file)) in parts.iter().enumerate() {
             let line = format!(
                 r#"    <DataSet timestep="{time}" group="" part="{part}" name="{name}" file="{file}"/>"#
             );
-            writeln!(self.entries, "{line}").expect("a String takes everything");
+            writeln!(text, "{line}").expect("a String takes everything");
         }
-        let text = format!(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n  \
-             <Collection>\n{}  </Collection>\n</VTKFile>\n",
-            self.entries
-        );
-        write_whole(&self.path, text.as_bytes())
+        let added = text.len() as u64;
+        text.push_str(FOOT);
+        let at = self.entries;
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => {
+                write_whole(&self.path, format!("{HEAD}{FOOT}").as_bytes())?;
+                none.insert(File::options().write(true).open(&self.path).map_err(Error::io(&self.path))?)
+            }
+        };
+        // One write from the end tags on; if the disk is full they go back to where they were.
+        let put = |file: &mut File, text: &str| {
+            file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(text.as_bytes()))
+        };
+        if let Err(e) = put(file, &text) {
+            let _ = file.set_len(at).and_then(|()| put(file, FOOT));
+            return Err(Error::io(&self.path)(e));
+        }
+        self.entries += added;
+        Ok(())
     }
 }

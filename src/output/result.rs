@@ -17,8 +17,41 @@ pub enum Status {
     Diverged,
     /// A signal asked the run to stop.
     Interrupted,
-    /// A file could not be written, or the device was lost.
+    /// A file could not be written, the device was lost, or the end was reached with a result that means nothing
+    /// (see the verdict).
     Failed,
+}
+
+/// What can be said of a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Grade {
+    /// Nothing speaks against it.
+    #[default]
+    Fine,
+    /// It can be looked at, with the reasons in mind.
+    Degraded,
+    /// It means nothing.
+    Failed,
+}
+
+/// A [`Grade`], and why.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Verdict {
+    /// What can be said.
+    pub grade: Grade,
+    /// Why, the worst first; nothing of a fine result.
+    pub reasons: Vec<String>,
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.grade {
+            Grade::Fine => f.write_str("fine"),
+            Grade::Degraded => write!(f, "degraded because {}", self.reasons.join("; ")),
+            Grade::Failed => write!(f, "failed because {}", self.reasons.join("; ")),
+        }
+    }
 }
 
 /// Numbers of particles.
@@ -62,12 +95,18 @@ pub struct Monitors {
     pub density_error_mean: f64,
     /// Largest v dt / l0 of the fluid [-].
     pub courant_max: f64,
+    /// Largest speed of the fluid [m/s].
+    #[serde(rename = "speed_max_m_s")]
+    pub speed_max: f64,
     /// Energy of fluid and free bodies at t = 0: of motion, of height, in contact springs [J].
     #[serde(rename = "energy_start_J")]
     pub energy_start: f64,
     /// The same at the end [J].
     #[serde(rename = "energy_end_J")]
     pub energy_end: f64,
+    /// Its largest value [J].
+    #[serde(rename = "energy_max_J")]
+    pub energy_max: f64,
     /// Fluid particles that were taken out.
     pub lost_particles: u64,
     /// Most neighbours of a particle.
@@ -114,6 +153,8 @@ pub struct Summary {
     pub status: Status,
     /// Why, in words.
     pub exit_reason: String,
+    /// What can be said of the result.
+    pub verdict: Verdict,
     /// Steps done.
     pub steps: u64,
     /// Time reached [s].

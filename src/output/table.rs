@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 pub struct Table {
     path: PathBuf,
     file: File,
+    /// Bytes of whole rows in the file.
+    whole: u64,
     columns: usize,
     pending: Vec<u8>,
 }
@@ -61,7 +63,8 @@ impl Table {
     /// [`Error::Io`].
     pub fn create(path: &Path, header: &[String]) -> Result<Self> {
         let file = File::create(path).map_err(Error::io(path))?;
-        let mut table = Self { path: path.to_path_buf(), file, columns: header.len(), pending: Vec::new() };
+        let mut table =
+            Self { path: path.to_path_buf(), file, whole: 0, columns: header.len(), pending: Vec::new() };
         table.push(header)?;
         table.flush()?;
         Ok(table)
@@ -83,13 +86,20 @@ impl Table {
         written.map_err(|e| Error::io(&self.path)(std::io::Error::other(e)))
     }
 
-    /// Hand all rows to the system in one go.
+    /// Hand all rows to the system in one go. A row that does not fit any more leaves no part behind.
     ///
     /// # Errors
     /// [`Error::Io`], e.g. when the disk is full.
     pub fn flush(&mut self) -> Result<()> {
         let written = self.file.write_all(&self.pending);
+        let bytes = self.pending.len() as u64;
         self.pending.clear();
+        if written.is_ok() {
+            self.whole += bytes;
+        } else {
+            // What went wrong is told below; a file that cannot even be cut was none to begin with.
+            let _ = self.file.set_len(self.whole);
+        }
         written.map_err(Error::io(&self.path))
     }
 }

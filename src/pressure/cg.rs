@@ -154,6 +154,25 @@ pub fn dot(a: &[f64], b: &[f64], sums: &mut Vec<f64>) -> f64 {
     sums.iter().sum()
 }
 
+/// [`solve`]; where the preconditioner breaks the iteration down, again with the diagonal alone, from where it
+/// stopped. A preconditioner in f32 leaves its range where the diagonal in f64 does not.
+pub fn solve_or_fall_back(
+    system: &System,
+    b: &[f64],
+    x: &mut [f64],
+    preconditioner: &mut dyn Precondition,
+    settings: &Settings,
+    work: &mut Workspace,
+) -> PressureReport {
+    let first = solve(system, b, x, preconditioner, settings, work);
+    if first.outcome != Outcome::Breakdown {
+        return first;
+    }
+    let settings = Settings { warm_start: true, ..*settings };
+    let again = solve(system, b, x, &mut Jacobi, &settings, work);
+    PressureReport { iterations: first.iterations + again.iterations, ..again }
+}
+
 /// Solve A x = b. `x` holds the start and gets the answer; `b` must be zero where there is no unknown.
 pub fn solve(
     system: &System,

@@ -14,7 +14,8 @@ pub enum Outcome {
     ZeroSource,
     /// The iterations ran out; the last iterate was kept.
     MaxIterations,
-    /// r.z or p.Ap was not positive: the matrix is singular or not definite; the last iterate was kept.
+    /// r.z or p.Ap was not positive, with the diagonal as preconditioner too: the matrix is singular or not definite;
+    /// the last iterate was kept.
     Breakdown,
     /// A residual was not a number.
     NonFinite,

@@ -5,24 +5,24 @@
 //! wrote, and says in `result.json` how it ended.
 
 pub mod frames;
-pub mod gauges;
 pub mod summary;
 pub mod tables;
-pub mod wall_force;
+pub mod verdict;
 
 use crate::error::{Error, Result};
-use crate::output::folder::Folder;
-use crate::output::result::{Status, Summary, memory_peak};
+use crate::gauges::Gauges;
+use crate::output::folder::{Folder, Mode};
+use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 use frames::Frames;
-use gauges::Gauges;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use summary::Totals;
 use tables::Tables;
+use verdict::Scale;
 
 /// What the command line adds to a case.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +37,8 @@ pub struct Options {
     pub steps: Option<u64>,
     /// Draw a picture of every frame.
     pub pictures: bool,
+    /// Files that the run was made from; results never take their place.
+    pub inputs: Vec<PathBuf>,
 }
 
 /// Where a run stands.
@@ -104,7 +106,7 @@ impl Due {
 /// signal once the run should stop; `observe` is called after every step.
 ///
 /// # Errors
-/// Only for what keeps a run from starting: a folder that is not empty, a gauge that hangs in the air.
+/// Only for what keeps a run from starting: a folder that is not empty or in use, a gauge that hangs in the air.
 /// What happens later is in [`Finished`].
 pub fn run(
     simulation: &mut Simulation,
@@ -115,7 +117,9 @@ pub fn run(
     observe: &mut dyn FnMut(&Progress),
 ) -> Result<Finished> {
     let gauges = Gauges::new(&simulation.case, scene)?;
-    let folder = Folder::create(&options.out, &options.name, options.force)?;
+    let mode = if options.force { Mode::Replace } else { Mode::New };
+    let folder = Folder::open(&options.out, &options.name, mode, &options.inputs)?;
+    let scale = Scale::new(simulation, scene);
     write_whole(&folder.file("case.toml"), text.as_bytes())?;
     let mut run = Run {
         start: Instant::now(),
@@ -146,11 +150,27 @@ pub fn run(
     let mut summary = run.totals.summary(simulation, scene);
     summary.case = options.name.clone();
     summary.status = status;
+    summary.verdict = match error {
+        Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()] },
+        None => verdict::judge(&summary, scale),
+    };
     summary.exit_reason = reason;
+    let mut error = error;
+    if summary.status == Status::Done && summary.verdict.grade == Grade::Failed {
+        summary.status = Status::Failed;
+        summary.exit_reason.push_str(", but what was computed means nothing");
+        error = Some(Error::Senseless(format!(
+            "{}: {}",
+            summary.exit_reason,
+            summary.verdict.reasons.join("; ")
+        )));
+    }
     summary.wall_s = run.start.elapsed().as_secs_f64();
     summary.frames = run.frames.written();
     summary.memory_peak_bytes = memory_peak();
     summary.stages.insert("output", run.totals.output.as_secs_f64());
+    // Where the disk is full this makes room for the last word.
+    folder.release();
     let written = summary.write(&folder.file("result.json"));
     Ok(Finished { summary, error: error.or(written.err()), signal })
 }
@@ -183,7 +203,8 @@ impl Run {
         self.tables.start(simulation, &mut self.totals)?;
         self.frames.write(simulation, scene)?;
         self.totals.output += writing.elapsed();
-        let mut dt = simulation.case.run.time_step;
+        // A run always does a step, however short it is.
+        let mut dt = 0.0;
         let mut progress = Progress::default();
         let ended = loop {
             // A rounding error short of the end is the end.

@@ -51,7 +51,12 @@ impl Totals {
         let monitors = &mut self.monitors;
         monitors.density_error_max = monitors.density_error_max.max(fluid.density_error_max);
         monitors.courant_max = monitors.courant_max.max(fluid.speed_max * dt / l0);
+        monitors.speed_max = monitors.speed_max.max(fluid.speed_max);
         monitors.energy_end = fluid.kinetic + fluid.potential + bodies;
+        // The sum may not be a number, and then is not to be passed over.
+        if !(monitors.energy_end <= monitors.energy_max) {
+            monitors.energy_max = monitors.energy_end;
+        }
         monitors.lost_particles = counters.lost;
         monitors.neighbours_max = counters.neighbours_max;
     }
@@ -59,6 +64,7 @@ impl Totals {
     /// The energy seen last is that of the start.
     pub fn start(&mut self) {
         self.monitors.energy_start = self.monitors.energy_end;
+        self.monitors.energy_max = self.monitors.energy_end;
         // Before the first step there is no number density to be wrong.
         (self.looks, self.density_error) = (0, 0.0);
     }

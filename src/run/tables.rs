@@ -1,11 +1,11 @@
 //! The tables over time: monitors.csv, bodies.csv and gauges.csv.
 
 use super::Due;
-use super::gauges::Gauges;
 use super::summary::Totals;
 use crate::backend::{Counters, Timing};
 use crate::contact::Energy;
 use crate::error::Result;
+use crate::gauges::Gauges;
 use crate::monitor::FluidMonitor;
 use crate::output::folder::Folder;
 use crate::output::table::{Cell, Table, vector_cells, vector_columns};
@@ -217,6 +217,7 @@ impl Tables {
             Cell::from(counters.lost),
             Cell::from(counters.displacement_clamps),
             Cell::from(counters.pressure_clamps),
+            Cell::from(counters.negative_pressures),
             Cell::from(u64::from(counters.neighbours_max)),
         ]);
         // A stage whose time nothing tells gets an empty cell.
@@ -245,7 +246,8 @@ fn monitor_header(stages: &[Stage]) -> Vec<String> {
     header.extend(vector_columns("centroid", "m"));
     header.extend(vector_columns("extent_max", "m"));
     let rest = "iterations [-],residual [-],outcome,penetration_over_l0 [-],contact_substeps [-],\
-                contact_omega_dt [-],fluid_lost [-],displacement_clamps [-],pressure_clamps [-],neighbours_max [-]";
+                contact_omega_dt [-],fluid_lost [-],displacement_clamps [-],pressure_clamps [-],\
+                negative_pressures [-],neighbours_max [-]";
     header.extend(rest.split(',').map(String::from));
     header.extend(stages.iter().map(|s| format!("wall_{} [s]", s.name())));
     header

@@ -206,6 +206,7 @@ impl<'a> Builder<'a> {
             }
             self.bodies.push(solid);
         }
+        self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }
 

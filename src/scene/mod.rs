@@ -19,6 +19,7 @@ mod lattice;
 mod layout;
 mod oriented;
 mod placement;
+mod support;
 mod walls;
 mod water;
 
@@ -157,6 +158,13 @@ impl Motion {
             }
             None => self.displacement[n - 1],
         }
+    }
+
+    /// Largest speed [m/s] between the times `from` and `to` [s].
+    pub fn fastest(&self, from: f64, to: f64) -> f64 {
+        let rows = self.time.windows(2).zip(self.displacement.windows(2));
+        let met = rows.filter(|(t, _)| t[0] < to && t[1] > from);
+        met.map(|(t, x)| (x[1] - x[0]).length() / (t[1] - t[0])).fold(0.0, f64::max)
     }
 
     /// Velocity [m/s] just after time `t` [s].

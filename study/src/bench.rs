@@ -184,7 +184,7 @@ const WARM_UP: u64 = 3;
 /// What keeps the case from starting or ends its run.
 pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) -> Result<Row> {
     let scene = Scene::build(case)?;
-    let mut sim = Simulation::new(case, &scene, make)?;
+    let mut sim = Simulation::with_backend(case, scene, make)?;
     let timing = sim.backend.timing();
     while sim.time < from {
         sim.step()?;
@@ -243,13 +243,13 @@ pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) 
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
     times.sort_by(f64::total_cmp);
     let quartile = |q: f64| times.get((q * times.len() as f64) as usize).copied().unwrap_or(mean);
-    let total = scene.groups.total();
+    let total = sim.groups.total();
     Ok(Row {
         adapter: sim.backend.description(),
         precision: sim.backend.precision(),
         spacing: case.run.spacing,
         particles: total,
-        fluid: scene.groups.fluid,
+        fluid: sim.groups.fluid,
         unknowns: last.unknowns,
         pairs: traffic.pairs,
         from: started,

@@ -5,6 +5,7 @@ use super::builtin::{self, ENTRIES};
 use super::computers::Computers;
 use super::definition::{Setup, files_of};
 use super::engine::{Context, Make, Options, Processor, Shard};
+use seixo::console::say;
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
 use serde::{Deserialize, Serialize};
@@ -40,10 +41,10 @@ pub struct StudyArgs {
     pub backend: Processor,
     /// Adapter of the GPU's points, a number or a part of a name as `seixo adapters` lists them. Without it a
     /// hardware GPU is taken, and no software one.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub adapter: Option<String>,
     /// Threads of the CPU's points; all cores if absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
     pub threads: Option<u16>,
     /// List the points and compute nothing.
     #[arg(long)]
@@ -127,13 +128,14 @@ impl Manifest {
 /// # Errors
 /// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
 pub fn command(args: &StudyArgs) -> Result<()> {
-    let computers = Computers::new(args.threads, args.adapter.clone());
+    seixo::threads::start(args.threads)?;
+    let computers = Computers::new(args.adapter.clone());
     let make: &Make = &|processor, scene, params, plan, settings| {
         computers.backend(processor, scene, params, plan, settings)
     };
     if args.what == "list" {
         for entry in ENTRIES {
-            println!("{:16} {}", entry.name, entry.about);
+            say(&format!("{:16} {}", entry.name, entry.about));
         }
         return Ok(());
     }
@@ -152,7 +154,7 @@ pub fn command(args: &StudyArgs) -> Result<()> {
     if args.dry_run {
         for (k, job) in study.jobs.iter().enumerate() {
             let parts: Vec<String> = job.parameters.iter().map(|(k, v)| format!("{k} = {v}")).collect();
-            println!("{k:4}  {}  {} ({})", job.hash(&study.name), job.method, parts.join(", "));
+            say(&format!("{k:4}  {}  {} ({})", job.hash(&study.name), job.method, parts.join(", ")));
         }
         return Ok(());
     }
@@ -167,11 +169,11 @@ pub fn command(args: &StudyArgs) -> Result<()> {
     };
     let context = Context { make, repetitions: args.repetitions };
     let (rows, text) = study.run(&options, &context, args.error)?;
-    print!("{text}");
+    say(text.trim_end_matches('\n'));
     let missing = study.jobs.len() - rows.len();
     if missing > 0 {
-        println!("{missing} of {} points are still to be computed.", study.jobs.len());
+        say(&format!("{missing} of {} points are still to be computed.", study.jobs.len()));
     }
-    println!("Results: {}", out.join("report.md").display());
+    say(&format!("Results: {}", out.join("report.md").display()));
     Ok(())
 }

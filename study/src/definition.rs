@@ -233,6 +233,13 @@ impl Definition {
         if study.error.is_empty() && study.check.is_empty() {
             return Err(Error::Case(format!("{name}: give [[error]] or [[check]]: what is to be found out")));
         }
+        let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+        if study.name.is_empty() || study.name.starts_with('.') || !study.name.chars().all(plain) {
+            return Err(Error::Case(format!(
+                "{name}: name: `{}` becomes the name of files: use letters, digits, _, - and dots inside of it",
+                study.name.escape_debug()
+            )));
+        }
         if study.case.is_some() == study.text.is_some() {
             return Err(Error::Case(format!("{name}: give `case` or `text`, one of them")));
         }

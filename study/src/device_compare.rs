@@ -2,9 +2,9 @@
 //! same state, and how far integral quantities drift apart over many steps.
 
 use glam::DVec3;
-use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::Gpu;
+use seixo::backend::{Backend, Processor};
 use seixo::body::{Pose, Wrench};
 use seixo::case::{Case, ContactDevice};
 use seixo::error::Result;
@@ -15,6 +15,7 @@ use seixo::plan::{ContactPlan, ParticleStage, Stage};
 use seixo::scene::{Drive, Scene, Solid};
 use seixo::simulation::Simulation;
 use serde::Serialize;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Error of a field after a stage.
@@ -224,13 +225,11 @@ fn for_cpu(case: &Case) -> Case {
 /// pass from stage to stage, as they do in a run.
 pub fn compare_stages(
     case: &Case,
-    scene: &Scene,
+    scene: &Arc<Scene>,
     adapter: Option<&str>,
     warmup: u64,
 ) -> Result<Vec<StageError>> {
-    let mut simulation = Simulation::new(&for_cpu(case), scene, |s, p, plan, settings| {
-        Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
-    })?;
+    let mut simulation = Simulation::on(&for_cpu(case), scene.clone(), &Processor::Cpu)?;
     for _ in 0..warmup {
         simulation.step()?;
     }
@@ -343,7 +342,8 @@ pub struct Drift {
 
 /// Run `steps` steps on the CPU and on the device, from the start of the case. Energies are compared to the
 /// largest energy at the end, momenta to mass times the root mean square speed, positions to the depth.
-pub fn drift(case: &Case, scene: &Scene, adapter: Option<&str>, steps: u64) -> Result<Drift> {
+pub fn drift(case: &Case, scene: &Arc<Scene>, adapter: Option<&str>, steps: u64) -> Result<Drift> {
+    let gpu = Processor::Gpu { adapter: adapter.map(str::to_owned) };
     let run = |mut simulation: Simulation| -> Result<(Simulation, f64, f64)> {
         let start = Instant::now();
         let mut iterations = 0.0;
@@ -354,13 +354,8 @@ pub fn drift(case: &Case, scene: &Scene, adapter: Option<&str>, steps: u64) -> R
         Ok((simulation, start.elapsed().as_secs_f64(), iterations / steps.max(1) as f64))
     };
     let (mut cpu, cpu_seconds, cpu_iterations) =
-        run(Simulation::new(&for_cpu(case), scene, |s, p, plan, settings| {
-            Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
-        })?)?;
-    let (mut gpu, gpu_seconds, gpu_iterations) =
-        run(Simulation::new(case, scene, |s, p, plan, settings| {
-            Ok(Box::new(Gpu::new(s, p, plan, settings, adapter)?) as Box<dyn Backend>)
-        })?)?;
+        run(Simulation::on(&for_cpu(case), scene.clone(), &Processor::Cpu)?)?;
+    let (mut gpu, gpu_seconds, gpu_iterations) = run(Simulation::on(case, scene.clone(), &gpu)?)?;
     let (c, g) = (cpu.backend.monitor()?, gpu.backend.monitor()?);
     let mut quantities = Vec::new();
     let mut add = |name: String, cpu: f64, gpu: f64, scale: f64| {

@@ -7,6 +7,7 @@
 use super::row::{FORMAT, Measured, Row, hash};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
+use seixo::console::remark;
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
 use seixo::params::Params;
@@ -160,7 +161,7 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
     let total: f64 = open.iter().map(|&k| jobs[k].weight).sum();
     let found = rows.iter().flatten().count();
     if found > 0 && !options.quiet {
-        eprintln!("{study}: {found} of {} points are finished already", jobs.len());
+        remark(&format!("{study}: {found} of {} points are finished already", jobs.len()));
     }
     let (start, mut done) = (Instant::now(), 0.0);
     for (n, &k) in open.iter().enumerate() {
@@ -182,13 +183,13 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
             let left = elapsed * (total / done.max(1e-300) - 1.0).max(0.0);
             let why = if row.measured.reason.is_empty() { "" } else { ": " };
             let place = format!("{}/{}", n + 1, open.len());
-            eprintln!(
+            remark(&format!(
                 "{study} [{place}] {} ({}): {}{why}{}  elapsed {elapsed:.0} s, ETA {left:.0} s",
                 row.method,
                 row.setting(),
                 row.measured.class.name(),
                 first_line(&row.measured.reason),
-            );
+            ));
         }
         // What is shown is what is in the file, to the last digit.
         rows[k] = serde_json::from_str(&text).ok().or(Some(row));

@@ -77,7 +77,7 @@ fn play(extreme: &Extreme, processor: Processor, context: &Context) -> Result<(E
         Err(error) => return refused(error, out),
     };
     let make = |s: &_, p: &_, plan: &_, settings| (context.make)(processor, s, p, plan, settings);
-    let mut simulation = match Simulation::new(&case, &scene, make) {
+    let mut simulation = match Simulation::with_backend(&case, scene, make) {
         Ok(simulation) => simulation,
         Err(error) => return refused(error, out),
     };
@@ -95,7 +95,7 @@ fn play(extreme: &Extreme, processor: Processor, context: &Context) -> Result<(E
         }
     }
     out.work.steps = simulation.steps;
-    out.work.particles = scene.groups.total() as u64;
+    out.work.particles = simulation.groups.total() as u64;
     out.work.particle_steps = out.work.particles * out.work.steps;
     out.put("time reached [s]", simulation.time);
     // A run that a guard stopped is not written out as a result; one that goes on is.

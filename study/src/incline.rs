@@ -199,14 +199,6 @@ pub fn calibrate(slide: Slide, friction: f64) -> Result<SlideRow> {
     Ok(SlideRow { friction, analytic: goal, error: row.time / goal - 1.0, ..row })
 }
 
-/// Fig. 12: eta for mu = 0, 0.1 ... 0.9.
-///
-/// # Errors
-/// Those of [`calibrate`].
-pub fn eta_curve(slide: Slide) -> Result<Vec<SlideRow>> {
-    (0..10).map(|k| if k == 0 { slide.run(5.0) } else { calibrate(slide, f64::from(k) * 0.1) }).collect()
-}
-
 /// Travel times of the smooth law for mu = 0 ... 0.9 on the slope.
 ///
 /// # Errors

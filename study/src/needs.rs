@@ -14,6 +14,7 @@ use seixo::fields::Fields;
 use seixo::plan::{Plan, Stage};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A kind of scene.
@@ -85,11 +86,11 @@ fn bits(simulation: &mut Simulation) -> Result<Vec<u64>> {
     Ok(bits)
 }
 
-fn play(sort: &Sort, all: bool) -> Result<(Ran, Plan, Scene)> {
+fn play(sort: &Sort, all: bool) -> Result<(Ran, Plan, Arc<Scene>)> {
     let sets: Vec<String> = sort.sets.iter().map(|s| (*s).to_string()).collect();
     let (case, _, _) = parse(sort.name, sort.text.to_owned(), &sets)?;
-    let scene = Scene::build(&case)?;
-    let mut simulation = Simulation::new(&case, &scene, |scene, params, plan, settings| {
+    let scene = Arc::new(Scene::build(&case)?);
+    let mut simulation = Simulation::with_backend(&case, scene.clone(), |scene, params, plan, settings| {
         let forced = if all { everything(plan) } else { plan.clone() };
         let mut cpu = Cpu::new(scene, params, &forced, settings)?;
         cpu.active_set = !all;

@@ -45,7 +45,7 @@ type Size = (&'static str, &'static str, f64);
 
 /// What a run holds at the start of a step.
 struct Moment {
-    scene: Scene,
+    scene: Arc<Scene>,
     params: Params,
     plan: Plan,
     step: Step,
@@ -57,17 +57,14 @@ impl Moment {
     fn new((name, text, spacing): Size) -> Result<Self> {
         let sets = [format!("run.spacing={spacing:?}"), "run.adaptive=true".into()];
         let (case, _, _) = parse(name, text.to_owned(), &sets)?;
-        let scene = Scene::build(&case)?;
-        let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
-            Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>)
-        })?;
+        let mut simulation = Simulation::on(&case, Scene::build(&case)?, &seixo::Processor::Cpu)?;
         for _ in 0..STEPS {
             simulation.step()?;
         }
         let step = simulation.next_step();
         let poses = simulation.solids.predict(step.time, step.dt).to_vec();
         let fields = simulation.backend.read()?;
-        let (params, plan) = (simulation.params.clone(), simulation.plan.clone());
+        let Simulation { params, plan, scene, .. } = simulation;
         Ok(Self { params, plan, step, poses, fields, scene })
     }
 

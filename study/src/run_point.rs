@@ -34,12 +34,11 @@ pub struct Point {
     pub repetitions: u32,
 }
 
-fn start(point: &Point, context: &Context) -> Result<(Simulation, Scene)> {
+fn start(point: &Point, context: &Context) -> Result<Simulation> {
     let (case, _, _) = parse("case", point.text.clone(), &[])?;
     let scene = Scene::build(&case)?;
     let make = |s: &_, p: &_, plan: &_, settings| (context.make)(point.processor, s, p, plan, settings);
-    let simulation = Simulation::new(&case, &scene, make)?;
-    Ok((simulation, scene))
+    Simulation::with_backend(&case, scene, make)
 }
 
 /// Steps of a throw-away run that warm up caches, threads and clocks.
@@ -50,14 +49,15 @@ const WARM_STEPS: u32 = 3;
 /// # Errors
 /// What keeps the run from starting. A run that diverges is a measured point of class failed.
 pub fn run(point: &Point, context: &Context) -> Result<Measured> {
-    let (mut warm, _) = start(point, context)?;
+    let mut warm = start(point, context)?;
     for _ in 0..WARM_STEPS {
         if warm.step().is_err() {
             break;
         }
     }
     drop(warm);
-    let (mut simulation, scene) = start(point, context)?;
+    let mut simulation = start(point, context)?;
+    let scene = simulation.scene.clone();
     let mut sampler = Sampler::new(&point.spec, &simulation, &scene)?;
     sampler.sample(&mut simulation, 0)?;
     let mut work = Work { particles: scene.groups.total() as u64, ..Work::default() };
@@ -98,7 +98,7 @@ pub fn run(point: &Point, context: &Context) -> Result<Measured> {
     let repetitions = if context.repetitions > 0 { context.repetitions } else { point.repetitions };
     let mut times = vec![seconds];
     for _ in 1..repetitions {
-        let (mut simulation, _) = start(point, context)?;
+        let mut simulation = start(point, context)?;
         let clock = Instant::now();
         while simulation.time < end - 1e-6 * simulation.case.run.time_step {
             simulation.step()?;

@@ -123,27 +123,6 @@ pub fn amplitude(law: Law, spring: f64, damping_ratio: f64, dt: f64, seconds: f6
     })
 }
 
-/// Fig. 3: amplitude over 10 s for the paper's springs, undamped and critically damped.
-///
-/// # Errors
-/// Those of [`amplitude`].
-pub fn amplitudes(law: Law, time_steps: &[f64]) -> Result<Vec<AmplitudeRow>> {
-    let mut rows = vec![];
-    for &dt in time_steps {
-        for ratio in [0.0, 1.0] {
-            for spring in SPRINGS {
-                // a single step beyond its stability limit is no result of the law
-                match amplitude(law, spring, ratio, dt, 10.0) {
-                    Ok(row) => rows.push(row),
-                    Err(seixo::error::Error::Case(_)) => {}
-                    Err(other) => return Err(other),
-                }
-            }
-        }
-    }
-    Ok(rows)
-}
-
 /// Fig. 4: the damped oscillation at K [N/m] beside the analytic one.
 ///
 /// # Errors

@@ -12,6 +12,7 @@ use seixo::params::{Params, Relaxation};
 use seixo::plan::LIGHT_2D;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::sync::Arc;
 
 /// A dam break in a small tank: 100 particles of water that slosh.
 const SLOSHING: &str = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.2\ndimensions = 2\n\
@@ -37,8 +38,7 @@ pub const GAMMA_MIXED: f64 = 2.0;
 
 fn simulation(text: &str, sets: &[String], context: &Context) -> Result<Simulation> {
     let (case, _, _) = parse("map", text.to_owned(), sets)?;
-    let scene = Scene::build(&case)?;
-    Simulation::new(&case, &scene, |s, p, plan, settings| {
+    Simulation::with_backend(&case, Scene::build(&case)?, |s, p, plan, settings| {
         (context.make)(Processor::Cpu, s, p, plan, settings)
     })
 }
@@ -137,11 +137,11 @@ fn viscous_limit(dimensions: u32, context: &Context) -> Result<Measured> {
         sets.extend(["tank.max=[0.4,0.1,0.6]", "fluid.block.0.max=[0.2,0.1,0.2]"].map(str::to_string));
     }
     let (case, _, _) = parse("map", SLOSHING.to_owned(), &sets)?;
-    let scene = Scene::build(&case)?;
+    let scene = Arc::new(Scene::build(&case)?);
     let limit = bisect(0.1, 2.0, |number| {
         let viscosity = number * 0.02 * 0.02 / 5e-4;
         // The check refuses cases beyond the limit: the map looks behind it.
-        let mut simulation = Simulation::new(&case, &scene, |s, p, plan, settings| {
+        let mut simulation = Simulation::with_backend(&case, scene.clone(), |s, p, plan, settings| {
             (context.make)(Processor::Cpu, s, &Params { viscosity, ..p.clone() }, plan, settings)
         })?;
         simulation.params.viscosity = viscosity;

@@ -2,11 +2,11 @@
 
 pub mod moving;
 
-use seixo::backend::Backend;
-use seixo::backend::cpu::Cpu;
+use seixo::backend::Processor;
 use seixo::case::Case;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::sync::Arc;
 
 /// The repository.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -16,14 +16,11 @@ pub fn case(text: &str) -> Case {
 }
 
 pub fn simulation(case: &Case) -> Simulation {
-    let scene = Scene::build(case).expect("the scene builds");
-    cpu_simulation(case, &scene)
+    cpu_simulation(case, Scene::build(case).expect("the scene builds"))
 }
 
-pub fn cpu_simulation(case: &Case, scene: &Scene) -> Simulation {
-    let make =
-        |s: &_, p: &_, plan: &_, settings| Ok(Box::new(Cpu::new(s, p, plan, settings)?) as Box<dyn Backend>);
-    Simulation::new(case, scene, make).expect("the simulation starts")
+pub fn cpu_simulation(case: &Case, scene: impl Into<Arc<Scene>>) -> Simulation {
+    Simulation::on(case, scene, &Processor::Cpu).expect("the simulation starts")
 }
 
 /// Still water 0.25 x 0.25 x `depth` m in a tank 0.2 m higher.

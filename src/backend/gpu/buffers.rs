@@ -81,7 +81,7 @@ table! {
         block_sum: u32, None, Fluid, |s, _| s.keys().div_ceil(SCAN_BLOCK);
         unsorted: u32, None, Fluid, |s, _| s.sorted();
         /// Positions, velocities and pressures of the fluid, one after the other.
-        sorted: [f32; 4], Reads, Fluid, |s, _| 2 * s.fluid + s.fluid.div_ceil(4);
+        sorted: f32, Reads, Fluid, |s, _| (4 + 4 + 1) * s.fluid;
         moving_slot: u32, None, Solids, |s, _| s.moving;
         static_start: u32, Writes, FixedWalls, |s, _| s.cells + 1;
         static_particle: [u32; 4], Writes, FixedWalls, |s, _| s.fixed;

@@ -5,6 +5,7 @@ use super::hierarchy::Levels;
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
 use crate::monitor::SPEED_BINS;
+use crate::neighbours::capacity;
 use crate::params::{Params, Step};
 use crate::plan::Plan;
 use crate::pressure::Settings;
@@ -22,6 +23,8 @@ const REDUCTION_GROUPS_MAX: u64 = 1024;
 pub const SCAN_BLOCK: u64 = 4 * WORKGROUP;
 /// Workgroups of a scan at most; they then take several blocks. A GPU is full with them.
 pub const SCAN_GROUPS_MAX: u64 = 1024;
+/// Fluid slots whose ghosts share a key of the counting sort; `GHOST_BLOCK` in shaders/common.wgsl.
+pub const GHOST_BLOCK: u64 = 64;
 /// Fluid particles at most: numbers travel in an f32.
 pub const FLUID_MAX: usize = 1 << 24;
 
@@ -33,16 +36,18 @@ pub mod counter {
     pub const DISPLACEMENT_CLAMPS: usize = 1;
     /// Pressures clamped since the last look.
     pub const PRESSURE_CLAMPS: usize = 2;
+    /// Negative pressures set to zero since the last look.
+    pub const NEGATIVE_PRESSURES: usize = 3;
     /// Most neighbours of a row.
-    pub const NEIGHBOURS_MAX: usize = 3;
+    pub const NEIGHBOURS_MAX: usize = 4;
     /// Smallest number of a particle that became non-finite, or `u32::MAX`.
-    pub const NON_FINITE: usize = 4;
+    pub const NON_FINITE: usize = 5;
     /// Smallest slot with more neighbours than a row holds, or `u32::MAX`.
-    pub const OVERFLOW: usize = 5;
+    pub const OVERFLOW: usize = 6;
     /// Words in the buffer.
     pub const WORDS: usize = 8;
     /// Their start values.
-    pub const START: [u32; WORDS] = [0, 0, 0, 0, u32::MAX, u32::MAX, 0, 0];
+    pub const START: [u32; WORDS] = [0, 0, 0, 0, 0, u32::MAX, u32::MAX, 0];
 }
 
 /// Constants of a run; see `Constants` in shaders/common.wgsl for the units.
@@ -156,12 +161,6 @@ pub fn middle(params: &Params) -> DVec3 {
     if params.dimensions == 2 { DVec3::new(m.x, 0.0, m.z) } else { m }
 }
 
-/// Neighbours that a row holds at most: twice the full lattice's, 64 for the usual one in three dimensions.
-/// Healthy runs stay below 1.6 times; more means that the fluid has collapsed onto itself.
-pub fn capacity(params: &Params) -> u32 {
-    (2 * params.neighbours).next_multiple_of(8).max(24)
-}
-
 impl Constants {
     /// In f64 as far as possible, rounded once.
     pub fn new(params: &Params, groups: &Groups, grid: &Grid, settings: &Settings, sizes: &Sizes) -> Self {
@@ -257,7 +256,7 @@ impl Sizes {
             cells: grid.total() as u64,
             grid: grid.count,
             solids: scene.solids.len() as u64,
-            capacity: u64::from(capacity(params)),
+            capacity: capacity(params.neighbours) as u64,
             rows_per_thread: 1,
         }
     }
@@ -293,7 +292,7 @@ impl Sizes {
 
     /// Keys of the counting sort.
     pub fn keys(&self) -> u64 {
-        self.cells + 1 + if self.moving > 0 { self.cells } else { 0 }
+        self.cells + self.fluid.div_ceil(GHOST_BLOCK) + if self.moving > 0 { self.cells } else { 0 }
     }
 
     /// Workgroups of the conjugate gradients.

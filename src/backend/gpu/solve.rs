@@ -9,22 +9,40 @@ use crate::pressure::{Outcome, PressureReport};
 
 /// Iterations between looks once the last solve's number is used up, with the diagonal and with multigrid.
 const CHUNK: [u32; 2] = [8, 2];
+/// Iterations to expect of the diagonal where multigrid has failed.
+const ALONE: u32 = 30;
 
 impl Gpu {
-    /// Conjugate gradients with the planned preconditioner. The residual reported is the true one,
-    /// ||b - A x|| / ||b||.
+    /// Conjugate gradients with the planned preconditioner; where multigrid breaks them down, again with the diagonal
+    /// alone, from where they stopped. The residual reported is the true one, ||b - A x|| / ||b||.
     pub(super) fn conjugate_gradient(&mut self) -> Result<PressureReport> {
         self.build_levels()?;
+        let multigrid = self.levels.is_some();
+        let first = report(&self.iterate(multigrid, self.settings.warm_start, self.last_iterations)?);
+        if !(multigrid && first.outcome == Outcome::Breakdown) {
+            self.last_iterations = first.iterations;
+            return Ok(first);
+        }
+        let again = report(&self.iterate(false, true, ALONE)?);
+        Ok(PressureReport { iterations: first.iterations + again.iterations, ..again })
+    }
+
+    /// Iterate until the device's verdict, with a cycle of multigrid or the diagonal; `expected` iterations are queued
+    /// before the first look.
+    fn iterate(&mut self, cycle: bool, warm_start: bool, expected: u32) -> Result<Solve> {
         let groups = self.sizes.reduction_groups();
         let over_rows = |kernel| (kernel, groups);
         let mut iteration = Vec::new();
-        // What judges the residual of the last iteration of a chunk; with the diagonal the next chunk does.
+        // What judges the residual of the last iteration of a chunk; without levels the next chunk does.
         let mut judge = None;
         if let Some(levels) = &self.levels {
             let descend = over_rows(kernel::descend);
             iteration.push(descend);
-            iteration.extend(levels.cycle(groups));
-            iteration.push(over_rows(kernel::ascend));
+            // Without the cycle z stays what `advance` made it: the residual over the diagonal.
+            if cycle {
+                iteration.extend(levels.cycle(groups));
+                iteration.push(over_rows(kernel::ascend));
+            }
             judge = Some(descend);
         }
         iteration.extend([kernel::multiply, kernel::advance].map(over_rows));
@@ -32,23 +50,20 @@ impl Gpu {
 
         let context = &mut self.context;
         context.clear(buffers::solve)?;
-        if !self.settings.warm_start {
+        if !warm_start {
             context.clear(buffers::pressure)?;
         }
         context.pass([kernel::pack, kernel::start_residual, kernel::start].map(over_rows))?;
         // An iteration too many costs empty dispatches, one too few a round trip to the device.
-        let multigrid = judge.is_some();
-        let spare = if multigrid { 1 } else { self.last_iterations / 8 + 2 };
-        let mut chunk = self.last_iterations + spare;
+        let mut chunk = expected + if cycle { 1 } else { expected / 8 + 2 };
         loop {
             let iterations = (0..chunk).flat_map(|_| iteration.iter().copied());
             context.pass(iterations.chain(judge).chain(end.map(over_rows)))?;
             let solve = context.download(buffers::solve, 1)?[0];
             if solve.done != 0 {
-                self.last_iterations = solve.iterations;
-                return Ok(report(&solve));
+                return Ok(solve);
             }
-            chunk = CHUNK[usize::from(multigrid)];
+            chunk = CHUNK[usize::from(cycle)];
         }
     }
 

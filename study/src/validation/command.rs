@@ -8,6 +8,7 @@ use crate::computers::Computers;
 use crate::definition::{Definition, Setup};
 use crate::engine::{Context, Make, Options, Processor, Shard};
 use crate::report::write_table;
+use seixo::console::say;
 use seixo::error::Result;
 use std::path::PathBuf;
 
@@ -44,7 +45,7 @@ pub struct ValidateArgs {
     #[arg(long, value_name = "N")]
     pub adapter: Option<String>,
     /// Threads of the CPU path; all cores if absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
     pub threads: Option<u16>,
     /// List the points and compute nothing.
     #[arg(long)]
@@ -64,17 +65,18 @@ pub fn command(args: &ValidateArgs) -> Result<()> {
         for name in cases::names("validation") {
             let definition = Definition::parse(name, &cases::text("validation", &format!("{name}.toml"))?)?;
             let when = if definition.full { " (with --full)" } else { "" };
-            println!("{name:20} {}{when}", definition.title);
+            say(&format!("{name:20} {}{when}", definition.title));
         }
         return Ok(());
     }
     let setup = Setup { full: args.full, sets: args.sets.clone(), processor: args.backend, runs: args.runs };
     let suite = Suite::new(&args.names, &setup)?;
     if args.dry_run {
-        suite.points().for_each(|point| println!("{point}"));
+        suite.points().for_each(|point| say(&point));
         return Ok(());
     }
-    let computers = Computers::new(args.threads, args.adapter.clone());
+    seixo::threads::start(args.threads)?;
+    let computers = Computers::new(args.adapter.clone());
     let options = Options {
         out: args.out.clone(),
         shard: args.shard,
@@ -89,12 +91,12 @@ pub fn command(args: &ValidateArgs) -> Result<()> {
     let path = args.page.clone().unwrap_or_else(|| args.out.join("validation.md"));
     page::write(&path, &suite, &rows)?;
     for validation in &suite.validations {
-        page::lines(validation, &rows).iter().for_each(|line| println!("{line}"));
+        page::lines(validation, &rows).iter().for_each(|line| say(line));
     }
     let missing = suite.len() - rows.len();
     if missing > 0 {
-        println!("{missing} of {} points are still to be computed.", suite.len());
+        say(&format!("{missing} of {} points are still to be computed.", suite.len()));
     }
-    println!("Page: {}", path.display());
+    say(&format!("Page: {}", path.display()));
     Ok(())
 }

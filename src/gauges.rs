@@ -1,7 +1,7 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
-use super::frames::read;
-use super::wall_force::FixedWall;
+pub mod wall_force;
+
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
@@ -10,6 +10,7 @@ use crate::output::table::{Cell, vector_cells, vector_columns};
 use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
+use wall_force::FixedWall;
 
 /// A pressure gauge: wall particles, and the way from each to the gauge's point [m].
 #[derive(Clone, Debug)]
@@ -119,7 +120,7 @@ impl Gauges {
         let mut row = vec![Cell::from(simulation.time)];
         self.pressures(simulation, known, &mut row)?;
         let viscous = simulation.params.viscosity > 0.0 && self.force.iter().any(|(_, t)| t.is_fixed());
-        let fields = if viscous || !self.level.is_empty() { read(simulation)? } else { None };
+        let fields = if viscous || !self.level.is_empty() { Some(simulation.fields()?) } else { None };
         let params = &simulation.params;
         for &(_, line) in &self.level {
             let level = fields.as_ref().and_then(|f| {

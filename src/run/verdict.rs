@@ -1,0 +1,125 @@
+//! What can be said of a result: fine, degraded, or nothing at all.
+
+use crate::output::result::{Grade, Summary, Verdict};
+use crate::scene::{Drive, Scene};
+use crate::simulation::Simulation;
+use crate::time_step::collapse_speed;
+
+/// Part of the solves that may fail, of the particles that may get lost, in a fine result and in one that means
+/// anything [-].
+const FAILURES: (f64, f64) = (0.01, 0.5);
+const LOST: (f64, f64) = (1e-3, 0.1);
+/// Mean of n / n0 - 1 [-]: the water is compressed by that much.
+const COMPRESSION: (f64, f64) = (0.05, 0.3);
+/// Largest speed over that of a fall through the domain.
+const SPEED: (f64, f64) = (5.0, 25.0);
+/// Gain of energy over the energy at hand.
+const GAIN: (f64, f64) = (0.1, 1.0);
+/// v dt / l0 [-]. Splashes are faster than the flow, and do no harm.
+const COURANT: (f64, f64) = (1.0, 10.0);
+/// Depth to which solids sank into each other over l0 [-].
+const PENETRATION: (f64, f64) = (0.5, 3.0);
+
+/// Speeds and energies that a scene can come to by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// Speed [m/s].
+    speed: f64,
+    /// Energy [J].
+    energy: f64,
+}
+
+impl Scale {
+    /// Those of `scene` at its start, as `simulation` holds it.
+    pub fn new(simulation: &Simulation, scene: &Scene) -> Self {
+        let params = &simulation.params;
+        let g = params.gravity.length();
+        let (low, high) = scene.domain;
+        let height = (high - low).abs().dot(params.gravity.normalize_or_zero().abs());
+        let height = if height.is_finite() { height } else { 0.0 };
+        let start = scene.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
+        // Tables of motion put in any energy: as much as all the water and all the bodies at their speed.
+        let driven = scene.solids.iter().filter_map(|s| match &s.drive {
+            Drive::Prescribed(motion) => Some(motion.fastest(0.0, simulation.case.run.end)),
+            Drive::Free(_) => None,
+        });
+        let driven = driven.fold(0.0, f64::max);
+        let (mut bodies, mut turning) = (0.0, 0.0);
+        for solid in &scene.solids {
+            if let Drive::Free(body) = &solid.drive {
+                bodies += body.mass;
+                turning += (body.inertia * body.angular_velocity * body.angular_velocity).element_sum();
+            }
+        }
+        let water = scene.groups.fluid as f64 * params.particle_mass();
+        let speed = start.max(driven);
+        // Water at rest without gravity is never quite at rest.
+        let noise = if water > 0.0 { 0.1 * params.sound_speed(simulation.case.run.time_step) } else { 0.0 };
+        Self {
+            speed: (speed * speed + 2.0 * g * height).sqrt().max(collapse_speed(params)).max(noise),
+            energy: g * (water * params.depth + bodies * height)
+                + (water + bodies) * speed * speed
+                + turning
+                + water * noise * noise,
+        }
+    }
+}
+
+/// Reasons, each with the grade that it leaves.
+struct Judge(Vec<(Grade, String)>);
+
+impl Judge {
+    /// `value` against what is fine and what is anything.
+    fn bound(&mut self, value: f64, (fine, any): (f64, f64), say: impl FnOnce() -> String) {
+        // A value that is not a number fits no bound.
+        let grade = if value <= fine {
+            return;
+        } else if value <= any {
+            Grade::Degraded
+        } else {
+            Grade::Failed
+        };
+        self.0.push((grade, say()));
+    }
+}
+
+/// The verdict on a run that reached its end or was stopped.
+pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
+    let (p, m) = (&summary.pressure, &summary.monitors);
+    let mut judge = Judge(Vec::new());
+    let solves = summary.steps.max(1) as f64;
+    let wet = summary.particles.fluid > 0 && summary.steps > 0;
+    if wet {
+        let fluid = summary.particles.fluid as f64;
+        judge.bound(p.failures as f64 / solves, FAILURES, || {
+            format!(
+                "{} of {} pressure solves missed fluid.solver.tolerance (largest residual {:.1e})",
+                p.failures, summary.steps, p.relative_residual_max
+            )
+        });
+        judge.bound(m.lost_particles as f64 / fluid, LOST, || {
+            format!("{} of {fluid} fluid particles left the domain", m.lost_particles)
+        });
+        judge.bound(m.density_error_mean.abs(), COMPRESSION, || {
+            format!("the water's density is off by {:.1} % in the mean", 100.0 * m.density_error_mean)
+        });
+        judge.bound(m.speed_max, (SPEED.0 * scale.speed, SPEED.1 * scale.speed), || {
+            format!("water reached {:.1} m/s where {:.1} m/s is to be expected", m.speed_max, scale.speed)
+        });
+        judge.bound(m.courant_max, COURANT, || {
+            format!("water moved {:.1} particles far in a step", m.courant_max)
+        });
+    }
+    judge.bound(m.penetration_max_over_l0, PENETRATION, || {
+        format!("solids sank {:.1} particles deep into each other", m.penetration_max_over_l0)
+    });
+    let gain = m.energy_max - m.energy_start;
+    judge.bound(gain, (GAIN.0 * scale.energy, GAIN.1 * scale.energy), || {
+        format!("the energy rose by {gain:.2e} J, where {:.2e} J is at hand", scale.energy)
+    });
+    judge.0.sort_by(|a, b| b.0.cmp(&a.0));
+    Verdict {
+        grade: judge.0.first().map_or(Grade::Fine, |(grade, _)| *grade),
+        reasons: judge.0.into_iter().map(|(_, why)| why).collect(),
+    }
+}

@@ -1,0 +1,244 @@
+//! Misuse and bad luck as a user meets them: what is refused, what is said, what is left behind.
+
+use crate::cli::{assert_whole, json, ran, seixo, small_case};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Runs the small case with `sets` and returns exit code, stderr and whether a folder was left.
+fn run(sets: &[&str]) -> (i32, String, bool) {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results");
+    let mut args = vec!["run", &case, "--backend", "cpu", "-q", "-o"];
+    let shown = out.display().to_string();
+    args.push(&shown);
+    args.extend(sets.iter().flat_map(|s| ["--set", s]));
+    let ran = ran(&args);
+    (ran.code, ran.err, out.exists())
+}
+
+/// What is refused by `run` is refused by `plan` in the same words, and leaves no folder.
+#[test]
+fn run_and_plan_refuse_the_same_and_leave_no_folder() {
+    let body = "body=[{name=\"b\",size=[0.2,0.05,0.2],center=[X,0,Z],density=500}]";
+    let at = |x: &str, z: &str| body.replace('X', x).replace('Z', z);
+    let contact = "contact={spring=1e5}";
+    let (beside, below, over) = (at("3.0", "0.3"), at("1.0", "-1.0"), at("1.3", "1.5"));
+    for (sets, words) in [
+        (vec!["run.gravity=[0,0,0,-9.81]"], "4 elements"),
+        (vec!["run.time_step=0.05"], "particles far in a step"),
+        (vec!["fluid.compressibility=1"], "fluid.compressibility: 1e0 1/Pa"),
+        (vec![&beside, contact], "body `b` at (3.0000, 0.0000, 0.3000) lies outside of the tank"),
+        (vec![&below, contact], "which spans 0 to 1 m along z, with nothing beneath it"),
+        (vec![&over, "contact={spring=1e9,substeps=1}"], "contact.substeps = 1 is unstable"),
+        (vec!["gauge.pressure.0.point=[1.5,0,0.9]"], "gauge.pressure `p floor`"),
+    ] {
+        let (code, err, left) = run(&sets);
+        assert!(code == 2 && err.contains(words), "{sets:?}: {code} {err}");
+        assert!(!left, "{sets:?} left a folder");
+        let folder = tempfile::tempdir().unwrap();
+        let case = small_case(folder.path());
+        let plan = ran(&[vec!["plan", &case], sets.iter().flat_map(|s| ["--set", s]).collect()].concat());
+        assert!(plan.code == 2 && plan.err.contains(words), "plan {sets:?}: {} {}", plan.code, plan.err);
+    }
+    let (code, err, _) = run(&[&over, contact]);
+    assert_eq!(code, 0, "a body above the open tank falls into it: {err}");
+}
+
+#[test]
+fn numbers_and_names_that_are_none_are_refused_on_the_command_line() {
+    for args in [
+        vec!["run", "cases/hydrostatic.toml", "--until", "nan"],
+        vec!["run", "cases/hydrostatic.toml", "--until", "inf"],
+        vec!["run", "cases/hydrostatic.toml", "--spacing", "NaN"],
+        vec!["run", "cases/hydrostatic.toml", "--adapter", ""],
+        vec!["run", "cases/hydrostatic.toml", "--threads", "60000"],
+        vec!["study", "hydrostatic", "--threads", "60000"],
+    ] {
+        let ran = ran(&args);
+        assert!(
+            ran.code == 2 && ran.err.contains(args[args.len() - 2]),
+            "{args:?}: {} {}",
+            ran.code,
+            ran.err
+        );
+    }
+}
+
+#[test]
+fn a_result_that_means_nothing_is_no_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results").display().to_string();
+    let base = ["run", &case, "-o", &out, "--backend", "cpu", "--force", "-q", "--json"];
+    let with = |sets: &[&str]| {
+        let sets: Vec<&str> = sets.iter().flat_map(|s| ["--set", s]).collect();
+        ran(&[&base[..], &sets].concat())
+    };
+    let fine = with(&[]);
+    assert_eq!((fine.code, fine.err.as_str()), (0, ""));
+    assert_eq!(json(&fine.out)["verdict"], serde_json::json!({ "grade": "fine", "reasons": [] }));
+    let none = with(&["fluid.solver.max_iterations=1", "fluid.solver.tolerance=1e-9"]);
+    assert_eq!(none.code, 4);
+    assert!(
+        none.err.contains("means nothing: 50 of 50 pressure solves missed fluid.solver.tolerance"),
+        "{}",
+        none.err
+    );
+    let result = json(&none.out);
+    assert_eq!(
+        (result["status"].as_str(), result["verdict"]["grade"].as_str()),
+        (Some("failed"), Some("failed"))
+    );
+    let some = with(&["fluid.solver.max_iterations=12"]);
+    assert_eq!(some.code, 0, "{}", some.err);
+    assert!(some.err.starts_with("verdict: degraded because "), "{}", some.err);
+    assert_eq!(json(&some.out)["verdict"]["grade"], "degraded");
+}
+
+/// A gate of 50 m/s would cross 2.5 spacings in a typed step.
+#[test]
+fn adaptive_steps_see_solids() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results").display().to_string();
+    let gate = "moving_wall.0.motion=[[0,0,0,0],[0.01,0,0,0],[0.02,0,0,0.5]]";
+    let run = ran(&[
+        "run",
+        &case,
+        "-o",
+        &out,
+        "--backend",
+        "cpu",
+        "--json",
+        "-q",
+        "--until",
+        "0.02",
+        "--set",
+        gate,
+        "--set",
+        "run.adaptive=true",
+    ]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let monitors = std::fs::read_to_string(Path::new(&out).join("monitors.csv")).unwrap();
+    let mut fast = 0;
+    for line in monitors.lines().skip(2) {
+        let cells: Vec<f64> = line.split(',').take(3).map(|c| c.parse().unwrap()).collect();
+        let (start, dt) = (cells[1] - cells[2], cells[2]);
+        if start > 0.01 - 1e-9 {
+            assert!(50.0 * dt <= 0.35 * 0.05 * (1.0 + 1e-9), "a step of {dt} s at {start} s");
+            fast += 1;
+        }
+    }
+    assert!(fast >= 28, "{fast} steps while the gate moves: {monitors}");
+}
+
+#[test]
+fn a_second_run_into_a_live_folder_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results");
+    let mut first = Command::new(seixo().get_program())
+        .args(["run", &case, "--backend", "cpu", "-q", "--until", "1e6", "-o"])
+        .arg(&out)
+        .spawn()
+        .unwrap();
+    while !out.join("vtu/fluid_0001.vtu").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let second = ran(&["run", &case, "--backend", "cpu", "-q", "--force", "-o", &out.display().to_string()]);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert!(second.code == 2 && second.err.contains("is in use"), "{} {}", second.code, second.err);
+    assert_whole(&out);
+}
+
+#[test]
+fn closed_streams_kill_no_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let run = |name: &str, redirect: &str| {
+        let out = folder.path().join(name);
+        let program = seixo().get_program().to_owned();
+        let line = format!("\"$0\" run \"$1\" -o \"$2\" --backend cpu {redirect}; exit ${{PIPESTATUS[0]}}");
+        let status =
+            Command::new("bash").arg("-c").arg(line).arg(program).arg(&case).arg(&out).status().unwrap();
+        (status.code().unwrap(), json(&std::fs::read_to_string(out.join("result.json")).unwrap()))
+    };
+    // Nobody reads the remarks: the results are all there.
+    let (code, result) = run("remarks", "2> >(true) > /dev/null");
+    assert_eq!((code, result["status"].as_str()), (0, Some("done")));
+    let (_, result) = run("both", "2>&1 | true");
+    assert_eq!(result["status"], "done");
+    if cfg!(target_os = "linux") {
+        let (code, result) = run("full", "--json -q > /dev/full 2> /dev/null");
+        assert_eq!((code, result["status"].as_str()), (5, Some("done")), "a result that nobody could read");
+    }
+}
+
+/// The disk fills up in the middle: tables end with a whole row, and the summary says why.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_leaves_whole_files_and_a_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results");
+    // Files larger than 40 kB fail as they do on a full disk; SIGXFSZ is what bash would die of.
+    let line = "trap '' XFSZ; ulimit -f 40; exec \"$0\" run \"$1\" -o \"$2\" --backend cpu -q --until 5";
+    let program = seixo().get_program().to_owned();
+    let output = Command::new("bash")
+        .args(["-c", line])
+        .arg(program)
+        .arg(&case)
+        .arg(&out)
+        .stdout(Stdio::null())
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(5), "{err}");
+    assert!(err.contains(".csv: File too large"), "{err}");
+    assert_whole(&out);
+    let result = json(&std::fs::read_to_string(out.join("result.json")).unwrap());
+    assert_eq!(result["status"], "failed");
+    assert!(result["exit_reason"].as_str().unwrap().contains("File too large"), "{result}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_cannot_start_are_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("results");
+    // Address space for the program but not for the stacks of a thousand threads.
+    let line = "ulimit -v 1500000; exec \"$0\" run \"$1\" -o \"$2\" --backend cpu -q --threads 1024";
+    let program = seixo().get_program().to_owned();
+    let output = Command::new("bash").args(["-c", line]).arg(program).arg(&case).arg(&out).output().unwrap();
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(5) && err.contains("1024 threads: "), "{:?}: {err}", output.status);
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_study_cannot_write_beside_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let study =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/study/hydrostatic.toml"));
+    let study = study.unwrap();
+    let named = |name: &str| {
+        let mut lines: Vec<String> = study.lines().map(str::to_owned).collect();
+        let line = lines.iter_mut().find(|l| l.starts_with("name = ")).unwrap();
+        *line = format!("name = {name}");
+        let path = folder.path().join("study.toml");
+        std::fs::write(&path, lines.join("\n")).unwrap();
+        ran(&["study", &path.display().to_string(), "--dry-run"])
+    };
+    for name in ["\"../../x\"", "\"/tmp/x\"", "\"\"", "\"a\\u001bb\"", "\".hidden\""] {
+        let refused = named(name);
+        assert!(
+            refused.code == 2 && refused.err.contains("becomes the name of files"),
+            "{name}: {}",
+            refused.err
+        );
+        assert!(!refused.err.contains('\u{1b}'));
+    }
+}
