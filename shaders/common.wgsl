@@ -56,6 +56,7 @@ struct Constants {
     gradient_scale: f32,   // d / n0
     density: f32,
     tolerance_squared: f32,
+    wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the

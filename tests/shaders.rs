@@ -233,6 +233,7 @@ fn structs_lie_the_same_on_both_sides() {
             gradient_scale,
             density,
             tolerance_squared,
+            wall_shear,
         }
     );
     same_layout!(

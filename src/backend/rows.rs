@@ -29,7 +29,7 @@ wide! {
         let mut arrays = RowArrays::default();
         for (k, a) in acceleration.iter_mut().enumerate() {
             let row = chunk.pressure(k);
-            *a = viscosity::viscosity(first + k, row, on.params, on.position, on.velocity, &mut arrays);
+            *a = viscosity::viscosity(first + k, row, on.params, on.fluid, on.position, on.velocity, &mut arrays);
         }
     }
 }

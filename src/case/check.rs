@@ -230,7 +230,9 @@ impl Checker<'_> {
         let Some(l0) = self.spacing().filter(|_| fits && !run.adaptive && run.time_step > 0.0) else {
             return;
         };
-        let limit = Lattice::new(run.dimensions, run.effective_radius).viscous_limit(run.dimensions);
+        let lattice = Lattice::new(run.dimensions, run.effective_radius);
+        let paper = self.case.fluid.as_ref().is_some_and(|f| f.preset == super::Preset::Paper);
+        let limit = lattice.viscous_limit(run.dimensions, if paper { 1.0 } else { lattice.wall_shear });
         let number = viscosity * run.time_step / (l0 * l0);
         if number > limit {
             let dt = 0.5 * limit * l0 * l0 / viscosity;

@@ -92,6 +92,6 @@ impl FixedWall {
         }
         let coefficient = params.viscosity * 2.0 * f64::from(params.dimensions)
             / (params.laplacian * params.number_density);
-        params.particle_mass() * coefficient * sum
+        params.particle_mass() * coefficient * params.wall_shear * sum
     }
 }

@@ -1,7 +1,8 @@
 //! Viscous acceleration, Eqs. (2) and (6), with the positions and neighbours of the last step.
 //! GPU twin: shaders/viscosity.wgsl
 //!
-//! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction.
+//! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction. A pair of
+//! fluid and wall weighs `params.wall_shear`: the wall's velocity holds on its surface, half a spacing before its layer.
 
 use crate::lattice::weight;
 use crate::neighbours::Row;
@@ -9,18 +10,21 @@ use crate::params::Params;
 use crate::row_arrays::RowArrays;
 use glam::DVec3;
 
-/// nu times the Laplacian of the velocity at slot `i` [m/s2]; `row` holds its pressure-carrying neighbours.
+/// nu times the Laplacian of the velocity at slot `i` [m/s2]; `row` holds its pressure-carrying neighbours, of which
+/// those below `fluid` are fluid.
 /// The particles have moved since the list was made: weights are made afresh.
 #[inline(always)]
 pub fn viscosity(
     i: usize,
     row: Row,
     params: &Params,
+    fluid: usize,
     position: &[DVec3],
     velocity: &[DVec3],
     arrays: &mut RowArrays,
 ) -> DVec3 {
-    coefficient(params) * laplacian_sum(i, row, |_| true, params, position, velocity, arrays)
+    let share = |j: u32| if (j as usize) < fluid { 1.0 } else { params.wall_shear };
+    coefficient(params) * laplacian_sum(i, row, share, params, position, velocity, arrays)
 }
 
 /// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
@@ -34,10 +38,10 @@ pub fn reaction(
     velocity: &[DVec3],
     arrays: &mut RowArrays,
 ) -> DVec3 {
-    let wet = |j: u32| (j as usize) < fluid;
+    let share = |j: u32| if (j as usize) < fluid { params.wall_shear } else { 0.0 };
     params.particle_mass()
         * coefficient(params)
-        * laplacian_sum(i, row, wet, params, position, velocity, arrays)
+        * laplacian_sum(i, row, share, params, position, velocity, arrays)
 }
 
 /// 2 d nu / (lambda n0) [1/s].
@@ -45,12 +49,12 @@ fn coefficient(params: &Params) -> f64 {
     params.viscosity * 2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density)
 }
 
-/// sum w (v_j - v_i) over the neighbours that `counts` admits.
+/// sum w (v_j - v_i) over the neighbours, each with its `share`.
 #[inline(always)]
 fn laplacian_sum(
     i: usize,
     row: Row,
-    counts: impl Fn(u32) -> bool,
+    share: impl Fn(u32) -> f64,
     params: &Params,
     position: &[DVec3],
     velocity: &[DVec3],
@@ -66,8 +70,7 @@ fn laplacian_sum(
     });
     let mut sum = DVec3::ZERO;
     for (&w, &j) in w.iter().zip(row.neighbour) {
-        let w = if counts(j) { w } else { 0.0 };
-        sum += w * (velocity[j as usize] - velocity[i]);
+        sum += share(j) * w * (velocity[j as usize] - velocity[i]);
     }
     sum
 }

@@ -79,6 +79,8 @@ pub struct Constants {
     pub gradient_scale: f32,
     pub density: f32,
     pub tolerance_squared: f32,
+    pub wall_shear: f32,
+    pub pad: [f32; 3],
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -191,6 +193,8 @@ impl Constants {
             gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
             density: params.density as f32,
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
+            wall_shear: params.wall_shear as f32,
+            pad: [0.0; 3],
         }
     }
 }
