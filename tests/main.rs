@@ -15,6 +15,7 @@ mod device;
 mod faults;
 mod fluid;
 mod fuzz;
+mod gauges;
 mod immersed;
 mod kernels;
 mod layers;
