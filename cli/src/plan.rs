@@ -226,7 +226,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
         sound_speed_m_s: params.sound_speed(dt),
         relaxation: step.relaxation,
         compressibility_1_pa: step.compressibility,
-        cells: Grid::new(params)?.total(),
+        cells: if built { Grid::new(params)?.total() } else { Estimate::new(&seen.case).cells as usize },
         neighbours_max: if built { Some(cpu.counters()?.neighbours_max) } else { None },
         cpu_bytes: (cpu.bytes() as f64 * sizes.pressure as f64 / coarse) as u64,
         gpu_bytes: memory.total(),

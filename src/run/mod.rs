@@ -8,20 +8,22 @@
 mod due;
 pub mod frames;
 pub mod resume;
+mod saving;
 pub mod summary;
 pub mod tables;
 pub mod verdict;
 
-use crate::checkpoint::{Archive, Found, Origin, file};
+use crate::checkpoint::{Archive, Found};
 use crate::error::{Error, Result};
 use crate::gauges::Gauges;
-use crate::output::folder::{Folder, Mode, checkpoints};
+use crate::output::folder::{Folder, Mode};
 use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 pub use due::Due;
 use frames::Frames;
+use saving::{Saving, earlier, fits};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -148,28 +150,6 @@ pub fn run(
     run.finish(simulation, scene, &options, &folder, stop, observe, resumes)
 }
 
-/// The state that `run.from` names.
-fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
-    let Some(from) = &simulation.case.run.from else { return Ok(None) };
-    let found = file::newest(&checkpoints(Path::new(from)))?;
-    let found = found.ok_or_else(|| Error::Case(format!("run.from: `{from}` holds no checkpoint")))?;
-    fits(simulation, &found).map_err(|e| Error::Case(format!("run.from: {e}")))?;
-    Ok(Some(Found { archive: found.archive.to_restore(), ..found }))
-}
-
-/// Refuses a state of another kind of processor.
-fn fits(simulation: &Simulation, found: &Found) -> Result<()> {
-    let (had, have) = (&found.origin.precision, simulation.backend.precision());
-    if had == have {
-        return Ok(());
-    }
-    let name = |precision: &str| if precision == "f64" { "cpu" } else { "gpu" };
-    let (path, had, have) = (found.path.display(), name(had), name(have));
-    Err(Error::Case(format!(
-        "{path} was saved by a run on the {had}, this one is on the {have}: use --backend {had}"
-    )))
-}
-
 fn remove(path: &Path) -> Result<()> {
     match std::fs::remove_file(path) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path)(e)),
@@ -182,53 +162,6 @@ enum End {
     Steps,
     Signal(i32),
     Deadline,
-}
-
-/// When and where the state is saved.
-struct Saving {
-    folder: PathBuf,
-    origin: Origin,
-    every: Due,
-    wall: Option<Duration>,
-    /// At all, but for signals.
-    planned: bool,
-    last: Instant,
-    /// Step of the file written last.
-    step: Option<u64>,
-    /// A state that was good, in case the run diverges.
-    good: Option<(u64, f64, Archive)>,
-}
-
-impl Saving {
-    fn new(simulation: &Simulation, name: &str, text: &str, folder: PathBuf) -> Self {
-        let checkpoint = simulation.case.run.checkpoint;
-        let origin = Origin {
-            version: env!("CARGO_PKG_VERSION").into(),
-            name: name.into(),
-            case: text.into(),
-            precision: simulation.backend.precision().into(),
-            step: 0,
-            time: 0.0,
-        };
-        let wall =
-            (checkpoint.wall > 0.0).then(|| Duration::try_from_secs_f64(checkpoint.wall).ok()).flatten();
-        Self {
-            folder,
-            origin,
-            every: Due::new(Some(checkpoint.every.unwrap_or(0.0))),
-            wall,
-            planned: checkpoint.wall > 0.0 || checkpoint.every.is_some(),
-            last: Instant::now(),
-            step: None,
-            good: None,
-        }
-    }
-
-    fn write(&mut self, step: u64, time: f64, archive: &Archive) -> Result<()> {
-        file::write(&self.folder, &Origin { step, time, ..self.origin.clone() }, archive)?;
-        (self.last, self.step, self.good) = (Instant::now(), Some(step), None);
-        Ok(())
-    }
 }
 
 struct Run {
