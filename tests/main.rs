@@ -11,6 +11,7 @@ mod cli;
 mod compare;
 mod contact;
 mod contact_device;
+mod contact_hard;
 mod device;
 mod faults;
 mod fluid;
