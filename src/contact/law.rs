@@ -82,8 +82,11 @@ pub(crate) trait Law: Send {
         Ok(1)
     }
 
-    /// The solids have been put elsewhere: what was deep before says nothing.
+    /// The solids have been put elsewhere, and the lists are no longer theirs.
     fn forget(&mut self) {}
+
+    /// The solids have been put elsewhere, where the lists still hold: what was deep before says nothing.
+    fn moved(&mut self) {}
 
     /// Energy stored at the poses of `now` [J], by the host alone.
     fn energy(&mut self, now: Now) -> f64;

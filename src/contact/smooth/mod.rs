@@ -228,6 +228,11 @@ impl Law for Smooth {
         self.device = None;
     }
 
+    fn moved(&mut self) {
+        let device = self.device.iter_mut().flat_map(|d| &mut d.pairs);
+        self.pairs.iter_mut().chain(device).for_each(|p| p.depth = f64::INFINITY);
+    }
+
     fn energy(&mut self, now: Now) -> f64 {
         self.press_on_host(now);
         self.pairs.iter().map(|p| p.energy).sum()
