@@ -457,7 +457,7 @@ fn deviation_of_stretched(factors: DVec3) -> f64 {
 
 #[test]
 fn water_stretched_at_constant_volume_keeps_its_density() {
-    for (stretch, most) in [(1.1_f64, 0.0015), (1.2, 0.0015), (1.3, 0.012)] {
+    for (stretch, most) in [(1.1_f64, 0.001), (1.2, 0.002), (1.3, 0.012)] {
         let (squeeze, root) = (1.0 / stretch, 1.0 / stretch.sqrt());
         for factors in [
             DVec3::new(stretch, 1.0, squeeze),
@@ -557,7 +557,7 @@ fn gravity_and_pressure_balance_on_a_melted_arrangement() {
     let (rms, mean) = frozen_snapshot("");
     println!("net acceleration of still water: rms {rms:.4} g, mean {mean:+.4} g");
     // Kicks by gravity in the predictor left 0.29 and -0.28 g.
-    assert!(rms < 0.15 && mean.abs() < 0.03, "{rms} {mean}");
+    assert!(rms < 0.15 && mean.abs() < 0.05, "{rms} {mean}");
 }
 
 #[test]

@@ -9,9 +9,8 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 11] = [
+pub const SWITCHES: [&str; 10] = [
     "CORRECTED",
-    "CORRECTED_SURFACE",
     "MIXED",
     "MOVING",
     "MULTIGRID",
@@ -27,7 +26,6 @@ pub const SWITCHES: [&str; 11] = [
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         params.gradient != Gradient::Minimum,
-        params.gradient == Gradient::CorrectedSurface,
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
