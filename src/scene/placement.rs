@@ -48,7 +48,7 @@ impl Surroundings<'_> {
         let Some((lift, up)) = lift else {
             let away = out.map_or("move it away".into(), |n| {
                 let n = point(n);
-                format!("move its center by {:.6} m along {n}", overlap + 1e-6)
+                format!("move it away, its center by {:.6} m along {n}", overlap + 1e-6)
             });
             return Err(format!("{says}: {away}, lifting it would take more than half its height"));
         };

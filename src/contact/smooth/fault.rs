@@ -8,9 +8,9 @@ use crate::contact::substeps::MOST_SUBSTEPS;
 use glam::{DMat3, DVec3};
 
 /// Depth over half of a solid's thickness from which its other side may soon be the nearer one.
-const THROUGH: f64 = 0.8;
+pub(super) const THROUGH: f64 = 0.8;
 /// Depth over the spacing that a driven solid is not pressed beyond: its stop would have held by then.
-const DRIVEN: f64 = 1.0;
+pub(super) const DRIVEN: f64 = 1.0;
 /// Way of a sub-step over half of the thickness of what is hit, at most: one sub-step at least sees it inside.
 const WAY: f64 = 0.5;
 
@@ -50,7 +50,10 @@ impl Smooth {
 
     /// The first pair of the last evaluation that has left what the law can be trusted with.
     pub(super) fn first_fault(&self, now: &Now) -> Option<Fault> {
-        self.evaluated().iter().filter(|p| p.depth > 0.0).find_map(|pair| {
+        // few pairs are ever deep, or much deeper than before
+        let little = 1e-3 * self.spacing;
+        let deep = |p: &&Pair| p.depth > p.before + little || p.depth > self.harmless;
+        self.evaluated().iter().filter(deep).find_map(|pair| {
             let [middle_a, middle_b] = self.middles(pair, now);
             let (in_a, in_b) = pair.deepest();
             let closing = Self::closing(pair, now);
@@ -60,7 +63,7 @@ impl Smooth {
             };
             let driven = pair.b.solid().is_some_and(|b| !now.bodies[b].is_free());
             let fault = |what: String| Fault { a: pair.a, b: other(pair.b), what };
-            if pair.depth > pair.before + 2.0 * closing * now.substep + 1e-3 * self.spacing {
+            if pair.depth > pair.before + 2.0 * closing * now.substep + little {
                 return Some(fault(format!(
                     "is suddenly {:.3e} m deep, after {:.3e} m: it came in where contact does not look; use a \
                      smaller run.time_step or a thicker wall",

@@ -37,6 +37,7 @@ use crate::error::Result;
 use crate::scene::{Scene, Solid};
 use crate::shape::{Cuboid, Geometry, Surface};
 use friction::Friction;
+use glam::{DMat3, DVec3};
 use pair::{Other, Pair};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -53,6 +54,8 @@ pub(crate) struct Smooth {
     pub walls: Vec<WallBox>,
     pub pairs: Vec<Pair>,
     friction: Friction,
+    /// Depth [m] below which no pair of the scene can be in trouble.
+    harmless: f64,
     pub spacing: f64,
     generation: u64,
     /// Sub-step and longest step [s] that the pairs have the constants of.
@@ -66,10 +69,18 @@ impl Smooth {
     pub fn new(scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Self {
         let of = |s: &Solid| s.surface(scene.spacing, scene.dimensions);
         let surfaces: Vec<Surface> = scene.solids.iter().map(of).collect();
+        let walls = walls::walls(scene);
+        let thinnest =
+            |half: DVec3| if scene.dimensions == 2 { half.x.min(half.z) } else { half.min_element() };
+        let solids = bodies.iter().map(|b| thinnest(b.shape.extent(DMat3::IDENTITY)));
+        let all = solids.chain(walls.iter().map(|w| thinnest(w.half)));
+        let harmless =
+            (fault::THROUGH * all.fold(f64::INFINITY, f64::min)).min(fault::DRIVEN * scene.spacing);
         limits.lambda = bodies.iter().zip(&surfaces).map(|(b, s)| stability::lambda(b, s)).collect();
         Self {
             surfaces,
-            walls: walls::walls(scene),
+            walls,
+            harmless,
             pairs: vec![],
             friction: Friction::default(),
             spacing: scene.spacing,

@@ -548,7 +548,7 @@ impl Pair {
         let a = &bodies[self.a];
         let b = self.b.solid().map(|b| &bodies[b]);
         let least = view.least / density;
-        other.shape.nodes((start, along, line.length), other.faces, least, &mut |s, width, inside| {
+        other.shape.each_node((start, along, line.length), other.faces, least, |s, width, inside| {
             let at = other.center + other.axes * (start + s * along);
             let normal = sign * (other.axes * inside.outward);
             let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
