@@ -7,6 +7,8 @@
 pub mod particle;
 
 use crate::body::{Pose, Wrench};
+use crate::checkpoint::Archive;
+use crate::error::Result;
 
 /// A part of the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +86,14 @@ impl Ledger {
     /// Sum of all entries [J].
     pub fn total(&self) -> f64 {
         self.0.iter().sum()
+    }
+
+    /// Save the entries, or take them over.
+    pub(crate) fn exchange(&mut self, archive: &mut Archive, of: &str) -> Result<()> {
+        for entry in Entry::ALL {
+            archive.number(&format!("ledger.{of}.{}", entry.name()), &mut self.0[entry as usize])?;
+        }
+        Ok(())
     }
 
     /// Entry by entry with another one.

@@ -4,6 +4,7 @@
 //! marked folder does `--force` remove anything, and only files with the names that a run gives.
 
 use super::write_whole;
+use crate::checkpoint::file::is_checkpoint;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -20,6 +21,20 @@ const RESERVED: usize = 32 << 10;
 /// Files of a run in the folder itself, beside `NAME.pvd`.
 const FILES: [&str; 7] =
     ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", RESERVE];
+
+/// The folder of the checkpoints of a run in `root`.
+pub fn checkpoints(root: &Path) -> PathBuf {
+    root.join("checkpoint")
+}
+
+/// Name of the case whose run `root` holds; nothing if it is no folder of seixo's.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn case_name(root: &Path) -> Result<Option<String>> {
+    let folder = Folder { root: root.to_path_buf(), name: String::new(), lock: Arc::new(None) };
+    Ok(folder.marker()?.map(|m| m.name))
+}
 
 /// What the marker says.
 #[derive(Debug, Serialize, Deserialize)]
@@ -68,7 +83,8 @@ impl Folder {
         let shown = root.display();
         if filled && mode == Mode::New {
             return Err(Error::Case(format!(
-                "{shown} is not empty; choose another folder with --out, or replace the results in it with --force"
+                "{shown} is not empty; choose another folder with --out, go on with the run in it with --resume, or \
+                 replace the results in it with --force"
             )));
         }
         let earlier = folder.marker()?;
@@ -170,7 +186,8 @@ impl Folder {
         self.remove(&self.pictures(), |file| {
             numbered(file, "frame_", ".png") || file.starts_with(".writing-")
         })?;
-        for folder in [self.vtu(), self.pictures()] {
+        self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(".writing-"))?;
+        for folder in [self.vtu(), self.pictures(), self.checkpoints()] {
             // Somebody else's files keep their folder.
             let _ = std::fs::remove_dir(folder);
         }
@@ -221,6 +238,11 @@ impl Folder {
     /// The folder of the pictures.
     pub fn pictures(&self) -> PathBuf {
         self.root.join("pictures")
+    }
+
+    /// The folder of the checkpoints.
+    pub fn checkpoints(&self) -> PathBuf {
+        checkpoints(&self.root)
     }
 
     /// The list of frames.

@@ -10,6 +10,8 @@
 //! | `monitors.csv`, `bodies.csv`, `gauges.csv` | row by row | tables over time, units in the header |
 //! | `pictures/frame_0000.png`, `final.png` | if asked for | pictures of the particles |
 //! | `result.json` | at the end, also of a failed run | the summary |
+//! | `checkpoint/step_0000000000.seixo` | now and then | the state, see [`crate::checkpoint::file`] |
+//! | `.seixo`, `.reserve` | at the start | marker and lock; room for the last word |
 //!
 //! Whole files appear by rename and tables grow by whole rows, so a killed run leaves nothing that cannot
 //! be read.
