@@ -173,7 +173,7 @@ impl Asked {
             }
             (None, Some(out)) => {
                 let none = || Error::Case(format!("{} holds no run of seixo to go on with", out.display()));
-                let name = case_name(&out)?.ok_or_else(none)?;
+                let name = case_name(&out)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
                 Ok(Self { case: out.join("case.toml"), name, out, resume, inputs: Vec::new() })
             }
             (None, None) => Err(Error::Case("--resume: name the folder of the run, or its case".into())),

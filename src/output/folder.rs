@@ -37,7 +37,7 @@ pub fn case_name(root: &Path) -> Result<Option<String>> {
 }
 
 /// What the marker says.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 struct Marker {
     /// Version of the program.
     seixo: String,
@@ -122,7 +122,8 @@ impl Folder {
     fn marker(&self) -> Result<Option<Marker>> {
         let path = self.file(MARKER);
         match std::fs::read(&path) {
-            Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
+            // A run that was killed while it wrote the marker has marked the folder all the same.
+            Ok(bytes) => Ok(Some(serde_json::from_slice(&bytes).unwrap_or_default())),
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
             Err(e) => Err(Error::io(&path)(e)),
         }
@@ -147,10 +148,11 @@ impl Folder {
         }
         let marker = Marker { seixo: env!("CARGO_PKG_VERSION").into(), name: self.name.clone() };
         let text = serde_json::to_string(&marker).unwrap_or_default() + "\n";
-        // Written in place: a rename would leave the lock on a file that is gone.
-        file.set_len(0)
-            .and_then(|()| std::io::Write::write_all(&mut &file, text.as_bytes()))
-            .map_err(Error::io(&path))?;
+        // In place, for a rename would leave the lock on a file that is gone; and not at all if it says that already.
+        if std::fs::read(&path).map_err(Error::io(&path))? != text.as_bytes() {
+            let put = std::io::Write::write_all(&mut &file, text.as_bytes());
+            put.and_then(|()| file.set_len(text.len() as u64)).map_err(Error::io(&path))?;
+        }
         Ok(Some(file))
     }
 
