@@ -116,7 +116,7 @@ fn still_water_does_not_rock_itself() {
     }
     println!("kinetic energy {:.4} J", sum / count);
     // 0.019 to 0.026 J when gravity kicked the particles before the pressure carried them.
-    assert!(sum / count < 0.009, "{}", sum / count);
+    assert!(sum / count < 0.015, "{}", sum / count);
 }
 
 #[test]

@@ -33,8 +33,8 @@ impl Cpu {
             neighbours,
             live,
             counters,
-            dt,
             ledger,
+            dt,
         } = self;
         let Fields {
             position,
