@@ -4,6 +4,7 @@
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::Wrench;
 use crate::case::{Case, ContactDevice, Fluid};
+use crate::checkpoint::Archive;
 use crate::contact::{ContactReport, Solids};
 use crate::error::Result;
 use crate::monitor::FluidMonitor;
@@ -12,6 +13,7 @@ use crate::plan::{ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
+use glam::DVec3;
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -122,6 +124,49 @@ impl Simulation {
             speed: 0.0,
             threads: None,
         })
+    }
+
+    /// Save the whole state between two steps, or take it over.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Case`] if the state is that of another scene, or what the backend says.
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            // Follows from the case.
+            case: _,
+            scene: _,
+            params: _,
+            plan: _,
+            groups,
+            wait_for_stages: _,
+            threads: _,
+            // Times by the clock are those of each process.
+            stages: _,
+            backend,
+            solids,
+            fluid_force,
+            time,
+            steps,
+            speed,
+        } = self;
+        let Groups { fluid, moving_wall, static_wall, static_dummy, moving_dummy } = *groups;
+        archive.same("particles of water", fluid as u64)?;
+        archive.same("wall particles that move", moving_wall as u64)?;
+        archive.same("wall particles", static_wall as u64)?;
+        archive.same("dummies", static_dummy as u64)?;
+        archive.same("dummies that move", moving_dummy as u64)?;
+        archive.same("solids that move", fluid_force.len() as u64)?;
+        archive.number("time", time)?;
+        archive.count("steps", steps)?;
+        archive.number("speed", speed)?;
+        let vectors = fluid_force.iter().flat_map(|w| [w.force, w.torque]);
+        let mut vectors: Vec<DVec3> = vectors.collect();
+        archive.array("fluid_force", &mut vectors, true)?;
+        for (wrench, v) in fluid_force.iter_mut().zip(vectors.chunks_exact(2)) {
+            *wrench = Wrench { force: v[0], torque: v[1] };
+        }
+        backend.exchange(archive)?;
+        solids.exchange(archive, backend.compute())
     }
 
     /// When the PPE's solver stops.

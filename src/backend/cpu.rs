@@ -1,5 +1,7 @@
 //! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
 
+mod archive;
+
 use super::rows::{Shared, density_rows, gradient_rows, viscosity_rows};
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
@@ -405,6 +407,10 @@ impl Backend for Cpu {
         // The lists name the slots of the particles that were here before.
         self.neighbours = Neighbours::new(self.neighbours.rows());
         Ok(())
+    }
+
+    fn exchange(&mut self, archive: &mut crate::checkpoint::Archive) -> Result<()> {
+        Cpu::exchange(self, archive)
     }
 
     fn traffic(&mut self) -> Result<Traffic> {

@@ -139,8 +139,14 @@ impl Checker<'_> {
                 "allowed: 2, 3",
             );
         }
+        self.not_negative("run.checkpoint.wall", run.checkpoint.wall, "s (0: no checkpoints by the clock)");
+        if let Some(every) = run.checkpoint.every {
+            self.positive("run.checkpoint.every", every, "s");
+        }
         if let Some([min, max]) = &run.domain {
             self.box_edges("run.domain", "run.domain", min, max);
+            self.place("run.domain", min);
+            self.place("run.domain", max);
         }
         if run.spacing > 0.0 && run.time_step > 0.0 && run.end.is_finite() && run.end / run.time_step > 1e9 {
             let message = format!("{:.1e} steps of {} s", run.end / run.time_step, run.time_step);

@@ -42,6 +42,7 @@ impl Checker<'_> {
                 self.positive(&path(key), value, unit);
             }
         }
+        self.place(&path("center"), &body.center);
         if let Some(inertia) = body.inertia {
             let [a, b, c] = inertia;
             if inertia.iter().any(|&i| i.is_finite() && i <= 0.0) {

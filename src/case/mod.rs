@@ -74,6 +74,28 @@ pub struct Run {
     /// Effective radius over the spacing, re / l0 [-].
     #[serde(default = "Run::default_effective_radius")]
     pub effective_radius: f64,
+    /// When the state is saved, so that a run that was stopped goes on where it was.
+    #[serde(default)]
+    pub checkpoint: Checkpoint,
+    /// Folder of an earlier run whose last state is the start of this one, instead of t = 0; a relative one counts
+    /// from the case file. Scene and processor must be the same; time, gauges, output and constants may differ.
+    pub from: Option<String>,
+}
+
+/// Intervals between checkpoints; there is one at the end, too, and when a signal stops a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Checkpoint {
+    /// Simulated time between checkpoints [s]; none by simulated time if absent.
+    pub every: Option<f64>,
+    /// Wall-clock time between checkpoints [s]; 0 for none, nor at the end, unless `every` is given.
+    pub wall: f64,
+}
+
+impl Default for Checkpoint {
+    fn default() -> Self {
+        Self { every: None, wall: 600.0 }
+    }
 }
 
 impl Run {

@@ -8,7 +8,7 @@ use super::friction::Friction;
 use super::geometry::{self, WallBox};
 use super::stiffness::{self, Damping, MOST_SUBSTEPS};
 use super::{Limits, paper, smooth};
-use crate::body::Body;
+use crate::body::{Body, Pose};
 use crate::scene::Scene;
 use crate::shape::{Cuboid, Geometry, Surface};
 use rayon::prelude::*;
@@ -21,19 +21,25 @@ const STEPS_AHEAD: f64 = 6.0;
 /// The lists' validity, and the pairs of solids that are close.
 pub(crate) struct Candidates {
     /// Path of each solid's fastest point since the lists were made [m].
-    travel: Vec<f64>,
+    pub(super) travel: Vec<f64>,
     /// Path that each solid may make [m].
-    skin: Vec<f64>,
-    valid: bool,
+    pub(super) skin: Vec<f64>,
+    pub(super) valid: bool,
     /// Counts how often the pairs were made.
-    generation: u64,
+    pub(super) generation: u64,
+    /// Poses that the lists were made in, and the step that they were made for [s].
+    pub(super) made: Vec<Pose>,
+    pub(super) made_dt: f64,
     /// Pairs of solids (a free one first) whose bounding boxes meet, sorted.
     pub close: Vec<(usize, usize)>,
 }
 
 impl Candidates {
-    pub fn new(solids: usize) -> Self {
+    pub fn new(poses: &[Pose]) -> Self {
+        let solids = poses.len();
         Self {
+            made: poses.to_vec(),
+            made_dt: 0.0,
             travel: vec![0.0; solids],
             skin: vec![0.0; solids],
             valid: false,
@@ -70,7 +76,9 @@ impl Candidates {
         if self.valid {
             return;
         }
+        self.made_dt = dt;
         for (k, body) in bodies.iter().enumerate() {
+            self.made[k] = body.pose;
             let speed = body.pose.velocity.length() + body.pose.angular_velocity.length() * body.radius();
             self.skin[k] = 0.25 * spacing + STEPS_AHEAD * dt * speed;
             self.travel[k] = 0.0;

@@ -5,6 +5,7 @@
 //! bodies a round trip to a device at every sub-step would cost more than the work; [`crate::plan`] judges.
 
 mod advice;
+mod archive;
 mod broad;
 mod candidates;
 mod collision;
@@ -153,12 +154,12 @@ impl Solids {
         Ok(Self {
             names: scene.solids.iter().map(|s| s.name.clone()).collect(),
             predicted: poses.clone(),
+            candidates: Candidates::new(&poses),
             poses,
             contact: vec![Wrench::default(); bodies.len()],
             load: vec![Wrench::default(); bodies.len()],
             gravity: scene.gravity,
             spacing: scene.spacing,
-            candidates: Candidates::new(bodies.len()),
             bodies,
             model,
             on_device: OnDevice::None,

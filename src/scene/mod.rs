@@ -63,6 +63,14 @@ pub enum Kind {
     Ghost = 5,
 }
 
+impl Kind {
+    /// The kind of a number, as `kind as u8` gives it.
+    pub fn from_code(code: u8) -> Option<Self> {
+        let all = [Self::Fluid, Self::Wall, Self::Dummy, Self::BodyWall, Self::BodyDummy, Self::Ghost];
+        all.into_iter().find(|&k| k as u8 == code)
+    }
+}
+
 /// How many particles each group holds; the groups lie in this order.
 #[derive(Clone, Copy, Default, Debug, PartialEq, Eq)]
 pub struct Groups {
