@@ -61,7 +61,8 @@ struct Constants {
     tolerance_squared: f32,
     smooth_density: f32,   // W0
     surface_head: f32,     // of the missing half spacing, Pa
-    pad: vec2f,
+    wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
+    pad: f32,
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the

@@ -6,7 +6,7 @@ use crate::body::{Pose, Wrench};
 use crate::case::{Case, ContactDevice, Fluid};
 use crate::checkpoint::Archive;
 use crate::contact::{ContactReport, Solids};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::params::{Params, Step};
@@ -109,7 +109,7 @@ impl Simulation {
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
                         what there is) or leave contact.device out";
-            return Err(crate::error::Error::Case(text.into()));
+            return Err(Error::Case(text.into()));
         }
         if plan.ledger && plan.wet() && backend.ledger()?.is_none() {
             let text =
@@ -176,8 +176,8 @@ impl Simulation {
             *wrench = Wrench { force: v[0], torque: v[1] };
         }
         if let Some((ledger, energy)) = solids_ledger {
-            ledger.exchange(archive, "solids")?;
-            archive.number("ledger.bodies", energy)?;
+            ledger.exchange(archive, "ledger.solids")?;
+            archive.number("ledger.energy", energy)?;
         }
         backend.exchange(archive)?;
         solids.exchange(archive, backend.compute())
@@ -284,7 +284,13 @@ impl Simulation {
         let report = self
             .timed(Stage::Contact, |s| s.solids.advance_on(s.backend.compute(), step.time, step.dt, &force));
         self.fluid_force = force;
-        let report = report?;
+        // the solids count no steps
+        let report = report.map_err(|e| match e {
+            Error::Diverged { time, stage, what, .. } => {
+                Error::Diverged { step: self.steps, time, stage, what }
+            }
+            other => other,
+        })?;
         self.check_bodies(step)?;
         if let Some(before) = before {
             self.book_solids(&given, &before, step.dt);

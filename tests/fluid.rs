@@ -588,3 +588,31 @@ fn a_collapse_gains_no_energy_whatever_the_start() {
     }
     assert!(worst < 1.0005, "{worst}");
 }
+
+#[test]
+fn a_plate_that_moves_along_drags_water_to_the_line_between_the_surfaces() {
+    // Plane Couette flow between free ends, ten particles across: u = U x / h. Walls that count as resting where their
+    // layers stand, half a spacing behind their surfaces, leave 4.5 % of U on the surface.
+    let (h, speed, viscosity) = (0.1, 0.1, 0.01);
+    let case = case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nend = 0.6\ngravity = [0, 0, 0]\ndimensions = 2\n\
+         domain = [[-0.1, -0.1, -0.4], [0.2, 0.1, 0.8]]\n\
+         [tank]\nmin = [0, 0, -0.2]\nmax = [{h}, 0.1, 0.6]\nopen = [\"x_max\", \"z_min\", \"z_max\"]\n\
+         [[moving_wall]]\nname = \"plate\"\nmin = [{h}, 0, -0.3]\nmax = [0.13, 0.1, 0.6]\n\
+         open = [\"x_max\", \"z_min\", \"z_max\"]\nmotion = [[0, 0, 0, 0], [1, 0, 0, {speed}]]\n\
+         [fluid]\nviscosity = {viscosity}\nsound_speed = 2\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [{h}, 0.1, 0.4]\n"
+    ));
+    let mut sim = simulation(&case);
+    while sim.time < 0.6 {
+        sim.step().expect("a step");
+    }
+    let fields = sim.backend.read().expect("the fields");
+    let middle: Vec<(f64, f64)> = (0..sim.groups.fluid)
+        .filter(|&i| (0.15..0.25).contains(&fields.position[i].z))
+        .map(|i| (fields.position[i].x / h, fields.velocity[i].z / speed))
+        .collect();
+    let rms = middle.iter().map(|(x, u)| (u - x).powi(2)).sum::<f64>() / middle.len() as f64;
+    println!("{} particles, rms {:.4} of the plate's speed", middle.len(), rms.sqrt());
+    assert!(middle.len() > 80 && rms.sqrt() < 0.01, "rms {}", rms.sqrt());
+}

@@ -235,6 +235,7 @@ fn structs_lie_the_same_on_both_sides() {
             tolerance_squared,
             smooth_density,
             surface_head,
+            wall_shear,
             pad,
         }
     );

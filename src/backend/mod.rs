@@ -50,10 +50,10 @@ impl Counters {
             non_finite,
             overflow,
         } = self;
-        archive.count("counters.negative_pressures", negative_pressures)?;
         archive.count("counters.lost", lost)?;
         archive.count("counters.displacement_clamps", displacement_clamps)?;
         archive.count("counters.pressure_clamps", pressure_clamps)?;
+        archive.count("counters.negative_pressures", negative_pressures)?;
         archive.small("counters.neighbours_max", neighbours_max)?;
         let mut none = non_finite.unwrap_or(u32::MAX);
         archive.small("counters.non_finite", &mut none)?;

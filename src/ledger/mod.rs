@@ -83,17 +83,15 @@ impl Ledger {
         self.0[entry as usize] += work;
     }
 
+    /// Save the work so far under `name`, or take it over.
+    pub(crate) fn exchange(&mut self, archive: &mut Archive, name: &str) -> Result<()> {
+        let entries = Entry::ALL.iter().zip(&mut self.0);
+        entries.map(|(entry, work)| archive.number(&format!("{name}.{}", entry.name()), work)).collect()
+    }
+
     /// Sum of all entries [J].
     pub fn total(&self) -> f64 {
         self.0.iter().sum()
-    }
-
-    /// Save the entries, or take them over.
-    pub(crate) fn exchange(&mut self, archive: &mut Archive, of: &str) -> Result<()> {
-        for entry in Entry::ALL {
-            archive.number(&format!("ledger.{of}.{}", entry.name()), &mut self.0[entry as usize])?;
-        }
-        Ok(())
     }
 
     /// Entry by entry with another one.

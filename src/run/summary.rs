@@ -45,9 +45,9 @@ impl Totals {
             looks,
             density_error,
             speed,
-            // By the clock of each process.
-            // Read anew with every row.
+            // Read from the simulation at the next row.
             ledger: _,
+            // By the clock of each process.
             output: _,
         } = self;
         for (name, value) in

@@ -33,8 +33,8 @@ impl Cpu {
             neighbours,
             live,
             counters,
-            ledger,
             dt,
+            ledger,
         } = self;
         let Fields {
             position,
@@ -64,8 +64,9 @@ impl Cpu {
             lists(archive, neighbours, position.len())?;
         }
         counters.exchange(archive)?;
+        // Its pressures and accelerations are made anew in every step.
         if let Some(ledger) = ledger {
-            ledger.work.exchange(archive, "water")?;
+            ledger.work.exchange(archive, "ledger.water")?;
         }
         archive.number("dt", dt)?;
         let count = kind.iter().take(groups.fluid).filter(|&&k| k == Kind::Fluid).count();

@@ -82,7 +82,8 @@ pub struct Constants {
     pub tolerance_squared: f32,
     pub smooth_density: f32,
     pub surface_head: f32,
-    pub pad: [f32; 2],
+    pub wall_shear: f32,
+    pub pad: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -197,7 +198,8 @@ impl Constants {
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
             smooth_density: params.smooth_density as f32,
             surface_head: missing_head(params) as f32,
-            pad: [0.0; 2],
+            wall_shear: params.wall_shear as f32,
+            pad: 0.0,
         }
     }
 }
