@@ -150,19 +150,17 @@ impl Gauges {
     }
 
     /// Pressures at the gauges' points. That of a wall particle is brought to the point as the force on bodies is
-    /// brought to their surface: with the weight of the water between, and the half spacing by which P = 0 lies below
+    /// brought to their surface: with the weight of the water between, and what the pressure lacks at
     /// the water's surface. A dry particle has none.
     fn pressures(&self, simulation: &mut Simulation, known: bool, row: &mut Vec<Cell>) -> Result<()> {
         let slots: Vec<usize> = self.pressure.iter().flat_map(|g| &g.slots).copied().collect();
         let pressures = if slots.is_empty() { Vec::new() } else { simulation.backend.pressures(&slots)? };
-        let weight = simulation.params.density * simulation.params.gravity;
+        let params = &simulation.params;
         let mut rest = pressures.as_slice();
         for gauge in &self.pressure {
             let (own, after) = rest.split_at(gauge.slots.len());
             rest = after;
-            let at_point = |(&p, &way): (&f64, &DVec3)| {
-                surface_pressure(p, p > 0.0, way, weight, simulation.params.spacing)
-            };
+            let at_point = |(&p, &way): (&f64, &DVec3)| surface_pressure(p, p > 0.0, way, params);
             let sum: f64 = own.iter().zip(&gauge.to_point).map(at_point).sum();
             row.push(Cell::from(if known { sum / own.len() as f64 } else { f64::NAN }));
         }

@@ -234,6 +234,8 @@ pub fn run(args: &RunArgs) -> Exit {
             groups.total(),
             groups.fluid
         ));
+        let advice = simulation.solids.advice(simulation.case.run.time_step);
+        advice.words.iter().for_each(|line| remark(line));
     }
     // Until here there is nothing to save, and a signal ends the program at once.
     let stop = signals::watch(args.quiet)?;

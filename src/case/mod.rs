@@ -8,7 +8,10 @@ mod check_solids;
 pub mod file;
 mod overrides;
 mod report;
+mod shape;
 mod surplus;
+
+pub use shape::BodyShape;
 
 use crate::scheme::{FreeSurface, Gradient, Source};
 use schemars::JsonSchema;
@@ -319,7 +322,8 @@ pub struct MovingWall {
     /// Faces that need no particles because nothing reaches them.
     #[serde(default)]
     pub open: Vec<Face>,
-    /// Rows of time [s] and displacement x, y, z [m]; linear between rows, constant after the last.
+    /// Rows of time [s] and displacement x, y, z [m]. Two rows: a constant velocity; more: a smooth curve through them
+    /// with a continuous velocity. At rest before the first and after the last.
     pub motion: Vec<[f64; 4]>,
 }
 
@@ -349,19 +353,6 @@ pub enum Freedom {
     RotationY,
     /// Rotation about z.
     RotationZ,
-}
-
-/// Shape of a body.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyShape {
-    /// A box of `size`.
-    #[default]
-    Box,
-    /// A sphere of `radius` (three dimensions).
-    Sphere,
-    /// A cylinder of `radius` and `height` with flat ends, along `axis`; in two dimensions a disc.
-    Cylinder,
 }
 
 /// A rigid body.
@@ -403,7 +394,8 @@ pub struct Body {
     /// Degrees of freedom that are locked.
     #[serde(default)]
     pub locked: Vec<Freedom>,
-    /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table instead of forces.
+    /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table, as a moving wall does,
+    /// instead of forces.
     pub motion: Option<Vec<[f64; 4]>>,
     /// Remove the water that the body displaces at t = 0 (otherwise an overlap is an error).
     #[serde(default)]
@@ -445,13 +437,15 @@ pub struct Contact {
     /// Contact law.
     #[serde(default = "Contact::default_law")]
     pub law: Law,
-    /// Spring coefficient K [N/m], Eq. (10).
+    /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none.
+    #[serde(default)]
     pub spring: f64,
     /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.
     pub damping: Option<f64>,
     /// Damping over the critical one of the lightest body, C / (2 sqrt(K m)) [-], Eq. (15).
     pub damping_ratio: Option<f64>,
-    /// Normal restitution e of a free impact [-] (law "smooth").
+    /// Normal restitution e of a free impact [-] (law "smooth"): 1 elastic, 0 plastic. 0.5 if none of the three is
+    /// given with law "smooth"; law "paper" is then undamped.
     pub restitution: Option<f64>,
     /// Numerical friction eta of Eq. (12) [kg/s]: over particle pairs (law "paper") or over the true
     /// surfaces, where it adds to `friction` (law "smooth").
@@ -561,6 +555,8 @@ pub struct Output {
     pub encoding: Encoding,
     /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
     pub table_every: Option<f64>,
+    /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.
+    pub ledger: bool,
 }
 
 impl Default for Output {
@@ -570,6 +566,7 @@ impl Default for Output {
             kinds: vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall],
             encoding: Encoding::Base64,
             table_every: None,
+            ledger: false,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The state of the solids, and of the lists of what may touch.
 
+use super::Solids;
 use super::candidates::Candidates;
-use super::{Limits, Solids};
+use super::substeps::{Cut, Limits};
 use crate::body::{Pose, Wrench};
 use crate::checkpoint::Archive;
 use crate::compute::Compute;
@@ -38,12 +39,11 @@ impl Solids {
             names: _,
             gravity: _,
             spacing,
-            model: _,
+            law: _,
             limits,
             // Made anew in every step, or from the state, or counters.
             poses: _,
             predicted: _,
-            on_device: _,
             traffic: _,
             load: _,
             bodies,
@@ -60,14 +60,16 @@ impl Solids {
             lambda: _,
             lightest: _,
             fastest: _,
+            falling: _,
             longest_step,
         } = limits;
         archive.number("solids.longest_step", longest_step)?;
-        let (mut dt, mut omega_dt, mut substeps) = planned.unwrap_or((-1.0, 0.0, 1));
+        let none = Cut { substeps: 1, omega_dt: 0.0 };
+        let (mut dt, Cut { mut substeps, mut omega_dt }) = planned.unwrap_or((-1.0, none));
         archive.number("solids.planned_step", &mut dt)?;
         archive.number("solids.planned_omega_dt", &mut omega_dt)?;
         archive.small("solids.planned_substeps", &mut substeps)?;
-        *planned = Some((dt, omega_dt, substeps)).filter(|p| p.0 > 0.0);
+        *planned = Some((dt, Cut { substeps, omega_dt })).filter(|p| p.0 > 0.0);
         let mut now: Vec<[f64; POSE]> = bodies.iter().map(|b| numbers(&b.pose)).collect();
         let mut momenta: Vec<DVec3> = bodies.iter().map(|b| b.momentum).collect();
         let mut wrenches: Vec<[DVec3; 2]> = contact.iter().map(|w| [w.force, w.torque]).collect();
@@ -91,6 +93,9 @@ impl Solids {
             let step = dt.max(f64::MIN_POSITIVE);
             self.evaluate(compute, step / f64::from(substeps.max(1)), step)?;
             self.candidates.travel = travelled;
+        }
+        if let Some(law) = &mut self.law {
+            law.moved();
         }
         for (k, body) in self.bodies.iter_mut().enumerate() {
             body.restore(pose(&now[k]), momenta[k]);

@@ -67,10 +67,9 @@ impl FixedWall {
 
     /// Force and torque of the pressures of its slots [N, N m]. Pressure 0 is that of a dry particle.
     pub fn pressure_force(&self, pressures: &[f64], params: &Params) -> Wrench {
-        let weight = params.density * params.gravity;
         let mut sum = Wrench::default();
         for (k, &p) in pressures.iter().enumerate() {
-            let p = surface_pressure(p, p > 0.0, self.to_surface[k], weight, params.spacing);
+            let p = surface_pressure(p, p > 0.0, self.to_surface[k], params);
             let force = -p * self.area[k];
             sum.force += force;
             sum.torque += (self.position[k] + self.to_surface[k] - self.about).cross(force);

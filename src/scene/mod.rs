@@ -17,6 +17,7 @@ mod domain;
 mod jitter;
 mod lattice;
 mod layout;
+mod motion;
 mod oriented;
 mod placement;
 mod support;
@@ -24,6 +25,8 @@ mod walls;
 mod water;
 
 pub use crate::shape::Shape;
+pub use motion::Motion;
+pub use placement::CONTACT_DISTANCE;
 
 use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
@@ -142,46 +145,6 @@ pub struct FreeBody {
     pub locked_translation: [bool; 3],
     /// `true` where a rotation about world x, y, z is locked.
     pub locked_rotation: [bool; 3],
-}
-
-/// A motion given by a table: time [s] against displacement from the start [m]; linear between rows,
-/// constant after the last one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
-    /// Times [s], increasing.
-    pub time: Vec<f64>,
-    /// Displacement from the starting position [m], one a time.
-    pub displacement: Vec<DVec3>,
-}
-
-impl Motion {
-    /// Displacement [m] at time `t` [s].
-    pub fn displacement(&self, t: f64) -> DVec3 {
-        let n = self.time.len();
-        match self.time.iter().position(|&ti| t < ti) {
-            Some(0) => self.displacement[0],
-            Some(k) => {
-                let s = (t - self.time[k - 1]) / (self.time[k] - self.time[k - 1]);
-                self.displacement[k - 1].lerp(self.displacement[k], s)
-            }
-            None => self.displacement[n - 1],
-        }
-    }
-
-    /// Largest speed [m/s] between the times `from` and `to` [s].
-    pub fn fastest(&self, from: f64, to: f64) -> f64 {
-        let rows = self.time.windows(2).zip(self.displacement.windows(2));
-        let met = rows.filter(|(t, _)| t[0] < to && t[1] > from);
-        met.map(|(t, x)| (x[1] - x[0]).length() / (t[1] - t[0])).fold(0.0, f64::max)
-    }
-
-    /// Velocity [m/s] just after time `t` [s].
-    pub fn velocity(&self, t: f64) -> DVec3 {
-        match self.time.iter().position(|&ti| t < ti) {
-            None | Some(0) => DVec3::ZERO,
-            Some(k) => (self.displacement[k] - self.displacement[k - 1]) / (self.time[k] - self.time[k - 1]),
-        }
-    }
 }
 
 /// How a moving solid moves.

@@ -190,8 +190,7 @@ impl Sampler {
         let centroid = monitor.centroid[2] - self.floor;
         self.depth += 2.0 * centroid / depth;
         if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::HydrostaticPressure)) {
-            // The pressure is zero at the centres of the topmost particles, half a spacing below the surface.
-            let surface = self.floor + 2.0 * centroid - 0.5 * simulation.params.spacing;
+            let surface = self.floor + 2.0 * centroid - simulation.params.zero_pressure_depth();
             let (rms, slope) = hydrostatics(fields, simulation.groups.fluid, surface, self.weight);
             self.square += (rms / (self.weight * depth)).powi(2);
             self.slope += slope;

@@ -17,6 +17,13 @@ pub struct Cuboid {
     pub half: DVec3,
 }
 
+impl Cuboid {
+    /// Part of the stretch `start` + s `along`, s in 0..`length`, inside: range of s.
+    pub(crate) fn clip(&self, start: DVec3, along: DVec3, length: f64) -> Option<(f64, f64)> {
+        edges::clip(start, along, length, self.half)
+    }
+}
+
 impl Geometry for Cuboid {
     fn name(&self) -> &'static str {
         "box"

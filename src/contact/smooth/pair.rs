@@ -1,31 +1,13 @@
-//! The conservative law: contact of true surfaces, one spring a pair of solids.
-//!
-//! Points of one solid's surface that lie inside the other's box give depths d_i >= 0 with constant
-//! weights w_i that sum to 1 over a face. The pair's *effective depth* is the generalised mean
-//!
-//! D = (sum_i w_i d_i^p)^(1/p),  p = 8,
-//!
-//! where edges carry their weight along their length and the sum over them is an integral (`edges`),
-//!
-//! and the contact stores U = K D^2 / 2. With all of a face in contact D is the depth and K the
-//! stiffness of the contact as a whole, whatever the resolution: what Eq. (14) wants of 1/n_c. Unlike
-//! that average, U is a continuous function of the two poses and the forces
-//! f_i = -dU/dd_i = K s_i d_i, s_i = w_i (d_i / D)^(p - 2), derive from it, so no energy appears when
-//! points come and go. p = 2 would be fixed weights, whose corners are N_face times softer than faces
-//! (0.34 l0 deep where a face takes a micrometre); with p = 8 a corner has w^(1/4) of K, 0.38 for 49
-//! points. Larger p stiffens rocking, (p - 1) K, as fast as corners and wins nothing.
-//!
-//! Beyond a quarter spacing a second spring joins, stiff enough to stop the fastest body of the scene
-//! within half a spacing more; it is never reached with a sensible K, and it is conservative too.
+//! A pair of solids under the smooth law: what of each lies in the other, forces, friction patches.
 
-use super::geometry::WallBox;
 use super::round;
+use super::walls::WallBox;
 use crate::body::{Body, Wrench};
 use crate::shape::{Faces, Inside, Line, Shape, Surface};
 use glam::{DMat3, DVec3};
 
 /// What a free solid touches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Other {
     /// A moving solid.
     Solid(usize),
@@ -256,8 +238,10 @@ pub(crate) struct Pair {
     pub wrench: [Wrench; 2],
     /// Energy stored [J].
     pub energy: f64,
-    /// Deepest point [m].
+    /// Deepest point [m]; infinite before the first evaluation.
     pub depth: f64,
+    /// The same at the evaluation before; infinite if there was none.
+    pub before: f64,
     /// Points in contact at the last evaluation, and those with the nodes of edges.
     points: usize,
     count: usize,
@@ -280,10 +264,20 @@ impl Pair {
             patches: vec![],
             wrench: Default::default(),
             energy: 0.0,
-            depth: 0.0,
+            depth: f64::INFINITY,
+            before: f64::INFINITY,
             points: 0,
             count: 0,
         }
+    }
+
+    /// Deepest points [m] inside the first and inside the second solid. Of what a device has found only one is
+    /// known, which may be either.
+    pub fn deepest(&self) -> (f64, f64) {
+        let in_first = |c: &Contact| (8..32).contains(&c.patch) || c.patch >= 64;
+        self.contacts.iter().fold((0.0, 0.0), |(a, b): (f64, f64), c| {
+            if in_first(c) { (a.max(c.depth), b) } else { (a, b.max(c.depth)) }
+        })
     }
 
     /// Points and nodes of edges in contact at the last evaluation.
@@ -334,6 +328,7 @@ impl Pair {
     pub fn join(&mut self, sums: &DeviceSums, bodies: &[Body]) {
         self.patches.clear();
         self.wrench = sums.wrench;
+        self.before = self.depth;
         (self.energy, self.depth) = (0.0, sums.deepest);
         self.points += sums.count - self.given.len();
         self.count = sums.count + self.contacts.len();
@@ -350,7 +345,7 @@ impl Pair {
     }
 
     /// The second solid.
-    fn other(&self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Frame {
+    pub(super) fn other(&self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Frame {
         match self.b {
             Other::Solid(b) => Frame::body(&bodies[b], surfaces[b].all_faces),
             Other::Wall(w) => Frame::wall(&walls[w]),
@@ -424,6 +419,7 @@ impl Pair {
         self.contacts.clear();
         self.patches.clear();
         self.wrench = Default::default();
+        self.before = self.depth;
         (self.energy, self.depth) = (0.0, 0.0);
         self.find(bodies, surfaces, walls);
         self.points = self.contacts.len();

@@ -1,25 +1,12 @@
-//! The paper's law, Eqs. (10) to (14), over pairs of wall-layer particles.
-//!
-//! On particle i of the first solid, from particle j of the second, with r = r_j - r_i, d = |r| < d_c,
-//! e = r / d and v = v_j - v_i:
-//!
-//! F_R = -K (d_c - d) e, F_D = C v, F_A = eta (v - (v . e) e),
-//! f = [(F_R + F_D) . N] N + F_A, F = sum f / n_c, T = sum (r_i - X) x f / n_c.
-//!
-//! What the paper leaves open is read so: N is the normal of the wall that particle j belongs to (with
-//! the body's own normals, or without the projection, a block sticks on the lattice of its slope); n_c
-//! counts the pairs of this pair of solids, all fixed walls being one solid; F_D may pull (without
-//! tension a critically damped body hops instead of staying). Two solids that move exchange the same
-//! force at the point r_i. The average is not conservative once a body turns: use the law `smooth` for
-//! anything but reproducing the paper.
+//! Eqs. (10) to (14) for a pair of solids.
 
-use super::broad::PointGrid;
 use crate::body::{Body, Wrench};
+use crate::contact::broad::PointGrid;
 use glam::DVec3;
 
 /// Constants of the law.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Law {
+pub(crate) struct Constants {
     /// K [N/m].
     pub spring: f64,
     /// C [kg/s].
@@ -114,7 +101,7 @@ impl Pair {
     }
 
     /// Eq. (14) at the bodies' poses and velocities.
-    pub fn evaluate(&mut self, law: &Law, bodies: &[Body], layers: &[Layer], walls: &Walls) {
+    pub fn evaluate(&mut self, law: &Constants, bodies: &[Body], layers: &[Layer], walls: &Walls) {
         let a = &bodies[self.a];
         let mut sum = [Wrench::default(); 2];
         let (mut count, mut energy, mut closest, mut normal_force) = (0, 0.0, f64::INFINITY, 0.0);

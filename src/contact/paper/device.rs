@@ -1,10 +1,10 @@
 //! The paper's law on a device: what shaders/contact_paper.wgsl is given, and what becomes of its answers.
 
-use super::{Link, four, place, vector};
+use super::{Constants, Layer, Lists, Pair};
 use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
-use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
-use crate::contact::paper::{Law, Layer, Pair};
+use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::contact::device::{Link, four, place, vector};
 use crate::error::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -81,7 +81,7 @@ pub const PROGRAM: Program = Program {
 };
 
 impl PaperLaw {
-    fn new(law: &Law) -> Self {
+    fn new(law: &Constants) -> Self {
         let scale = PARTS / power_of_two(law.distance);
         let square = (law.distance * scale).powi(2);
         Self {
@@ -128,7 +128,7 @@ struct Entry {
 }
 
 /// The paper's law's pairs on a device.
-pub(crate) struct Paper {
+pub(crate) struct Pairs {
     generation: u64,
     first: Vec<(u32, u32)>,
     /// Power of two above each solid's size [m]: the largest coordinate of its particles.
@@ -139,9 +139,9 @@ pub(crate) struct Paper {
     poses: Vec<PaperPose>,
 }
 
-impl Paper {
+impl Pairs {
     /// Gives the device the particles of all solids and the law.
-    pub fn new(layers: &[Layer], bodies: &[Body], law: &Law, link: &mut Link) -> Result<Self> {
+    pub fn new(layers: &[Layer], bodies: &[Body], law: &Constants, link: &mut Link) -> Result<Self> {
         // Fixed particles within reach of a body are not much further from it than its own.
         let of = |layer: &Layer| {
             let largest = layer.offsets.iter().map(|o| o.length()).fold(0.0, f64::max);
@@ -172,10 +172,10 @@ impl Paper {
     /// Searches the pairs anew.
     pub fn search(
         &mut self,
-        model: &candidates::Paper,
+        model: &Lists,
         candidates: &Candidates,
         bodies: &[Body],
-        law: &Law,
+        law: &Constants,
         link: &mut Link,
     ) -> Result<()> {
         let mut fixed: Vec<[[f32; 4]; 3]> = vec![];
@@ -250,7 +250,7 @@ impl Paper {
     }
 
     /// Eq. (14) of all pairs at the bodies' poses and velocities.
-    pub fn evaluate(&mut self, law: &Law, bodies: &[Body], link: &mut Link) -> Result<()> {
+    pub fn evaluate(&mut self, law: &Constants, bodies: &[Body], link: &mut Link) -> Result<()> {
         if self.entries.is_empty() {
             return Ok(());
         }
@@ -308,7 +308,7 @@ fn pose(entry: &Entry, size: f64, bodies: &[Body]) -> PaperPose {
 }
 
 /// Turns the sums of a pair, which are in A's frame and about A's centre, to the world, and divides by n_c.
-fn take(pair: &mut Pair, sum: &[[f32; 4]; 3], law: &Law, bodies: &[Body]) {
+fn take(pair: &mut Pair, sum: &[[f32; 4]; 3], law: &Constants, bodies: &[Body]) {
     let a = &bodies[pair.a];
     let (force, torque) = (a.rotation * vector(sum[0]), a.rotation * vector(sum[1]));
     let arm = pair.b.map_or(DVec3::ZERO, |b| a.pose.position - bodies[b].pose.position);

@@ -1,14 +1,7 @@
-//! The paper's baseline: the collision model of Lee et al. (2011), Eq. (18), between particles of
-//! solids.
-//!
-//! Two particles closer than a l0 that approach each other leave with -b times their approach speed.
-//! Inside a rigid body a particle's velocity is the body's, so the change is an impulse on the body at
-//! the particle, along the line of the pair; pairs follow one another in a fixed order and most find
-//! that the first has already parted them. There is no force at rest and no normal: bodies sink to
-//! a l0, roll on the lattice and turn at random. It need be no better than the paper says it is.
+//! Eq. (18) for a pair of solids.
 
-use super::paper::{Layer, Pair, Walls};
 use crate::body::Body;
+use crate::contact::paper::{Layer, Pair, Walls};
 use glam::DVec3;
 
 /// Applies Eq. (18) to the candidates of `pair` within `distance` = a l0 [m], restitution `b` [-].

@@ -11,7 +11,7 @@
 //! The viscous friction of the paper's Eq. (12) is at hand as well: -eta times the slip, shared among the
 //! patches of two solids by their normal forces.
 
-use super::smooth::Pair;
+use super::pair::{Pair, Patch};
 use crate::body::Body;
 use glam::{DMat3, DVec3};
 
@@ -83,7 +83,7 @@ impl Friction {
 }
 
 impl Slip {
-    fn new(a: usize, b: Option<usize>, patch: &super::smooth::Patch, bodies: &[Body], cap: f64) -> Self {
+    fn new(a: usize, b: Option<usize>, patch: &Patch, bodies: &[Body], cap: f64) -> Self {
         let first = patch.normal.any_orthonormal_vector();
         let tangent = [first, patch.normal.cross(first)];
         let spin = patch.normal * patch.radius;

@@ -8,8 +8,7 @@
 //! two parts (`paper`), and the shader computes from small numbers. See the head comments of
 //! shaders/contact_smooth.wgsl and shaders/contact_paper.wgsl.
 
-pub mod paper;
-pub mod smooth;
+pub use super::{paper::device as paper, smooth::device as smooth};
 
 use crate::compute::{Buffer, Compute, Element, Kernel, Program};
 use crate::error::{Error, Result};
@@ -38,21 +37,21 @@ pub(crate) struct Link<'a> {
 }
 
 impl Link<'_> {
-    fn write<T: Element>(&mut self, buffer: Buffer<T>, data: &[T]) -> Result<()> {
+    pub(super) fn write<T: Element>(&mut self, buffer: Buffer<T>, data: &[T]) -> Result<()> {
         self.traffic.sent += size_of_val(data) as u64;
         self.compute.upload(buffer.id(), bytemuck::cast_slice(data))
     }
 
-    fn reserve<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<()> {
+    pub(super) fn reserve<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<()> {
         self.compute.reserve(buffer.id(), buffer.size() * count as u64)
     }
 
-    fn run(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
+    pub(super) fn run(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
         self.traffic.dispatches += kernels.len() as u64;
         self.compute.dispatch(kernels)
     }
 
-    fn read<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<Vec<T>> {
+    pub(super) fn read<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<Vec<T>> {
         let bytes = buffer.size() * count as u64;
         self.traffic.round_trips += 1;
         self.traffic.read += bytes;
@@ -60,28 +59,21 @@ impl Link<'_> {
     }
 }
 
-/// The state of the law's pairs on a device.
-pub(crate) enum OnDevice {
-    None,
-    Smooth(Box<smooth::Smooth>),
-    Paper(Box<paper::Paper>),
-}
-
-fn four(v: DVec3, w: f64) -> [f32; 4] {
+pub(super) fn four(v: DVec3, w: f64) -> [f32; 4] {
     let v = v.as_vec3();
     [v.x, v.y, v.z, w as f32]
 }
 
-fn three(v: DVec3) -> [f32; 3] {
+pub(super) fn three(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-fn vector(v: [f32; 4]) -> DVec3 {
+pub(super) fn vector(v: [f32; 4]) -> DVec3 {
     DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }
 
 /// A place in a buffer as a device counts.
-fn place(n: usize) -> Result<u32> {
+pub(super) fn place(n: usize) -> Result<u32> {
     u32::try_from(n).ok().filter(|n| n >> 31 == 0).ok_or_else(|| {
         Error::Gpu(
             "contact has more candidates than a device can number; use contact.device = \"host\"".into(),

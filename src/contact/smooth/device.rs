@@ -1,11 +1,12 @@
 //! The smooth law on a device: what shaders/contact_smooth.wgsl is given, and what becomes of its answers.
 
-use super::{Link, four, place, three, vector};
+use super::pair::{Contact, DeviceSums, Other, Pair, Patch};
+use super::{Smooth, set_constants};
 use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
-use crate::contact::Limits;
-use crate::contact::candidates::{self, Candidates, MANY_PAIRS};
-use crate::contact::smooth::{Contact, DeviceSums, Other, Pair, Patch};
+use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::contact::device::{Link, four, place, three, vector};
+use crate::contact::substeps::Limits;
 use crate::error::Result;
 use crate::shape::Surface;
 use bytemuck::{Pod, Zeroable};
@@ -116,7 +117,7 @@ impl Cloud {
 }
 
 /// The smooth law's pairs on a device.
-pub(crate) struct Smooth {
+pub(crate) struct Pairs {
     generation: u64,
     clouds: Vec<Cloud>,
     /// Pairs with points near each other, and of each what the device knows.
@@ -132,7 +133,7 @@ pub(crate) struct Smooth {
     sent: bool,
 }
 
-impl Smooth {
+impl Pairs {
     /// Gives the device the points of all solids.
     pub fn new(surfaces: &[Surface], link: &mut Link) -> Result<Self> {
         let mut points = vec![];
@@ -163,13 +164,14 @@ impl Smooth {
     /// Searches the pairs anew.
     pub fn search(
         &mut self,
-        model: &candidates::Smooth,
+        model: &Smooth,
         candidates: &Candidates,
         bodies: &[Body],
         link: &mut Link,
     ) -> Result<()> {
         let mut list = 0;
-        (self.pairs, self.records) = (vec![], vec![]);
+        let before = std::mem::take(&mut self.pairs);
+        self.records.clear();
         for (mut pair, skin) in model.close(candidates, bodies) {
             let (body, own) = (&bodies[pair.a], self.clouds[pair.a]);
             let (theirs, faces_b, share) = match pair.b {
@@ -206,6 +208,7 @@ impl Smooth {
             self.keep(&near)?;
             link.reserve(buffer::contact_sum, self.sums)?;
         }
+        Smooth::carry(&before, self.generation == 0, &mut self.pairs);
         self.generation = candidates.generation();
         (self.constants, self.sent) = (None, false);
         Ok(())
@@ -237,23 +240,16 @@ impl Smooth {
     }
 
     /// Constants of every pair for sub-steps of `h` [s].
-    pub fn set_constants(
-        &mut self,
-        model: &candidates::Smooth,
-        limits: &Limits,
-        bodies: &[Body],
-        spacing: f64,
-        h: f64,
-    ) {
+    pub fn set_constants(&mut self, model: &Smooth, limits: &Limits, bodies: &[Body], spacing: f64, h: f64) {
         let wanted = Some((h, limits.longest_step));
         if self.constants != wanted {
-            candidates::set_constants(&mut self.pairs, &model.surfaces, limits, bodies, spacing, h);
+            set_constants(&mut self.pairs, &model.surfaces, limits, bodies, spacing, h);
             (self.constants, self.sent) = (wanted, false);
         }
     }
 
     /// How each pair lies now, and what the host finds beside the points.
-    fn place_poses(&mut self, model: &candidates::Smooth, bodies: &[Body]) -> Result<()> {
+    fn place_poses(&mut self, model: &Smooth, bodies: &[Body]) -> Result<()> {
         let clouds = &self.clouds;
         let of = |(pair, record): (&mut Pair, &SmoothPair)| {
             let (surfaces, walls) = (&model.surfaces, &model.walls);
@@ -281,7 +277,7 @@ impl Smooth {
     }
 
     /// Normal forces of all pairs at the bodies' poses and velocities.
-    pub fn evaluate(&mut self, model: &candidates::Smooth, bodies: &[Body], link: &mut Link) -> Result<()> {
+    pub fn evaluate(&mut self, model: &Smooth, bodies: &[Body], link: &mut Link) -> Result<()> {
         if self.pairs.is_empty() {
             return Ok(());
         }
@@ -372,7 +368,7 @@ fn clearances(turn: DMat3, shift: DVec3, half: DVec3, cloud: &Cloud) -> (DVec3, 
     (of(1.0), of(-1.0))
 }
 
-fn pose(pair: &Pair, clouds: &[Cloud], model: &candidates::Smooth, bodies: &[Body]) -> SmoothPose {
+fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> SmoothPose {
     let a = &bodies[pair.a];
     let still = a.rotation.transpose();
     let (center, axes, half, velocity, spin) = match pair.b {
