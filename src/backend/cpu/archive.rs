@@ -33,7 +33,6 @@ impl Cpu {
             neighbours,
             live,
             counters,
-            ledger,
             dt,
         } = self;
         let Fields {
