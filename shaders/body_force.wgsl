@@ -33,10 +33,9 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let orientation = poses[chunk.z].orientation;
         let wall = wall_layer[k];
         if state[params.fluid + k] == INNER {
-            // Inside the surface by to_surface, and below the water's surface by half a spacing.
-            let inside = dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
-            let head = inside + 0.5 * params.spacing * length(params.gravity);
-            let surface_pressure = max(pressure[params.fluid + k] + params.density * head, 0.0);
+            // Inside the surface by to_surface; see missing_head in src/kernels/body_force.rs.
+            let inside = params.density * dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
+            let surface_pressure = max(pressure[params.fluid + k] + inside + params.surface_head, 0.0);
             force = -surface_pressure * rotate(orientation, wall.area.xyz);
         }
 //#if REACTION

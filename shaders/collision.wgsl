@@ -1,6 +1,7 @@
 // Collision of particles that come too close (Lee et al. 2011), Eq. (18): pairs closer than a l0 that still approach each
-// other rebound, dv = -(1 + b) (v_i - v_j).r r / r^2, half of it each for two fluid particles. Written as an acceleration;
-// the reaction on wall layers of moving solids as a force.
+// other rebound, dv = -(1 + b) (v_i - v_j).r r / r^2, half of it each for two fluid particles. With SHARED_COLLISIONS a
+// particle takes part in each of its pairs with an equal part of its mass. Written as an acceleration; the reaction on
+// wall layers of moving solids as a force.
 // Twin: src/kernels/collision.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -24,6 +25,25 @@ fn rebound(x: vec3f, v: vec3f, j: u32) -> vec3f {
     return -(1.0 + params.restitution) * approach / distance_squared * r;
 }
 
+// Parts into which fluid particle i is split: the number of its colliding pairs, at least one.
+fn parts(i: u32) -> f32 {
+//#if SHARED_COLLISIONS
+    let x = position[i].xyz;
+    let v = velocity[i].xyz;
+    let count = neighbour_count[i];
+    var pairs = 0u;
+    for (var k = 0u; k < near_of(count); k++) {
+        pairs += u32(any(rebound(x, v, neighbour_list[near_place(i, k)]) != vec3f(0.0)));
+    }
+    for (var k = 0u; k < dummies_of(count); k++) {
+        pairs += u32(any(rebound(x, v, neighbour_list[dummy_place(i, k)]) != vec3f(0.0)));
+    }
+    return max(f32(pairs), 1.0);
+//#else
+    return 1.0;
+//#endif
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn collision(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;
@@ -36,18 +56,29 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
         let x = position[i].xyz;
         let v = velocity[i].xyz;
         let near = near_of(count);
+        // Solids are immovable here: infinitely many parts of them change nothing.
+        var own = 0.0;
+        if i < params.fluid {
+            own = parts(i);
+        }
         for (var k = 0u; k < near; k++) {
             let j = neighbour_list[near_place(i, k)];
-            if i < params.fluid {
-                change += select(1.0, 0.5, j < params.fluid) * rebound(x, v, j);
-            } else if j < params.fluid {
-                change += rebound(x, v, j);
+            if i >= params.fluid && j >= params.fluid {
+                continue;
+            }
+            let full = rebound(x, v, j);
+            if any(full != vec3f(0.0)) {
+                var other = 0.0;
+                if j < params.fluid {
+                    other = parts(j);
+                }
+                change += full / (own + other);
             }
         }
         if i < params.fluid {
             let dummies = dummies_of(count);
             for (var k = 0u; k < dummies; k++) {
-                change += rebound(x, v, neighbour_list[dummy_place(i, k)]);
+                change += rebound(x, v, neighbour_list[dummy_place(i, k)]) / own;
             }
         }
     }

@@ -22,6 +22,9 @@ const INNER: u32 = 2u;
 const DISPLACEMENT_MAX: f32 = 0.5;
 const CLOSEST: f32 = 0.1;
 
+// As crate::neighbourhood::EIGENVALUE_MIN.
+const EIGENVALUE_MIN: f32 = 0.1;
+
 // Places in `counters`, as crate::backend::gpu::layout::counter.
 const LOST: u32 = 0u;
 const DISPLACEMENT_CLAMPS: u32 = 1u;
@@ -56,6 +59,10 @@ struct Constants {
     gradient_scale: f32,   // d / n0
     density: f32,
     tolerance_squared: f32,
+    smooth_density: f32,   // W0
+    surface_head: f32,     // of the missing half spacing, Pa
+    wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
+    pad: f32,
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
@@ -94,6 +101,51 @@ fn finite_vector(v: vec3f) -> bool {
 fn weight(distance_squared: f32) -> f32 {
     let closest = CLOSEST * params.spacing;
     return max(params.effective_radius * inverseSqrt(max(distance_squared, closest * closest)) - 1.0, 0.0);
+}
+
+// The sum of w r r^T / r^2 over a neighbourhood: its diagonal, and yz, xz, xy.
+struct Moment {
+    diagonal: vec3f,
+    mixed: vec3f,
+}
+
+// Its part of a neighbour at r, with e = w r / r^2.
+fn add_moment(sum: Moment, e: vec3f, r: vec3f) -> Moment {
+    return Moment(sum.diagonal + e * r, sum.mixed + e.yxx * r.zzy);
+}
+
+// w r / r^2 of a pair, 0 for a coincident one.
+fn pair_vector(r: vec3f) -> vec3f {
+    let distance_squared = dot(r, r);
+    return select(weight(distance_squared) / distance_squared, 0.0, distance_squared == 0.0) * r;
+}
+
+// Inverse of M = d / n0 times the sum, or 1 where a lower bound of its smallest eigenvalue is too small. M is symmetric:
+// its inverse is the matrix of cofactors over the determinant. See src/neighbourhood.rs.
+fn inverse_moment(sum: Moment) -> mat3x3f {
+    var diagonal = params.gradient_scale * sum.diagonal;
+    let mixed = params.gradient_scale * sum.mixed;
+//#if TWO_DIMENSIONS
+    // The plane y = 0 has no moment across it.
+    diagonal.y = 1.0;
+//#endif
+    let cofactor = diagonal.yxx * diagonal.zzy - mixed * mixed;
+    let across = mixed.yxx * mixed.zzy - diagonal * mixed;
+    let determinant = diagonal.x * cofactor.x + mixed.z * across.z + mixed.y * across.y;
+//#if TWO_DIMENSIONS
+    let known = determinant > EIGENVALUE_MIN * (diagonal.x + diagonal.z);
+//#else
+    let trace = diagonal.x + diagonal.y + diagonal.z;
+    let known = 4.0 * determinant > EIGENVALUE_MIN * trace * trace;
+//#endif
+    if !known {
+        return mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    }
+    return (1.0 / determinant) * mat3x3f(
+        vec3f(cofactor.x, across.z, across.y),
+        vec3f(across.z, cofactor.y, across.x),
+        vec3f(across.y, across.x, cofactor.z),
+    );
 }
 
 // A word of `neighbour_count`: 12 bits neighbours that carry pressure, 12 bits dummies, 1 bit "a pair is close".

@@ -16,7 +16,12 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     if x.w != FLUID {
         return;
     }
+//#if MIXED
+    // Gravity acts with the pressure gradient.
+    var a = vec3f(0.0);
+//#else
     var a = params.gravity;
+//#endif
 //#if VISCOSITY
     a += acceleration[i].xyz;
     acceleration[i] = vec4f(0.0);

@@ -11,12 +11,47 @@
 @group(0) @binding(8) var<storage, read_write> source_diagonal: array<vec2f>;
 
 //#if MIXED
-fn divergence(r: vec3f, v: vec3f) -> f32 {
-    let distance_squared = dot(r, r);
-    if distance_squared == 0.0 {
-        return 0.0;
+// What a row sums over all its neighbours.
+struct Sums {
+    density: f32,    // W, the particle itself among them
+    moment: Moment,
+    inner: mat3x3f,  // e (v_j - v_i)^T, column c with component c of the velocity
+    solid: mat3x3f,  // the same of the solids around a fluid particle
+    normal: vec3f,   // e of those solids
+}
+
+// W, as crate::lattice::smooth_weight.
+fn smooth_weight(distance_squared: f32) -> f32 {
+    let q = sqrt(distance_squared) / params.effective_radius;
+    let rest = max(1.0 - q, 0.0);
+    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
+}
+
+fn add_neighbour(sums: Sums, r: vec3f, v: vec3f, slips: bool) -> Sums {
+    var out = sums;
+    let e = pair_vector(r);
+    let rate = mat3x3f(e * v.x, e * v.y, e * v.z);
+    out.density += smooth_weight(dot(r, r));
+    out.moment = add_moment(out.moment, e, r);
+    if slips {
+        out.solid += rate;
+        out.normal += e;
+    } else {
+        out.inner += rate;
     }
-    return dot(v, r) * weight(distance_squared) / distance_squared;
+    return out;
+}
+
+// sum v . M^-1 e, of solids with their velocity along the mean normal alone.
+fn divergence(sums: Sums) -> f32 {
+    let inverse = inverse_moment(sums.moment);
+    var sum = dot(inverse[0], sums.inner[0]) + dot(inverse[1], sums.inner[1]) + dot(inverse[2], sums.inner[2]);
+    let squared = dot(sums.normal, sums.normal);
+    if squared > 0.0 {
+        let normal = sums.normal * inverseSqrt(squared);
+        sum += dot(inverse * normal, sums.solid * normal);
+    }
+    return sum;
 }
 
 //#endif
@@ -36,28 +71,35 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     var links = 0.0;
 //#if MIXED
     let v = velocity[i].xyz;
-    var sum = 0.0;
+    var first_moment = vec3f(0.0);
+    let zero = mat3x3f(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    var sums = Sums(1.0, Moment(vec3f(0.0), vec3f(0.0)), zero, zero, vec3f(0.0));
 //#endif
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
         let r = position[j].xyz - x;
-        links += weight(dot(r, r));
+        let w = weight(dot(r, r));
+        links += w;
 //#if MIXED
-        sum += divergence(r, velocity[j].xyz - v);
+        first_moment += w * r;
+        sums = add_neighbour(sums, r, velocity[j].xyz - v, i < params.fluid && j >= params.fluid);
 //#endif
     }
     if links <= 0.0 {
         source_diagonal[i] = vec2f(0.0, 1.0);
         return;
     }
-    var b = now.source_density * (number_density[i] - params.number_density) / params.number_density;
 //#if MIXED
     let dummies = dummies_of(count);
     for (var k = 0u; k < dummies; k++) {
         let j = neighbour_list[dummy_place(i, k)];
-        sum += divergence(position[j].xyz - x, velocity[j].xyz - v);
+        sums = add_neighbour(sums, position[j].xyz - x, velocity[j].xyz - v, i < params.fluid);
     }
-    b -= now.source_divergence * sum;
+    let b = now.source_density * (sums.density - params.smooth_density) / params.smooth_density
+        - now.source_divergence * divergence(sums)
+        - params.density * dot(params.gravity, first_moment);
+//#else
+    let b = now.source_density * (number_density[i] - params.number_density) / params.number_density;
 //#endif
     source_diagonal[i] = vec2f(b, links + now.compressibility);
 }

@@ -118,6 +118,11 @@ impl Neighbours {
         self.chunks[i / CHUNK].all(i % CHUNK)
     }
 
+    /// All neighbours of particle `i`, and how many of them carry pressure; they come first.
+    pub fn parts(&self, i: usize) -> (Row<'_>, usize) {
+        self.chunks[i / CHUNK].parts(i % CHUNK)
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.chunks.iter().map(Chunk::rows).sum()

@@ -4,7 +4,7 @@ use crate::case::{Case, Preset};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 use crate::scene::Scene;
-use crate::scheme::{FreeSurface, Gradient, Source};
+use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 use glam::DVec3;
 
 /// How gamma of Eq. (8) follows from the time step.
@@ -34,6 +34,8 @@ pub struct Params {
     pub number_density: f64,
     /// lambda, Eq. (7) [m2].
     pub laplacian: f64,
+    /// Sum W0 of the smooth density on the full lattice [-].
+    pub smooth_density: f64,
     /// Neighbours of a particle on the full lattice.
     pub neighbours: u32,
     /// Gravity [m/s2].
@@ -42,6 +44,9 @@ pub struct Params {
     pub density: f64,
     /// Kinematic viscosity [m2/s].
     pub viscosity: f64,
+    /// Weight of a pair of fluid and wall in the viscous sum [-]: 1 in the paper's scheme, else that of
+    /// [`Lattice::wall_shear`].
+    pub wall_shear: f64,
     /// Free-surface threshold beta [-].
     pub free_surface_threshold: f64,
     /// Source term of the PPE.
@@ -54,6 +59,8 @@ pub struct Params {
     pub relaxation: Relaxation,
     /// alpha of Eq. (8) [1/Pa], if typed.
     pub compressibility: Option<f64>,
+    /// How colliding pairs share their impulses.
+    pub collision: Collision,
     /// Distance below which approaching particles collide, a l0 [m].
     pub collision_distance: f64,
     /// Restitution b of the collision, Eq. (18) [-].
@@ -114,22 +121,43 @@ impl Params {
             effective_radius: run.effective_radius * l0,
             number_density: lattice.number_density,
             laplacian: lattice.laplacian * l0 * l0,
+            smooth_density: lattice.smooth_density,
             neighbours: lattice.neighbours,
             gravity: scene.gravity,
             density: fluid.map_or(1000.0, |f| f.density),
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
+            wall_shear: if paper { 1.0 } else { lattice.wall_shear },
             free_surface_threshold: fluid.map_or(0.97, |f| f.free_surface_threshold),
             source: fluid.and_then(|f| f.source).unwrap_or(source),
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),
             free_surface: fluid.and_then(|f| f.free_surface).unwrap_or(free_surface),
             relaxation,
             compressibility: fluid.and_then(|f| f.compressibility),
+            collision: if paper { Collision::Single } else { Collision::Shared },
             collision_distance: fluid.map_or(0.8, |f| f.collision_distance) * l0,
             collision_restitution: fluid.map_or(0.2, |f| f.collision_restitution),
             depth: scene.depth,
             domain_min: scene.domain.0,
             domain_max: scene.domain.1,
         })
+    }
+
+    /// Depth below the water's surface at which P = 0 holds [m]. With the source of Eq. (8) that is at the centres of the
+    /// surface particles. The balanced source carries the whole weight of the water, theirs too, which rests on a
+    /// pressure half a spacing higher.
+    pub fn zero_pressure_depth(&self) -> f64 {
+        match self.source {
+            Source::NumberDensity => 0.5 * self.spacing,
+            Source::Mixed => 0.0,
+        }
+    }
+
+    /// Gravity of the explicit stage [m/s2]: none where it acts together with the pressure that balances it.
+    pub fn explicit_gravity(&self) -> DVec3 {
+        match self.source {
+            Source::NumberDensity => self.gravity,
+            Source::Mixed => DVec3::ZERO,
+        }
     }
 
     /// Reference speed c_s [m/s] for a time step `dt` [s].

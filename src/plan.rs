@@ -180,6 +180,8 @@ pub struct Plan {
     pub force_relaxation: f64,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
+    /// Whether the energy ledger is kept.
+    pub ledger: bool,
     /// Whether walls that never move line the fluid.
     pub fixed_walls: bool,
 }
@@ -190,6 +192,7 @@ impl Plan {
         let fluid = scene.groups.fluid > 0;
         let moving = !scene.solids.is_empty();
         let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
+        let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| s.name == g.on));
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
@@ -199,10 +202,10 @@ impl Plan {
                 Stage::MoveSolids => wet("solids move in the fluid"),
                 Stage::Collision if params.collision_distance == 0.0 => Err("collision distance is zero"),
                 Stage::Collision => wet("particles may come too close"),
-                Stage::BodyForce if !free && case.gauge.force.is_empty() => {
-                    Err("no body is free and no gauge asks for a force")
-                }
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
+                Stage::BodyForce if !free && !gauged && !case.output.ledger => {
+                    Err("no body is free and no gauge asks for the force on one that moves")
+                }
                 Stage::BodyForce => wet("the fluid acts on solids"),
                 Stage::Contact if !moving => Err("nothing solid moves"),
                 Stage::Contact if !free => Ok("solids follow their tables of motion"),
@@ -237,7 +240,8 @@ impl Plan {
         let asked = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         let contact = ContactPlan::judge(case, scene, asked);
         let fixed_walls = fluid && !scene.groups.static_range().is_empty();
-        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation, contact, fixed_walls }
+        let ledger = case.output.ledger;
+        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation, contact, ledger, fixed_walls }
     }
 
     /// Whether `stage` runs.

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub enum Source {
     /// The paper's Eq. (8): deviation of the number density alone.
     NumberDensity,
-    /// Divergence of the predicted velocity plus gamma times the deviation.
+    /// Divergence of the predicted velocity, corrected by the moment matrix, gamma times the deviation of a smooth
+    /// density sum, and the weight of the water, which the pressure at rest balances on any arrangement.
     Mixed,
 }
 
@@ -19,12 +20,8 @@ pub enum Source {
 pub enum Gradient {
     /// The paper's Eq. (9): against the smallest pressure in the neighbourhood.
     Minimum,
-    /// Eq. (9) times the inverse of the particle's moment matrix: exact for linear fields.
+    /// Eq. (9) times the inverse of the particle's moment matrix below the surface: exact for linear fields.
     MinimumCorrected,
-    /// The same at the free surface too, where the one-sided sum carries half the weight of a particle. Still
-    /// water stays three times calmer and small bodies float steadily; a collapse gains up to 0.5 % of energy
-    /// before it loses any.
-    CorrectedSurface,
 }
 
 /// Which particles lie on the free surface (P = 0).
@@ -35,6 +32,15 @@ pub enum FreeSurface {
     Threshold,
     /// n < 0.8 beta n0, or n < beta n0 and the neighbours' centroid lies more than 0.1 l0 away.
     ThresholdOffset,
+}
+
+/// How pairs of particles that collide at once share their impulses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Collision {
+    /// The paper's Eq. (18): each as if it were the only one.
+    Single,
+    /// A particle takes part in each of its pairs with a part of its mass.
+    Shared,
 }
 
 /// Preconditioner of the conjugate gradients.

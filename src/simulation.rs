@@ -2,11 +2,12 @@
 //! `step.rs`.
 
 use crate::backend::{Backend, Counters, Timing};
-use crate::body::Wrench;
+use crate::body::{Pose, Wrench};
 use crate::case::{Case, ContactDevice, Fluid};
 use crate::checkpoint::Archive;
 use crate::contact::{ContactReport, Solids};
 use crate::error::{Error, Result};
+use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::params::{Params, Step};
 use crate::plan::{ParticleStage, Plan, Stage};
@@ -63,6 +64,8 @@ pub struct Simulation {
     pub wait_for_stages: bool,
     /// Sizes of the particle groups.
     pub groups: Groups,
+    /// Work of and on the solids, and the energy of the free ones [J], if the ledger is kept.
+    solids_ledger: Option<(Ledger, f64)>,
     speed: f64,
     pub(crate) threads: Option<ThreadPool>,
 }
@@ -99,7 +102,7 @@ impl Simulation {
         let params = Params::new(case, &scene)?;
         let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
-        let solids = Solids::new(&scene, case.contact.as_ref())?;
+        let mut solids = Solids::new(&scene, case.contact.as_ref())?;
         crate::sense::refuse(case, &scene, &params, &solids)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
@@ -108,8 +111,14 @@ impl Simulation {
                         what there is) or leave contact.device out";
             return Err(Error::Case(text.into()));
         }
+        if plan.ledger && plan.wet() && backend.ledger()?.is_none() {
+            let text =
+                "output.ledger = true: this backend keeps no ledger; use --backend cpu or leave it out";
+            return Err(crate::error::Error::Case(text.into()));
+        }
         Ok(Self {
             backend,
+            solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
@@ -148,6 +157,7 @@ impl Simulation {
             time,
             steps,
             speed,
+            solids_ledger,
         } = self;
         let Groups { fluid, moving_wall, static_wall, static_dummy, moving_dummy } = *groups;
         archive.same("particles of water", fluid as u64)?;
@@ -164,6 +174,10 @@ impl Simulation {
         archive.array("fluid_force", &mut vectors, true)?;
         for (wrench, v) in fluid_force.iter_mut().zip(vectors.chunks_exact(2)) {
             *wrench = Wrench { force: v[0], torque: v[1] };
+        }
+        if let Some((ledger, energy)) = solids_ledger {
+            ledger.exchange(archive, "ledger.solids")?;
+            archive.number("ledger.energy", energy)?;
         }
         backend.exchange(archive)?;
         solids.exchange(archive, backend.compute())
@@ -237,7 +251,7 @@ impl Simulation {
             return Ok(());
         }
         self.timed(Stage::MoveSolids, |s| {
-            let poses = s.solids.predict(t, dt);
+            let poses = s.solids.predict(t, dt, s.params.explicit_gravity());
             s.backend.move_solids(poses)
         })
     }
@@ -255,9 +269,12 @@ impl Simulation {
         if !self.plan.has(Stage::Contact) {
             return Ok(ContactReport::default());
         }
+        let before = self.solids_ledger.is_some().then(|| self.solids.poses().to_vec());
+        let mut given = vec![Wrench::default(); self.fluid_force.len()];
         if self.plan.has(Stage::BodyForce) {
             let force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
             let share = if self.steps == 0 { 1.0 } else { self.plan.force_relaxation };
+            given.clone_from(&force);
             for (old, new) in self.fluid_force.iter_mut().zip(force) {
                 old.force = old.force.lerp(new.force, share);
                 old.torque = old.torque.lerp(new.torque, share);
@@ -275,10 +292,36 @@ impl Simulation {
             other => other,
         })?;
         self.check_bodies(step)?;
+        if let Some(before) = before {
+            self.book_solids(&given, &before, step.dt);
+        }
         if self.plan.has(Stage::MoveSolids) {
             self.timed(Stage::MoveSolids, |s| s.backend.move_solids(s.solids.poses()))?;
         }
         Ok(report)
+    }
+
+    /// Books what the water gave the solids, what they received of it and what contact did, on the way from the
+    /// poses `before`.
+    fn book_solids(&mut self, given: &[Wrench], before: &[Pose], dt: f64) {
+        let Some((ledger, energy)) = &mut self.solids_ledger else { return };
+        let solids = &self.solids;
+        let poses = solids.predicted().iter().zip(before).zip(solids.poses());
+        for (k, ((told, before), after)) in poses.enumerate() {
+            ledger.solid(dt, solids.is_free(k), &given[k], &self.fluid_force[k], [told, before, after]);
+        }
+        let now = self.solids.energy().total();
+        ledger.add(Entry::Contact, now - *energy);
+        *energy = now;
+    }
+
+    /// Work of each part of the step since the start, if the case asks for it.
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn ledger(&mut self) -> Result<Option<Ledger>> {
+        let Some((solids, _)) = &self.solids_ledger else { return Ok(None) };
+        Ok(Some(self.backend.ledger()?.unwrap_or_default().plus(solids)))
     }
 
     fn check_bodies(&self, step: &Step) -> Result<()> {

@@ -89,9 +89,9 @@ fn the_static_lattice_has_the_initial_number_density() {
 
 #[test]
 fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pressure_are_exact() {
-    let text = hydrostatic(0.05, 1e-3, "relaxation = 1e-12");
+    let text = hydrostatic(0.025, 1e-3, "relaxation = 1e-12");
     let (mut cpu, params, step) = prepared(&text, 0.0);
-    // On the lattice, div of v = B x is tr B; away from walls, where the neighbours' velocity is linear too.
+    // div of v = B x is tr B; away from walls, where the neighbours' velocity is linear too.
     let b =
         DMat3::from_cols(DVec3::new(0.3, 0.7, -0.2), DVec3::new(0.1, 0.5, 0.9), DVec3::new(0.4, -0.6, 1.1));
     let mut fields = cpu.fields().clone();
@@ -109,12 +109,12 @@ fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pr
     let mut checked = 0;
     for i in 0..cpu.groups().fluid {
         let x = cpu.fields().position[i];
-        let clear = |a: f64, top: f64| a > 0.06 && a < top - 0.06;
-        if clear(x.x, 0.25) && clear(x.y, 0.25) && clear(x.z, 0.45) {
+        let clear = |a: f64, top: f64| a > 0.07 && a < top - 0.07;
+        if clear(x.x, 0.25) && clear(x.y, 0.25) && clear(x.z, 0.5) {
             let source = cpu.fields().source[i];
             assert!((source / expected - 1.0).abs() < 1e-6, "{source} for {expected}");
             let a = cpu.fields().acceleration[i];
-            assert!((a + gradient / params.density).length() < 1e-9, "{a}");
+            assert!((a - params.gravity + gradient / params.density).length() < 1e-9, "{a}");
             checked += 1;
         }
     }
@@ -150,7 +150,7 @@ fn the_corrected_gradient_stays_exact_on_shaken_positions() {
         let minimum = row_minimum(&fields.pressure, i, &cpu);
         let m = moment(&fields.position, i, &cpu, &params);
         let shift = (1e4 - minimum) * (m.1.inverse() * m.0);
-        let expected = -(gradient + shift) / params.density;
+        let expected = params.gravity - (gradient + shift) / params.density;
         let a = cpu.fields().acceleration[i];
         assert!((a - expected).length() < 1e-9 * expected.length().max(1.0), "{a} for {expected}");
         checked += 1;
@@ -343,7 +343,7 @@ fn hydrostatics(fluid: &str, dt: f64, window: (f64, f64)) -> [f64; 4] {
             continue;
         }
         let (f, m) = (sim.backend.read().unwrap(), sim.backend.monitor().unwrap());
-        let surface = 2.0 * m.centroid[2] - 0.5 * 0.025;
+        let surface = 2.0 * m.centroid[2] - sim.params.zero_pressure_depth();
         let (mut e, mut n, mut z, mut p, mut zz, mut zp) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for i in (0..sim.groups.fluid).filter(|&i| f.state[i] == State::Inner) {
             let (zi, pi) = (f.position[i].z, f.pressure[i]);
@@ -406,11 +406,11 @@ fn dam_break_accurate() {
         assert!((value / expected - 1.0).abs() < part, "{value} for {expected}");
     };
     near(rows[0][0], 1.105, 0.02);
-    near(rows[0][1], 100.6, 0.02);
-    near(rows[0][2], 59.7, 0.02);
+    near(rows[0][1], 99.9, 0.02);
+    near(rows[0][2], 63.0, 0.02);
     near(rows[1][0], 1.727, 0.03);
     let left = (rows[1][1] + rows[1][2]) / 165.3;
-    assert!((left - 0.910).abs() < 0.02, "{left}");
+    assert!((left - 0.955).abs() < 0.02, "{left}");
 }
 
 #[test]
@@ -423,4 +423,196 @@ fn dam_break_paper() {
             assert!((row[k] / expected[k] - 1.0).abs() < part[k], "{row:?} for {expected:?}");
         }
     }
+}
+
+/// The largest |source| / (gamma rho / dt^2) on a lattice that is stretched by `factors`, without motion and gravity:
+/// the relative density that the PPE sees, in the middle of a tank.
+fn deviation_of_stretched(factors: DVec3) -> f64 {
+    let mut text = hydrostatic(0.05, 1e-3, "relaxation = 0.1");
+    text.run.gravity = [0.0; 3];
+    let mut scene = Scene::build(&text).unwrap();
+    let middle = scene.position[scene.groups.fluid / 2];
+    for x in &mut scene.position {
+        *x = middle + factors * (*x - middle);
+    }
+    let reach = scene.domain.1 - scene.domain.0;
+    scene.domain = (scene.domain.0 - reach, scene.domain.1 + reach);
+    let params = Params::new(&text, &scene).unwrap();
+    let plan = Plan::new(&text, &scene, &params);
+    let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
+    let step = params.step(0.0, text.run.time_step, 1.0);
+    for stage in [
+        ParticleStage::CellList,
+        ParticleStage::NeighbourList,
+        ParticleStage::NumberDensity,
+        ParticleStage::PressureSource,
+    ] {
+        cpu.run(stage, &step).unwrap();
+    }
+    let at = |i: &usize| cpu.fields().position[*i].distance(middle);
+    let i = (0..scene.groups.fluid).min_by(|a, b| at(a).total_cmp(&at(b))).unwrap();
+    assert_eq!(cpu.fields().state[i], State::Inner);
+    cpu.fields().source[i] * step.dt * step.dt / (step.relaxation * params.density)
+}
+
+#[test]
+fn water_stretched_at_constant_volume_keeps_its_density() {
+    for (stretch, most) in [(1.1_f64, 0.001), (1.2, 0.002), (1.3, 0.012)] {
+        let (squeeze, root) = (1.0 / stretch, 1.0 / stretch.sqrt());
+        for factors in [
+            DVec3::new(stretch, 1.0, squeeze),
+            DVec3::new(root, root, stretch),
+            DVec3::new(1.0 / root, 1.0 / root, squeeze),
+        ] {
+            let deviation = deviation_of_stretched(factors);
+            println!("{factors}: {:+.3} %", 100.0 * deviation);
+            assert!(deviation.abs() < most, "{factors}: {deviation}");
+        }
+    }
+    // And a change of volume is seen: W falls off by 3 (1 %) and more.
+    assert!(deviation_of_stretched(DVec3::splat(0.99)) > 0.02);
+}
+
+#[test]
+fn the_divergence_stays_exact_and_still_water_balanced_on_shaken_positions() {
+    let text = hydrostatic(0.025, 1e-3, "relaxation = 1e-12\ncompressibility = 1e-10");
+    let (mut cpu, params, step) = prepared(&text, 0.2);
+    let gradient =
+        DMat3::from_cols(DVec3::new(0.3, 0.7, -0.2), DVec3::new(0.1, -0.5, 0.9), DVec3::new(0.4, -0.6, 1.1));
+    let at_rest = {
+        let x = cpu.fields().position.clone();
+        let depth = |x: DVec3| params.density * params.gravity.dot(x - DVec3::Z);
+        let still: Vec<f64> = x.iter().take(cpu.groups().pressure()).map(|&x| depth(x)).collect();
+        let fields = cpu.fields_mut();
+        fields.velocity.fill(DVec3::ZERO);
+        cpu.run(ParticleStage::PressureSource, &step).unwrap();
+        let a = system(&cpu, &params);
+        let (mut q, mut sums) = (vec![0.0; still.len()], Vec::new());
+        a.multiply(&still, &mut q, &mut sums);
+        let b = &cpu.fields().source;
+        let mut worst = (0, 0.0_f64);
+        for i in 0..still.len() {
+            let carriers = cpu.neighbours().pressure(i).neighbour;
+            let inner = |j: &u32| cpu.fields().state[*j as usize] == State::Inner;
+            if cpu.fields().state[i] == State::Inner && carriers.iter().all(inner) {
+                let compressed = step.compressibility * params.density / step.dt.powi(2) * still[i];
+                let error = (q[i] - b[i] - compressed).abs() / (a.diagonal[i] * 9810.0 * 0.025);
+                worst = (worst.0 + 1, worst.1.max(error));
+            }
+        }
+        worst
+    };
+    println!("{} rows at rest, worst {:.1e} of rho g l0", at_rest.0, at_rest.1);
+    assert!(at_rest.0 > 1000 && at_rest.1 < 1e-7, "{at_rest:?}");
+    let fields = cpu.fields_mut();
+    for i in 0..fields.velocity.len() {
+        fields.velocity[i] = gradient * fields.position[i];
+    }
+    let before = cpu.fields().source.clone();
+    cpu.run(ParticleStage::PressureSource, &step).unwrap();
+    let expected = -(0.3 - 0.5 + 1.1) * params.density / step.dt;
+    let mut checked = 0;
+    for i in 0..cpu.groups().fluid {
+        let row = cpu.neighbours().all(i).neighbour;
+        let fluid = row.iter().all(|&j| (j as usize) < cpu.groups().fluid);
+        if fluid && cpu.fields().state[i] == State::Inner {
+            let change = cpu.fields().source[i] - before[i];
+            assert!((change / expected - 1.0).abs() < 1e-6, "{change} for {expected}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 300, "{checked}");
+}
+
+/// Acceleration over g of water at rest on a melted arrangement, below the surface: rms and mean along z. The particles
+/// of a tank that has stood for a second are stopped and released for one step, with gamma next to nothing.
+fn frozen_snapshot(fluid: &str) -> (f64, f64) {
+    let mut sim = simulation(&hydrostatic_of_depth(0.25, 0.025, 1e-3, &format!("{fluid}\nsound_speed = 5")));
+    while sim.time < 1.2 {
+        sim.step().unwrap();
+    }
+    let mut fields = sim.backend.read().unwrap();
+    fields.velocity.fill(DVec3::ZERO);
+    let surface = 2.0 * sim.backend.monitor().unwrap().centroid[2];
+    let still = hydrostatic_of_depth(0.25, 0.025, 1e-3, &format!("{fluid}\nrelaxation = 1e-9"));
+    let mut sim = simulation(&still);
+    sim.backend.write(&fields).unwrap();
+    let step = sim.step().unwrap();
+    let (mut squares, mut sum, mut count) = (0.0, 0.0, 0.0);
+    let f = sim.backend.read().unwrap();
+    for i in 0..sim.groups.fluid {
+        let a = f.velocity[i] / (step.dt * 9.81);
+        if surface - f.position[i].z > 2.1 * 0.025 {
+            squares += a.length_squared();
+            sum += a.z;
+            count += 1.0;
+        }
+    }
+    assert!(count > 600.0, "{count}");
+    ((squares / count).sqrt(), sum / count)
+}
+
+#[test]
+fn gravity_and_pressure_balance_on_a_melted_arrangement() {
+    let (rms, mean) = frozen_snapshot("");
+    println!("net acceleration of still water: rms {rms:.4} g, mean {mean:+.4} g");
+    // Kicks by gravity in the predictor left 0.29 and -0.28 g.
+    assert!(rms < 0.15 && mean.abs() < 0.05, "{rms} {mean}");
+}
+
+#[test]
+fn a_collapse_gains_no_energy_whatever_the_start() {
+    let case: seixo::case::Case =
+        toml::from_str(include_str!("../cases/dam_break_2d.toml")).expect("a valid case");
+    let mut worst = 0.0_f64;
+    for seed in 0..4 {
+        let mut sim = simulation(&case);
+        let mut fields = sim.backend.read().unwrap();
+        for i in 0..sim.groups.fluid {
+            fields.position[i] +=
+                0.05 * sim.params.spacing * common::moving::noise_vector(i + seed * 100_000, 2);
+        }
+        sim.backend.write(&fields).unwrap();
+        let energy = |sim: &mut seixo::simulation::Simulation| {
+            let m = sim.backend.monitor().unwrap();
+            m.kinetic + m.potential
+        };
+        let start = energy(&mut sim);
+        let mut most = 0.0_f64;
+        while sim.time < 0.14 {
+            sim.step().unwrap();
+            most = most.max(energy(&mut sim) / start);
+        }
+        println!("seed {seed}: largest energy {most:.5}");
+        worst = worst.max(most);
+    }
+    assert!(worst < 1.0005, "{worst}");
+}
+
+#[test]
+fn a_plate_that_moves_along_drags_water_to_the_line_between_the_surfaces() {
+    // Plane Couette flow between free ends, ten particles across: u = U x / h. Walls that count as resting where their
+    // layers stand, half a spacing behind their surfaces, leave 4.5 % of U on the surface.
+    let (h, speed, viscosity) = (0.1, 0.1, 0.01);
+    let case = case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nend = 0.6\ngravity = [0, 0, 0]\ndimensions = 2\n\
+         domain = [[-0.1, -0.1, -0.4], [0.2, 0.1, 0.8]]\n\
+         [tank]\nmin = [0, 0, -0.2]\nmax = [{h}, 0.1, 0.6]\nopen = [\"x_max\", \"z_min\", \"z_max\"]\n\
+         [[moving_wall]]\nname = \"plate\"\nmin = [{h}, 0, -0.3]\nmax = [0.13, 0.1, 0.6]\n\
+         open = [\"x_max\", \"z_min\", \"z_max\"]\nmotion = [[0, 0, 0, 0], [1, 0, 0, {speed}]]\n\
+         [fluid]\nviscosity = {viscosity}\nsound_speed = 2\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [{h}, 0.1, 0.4]\n"
+    ));
+    let mut sim = simulation(&case);
+    while sim.time < 0.6 {
+        sim.step().expect("a step");
+    }
+    let fields = sim.backend.read().expect("the fields");
+    let middle: Vec<(f64, f64)> = (0..sim.groups.fluid)
+        .filter(|&i| (0.15..0.25).contains(&fields.position[i].z))
+        .map(|i| (fields.position[i].x / h, fields.velocity[i].z / speed))
+        .collect();
+    let rms = middle.iter().map(|(x, u)| (u - x).powi(2)).sum::<f64>() / middle.len() as f64;
+    println!("{} particles, rms {:.4} of the plate's speed", middle.len(), rms.sqrt());
+    assert!(middle.len() > 80 && rms.sqrt() < 0.01, "rms {}", rms.sqrt());
 }

@@ -104,27 +104,24 @@ fn shallow(cube: bool, fluid: &str) -> Case {
 }
 
 #[test]
-fn still_water_does_not_rock_itself_when_the_gradient_is_corrected_at_the_surface() {
-    let kinetic = |fluid: &str| {
-        let mut sim = simulation(&shallow(false, fluid));
-        let (mut sum, mut count) = (0.0, 0.0);
-        while sim.time < 1.5 {
-            sim.step().expect("water at rest");
-            if sim.time > 1.0 {
-                sum += sim.backend.monitor().expect("water").kinetic;
-                count += 1.0;
-            }
+fn still_water_does_not_rock_itself() {
+    let mut sim = simulation(&shallow(false, ""));
+    let (mut sum, mut count) = (0.0, 0.0);
+    while sim.time < 1.5 {
+        sim.step().expect("water at rest");
+        if sim.time > 1.0 {
+            sum += sim.backend.monitor().expect("water").kinetic;
+            count += 1.0;
         }
-        sum / count
-    };
-    let (plain, corrected) = (kinetic(""), kinetic("gradient = \"corrected_surface\""));
-    println!("kinetic energy {plain:.4} J, corrected at the surface {corrected:.4} J");
-    assert!(corrected < 0.45 * plain && corrected < 0.009, "{corrected} of {plain}");
+    }
+    println!("kinetic energy {:.4} J", sum / count);
+    // 0.019 to 0.026 J when gravity kicked the particles before the pressure carried them.
+    assert!(sum / count < 0.015, "{}", sum / count);
 }
 
 #[test]
 fn a_small_cube_does_not_swing_itself_out_of_the_water() {
-    let mut sim = simulation(&shallow(true, "gradient = \"corrected_surface\""));
+    let mut sim = simulation(&shallow(true, ""));
     let mut heights = Vec::new();
     while sim.time < 1.75 {
         sim.step().expect("the cube floats");

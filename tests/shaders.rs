@@ -233,6 +233,10 @@ fn structs_lie_the_same_on_both_sides() {
             gradient_scale,
             density,
             tolerance_squared,
+            smooth_density,
+            surface_head,
+            wall_shear,
+            pad,
         }
     );
     same_layout!(
@@ -332,6 +336,7 @@ fn constants_are_the_same_on_both_sides() {
     use seixo::backend::gpu::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};
     use seixo::fields::State;
     use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::neighbourhood::EIGENVALUE_MIN;
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
     let common = |name: &str| constant(shader::COMMON, name);
@@ -344,6 +349,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(common("INNER"), f64::from(State::Inner as u8));
     assert_eq!(common("DISPLACEMENT_MAX"), DISPLACEMENT_MAX);
     assert_eq!(common("CLOSEST"), CLOSEST);
+    assert_eq!(common("EIGENVALUE_MIN"), EIGENVALUE_MIN);
     for (name, place) in [
         ("LOST", counter::LOST),
         ("DISPLACEMENT_CLAMPS", counter::DISPLACEMENT_CLAMPS),

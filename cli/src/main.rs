@@ -44,6 +44,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Run a study: error against run time, limits of stability, what a scene does not need.
     Study(seixo_study::command::StudyArgs),
+    /// Hold runs against experiments and analytic solutions: one page with tables and charts.
+    Validate(seixo_study::validation::command::ValidateArgs),
     /// Time a step by stage, against the bytes that must move.
     Bench(bench::BenchArgs),
     /// List the adapters that can be used.
@@ -125,6 +127,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Study(args) => seixo_study::command::command(&args).map(|()| 0),
+        Command::Validate(args) => seixo_study::validation::command::command(&args).map(|()| 0),
         Command::Adapters { json } => device::list(json),
         Command::Schema => {
             say(seixo::case::Case::schema().trim_end());

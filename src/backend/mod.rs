@@ -3,7 +3,6 @@
 pub mod cpu;
 pub mod gpu;
 mod processor;
-mod rows;
 pub mod traffic;
 
 use self::traffic::Traffic;
@@ -12,6 +11,7 @@ use crate::checkpoint::Archive;
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{ParticleStage, Stage};
@@ -50,10 +50,10 @@ impl Counters {
             non_finite,
             overflow,
         } = self;
-        archive.count("counters.negative_pressures", negative_pressures)?;
         archive.count("counters.lost", lost)?;
         archive.count("counters.displacement_clamps", displacement_clamps)?;
         archive.count("counters.pressure_clamps", pressure_clamps)?;
+        archive.count("counters.negative_pressures", negative_pressures)?;
         archive.small("counters.neighbours_max", neighbours_max)?;
         let mut none = non_finite.unwrap_or(u32::MAX);
         archive.small("counters.non_finite", &mut none)?;
@@ -130,6 +130,10 @@ pub trait Backend: Send {
     fn body_force(&mut self) -> Result<Vec<Wrench>>;
     /// What the guards have seen.
     fn counters(&mut self) -> Result<Counters>;
+    /// Work of the stages on the water since the start, if the plan asks for the ledger and the backend keeps one.
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        Ok(None)
+    }
     /// Sums over the fluid.
     fn monitor(&mut self) -> Result<FluidMonitor>;
     /// Both of these, with one wait on a device; [`Self::stage_seconds`] is up to date then.

@@ -174,6 +174,13 @@ pub struct Fluid {
     /// Blocks of water at t = 0.
     #[serde(default)]
     pub block: Vec<Block>,
+    /// Largest displacement of a water particle from its lattice at t = 0, along each axis, over the spacing [-];
+    /// 0 for none. For ensembles: starts with different `seed` differ in nothing else.
+    #[serde(default)]
+    pub jitter: f64,
+    /// Which of the jittered starts.
+    #[serde(default)]
+    pub seed: u32,
     /// The pressure Poisson equation's solver.
     #[serde(default)]
     pub solver: Solver,
@@ -247,6 +254,16 @@ pub enum Face {
     /// Largest z.
     ZMax,
 }
+
+/// Faces of the tank and the names of their walls, in the order of [`Face`].
+pub const TANK_FACES: [(Face, &str); 6] = [
+    (Face::XMin, "tank.x_min"),
+    (Face::XMax, "tank.x_max"),
+    (Face::YMin, "tank.y_min"),
+    (Face::YMax, "tank.y_max"),
+    (Face::ZMin, "tank.z_min"),
+    (Face::ZMax, "tank.z_max"),
+];
 
 /// A rectangular container; walls outside of `min`..`max`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -462,11 +479,11 @@ impl Contact {
 pub struct Gauges {
     /// Interval between rows [s]; every step if absent.
     pub every: Option<f64>,
-    /// Pressure on a wall: mean over the wall particles within half an effective radius of the point.
+    /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
     pub pressure: Vec<PressureGauge>,
     /// Height of the water surface along a vertical line.
     pub level: Vec<LevelGauge>,
-    /// Force and torque of the fluid on a body or moving wall.
+    /// Force and torque of the fluid on a body or wall.
     pub force: Vec<ForceGauge>,
 }
 
@@ -496,7 +513,8 @@ pub struct LevelGauge {
 pub struct ForceGauge {
     /// Name, used in the header.
     pub name: String,
-    /// Name of the body or moving wall.
+    /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
+    /// the centre of mass, or the middle of a fixed wall.
     pub on: String,
 }
 
@@ -537,6 +555,8 @@ pub struct Output {
     pub encoding: Encoding,
     /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
     pub table_every: Option<f64>,
+    /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.
+    pub ledger: bool,
 }
 
 impl Default for Output {
@@ -546,6 +566,7 @@ impl Default for Output {
             kinds: vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall],
             encoding: Encoding::Base64,
             table_every: None,
+            ledger: false,
         }
     }
 }

@@ -207,7 +207,7 @@ pub fn write(folder: &Path, origin: &Origin, archive: &Archive) -> Result<(PathB
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let bytes = encode(origin, archive)?;
     let path = folder.join(format!("step_{:010}.seixo", origin.step));
-    let mut file = crate::output::beside(folder).map_err(Error::io(&path))?;
+    let mut file = crate::whole::beside(folder).map_err(Error::io(&path))?;
     file.write_all(&bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(&path))?;
     file.persist(&path).map_err(|e| Error::io(&path)(e.error))?;
     // The name, too, has to be on the disk; where folders cannot be opened, the system sees to it.

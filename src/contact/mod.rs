@@ -105,6 +105,16 @@ impl Solids {
         &self.poses
     }
 
+    /// Poses that [`Solids::predict`] gave last.
+    pub fn predicted(&self) -> &[Pose] {
+        &self.predicted
+    }
+
+    /// Whether forces move solid `k`.
+    pub fn is_free(&self, k: usize) -> bool {
+        self.bodies[k].is_free()
+    }
+
     /// Name of solid `k`, as in the case.
     pub fn name(&self, k: usize) -> &str {
         &self.names[k]
@@ -120,16 +130,18 @@ impl Solids {
         &self.contact
     }
 
-    /// Poses at `t + dt` for the explicit stage of the fluid: V* = V + dt (g + contact acceleration of
+    /// Poses at `t + dt` for the explicit stage of the fluid: V* = V + dt (`gravity` + contact acceleration of
     /// the last step), X* = X + dt V*, the same for the angular momentum; prescribed solids by their table.
-    pub fn predict(&mut self, t: f64, dt: f64) -> &[Pose] {
+    /// `gravity` is that of the fluid's explicit stage ([`crate::params::Params::explicit_gravity`]), so that body
+    /// and water fall together there.
+    pub fn predict(&mut self, t: f64, dt: f64, gravity: DVec3) -> &[Pose] {
         for (k, body) in self.bodies.iter().enumerate() {
             self.predicted[k] = match (body.prescribed_velocity(t, dt), body.prescribed_position(t + dt)) {
                 (Some(velocity), Some(position)) => Pose { position, velocity, ..body.pose },
                 _ => {
                     let mut body = body.clone();
                     let contact = self.contact[k];
-                    body.kick(dt * (body.mass * self.gravity + contact.force), dt * contact.torque);
+                    body.kick(dt * (body.mass * gravity + contact.force), dt * contact.torque);
                     body.drift(dt);
                     body.pose
                 }

@@ -2,16 +2,20 @@
 //! viscosity and collisions.
 //! GPU twin: shaders/body_force.wgsl
 
+use crate::params::Params;
 use glam::DVec3;
 
-/// Pressure on the true surface of the solid [Pa], with `weight` = rho g [N/m3]. Two heads are known to be
-/// missing: a wall-layer particle's centre lies half a spacing inside the surface (`to_surface`, world axes [m]),
-/// and P = 0 holds at the centres of the water's surface particles, half a spacing below the surface. Without
-/// them a floating body would sink a whole spacing too deep. Particles that are no unknown feel no pressure.
+/// Pressure on the true surface of the solid [Pa]. A wall-layer particle's centre lies half a spacing inside the surface
+/// (`to_surface`, world axes [m]). Particles that are no unknown feel no pressure.
 #[inline(always)]
-pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, weight: DVec3, spacing: f64) -> f64 {
-    let head = weight.dot(to_surface) + 0.5 * spacing * weight.length();
+pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, params: &Params) -> f64 {
+    let head = params.density * params.gravity.dot(to_surface) + missing_head(params);
     if unknown { (pressure + head).max(0.0) } else { 0.0 }
+}
+
+/// What the pressure lacks at the water's surface [Pa].
+pub fn missing_head(params: &Params) -> f64 {
+    params.density * params.gravity.length() * params.zero_pressure_depth()
 }
 
 /// Force of one wall-layer particle [N]: -P A + reaction, with `area` in world axes [m2].

@@ -1,7 +1,6 @@
 //! Cell list: count, scan, stable scatter. Fluid particles are reordered by cell each step; moving solids
 //! are indexed by cell each step; what never moves is indexed once.
 
-use super::neighbour_list::Coordinates;
 use crate::cells::Grid;
 use crate::fields::Fields;
 use crate::scene::Kind;
@@ -15,8 +14,6 @@ pub struct CellList {
     pub start: Vec<u32>,
     /// Slots in cell order.
     pub slot: Vec<u32>,
-    /// Coordinates in cell order [m].
-    pub coordinates: Coordinates,
 }
 
 /// Stable counting sort: `start[c]` gets the first place of cell c, `order[p]` the particle that goes to place p.
@@ -58,9 +55,6 @@ impl CellList {
         counting_sort(&scratch.cell, grid.total(), &mut self.start, &mut scratch.order);
         self.slot.clear();
         self.slot.extend(scratch.order.iter().map(|&k| scratch.slots[k as usize]));
-        scratch.vector.clear();
-        scratch.vector.extend(self.slot.iter().map(|&s| position[s as usize]));
-        self.coordinates.set(&scratch.vector);
     }
 }
 

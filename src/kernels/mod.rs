@@ -1,6 +1,6 @@
 //! One kernel, one name: `shaders/NAME.wgsl` runs on the device, `src/kernels/NAME.rs` is its twin, a
-//! plain function in f64 that says what the shader must do. The CPU backend runs the twins over all
-//! particles; it is the reference that device results are measured against.
+//! plain function in f64 that says what the shader must do. [`crate::backend::cpu`] has faster versions of some,
+//! which are tested against the twins, and runs them over all particles; device results are measured against it.
 
 pub mod body_force;
 pub mod cell_list;
@@ -17,3 +17,5 @@ pub mod predict;
 pub mod pressure_gradient;
 pub mod pressure_source;
 pub mod viscosity;
+
+pub use crate::neighbourhood::Particles;

@@ -1,10 +1,10 @@
 //! Particle number density, Eq. (4), and the free surface.
 //! GPU twin: shaders/number_density.wgsl
 
+use super::Particles;
 use crate::fields::State;
 use crate::lattice::weight;
 use crate::params::Params;
-use crate::row_arrays::{LANES, RowArrays, sum};
 use crate::scheme::FreeSurface;
 use glam::DVec3;
 
@@ -14,43 +14,33 @@ const OFFSET: f64 = 0.1;
 /// Smallest distance used in weights, over l0: coincident particles must not give infinities.
 pub const CLOSEST: f64 = 0.1;
 
-/// Weights of `n` neighbours at distances `r.r`, Eq. (3), into `r.w`; pairs beyond the effective radius (the
-/// collision may have moved them since the search) get 0.
+/// Weight of a pair at a distance of sqrt(`r2`), Eq. (3) [-]; 0 beyond the effective radius: the collision may have
+/// moved the pair since the search.
 #[inline(always)]
-pub fn weights(n: usize, r: &mut RowArrays, params: &Params) {
-    let (re, floor) = (params.effective_radius, CLOSEST * params.spacing);
-    let filled = n.next_multiple_of(LANES);
-    let RowArrays { r, w, .. } = r;
-    r.map_squares(&mut w[..filled], |r2| weight(r2.sqrt().max(floor), re).max(0.0));
-    w[n..filled].fill(0.0);
+pub fn pair_weight(r2: f64, params: &Params) -> f64 {
+    weight(r2.sqrt().max(CLOSEST * params.spacing), params.effective_radius).max(0.0)
 }
 
-/// Number density of slot `i` and its part in the PPE; `r` gets distances and weights of its neighbours. `fluid` is
-/// the number of fluid slots: a wall particle without fluid in reach is dry and inactive.
+/// Number density of slot `i`, Eq. (4) [-], and its part in the PPE.
+pub fn number_density(i: usize, neighbour: &[u32], on: Particles) -> (f64, State) {
+    let offset = |j: u32| on.position[j as usize] - on.position[i];
+    let w = |j: u32| pair_weight(offset(j).length_squared(), on.params);
+    let n: f64 = neighbour.iter().map(|&j| w(j)).sum();
+    // A wall particle without fluid in reach is dry.
+    let wet = i < on.fluid || neighbour.iter().any(|&j| (j as usize) < on.fluid && w(j) > 0.0);
+    let centroid = || neighbour.iter().map(|&j| w(j) * offset(j)).sum();
+    (n, if wet { free_surface(n, centroid, on.params) } else { State::Inactive })
+}
+
+/// Whether a particle of number density `n` lies on the free surface; `first_moment` is sum w r.
 #[inline(always)]
-pub fn number_density(
-    i: usize,
-    neighbour: &[u32],
-    params: &Params,
-    fluid: usize,
-    position: &[DVec3],
-    r: &mut RowArrays,
-) -> (f64, State) {
-    let filled = r.r.differences(i, neighbour, position);
-    weights(neighbour.len(), r, params);
-    let w = &r.w[..filled];
-    let n = sum(w);
-    let wet = i < fluid || neighbour.iter().zip(w).any(|(&j, &w)| (j as usize) < fluid && w > 0.0);
-    if !wet {
-        return (n, State::Inactive);
-    }
+pub fn free_surface(n: f64, first_moment: impl FnOnce() -> DVec3, params: &Params) -> State {
     let threshold = params.free_surface_threshold * params.number_density;
     let surface = match params.free_surface {
         FreeSurface::Threshold => n < threshold,
         FreeSurface::ThresholdOffset => {
-            n < 0.8 * threshold
-                || (n < threshold && r.r.weighted_sum(w).length() > OFFSET * params.spacing * n)
+            n < 0.8 * threshold || (n < threshold && first_moment().length() > OFFSET * params.spacing * n)
         }
     };
-    (n, if surface { State::Surface } else { State::Inner })
+    if surface { State::Surface } else { State::Inner }
 }

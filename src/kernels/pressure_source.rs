@@ -4,11 +4,18 @@
 //!
 //! over neighbours that carry pressure (dummies: no flux; surface particles: P = 0).
 //! GPU twin: shaders/pressure_source.wgsl
+//!
+//! The paper's source is the deviation of the number density alone. The mixed one takes the divergence of the velocity,
+//! corrected by the moment matrix so that a stretch at constant volume has none, the deviation of a smooth density sum,
+//! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles.
 
+use super::Particles;
+use crate::lattice::smooth_weight;
+use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::{Params, Step};
 use crate::scheme::Source;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Coefficient c of the Laplacian, Eq. (6) [1/m2].
 #[inline(always)]
@@ -17,37 +24,61 @@ pub fn laplacian_coefficient(params: &Params) -> f64 {
 }
 
 /// Right side b [Pa/m2] and diagonal [1/m2] of slot `i` with number density `n`. `all` holds every
-/// neighbour, `pressure` those that carry pressure.
-#[inline(always)]
+/// neighbour, of which the first `carry` carry pressure.
 pub fn pressure_source(
     i: usize,
     n: f64,
-    (all, pressure): (Row, Row),
-    params: &Params,
+    (all, carry): (Row, usize),
+    on: Particles,
     step: &Step,
-    position: &[DVec3],
-    velocity: &[DVec3],
 ) -> (f64, f64) {
-    let c = laplacian_coefficient(params);
-    let links: f64 = pressure.weight.iter().sum();
+    let (params, c) = (on.params, laplacian_coefficient(on.params));
+    let links: f64 = all.iter().take(carry).map(|(_, w)| w).sum();
     if links <= 0.0 {
         return (0.0, c);
     }
     let per_time = params.density / step.dt;
-    let deviation = (n - params.number_density) / params.number_density;
-    let mut b = step.relaxation * per_time / step.dt * deviation;
-    if params.source == Source::Mixed {
-        let (x, v) = (position[i], velocity[i]);
-        let mut divergence = 0.0;
-        for (j, w) in all.iter() {
-            let r = position[j] - x;
-            let r2 = r.length_squared();
-            if r2 > 0.0 {
-                divergence += (velocity[j] - v).dot(r) * w / r2;
-            }
+    let b = match params.source {
+        Source::NumberDensity => number_density_source(n, params, step),
+        Source::Mixed => {
+            let first_moment: DVec3 =
+                all.iter().take(carry).map(|(j, w)| w * (on.position[j] - on.position[i])).sum();
+            step.relaxation * per_time / step.dt * deviation(i, all, on)
+                - (1.0 - step.relaxation) * per_time * divergence(i, all, on)
+                - c * params.density * params.gravity.dot(first_moment)
         }
-        divergence *= f64::from(params.dimensions) / params.number_density;
-        b -= (1.0 - step.relaxation) * per_time * divergence;
-    }
+    };
     (b, c * links + step.compressibility * per_time / step.dt)
+}
+
+/// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).
+#[inline(always)]
+pub fn number_density_source(n: f64, params: &Params, step: &Step) -> f64 {
+    let deviation = (n - params.number_density) / params.number_density;
+    step.relaxation * (params.density / step.dt) / step.dt * deviation
+}
+
+/// (1 + sum W) / W0 - 1 [-]: W is smooth where it ends and finite at r = 0, so that the sum keeps its value on
+/// stretched and on disordered arrangements, where n of Eq. (4) rises.
+fn deviation(i: usize, all: Row, on: Particles) -> f64 {
+    let (x, re) = (on.position[i], on.params.effective_radius);
+    let near: f64 = all.iter().map(|(j, _)| smooth_weight(on.position[j].distance(x) / re)).sum();
+    (1.0 + near) / on.params.smooth_density - 1.0
+}
+
+/// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Solids count with their
+/// velocity along their mean normal: that past them moves no volume.
+fn divergence(i: usize, all: Row, on: Particles) -> f64 {
+    let inverse = inverse(moment(i, all, on), on.params.dimensions).unwrap_or(DMat3::IDENTITY);
+    let slips = |j: usize| i < on.fluid && j >= on.fluid;
+    let solids = all.iter().filter(|&(j, _)| slips(j));
+    let normal = solids.map(|(j, w)| pair_vector(i, j, w, on)).sum::<DVec3>().normalize_or_zero();
+    let pair = |(j, w): (usize, f64)| {
+        let mut v = on.velocity[j] - on.velocity[i];
+        if slips(j) {
+            v = v.dot(normal) * normal;
+        }
+        v.dot(inverse * pair_vector(i, j, w, on))
+    };
+    all.iter().map(pair).sum()
 }

@@ -1,73 +1,41 @@
 //! Viscous acceleration, Eqs. (2) and (6), with the positions and neighbours of the last step.
 //! GPU twin: shaders/viscosity.wgsl
 //!
-//! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction.
+//! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction. A pair of
+//! fluid and wall weighs `params.wall_shear`: the wall's velocity holds on its surface, half a spacing before its layer.
 
+use super::Particles;
 use crate::lattice::weight;
-use crate::neighbours::Row;
 use crate::params::Params;
-use crate::row_arrays::RowArrays;
 use glam::DVec3;
 
-/// nu times the Laplacian of the velocity at slot `i` [m/s2]; `row` holds its pressure-carrying neighbours.
-/// The particles have moved since the list was made: weights are made afresh.
-#[inline(always)]
-pub fn viscosity(
-    i: usize,
-    row: Row,
-    params: &Params,
-    position: &[DVec3],
-    velocity: &[DVec3],
-    arrays: &mut RowArrays,
-) -> DVec3 {
-    coefficient(params) * laplacian_sum(i, row, |_| true, params, position, velocity, arrays)
-}
-
-/// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
-#[inline(always)]
-pub fn reaction(
-    i: usize,
-    row: Row,
-    params: &Params,
-    fluid: usize,
-    position: &[DVec3],
-    velocity: &[DVec3],
-    arrays: &mut RowArrays,
-) -> DVec3 {
-    let wet = |j: u32| (j as usize) < fluid;
-    params.particle_mass()
-        * coefficient(params)
-        * laplacian_sum(i, row, wet, params, position, velocity, arrays)
-}
-
-/// 2 d nu / (lambda n0) [1/s].
-fn coefficient(params: &Params) -> f64 {
+/// 2 d nu / (lambda n0) [1/s], Eq. (6).
+pub fn coefficient(params: &Params) -> f64 {
     params.viscosity * 2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density)
 }
 
-/// sum w (v_j - v_i) over the neighbours that `counts` admits.
+/// nu lap v at slot `i` [m/s2], Eq. (6); `carriers` are its neighbours that carry pressure.
+/// The particles have moved since the list was made: weights are made afresh.
+pub fn viscosity(i: usize, carriers: &[u32], on: Particles) -> DVec3 {
+    coefficient(on.params) * carriers.iter().map(|&j| exchange(i, j as usize, on)).sum::<DVec3>()
+}
+
+/// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
+pub fn reaction(i: usize, carriers: &[u32], on: Particles) -> DVec3 {
+    let wet = carriers.iter().filter(|&&j| (j as usize) < on.fluid);
+    let sum: DVec3 = wet.map(|&j| exchange(i, j as usize, on)).sum();
+    on.params.particle_mass() * coefficient(on.params) * sum
+}
+
+/// Share of the pair of slots `i` and `j` in the sum [-].
 #[inline(always)]
-fn laplacian_sum(
-    i: usize,
-    row: Row,
-    counts: impl Fn(u32) -> bool,
-    params: &Params,
-    position: &[DVec3],
-    velocity: &[DVec3],
-    arrays: &mut RowArrays,
-) -> DVec3 {
-    let re = params.effective_radius;
-    let RowArrays { r, w, .. } = arrays;
-    r.differences(i, row.neighbour, position);
-    let w = &mut w[..row.neighbour.len()];
-    r.map_squares(w, |r2| {
-        let r = r2.sqrt();
-        if r > 0.0 && r < re { weight(r, re) } else { 0.0 }
-    });
-    let mut sum = DVec3::ZERO;
-    for (&w, &j) in w.iter().zip(row.neighbour) {
-        let w = if counts(j) { w } else { 0.0 };
-        sum += w * (velocity[j as usize] - velocity[i]);
-    }
-    sum
+pub fn share(i: usize, j: usize, on: Particles) -> f64 {
+    if (i < on.fluid) == (j < on.fluid) { 1.0 } else { on.params.wall_shear }
+}
+
+/// w_ij (v_j - v_i), with its share [m/s].
+fn exchange(i: usize, j: usize, on: Particles) -> DVec3 {
+    let (r, re) = (on.position[j].distance(on.position[i]), on.params.effective_radius);
+    let w = if r > 0.0 && r < re { weight(r, re) } else { 0.0 };
+    share(i, j, on) * w * (on.velocity[j] - on.velocity[i])
 }

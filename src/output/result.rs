@@ -175,6 +175,10 @@ pub struct Summary {
     pub pressure: Pressure,
     /// Extremes.
     pub monitors: Monitors,
+    /// Work of each part of the step [J], and what of the change of energy none of them accounts for, if
+    /// `output.ledger` asks for it.
+    #[serde(rename = "ledger_J", skip_serializing_if = "Option::is_none")]
+    pub ledger: Option<BTreeMap<&'static str, f64>>,
     /// Bodies and moving walls.
     pub bodies: Vec<Body>,
 }

@@ -4,10 +4,12 @@ use super::tables::solved;
 use crate::backend::Counters;
 use crate::checkpoint::Archive;
 use crate::error::Result;
+use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::output::result::{Body, Monitors, Particles, Pressure, Summary};
 use crate::scene::{Kind, Scene};
 use crate::simulation::{Simulation, StepReport};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Sums since the start.
@@ -20,6 +22,8 @@ pub struct Totals {
     monitors: Monitors,
     looks: u64,
     density_error: f64,
+    /// Work of each part of the step, if it is kept.
+    pub ledger: Option<Ledger>,
     /// Largest speed of the fluid when last looked at [m/s].
     pub speed: f64,
     /// Wall-clock time spent on files.
@@ -41,6 +45,8 @@ impl Totals {
             looks,
             density_error,
             speed,
+            // Read from the simulation at the next row.
+            ledger: _,
             // By the clock of each process.
             output: _,
         } = self;
@@ -160,6 +166,7 @@ impl Totals {
             stages: simulation.stages.iter().map(|(stage, seconds)| (stage.name(), *seconds)).collect(),
             pressure,
             monitors,
+            ledger: self.ledger.map(|ledger| works(&ledger, monitors.energy_end - monitors.energy_start)),
             bodies: bodies(simulation),
             ..Summary::default()
         }
@@ -178,6 +185,12 @@ pub fn particles(scene: &Scene) -> Particles {
         }
     }
     out
+}
+
+/// The ledger as `result.json` has it, for an energy that changed by `change` [J].
+fn works(ledger: &Ledger, change: f64) -> BTreeMap<&'static str, f64> {
+    let entries = Entry::ALL.map(|entry| (entry.name(), ledger.get(entry)));
+    entries.into_iter().chain([("unaccounted", change - ledger.total())]).collect()
 }
 
 fn bodies(simulation: &Simulation) -> Vec<Body> {

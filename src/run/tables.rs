@@ -7,6 +7,7 @@ use crate::checkpoint::Archive;
 use crate::contact::Energy;
 use crate::error::Result;
 use crate::gauges::Gauges;
+use crate::ledger::Entry;
 use crate::monitor::FluidMonitor;
 use crate::output::folder::Folder;
 use crate::output::table::{Cell, Table, vector_cells, vector_columns};
@@ -106,7 +107,7 @@ impl Tables {
         };
         let bodies = if scene.solids.is_empty() { None } else { Some(table("bodies.csv", &body_header())?) };
         Ok(Self {
-            monitors: table("monitors.csv", &monitor_header(&stages))?,
+            monitors: table("monitors.csv", &monitor_header(&stages, simulation.plan.ledger))?,
             bodies,
             gauges,
             due: Due::new(every),
@@ -208,7 +209,10 @@ impl Tables {
         let bodies = simulation.solids.energy();
         totals.look(&fluid, &counters, bodies.total(), report.dt, simulation.params.spacing);
         let since = std::mem::take(&mut self.since);
-        let row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
+        let mut row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
+        let ledger = simulation.ledger()?;
+        row.extend(ledger.iter().flat_map(|l| Entry::ALL.map(|entry| Cell::from(l.get(entry)))));
+        totals.ledger = ledger;
         self.since.stages = simulation.stages.clone();
         self.monitors.row(&row)?;
         self.monitors.flush()?;
@@ -291,7 +295,7 @@ impl Tables {
     }
 }
 
-fn monitor_header(stages: &[Stage]) -> Vec<String> {
+fn monitor_header(stages: &[Stage], ledger: bool) -> Vec<String> {
     let fixed = "step [-],time [s],dt [s],courant [-],speed_max [m/s],density_error_mean [-],density_error_max [-],\
                  kinetic [J],potential [J],body_kinetic [J],body_potential [J],body_contact [J],energy [J]";
     let mut header: Vec<String> = fixed.split(',').map(String::from).collect();
@@ -303,6 +307,9 @@ fn monitor_header(stages: &[Stage]) -> Vec<String> {
                 negative_pressures [-],neighbours_max [-]";
     header.extend(rest.split(',').map(String::from));
     header.extend(stages.iter().map(|s| format!("wall_{} [s]", s.name())));
+    if ledger {
+        header.extend(Entry::ALL.map(|entry| format!("work_{} [J]", entry.name())));
+    }
     header
 }
 

@@ -14,6 +14,7 @@
 mod bodies;
 mod build;
 mod domain;
+mod jitter;
 mod lattice;
 mod layout;
 mod motion;
@@ -30,6 +31,22 @@ pub use placement::CONTACT_DISTANCE;
 use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::Range;
+
+/// Wall particles that stand for `point`: those within half an effective radius `reach` of it, or, where the lattice
+/// has moved the wall away, of the nearest one. `Err` holds the nearest if the point is on no wall, and nothing if
+/// there are no walls.
+///
+/// # Errors
+/// See above.
+pub fn wall_at(wall: &[DVec3], point: DVec3, reach: f64, spacing: f64) -> Result<Vec<usize>, Option<DVec3>> {
+    // A face moves by up to half a spacing to fit the lattice, its particles stand half a spacing behind it; along
+    // the face it may end half a spacing short, and half a spacing from the last particle.
+    let farthest = 3_f64.sqrt() * (1.0 + 1e-6) * spacing;
+    let nearest = wall.iter().copied().min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)));
+    let nearest = nearest.filter(|n| n.distance(point) <= farthest).ok_or(nearest)?;
+    let from = if nearest.distance(point) <= reach { point } else { nearest };
+    Ok((0..wall.len()).filter(|&k| wall[k].distance(from) <= reach).collect())
+}
 
 /// What a particle is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
@@ -205,6 +222,8 @@ pub struct Scene {
     /// Outward normal (into the free space) of each static wall particle, for contact; one per slot of
     /// [`Groups::static_wall_range`]. Edge particles hold the sum of their faces' normals, normalised.
     pub static_wall_normal: Vec<DVec3>,
+    /// Index into `walls` of each static wall particle.
+    pub static_wall_shape: Vec<u32>,
     /// Box that no particle may leave [m].
     pub domain: (DVec3, DVec3),
     /// Largest depth of water at the start, along gravity [m].

@@ -251,7 +251,8 @@ pub fn compare_stages(
     let start = pair.gpu.read()?;
     pair.cpu.write(&start)?;
     let step = simulation.next_step();
-    let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt).to_vec();
+    let gravity = simulation.params.explicit_gravity();
+    let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt, gravity).to_vec();
     // Viscosity takes the neighbours of the step before.
     for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
         pair.cpu.run(stage, &step)?;

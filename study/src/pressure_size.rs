@@ -62,7 +62,8 @@ impl Moment {
             simulation.step()?;
         }
         let step = simulation.next_step();
-        let poses = simulation.solids.predict(step.time, step.dt).to_vec();
+        let gravity = simulation.params.explicit_gravity();
+        let poses = simulation.solids.predict(step.time, step.dt, gravity).to_vec();
         let fields = simulation.backend.read()?;
         let Simulation { params, plan, scene, .. } = simulation;
         Ok(Self { params, plan, step, poses, fields, scene })

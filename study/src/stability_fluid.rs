@@ -103,7 +103,12 @@ fn still(sets: &[String], gamma: f64, context: &Context) -> Result<(f64, f64, Si
         if simulation.time > 0.5 * end && simulation.steps % 4 == 0 {
             let (fields, monitor) = (simulation.backend.read()?, simulation.backend.monitor()?);
             let z = monitor.centroid[2];
-            let (rms, _) = hydrostatics(&fields, simulation.groups.fluid, 2.0 * z - 0.01, weight);
+            let (rms, _) = hydrostatics(
+                &fields,
+                simulation.groups.fluid,
+                2.0 * z - simulation.params.zero_pressure_depth(),
+                weight,
+            );
             square += (rms / (weight * 0.4)).powi(2);
             depth += 2.0 * z / 0.4;
             samples += 1.0;
@@ -162,7 +167,8 @@ fn viscous_limit(dimensions: u32, context: &Context) -> Result<Measured> {
         Ok(true)
     })?;
     out.put("limit [-]", limit);
-    out.put("theory [-]", Lattice::new(dimensions, 2.1).viscous_limit(dimensions));
+    let lattice = Lattice::new(dimensions, 2.1);
+    out.put("theory [-]", lattice.viscous_limit(dimensions, lattice.wall_shear));
     Ok(out)
 }
 

@@ -34,6 +34,7 @@ impl Cpu {
             live,
             counters,
             dt,
+            ledger,
         } = self;
         let Fields {
             position,
@@ -63,6 +64,10 @@ impl Cpu {
             lists(archive, neighbours, position.len())?;
         }
         counters.exchange(archive)?;
+        // Its pressures and accelerations are made anew in every step.
+        if let Some(ledger) = ledger {
+            ledger.work.exchange(archive, "ledger.water")?;
+        }
         archive.number("dt", dt)?;
         let count = kind.iter().take(groups.fluid).filter(|&&k| k == Kind::Fluid).count();
         let sorted = kind.iter().take(count).all(|&k| k == Kind::Fluid);

@@ -167,6 +167,7 @@ mod tests {
             preconditioner: Preconditioner::Multigrid,
             force_relaxation: 1.0,
             contact: Default::default(),
+            ledger: false,
             fixed_walls: true,
         }
     }

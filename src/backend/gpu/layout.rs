@@ -4,6 +4,7 @@ use super::buffers::TABLE;
 use super::hierarchy::Levels;
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
+use crate::kernels::body_force::missing_head;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
 use crate::params::{Params, Step};
@@ -79,6 +80,10 @@ pub struct Constants {
     pub gradient_scale: f32,
     pub density: f32,
     pub tolerance_squared: f32,
+    pub smooth_density: f32,
+    pub surface_head: f32,
+    pub wall_shear: f32,
+    pub pad: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -191,6 +196,10 @@ impl Constants {
             gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
             density: params.density as f32,
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
+            smooth_density: params.smooth_density as f32,
+            surface_head: missing_head(params) as f32,
+            wall_shear: params.wall_shear as f32,
+            pad: 0.0,
         }
     }
 }
@@ -402,6 +411,7 @@ mod tests {
             force_relaxation: 1.0,
             contact: Default::default(),
             fixed_walls: true,
+            ledger: false,
         };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
         assert!(middle.total() < 200_000_000, "{}", middle.total());
@@ -421,6 +431,7 @@ mod tests {
             force_relaxation: 1.0,
             contact: Default::default(),
             fixed_walls: false,
+            ledger: false,
         };
         assert_eq!(Memory::new(&Sizes::default(), &plan).total(), 0);
     }

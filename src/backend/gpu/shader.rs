@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Arrays, Plan, Stage};
-use crate::scheme::{FreeSurface, Gradient, Source};
+use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 
 /// Appended to every kernel.
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
@@ -11,11 +11,11 @@ pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 /// Names that `//#if NAME` may ask for.
 pub const SWITCHES: [&str; 10] = [
     "CORRECTED",
-    "CORRECTED_SURFACE",
     "MIXED",
     "MOVING",
     "MULTIGRID",
     "REACTION",
+    "SHARED_COLLISIONS",
     "STATIC",
     "THRESHOLD_OFFSET",
     "TWO_DIMENSIONS",
@@ -26,11 +26,11 @@ pub const SWITCHES: [&str; 10] = [
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         params.gradient != Gradient::Minimum,
-        params.gradient == Gradient::CorrectedSurface,
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
         plan.needs(Arrays::Reaction),
+        params.collision == Collision::Shared,
         plan.needs(Arrays::FixedWalls),
         params.free_surface == FreeSurface::ThresholdOffset,
         params.dimensions == 2,

@@ -24,4 +24,4 @@ macro_rules! wide {
         }
     };
 }
-pub(crate) use wide;
+pub(super) use wide;

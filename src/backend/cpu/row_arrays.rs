@@ -67,6 +67,8 @@ pub struct RowArrays {
     pub r: Columns,
     /// Another vector of each neighbour.
     pub v: Columns,
+    /// A third one.
+    pub e: Columns,
     /// A number for each neighbour, mostly the weight.
     pub w: Column,
     /// Another number.
@@ -76,7 +78,7 @@ pub struct RowArrays {
 impl Default for RowArrays {
     fn default() -> Self {
         let v = Columns { x: [0.0; LONGEST], y: [0.0; LONGEST], z: [0.0; LONGEST] };
-        Self { r: v, v, w: [0.0; LONGEST], s: [0.0; LONGEST] }
+        Self { r: v, v, e: v, w: [0.0; LONGEST], s: [0.0; LONGEST] }
     }
 }
 

@@ -1,8 +1,24 @@
-//! The CPU backend: the kernels' twins in f64, over all particles, on all cores.
+//! The CPU backend: the kernels in f64, over all particles, on all cores. Those that sum over neighbours have a fast
+//! version here, tested against the plain one in [`crate::kernels`].
 
 mod archive;
+mod ledger;
+mod moment;
+mod number_density;
+mod pressure_gradient;
+mod pressure_source;
+mod row_arrays;
+mod search;
+mod viscosity;
+mod wide;
 
-use super::rows::{Shared, density_rows, gradient_rows, viscosity_rows};
+use self::ledger::WaterLedger;
+use self::number_density::density_rows;
+use self::pressure_gradient::gradient_rows;
+use self::pressure_source::source_rows;
+use self::row_arrays::RowArrays;
+use self::search::{Candidates, Coordinates, Search, neighbour_list};
+use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
 use crate::body::{Pose, Wrench};
@@ -10,10 +26,9 @@ use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
-use crate::kernels::neighbour_list::{Candidates, Coordinates, Search, neighbour_list};
-use crate::kernels::{
-    body_force, collision, correct, monitor, move_solids, predict, pressure_source, viscosity,
-};
+use crate::kernels::pressure_source::laplacian_coefficient;
+use crate::kernels::{Particles, body_force, collision, correct, monitor, move_solids, predict};
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
 use crate::params::{Params, Step};
@@ -21,7 +36,6 @@ use crate::plan::{Arrays, ParticleStage, Plan};
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve_or_fall_back};
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
-use crate::row_arrays::RowArrays;
 use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
 use glam::DVec3;
@@ -39,8 +53,8 @@ pub struct Cpu {
     grid: Grid,
     fluid_start: Vec<u32>,
     coordinates: Coordinates,
-    moving: Option<CellList>,
-    fixed: Option<CellList>,
+    moving: Option<(CellList, Coordinates)>,
+    fixed: Option<(CellList, Coordinates)>,
     near_fluid: Vec<bool>,
     /// Keep dry walls in every stage, to show that leaving them out changes nothing.
     pub active_set: bool,
@@ -50,6 +64,7 @@ pub struct Cpu {
     multigrid: Option<Multigrid>,
     live: usize,
     counters: Counters,
+    ledger: Option<Box<WaterLedger>>,
     dt: f64,
 }
 
@@ -64,7 +79,9 @@ impl Cpu {
         let fixed = (wet && !groups.static_range().is_empty()).then(|| {
             let mut list = CellList::default();
             list.index(&grid, groups.static_range(), &scene.position, &mut scratch);
-            list
+            let mut coordinates = Coordinates::default();
+            coordinates.set(list.slot.par_iter().map(|&s| &scene.position[s as usize]));
+            (list, coordinates)
         });
         Ok(Self {
             params: params.clone(),
@@ -76,7 +93,7 @@ impl Cpu {
             grid,
             fluid_start: Vec::new(),
             coordinates: Coordinates::default(),
-            moving: (wet && groups.moving_wall > 0).then(CellList::default),
+            moving: (wet && groups.moving_wall > 0).then(Default::default),
             fixed,
             near_fluid: Vec::new(),
             active_set: true,
@@ -86,6 +103,7 @@ impl Cpu {
             multigrid: (wet && plan.preconditioner == Preconditioner::Multigrid).then(Multigrid::default),
             live: groups.fluid,
             counters: Counters::default(),
+            ledger: (wet && plan.ledger).then(Box::default),
             dt: 0.0,
         })
     }
@@ -111,12 +129,12 @@ impl Cpu {
     }
 
     fn viscosity(&mut self) {
-        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let Self { fields, neighbours, params, groups, .. } = self;
         if neighbours.pairs() == 0 {
             return;
         }
         let (position, velocity) = (&fields.position, &fields.velocity);
-        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
         fields
             .acceleration
             .par_chunks_mut(CHUNK)
@@ -125,21 +143,18 @@ impl Cpu {
             .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
         let reaction = |arrays: &mut RowArrays, (k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
-            *f = viscosity::reaction(
-                i,
-                neighbours.pressure(i),
-                params,
-                groups.fluid,
-                position,
-                velocity,
-                arrays,
-            );
+            *f = viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays);
         };
         fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::default, reaction);
     }
 
     fn predict(&mut self, dt: f64) {
-        let (g, l0, n) = (self.params.gravity, self.params.spacing, self.live);
+        if let Some(ledger) = &mut self.ledger {
+            let Fields { position, velocity, acceleration, .. } = &self.fields;
+            let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
+            ledger.predict(self.live, on, acceleration, dt);
+        }
+        let (g, l0, n) = (self.params.explicit_gravity(), self.params.spacing, self.live);
         let Fields { position, velocity, acceleration, .. } = &mut self.fields;
         let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n])
             .into_par_iter()
@@ -153,14 +168,20 @@ impl Cpu {
     }
 
     fn cell_list(&mut self) {
+        if let Some(ledger) = &mut self.ledger {
+            let Fields { position, velocity, .. } = &self.fields;
+            let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
+            ledger.lost(self.live, on);
+        }
         let domain = (self.params.domain_min, self.params.domain_max);
         let Self { fields, grid, params, fluid_start, scratch, groups, .. } = self;
         self.counters.lost +=
             cell_list::reorder_fluid(fields, grid, domain, params.dimensions, fluid_start, scratch);
         self.live = fluid_start[grid.total()] as usize;
-        if let Some(list) = &mut self.moving {
+        if let Some((list, coordinates)) = &mut self.moving {
             let slots = groups.moving_wall_range().chain(groups.moving_dummy_range());
             list.index(grid, slots, &fields.position, scratch);
+            coordinates.set(list.slot.par_iter().map(|&s| &fields.position[s as usize]));
         }
         if self.active_set {
             cell_list::mark_near_fluid(grid, fluid_start, &mut self.near_fluid);
@@ -173,13 +194,13 @@ impl Cpu {
     fn neighbour_list(&mut self) {
         let Self { fields, grid, params, groups, near_fluid, live, .. } = self;
         let (fluid, position, live) = (groups.fluid, &fields.position, *live);
-        self.coordinates.set(&position[..live]);
+        self.coordinates.set(position[..live].par_iter());
         let from = Candidates {
             grid,
             fluid_start: &self.fluid_start,
             fluid: &self.coordinates,
-            moving: self.moving.as_ref(),
-            fixed: self.fixed.as_ref(),
+            moving: self.moving.as_ref().map(|(list, x)| (list, x)),
+            fixed: self.fixed.as_ref().map(|(list, x)| (list, x)),
             pressure_slots: groups.pressure() as u32,
         };
         let (largest, slot) = self
@@ -209,63 +230,69 @@ impl Cpu {
 
     fn collision(&mut self, step: &Step) {
         let Self { fields, neighbours, params, groups, .. } = self;
-        let (x, v) = (&fields.position, &fields.velocity);
-        let close = |i: usize| {
-            let chunk = &neighbours.chunks[i / CHUNK];
-            chunk.close[i % CHUNK].then(|| chunk.all(i % CHUNK))
-        };
+        let (position, velocity) = (&fields.position, &fields.velocity);
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let close = |i: usize| neighbours.chunks[i / CHUNK].close[i % CHUNK];
         fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
-            let change = close(i).map(|row| collision::collision(i, row, params, groups.fluid, x, v));
-            *a = change.unwrap_or(DVec3::ZERO) / step.dt;
+            let change = if close(i) { collision::collision(i, neighbours, on) } else { DVec3::ZERO };
+            *a = change / step.dt;
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if let Some(row) = close(i) {
-                *f += collision::reaction(i, row, params, groups.fluid, x, v, step.dt);
+            if close(i) {
+                *f += collision::reaction(i, neighbours, on, step.dt);
             }
         });
+        if let Some(ledger) = &mut self.ledger {
+            ledger.collision(self.live, on, &fields.acceleration, step.dt);
+        }
         self.correct(step.dt);
     }
 
     fn number_density(&mut self) {
         let Self { fields, neighbours, params, groups, live, .. } = self;
         let Fields { position, velocity, number_density, state, .. } = fields;
-        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
         (&mut neighbours.chunks, number_density.par_chunks_mut(CHUNK), state.par_chunks_mut(CHUNK))
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (chunk, density, state))| density_rows(c * CHUNK, chunk, density, state, on));
-    }
-
-    fn pressure_source(&mut self, step: &Step) {
-        let Self { fields, neighbours, params, .. } = self;
-        let (position, velocity, density, state) =
-            (&fields.position, &fields.velocity, &fields.number_density, &fields.state);
-        (&neighbours.chunks, fields.source.par_chunks_mut(CHUNK), fields.diagonal.par_chunks_mut(CHUNK))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(c, (chunk, source, diagonal))| {
-                for k in 0..source.len() {
-                    let i = c * CHUNK + k;
-                    (source[k], diagonal[k]) = (0.0, 1.0);
-                    if state[i] == State::Inner {
-                        let rows = (chunk.all(k), chunk.pressure(k));
-                        (source[k], diagonal[k]) = pressure_source::pressure_source(
-                            i, density[i], rows, params, step, position, velocity,
-                        );
-                    }
-                }
+            .for_each(|(c, (chunk, density, state))| {
+                density_rows(c * CHUNK, *live, chunk, density, state, on)
             });
     }
 
-    fn pressure_gradient(&mut self) {
-        let Self { fields, neighbours, params, groups, live, .. } = self;
-        let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
-        let on = Shared { params, position, velocity, fluid: groups.fluid, live: *live };
-        (acceleration.par_chunks_mut(CHUNK), &neighbours.chunks, state.par_chunks(CHUNK))
+    fn pressure_source(&mut self, step: &Step) {
+        let Self { fields, neighbours, params, groups, .. } = self;
+        let Fields { position, velocity, number_density, state, source, diagonal, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        (
+            &neighbours.chunks,
+            (number_density.par_chunks(CHUNK), state.par_chunks(CHUNK)),
+            (source.par_chunks_mut(CHUNK), diagonal.par_chunks_mut(CHUNK)),
+        )
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (a, chunk, state))| gradient_rows(c * CHUNK, chunk, a, state, pressure, on));
+            .for_each(|(c, (chunk, given, out))| source_rows(c * CHUNK, chunk, given, out, on, step));
+    }
+
+    fn pressure_gradient(&mut self) {
+        let Self { fields, neighbours, params, groups, live, ledger, .. } = self;
+        let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let live = *live;
+        let rows = |pressure: &[f64], acceleration: &mut [DVec3]| {
+            (acceleration.par_chunks_mut(CHUNK), &neighbours.chunks, state.par_chunks(CHUNK))
+                .into_par_iter()
+                .enumerate()
+                .for_each(|(c, (a, chunk, state))| {
+                    gradient_rows(c * CHUNK, live, chunk, a, state, pressure, on);
+                });
+        };
+        rows(pressure, acceleration);
+        if let Some(ledger) = ledger {
+            ledger.unclipped.resize(acceleration.len(), DVec3::ZERO);
+            rows(&ledger.solution, &mut ledger.unclipped);
+        }
     }
 
     fn correct(&mut self, dt: f64) {
@@ -311,7 +338,14 @@ impl Backend for Cpu {
             ParticleStage::NumberDensity => self.number_density(),
             ParticleStage::PressureSource => self.pressure_source(step),
             ParticleStage::PressureGradient => self.pressure_gradient(),
-            ParticleStage::Correct => self.correct(step.dt),
+            ParticleStage::Correct => {
+                if let Some(ledger) = &mut self.ledger {
+                    let Fields { position, velocity, acceleration, .. } = &self.fields;
+                    let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
+                    ledger.pressure(self.live, on, acceleration, step.dt);
+                }
+                self.correct(step.dt);
+            }
         }
         Ok(())
     }
@@ -322,7 +356,7 @@ impl Backend for Cpu {
             neighbours,
             state: &fields.state,
             diagonal: &fields.diagonal,
-            coefficient: pressure_source::laplacian_coefficient(params),
+            coefficient: laplacian_coefficient(params),
         };
         let preconditioner: &mut dyn Precondition = match multigrid {
             Some(multigrid) => {
@@ -333,6 +367,9 @@ impl Backend for Cpu {
         };
         let report =
             solve_or_fall_back(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
+        if let Some(ledger) = &mut self.ledger {
+            ledger.solution.clone_from(&fields.pressure);
+        }
         let cut = |p: &mut f64| {
             let (high, low) = (*p > step.pressure_max, *p < 0.0);
             *p = p.clamp(0.0, step.pressure_max);
@@ -363,7 +400,7 @@ impl Backend for Cpu {
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        let (weight, spacing) = (self.params.density * self.params.gravity, self.params.spacing);
+        let params = &self.params;
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
@@ -371,8 +408,7 @@ impl Backend for Cpu {
                 let area = pose.orientation * solid.wall_area[k];
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let unknown = fields.state[i] == State::Inner;
-                let pressure =
-                    body_force::surface_pressure(fields.pressure[i], unknown, to_surface, weight, spacing);
+                let pressure = body_force::surface_pressure(fields.pressure[i], unknown, to_surface, params);
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;
@@ -383,6 +419,10 @@ impl Backend for Cpu {
         let wrenches = wrenches.collect();
         fields.reaction.fill(DVec3::ZERO);
         Ok(wrenches)
+    }
+
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        Ok(self.ledger.as_ref().map(|ledger| ledger.work))
     }
 
     fn counters(&mut self) -> Result<Counters> {
@@ -439,6 +479,6 @@ impl Backend for Cpu {
         let f = &self.fields;
         (f.position.len() * per_particle + f.pressure.len() * per_pressure + self.neighbours.bytes()) as u64
             + (self.fluid_start.len() * 4 + self.near_fluid.len()) as u64
-            + self.fixed.as_ref().map_or(0, |l| l.start.len() * 4 + l.slot.len() * 28) as u64
+            + self.fixed.as_ref().map_or(0, |l| l.0.start.len() * 4 + l.0.slot.len() * 28) as u64
     }
 }

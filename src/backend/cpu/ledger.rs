@@ -1,0 +1,79 @@
+//! The water's part of the energy ledger: [`crate::ledger::particle`] over all particles.
+
+use crate::kernels::Particles;
+use crate::kernels::cell_list::inside;
+use crate::ledger::particle::{correct_clamp, correct_work, predict_work};
+use crate::ledger::{Entry, Ledger};
+use crate::neighbours::CHUNK;
+use crate::params::Params;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Work so far, and what it takes to tell the cut of pressures from the pressure.
+#[derive(Default)]
+pub struct WaterLedger {
+    /// Work of the water's entries [J].
+    pub work: Ledger,
+    /// Pressure as solved [Pa].
+    pub solution: Vec<f64>,
+    /// Acceleration by it [m/s2].
+    pub unclipped: Vec<DVec3>,
+}
+
+/// Sums of `of` over the particles below `live`, in an order that does not depend on the number of threads.
+fn sums<const N: usize>(live: usize, of: impl Fn(usize) -> [f64; N] + Sync) -> [f64; N] {
+    let chunk = |c: usize| {
+        let slots = c * CHUNK..((c + 1) * CHUNK).min(live);
+        slots.map(&of).fold([0.0; N], |a, b| std::array::from_fn(|k| a[k] + b[k]))
+    };
+    let parts: Vec<[f64; N]> = (0..live.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
+    parts.iter().fold([0.0; N], |a, b| std::array::from_fn(|k| a[k] + b[k]))
+}
+
+impl WaterLedger {
+    fn add<const N: usize>(&mut self, entries: [Entry; N], params: &Params, sums: [f64; N]) {
+        let mass = params.particle_mass();
+        entries.into_iter().zip(sums).for_each(|(entry, sum)| self.work.add(entry, mass * sum));
+    }
+
+    /// Books `predict`, which is about to run with the viscous accelerations `viscous`.
+    pub fn predict(&mut self, live: usize, on: Particles, viscous: &[DVec3], dt: f64) {
+        let of = |i: usize| predict_work(on.position[i], on.velocity[i], viscous[i], on.params, dt);
+        self.add([Entry::Gravity, Entry::Viscosity, Entry::Clamps], on.params, sums(live, of));
+    }
+
+    /// Books the particles that `cell_list` is about to take out.
+    pub fn lost(&mut self, live: usize, on: Particles) {
+        let (params, domain) = (on.params, (on.params.domain_min, on.params.domain_max));
+        let of = |i: usize| {
+            let (x, v) = (on.position[i], on.velocity[i]);
+            let kept = inside(x, v, domain.0, domain.1, params.dimensions) || !(x + v).is_finite();
+            [if kept { 0.0 } else { params.gravity.dot(x) - 0.5 * v.length_squared() }]
+        };
+        self.add([Entry::Lost], params, sums(live, of));
+    }
+
+    /// Books `correct`, which is about to run with the accelerations `by_collision`.
+    pub fn collision(&mut self, live: usize, on: Particles, by_collision: &[DVec3], dt: f64) {
+        let of = |i: usize| {
+            let (v, a) = (on.velocity[i], by_collision[i]);
+            let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
+            [correct_work(v, a, a, on.params.gravity, dt), clamp]
+        };
+        self.add([Entry::Collision, Entry::Clamps], on.params, sums(live, of));
+    }
+
+    /// Books `correct`, which is about to run with the accelerations `total` of pressure and gravity.
+    pub fn pressure(&mut self, live: usize, on: Particles, total: &[DVec3], dt: f64) {
+        let gravity = on.params.gravity - on.params.explicit_gravity();
+        let of = |i: usize| {
+            let (v, a) = (on.velocity[i], total[i]);
+            let work = |part| correct_work(v, part, a, on.params.gravity, dt);
+            let solved = self.unclipped[i];
+            let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
+            [work(gravity), work(solved - gravity), work(a - solved), clamp]
+        };
+        let sums = sums(live, of);
+        self.add([Entry::Gravity, Entry::Pressure, Entry::Clip, Entry::Clamps], on.params, sums);
+    }
+}

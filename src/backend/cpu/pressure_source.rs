@@ -1,0 +1,111 @@
+//! [`crate::kernels::pressure_source`], several neighbours at a time.
+
+use super::moment::{moment, pair_vectors};
+use super::row_arrays::{Columns, RowArrays, sum};
+use super::wide::wide;
+use crate::fields::State;
+use crate::kernels::Particles;
+use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source};
+use crate::lattice::smooth_weight;
+use crate::neighbourhood::{inverse, scale};
+use crate::neighbours::{Chunk, Row};
+use crate::params::Step;
+use crate::scheme::Source;
+use glam::{DMat3, DVec3};
+
+wide! {
+    /// Right sides and diagonals of the slots from `first` on, whose number densities and states are given.
+    pub fn source_rows(
+        first: usize,
+        chunk: &Chunk,
+        given: (&[f64], &[State]),
+        out: (&mut [f64], &mut [f64]),
+        on: Particles,
+        step: &Step,
+    ) {
+        let ((density, state), (source, diagonal)) = (given, out);
+        let (mut arrays, c) = (RowArrays::default(), laplacian_coefficient(on.params));
+        let compressible = step.compressibility * (on.params.density / step.dt) / step.dt;
+        for k in 0..source.len() {
+            (source[k], diagonal[k]) = (0.0, 1.0);
+            if state[k] != State::Inner {
+                continue;
+            }
+            let links: f64 = chunk.pressure(k).weight.iter().sum();
+            if links <= 0.0 {
+                diagonal[k] = c;
+                continue;
+            }
+            diagonal[k] = c * links + compressible;
+            source[k] = match on.params.source {
+                Source::NumberDensity => number_density_source(density[k], on.params, step),
+                Source::Mixed => mixed_source(first + k, chunk.parts(k), on, step, &mut arrays),
+            };
+        }
+    }
+}
+
+/// Right side of slot `i`, corrected, smooth and balanced.
+#[inline(always)]
+fn mixed_source(
+    i: usize,
+    (all, carry): (Row, usize),
+    on: Particles,
+    step: &Step,
+    arrays: &mut RowArrays,
+) -> f64 {
+    let (params, n) = (on.params, all.neighbour.len());
+    let RowArrays { r, v, w, s, e } = arrays;
+    let filled = r.differences(i, all.neighbour, on.position);
+    let (w, s) = (&mut w[..filled], &mut s[..filled]);
+    w[..n].copy_from_slice(all.weight);
+    w[n..].fill(0.0);
+    r.map_squares(s, |r2| smooth_weight(r2.sqrt() / params.effective_radius));
+    let deviation = (1.0 + sum(&s[..n])) / params.smooth_density - 1.0;
+    pair_vectors(r, w, e);
+    let m = moment(r, e, filled, scale(on), params.dimensions);
+    let inverse = inverse(m, params.dimensions).unwrap_or(DMat3::IDENTITY);
+    v.differences(i, all.neighbour, on.velocity);
+    if i < on.fluid {
+        slip(all.neighbour, on.fluid, e, v);
+    }
+    s.copy_from_slice(w);
+    s[carry..].fill(0.0);
+    let first_moment = r.weighted_sum(s);
+    corrected_products(inverse, e, v, s);
+    let divergence = scale(on) * sum(s);
+    let per_time = params.density / step.dt;
+    step.relaxation * per_time / step.dt * deviation
+        - (1.0 - step.relaxation) * per_time * divergence
+        - laplacian_coefficient(params) * params.density * params.gravity.dot(first_moment)
+}
+
+/// Leaves of the relative velocity `v` of solid neighbours only what lies along their mean normal. Fluid comes first
+/// in a row.
+#[inline(always)]
+fn slip(neighbour: &[u32], fluid: usize, e: &Columns, v: &mut Columns) {
+    let first = neighbour.partition_point(|&j| (j as usize) < fluid);
+    let mut normal = DVec3::ZERO;
+    for k in first..neighbour.len() {
+        normal += DVec3::new(e.x[k], e.y[k], e.z[k]);
+    }
+    let normal = normal.normalize_or_zero();
+    for k in first..neighbour.len() {
+        let along = DVec3::new(v.x[k], v.y[k], v.z[k]).dot(normal) * normal;
+        (v.x[k], v.y[k], v.z[k]) = (along.x, along.y, along.z);
+    }
+}
+
+/// out_k <- v_k . (inverse e_k), with a symmetric `inverse`.
+#[inline(always)]
+fn corrected_products(inverse: DMat3, e: &Columns, v: &Columns, out: &mut [f64]) {
+    let n = out.len();
+    let (ex, ey, ez) = (&e.x[..n], &e.y[..n], &e.z[..n]);
+    let (vx, vy, vz) = (&v.x[..n], &v.y[..n], &v.z[..n]);
+    let [[a, b, c], [_, d, f], [_, _, g]] = inverse.to_cols_array_2d();
+    for k in 0..n {
+        out[k] = vx[k] * (a * ex[k] + b * ey[k] + c * ez[k])
+            + vy[k] * (b * ex[k] + d * ey[k] + f * ez[k])
+            + vz[k] * (c * ex[k] + f * ey[k] + g * ez[k]);
+    }
+}

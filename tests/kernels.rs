@@ -1,0 +1,233 @@
+//! The CPU's fast stages against the plain kernels that say what they must do, row by row, in a state that uses
+//! everything: water off its lattice that collides, an obstacle, a gate that moves, a body that moves and turns.
+
+use crate::common::moving as common;
+
+use glam::DVec3;
+use seixo::backend::Backend;
+use seixo::backend::cpu::Cpu;
+use seixo::cells::Grid;
+use seixo::fields::State;
+use seixo::kernels::cell_list::{CellList, Scratch};
+use seixo::kernels::neighbour_list::{Candidates, neighbour_list};
+use seixo::kernels::{Particles, number_density, pressure_gradient, pressure_source, viscosity};
+use seixo::params::{Params, Step};
+use seixo::plan::{ParticleStage, Plan};
+use seixo::pressure::Settings;
+use seixo::scene::{Groups, Scene};
+
+/// Sums in another order.
+const ROUND_OFF: f64 = 1e-11;
+
+struct Water {
+    cpu: Cpu,
+    params: Params,
+    scene: Scene,
+    step: Step,
+}
+
+impl Water {
+    fn new(dimensions: u32, fluid: &str) -> Self {
+        let case = common::case(dimensions, fluid);
+        let mut scene = common::scene(dimensions, if dimensions == 2 { 3 } else { 1 });
+        for i in 0..scene.groups.fluid {
+            scene.position[i] += 0.2 * scene.spacing * common::noise_vector(i, dimensions);
+            scene.velocity[i] = 0.4 * common::noise_vector(i + 100_000, dimensions);
+        }
+        let params = Params::new(&case, &scene).expect("valid");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
+        let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+        cpu.move_solids(&common::poses(&scene, 0.01)).expect("moves");
+        let step = params.step(0.0, 1e-3, 2.0);
+        cpu.run(ParticleStage::CellList, &step).expect("runs");
+        cpu.run(ParticleStage::NeighbourList, &step).expect("runs");
+        Self { cpu, params, scene, step }
+    }
+
+    fn run(&mut self, stage: ParticleStage) {
+        self.cpu.run(stage, &self.step).expect("the CPU runs");
+    }
+
+    fn particles(&self) -> Particles<'_> {
+        let f = self.cpu.fields();
+        let (position, velocity) = (&f.position, &f.velocity);
+        Particles { params: &self.params, position, velocity, fluid: self.groups().fluid }
+    }
+
+    fn groups(&self) -> Groups {
+        self.scene.groups
+    }
+}
+
+fn each(test: impl Fn(&mut Water)) {
+    for (dimensions, fluid) in
+        [(3, "preset = \"accurate\""), (3, "preset = \"paper\""), (2, "preset = \"accurate\"")]
+    {
+        println!("{dimensions}D, {fluid}");
+        test(&mut Water::new(dimensions, fluid));
+    }
+}
+
+/// Both within round-off of the largest plain value; returns that.
+fn close(fast: &[DVec3], plain: &[DVec3]) -> f64 {
+    let scale = plain.iter().fold(0.0_f64, |s, v| s.max(v.length()));
+    for (k, (f, p)) in fast.iter().zip(plain).enumerate() {
+        assert!((*f - *p).length() <= ROUND_OFF * scale, "{k}: {f} for {p}");
+    }
+    scale
+}
+
+#[test]
+fn the_fast_search_finds_the_plain_rows() {
+    each(|s| {
+        let (grid, g) = (Grid::new(&s.params).expect("a grid"), s.groups());
+        let x = &s.cpu.fields().position;
+        let mut scratch = Scratch::default();
+        let mut index = |slots: &mut dyn Iterator<Item = usize>| {
+            let mut list = CellList::default();
+            list.index(&grid, slots, x, &mut scratch);
+            list
+        };
+        let fluid = index(&mut (0..g.fluid));
+        assert!(fluid.slot.is_sorted(), "the fluid is in cell order");
+        let moving = index(&mut g.moving_wall_range().chain(g.moving_dummy_range()));
+        let fixed = index(&mut g.static_range());
+        let from = Candidates {
+            grid: &grid,
+            fluid_start: &fluid.start,
+            moving: Some(&moving),
+            fixed: Some(&fixed),
+            pressure_slots: g.pressure() as u32,
+        };
+        let mut pairs = 0;
+        for i in 0..g.pressure() {
+            let fast = s.cpu.neighbours().all(i).neighbour;
+            let (plain, carry) = neighbour_list(i as u32, s.params.effective_radius, &from, x);
+            // Dry walls have no row.
+            if i < g.fluid || !fast.is_empty() {
+                assert_eq!((fast, s.cpu.neighbours().pressure(i).neighbour.len()), (&plain[..], carry));
+            } else {
+                assert!(plain.iter().all(|&j| j as usize >= g.fluid), "slot {i} is wet");
+            }
+            pairs += fast.len();
+        }
+        assert!(pairs > 4000, "{pairs}");
+    });
+}
+
+#[test]
+fn the_fast_viscosity_is_the_plain_one() {
+    each(|s| {
+        s.run(ParticleStage::Viscosity);
+        let on = s.particles();
+        let row = |i: usize| s.cpu.neighbours().pressure(i).neighbour;
+        let g = s.groups();
+        let plain: Vec<DVec3> = (0..g.fluid).map(|i| viscosity::viscosity(i, row(i), on)).collect();
+        assert!(close(&s.cpu.fields().acceleration, &plain) > 1e-2);
+        let walls = g.moving_wall_range();
+        let plain: Vec<DVec3> = walls.map(|i| viscosity::reaction(i, row(i), on)).collect();
+        assert!(close(&s.cpu.fields().reaction, &plain) > 1e-6);
+    });
+}
+
+#[test]
+fn the_fast_number_density_is_the_plain_one() {
+    each(|s| {
+        s.run(ParticleStage::NumberDensity);
+        let f = s.cpu.fields();
+        for i in 0..s.groups().pressure() {
+            let row = s.cpu.neighbours().all(i);
+            let (n, state) = number_density::number_density(i, row.neighbour, s.particles());
+            assert!((f.number_density[i] - n).abs() < ROUND_OFF * s.params.number_density);
+            assert_eq!(f.state[i], state, "slot {i}");
+            for (j, w) in row.iter() {
+                let plain =
+                    number_density::pair_weight(f.position[i].distance_squared(f.position[j]), &s.params);
+                assert!((w - plain).abs() < ROUND_OFF);
+            }
+        }
+        for state in [State::Inactive, State::Surface, State::Inner] {
+            assert!(f.state.iter().filter(|&&s| s == state).count() > 20, "{state:?}");
+        }
+    });
+}
+
+#[test]
+fn the_fast_pressure_source_is_the_plain_one() {
+    each(|s| {
+        s.run(ParticleStage::NumberDensity);
+        s.run(ParticleStage::PressureSource);
+        let f = s.cpu.fields();
+        let scale = f.source.iter().fold(0.0_f64, |s, b| s.max(b.abs()));
+        let (mut rows, mut walls) = (0, 0);
+        for i in (0..s.groups().pressure()).filter(|&i| f.state[i] == State::Inner) {
+            let row = s.cpu.neighbours().parts(i);
+            let (b, d) =
+                pressure_source::pressure_source(i, f.number_density[i], row, s.particles(), &s.step);
+            assert!((f.source[i] - b).abs() < ROUND_OFF * scale, "{i}: {} for {b}", f.source[i]);
+            assert!((f.diagonal[i] - d).abs() < ROUND_OFF * d);
+            rows += 1;
+            walls += usize::from(i >= s.groups().fluid);
+        }
+        assert!(rows > 300 && walls > 40 && scale > 1e4, "{rows} rows, {walls} walls, {scale}");
+    });
+}
+
+#[test]
+fn the_fast_pressure_gradient_is_the_plain_one() {
+    each(|s| {
+        s.run(ParticleStage::NumberDensity);
+        for (i, p) in s.cpu.fields_mut().pressure.iter_mut().enumerate() {
+            *p = 1000.0 * (1.0 + common::noise(i));
+        }
+        s.run(ParticleStage::PressureGradient);
+        let f = s.cpu.fields();
+        let plain = |i: usize| {
+            let row = s.cpu.neighbours().parts(i);
+            pressure_gradient::pressure_gradient(i, row, f.state[i], s.particles(), &f.pressure)
+        };
+        let plain: Vec<DVec3> = (0..s.groups().fluid).map(plain).collect();
+        assert!(close(&f.acceleration, &plain) > 10.0);
+    });
+}
+
+/// Energy of the water before and after collisions of a heap in which nearly every particle has several, and how many
+/// pairs collide.
+fn collide(fluid: &str) -> (f64, f64, usize) {
+    let case = common::case(3, fluid);
+    let mut scene = common::scene(3, 1);
+    let middle = scene.position[scene.groups.fluid / 2];
+    for i in 0..scene.groups.fluid {
+        // Into half of each way: no wall is near.
+        scene.position[i] = middle + 0.45 * (scene.position[i] - middle);
+        scene.velocity[i] = common::noise_vector(i, 3) - 3.0 * (scene.position[i] - middle);
+    }
+    let params = Params::new(&case, &scene).expect("valid");
+    let plan = Plan::new(&case, &scene, &params);
+    let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
+    let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+    let step = params.step(0.0, 1e-4, 2.0);
+    cpu.run(ParticleStage::CellList, &step).expect("runs");
+    cpu.run(ParticleStage::NeighbourList, &step).expect("runs");
+    let sums = |cpu: &Cpu| {
+        let v = &cpu.fields().velocity[..scene.groups.fluid];
+        0.5 * v.iter().map(|v| v.length_squared()).sum::<f64>()
+    };
+    let before = sums(&cpu);
+    let collides = |chunk: &seixo::neighbours::Chunk| chunk.close.iter().filter(|&&c| c).count();
+    let colliding = cpu.neighbours().chunks.iter().map(collides).sum();
+    cpu.run(ParticleStage::Collision, &step).expect("runs");
+    let after = sums(&cpu);
+    (before, after, colliding)
+}
+
+#[test]
+fn collisions_that_share_impulses_add_no_energy_where_single_ones_do() {
+    let (before, after, colliding) = collide("preset = \"accurate\"");
+    println!("shared: {before:.2} J/kg to {after:.2}, {colliding} rows");
+    assert!(colliding > 300 && after < before, "{before} {after}");
+    let (before, after, ..) = collide("preset = \"paper\"");
+    println!("single: {before:.2} J/kg to {after:.2}");
+    assert!(after > 1.05 * before, "the heap does not amplify, so this shows nothing: {before} {after}");
+}

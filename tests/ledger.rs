@@ -1,0 +1,81 @@
+//! The energy ledger: its entries account for every change of the energy, to round-off.
+
+use crate::common;
+use common::*;
+use seixo::case::{Case, MovingWall};
+use seixo::ledger::{Entry, Ledger};
+use seixo::plan::Stage;
+use seixo::simulation::Simulation;
+
+/// Energy of water and free bodies [J].
+fn energy(sim: &mut Simulation) -> f64 {
+    let water = sim.backend.monitor().expect("measured");
+    water.kinetic + water.potential + sim.solids.energy().total()
+}
+
+/// Runs `case` for `steps` steps; the ledger closes to 1e-10 of the energy at the start all the way. The last `shot`
+/// particles are shot up, so fast that their displacements are shortened, and out of the domain.
+fn closes(case: &mut Case, steps: usize, shot: usize) -> (Ledger, f64) {
+    case.output.ledger = true;
+    let mut sim = simulation(case);
+    let mut fields = sim.backend.read().expect("readable");
+    let fluid = sim.groups.fluid;
+    fields.velocity[fluid - shot..fluid].fill(12.0 * glam::DVec3::Z);
+    sim.backend.write(&fields).expect("writable");
+    let start = energy(&mut sim);
+    for _ in 0..steps {
+        sim.step().expect("a step");
+        let ledger = sim.ledger().expect("kept").expect("asked for");
+        let open = energy(&mut sim) - start - ledger.total();
+        assert!(open.abs() < 1e-10 * start, "step {}: {open:e} of {start} J, {ledger:?}", sim.steps);
+    }
+    let ledger = sim.ledger().expect("kept").expect("asked for");
+    for entry in Entry::ALL {
+        println!("{:10} {:+.3e}", entry.name(), ledger.get(entry) / start);
+    }
+    (ledger, start)
+}
+
+#[test]
+fn the_ledger_of_a_collapse_closes_with_either_scheme() {
+    for preset in ["accurate", "paper"] {
+        let mut case = dam_break(0.04, 2e-3, &format!("preset = \"{preset}\"\nviscosity = 1e-4"));
+        let (ledger, start) = closes(&mut case, 150, 5);
+        let of_water =
+            [Entry::Gravity, Entry::Viscosity, Entry::Collision, Entry::Pressure, Entry::Clip, Entry::Clamps];
+        for entry in of_water {
+            assert!(ledger.get(entry).abs() > 1e-6 * start, "{preset}: {}", entry.name());
+        }
+        assert!(ledger.get(Entry::Viscosity) < 0.0 && ledger.get(Entry::Collision) < 0.0);
+        assert!(ledger.get(Entry::Lost) != 0.0, "{preset}: nothing is lost");
+        assert_eq!(ledger.get(Entry::Contact), 0.0);
+    }
+}
+
+#[test]
+fn the_ledger_closes_with_a_gate_and_a_body_and_shows_what_they_put_in() {
+    let mut case: Case = toml::from_str(include_str!("../cases/floating_cube.toml")).expect("a valid case");
+    case.run.spacing = 0.018;
+    // A plate that is pushed into the water beside the cube, which starts below its draft and bobs.
+    case.moving_wall = vec![MovingWall {
+        name: "plate".into(),
+        min: [0.018, 0.018, 0.135],
+        max: [0.036, 0.252, 0.225],
+        open: vec![],
+        motion: vec![[0.0; 4], [0.1, 0.0, 0.0, -0.05]],
+    }];
+    let (ledger, start) = closes(&mut case, 250, 0);
+    for entry in [Entry::Walls, Entry::Exchange, Entry::Contact] {
+        assert!(ledger.get(entry).abs() > 1e-9 * start, "{}", entry.name());
+    }
+    assert!(ledger.get(Entry::Walls) > 0.0, "the plate lifts the water");
+}
+
+#[test]
+fn without_being_asked_for_nothing_is_kept() {
+    let mut sim = simulation(&dam_break(0.05, 2e-3, ""));
+    sim.step().expect("a step");
+    assert_eq!(sim.ledger().expect("no device"), None);
+    assert!(sim.backend.ledger().expect("no device").is_none());
+    assert!(!sim.plan.ledger && !sim.plan.has(Stage::BodyForce));
+}
