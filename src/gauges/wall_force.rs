@@ -10,7 +10,7 @@ use crate::lattice::weight;
 use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene};
 use glam::{DMat3, DVec3, IVec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The wall layer of a fixed wall.
 #[derive(Clone, Debug, Default)]
@@ -32,22 +32,29 @@ impl FixedWall {
         let shape = scene.walls.iter().position(|w| w.name == name)?;
         let about = scene.walls[shape].center;
         let on_lattice = scene.walls[shape].axes == DMat3::IDENTITY;
-        let of_tank = name.starts_with("tank.");
         let mut out = Self { about, ..Self::default() };
         let l0 = scene.spacing;
+        // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
+        let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
+        let cell = |x: DVec3| ((x - origin) / l0).round().as_ivec3();
+        let solid: HashSet<IVec3> =
+            scene.position[scene.groups.static_range()].iter().map(|x| cell(*x)).collect();
         for (k, slot) in scene.groups.static_wall_range().enumerate() {
-            let normal = scene.static_wall_normal[k];
+            let (normal, x) = (scene.static_wall_normal[k], scene.position[slot]);
             if scene.static_wall_shape[k] as usize != shape {
                 continue;
             }
             // Particles on an edge of a box belong to all of its faces there, whole.
-            let faces = if on_lattice {
-                DVec3::from_array(normal.to_array().map(|n| if n.abs() > 1e-6 { n.signum() } else { 0.0 }))
-            } else {
-                normal
+            let open = |axis: usize| {
+                let face = DVec3::AXES[axis] * normal[axis].signum();
+                if normal[axis].abs() > 1e-6 && !solid.contains(&cell(x + l0 * face)) {
+                    face
+                } else {
+                    DVec3::ZERO
+                }
             };
-            // Where two faces of the tank meet there is no surface: the fluid sees neither of its corners.
-            if of_tank && faces.length_squared() > 1.5 {
+            let faces = if on_lattice { open(0) + open(1) + open(2) } else { normal };
+            if faces == DVec3::ZERO {
                 continue;
             }
             out.slots.push(slot);

@@ -235,7 +235,10 @@ impl Sampler {
             out.put("lost particles [-]", counters.lost as f64);
             out.put("most neighbours [-]", f64::from(counters.neighbours_max));
             out.put("most iterations [-]", f64::from(self.iterations_max));
-            out.put("energy rise [-]", self.rise);
+            // Water at rest without weight has no energy to compare with.
+            if self.energy_start != 0.0 {
+                out.put("energy rise [-]", self.rise);
+            }
             out.put("density error [-]", mean(self.density_error).abs());
             out.limit("lost particles [-]", 0.0);
         }

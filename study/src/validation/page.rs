@@ -292,7 +292,12 @@ fn curves(title: &str, check: &Check, reference: &Reference, groups: &[Group]) -
             vec![[least, value], [most, value]],
         ));
     }
-    let label = check.curve.clone().unwrap_or_default();
+    // Shifted or scaled, the curve has the unit of what is taken from it.
+    let curve = check.curve.clone().unwrap_or_default();
+    let label = match (curve.split_once(" ["), check.name.rsplit_once(" [")) {
+        (Some((what, _)), Some((_, unit))) if check.times != 1.0 => format!("{what} [{unit}"),
+        _ => curve,
+    };
     let which: Vec<String> = check.only.iter().map(|(axis, value)| format!(", {axis} {value}")).collect();
     let title = format!("{title}: {}{}", label.split(" [").next().unwrap_or_default(), which.concat());
     Chart { title, subtitle: String::new(), x: Axis::linear(&check.axis), y: Axis::linear(&label), series }
