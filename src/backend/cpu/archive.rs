@@ -34,6 +34,7 @@ impl Cpu {
             live,
             counters,
             dt,
+            ledger,
         } = self;
         let Fields {
             position,
