@@ -22,7 +22,7 @@ const INNER: u32 = 2u;
 const DISPLACEMENT_MAX: f32 = 0.5;
 const CLOSEST: f32 = 0.1;
 
-// As crate::kernels::moment::EIGENVALUE_MIN.
+// As crate::neighbourhood::EIGENVALUE_MIN.
 const EIGENVALUE_MIN: f32 = 0.1;
 
 // Places in `counters`, as crate::backend::gpu::layout::counter.
@@ -59,9 +59,10 @@ struct Constants {
     gradient_scale: f32,   // d / n0
     density: f32,
     tolerance_squared: f32,
-    wendland: f32,         // W0
+    smooth_density: f32,   // W0
     surface_head: f32,     // of the missing half spacing, Pa
-    pad: vec2f,
+    wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
+    pad: f32,
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
@@ -128,7 +129,7 @@ fn pair_vector(r: vec3f) -> vec3f {
 }
 
 // Inverse of M = d / n0 times the sum, or 1 where a lower bound of its smallest eigenvalue is too small. M is symmetric:
-// its inverse is the matrix of cofactors over the determinant. See src/kernels/moment.rs.
+// its inverse is the matrix of cofactors over the determinant. See src/neighbourhood.rs.
 fn inverse_moment(sum: Moment) -> mat3x3f {
     var diagonal = params.gradient_scale * sum.diagonal;
     let mixed = params.gradient_scale * sum.mixed;

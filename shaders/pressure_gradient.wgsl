@@ -41,11 +41,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     }
     var gradient = params.gradient_scale * sum;
 //#if CORRECTED
-//#if CORRECTED_SURFACE
-    {
-//#else
     if state[i] == INNER {
-//#endif
         let dummies = dummies_of(count);
         for (var k = 0u; k < dummies; k++) {
             let r = position[neighbour_list[dummy_place(i, k)]].xyz - x.xyz;

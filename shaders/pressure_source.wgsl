@@ -13,25 +13,25 @@
 //#if MIXED
 // What a row sums over all its neighbours.
 struct Sums {
-    smooth: f32,     // W, the particle itself among them
+    density: f32,    // W, the particle itself among them
     moment: Moment,
     inner: mat3x3f,  // e (v_j - v_i)^T, column c with component c of the velocity
     solid: mat3x3f,  // the same of the solids around a fluid particle
     normal: vec3f,   // e of those solids
 }
 
-// Wendland's C2 without its norm.
-fn wendland(distance_squared: f32) -> f32 {
+// W, as crate::lattice::smooth_weight.
+fn smooth_weight(distance_squared: f32) -> f32 {
     let q = sqrt(distance_squared) / params.effective_radius;
     let rest = max(1.0 - q, 0.0);
-    return rest * rest * rest * rest * (1.0 + 4.0 * q);
+    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
 }
 
 fn add_neighbour(sums: Sums, r: vec3f, v: vec3f, slips: bool) -> Sums {
     var out = sums;
     let e = pair_vector(r);
     let rate = mat3x3f(e * v.x, e * v.y, e * v.z);
-    out.smooth += wendland(dot(r, r));
+    out.density += smooth_weight(dot(r, r));
     out.moment = add_moment(out.moment, e, r);
     if slips {
         out.solid += rate;
@@ -95,7 +95,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         let j = neighbour_list[dummy_place(i, k)];
         sums = add_neighbour(sums, position[j].xyz - x, velocity[j].xyz - v, i < params.fluid);
     }
-    let b = now.source_density * (sums.smooth - params.wendland) / params.wendland
+    let b = now.source_density * (sums.density - params.smooth_density) / params.smooth_density
         - now.source_divergence * divergence(sums)
         - params.density * dot(params.gravity, first_moment);
 //#else

@@ -1,5 +1,5 @@
 // Viscous acceleration, Eqs. (2) and (6), a_i = nu 2 d / (lambda n0) sum w_ij (v_j - v_i), and its reaction on the wall
-// layers of moving solids. Positions and neighbours are those of the last step.
+// layers of moving solids. Pairs of fluid and wall weigh params.wall_shear. Positions and neighbours are those of the last step.
 // Twin: src/kernels/viscosity.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -21,7 +21,9 @@ fn shear(i: u32, below: u32) -> vec3f {
         // The particles have moved since the list was made.
         if j < below && distance_squared > 0.0
             && distance_squared < params.effective_radius * params.effective_radius {
-            sum += (velocity[j].xyz - v) * (params.effective_radius * inverseSqrt(distance_squared) - 1.0);
+            let share = select(1.0, params.wall_shear, (i < params.fluid) != (j < params.fluid));
+            let w = params.effective_radius * inverseSqrt(distance_squared) - 1.0;
+            sum += share * w * (velocity[j].xyz - v);
         }
     }
     return params.viscosity * sum;

@@ -19,6 +19,13 @@ pub enum State {
     Inner = 2,
 }
 
+impl State {
+    /// The state of a number, as `state as u8` gives it.
+    pub fn from_code(code: u8) -> Option<Self> {
+        [Self::Inactive, Self::Surface, Self::Inner].into_iter().find(|&s| s as u8 == code)
+    }
+}
+
 /// State of all particles. Arrays marked P hold the pressure-carrying slots only, F the fluid slots only.
 #[derive(Clone, Default, Debug)]
 pub struct Fields {

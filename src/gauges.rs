@@ -1,69 +1,90 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
+pub mod wall_force;
+
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
+use crate::kernels::body_force::surface_pressure;
 use crate::output::table::{Cell, vector_cells, vector_columns};
-use crate::scene::{Groups, Kind, Scene};
+use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
+use wall_force::FixedWall;
+
+/// A pressure gauge: wall particles, and the way from each to the gauge's point [m].
+#[derive(Clone, Debug)]
+struct WallPressure {
+    name: String,
+    slots: Vec<usize>,
+    to_point: Vec<DVec3>,
+}
+
+/// What a force gauge is on.
+#[derive(Clone, Debug)]
+enum Target {
+    /// A body or moving wall, by its index.
+    Solid(usize),
+    /// A fixed wall.
+    Fixed(FixedWall),
+}
 
 /// The gauges of a case, found in its scene.
 #[derive(Clone, Debug, Default)]
 pub struct Gauges {
-    pressure: Vec<(String, Vec<usize>)>,
+    pressure: Vec<WallPressure>,
     level: Vec<(String, [f64; 2])>,
-    force: Vec<(String, usize)>,
+    force: Vec<(String, Target)>,
 }
 
 impl Gauges {
     /// Find wall particles and solids of the gauges of `case`.
     ///
-    /// A pressure gauge is the mean over the particles of fixed walls within half an effective radius of its
-    /// point.
+    /// A pressure gauge is the mean over the particles of fixed walls within half an effective radius of its point,
+    /// or of the wall particle nearest to it where the lattice has moved the wall away.
     ///
     /// # Errors
-    /// [`Error::Case`] for a pressure gauge that is not on a wall and for a force gauge on no solid.
+    /// [`Error::Case`] for a pressure gauge that is not on a wall and for a force gauge on nothing.
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
         let reach = 0.5 * case.run.effective_radius * scene.spacing;
         let mut out = Self::default();
+        let first = scene.groups.static_wall_range().start;
+        let wall = &scene.position[scene.groups.static_wall_range()];
         for gauge in &case.gauge.pressure {
             if scene.groups.fluid == 0 {
                 return Err(Error::Case(format!("gauge.pressure {}: there is no fluid", gauge.name)));
             }
-            let point = DVec3::from(gauge.point);
-            let distance = |&slot: &usize| scene.position[slot].distance(point);
-            let slots: Vec<usize> =
-                scene.groups.static_wall_range().filter(|s| distance(s) <= reach).collect();
-            if slots.is_empty() {
-                let nearest =
-                    scene.groups.static_wall_range().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-                let hint = nearest.map_or("there are no walls".to_string(), |slot| {
-                    format!(
-                        "the nearest wall particle is {:.4} m away at {:.4}",
-                        distance(&slot),
-                        scene.position[slot]
-                    )
-                });
-                return Err(Error::Case(format!(
-                    "gauge.pressure {}: no wall particle lies within {reach:.4} m of {point}; {hint}",
-                    gauge.name
-                )));
+            let mut point = DVec3::from(gauge.point);
+            if scene.dimensions == 2 {
+                point.y = 0.0;
             }
-            out.pressure.push((gauge.name.clone(), slots));
+            let found = wall_at(wall, point, reach, scene.spacing).map_err(|nearest| {
+                let hint = nearest.map_or("there are no fixed walls".to_string(), |at| {
+                    format!("the nearest wall particle is {:.4} m away at {at:.4}", at.distance(point))
+                });
+                Error::Case(format!("gauge.pressure {}: no fixed wall at {point}; {hint}", gauge.name))
+            })?;
+            out.pressure.push(WallPressure {
+                name: gauge.name.clone(),
+                slots: found.iter().map(|k| first + k).collect(),
+                to_point: found.iter().map(|&k| point - wall[k]).collect(),
+            });
         }
         out.level.extend(case.gauge.level.iter().map(|g| (g.name.clone(), g.at)));
         for gauge in &case.gauge.force {
-            let Some(solid) = scene.solids.iter().position(|s| s.name == gauge.on) else {
-                let names: Vec<&str> = scene.solids.iter().map(|s| s.name.as_str()).collect();
+            let solid = scene.solids.iter().position(|s| s.name == gauge.on).map(Target::Solid);
+            let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Target::Fixed));
+            let Some(target) = target else {
+                let solids = scene.solids.iter().map(|s| s.name.as_str());
+                let names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
                 return Err(Error::Case(format!(
-                    "gauge.force {}: no body or moving wall is called `{}`; there are: {}",
+                    "gauge.force {}: nothing is called `{}`; there are: {}",
                     gauge.name,
                     gauge.on,
                     names.join(", ")
                 )));
             };
-            out.force.push((gauge.name.clone(), solid));
+            out.force.push((gauge.name.clone(), target));
         }
         Ok(out)
     }
@@ -76,47 +97,80 @@ impl Gauges {
     /// Header of gauges.csv.
     pub fn header(&self) -> Vec<String> {
         let mut header = vec!["time [s]".to_string()];
-        header.extend(self.pressure.iter().map(|(name, _)| format!("{name} [Pa]")));
+        header.extend(self.pressure.iter().map(|g| format!("{} [Pa]", g.name)));
         header.extend(self.level.iter().map(|(name, _)| format!("{name} [m]")));
-        for (name, _) in &self.force {
+        for (name, target) in &self.force {
             header.extend(vector_columns(&format!("{name}_force"), "N"));
             header.extend(vector_columns(&format!("{name}_torque"), "N m"));
+            if matches!(target, Target::Fixed(_)) {
+                header.extend(vector_columns(&format!("{name}_viscous"), "N"));
+            }
         }
         header
     }
 
     /// A row of gauges.csv. Before the first step there is neither pressure nor force: these cells are empty.
-    /// A level gauge reads all particles back, which costs more than the others.
+    /// A level gauge and, in a viscous fluid, a force gauge on a fixed wall read all particles back, which costs more
+    /// than the others.
     ///
     /// # Errors
     /// What the backend says when it is read.
     pub fn row(&self, simulation: &mut Simulation) -> Result<Vec<Cell>> {
         let known = simulation.steps > 0;
         let mut row = vec![Cell::from(simulation.time)];
-        let slots: Vec<usize> = self.pressure.iter().flat_map(|(_, slots)| slots).copied().collect();
-        let pressures = if slots.is_empty() { Vec::new() } else { simulation.backend.pressures(&slots)? };
-        let mut at = 0;
-        for (_, slots) in &self.pressure {
-            let mean = pressures[at..at + slots.len()].iter().sum::<f64>() / slots.len() as f64;
-            row.push(Cell::from(if known { mean } else { f64::NAN }));
-            at += slots.len();
-        }
-        if !self.level.is_empty() {
-            let fields = simulation.fields()?;
-            let params = &simulation.params;
-            for &(_, line) in &self.level {
+        self.pressures(simulation, known, &mut row)?;
+        let viscous = simulation.params.viscosity > 0.0 && self.force.iter().any(|(_, t)| t.is_fixed());
+        let fields = if viscous || !self.level.is_empty() { Some(simulation.fields()?) } else { None };
+        let params = &simulation.params;
+        for &(_, line) in &self.level {
+            let level = fields.as_ref().and_then(|f| {
                 let (reach, l0) = (params.effective_radius, params.spacing);
-                let level = level(&fields, &simulation.groups, line, params.dimensions, reach, l0);
-                row.push(Cell::from(level.unwrap_or(f64::NAN)));
+                level(f, &simulation.groups, line, params.dimensions, reach, l0)
+            });
+            row.push(Cell::from(level.unwrap_or(f64::NAN)));
+        }
+        for (_, target) in &self.force {
+            let (wrench, viscous) = match target {
+                Target::Solid(solid) => (simulation.fluid_force[*solid], None),
+                Target::Fixed(wall) => {
+                    let pressures = simulation.backend.pressures(&wall.slots)?;
+                    let mut wrench = wall.pressure_force(&pressures, &simulation.params);
+                    let viscous = fields.as_ref().filter(|_| viscous).map_or(DVec3::ZERO, |f| {
+                        wall.viscous_force(f, &simulation.groups, &simulation.params)
+                    });
+                    wrench.force += viscous;
+                    (wrench, Some(viscous))
+                }
+            };
+            for vector in [Some(wrench.force), Some(wrench.torque), viscous].into_iter().flatten() {
+                row.extend(vector_cells(if known { vector } else { DVec3::NAN }));
             }
         }
-        for &(_, solid) in &self.force {
-            let wrench = simulation.fluid_force[solid];
-            let nothing = DVec3::NAN;
-            row.extend(vector_cells(if known { wrench.force } else { nothing }));
-            row.extend(vector_cells(if known { wrench.torque } else { nothing }));
-        }
         Ok(row)
+    }
+
+    /// Pressures at the gauges' points. That of a wall particle is brought to the point as the force on bodies is
+    /// brought to their surface: with the weight of the water between, and what the pressure lacks at
+    /// the water's surface. A dry particle has none.
+    fn pressures(&self, simulation: &mut Simulation, known: bool, row: &mut Vec<Cell>) -> Result<()> {
+        let slots: Vec<usize> = self.pressure.iter().flat_map(|g| &g.slots).copied().collect();
+        let pressures = if slots.is_empty() { Vec::new() } else { simulation.backend.pressures(&slots)? };
+        let params = &simulation.params;
+        let mut rest = pressures.as_slice();
+        for gauge in &self.pressure {
+            let (own, after) = rest.split_at(gauge.slots.len());
+            rest = after;
+            let at_point = |(&p, &way): (&f64, &DVec3)| surface_pressure(p, p > 0.0, way, params);
+            let sum: f64 = own.iter().zip(&gauge.to_point).map(at_point).sum();
+            row.push(Cell::from(if known { sum / own.len() as f64 } else { f64::NAN }));
+        }
+        Ok(())
+    }
+}
+
+impl Target {
+    fn is_fixed(&self) -> bool {
+        matches!(self, Self::Fixed(_))
     }
 }
 

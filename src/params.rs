@@ -35,7 +35,7 @@ pub struct Params {
     /// lambda, Eq. (7) [m2].
     pub laplacian: f64,
     /// Sum W0 of the smooth density on the full lattice [-].
-    pub wendland: f64,
+    pub smooth_density: f64,
     /// Neighbours of a particle on the full lattice.
     pub neighbours: u32,
     /// Gravity [m/s2].
@@ -44,6 +44,9 @@ pub struct Params {
     pub density: f64,
     /// Kinematic viscosity [m2/s].
     pub viscosity: f64,
+    /// Weight of a pair of fluid and wall in the viscous sum [-]: 1 in the paper's scheme, else that of
+    /// [`Lattice::wall_shear`].
+    pub wall_shear: f64,
     /// Free-surface threshold beta [-].
     pub free_surface_threshold: f64,
     /// Source term of the PPE.
@@ -118,11 +121,12 @@ impl Params {
             effective_radius: run.effective_radius * l0,
             number_density: lattice.number_density,
             laplacian: lattice.laplacian * l0 * l0,
-            wendland: lattice.wendland,
+            smooth_density: lattice.smooth_density,
             neighbours: lattice.neighbours,
             gravity: scene.gravity,
             density: fluid.map_or(1000.0, |f| f.density),
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
+            wall_shear: if paper { 1.0 } else { lattice.wall_shear },
             free_surface_threshold: fluid.map_or(0.97, |f| f.free_surface_threshold),
             source: fluid.and_then(|f| f.source).unwrap_or(source),
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),

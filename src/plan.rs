@@ -182,6 +182,7 @@ impl Plan {
         let fluid = scene.groups.fluid > 0;
         let moving = !scene.solids.is_empty();
         let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
+        let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| s.name == g.on));
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
@@ -192,8 +193,8 @@ impl Plan {
                 Stage::Collision if params.collision_distance == 0.0 => Err("collision distance is zero"),
                 Stage::Collision => wet("particles may come too close"),
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
-                Stage::BodyForce if !free && case.gauge.force.is_empty() && !case.output.ledger => {
-                    Err("no body is free and no gauge asks for a force")
+                Stage::BodyForce if !free && !gauged && !case.output.ledger => {
+                    Err("no body is free and no gauge asks for the force on one that moves")
                 }
                 Stage::BodyForce => wet("the fluid acts on solids"),
                 Stage::Contact if !moving => Err("nothing solid moves"),

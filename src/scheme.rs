@@ -20,12 +20,8 @@ pub enum Source {
 pub enum Gradient {
     /// The paper's Eq. (9): against the smallest pressure in the neighbourhood.
     Minimum,
-    /// Eq. (9) times the inverse of the particle's moment matrix: exact for linear fields.
+    /// Eq. (9) times the inverse of the particle's moment matrix below the surface: exact for linear fields.
     MinimumCorrected,
-    /// The same at the free surface too, where the one-sided sum carries half the weight of a particle. Still
-    /// water stays three times calmer and small bodies float steadily; a collapse gains up to 0.5 % of energy
-    /// before it loses any.
-    CorrectedSurface,
 }
 
 /// Which particles lie on the free surface (P = 0).

@@ -4,8 +4,9 @@
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::{Pose, Wrench};
 use crate::case::{Case, ContactDevice, Fluid};
+use crate::checkpoint::Archive;
 use crate::contact::{ContactReport, Solids};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::params::{Params, Step};
@@ -13,6 +14,7 @@ use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
+use glam::DVec3;
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -107,7 +109,7 @@ impl Simulation {
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
                         what there is) or leave contact.device out";
-            return Err(crate::error::Error::Case(text.into()));
+            return Err(Error::Case(text.into()));
         }
         if plan.ledger && plan.wet() && backend.ledger()?.is_none() {
             let text =
@@ -131,6 +133,54 @@ impl Simulation {
             speed: 0.0,
             threads: None,
         })
+    }
+
+    /// Save the whole state between two steps, or take it over.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Case`] if the state is that of another scene, or what the backend says.
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            // Follows from the case.
+            case: _,
+            scene: _,
+            params: _,
+            plan: _,
+            groups,
+            wait_for_stages: _,
+            threads: _,
+            // Times by the clock are those of each process.
+            stages: _,
+            backend,
+            solids,
+            fluid_force,
+            time,
+            steps,
+            speed,
+            solids_ledger,
+        } = self;
+        let Groups { fluid, moving_wall, static_wall, static_dummy, moving_dummy } = *groups;
+        archive.same("particles of water", fluid as u64)?;
+        archive.same("wall particles that move", moving_wall as u64)?;
+        archive.same("wall particles", static_wall as u64)?;
+        archive.same("dummies", static_dummy as u64)?;
+        archive.same("dummies that move", moving_dummy as u64)?;
+        archive.same("solids that move", fluid_force.len() as u64)?;
+        archive.number("time", time)?;
+        archive.count("steps", steps)?;
+        archive.number("speed", speed)?;
+        let vectors = fluid_force.iter().flat_map(|w| [w.force, w.torque]);
+        let mut vectors: Vec<DVec3> = vectors.collect();
+        archive.array("fluid_force", &mut vectors, true)?;
+        for (wrench, v) in fluid_force.iter_mut().zip(vectors.chunks_exact(2)) {
+            *wrench = Wrench { force: v[0], torque: v[1] };
+        }
+        if let Some((ledger, energy)) = solids_ledger {
+            ledger.exchange(archive, "ledger.solids")?;
+            archive.number("ledger.energy", energy)?;
+        }
+        backend.exchange(archive)?;
+        solids.exchange(archive, backend.compute())
     }
 
     /// When the PPE's solver stops.
@@ -233,7 +283,13 @@ impl Simulation {
         let report = self
             .timed(Stage::Contact, |s| s.solids.advance_on(s.backend.compute(), step.time, step.dt, &force));
         self.fluid_force = force;
-        let report = report?;
+        // the solids count no steps
+        let report = report.map_err(|e| match e {
+            Error::Diverged { time, stage, what, .. } => {
+                Error::Diverged { step: self.steps, time, stage, what }
+            }
+            other => other,
+        })?;
         self.check_bodies(step)?;
         if let Some(before) = before {
             self.book_solids(&before, step.dt);

@@ -31,7 +31,8 @@ impl Bounds {
         };
         let viscous = if params.viscosity > 0.0 {
             let lattice = Lattice::new(params.dimensions, params.effective_radius / l0);
-            VISCOUS_MAX * lattice.viscous_limit(params.dimensions) * l0 * l0 / params.viscosity
+            VISCOUS_MAX * lattice.viscous_limit(params.dimensions, params.wall_shear) * l0 * l0
+                / params.viscosity
         } else {
             f64::INFINITY
         };

@@ -210,7 +210,7 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     (
         "on = \"cube\"",
         "on = \"cub\"",
-        &["gauge.force.0.on: no body or moving wall is called `cub`", "did you mean `cube`?"],
+        &["gauge.force.0.on: nothing solid is called `cub`", "did you mean `cube`?"],
     ),
 ];
 

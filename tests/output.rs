@@ -344,3 +344,16 @@ fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
 fn contact() -> seixo::case::Contact {
     toml::from_str("spring = 1e4").unwrap()
 }
+
+/// A run that is killed while it marks its folder leaves a marker without words: the folder is seixo's all the same.
+#[test]
+fn a_marker_that_was_cut_off_marks_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let marker = folder.path().join(".seixo");
+    for left in ["", "{\"seixo\":\"0."] {
+        std::fs::write(&marker, left).unwrap();
+        assert_eq!(seixo::output::folder::case_name(folder.path()).unwrap().as_deref(), Some(""));
+        drop(Folder::open(folder.path(), "case", Mode::Replace, &[]).unwrap());
+        assert_eq!(seixo::output::folder::case_name(folder.path()).unwrap().as_deref(), Some("case"));
+    }
+}

@@ -235,8 +235,9 @@ fn structs_lie_the_same_on_both_sides() {
             gradient_scale,
             density,
             tolerance_squared,
-            wendland,
+            smooth_density,
             surface_head,
+            wall_shear,
             pad,
         }
     );
@@ -340,7 +341,8 @@ fn constant(text: &str, name: &str) -> f64 {
 fn constants_are_the_same_on_both_sides() {
     use seixo::backend::gpu::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};
     use seixo::fields::State;
-    use seixo::kernels::{moment::EIGENVALUE_MIN, number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::neighbourhood::EIGENVALUE_MIN;
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
     let common = |name: &str| constant(shader::COMMON, name);

@@ -1,44 +1,10 @@
 //! Round bodies: rolling, bouncing, resting, turning over, against analytic results; what a case may ask of them.
 
 use crate::common::case;
+use crate::common::dry::{Dry, G};
 use glam::DVec3;
-use seixo::body::{Pose, Wrench};
 use seixo::case::file;
-use seixo::contact::Solids;
 use seixo::scene::Scene;
-
-const G: f64 = 9.80665;
-
-/// A dry scene in motion.
-struct Dry {
-    solids: Solids,
-    dt: f64,
-    step: u32,
-}
-
-impl Dry {
-    fn new(text: &str) -> Self {
-        let case = case(text);
-        let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}\n{text}"));
-        let solids = Solids::new(&scene, case.contact.as_ref()).unwrap();
-        Self { solids, dt: case.run.time_step, step: 0 }
-    }
-
-    fn step(&mut self) -> &[Pose] {
-        let still = vec![Wrench::default(); self.solids.poses().len()];
-        self.solids.advance(f64::from(self.step) * self.dt, self.dt, &still).unwrap();
-        self.step += 1;
-        self.solids.poses()
-    }
-
-    fn run(&mut self, time: f64) -> &[Pose] {
-        let end = (time / self.dt).round() as u32;
-        while self.step < end {
-            self.step();
-        }
-        self.solids.poses()
-    }
-}
 
 /// The shape keys of a sphere and of a cylinder lying along y.
 const ROUND: [(&str, f64, &str); 2] = [

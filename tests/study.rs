@@ -133,3 +133,87 @@ fn mistakes_are_told_before_anything_runs() {
         assert!(text.contains(expected), "{arguments:?}: {text}");
     }
 }
+
+#[test]
+fn a_validation_is_a_file_with_checks_and_gives_a_page_with_mean_and_spread() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let head = STUDY.split("[measure]").next().expect("the case");
+    let checks = r#"
+source = "analytic"
+full = false
+"#;
+    let rest = r#"
+[measure]
+of = ["gauges", "fluid"]
+every = 0.01
+[[axis]]
+name = "preset"
+key = "fluid.preset"
+values = ["paper", "accurate"]
+[[check]]
+name = "pressure at the floor [Pa]"
+curve = "floor [Pa]"
+take = "mean"
+window = [0.1, 0.3]
+against = "floor.csv"
+columns = ["t_s", "p_Pa"]
+tolerance = 0.1
+peers = [{ name = "a peer", value = 4000.0 }]
+[[check]]
+name = "twice the depth of the centroid, paper alone [m]"
+only = { preset = "paper" }
+curve = "fluid z [m]"
+take = "at"
+level = 0.2
+reference = 9.9
+tolerance = 0.1
+"#;
+    let gauge = "[[gauge.pressure]]\nname = \"floor\"\npoint = [0.1, 0, 0]\n[output]\nevery = 0\n\"\"\"";
+    let head = head.replace("title =", &format!("{checks}title =")).replacen("\"\"\"\n", "@", 1);
+    let text = head.replace("\"\"\"", gauge).replace('@', "\"\"\"\n") + rest;
+    std::fs::write(folder.join("tank.toml"), text).expect("a file");
+    std::fs::write(folder.join("floor.csv"), "# source: analytic\nt_s,p_Pa\n0.1,1961\n0.3,1961\n")
+        .expect("a file");
+    let validate = |arguments: &[&str]| {
+        let out = Command::new(env!("CARGO_BIN_EXE_seixo"))
+            .current_dir(folder)
+            .arg("validate")
+            .args(arguments)
+            .output();
+        let out = out.expect("the program starts");
+        let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+        (out.status.code().unwrap_or(-1), text)
+    };
+    let (code, text) = validate(&["tank.toml", "--runs", "2", "-o", "one", "--shard", "1/2"]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("2 of 4 points are still to be computed"), "{text}");
+    assert_eq!(validate(&["tank.toml", "--runs", "2", "-o", "two", "--shard", "2/2", "-q"]).0, 0);
+    let joined = [
+        "tank.toml",
+        "--runs",
+        "2",
+        "-o",
+        "both",
+        "--join",
+        "one",
+        "--join",
+        "two",
+        "--page",
+        "docs/page.md",
+    ];
+    let (code, text) = validate(&joined);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("ok     small: pressure at the floor [Pa], accurate"), "{text}");
+    assert!(text.contains("BEYOND small: twice the depth of the centroid, paper alone [m], paper"), "{text}");
+    let page = std::fs::read_to_string(folder.join("docs/page.md")).expect("the page");
+    for word in
+        ["Reference: analytic", "| a peer |", "± ", "(2) | 1961 |", "img/validation-small-floor-curve.svg"]
+    {
+        assert!(page.contains(word), "{word} is not in\n{page}");
+    }
+    assert!(!page.contains("paper alone [m] | accurate"), "{page}");
+    assert!(folder.join("docs/img/validation-small-floor-curve.svg").exists());
+    let (code, text) = validate(&["hydrostatics"]);
+    assert_eq!((code, text.contains("did you mean `hydrostatic`")), (2, true), "{text}");
+}

@@ -618,19 +618,6 @@ fn pressure_gradient() {
         assert!(moved(&before, &after, |f| flat(&f.acceleration)) > 1.0);
         pair.check(Stage::PressureGradient);
     });
-    // At the free surface too.
-    for (dimensions, fluid) in
-        [(3, "gradient = \"corrected_surface\""), (2, "gradient = \"corrected_surface\"")]
-    {
-        let Some(mut pair) = Pair::new(dimensions, fluid) else { return };
-        pair.run_all(&LISTS);
-        pair.run(Stage::NumberDensity);
-        pair.run(Stage::PressureGradient);
-        let (_, after) = pair.fields();
-        let surface = |i: &usize| after.state[*i] == State::Surface && after.acceleration[*i].length() > 1.0;
-        assert!((0..pair.scene.groups.fluid).filter(surface).count() > 10);
-        pair.check(Stage::PressureGradient);
-    }
 }
 
 #[test]

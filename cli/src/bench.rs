@@ -1,7 +1,7 @@
 //! `seixo bench`.
 
 use super::setup::Setup;
-use super::{BackendName, CaseArgs, DeviceArgs, Exit, device};
+use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit, device};
 use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
 use seixo::backend::traffic::Solve;
 use seixo::console::{remark, say, say_json};
@@ -70,8 +70,8 @@ fn choices(args: &DeviceArgs) -> Vec<BackendName> {
 }
 
 fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -> Result<Option<Row>> {
-    let case =
-        CaseArgs { case: args.case.clone(), spacing: Some(spacing), sets: args.sets.clone(), until: None };
+    let changes = Changes { spacing: Some(spacing), sets: args.sets.clone(), until: None };
+    let case = CaseArgs { case: args.case.clone(), changes };
     let setup = Setup::new(&case, true)?;
     let end = setup.loaded.case.run.end;
     if !(0.0..=end).contains(&args.from) {

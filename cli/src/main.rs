@@ -8,6 +8,7 @@ mod plan;
 mod progress;
 mod run;
 mod setup;
+mod signals;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use seixo::console::{lost, remark, say};
@@ -21,8 +22,8 @@ const EXIT_CODES: &str = "Exit codes:
   3    no suitable GPU, or the device was lost
   4    the computation diverged (its last state is kept), or its result means nothing
   5    a file could not be read or written, or a result not be printed
-  130  interrupted by SIGINT (Ctrl-C)
-  143  interrupted by SIGTERM";
+  75   stopped by --max-wall, SIGUSR1 or SIGXCPU with the state saved: go on with --resume
+  129, 130, 143  interrupted by SIGHUP, SIGINT (Ctrl-C), SIGTERM; the state is saved";
 
 /// Water that carries solids: incompressible particle flow (MPS) with rigid bodies that float, collide and
 /// slide, on any GPU or on the CPU.
@@ -43,6 +44,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Run a study: error against run time, limits of stability, what a scene does not need.
     Study(seixo_study::command::StudyArgs),
+    /// Hold runs against experiments and analytic solutions: one page with tables and charts.
+    Validate(seixo_study::validation::command::ValidateArgs),
     /// Time a step by stage, against the bytes that must move.
     Bench(bench::BenchArgs),
     /// List the adapters that can be used.
@@ -60,6 +63,13 @@ enum Command {
 struct CaseArgs {
     /// The case file (TOML).
     case: PathBuf,
+    #[command(flatten)]
+    changes: Changes,
+}
+
+/// What to change in a case.
+#[derive(Clone, Debug, Default, clap::Args)]
+struct Changes {
     /// Particle spacing l0 [m], instead of run.spacing.
     #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = finite)]
     spacing: Option<f64>,
@@ -71,7 +81,7 @@ struct CaseArgs {
     until: Option<f64>,
 }
 
-impl CaseArgs {
+impl Changes {
     /// All changes of values, those with an option of their own as well.
     fn all_sets(&self) -> Vec<String> {
         let end = self.until.map(|end| format!("run.end={end:?}"));
@@ -117,6 +127,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Study(args) => seixo_study::command::command(&args).map(|()| 0),
+        Command::Validate(args) => seixo_study::validation::command::command(&args).map(|()| 0),
         Command::Adapters { json } => device::list(json),
         Command::Schema => {
             say(seixo::case::Case::schema().trim_end());

@@ -1,6 +1,6 @@
 //! `seixo plan`: what a run would compute.
 
-use super::setup::Setup;
+use super::setup::{self, Setup};
 use super::{CaseArgs, Exit};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -8,12 +8,13 @@ use seixo::backend::gpu::forecast::{Forecast, Group, groups};
 use seixo::backend::gpu::layout::{Memory, Sizes};
 use seixo::backend::gpu::sizes;
 use seixo::case::Case;
-use seixo::case::file::load;
 use seixo::cells::Grid;
 use seixo::console::{say, say_json};
 use seixo::contact::Solids;
 use seixo::error::Result;
+use seixo::estimate::{Estimate, bytes};
 use seixo::gauges::Gauges;
+use seixo::machine;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
@@ -83,6 +84,8 @@ struct Report {
     stages: Vec<StageLine>,
     contact: ContactLine,
     scheme: Option<Scheme>,
+    /// From the case alone, as `run` judges it.
+    estimate: Estimate,
     advice: Vec<String>,
 }
 
@@ -106,18 +109,18 @@ struct Seen {
 
 impl Seen {
     fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let mut case = load(&args.case, args.spacing, &args.all_sets())?.case;
+        let mut case = setup::read(args)?.case;
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
         let blocks = case.fluid.iter().flat_map(|f| &f.block);
         let extent = |b: &seixo::case::Block, k: usize| (b.max[k] - b.min[k]).abs();
         let fluid = |b| extent(b, 0) * extent(b, 2) * if d == 3.0 { extent(b, 1) } else { 1.0 } / l0.powf(d);
         let fluid: f64 = blocks.map(fluid).sum();
         let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
-        let mut sets = args.sets.clone();
+        let mut changes = args.changes.clone();
         if coarser > 1.0 {
-            sets.push(format!("run.spacing={:?}", coarser * l0));
+            changes.sets.push(format!("run.spacing={:?}", coarser * l0));
         }
-        let typed = CaseArgs { sets, case: args.case.clone(), ..*args };
+        let typed = CaseArgs { changes, case: args.case.clone() };
         // What the coarser lattice rounds is no news.
         let setup = Setup::new(&typed, quiet || coarser > 1.0)?;
         if coarser == 1.0 {
@@ -155,6 +158,17 @@ fn report(seen: &Seen) -> Result<Report> {
     } else if plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
+    let estimate = Estimate::new(case);
+    let free = |n: Option<u64>| n.map_or(f64::INFINITY, |n| n as f64);
+    if estimate.memory_beside_device > free(machine::memory()) {
+        advice.push("memory: this machine has less free than the run takes; `seixo run` refuses it".into());
+    }
+    if estimate.disk() > free(machine::disk(std::path::Path::new("."))) {
+        advice.push(
+            "disk: the results take more room than is free here; raise output.every or output.table_every"
+                .into(),
+        );
+    }
     let stages = plan.reasons.iter().map(|(stage, reason)| StageLine {
         stage: stage.name(),
         planned: reason.is_ok(),
@@ -183,6 +197,7 @@ fn report(seen: &Seen) -> Result<Report> {
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
+        estimate,
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
     })
@@ -211,7 +226,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
         sound_speed_m_s: params.sound_speed(dt),
         relaxation: step.relaxation,
         compressibility_1_pa: step.compressibility,
-        cells: Grid::new(params)?.total(),
+        cells: if built { Grid::new(params)?.total() } else { Estimate::new(&seen.case).cells as usize },
         neighbours_max: if built { Some(cpu.counters()?.neighbours_max) } else { None },
         cpu_bytes: (cpu.bytes() as f64 * sizes.pressure as f64 / coarse) as u64,
         gpu_bytes: memory.total(),
@@ -327,6 +342,24 @@ fn words(report: &Report) -> String {
             s.gpu_forecasts.iter().enumerate().flat_map(|(k, f)| forecast(f, k > 0, report.spacing_m)),
         );
     }
+    let e = &report.estimate;
+    lines.extend([
+        String::new(),
+        "estimates".to_string(),
+        format!(
+            "  memory on the host: {} on the CPU, {} beside a GPU",
+            bytes(e.memory_cpu),
+            bytes(e.memory_beside_device)
+        ),
+        format!(
+            "  results: {:.0} frames of {}, tables {}, checkpoints {}: {}",
+            e.frames,
+            bytes(e.frame_bytes),
+            bytes(e.table_bytes),
+            bytes(e.checkpoint_bytes),
+            bytes(e.disk())
+        ),
+    ]);
     if !report.advice.is_empty() {
         lines.extend([String::new(), "advice".to_string()]);
         lines.extend(report.advice.iter().map(|a| format!("  {a}")));

@@ -1,33 +1,53 @@
 //! `seixo run`.
 
 use super::progress::{Display, clock};
-use super::setup::Setup;
-use super::{CaseArgs, DeviceArgs, Exit};
+use super::setup::{self, Setup};
+use super::signals::{self, RESUME};
+use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
+use seixo::backend::gpu::Gpu;
+use seixo::case::Case;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
+use seixo::estimate::{Estimate, bytes};
+use seixo::machine;
+use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
-use seixo::run::{Options, run as run_simulation};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use seixo::run::resume::{Standing, standing};
+use seixo::run::{Options, Start, run as run_simulation};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
+    /// The case file (TOML); with --resume DIR the case is that of DIR.
+    #[arg(required_unless_present = "resume")]
+    case: Option<PathBuf>,
     #[command(flatten)]
-    case: CaseArgs,
+    changes: Changes,
     #[command(flatten)]
     device: DeviceArgs,
     /// Folder of the results [default: out/NAME-OF-THE-CASE].
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Go on with the run in the folder of the results: start it if there is none, return at once if it is done.
+    /// The same command can be given again until the run has reached its end.
+    #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "", conflicts_with = "force")]
+    resume: Option<String>,
+    /// Stop after this time by the clock with the state saved, e.g. 3h50m, 90s (exit code 75).
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    max_wall: Option<Duration>,
     /// Replace earlier results in the folder.
     #[arg(long)]
     force: bool,
     /// Stop after this many steps.
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
+    /// Memory that the run may take, e.g. 8G, instead of what the machine has free.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    memory_limit: Option<u64>,
+    /// Run even if the disk seems too small for the results.
+    #[arg(long)]
+    force_disk: bool,
     /// Draw a picture of every frame, and of the end.
     #[arg(long)]
     picture: bool,
@@ -39,17 +59,171 @@ pub struct RunArgs {
     json: bool,
 }
 
+/// A time by the clock: `3h50m`, `1d`, `90s`, or seconds.
+fn duration(text: &str) -> std::result::Result<Duration, String> {
+    let wrong = || "write a time like 3h50m, 90s or 600 (seconds)".to_owned();
+    let (mut total, mut number) = (0.0, String::new());
+    for c in text.trim().chars() {
+        let unit = match c {
+            '0'..='9' | '.' => {
+                number.push(c);
+                continue;
+            }
+            'd' => 86_400.0,
+            'h' => 3600.0,
+            'm' => 60.0,
+            's' => 1.0,
+            _ => return Err(wrong()),
+        };
+        total += unit * number.parse::<f64>().map_err(|_| wrong())?;
+        number.clear();
+    }
+    if !number.is_empty() {
+        total += number.parse::<f64>().map_err(|_| wrong())?;
+    }
+    let time = Duration::try_from_secs_f64(total).map_err(|_| wrong())?;
+    if time.is_zero() { Err(wrong()) } else { Ok(time) }
+}
+
+/// Bytes: `8G`, `500M`, or a number.
+fn size(text: &str) -> std::result::Result<u64, String> {
+    let text = text.trim();
+    let (number, unit) = match text.char_indices().next_back() {
+        Some((at, 'k' | 'K')) => (&text[..at], 1e3),
+        Some((at, 'M')) => (&text[..at], 1e6),
+        Some((at, 'G')) => (&text[..at], 1e9),
+        Some((at, 'T')) => (&text[..at], 1e12),
+        _ => (text, 1.0),
+    };
+    let bytes = number.parse::<f64>().map_err(|_| "write a size like 8G or 500M")? * unit;
+    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err("write a size like 8G or 500M".into()) }
+}
+
+/// Refuses a case that the machine cannot hold, before anything is built.
+fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool) -> Result<()> {
+    let estimate = Estimate::new(case).at_most(args.steps);
+    let on_cpu = match args.device.backend {
+        BackendName::Cpu => true,
+        BackendName::Gpu => false,
+        BackendName::Auto => args.device.adapter.is_none(),
+    };
+    let needs = |cpu: bool| if cpu { estimate.memory_cpu } else { estimate.memory_beside_device };
+    let limit = args.memory_limit.or_else(machine::memory).map_or(f64::INFINITY, |n| n as f64);
+    // Drivers are asked only if it matters whether there is one.
+    let on_cpu = on_cpu
+        && (args.device.backend == BackendName::Cpu || needs(true) <= limit || !Gpu::hardware_available());
+    if needs(on_cpu) > limit {
+        return Err(Error::Case(format!(
+            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory, {} are {}: use a larger run.spacing \
+             or a smaller domain, or say with --memory-limit what the run may take",
+            asked.name,
+            estimate.particles,
+            estimate.cells,
+            bytes(needs(on_cpu)),
+            bytes(limit),
+            if args.memory_limit.is_some() { "allowed" } else { "free" }
+        )));
+    }
+    let free = machine::disk(&asked.out).map_or(f64::INFINITY, |n| n as f64);
+    if estimate.disk() > free && !args.force_disk && !resumes {
+        return Err(Error::Case(format!(
+            "{}: the results take about {}, {} are free on the disk of {}: raise output.every, output.table_every or \
+             run.spacing, or run all the same with --force-disk",
+            asked.name,
+            bytes(estimate.disk()),
+            bytes(free),
+            asked.out.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Which case to run, where its results go, and whether to go on with what is there.
+struct Asked {
+    case: PathBuf,
+    name: String,
+    out: PathBuf,
+    resume: bool,
+    inputs: Vec<PathBuf>,
+}
+
+impl Asked {
+    fn new(args: &RunArgs) -> Result<Self> {
+        let given = args.resume.as_deref().map(PathBuf::from);
+        // `--resume CASE` takes the case for its folder.
+        let (case, folder) = match (&args.case, &given) {
+            (None, Some(path)) if path.is_file() => (Some(path.clone()), None),
+            (case, folder) => (case.clone(), folder.clone().filter(|f| !f.as_os_str().is_empty())),
+        };
+        if let (Some(out), Some(folder)) = (&args.out, &folder)
+            && out != folder
+        {
+            let (out, folder) = (out.display(), folder.display());
+            return Err(Error::Case(format!(
+                "--out {out} and --resume {folder} name two folders: leave one out"
+            )));
+        }
+        let resume = given.is_some();
+        let out = args.out.clone().or(folder);
+        match (case, out) {
+            (Some(case), out) => {
+                let name = setup::name(&case);
+                let out = out.unwrap_or_else(|| Path::new("out").join(&name));
+                Ok(Self { inputs: vec![case.clone()], case, name, out, resume })
+            }
+            (None, Some(out)) => {
+                let none = || Error::Case(format!("{} holds no run of seixo to go on with", out.display()));
+                let name = case_name(&out)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
+                Ok(Self { case: out.join("case.toml"), name, out, resume, inputs: Vec::new() })
+            }
+            (None, None) => Err(Error::Case("--resume: name the folder of the run, or its case".into())),
+        }
+    }
+}
+
 pub fn run(args: &RunArgs) -> Exit {
+    let deadline = args.max_wall.map(|wall| Instant::now() + wall);
     seixo::threads::start(args.device.threads)?;
-    let setup = Setup::new(&args.case, args.quiet)?;
+    let asked = Asked::new(args)?;
+    let loaded = setup::read(&CaseArgs { case: asked.case.clone(), changes: args.changes.clone() })?;
+    let start = match (asked.resume, args.force) {
+        (false, true) => Start::Replace,
+        (false, false) => Start::New,
+        (true, _) => match standing(&asked.out, &loaded.case)? {
+            Standing::Nothing => Start::New,
+            Standing::Lost => Start::Replace,
+            Standing::Done(result) => {
+                if args.json {
+                    say(result.trim_end());
+                } else if !args.quiet {
+                    say(&format!("the run in {} is done", asked.out.display()));
+                }
+                return Ok(0);
+            }
+            Standing::Stopped(found) => {
+                found
+                    .damaged
+                    .iter()
+                    .for_each(|why| remark(&format!("warning: an older state is taken: {why}")));
+                if !args.quiet {
+                    let (step, time) = (found.origin.step, found.origin.time);
+                    remark(&format!("going on from step {step}, t = {time:.4} s"));
+                }
+                Start::Resume(found)
+            }
+        },
+    };
+    fits(args, &asked, &loaded.case, matches!(start, Start::Resume(_)))?;
+    let setup = Setup::build(loaded, asked.name, args.quiet)?;
     let mut simulation = setup.simulation(&args.device)?;
     let options = Options {
-        out: args.out.clone().unwrap_or_else(|| Path::new("out").join(&setup.name)),
+        out: asked.out.clone(),
         name: setup.name.clone(),
-        force: args.force,
+        start,
         steps: args.steps,
+        deadline,
         pictures: args.picture,
-        inputs: vec![args.case.case.clone()],
+        inputs: asked.inputs,
     };
     if !args.quiet {
         let groups = simulation.groups;
@@ -60,13 +234,15 @@ pub fn run(args: &RunArgs) -> Exit {
             groups.total(),
             groups.fluid
         ));
+        let advice = simulation.solids.advice(simulation.case.run.time_step);
+        advice.words.iter().for_each(|line| remark(line));
     }
     // Until here there is nothing to save, and a signal ends the program at once.
-    let stop = watch_signals()?;
+    let stop = signals::watch(args.quiet)?;
     let mut display = Display::new(args.quiet, simulation.plan.wet());
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
     let finished =
-        run_simulation(&mut simulation, &setup.scene, &setup.loaded.text, &options, &stop, &mut observe)?;
+        run_simulation(&mut simulation, &setup.scene, &setup.loaded.text, options, &stop, &mut observe)?;
     display.finish();
     let verdict = &finished.summary.verdict;
     if finished.error.is_none() && verdict.grade != Grade::Fine {
@@ -75,28 +251,14 @@ pub fn run(args: &RunArgs) -> Exit {
     if args.json {
         say(&finished.summary.json());
     } else if !args.quiet {
-        say(&words(&finished.summary, &options.out));
+        say(&words(&finished.summary, &asked.out));
     }
     match (finished.error, finished.signal) {
         (Some(error), _) => Err(error),
-        (None, Some(signal)) => Ok(128 + signal as u8),
+        (None, Some(signal)) => Ok(signals::exit_code(signal)),
+        (None, None) if finished.resumable => Ok(RESUME),
         (None, None) => Ok(0),
     }
-}
-
-/// A number that turns from 0 to that of the signal that asked the run to end. A second signal ends the
-/// program on the spot.
-fn watch_signals() -> Result<Arc<AtomicUsize>> {
-    let stop = Arc::new(AtomicUsize::new(0));
-    let armed = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        // The order matters: at the first signal the shutdown is not armed yet.
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&armed))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&armed)))
-            .and_then(|_| signal_hook::flag::register_usize(signal, Arc::clone(&stop), signal as usize))
-            .map_err(Error::io("signal handler"))?;
-    }
-    Ok(stop)
 }
 
 fn words(summary: &Summary, out: &Path) -> String {

@@ -6,6 +6,7 @@ use seixo::console::remark;
 use seixo::error::Result;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A case, read and built.
@@ -24,13 +25,19 @@ impl Setup {
     /// # Errors
     /// What is wrong with the case.
     pub fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let loaded = load(&args.case, args.spacing, &args.all_sets())?;
+        Self::build(read(args)?, name(&args.case), quiet)
+    }
+
+    /// Build the scene of a case that was read.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn build(loaded: Loaded, name: String, quiet: bool) -> Result<Self> {
         let scene = Arc::new(Scene::build(&loaded.case)?);
         if !quiet {
             loaded.warnings.iter().for_each(|w| remark(w));
             scene.notes.iter().for_each(|n| remark(&format!("note: {n}")));
         }
-        let name = args.case.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned());
         Ok(Self { name, loaded, scene })
     }
 
@@ -41,4 +48,17 @@ impl Setup {
     pub fn simulation(&self, args: &DeviceArgs) -> Result<Simulation> {
         Simulation::on(&self.loaded.case, self.scene.clone(), &device::processor(args)?)
     }
+}
+
+/// Read a case.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn read(args: &CaseArgs) -> Result<Loaded> {
+    load(&args.case, args.changes.spacing, &args.changes.all_sets())
+}
+
+/// Name of a case: its file without the extension.
+pub fn name(case: &Path) -> String {
+    case.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned())
 }

@@ -6,6 +6,7 @@
 //! wgpu.
 
 mod adapter;
+mod archive;
 mod bandwidth;
 pub mod buffers;
 mod clock;
@@ -506,6 +507,10 @@ impl Backend for Gpu {
 
     fn write(&mut self, fields: &Fields) -> Result<()> {
         if self.plan.wet() { self.write_fields(fields) } else { Ok(()) }
+    }
+
+    fn exchange(&mut self, archive: &mut crate::checkpoint::Archive) -> Result<()> {
+        Gpu::exchange(self, archive)
     }
 
     fn wait(&mut self) -> Result<()> {

@@ -7,6 +7,7 @@ pub mod traffic;
 
 use self::traffic::Traffic;
 use crate::body::{FreeBody, Pose, Wrench};
+use crate::checkpoint::Archive;
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
@@ -35,6 +36,34 @@ pub struct Counters {
     pub non_finite: Option<u32>,
     /// A row with more neighbours than the lists hold: slot and neighbours.
     pub overflow: Option<(u32, u32)>,
+}
+
+impl Counters {
+    /// Save the counters, or take them over.
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            lost,
+            displacement_clamps,
+            pressure_clamps,
+            negative_pressures,
+            neighbours_max,
+            non_finite,
+            overflow,
+        } = self;
+        archive.count("counters.lost", lost)?;
+        archive.count("counters.displacement_clamps", displacement_clamps)?;
+        archive.count("counters.pressure_clamps", pressure_clamps)?;
+        archive.count("counters.negative_pressures", negative_pressures)?;
+        archive.small("counters.neighbours_max", neighbours_max)?;
+        let mut none = non_finite.unwrap_or(u32::MAX);
+        archive.small("counters.non_finite", &mut none)?;
+        *non_finite = Some(none).filter(|&n| n != u32::MAX);
+        let (mut slot, mut neighbours) = overflow.unwrap_or((u32::MAX, 0));
+        archive.small("counters.overflow_slot", &mut slot)?;
+        archive.small("counters.overflow_neighbours", &mut neighbours)?;
+        *overflow = Some((slot, neighbours)).filter(|o| o.0 != u32::MAX);
+        Ok(())
+    }
 }
 
 /// How the time of a stage can be told.
@@ -132,6 +161,8 @@ pub trait Backend: Send {
     fn read(&mut self) -> Result<Fields>;
     /// Overwrite all fields (positions, velocities, kinds, ids, pressures).
     fn write(&mut self, fields: &Fields) -> Result<()>;
+    /// Save the whole state between two steps, to the last bit, or take it over; on the same kind of backend.
+    fn exchange(&mut self, archive: &mut Archive) -> Result<()>;
     /// Wait until everything asked for so far is done, if the backend works in the background.
     fn wait(&mut self) -> Result<()> {
         Ok(())

@@ -139,8 +139,14 @@ impl Checker<'_> {
                 "allowed: 2, 3",
             );
         }
+        self.not_negative("run.checkpoint.wall", run.checkpoint.wall, "s (0: no checkpoints by the clock)");
+        if let Some(every) = run.checkpoint.every {
+            self.positive("run.checkpoint.every", every, "s");
+        }
         if let Some([min, max]) = &run.domain {
             self.box_edges("run.domain", "run.domain", min, max);
+            self.place("run.domain", min);
+            self.place("run.domain", max);
         }
         if run.spacing > 0.0 && run.time_step > 0.0 && run.end.is_finite() && run.end / run.time_step > 1e9 {
             let message = format!("{:.1e} steps of {} s", run.end / run.time_step, run.time_step);
@@ -193,6 +199,8 @@ impl Checker<'_> {
                 self.relaxation("fluid.sound_speed", (speed * self.case.run.time_step / l0).powi(2));
             }
         }
+        let jitter = fluid.jitter;
+        self.range("fluid.jitter", jitter, (0.0..=0.3).contains(&jitter), "0 to 0.3 of the spacing");
         if fluid.block.is_empty() {
             self.add(
                 "fluid",
@@ -228,7 +236,9 @@ impl Checker<'_> {
         let Some(l0) = self.spacing().filter(|_| fits && !run.adaptive && run.time_step > 0.0) else {
             return;
         };
-        let limit = Lattice::new(run.dimensions, run.effective_radius).viscous_limit(run.dimensions);
+        let lattice = Lattice::new(run.dimensions, run.effective_radius);
+        let paper = self.case.fluid.as_ref().is_some_and(|f| f.preset == super::Preset::Paper);
+        let limit = lattice.viscous_limit(run.dimensions, if paper { 1.0 } else { lattice.wall_shear });
         let number = viscosity * run.time_step / (l0 * l0);
         if number > limit {
             let dt = 0.5 * limit * l0 * l0 / viscosity;
@@ -296,16 +306,23 @@ impl Checker<'_> {
             )
             .collect();
         self.unique(&names, "gauge");
-        let solids: Vec<&str> = (self.case.body.iter().map(|b| b.name.as_str()))
-            .chain(self.case.moving_wall.iter().map(|w| w.name.as_str()))
+        let case = self.case;
+        let mut solid: Vec<&str> = (case.body.iter().map(|b| b.name.as_str()))
+            .chain(case.moving_wall.iter().map(|w| w.name.as_str()))
+            .chain(case.obstacle.iter().map(|o| o.name.as_str()))
+            .chain(case.plane.iter().map(|p| p.name.as_str()))
             .collect();
+        if let Some(tank) = &case.tank {
+            let walls = super::TANK_FACES.iter().filter(|(face, _)| !tank.open.contains(face));
+            solid.extend(walls.map(|(_, name)| *name));
+        }
         for (k, gauge) in gauges.force.iter().enumerate() {
-            if !solids.contains(&gauge.on.as_str()) {
-                let message = format!("no body or moving wall is called `{}`", gauge.on);
-                let remedy = match super::report::closest(&gauge.on, &solids) {
+            if !solid.contains(&gauge.on.as_str()) {
+                let message = format!("nothing solid is called `{}`", gauge.on);
+                let remedy = match super::report::closest(&gauge.on, &solid) {
                     Some(name) => format!("did you mean `{name}`?"),
-                    None if solids.is_empty() => "remove the gauge".to_owned(),
-                    None => format!("allowed: {}", solids.join(", ")),
+                    None if solid.is_empty() => "remove the gauge".to_owned(),
+                    None => format!("allowed: {}", solid.join(", ")),
                 };
                 self.add(format!("gauge.force.{k}.on"), message, remedy);
             }

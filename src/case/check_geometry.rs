@@ -3,8 +3,10 @@
 use super::check::{Checker, face, length};
 use super::{Face, Vector};
 
-/// More cells than this do not fit into memory, nor their indices into 32 bits.
-const MOST_CELLS: f64 = 1e9;
+/// More cells than this are a slip of the pen; what a machine can hold is asked before anything is built.
+const MOST_CELLS: f64 = 1e11;
+/// Cells that a place may lie away from the origin: they are numbered in 32 bits.
+const FARTHEST: f64 = 1e9;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl Checker<'_> {
@@ -34,7 +36,7 @@ impl Checker<'_> {
         };
         let cells: f64 = self.axes().map(|k| (max[k] - min[k]) / l0).product();
         let far = self.axes().map(|k| min[k].abs().max(max[k].abs()) / l0).fold(0.0, f64::max);
-        if cells > MOST_CELLS || far > MOST_CELLS {
+        if cells > MOST_CELLS || far > FARTHEST {
             let message = format!("{what} takes up or lies beyond {:.1e} cells of {l0} m", cells.max(far));
             self.add(path, message, "use a larger run.spacing, or correct a length that is far too large");
             return;
@@ -44,6 +46,16 @@ impl Checker<'_> {
             let message =
                 format!("{what} is {across:.4} m across along {}, less than one particle of {l0} m", AXES[k]);
             self.add(path, message, format!("use run.spacing = {} or less", round_down(across)));
+        }
+    }
+
+    /// A place that can be numbered in cells.
+    pub(super) fn place(&mut self, path: &str, at: &[f64]) {
+        let Some(l0) = self.spacing() else { return };
+        let far = at.iter().map(|x| x.abs() / l0).fold(0.0, f64::max);
+        if far.is_finite() && far > FARTHEST {
+            let message = format!("{far:.1e} cells of {l0} m away from the origin");
+            self.add(path, message, "use a larger run.spacing, or correct a length that is far too large");
         }
     }
 
@@ -94,6 +106,14 @@ impl Checker<'_> {
         }
     }
 
+    /// Cells of a plane's surface, one across in two dimensions; infinite if it lies too far off.
+    fn plane_cells(&self, plane: &super::Plane, l0: f64) -> f64 {
+        let across = if self.flat() { 1.0 } else { (plane.size[1] / l0).max(1.0) };
+        let far = plane.center.iter().map(|x| x.abs() / l0).fold(0.0, f64::max);
+        let cells = (plane.size[0] / l0).max(1.0) * across;
+        if far > FARTHEST { f64::INFINITY } else { cells }
+    }
+
     fn plane(&mut self, path: &str, plane: &super::Plane) {
         let (n, a) = (plane.normal, plane.along);
         let cross = [n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0]];
@@ -117,7 +137,7 @@ impl Checker<'_> {
             );
         }
         if let Some(l0) = self.spacing()
-            && plane.size[0] * plane.size[1] > MOST_CELLS * l0 * l0
+            && self.plane_cells(plane, l0) > MOST_CELLS
         {
             self.add(
                 format!("{path}.size"),
@@ -154,6 +174,7 @@ impl Checker<'_> {
             }
         }
         if !rows.is_empty() && rows.iter().flatten().all(|x| x.is_finite()) {
+            rows.iter().enumerate().for_each(|(k, row)| self.place(&format!("{path}.{k}"), &row[1..]));
             self.motion_start(path, rows);
             self.motion_jumps(path, rows);
         }

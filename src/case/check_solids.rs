@@ -2,25 +2,13 @@
 
 use super::check::{Checker, length};
 use super::{Body, BodyShape, ContactDevice, Law};
+use glam::DMat3;
 
 /// Most sub-steps of a step that a case can ask for.
 const MOST_SUBSTEPS: u32 = 100_000;
 /// Springs outside of this range overflow, or vanish in rounding [N/m].
 const SPRING_LEAST: f64 = 1e-9;
 const SPRING_MOST: f64 = 1e18;
-
-/// Volume of a whole body [m3], and its extent along y in two dimensions [m].
-fn whole(body: &Body) -> (f64, f64) {
-    let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
-    match body.shape {
-        BodyShape::Box => {
-            let [x, y, z] = body.size.unwrap_or_default();
-            (x * y * z, y)
-        }
-        BodyShape::Sphere => (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3), 2.0 * radius),
-        BodyShape::Cylinder => (std::f64::consts::PI * radius.powi(2) * height, height),
-    }
-}
 
 impl Checker<'_> {
     pub(super) fn body(&mut self, k: usize, body: &Body) {
@@ -42,6 +30,7 @@ impl Checker<'_> {
                 self.positive(&path(key), value, unit);
             }
         }
+        self.place(&path("center"), &body.center);
         if let Some(inertia) = body.inertia {
             let [a, b, c] = inertia;
             if inertia.iter().any(|&i| i.is_finite() && i <= 0.0) {
@@ -108,17 +97,17 @@ impl Checker<'_> {
             self.range("contact.spring", spring, false, &allowed);
             return;
         }
+        let (spacing, flat) = (run.spacing, self.flat());
         let weight = |body: &Body| {
-            let (volume, depth) = whole(body);
-            let share = if self.flat() { run.spacing / depth } else { 1.0 };
-            body.mass.or(body.density.map(|d| d * volume)).unwrap_or(0.0) * share * length(&run.gravity)
+            let (shape, share) = body.shape(spacing, flat);
+            let mass = body.mass.map(|m| m * share).or(body.density.map(|d| d * shape.volume()));
+            mass.unwrap_or(0.0) * length(&run.gravity)
         };
         let smallest = |body: &Body| {
-            let edges = body.size.unwrap_or([f64::INFINITY; 3]);
-            let across = 2.0 * body.radius.unwrap_or(f64::INFINITY);
-            let along =
-                if self.flat() { f64::INFINITY } else { edges[1].min(body.height.unwrap_or(f64::INFINITY)) };
-            edges[0].min(edges[2]).min(across).min(along)
+            let [x, y, z] = (2.0 * body.shape(spacing, flat).0.extent(DMat3::IDENTITY)).to_array();
+            // what is missing is reported elsewhere
+            let lengths = [x, if flat { x } else { y }, z].map(|l| if l > 0.0 { l } else { f64::INFINITY });
+            lengths.into_iter().fold(f64::INFINITY, f64::min)
         };
         let free = self.case.body.iter().filter(|b| b.motion.is_none() && b.locked.len() < 6);
         let sinks = |b: &&Body| weight(b) / spring > smallest(b);
@@ -136,11 +125,7 @@ impl Checker<'_> {
     /// The keys that the shape needs, no others, and a particle across at least.
     fn shape(&mut self, k: usize, body: &Body) {
         let path = |key: &str| format!("body.{k}.{key}");
-        let (name, needed): (_, &[&str]) = match body.shape {
-            BodyShape::Box => ("box", &["size"]),
-            BodyShape::Sphere => ("sphere", &["radius"]),
-            BodyShape::Cylinder => ("cylinder", &["radius", "height"]),
-        };
+        let (name, needed) = body.shape.keys();
         let keys = [
             ("size", body.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
             ("radius", body.radius.is_some(), "0.1", "[m]"),
@@ -189,14 +174,7 @@ impl Checker<'_> {
                 self.add(path("axis"), message, "set axis = [0, 1, 0], or leave it out");
             }
         }
-        let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
-        let (key, size) = match body.shape {
-            BodyShape::Box => ("size", body.size.unwrap_or_default()),
-            BodyShape::Sphere => ("radius", [2.0 * radius; 3]),
-            BodyShape::Cylinder if flat => ("radius", [2.0 * radius; 3]),
-            BodyShape::Cylinder if height < 2.0 * radius => ("height", [2.0 * radius, 2.0 * radius, height]),
-            BodyShape::Cylinder => ("radius", [2.0 * radius, 2.0 * radius, height]),
-        };
+        let (key, size) = body.across(flat);
         if complete && size.iter().all(|&l| l > 0.0) {
             self.fits(&path(key), &format!("body `{}`", body.name), &[0.0; 3], &size);
         }
@@ -215,7 +193,11 @@ impl Checker<'_> {
             }
             return;
         };
-        self.positive("contact.spring", contact.spring, "N/m");
+        if contact.law == Law::Pressure {
+            self.not_negative("contact.spring", contact.spring, "N/m");
+        } else {
+            self.positive("contact.spring", contact.spring, "N/m");
+        }
         self.one_of(
             "contact",
             &[
@@ -231,7 +213,7 @@ impl Checker<'_> {
             self.not_negative("contact.damping_ratio", ratio, "");
         }
         if let Some(e) = contact.restitution {
-            self.range("contact.restitution", e, e > 0.0 && e <= 1.0, "more than 0, at most 1");
+            self.range("contact.restitution", e, e >= 0.0 && e <= 1.0, "0 (plastic) to 1 (elastic)");
         }
         self.not_negative("contact.viscous_friction", contact.viscous_friction, "kg/s");
         self.not_negative("contact.friction", contact.friction, "");

@@ -8,6 +8,9 @@ use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
+/// Problems that are shown; nobody reads a thousand, and each takes its time.
+const MOST_SHOWN: usize = 20;
+
 /// A case that was read, and the text that it came from.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -40,12 +43,15 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
         all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
     }
     all.extend_from_slice(sets);
-    parse(&path.display().to_string(), text, &all).map(|(case, text, warnings)| Loaded {
-        case,
-        text,
-        path: path.to_owned(),
-        warnings,
-    })
+    let name = path.display().to_string();
+    let (mut case, mut text, warnings) = parse(&name, text, &all)?;
+    // What a case says of its place holds no more for its copy beside the results.
+    if let Some(from) = case.run.from.as_ref().map(PathBuf::from).filter(|p| p.is_relative()) {
+        let from = std::path::absolute(path.with_file_name("").join(from)).map_err(Error::io(path))?;
+        let from = toml_edit::Value::from(from.display().to_string());
+        (case, text, _) = parse(&name, text, &[format!("run.from={from}")])?;
+    }
+    Ok(Loaded { case, text, path: path.to_owned(), warnings })
 }
 
 /// Parses and checks the text of a case; `name` stands for the file in messages. Returns the case, the text
@@ -86,9 +92,14 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
     let problems = too_long.chain(check(&case));
     let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
     if !errors.is_empty() {
-        return Err(Error::Case(wrong(&errors.iter().map(located).collect::<Vec<_>>())));
+        let shown: Vec<Message> = errors.iter().take(MOST_SHOWN).map(located).collect();
+        let mut report = wrong(&shown);
+        if errors.len() > MOST_SHOWN {
+            report.push_str(&format!("\n\nerror: and {} more", errors.len() - MOST_SHOWN));
+        }
+        return Err(Error::Case(report));
     }
-    let warnings = warnings.iter().map(|p| wrong(&[located(p)])).collect();
+    let warnings = warnings.iter().take(MOST_SHOWN).map(|p| wrong(&[located(p)])).collect();
     drop(table);
     Ok((case, text, warnings))
 }

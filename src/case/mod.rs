@@ -8,7 +8,10 @@ mod check_solids;
 pub mod file;
 mod overrides;
 mod report;
+mod shape;
 mod surplus;
+
+pub use shape::BodyShape;
 
 use crate::scheme::{FreeSurface, Gradient, Source};
 use schemars::JsonSchema;
@@ -74,6 +77,28 @@ pub struct Run {
     /// Effective radius over the spacing, re / l0 [-].
     #[serde(default = "Run::default_effective_radius")]
     pub effective_radius: f64,
+    /// When the state is saved, so that a run that was stopped goes on where it was.
+    #[serde(default)]
+    pub checkpoint: Checkpoint,
+    /// Folder of an earlier run whose last state is the start of this one, instead of t = 0; a relative one counts
+    /// from the case file. Scene and processor must be the same; time, gauges, output and constants may differ.
+    pub from: Option<String>,
+}
+
+/// Intervals between checkpoints; there is one at the end, too, and when a signal stops a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Checkpoint {
+    /// Simulated time between checkpoints [s]; none by simulated time if absent.
+    pub every: Option<f64>,
+    /// Wall-clock time between checkpoints [s]; 0 for none, nor at the end, unless `every` is given.
+    pub wall: f64,
+}
+
+impl Default for Checkpoint {
+    fn default() -> Self {
+        Self { every: None, wall: 600.0 }
+    }
 }
 
 impl Run {
@@ -149,6 +174,13 @@ pub struct Fluid {
     /// Blocks of water at t = 0.
     #[serde(default)]
     pub block: Vec<Block>,
+    /// Largest displacement of a water particle from its lattice at t = 0, along each axis, over the spacing [-];
+    /// 0 for none. For ensembles: starts with different `seed` differ in nothing else.
+    #[serde(default)]
+    pub jitter: f64,
+    /// Which of the jittered starts.
+    #[serde(default)]
+    pub seed: u32,
     /// The pressure Poisson equation's solver.
     #[serde(default)]
     pub solver: Solver,
@@ -223,6 +255,16 @@ pub enum Face {
     ZMax,
 }
 
+/// Faces of the tank and the names of their walls, in the order of [`Face`].
+pub const TANK_FACES: [(Face, &str); 6] = [
+    (Face::XMin, "tank.x_min"),
+    (Face::XMax, "tank.x_max"),
+    (Face::YMin, "tank.y_min"),
+    (Face::YMax, "tank.y_max"),
+    (Face::ZMin, "tank.z_min"),
+    (Face::ZMax, "tank.z_max"),
+];
+
 /// A rectangular container; walls outside of `min`..`max`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -280,7 +322,8 @@ pub struct MovingWall {
     /// Faces that need no particles because nothing reaches them.
     #[serde(default)]
     pub open: Vec<Face>,
-    /// Rows of time [s] and displacement x, y, z [m]; linear between rows, constant after the last.
+    /// Rows of time [s] and displacement x, y, z [m]. Two rows: a constant velocity; more: a smooth curve through them
+    /// with a continuous velocity. At rest before the first and after the last.
     pub motion: Vec<[f64; 4]>,
 }
 
@@ -310,19 +353,6 @@ pub enum Freedom {
     RotationY,
     /// Rotation about z.
     RotationZ,
-}
-
-/// Shape of a body.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyShape {
-    /// A box of `size`.
-    #[default]
-    Box,
-    /// A sphere of `radius` (three dimensions).
-    Sphere,
-    /// A cylinder of `radius` and `height` with flat ends, along `axis`; in two dimensions a disc.
-    Cylinder,
 }
 
 /// A rigid body.
@@ -364,7 +394,8 @@ pub struct Body {
     /// Degrees of freedom that are locked.
     #[serde(default)]
     pub locked: Vec<Freedom>,
-    /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table instead of forces.
+    /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table, as a moving wall does,
+    /// instead of forces.
     pub motion: Option<Vec<[f64; 4]>>,
     /// Remove the water that the body displaces at t = 0 (otherwise an overlap is an error).
     #[serde(default)]
@@ -406,13 +437,15 @@ pub struct Contact {
     /// Contact law.
     #[serde(default = "Contact::default_law")]
     pub law: Law,
-    /// Spring coefficient K [N/m], Eq. (10).
+    /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none.
+    #[serde(default)]
     pub spring: f64,
     /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.
     pub damping: Option<f64>,
     /// Damping over the critical one of the lightest body, C / (2 sqrt(K m)) [-], Eq. (15).
     pub damping_ratio: Option<f64>,
-    /// Normal restitution e of a free impact [-] (law "smooth").
+    /// Normal restitution e of a free impact [-] (law "smooth"): 1 elastic, 0 plastic. 0.5 if none of the three is
+    /// given with law "smooth"; law "paper" is then undamped.
     pub restitution: Option<f64>,
     /// Numerical friction eta of Eq. (12) [kg/s]: over particle pairs (law "paper") or over the true
     /// surfaces, where it adds to `friction` (law "smooth").
@@ -446,11 +479,11 @@ impl Contact {
 pub struct Gauges {
     /// Interval between rows [s]; every step if absent.
     pub every: Option<f64>,
-    /// Pressure on a wall: mean over the wall particles within half an effective radius of the point.
+    /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
     pub pressure: Vec<PressureGauge>,
     /// Height of the water surface along a vertical line.
     pub level: Vec<LevelGauge>,
-    /// Force and torque of the fluid on a body or moving wall.
+    /// Force and torque of the fluid on a body or wall.
     pub force: Vec<ForceGauge>,
 }
 
@@ -480,7 +513,8 @@ pub struct LevelGauge {
 pub struct ForceGauge {
     /// Name, used in the header.
     pub name: String,
-    /// Name of the body or moving wall.
+    /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
+    /// the centre of mass, or the middle of a fixed wall.
     pub on: String,
 }
 

@@ -5,19 +5,19 @@
 //! bodies a round trip to a device at every sub-step would cost more than the work; [`crate::plan`] judges.
 
 mod advice;
+mod archive;
 mod broad;
 mod candidates;
-mod collision;
 pub mod device;
-mod friction;
-mod geometry;
+mod law;
 mod paper;
+mod pressure;
 mod probe;
 mod report;
-mod round;
 mod smooth;
 mod state;
 mod stiffness;
+mod substeps;
 
 pub use advice::ContactAdvice;
 pub use probe::{Probe, ProbePatch};
@@ -28,34 +28,20 @@ use crate::body::{Body, FreeBody, Pose, Wrench};
 use crate::case;
 use crate::compute::Compute;
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::scene::{CONTACT_DISTANCE, Scene};
 use candidates::Candidates;
-use device::{Link, OnDevice, Traffic};
+use device::{Link, Traffic};
 use glam::DVec3;
-use stiffness::Damping;
-
-/// Restitution b of the collision model of the law `pressure`, Eq. (18) [-].
-const COLLISION_RESTITUTION: f64 = 0.2;
-/// Distance of the collision model over the spacing, a [-].
-const COLLISION_DISTANCE: f64 = 0.8;
+use law::{Fault, Law, Now};
+use substeps::{Cut, Limits};
 
 /// Gap between two facing surfaces at which a law's contact begins [m]: d_c - l0 for the paper's,
 /// 0 for the smooth one. A body stands free of forces, and so starts without a jump, at this gap.
 pub fn standing_gap(law: case::Law, spacing: f64) -> f64 {
     match law {
-        case::Law::Paper => (1.5_f64.sqrt() - 1.0) * spacing,
+        case::Law::Paper => (CONTACT_DISTANCE - 1.0) * spacing,
         case::Law::Smooth | case::Law::Pressure => 0.0,
     }
-}
-
-/// The contact law with its working memory.
-enum Model {
-    /// No solid moves freely, or nothing to touch.
-    None,
-    Smooth(candidates::Smooth),
-    Paper(candidates::Paper, paper::Law),
-    /// Baseline: impulses, no forces.
-    Collision(candidates::Paper),
 }
 
 /// The moving solids of a scene and the contact between them and with the walls.
@@ -68,30 +54,13 @@ pub struct Solids {
     gravity: DVec3,
     spacing: f64,
     candidates: Candidates,
-    model: Model,
-    on_device: OnDevice,
+    /// `None` if no solid moves freely.
+    law: Option<Box<dyn Law>>,
     traffic: Traffic,
     limits: Limits,
     load: Vec<Wrench>,
-    /// Time step, its dt sqrt(K / m_e) and its sub-steps, as last planned.
-    planned: Option<(f64, f64, u32)>,
-}
-
-/// What the case asks of contact, and the stiffness of each body.
-#[derive(Clone)]
-pub(crate) struct Limits {
-    spring: f64,
-    damping: Damping,
-    viscous_friction: f64,
-    friction: f64,
-    forced: Option<u32>,
-    lambda: Vec<stiffness::Lambda>,
-    /// Mass of the lightest free body [kg].
-    lightest: f64,
-    /// Fastest speed that the case's heights and starting velocities allow [m/s].
-    fastest: f64,
-    /// Largest time step so far [s]: softened contacts are never stiffened again, which would add energy.
-    longest_step: f64,
+    /// Time step [s] and how it is cut, as last planned.
+    planned: Option<(f64, Cut)>,
 }
 
 impl Solids {
@@ -101,67 +70,30 @@ impl Solids {
     /// [`Error::Case`] if a free body has no contact law, or if the law's numbers contradict each other.
     pub fn new(scene: &Scene, contact: Option<&case::Contact>) -> Result<Self> {
         let bodies: Vec<Body> = scene.solids.iter().map(|s| Body::new(s, scene.dimensions)).collect();
-        let free = || bodies.iter().filter(|b| b.is_free());
-        if let (None, Some(k)) = (contact, bodies.iter().position(Body::is_free)) {
+        let free = bodies.iter().position(Body::is_free);
+        if let (None, Some(k)) = (contact, free) {
             let name = &scene.solids[k].name;
             return Err(Error::Case(format!(
                 "body \"{name}\" moves freely, so the case needs [contact] with law and spring"
             )));
         }
-        let lightest = free().map(|b| b.mass).fold(f64::INFINITY, f64::min);
-        let fastest = advice::fastest_speed(scene);
-        let mut limits = Limits {
-            spring: contact.map_or(0.0, |c| c.spring),
-            damping: contact.map_or(Ok(Damping::Coefficient(0.0)), |c| Damping::new(c, lightest))?,
-            viscous_friction: contact.map_or(0.0, |c| c.viscous_friction),
-            friction: contact.map_or(0.0, |c| c.friction),
-            forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
-            lambda: vec![stiffness::Lambda::default(); bodies.len()],
-            lightest,
-            fastest,
-            longest_step: 0.0,
-        };
-        let model = match contact {
-            Some(c) if free().next().is_some() => match c.law {
-                case::Law::Smooth => {
-                    let model = candidates::Smooth::new(scene);
-                    limits.lambda =
-                        bodies.iter().zip(&model.surfaces).map(|(b, s)| stiffness::smooth(b, s)).collect();
-                    Model::Smooth(model)
-                }
-                case::Law::Paper => {
-                    let model = candidates::Paper::new(scene);
-                    let layers = bodies.iter().zip(&model.layers);
-                    limits.lambda = layers.map(|(b, l)| stiffness::paper(b, &l.offsets, c.torque)).collect();
-                    let Damping::Coefficient(damping) = limits.damping else {
-                        unreachable!("Damping::new gives a Ratio to the smooth law alone")
-                    };
-                    let law = paper::Law {
-                        spring: c.spring,
-                        damping,
-                        viscous_friction: c.viscous_friction,
-                        distance: 1.5_f64.sqrt() * scene.spacing,
-                        torque: c.torque,
-                    };
-                    Model::Paper(model, law)
-                }
-                case::Law::Pressure => Model::Collision(candidates::Paper::new(scene)),
-            },
-            _ => Model::None,
+        let mut limits = Limits::new(contact, scene, &bodies)?;
+        let law = match (contact, free) {
+            (Some(contact), Some(_)) => Some(law::of_case(contact, scene, &bodies, &mut limits)?),
+            _ => None,
         };
         let poses: Vec<Pose> = bodies.iter().map(|b| b.pose).collect();
         Ok(Self {
             names: scene.solids.iter().map(|s| s.name.clone()).collect(),
             predicted: poses.clone(),
+            candidates: Candidates::new(&poses),
             poses,
             contact: vec![Wrench::default(); bodies.len()],
             load: vec![Wrench::default(); bodies.len()],
             gravity: scene.gravity,
             spacing: scene.spacing,
-            candidates: Candidates::new(bodies.len()),
             bodies,
-            model,
-            on_device: OnDevice::None,
+            law,
             traffic: Traffic::default(),
             limits,
             planned: None,
@@ -253,7 +185,9 @@ impl Solids {
         dt: f64,
         fluid: &[Wrench],
     ) -> Result<ContactReport> {
-        let mut report = self.prepare(dt)?;
+        let cut = self.prepare(dt)?;
+        let substeps = self.hurry(cut, t, dt)?;
+        let mut report = ContactReport { substeps, omega_dt: cut.omega_dt, ..ContactReport::default() };
         let h = dt / f64::from(report.substeps);
         let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
         for body in &mut self.bodies {
@@ -262,9 +196,15 @@ impl Solids {
             }
         }
         for step in 0..report.substeps {
+            let start = t + h * f64::from(step);
+            for body in self.bodies.iter_mut().filter(|b| b.bends(t, dt)) {
+                if let Some(velocity) = body.prescribed_velocity(start, h) {
+                    body.pose.velocity = velocity;
+                }
+            }
             // a plain as_deref_mut would keep the borrow for the whole loop
             let compute = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
-            self.substep(compute, h, dt, fluid, &mut report)?;
+            self.substep(compute, (start, h, dt), fluid, &mut report)?;
             let now = t + dt * f64::from(step + 1) / f64::from(report.substeps);
             for (k, body) in self.bodies.iter_mut().enumerate() {
                 if body.is_free() {
@@ -301,162 +241,80 @@ impl Solids {
         self.traffic
     }
 
+    /// How the step `dt` [s] is cut.
+    fn prepare(&mut self, dt: f64) -> Result<Cut> {
+        if let Some((step, cut)) = self.planned
+            && step == dt
+        {
+            return Ok(cut);
+        }
+        let cut = self.limits.cut(self.law.as_deref(), &self.bodies, dt)?;
+        self.planned = Some((dt, cut));
+        Ok(cut)
+    }
+
+    /// Sub-steps of the step: more than planned while a fast solid is close to another.
+    fn hurry(&mut self, cut: Cut, t: f64, dt: f64) -> Result<u32> {
+        self.candidates.refresh(&self.bodies, self.spacing, dt);
+        let Self { law: Some(law), bodies, candidates, limits, .. } = self else { return Ok(cut.substeps) };
+        let hurry = law.hurry(Now { bodies, candidates, limits, substep: dt }, dt);
+        let hurry = hurry.map_err(|fault| self.fault(&fault, t))?;
+        Ok(cut.substeps.max(hurry))
+    }
+
+    /// An error if the last evaluation has left what the law can be trusted with.
+    fn check(&self, t: f64, h: f64) -> Result<()> {
+        let Self { law: Some(law), bodies, candidates, limits, .. } = self else { return Ok(()) };
+        match law.fault(Now { bodies, candidates, limits, substep: h }) {
+            Some(fault) => Err(self.fault(&fault, t)),
+            None => Ok(()),
+        }
+    }
+
+    fn fault(&self, fault: &Fault, time: f64) -> Error {
+        let other = match &fault.b {
+            Ok(b) => format!("\"{}\"", self.names[*b]),
+            Err(wall) => format!("wall \"{wall}\""),
+        };
+        let what = format!("body \"{}\" against {other}: it {}", self.names[fault.a], fault.what);
+        Error::Diverged { step: 0, time, stage: "contact", what }
+    }
+
     /// Forces of contact at the bodies' poses and velocities, on `compute` if there is one, for sub-steps of
     /// `h` [s] of steps of `dt` [s]. Lists are made anew if they no longer hold.
     fn evaluate(&mut self, compute: Option<&mut dyn Compute>, h: f64, dt: f64) -> Result<()> {
-        let (bodies, spacing) = (&self.bodies, self.spacing);
-        self.candidates.refresh(bodies, spacing, dt);
-        let candidates = &self.candidates;
-        // the device's kernel presses points of boxes into boxes
-        let compute = compute.filter(|_| !matches!(&self.model, Model::Smooth(model) if model.is_round()));
-        let mut link = compute.map(|compute| Link { compute, traffic: &mut self.traffic });
-        match (&mut self.model, &mut link) {
-            (Model::None, _) => {}
-            (Model::Smooth(model), None) => {
-                self.on_device = OnDevice::None;
-                if !model.is_current(candidates) {
-                    model.collect(candidates, bodies);
-                    model.set_constants(&self.limits, bodies, spacing, h);
-                }
-                model.evaluate(bodies);
-            }
-            (Model::Smooth(model), Some(link)) => {
-                let pairs = match &mut self.on_device {
-                    OnDevice::Smooth(pairs) => pairs,
-                    other => {
-                        *other = OnDevice::Smooth(device::smooth::Smooth::new(&model.surfaces, link)?.into());
-                        let OnDevice::Smooth(pairs) = other else { unreachable!("just set") };
-                        pairs
-                    }
-                };
-                if !pairs.is_current(candidates) {
-                    pairs.search(model, candidates, bodies, link)?;
-                }
-                pairs.set_constants(model, &self.limits, bodies, spacing, h);
-                pairs.evaluate(model, bodies, link)?;
-            }
-            (Model::Paper(model, law), None) => {
-                self.on_device = OnDevice::None;
-                if !model.is_current(candidates) {
-                    model.collect(candidates, bodies, law.distance);
-                }
-                model.evaluate(law, bodies);
-            }
-            (Model::Paper(model, law), Some(link)) => {
-                let pairs = match &mut self.on_device {
-                    OnDevice::Paper(pairs) => pairs,
-                    other => {
-                        *other = OnDevice::Paper(
-                            device::paper::Paper::new(&model.layers, bodies, law, link)?.into(),
-                        );
-                        let OnDevice::Paper(pairs) = other else { unreachable!("just set") };
-                        pairs
-                    }
-                };
-                if !pairs.is_current(candidates) {
-                    pairs.search(model, candidates, bodies, law, link)?;
-                }
-                pairs.evaluate(law, bodies, link)?;
-            }
-            (Model::Collision(model), _) => {
-                if !model.is_current(candidates) {
-                    model.collect(candidates, bodies, spacing);
-                }
-            }
-        }
-        Ok(())
+        self.candidates.refresh(&self.bodies, self.spacing, dt);
+        let Some(law) = &mut self.law else { return Ok(()) };
+        let Self { bodies, candidates, limits, traffic, .. } = self;
+        let link = compute.map(|compute| Link { compute, traffic });
+        law.evaluate(Now { bodies, candidates, limits, substep: h }, link)
     }
 
-    /// The smooth law's pairs of the last evaluation.
-    fn smooth_pairs(&self) -> &[smooth::Pair] {
-        match (&self.on_device, &self.model) {
-            (OnDevice::Smooth(pairs), _) => &pairs.pairs,
-            (_, Model::Smooth(model)) => &model.pairs,
-            _ => &[],
-        }
-    }
-
-    /// The paper's law's pairs of the last evaluation.
-    fn paper_pairs(&self) -> &[paper::Pair] {
-        match (&self.on_device, &self.model) {
-            (OnDevice::Paper(pairs), _) => &pairs.pairs,
-            (_, Model::Paper(model, _)) => &model.pairs,
-            _ => &[],
-        }
-    }
-
-    /// Adds the wrenches of the last evaluation to `load`, one per solid.
-    fn add_wrenches(&self, load: &mut [Wrench]) {
-        for pair in self.smooth_pairs() {
-            load[pair.a] += pair.wrench[0];
-            if let smooth::Other::Solid(b) = pair.b {
-                load[b] += pair.wrench[1];
-            }
-        }
-        for pair in self.paper_pairs() {
-            load[pair.a] += pair.wrench[0];
-            if let Some(b) = pair.b {
-                load[b] += pair.wrench[1];
-            }
-        }
-    }
-
-    /// Forces, impulses and friction of one sub-step; positions stay.
+    /// Forces, impulses and friction of the sub-step of `h` [s] from `t` in a step of `dt`; positions stay.
     fn substep(
         &mut self,
         compute: Option<&mut dyn Compute>,
-        h: f64,
-        dt: f64,
+        (t, h, dt): (f64, f64, f64),
         fluid: &[Wrench],
         report: &mut ContactReport,
     ) -> Result<()> {
         self.evaluate(compute, h, dt)?;
-        let mut load = std::mem::take(&mut self.load);
-        load.copy_from_slice(fluid);
-        self.add_wrenches(&mut load);
-        self.load = load;
-        (report.pairs, report.solid_pairs, report.potential_energy) = (0, 0, 0.0);
-        let mut count = |pairs: usize, energy: f64, depth: f64| {
-            report.pairs += pairs;
-            report.solid_pairs += usize::from(pairs > 0);
-            report.potential_energy += energy;
-            report.penetration_max_over_l0 = report.penetration_max_over_l0.max(depth);
-        };
-        self.smooth_pairs().iter().for_each(|p| count(p.contact_count(), p.energy, p.depth));
-        if let Model::Paper(_, law) = &self.model {
-            self.paper_pairs().iter().for_each(|p| count(p.count, p.energy, law.distance - p.closest));
+        self.check(t, h)?;
+        self.load.copy_from_slice(fluid);
+        if let Some(law) = &self.law {
+            law.add_loads(&mut self.load);
         }
-        let bodies = &mut self.bodies;
-        for (body, load) in bodies.iter_mut().zip(&self.load) {
+        for (body, load) in self.bodies.iter_mut().zip(&self.load) {
             if body.is_free() {
                 body.kick(h * (body.mass * self.gravity + load.force), h * load.torque);
             }
         }
-        match &mut self.model {
-            Model::Smooth(model) => {
-                let pairs = match &self.on_device {
-                    OnDevice::Smooth(pairs) => &pairs.pairs,
-                    _ => &model.pairs,
-                };
-                let (mu, eta) = (self.limits.friction, self.limits.viscous_friction);
-                model.friction.apply(pairs, bodies, mu, eta, h);
-            }
-            Model::Collision(model) => {
-                for pair in &model.pairs {
-                    let distance = COLLISION_DISTANCE * self.spacing;
-                    let hits = collision::collide(
-                        pair,
-                        bodies,
-                        &model.layers,
-                        &model.walls,
-                        distance,
-                        COLLISION_RESTITUTION,
-                    );
-                    report.pairs += hits;
-                    report.solid_pairs += usize::from(hits > 0);
-                }
-            }
-            Model::None | Model::Paper(..) => {}
+        if let Some(law) = &mut self.law {
+            let (pressed, acted) = (law.summary(), law.act(&mut self.bodies, &self.limits, h));
+            report.pairs = pressed.points + acted.points;
+            report.solid_pairs = pressed.solids + acted.solids;
+            report.potential_energy = pressed.energy;
+            report.penetration_max_over_l0 = report.penetration_max_over_l0.max(pressed.depth);
         }
         Ok(())
     }

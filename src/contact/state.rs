@@ -1,6 +1,7 @@
 //! Energy, momentum and checkpoints of the solids.
 
-use super::{Energy, Model, SolidState, Solids};
+use super::law::Now;
+use super::{Energy, SolidState, Solids};
 use crate::error::{Error, Result};
 use glam::DVec3;
 
@@ -13,24 +14,11 @@ impl Solids {
             energy.gravity -= body.mass * self.gravity.dot(body.pose.position);
         }
         self.candidates.refresh(&self.bodies, self.spacing, 0.0);
-        match &mut self.model {
-            Model::Smooth(model) => {
-                if !model.is_current(&self.candidates) {
-                    model.collect(&self.candidates, &self.bodies);
-                    let h = self.limits.longest_step;
-                    model.set_constants(&self.limits, &self.bodies, self.spacing, h.max(f64::MIN_POSITIVE));
-                }
-                model.evaluate(&self.bodies);
-                energy.contact = model.pairs.iter().map(|p| p.energy).sum();
-            }
-            Model::Paper(model, law) => {
-                if !model.is_current(&self.candidates) {
-                    model.collect(&self.candidates, &self.bodies, law.distance);
-                }
-                model.evaluate(law, &self.bodies);
-                energy.contact = model.pairs.iter().map(|p| p.energy).sum();
-            }
-            Model::None | Model::Collision(_) => {}
+        if let Some(law) = &mut self.law {
+            let Self { bodies, candidates, limits, .. } = self;
+            // before the first step there is no sub-step yet
+            let substep = self.planned.map_or(0.0, |(dt, cut)| dt / f64::from(cut.substeps));
+            energy.contact = law.energy(Now { bodies, candidates, limits, substep });
         }
         energy
     }
@@ -64,6 +52,9 @@ impl Solids {
             self.contact[k] = state.contact;
         }
         self.candidates.forget();
+        if let Some(law) = &mut self.law {
+            law.forget();
+        }
         Ok(())
     }
 }

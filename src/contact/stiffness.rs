@@ -5,90 +5,17 @@
 //! can touch (a corner, an edge, a face that bounces or rocks): omega^2 = lambda K, so 1 / lambda is the
 //! effective mass m_e.
 
-use crate::body::Body;
 use crate::case;
 use crate::error::{Error, Result};
-use crate::shape::Surface;
-use glam::DVec3;
 
-/// Exponent p of the effective depth of the smooth law.
-pub(crate) const EXPONENT: f64 = 8.0;
-/// Largest dt sqrt(K / m_e) of a sub-step; 2 is the limit of stability, energy errors grow as its square.
-pub(crate) const OMEGA_STEP: f64 = 0.5;
-/// The same where energy must come back: the law `smooth` undamped, or with a restitution.
-pub(crate) const ELASTIC_OMEGA_STEP: f64 = 0.2;
-/// Largest C dt / m_e of a sub-step.
-pub(crate) const DAMPING_STEP: f64 = 0.8;
-/// Most sub-steps of the smooth law. What would need more is softened: at 64 sub-steps a body still
-/// stops within v dt / 32, so a larger K changes nothing that a fluid step could resolve.
-pub(crate) const MOST_SUBSTEPS: u32 = 64;
-/// Sub-steps at which the paper's law, which is never softened, is refused.
-pub(crate) const ABSURD_SUBSTEPS: u32 = 10_000;
+/// Restitution of the smooth law if the case says nothing of damping: undamped bodies never come to rest.
+const DEFAULT_RESTITUTION: f64 = 0.5;
 
 /// Largest eigenvalues of a body's contact, unit spring and unit dashpot [1/kg].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Lambda {
     pub spring: f64,
     pub damping: f64,
-}
-
-/// Eigenvalues of the smooth law. Zero for prescribed solids.
-pub(crate) fn smooth(body: &Body, surface: &Surface) -> Lambda {
-    if !body.is_free() {
-        return Lambda::default();
-    }
-    let share = |sum: f64| sum.powf(2.0 / EXPONENT);
-    let turn = 1.0 / body.principal.min_element();
-    let mass = 1.0 / body.mass;
-    let turns = body.locked_rotation != [true; 3];
-    let mut lambda = Lambda { spring: mass, damping: mass };
-    let mut take = |spring: f64, damping: f64| {
-        lambda.spring = lambda.spring.max(spring);
-        lambda.damping = lambda.damping.max(damping);
-    };
-    if !turns {
-        return lambda;
-    }
-    let samples = surface.samples();
-    for (p, w, _) in &samples {
-        let give = mass + p.length_squared() * turn;
-        take(share(*w) * give, share(*w).sqrt() * give);
-    }
-    for face in 0..6_u8 {
-        let on = |other: u8| {
-            let both = 1 << face | 1 << other;
-            samples.iter().filter(move |s| s.2 & both == both).map(|s| (s.0, s.1))
-        };
-        for other in 0..6_u8 {
-            // `face` alone when both are the same, else the edge between them
-            let sum: f64 = on(other).map(|(_, w)| w).sum();
-            if sum == 0.0 {
-                continue;
-            }
-            let center = on(other).map(|(p, w)| p * w).sum::<DVec3>() / sum;
-            let arm = if other == face { 0.0 } else { center.length_squared() };
-            let spread =
-                |axis: usize| on(other).map(|(p, w)| w * (p[axis] - center[axis]).powi(2)).sum::<f64>();
-            let (u, v) = ((usize::from(face / 2) + 1) % 3, (usize::from(face / 2) + 2) % 3);
-            let rocking = (spread(u) / body.principal[v]).max(spread(v) / body.principal[u]) / sum;
-            let bounce = mass + arm * turn;
-            take(share(sum) * bounce, share(sum).sqrt() * bounce);
-            take(share(sum) * (EXPONENT - 1.0) * rocking, share(sum).sqrt() * rocking);
-        }
-    }
-    lambda
-}
-
-/// Eigenvalue of the paper's law: the worst particle of the wall layer pushed along an axis.
-pub(crate) fn paper(body: &Body, offsets: &[DVec3], torque: bool) -> Lambda {
-    if !body.is_free() {
-        return Lambda::default();
-    }
-    let turns = torque && body.locked_rotation != [true; 3];
-    let worst = offsets.iter().flat_map(|r| DVec3::AXES.map(|n| r.cross(n)));
-    let turning = worst.map(|t| t.dot(t / body.principal)).fold(0.0, f64::max);
-    let lambda = 1.0 / body.mass + if turns { turning } else { 0.0 };
-    Lambda { spring: lambda, damping: lambda }
 }
 
 /// How the case gives the damping.
@@ -104,6 +31,9 @@ impl Damping {
     /// Reads the case; `lightest` is the mass of the lightest free body [kg].
     pub fn new(contact: &case::Contact, lightest: f64) -> Result<Self> {
         match (contact.damping, contact.damping_ratio, contact.restitution) {
+            (None, None, None) if contact.law == case::Law::Smooth => {
+                Ok(Self::Ratio(damping_ratio(DEFAULT_RESTITUTION)))
+            }
             (None, None, None) => Ok(Self::Coefficient(0.0)),
             (Some(c), None, None) => Ok(Self::Coefficient(c)),
             (None, Some(ratio), None) => {

@@ -8,8 +8,6 @@ pub mod collision;
 pub mod conjugate_gradient;
 pub mod correct;
 pub mod coupling;
-pub mod ledger;
-pub mod moment;
 pub mod monitor;
 pub mod move_solids;
 pub mod multigrid;
@@ -21,18 +19,4 @@ pub mod pressure_gradient;
 pub mod pressure_source;
 pub mod viscosity;
 
-use crate::params::Params;
-use glam::DVec3;
-
-/// What sums over neighbours read.
-#[derive(Clone, Copy)]
-pub struct Particles<'a> {
-    /// Constants.
-    pub params: &'a Params,
-    /// Positions [m].
-    pub position: &'a [DVec3],
-    /// Velocities [m/s].
-    pub velocity: &'a [DVec3],
-    /// Fluid slots: those below are fluid, the others solid.
-    pub fluid: usize,
-}
+pub use crate::neighbourhood::Particles;

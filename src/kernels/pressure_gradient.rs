@@ -5,8 +5,8 @@
 //! that carries it, in this stage, and not in `predict`.
 
 use super::Particles;
-use super::moment::{inverse, moment, pair_vector};
 use crate::fields::State;
+use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::Params;
 use crate::scheme::{Gradient, Source};
@@ -15,11 +15,7 @@ use glam::DVec3;
 /// Whether the gradient of a particle is multiplied by the inverse of its moment matrix.
 #[inline(always)]
 pub fn is_corrected(state: State, params: &Params) -> bool {
-    match params.gradient {
-        Gradient::Minimum => false,
-        Gradient::MinimumCorrected => state == State::Inner,
-        Gradient::CorrectedSurface => true,
-    }
+    params.gradient == Gradient::MinimumCorrected && state == State::Inner
 }
 
 /// Acceleration by a gradient of the pressure [m/s2], and by gravity where that acts in this stage.

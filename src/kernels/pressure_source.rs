@@ -10,8 +10,8 @@
 //! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles.
 
 use super::Particles;
-use super::moment::{inverse, moment, pair_vector};
-use crate::lattice::wendland;
+use crate::lattice::smooth_weight;
+use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::{Params, Step};
 use crate::scheme::Source;
@@ -62,8 +62,8 @@ pub fn number_density_source(n: f64, params: &Params, step: &Step) -> f64 {
 /// stretched and on disordered arrangements, where n of Eq. (4) rises.
 fn deviation(i: usize, all: Row, on: Particles) -> f64 {
     let (x, re) = (on.position[i], on.params.effective_radius);
-    let near: f64 = all.iter().map(|(j, _)| wendland(on.position[j].distance(x) / re)).sum();
-    (1.0 + near) / on.params.wendland - 1.0
+    let near: f64 = all.iter().map(|(j, _)| smooth_weight(on.position[j].distance(x) / re)).sum();
+    (1.0 + near) / on.params.smooth_density - 1.0
 }
 
 /// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Solids count with their

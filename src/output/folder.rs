@@ -4,6 +4,7 @@
 //! marked folder does `--force` remove anything, and only files with the names that a run gives.
 
 use super::write_whole;
+use crate::checkpoint::file::is_checkpoint;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -21,8 +22,22 @@ const RESERVED: usize = 32 << 10;
 const FILES: [&str; 7] =
     ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", RESERVE];
 
+/// The folder of the checkpoints of a run in `root`.
+pub fn checkpoints(root: &Path) -> PathBuf {
+    root.join("checkpoint")
+}
+
+/// Name of the case whose run `root` holds; nothing if it is no folder of seixo's.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn case_name(root: &Path) -> Result<Option<String>> {
+    let folder = Folder { root: root.to_path_buf(), name: String::new(), lock: Arc::new(None) };
+    Ok(folder.marker()?.map(|m| m.name))
+}
+
 /// What the marker says.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 struct Marker {
     /// Version of the program.
     seixo: String,
@@ -68,7 +83,8 @@ impl Folder {
         let shown = root.display();
         if filled && mode == Mode::New {
             return Err(Error::Case(format!(
-                "{shown} is not empty; choose another folder with --out, or replace the results in it with --force"
+                "{shown} is not empty; choose another folder with --out, go on with the run in it with --resume, or \
+                 replace the results in it with --force"
             )));
         }
         let earlier = folder.marker()?;
@@ -106,7 +122,8 @@ impl Folder {
     fn marker(&self) -> Result<Option<Marker>> {
         let path = self.file(MARKER);
         match std::fs::read(&path) {
-            Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
+            // A run that was killed while it wrote the marker has marked the folder all the same.
+            Ok(bytes) => Ok(Some(serde_json::from_slice(&bytes).unwrap_or_default())),
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
             Err(e) => Err(Error::io(&path)(e)),
         }
@@ -131,10 +148,11 @@ impl Folder {
         }
         let marker = Marker { seixo: env!("CARGO_PKG_VERSION").into(), name: self.name.clone() };
         let text = serde_json::to_string(&marker).unwrap_or_default() + "\n";
-        // Written in place: a rename would leave the lock on a file that is gone.
-        file.set_len(0)
-            .and_then(|()| std::io::Write::write_all(&mut &file, text.as_bytes()))
-            .map_err(Error::io(&path))?;
+        // In place, for a rename would leave the lock on a file that is gone; and not at all if it says that already.
+        if std::fs::read(&path).map_err(Error::io(&path))? != text.as_bytes() {
+            let put = std::io::Write::write_all(&mut &file, text.as_bytes());
+            put.and_then(|()| file.set_len(text.len() as u64)).map_err(Error::io(&path))?;
+        }
         Ok(Some(file))
     }
 
@@ -170,7 +188,8 @@ impl Folder {
         self.remove(&self.pictures(), |file| {
             numbered(file, "frame_", ".png") || file.starts_with(".writing-")
         })?;
-        for folder in [self.vtu(), self.pictures()] {
+        self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(".writing-"))?;
+        for folder in [self.vtu(), self.pictures(), self.checkpoints()] {
             // Somebody else's files keep their folder.
             let _ = std::fs::remove_dir(folder);
         }
@@ -221,6 +240,11 @@ impl Folder {
     /// The folder of the pictures.
     pub fn pictures(&self) -> PathBuf {
         self.root.join("pictures")
+    }
+
+    /// The folder of the checkpoints.
+    pub fn checkpoints(&self) -> PathBuf {
+        checkpoints(&self.root)
     }
 
     /// The list of frames.

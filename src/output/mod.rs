@@ -10,6 +10,8 @@
 //! | `monitors.csv`, `bodies.csv`, `gauges.csv` | row by row | tables over time, units in the header |
 //! | `pictures/frame_0000.png`, `final.png` | if asked for | pictures of the particles |
 //! | `result.json` | at the end, also of a failed run | the summary |
+//! | `checkpoint/step_0000000000.seixo` | now and then | the state, see [`crate::checkpoint::file`] |
+//! | `.seixo`, `.reserve` | at the start | marker and lock; room for the last word |
 //!
 //! Whole files appear by rename and tables grow by whole rows, so a killed run leaves nothing that cannot
 //! be read.
@@ -23,23 +25,4 @@ pub mod result;
 pub mod table;
 pub mod vtu;
 
-use crate::error::{Error, Result};
-use std::io::Write;
-use std::path::Path;
-
-/// Write `bytes` to `path` so that the file holds either what it held before or all of them.
-///
-/// # Errors
-/// [`Error::Io`] with the path (folder missing, disk full ...).
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".writing-");
-    // A file of the run is no secret: the usual permissions instead of the private ones of temporary files.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-    let mut file = builder.tempfile_in(folder).map_err(Error::io(path))?;
-    file.write_all(bytes).map_err(Error::io(path))?;
-    file.persist(path).map_err(|e| Error::io(path)(e.error))?;
-    Ok(())
-}
+pub use crate::whole::write_whole;

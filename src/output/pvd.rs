@@ -1,6 +1,7 @@
 //! The PVD file: which VTU files make up which moment.
 
 use super::write_whole;
+use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -24,6 +25,27 @@ impl Pvd {
     /// A list without frames; nothing is written yet.
     pub fn new(path: PathBuf) -> Self {
         Self { path, file: None, entries: HEAD.len() as u64 }
+    }
+
+    /// Save how long the list is, or cut the file back to what it was. Returns nothing to read otherwise.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if the file is shorter than that, [`Error::Io`].
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self { path, file, entries } = self;
+        archive.count("pvd.bytes", entries)?;
+        if archive.is_saving() || *entries <= HEAD.len() as u64 {
+            return Ok(());
+        }
+        let io = |e| Error::io(&*path)(e);
+        let mut opened = File::options().read(true).write(true).open(&*path).map_err(io)?;
+        if opened.metadata().map_err(io)?.len() < *entries {
+            return Err(Error::Case(format!("{}: it is shorter than when the run stopped", path.display())));
+        }
+        opened.seek(SeekFrom::Start(*entries)).and_then(|_| opened.write_all(FOOT.as_bytes())).map_err(io)?;
+        opened.set_len(*entries + FOOT.len() as u64).map_err(io)?;
+        *file = Some(opened);
+        Ok(())
     }
 
     /// Add the frame at `time` [s]: names of its parts and their files, relative to the PVD. A part that does

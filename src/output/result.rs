@@ -159,8 +159,10 @@ pub struct Summary {
     pub steps: u64,
     /// Time reached [s].
     pub time_s: f64,
-    /// Wall-clock time [s].
+    /// Wall-clock time [s], of all its processes.
     pub wall_s: f64,
+    /// Processes that it took: 1, and one more each time that it was resumed.
+    pub parts: u64,
     /// Frames written.
     pub frames: u64,
     /// Most memory that the process has held so far [bytes], where the system tells it (Linux).

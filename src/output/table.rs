@@ -1,8 +1,9 @@
 //! CSV tables: one header with units, then rows that reach the file whole.
 
+use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use std::fs::File;
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A table on disk.
@@ -68,6 +69,33 @@ impl Table {
         table.push(header)?;
         table.flush()?;
         Ok(table)
+    }
+
+    /// The table of a run that goes on; [`Table::exchange`] says where.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if there is none.
+    pub fn reopen(path: &Path, header: &[String]) -> Result<Self> {
+        let file = File::options().read(true).write(true).open(path).map_err(Error::io(path))?;
+        Ok(Self { path: path.to_path_buf(), file, whole: 0, columns: header.len(), pending: Vec::new() })
+    }
+
+    /// Save how long the table is, once it has reached the disk, or cut it back to what it was.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if it is shorter than that, [`Error::Io`].
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self { path, file, whole, columns: _, pending: _ } = self;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        archive.count(&format!("{name}.bytes"), whole)?;
+        let io = |e| Error::io(&*path)(e);
+        if archive.is_saving() {
+            return file.sync_data().map_err(io);
+        }
+        if file.metadata().map_err(io)?.len() < *whole {
+            return Err(Error::Case(format!("{}: it is shorter than when the run stopped", path.display())));
+        }
+        file.set_len(*whole).and_then(|()| file.seek(SeekFrom::Start(*whole)).map(|_| ())).map_err(io)
     }
 
     /// Add a row; it reaches the file with the next [`Table::flush`].

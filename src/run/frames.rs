@@ -1,6 +1,7 @@
 //! Frames: the particles of one moment, in VTU files and pictures.
 
 use crate::case::{Encoding, Output, OutputKind};
+use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::output::folder::Folder;
@@ -24,6 +25,8 @@ pub struct Frames {
     every: f64,
     picture: Option<Picture>,
     written: u64,
+    /// The last frame is that of the present step.
+    fresh: Option<u64>,
 }
 
 impl Frames {
@@ -52,7 +55,37 @@ impl Frames {
             every: output.every,
             picture,
             written: 0,
+            fresh: None,
         })
+    }
+
+    /// Save which frames there are, or go back to them.
+    ///
+    /// # Errors
+    /// [`Error::Case`], [`Error::Io`].
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            folder: _,
+            encoding: _,
+            fluid: _,
+            solids: _,
+            walls: _,
+            every: _,
+            picture: _,
+            fresh,
+            pvd,
+            written,
+        } = self;
+        let mut step = fresh.unwrap_or(u64::MAX);
+        archive.count("frames.step", &mut step)?;
+        *fresh = Some(step).filter(|&s| s != u64::MAX);
+        archive.count("frames", written)?;
+        pvd.exchange(archive)
+    }
+
+    /// Whether there is a frame of step `steps`.
+    pub fn is_fresh(&self, steps: u64) -> bool {
+        self.fresh == Some(steps)
     }
 
     /// Frames written so far.
@@ -90,6 +123,7 @@ impl Frames {
             write_whole(&self.folder.pictures().join(format!("frame_{number:04}.png")), &png)?;
         }
         self.written += 1;
+        self.fresh = Some(simulation.steps);
         Ok(())
     }
 

@@ -2,13 +2,18 @@
 //!
 //! Frames come at t = 0, at the first step that reaches each multiple of `output.every`, and at the end;
 //! the time step is never cut to hit them. A run that diverges or is interrupted keeps everything that it
-//! wrote, and says in `result.json` how it ended.
+//! wrote, and says in `result.json` how it ended. Its state is saved now and then, and when it is stopped:
+//! gone on with, it writes what it would have written undisturbed.
 
+mod due;
 pub mod frames;
+pub mod resume;
+mod saving;
 pub mod summary;
 pub mod tables;
 pub mod verdict;
 
+use crate::checkpoint::{Archive, Found};
 use crate::error::{Error, Result};
 use crate::gauges::Gauges;
 use crate::output::folder::{Folder, Mode};
@@ -16,25 +21,41 @@ use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
+pub use due::Due;
 use frames::Frames;
-use std::path::PathBuf;
+use saving::{Saving, earlier, fits};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use summary::Totals;
 use tables::Tables;
 use verdict::Scale;
 
+/// Where a run begins.
+#[derive(Debug, Default)]
+pub enum Start {
+    /// At t = 0, or at `run.from`, in a folder of its own.
+    #[default]
+    New,
+    /// The same, in the place of earlier results.
+    Replace,
+    /// Where the run in the folder was when it saved its state.
+    Resume(Box<Found>),
+}
+
 /// What the command line adds to a case.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Options {
     /// Name of the case, for file names and the summary.
     pub name: String,
     /// Folder of the results.
     pub out: PathBuf,
-    /// Replace earlier results in the folder.
-    pub force: bool,
-    /// Stop after this many steps.
+    /// Where to begin.
+    pub start: Start,
+    /// Stop after this many steps, counted from t = 0.
     pub steps: Option<u64>,
+    /// Stop at this moment, with the state saved.
+    pub deadline: Option<Instant>,
     /// Draw a picture of every frame.
     pub pictures: bool,
     /// Files that the run was made from; results never take their place.
@@ -65,120 +86,82 @@ pub struct Progress {
 pub struct Finished {
     /// What `result.json` holds.
     pub summary: Summary,
-    /// What ended the run, unless it was its end or a signal.
+    /// What ended the run, unless it was its end, a signal or the clock.
     pub error: Option<Error>,
     /// The signal that ended the run.
     pub signal: Option<i32>,
-}
-
-/// Moments at multiples of an interval; at every step without one.
-#[derive(Clone, Copy, Debug)]
-pub struct Due {
-    every: Option<f64>,
-    next: f64,
-}
-
-impl Due {
-    /// Every `every` seconds after t = 0; every step if `None`, never if 0 or less.
-    pub fn new(every: Option<f64>) -> Self {
-        Self { every, next: 1.0 }
-    }
-
-    /// Whether `time` [s] has reached the next moment; moves on to the one after.
-    pub fn reached(&mut self, time: f64) -> bool {
-        match self.every {
-            None => true,
-            Some(every) if every > 0.0 => {
-                // Sums of time steps miss a multiple by some rounding errors.
-                let now = (time / every * (1.0 + 1e-12) + 1e-9).floor();
-                let reached = now >= self.next;
-                if reached {
-                    self.next = now + 1.0;
-                }
-                reached
-            }
-            Some(_) => false,
-        }
-    }
+    /// It was stopped by the clock, or by a signal, and its state is saved.
+    pub resumable: bool,
 }
 
 /// Run `simulation` of `scene` to its end. `text` is the case as a TOML file; `stop` holds the number of a
 /// signal once the run should stop; `observe` is called after every step.
 ///
 /// # Errors
-/// Only for what keeps a run from starting: a folder that is not empty or in use, a gauge that hangs in the air.
-/// What happens later is in [`Finished`].
+/// Only for what keeps a run from starting: a folder that is not empty or in use, a gauge that hangs in the air, a
+/// state that is none of this scene. What happens later is in [`Finished`].
 pub fn run(
     simulation: &mut Simulation,
     scene: &Scene,
     text: &str,
-    options: &Options,
+    options: Options,
     stop: &AtomicUsize,
     observe: &mut dyn FnMut(&Progress),
 ) -> Result<Finished> {
     let gauges = Gauges::new(&simulation.case, scene)?;
-    let mode = if options.force { Mode::Replace } else { Mode::New };
+    let mut archive = None;
+    let mode = match &options.start {
+        Start::New => Mode::New,
+        Start::Replace => Mode::Replace,
+        Start::Resume(found) => {
+            fits(simulation, found)?;
+            archive = Some(found.archive.to_restore());
+            Mode::Continue
+        }
+    };
+    let resumes = archive.is_some();
+    let from = if resumes { None } else { earlier(simulation)? };
+    if let Some(archive) = archive.as_mut().or(from.map(|f| f.archive).as_mut()) {
+        simulation.exchange(archive)?;
+    }
     let folder = Folder::open(&options.out, &options.name, mode, &options.inputs)?;
-    let scale = Scale::new(simulation, scene);
-    write_whole(&folder.file("case.toml"), text.as_bytes())?;
     let mut run = Run {
         start: Instant::now(),
         frames: Frames::new(&folder, &simulation.case.output, scene, options.pictures)?,
-        tables: Tables::create(&folder, simulation, scene, gauges)?,
+        tables: Tables::create(&folder, simulation, scene, gauges, resumes)?,
         totals: Totals::default(),
         steps_max: options.steps.unwrap_or(u64::MAX),
+        deadline: options.deadline,
+        due: Due::new(Some(simulation.case.output.every)),
+        saving: Saving::new(simulation, &options.name, text, folder.checkpoints()),
+        walls: 0.0,
+        parts: 0,
+        // A run always does a step, however short it is.
+        dt: 0.0,
     };
-    let ended = run.advance(simulation, scene, stop, observe);
-    let (status, reason, error, signal) = match ended {
-        Ok(End::Time) => (Status::Done, "end time reached".to_string(), None, None),
-        Ok(End::Steps) => (Status::Done, "number of steps reached".to_string(), None, None),
-        Ok(End::Signal(n)) => (Status::Interrupted, format!("signal {n}"), None, Some(n)),
-        Err(error) => {
-            let diverged = matches!(error, Error::Diverged { .. });
-            let mut reason = error.to_string();
-            if diverged {
-                // Best effort: a device that is lost cannot be read any more, and the first error counts.
-                match run.frames.write_last(simulation, scene) {
-                    Ok(()) => reason.push_str("; the state is in vtu/last_*.vtu"),
-                    Err(e) => reason.push_str(&format!("; its state could not be written: {e}")),
-                }
-            }
-            let status = if diverged { Status::Diverged } else { Status::Failed };
-            (status, reason, Some(error), None)
-        }
-    };
-    let mut summary = run.totals.summary(simulation, scene);
-    summary.case = options.name.clone();
-    summary.status = status;
-    summary.verdict = match error {
-        Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()] },
-        None => verdict::judge(&summary, scale),
-    };
-    summary.exit_reason = reason;
-    let mut error = error;
-    if summary.status == Status::Done && summary.verdict.grade == Grade::Failed {
-        summary.status = Status::Failed;
-        summary.exit_reason.push_str(", but what was computed means nothing");
-        error = Some(Error::Senseless(format!(
-            "{}: {}",
-            summary.exit_reason,
-            summary.verdict.reasons.join("; ")
-        )));
+    match &mut archive {
+        Some(archive) => run.exchange(archive)?,
+        None => run.skip(simulation.time),
     }
-    summary.wall_s = run.start.elapsed().as_secs_f64();
-    summary.frames = run.frames.written();
-    summary.memory_peak_bytes = memory_peak();
-    summary.stages.insert("output", run.totals.output.as_secs_f64());
-    // Where the disk is full this makes room for the last word.
-    folder.release();
-    let written = summary.write(&folder.file("result.json"));
-    Ok(Finished { summary, error: error.or(written.err()), signal })
+    // What the run said of its end holds no more.
+    remove(&folder.file("result.json"))?;
+    write_whole(&folder.file("case.toml"), text.as_bytes())?;
+    run.parts += 1;
+    run.finish(simulation, scene, &options, &folder, stop, observe, resumes)
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path)(e)),
+        _ => Ok(()),
+    }
 }
 
 enum End {
     Time,
     Steps,
     Signal(i32),
+    Deadline,
 }
 
 struct Run {
@@ -187,28 +170,168 @@ struct Run {
     tables: Tables,
     totals: Totals,
     steps_max: u64,
+    deadline: Option<Instant>,
+    due: Due,
+    saving: Saving,
+    /// Wall-clock time of the processes before this one [s].
+    walls: f64,
+    /// Processes that the run took.
+    parts: u64,
+    /// The last time step [s]; 0 before the first.
+    dt: f64,
 }
 
 impl Run {
+    /// Save how far files and sums are, or go back to that.
+    fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self { start, frames, tables, totals, steps_max: _, deadline: _, due, saving, walls, parts, dt } =
+            self;
+        frames.exchange(archive)?;
+        tables.exchange(archive)?;
+        totals.exchange(archive)?;
+        due.exchange("frames", archive)?;
+        saving.every.exchange("checkpoint", archive)?;
+        let mut wall = *walls + start.elapsed().as_secs_f64();
+        archive.number("run.wall", &mut wall)?;
+        if !archive.is_saving() {
+            *walls = wall;
+        }
+        archive.number("run.step", dt)?;
+        archive.count("run.parts", parts)
+    }
+
+    /// A run that begins late: moments before `time` [s] are over.
+    fn skip(&mut self, time: f64) {
+        if time > 0.0 {
+            self.due.reached(time);
+            self.saving.every.reached(time);
+            self.tables.skip(time);
+        }
+    }
+
+    fn state(&mut self, simulation: &mut Simulation) -> Result<Archive> {
+        let mut archive = Archive::new();
+        simulation.exchange(&mut archive)?;
+        self.exchange(&mut archive)?;
+        Ok(archive)
+    }
+
+    fn save(&mut self, simulation: &mut Simulation) -> Result<()> {
+        let archive = self.state(simulation)?;
+        self.saving.write(simulation.steps, simulation.time, &archive)
+    }
+
+    /// Save the state if it is time to.
+    fn save_if_due(&mut self, simulation: &mut Simulation) -> Result<()> {
+        let due = self.saving.every.reached(simulation.time);
+        if due || self.saving.wall.is_some_and(|wall| self.saving.last.elapsed() >= wall) {
+            self.save(simulation)?;
+        } else if self.saving.planned && self.frames.is_fresh(simulation.steps) {
+            // In memory, beside a frame: what is saved if the run diverges.
+            let archive = self.state(simulation)?;
+            self.saving.good = Some((simulation.steps, simulation.time, archive));
+        }
+        Ok(())
+    }
+
+    /// The run, and what is said of its end.
+    fn finish(
+        mut self,
+        simulation: &mut Simulation,
+        scene: &Scene,
+        options: &Options,
+        folder: &Folder,
+        stop: &AtomicUsize,
+        observe: &mut dyn FnMut(&Progress),
+        resumes: bool,
+    ) -> Result<Finished> {
+        let scale = Scale::new(simulation, scene);
+        let ended = self.advance(simulation, scene, stop, observe, resumes);
+        let saved = format!("; go on with --resume {}", options.out.display());
+        let mut resumable = false;
+        let (status, reason, mut error, signal) = match ended {
+            Ok(End::Time) => (Status::Done, "end time reached".to_string(), None, None),
+            Ok(End::Steps) => (Status::Done, "number of steps reached".to_string(), None, None),
+            Ok(End::Signal(n)) => {
+                resumable = true;
+                (Status::Interrupted, format!("signal {n}{saved}"), None, Some(n))
+            }
+            Ok(End::Deadline) => {
+                resumable = true;
+                (Status::Interrupted, format!("--max-wall reached{saved}"), None, None)
+            }
+            Err(error) => {
+                let diverged = matches!(error, Error::Diverged { .. });
+                let mut reason = error.to_string();
+                if diverged {
+                    reason.push_str(&self.keep_last(simulation, scene));
+                }
+                let status = if diverged { Status::Diverged } else { Status::Failed };
+                (status, reason, Some(error), None)
+            }
+        };
+        let mut summary = self.totals.summary(simulation, scene);
+        summary.case = options.name.clone();
+        summary.status = status;
+        summary.verdict = match error {
+            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()] },
+            None => verdict::judge(&summary, scale),
+        };
+        summary.exit_reason = reason;
+        if summary.status == Status::Done && summary.verdict.grade == Grade::Failed {
+            summary.status = Status::Failed;
+            summary.exit_reason.push_str(", but what was computed means nothing");
+            let why = summary.verdict.reasons.join("; ");
+            error = Some(Error::Senseless(format!("{}: {why}", summary.exit_reason)));
+        }
+        summary.wall_s = self.walls + self.start.elapsed().as_secs_f64();
+        summary.parts = self.parts;
+        summary.frames = self.frames.written();
+        summary.memory_peak_bytes = memory_peak();
+        summary.stages.insert("output", self.totals.output.as_secs_f64());
+        // Where the disk is full this makes room for the last word.
+        folder.release();
+        let written = summary.write(&folder.file("result.json"));
+        Ok(Finished { summary, error: error.or(written.err()), signal, resumable })
+    }
+
+    /// Keep the state in which a run diverged, to be looked at, and the last good one; says where.
+    fn keep_last(&mut self, simulation: &mut Simulation, scene: &Scene) -> String {
+        // Best effort: a device that is lost cannot be read any more, and the first error counts.
+        let mut said = match self.frames.write_last(simulation, scene) {
+            Ok(()) => "; the state is in vtu/last_*.vtu".to_owned(),
+            Err(e) => format!("; its state could not be written: {e}"),
+        };
+        if let Some((step, time, archive)) = self.saving.good.take()
+            && let Err(e) = self.saving.write(step, time, &archive)
+        {
+            said.push_str(&format!("; the last good state could not be written: {e}"));
+        } else if let Some(step) = self.saving.step {
+            said.push_str(&format!("; the last good state, of step {step}, is in checkpoint/"));
+        }
+        said
+    }
+
     fn advance(
         &mut self,
         simulation: &mut Simulation,
         scene: &Scene,
         stop: &AtomicUsize,
         observe: &mut dyn FnMut(&Progress),
+        resumes: bool,
     ) -> Result<End> {
         let end = simulation.case.run.end;
-        let mut due = Due::new(Some(simulation.case.output.every));
-        let writing = Instant::now();
-        self.tables.start(simulation, &mut self.totals)?;
-        self.frames.write(simulation, scene)?;
-        self.totals.output += writing.elapsed();
-        // A run always does a step, however short it is.
-        let mut dt = 0.0;
-        let mut progress = Progress::default();
+        if !resumes {
+            let writing = Instant::now();
+            self.tables.start(simulation, &mut self.totals)?;
+            self.frames.write(simulation, scene)?;
+            self.totals.output += writing.elapsed();
+        }
+        let mut progress = Progress { time: simulation.time, ..Progress::default() };
+        progress.report.dt = self.dt;
         let ended = loop {
             // A rounding error short of the end is the end.
-            if simulation.time >= end - 1e-6 * dt {
+            if simulation.time >= end - 1e-6 * self.dt {
                 break End::Time;
             }
             if simulation.steps >= self.steps_max {
@@ -218,15 +341,20 @@ impl Run {
             if signal != 0 {
                 break End::Signal(signal as i32);
             }
+            if self.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                break End::Deadline;
+            }
             let report = simulation.step()?;
-            dt = report.dt;
+            self.dt = report.dt;
             let writing = Instant::now();
             self.totals.add(&report, simulation);
             self.tables.step(&report, simulation, &mut self.totals)?;
-            progress.frame = due.reached(simulation.time);
+            progress.frame = self.due.reached(simulation.time);
             if progress.frame {
                 self.frames.write(simulation, scene)?;
             }
+            // After the files of this step, so that a state knows all of them.
+            self.save_if_due(simulation)?;
             self.totals.output += writing.elapsed();
             progress.report = report;
             progress.time = simulation.time;
@@ -235,7 +363,12 @@ impl Run {
             observe(&progress);
         };
         let writing = Instant::now();
-        if !progress.frame && simulation.steps > 0 {
+        // Before the last frame and the last rows, which a run that goes on would not have written.
+        let stopped = matches!(ended, End::Signal(_) | End::Deadline);
+        if (stopped || self.saving.planned) && self.saving.step != Some(simulation.steps) {
+            self.save(simulation)?;
+        }
+        if !self.frames.is_fresh(simulation.steps) {
             self.frames.write(simulation, scene)?;
         }
         self.tables.finish(&progress.report, simulation, &mut self.totals)?;
@@ -251,26 +384,5 @@ impl Run {
         progress.done = by_time.max(by_steps).clamp(1e-9, 1.0);
         let remaining = progress.wall.as_secs_f64() * (1.0 / progress.done - 1.0);
         progress.remaining = Duration::try_from_secs_f64(remaining).unwrap_or(Duration::MAX);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Due;
-
-    #[test]
-    fn moments_are_reached_once_each_in_spite_of_rounding() {
-        let mut due = Due::new(Some(0.05));
-        let mut time = 0.0;
-        let mut count = 0;
-        for _ in 0..1000 {
-            time += 0.001;
-            count += u32::from(due.reached(time));
-        }
-        assert_eq!(count, 20);
-        let mut late = Due::new(Some(0.05));
-        assert!(!late.reached(0.049) && late.reached(0.26) && !late.reached(0.299) && late.reached(0.3));
-        assert!(!Due::new(Some(0.0)).reached(1.0));
-        assert!(Due::new(None).reached(0.0));
     }
 }

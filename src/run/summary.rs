@@ -2,6 +2,8 @@
 
 use super::tables::solved;
 use crate::backend::Counters;
+use crate::checkpoint::Archive;
+use crate::error::Result;
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::output::result::{Body, Monitors, Particles, Pressure, Summary};
@@ -29,6 +31,75 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Save the sums, or take them over.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Case`] if the state has none.
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            solves,
+            unknowns,
+            iterations,
+            pressure,
+            monitors,
+            looks,
+            density_error,
+            speed,
+            // Read from the simulation at the next row.
+            ledger: _,
+            // By the clock of each process.
+            output: _,
+        } = self;
+        for (name, value) in
+            [("solves", solves), ("unknowns", unknowns), ("iterations", iterations), ("looks", looks)]
+        {
+            archive.count(&format!("totals.{name}"), value)?;
+        }
+        archive.number("totals.density_error", density_error)?;
+        archive.number("totals.speed", speed)?;
+        // Means are made at the end.
+        let Pressure {
+            preconditioner: _,
+            unknowns_mean: _,
+            iterations_mean: _,
+            iterations_max,
+            relative_residual_max,
+            failures,
+        } = pressure;
+        archive.small("totals.iterations_max", iterations_max)?;
+        archive.number("totals.relative_residual_max", relative_residual_max)?;
+        archive.count("totals.failures", failures)?;
+        let Monitors {
+            density_error_max,
+            density_error_mean: _,
+            courant_max,
+            speed_max,
+            energy_start,
+            energy_end,
+            energy_max,
+            lost_particles,
+            neighbours_max,
+            penetration_max_over_l0,
+            contact_omega_dt,
+            contact_substeps_max,
+        } = monitors;
+        for (name, value) in [
+            ("density_error_max", density_error_max),
+            ("courant_max", courant_max),
+            ("speed_max", speed_max),
+            ("energy_start", energy_start),
+            ("energy_end", energy_end),
+            ("energy_max", energy_max),
+            ("penetration_max_over_l0", penetration_max_over_l0),
+            ("contact_omega_dt", contact_omega_dt),
+        ] {
+            archive.number(&format!("totals.{name}"), value)?;
+        }
+        archive.count("totals.lost_particles", lost_particles)?;
+        archive.small("totals.neighbours_max", neighbours_max)?;
+        archive.small("totals.contact_substeps_max", contact_substeps_max)
+    }
+
     /// Count a step in.
     pub fn add(&mut self, report: &StepReport, simulation: &Simulation) {
         if simulation.plan.wet() {

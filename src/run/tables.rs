@@ -1,8 +1,9 @@
 //! The tables over time: monitors.csv, bodies.csv and gauges.csv.
 
-use super::Due;
+use super::due::Due;
 use super::summary::Totals;
 use crate::backend::{Counters, Timing};
+use crate::checkpoint::Archive;
 use crate::contact::Energy;
 use crate::error::Result;
 use crate::gauges::Gauges;
@@ -42,6 +43,28 @@ struct Since {
     stages: BTreeMap<Stage, f64>,
 }
 
+impl Since {
+    /// Save the sums, or take them over.
+    fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        // The times of the stages are those of each process.
+        let Self { iterations, residual, outcome, penetration, omega_dt, substeps, stages: _ } = self;
+        archive.small("since.iterations", iterations)?;
+        archive.number("since.residual", residual)?;
+        archive.number("since.penetration", penetration)?;
+        archive.number("since.omega_dt", omega_dt)?;
+        archive.small("since.substeps", substeps)?;
+        let code = outcome.and_then(|o| OUTCOMES.iter().position(|&other| other == o));
+        let mut code = code.map_or(u64::MAX, |k| k as u64);
+        archive.count("since.outcome", &mut code)?;
+        *outcome = usize::try_from(code).ok().and_then(|k| OUTCOMES.get(k).copied());
+        Ok(())
+    }
+}
+
+/// All outcomes, in the order of their codes in a checkpoint.
+const OUTCOMES: [Outcome; 5] =
+    [Outcome::Converged, Outcome::ZeroSource, Outcome::MaxIterations, Outcome::Breakdown, Outcome::NonFinite];
+
 /// A word for a table.
 pub fn outcome_name(outcome: Outcome) -> &'static str {
     match outcome {
@@ -59,29 +82,32 @@ pub fn solved(outcome: Outcome) -> bool {
 }
 
 impl Tables {
-    /// Tables with their headers.
+    /// Tables with their headers; those of a run that `goes_on` are there already.
     ///
     /// # Errors
     /// [`crate::error::Error::Io`].
-    pub fn create(folder: &Folder, simulation: &Simulation, scene: &Scene, gauges: Gauges) -> Result<Self> {
+    pub fn create(
+        folder: &Folder,
+        simulation: &Simulation,
+        scene: &Scene,
+        gauges: Gauges,
+        goes_on: bool,
+    ) -> Result<Self> {
+        let table = |name: &str, header: &[String]| {
+            let path = folder.file(name);
+            if goes_on { Table::reopen(&path, header) } else { Table::create(&path, header) }
+        };
         let stages: Vec<Stage> = Stage::ALL.into_iter().filter(|&s| simulation.plan.has(s)).collect();
         let every = simulation.case.output.table_every;
         let gauges = if gauges.is_empty() {
             None
         } else {
-            let table = Table::create(&folder.file("gauges.csv"), &gauges.header())?;
+            let table = table("gauges.csv", &gauges.header())?;
             Some((gauges, table))
         };
-        let bodies = if scene.solids.is_empty() {
-            None
-        } else {
-            Some(Table::create(&folder.file("bodies.csv"), &body_header())?)
-        };
+        let bodies = if scene.solids.is_empty() { None } else { Some(table("bodies.csv", &body_header())?) };
         Ok(Self {
-            monitors: Table::create(
-                &folder.file("monitors.csv"),
-                &monitor_header(&stages, simulation.plan.ledger),
-            )?,
+            monitors: table("monitors.csv", &monitor_header(&stages, simulation.plan.ledger))?,
             bodies,
             gauges,
             due: Due::new(every),
@@ -90,6 +116,30 @@ impl Tables {
             since: Since::default(),
             last: None,
         })
+    }
+
+    /// Save where the tables stand, or cut them back to that.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Case`] if one is shorter than that, [`crate::error::Error::Io`].
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self { monitors, bodies, gauges, due, gauges_due, stages: _, since, last } = self;
+        monitors.exchange(archive)?;
+        for table in bodies.iter_mut().chain(gauges.as_mut().map(|(_, table)| table)) {
+            table.exchange(archive)?;
+        }
+        due.exchange("tables", archive)?;
+        gauges_due.exchange("gauges", archive)?;
+        let mut step = last.unwrap_or(u64::MAX);
+        archive.count("tables.last", &mut step)?;
+        *last = Some(step).filter(|&s| s != u64::MAX);
+        since.exchange(archive)
+    }
+
+    /// Moments before `time` [s] are over.
+    pub(crate) fn skip(&mut self, time: f64) {
+        self.due.reached(time);
+        self.gauges_due.reached(time);
     }
 
     /// Rows at t = 0.

@@ -3,14 +3,13 @@
 use super::oriented::Placed;
 use super::walls::motion;
 use super::{Drive, FreeBody, Shape, Solid};
-use crate::case::{self, BodyShape, Freedom};
-use crate::shape::{Cylinder, Disc, Sphere};
+use crate::case::{self, Freedom};
 use glam::{DMat3, DQuat, DVec3};
 
 /// A body without slots, at the position that the case asks for.
 pub(super) fn body(body: &case::Body, spacing: f64, dimensions: u32, layers: i32) -> Solid {
     let plane = dimensions == 2;
-    let (shape, share) = shape(body, spacing, plane);
+    let (shape, share) = body.shape(spacing, plane);
     let mut position: DVec3 = body.center.into();
     if plane {
         position.y = 0.0;
@@ -33,26 +32,6 @@ pub(super) fn body(body: &case::Body, spacing: f64, dimensions: u32, layers: i32
         dummy_offset: particles.dummy,
         wall_area: particles.area,
         wall_to_surface: particles.to_surface,
-    }
-}
-
-/// The shape that the case asks for, and the share of a given mass that it stands for: in two dimensions a
-/// body is a slice l0 wide.
-fn shape(body: &case::Body, spacing: f64, plane: bool) -> (Shape, f64) {
-    let (radius, height) = (body.radius.unwrap_or_default(), body.height.unwrap_or_default());
-    let slice = |width: f64| if plane { spacing / width } else { 1.0 };
-    match body.shape {
-        BodyShape::Box => {
-            let mut size: DVec3 = body.size.unwrap_or_default().into();
-            let share = slice(size.y);
-            if plane {
-                size.y = spacing;
-            }
-            (Shape::cuboid(size), share)
-        }
-        BodyShape::Sphere => (Shape::Sphere(Sphere { radius }), 1.0),
-        BodyShape::Cylinder if plane => (Shape::Disc(Disc { radius, width: spacing }), slice(height)),
-        BodyShape::Cylinder => (Shape::Cylinder(Cylinder { radius, half_height: 0.5 * height }), 1.0),
     }
 }
 

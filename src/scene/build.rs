@@ -7,7 +7,7 @@ use super::lattice::{Cells, Grid, Lattice};
 use super::placement::{Surroundings, point};
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::Water;
-use super::{Scene, Solid};
+use super::{Scene, Solid, wall_at};
 use crate::case::{Case, Law};
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3, IVec3};
@@ -218,18 +218,14 @@ impl<'a> Builder<'a> {
             if self.lattice.plane {
                 at.y = 0.0;
             }
-            let solids = self.moving_walls.iter().chain(&self.bodies).flat_map(Solid::wall_positions);
-            let all = self.fixed.wall.iter().copied().chain(solids);
-            let Some(nearest) = all.min_by(|a, b| a.distance(at).total_cmp(&b.distance(at))) else {
-                continue;
-            };
-            if nearest.distance(at) > reach {
+            if let Err(nearest) = wall_at(&self.fixed.wall, at, reach, self.lattice.spacing) {
+                let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
+                    format!("the nearest stands at {}", point(nearest))
+                });
                 self.problems.push(format!(
-                    "gauge.pressure `{}` at {}: no wall particle within {reach:.4} m, the nearest stands at {}: move the \
-                     point onto a wall",
+                    "gauge.pressure `{}` at {}: no fixed wall there, {hint}: move the point onto a wall",
                     gauge.name,
-                    point(at),
-                    point(nearest)
+                    point(at)
                 ));
             }
         }

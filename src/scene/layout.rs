@@ -1,6 +1,7 @@
 //! Laying particles out in groups, see [`Groups`].
 
 use super::build::Builder;
+use super::jitter::jitter;
 use super::{Drive, Groups, Kind, Scene, Solid};
 use glam::DVec3;
 
@@ -24,8 +25,14 @@ impl Builder<'_> {
             kind: Vec::with_capacity(total),
             solid: Vec::with_capacity(total),
         };
+        let (most, seed) = self.case.fluid.as_ref().map_or((0.0, 0), |f| (f.jitter, f.seed));
         for (&c, &v) in self.water.cell.iter().zip(&self.water.velocity) {
-            layout.push(self.lattice.center(c), v, Kind::Fluid, 0);
+            let mut at = self.lattice.center(c);
+            if most > 0.0 {
+                at += jitter(c, seed, most * self.lattice.spacing);
+                at.y = if self.lattice.plane { 0.0 } else { at.y };
+            }
+            layout.push(at, v, Kind::Fluid, 0);
         }
         for (k, solid) in solids.iter_mut().enumerate() {
             let kind = if solid.is_body { Kind::BodyWall } else { Kind::Wall };
@@ -53,6 +60,7 @@ impl Builder<'_> {
             solids,
             walls: self.fixed.shapes,
             static_wall_normal: self.fixed.normal,
+            static_wall_shape: self.fixed.shape_of,
             domain,
             depth: self.depth,
             notes: self.notes,

@@ -14,8 +14,10 @@
 mod bodies;
 mod build;
 mod domain;
+mod jitter;
 mod lattice;
 mod layout;
+mod motion;
 mod oriented;
 mod placement;
 mod support;
@@ -23,10 +25,28 @@ mod walls;
 mod water;
 
 pub use crate::shape::Shape;
+pub use motion::Motion;
+pub use placement::CONTACT_DISTANCE;
 
 use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::Range;
+
+/// Wall particles that stand for `point`: those within half an effective radius `reach` of it, or, where the lattice
+/// has moved the wall away, of the nearest one. `Err` holds the nearest if the point is on no wall, and nothing if
+/// there are no walls.
+///
+/// # Errors
+/// See above.
+pub fn wall_at(wall: &[DVec3], point: DVec3, reach: f64, spacing: f64) -> Result<Vec<usize>, Option<DVec3>> {
+    // A face moves by up to half a spacing to fit the lattice, its particles stand half a spacing behind it; along
+    // the face it may end half a spacing short, and half a spacing from the last particle.
+    let farthest = 3_f64.sqrt() * (1.0 + 1e-6) * spacing;
+    let nearest = wall.iter().copied().min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)));
+    let nearest = nearest.filter(|n| n.distance(point) <= farthest).ok_or(nearest)?;
+    let from = if nearest.distance(point) <= reach { point } else { nearest };
+    Ok((0..wall.len()).filter(|&k| wall[k].distance(from) <= reach).collect())
+}
 
 /// What a particle is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
@@ -44,6 +64,14 @@ pub enum Kind {
     BodyDummy = 4,
     /// A fluid particle that left the domain or became non-finite; takes part in nothing.
     Ghost = 5,
+}
+
+impl Kind {
+    /// The kind of a number, as `kind as u8` gives it.
+    pub fn from_code(code: u8) -> Option<Self> {
+        let all = [Self::Fluid, Self::Wall, Self::Dummy, Self::BodyWall, Self::BodyDummy, Self::Ghost];
+        all.into_iter().find(|&k| k as u8 == code)
+    }
 }
 
 /// How many particles each group holds; the groups lie in this order.
@@ -117,46 +145,6 @@ pub struct FreeBody {
     pub locked_translation: [bool; 3],
     /// `true` where a rotation about world x, y, z is locked.
     pub locked_rotation: [bool; 3],
-}
-
-/// A motion given by a table: time [s] against displacement from the start [m]; linear between rows,
-/// constant after the last one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
-    /// Times [s], increasing.
-    pub time: Vec<f64>,
-    /// Displacement from the starting position [m], one a time.
-    pub displacement: Vec<DVec3>,
-}
-
-impl Motion {
-    /// Displacement [m] at time `t` [s].
-    pub fn displacement(&self, t: f64) -> DVec3 {
-        let n = self.time.len();
-        match self.time.iter().position(|&ti| t < ti) {
-            Some(0) => self.displacement[0],
-            Some(k) => {
-                let s = (t - self.time[k - 1]) / (self.time[k] - self.time[k - 1]);
-                self.displacement[k - 1].lerp(self.displacement[k], s)
-            }
-            None => self.displacement[n - 1],
-        }
-    }
-
-    /// Largest speed [m/s] between the times `from` and `to` [s].
-    pub fn fastest(&self, from: f64, to: f64) -> f64 {
-        let rows = self.time.windows(2).zip(self.displacement.windows(2));
-        let met = rows.filter(|(t, _)| t[0] < to && t[1] > from);
-        met.map(|(t, x)| (x[1] - x[0]).length() / (t[1] - t[0])).fold(0.0, f64::max)
-    }
-
-    /// Velocity [m/s] just after time `t` [s].
-    pub fn velocity(&self, t: f64) -> DVec3 {
-        match self.time.iter().position(|&ti| t < ti) {
-            None | Some(0) => DVec3::ZERO,
-            Some(k) => (self.displacement[k] - self.displacement[k - 1]) / (self.time[k] - self.time[k - 1]),
-        }
-    }
 }
 
 /// How a moving solid moves.
@@ -234,6 +222,8 @@ pub struct Scene {
     /// Outward normal (into the free space) of each static wall particle, for contact; one per slot of
     /// [`Groups::static_wall_range`]. Edge particles hold the sum of their faces' normals, normalised.
     pub static_wall_normal: Vec<DVec3>,
+    /// Index into `walls` of each static wall particle.
+    pub static_wall_shape: Vec<u32>,
     /// Box that no particle may leave [m].
     pub domain: (DVec3, DVec3),
     /// Largest depth of water at the start, along gravity [m].

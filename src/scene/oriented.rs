@@ -44,8 +44,13 @@ impl Placed {
     }
     /// How far the shapes overlap along the direction in which they overlap least [m]; 0 or less: apart.
     pub fn overlap(&self, other: &Self) -> f64 {
+        self.way_out(other).0
+    }
+    /// The same, with that direction, in which this shape would have to move.
+    pub fn way_out(&self, other: &Self) -> (f64, DVec3) {
         let d = self.center - other.center;
-        self.least(other, |n| self.reach(n) + other.reach(n) - d.dot(n).abs())
+        let (overlap, n) = self.least(other, |n| self.reach(n) + other.reach(n) - d.dot(n).abs());
+        (overlap, n * d.dot(n).signum())
     }
     /// Least distance >= 0 by which this shape has to move along the unit vector `up` to touch `other` only
     /// [m]; infinite if it cannot.
@@ -61,26 +66,24 @@ impl Placed {
                 f64::INFINITY
             }
         });
-        lift.max(0.0)
+        lift.0.max(0.0)
     }
 
-    /// Least value of `of` over all directions that may tell this shape from `other`.
-    fn least(&self, other: &Self, of: impl Fn(DVec3) -> f64) -> f64 {
-        let axes = axes(self, other);
-        let value = |n: &DVec3| of(*n);
-        if self.shape.as_cuboid().is_some() && other.shape.as_cuboid().is_some() {
-            return axes.iter().map(value).fold(f64::INFINITY, f64::min);
-        }
-        let mut all: Vec<(f64, DVec3)> = axes.iter().map(|n| (of(*n), *n)).collect();
+    /// Least value of `of` over all directions that may tell this shape from `other`, and the direction.
+    fn least(&self, other: &Self, of: impl Fn(DVec3) -> f64) -> (f64, DVec3) {
+        let mut all: Vec<(f64, DVec3)> = axes(self, other).into_iter().map(|n| (of(n), n)).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        all.truncate(4);
-        let searched = all.into_iter().map(|(start, n)| search(start, n, &of));
-        searched.fold(f64::INFINITY, f64::min)
+        if self.shape.as_cuboid().is_none() || other.shape.as_cuboid().is_none() {
+            all.truncate(4);
+            all.iter_mut().for_each(|(least, n)| (*least, *n) = search(*least, *n, &of));
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        all.first().copied().unwrap_or((f64::INFINITY, DVec3::Z))
     }
 }
 
-/// Least value of `of` that steps from the direction `n`, where it is `least`, lead to.
-fn search(mut least: f64, mut n: DVec3, of: impl Fn(DVec3) -> f64) -> f64 {
+/// Least value of `of` that steps from the direction `n`, where it is `least`, lead to, and its direction.
+fn search(mut least: f64, mut n: DVec3, of: impl Fn(DVec3) -> f64) -> (f64, DVec3) {
     let mut step = SEARCH.0;
     while step > SEARCH.1 && least.is_finite() {
         let (u, v) = n.any_orthonormal_pair();
@@ -91,7 +94,7 @@ fn search(mut least: f64, mut n: DVec3, of: impl Fn(DVec3) -> f64) -> f64 {
             _ => step *= 0.5,
         }
     }
-    least
+    (least, n)
 }
 
 /// Directions along which two shapes that do not overlap may be told apart; of two boxes all 15.

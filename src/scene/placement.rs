@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 use std::collections::HashMap;
 
 /// Contact distance over the spacing, d_c / l0, section 3 of the paper.
-pub(super) const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
+pub const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
 
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {
@@ -28,6 +28,8 @@ pub(super) struct Surroundings<'a> {
 struct Contact {
     with: String,
     overlap: f64,
+    /// The shortest way out, if it is a straight one.
+    out: Option<DVec3>,
 }
 
 impl Surroundings<'_> {
@@ -36,7 +38,7 @@ impl Surroundings<'_> {
     /// # Errors
     /// A sentence that names the body, what it overlaps, by how much, and what to do.
     pub fn place(&self, body: &mut Solid, standing: bool) -> Result<Option<String>, String> {
-        let Some(Contact { with, overlap }) = self.deepest(body) else { return Ok(None) };
+        let Some(Contact { with, overlap, out }) = self.deepest(body) else { return Ok(None) };
         // A lift over the rim of a wall is not what anyone means by standing.
         let lift = self
             .up
@@ -44,7 +46,11 @@ impl Surroundings<'_> {
             .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
         let says = format!("body `{}` overlaps {with} by {overlap:.6} m at t = 0", body.name);
         let Some((lift, up)) = lift else {
-            return Err(format!("{says}: move it away, lifting it would take more than half its height"));
+            let away = out.map_or("move it away".into(), |n| {
+                let n = point(n);
+                format!("move it away, its center by {:.6} m along {n}", overlap + 1e-6)
+            });
+            return Err(format!("{says}: {away}, lifting it would take more than half its height"));
         };
         if !standing {
             let more = lift + 1e-6;
@@ -85,7 +91,10 @@ impl Surroundings<'_> {
         let boxes = self.boxes(body);
         let solid = boxes
             .into_iter()
-            .map(|(with, b)| Contact { with, overlap: own.overlap(&b) })
+            .map(|(with, b)| {
+                let (overlap, out) = own.way_out(&b);
+                Contact { with, overlap, out: Some(out) }
+            })
             .filter(|c| c.overlap > tolerance)
             .max_by(|a, b| a.overlap.total_cmp(&b.overlap));
         if solid.is_some() || self.law != Law::Paper {
@@ -101,6 +110,7 @@ impl Surroundings<'_> {
             .map(|(overlap, with)| Contact {
                 with: format!("{} (particles closer than d_c = {d_c:.6} m)", self.pair_name(with)),
                 overlap,
+                out: None,
             })
     }
 

@@ -3,7 +3,7 @@
 use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
 use super::oriented::Placed;
 use super::{Drive, Motion, Shape, Solid, WallShape};
-use crate::case::{self, Face};
+use crate::case::{self, Face, TANK_FACES};
 use glam::{DMat3, DQuat, DVec3, IVec3};
 
 /// Particles of the walls that never move.
@@ -18,24 +18,15 @@ pub(super) struct Fixed {
     pub shapes: Vec<WallShape>,
 }
 
-/// Names of the tank's faces, in the order of [`Face`].
-const FACES: [(Face, &str); 6] = [
-    (Face::XMin, "tank.x_min"),
-    (Face::XMax, "tank.x_max"),
-    (Face::YMin, "tank.y_min"),
-    (Face::YMax, "tank.y_max"),
-    (Face::ZMin, "tank.z_min"),
-    (Face::ZMax, "tank.z_max"),
-];
-
 /// Name of the tank's face `2 axis + side`.
 pub(super) fn face_name(face: usize) -> &'static str {
-    FACES[face].1
+    TANK_FACES[face].1
 }
 
 /// Which faces carry a wall: `[min, max]` an axis. No y faces in two dimensions.
 pub(super) fn closed(open: &[Face], plane: bool) -> [[bool; 2]; 3] {
-    let wall = |axis: usize, side: usize| (axis != 1 || !plane) && !open.contains(&FACES[2 * axis + side].0);
+    let wall =
+        |axis: usize, side: usize| (axis != 1 || !plane) && !open.contains(&TANK_FACES[2 * axis + side].0);
     std::array::from_fn(|axis| std::array::from_fn(|side| wall(axis, side)))
 }
 

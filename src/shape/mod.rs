@@ -67,6 +67,30 @@ impl Shape {
         Self::Box(Cuboid { half: 0.5 * size })
     }
 
+    /// [`Geometry::depth`], for boxes without asking which shape it is at every point.
+    #[inline]
+    pub fn depth(&self, q: DVec3, faces: Faces) -> Option<Inside> {
+        match self {
+            Self::Box(shape) => shape.depth(q, faces),
+            other => (**other).depth(q, faces),
+        }
+    }
+
+    /// [`Geometry::nodes`], for boxes with `visit` in line.
+    #[inline]
+    pub(crate) fn each_node(
+        &self,
+        line: (DVec3, DVec3, f64),
+        faces: Faces,
+        least: f64,
+        mut visit: impl FnMut(f64, f64, Inside),
+    ) {
+        match self {
+            Self::Box(shape) => shape.each_node(line, faces, least, visit),
+            other => other.nodes(line, faces, least, &mut visit),
+        }
+    }
+
     /// The box, if it is one: what has no particles of its own lattice, and every wall, is a box.
     pub fn as_cuboid(&self) -> Option<&Cuboid> {
         match self {

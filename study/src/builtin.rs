@@ -2,8 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, compare, contact_cost, dry_studies, gallery, needs, pressure_size, pressure_solve, stability,
-    wall_of_cubes, work_precision,
+    Study, cases, compare, contact_cost, dry_studies, gallery, needs, pressure_size, pressure_solve,
+    stability, wall_of_cubes, work_precision,
 };
 use seixo::error::{Error, Result};
 
@@ -17,7 +17,7 @@ pub struct Entry {
 }
 
 enum Maker {
-    /// A study file.
+    /// A study file of the program's cases.
     File(&'static str),
     /// A function.
     Function(fn(&Setup) -> Study),
@@ -28,28 +28,24 @@ pub const ENTRIES: &[Entry] = &[
     Entry {
         name: "hydrostatic",
         about: "water at rest: pressure, sensor noise, spurious motion, volume against run time",
-        make: Maker::File(include_str!("../../cases/study/hydrostatic.toml")),
+        make: Maker::File("hydrostatic.toml"),
     },
     Entry {
         name: "dam-break",
         about: "front and energy of a dam break over spacing, preset, tolerance and sound speed",
-        make: Maker::File(include_str!("../../cases/study/dam_break.toml")),
+        make: Maker::File("dam_break.toml"),
     },
     Entry {
         name: "dam-break-2d",
         about: "front of a dam break in two dimensions against three experiments",
-        make: Maker::File(include_str!("../../cases/study/dam_break_2d.toml")),
+        make: Maker::File("dam_break_2d.toml"),
     },
     Entry {
         name: "floating-cube",
         about: "draft of a floating cube against Archimedes' law",
-        make: Maker::File(include_str!("../../cases/study/floating_cube.toml")),
+        make: Maker::File("floating_cube.toml"),
     },
-    Entry {
-        name: "precision",
-        about: "GPU in f32 against CPU in f64",
-        make: Maker::File(include_str!("../../cases/study/precision.toml")),
-    },
+    Entry { name: "precision", about: "GPU in f32 against CPU in f64", make: Maker::File("precision.toml") },
     Entry {
         name: "pressure-solve",
         about: "the pressure equation alone: residual and pressure error against iterations and time",
@@ -112,27 +108,6 @@ pub const ENTRIES: &[Entry] = &[
     },
 ];
 
-/// Files that the built-in study files refer to, as they stood when the program was built.
-fn embedded(name: &str) -> Result<String> {
-    let text = match name.trim_start_matches("../") {
-        "hydrostatic.toml" => include_str!("../../cases/hydrostatic.toml"),
-        "dam_break.toml" => include_str!("../../cases/dam_break.toml"),
-        "dam_break_2d.toml" => include_str!("../../cases/dam_break_2d.toml"),
-        "floating_cube.toml" => include_str!("../../cases/floating_cube.toml"),
-        "reference/front_koshizuka_oka_1996_experiment.csv" => {
-            include_str!("../../cases/reference/front_koshizuka_oka_1996_experiment.csv")
-        }
-        "reference/front_martin_moyce_1952_a1.csv" => {
-            include_str!("../../cases/reference/front_martin_moyce_1952_a1.csv")
-        }
-        "reference/front_martin_moyce_1952_a2.csv" => {
-            include_str!("../../cases/reference/front_martin_moyce_1952_a2.csv")
-        }
-        _ => return Err(Error::Case(format!("`{name}` is not built in"))),
-    };
-    Ok(text.to_owned())
-}
-
 /// The built-in study `name`; with what the command line adds.
 ///
 /// # Errors
@@ -150,7 +125,9 @@ pub fn find(name: &str, setup: &Setup) -> Result<Study> {
         )));
     };
     match entry.make {
-        Maker::File(text) => from_file(name, text, &embedded, setup),
+        Maker::File(file) => {
+            from_file(name, &cases::text("study", file)?, &|file| cases::text("study", file), setup)
+        }
         Maker::Function(make) if setup.sets.is_empty() => Ok(make(setup)),
         Maker::Function(_) => {
             Err(Error::Case(format!("`{name}` sets up its own scenes: --set does not apply")))

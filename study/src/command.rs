@@ -2,10 +2,9 @@
 
 use super::Study;
 use super::builtin::{self, ENTRIES};
+use super::computers::Computers;
 use super::definition::{Setup, files_of};
 use super::engine::{Context, Make, Options, Processor, Shard};
-use seixo::backend;
-use seixo::backend::gpu::Gpu;
 use seixo::console::say;
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
@@ -55,7 +54,11 @@ pub struct StudyArgs {
     pub quiet: bool,
 }
 
-fn processor(text: &str) -> std::result::Result<Processor, String> {
+/// What `--backend` takes.
+///
+/// # Errors
+/// What it takes, for anything else.
+pub fn processor(text: &str) -> std::result::Result<Processor, String> {
     match text {
         "cpu" => Ok(Processor::Cpu),
         "gpu" => Ok(Processor::Gpu),
@@ -112,7 +115,7 @@ impl Manifest {
 
     fn study(&self) -> Result<Study> {
         let processor = if self.gpu { Processor::Gpu } else { Processor::Cpu };
-        let setup = Setup { full: self.full, sets: self.sets.clone(), processor };
+        let setup = Setup { full: self.full, sets: self.sets.clone(), processor, runs: 0 };
         match &self.file {
             Some((text, folder)) => builtin::from_file(&self.what, text, &files_of(folder), &setup),
             None => builtin::find(&self.what, &setup),
@@ -126,15 +129,9 @@ impl Manifest {
 /// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
 pub fn command(args: &StudyArgs) -> Result<()> {
     seixo::threads::start(args.threads)?;
-    // Drivers are asked only when the first point wants one.
-    let hardware = std::sync::LazyLock::new(|| args.adapter.is_some() || Gpu::hardware_available());
-    let gpu = backend::Processor::Gpu { adapter: args.adapter.clone() };
-    let make: &Make = &|processor, scene, params, plan, settings| match processor {
-        Processor::Cpu => backend::Processor::Cpu.open(scene, params, plan, settings),
-        Processor::Gpu if !*hardware => Err(Error::Gpu(
-            "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
-        )),
-        Processor::Gpu => gpu.open(scene, params, plan, settings),
+    let computers = Computers::new(args.adapter.clone());
+    let make: &Make = &|processor, scene, params, plan, settings| {
+        computers.backend(processor, scene, params, plan, settings)
     };
     if args.what == "list" {
         for entry in ENTRIES {

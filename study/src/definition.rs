@@ -28,6 +28,7 @@
 use super::engine::{Job, Processor};
 use super::measure::Spec;
 use super::run_point::{Point, run};
+use super::validation::check::Check;
 use seixo::case::file::parse;
 use seixo::error::{Error, Result};
 use serde::Deserialize;
@@ -45,6 +46,12 @@ pub struct Definition {
     /// The question it answers, for the report.
     #[serde(default)]
     pub question: String,
+    /// Where the reference comes from, for a validation.
+    #[serde(default)]
+    pub source: String,
+    /// Only with `--full`, for a validation.
+    #[serde(default)]
+    pub full: bool,
     /// The case file, relative to the study file.
     pub case: Option<String>,
     /// The case itself, instead of `case`.
@@ -66,7 +73,11 @@ pub struct Definition {
     #[serde(default)]
     pub grid: Vec<Grid>,
     /// What counts as error.
+    #[serde(default)]
     pub error: Vec<ErrorMeasure>,
+    /// What is compared with what, for a validation.
+    #[serde(default)]
+    pub check: Vec<Check>,
     /// Values beyond which a point counts as degraded.
     #[serde(default)]
     pub limit: BTreeMap<String, f64>,
@@ -148,7 +159,13 @@ pub struct Setup {
     pub sets: Vec<String>,
     /// Where points compute that do not say.
     pub processor: Processor,
+    /// Jittered starts of each point; 0 for the one on the lattice.
+    pub runs: u32,
 }
+
+/// Displacement of the particles of jittered starts over the spacing [-]: enough for runs to part, too little to be
+/// seen at t = 0.
+const JITTER: f64 = 0.02;
 
 /// A file that a study refers to.
 pub type Files<'a> = dyn Fn(&str) -> Result<String> + 'a;
@@ -210,6 +227,12 @@ impl Definition {
                 return Err(Error::Case(format!("{name}: error: give `value`, or `curve` and `against`")));
             }
         }
+        for check in &study.check {
+            check.sound().map_err(|e| Error::Case(format!("{name}: {e}")))?;
+        }
+        if study.error.is_empty() && study.check.is_empty() {
+            return Err(Error::Case(format!("{name}: give [[error]] or [[check]]: what is to be found out")));
+        }
         let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
         if study.name.is_empty() || study.name.starts_with('.') || !study.name.chars().all(plain) {
             return Err(Error::Case(format!(
@@ -243,6 +266,9 @@ impl Definition {
     pub fn jobs(&self, files: &Files, setup: &Setup) -> Result<Vec<Job>> {
         let full = setup.full;
         let text = self.case_text(files)?;
+        // A dry scene has nothing to jitter.
+        let wet = parse(&self.name, text.clone(), &self.set).is_ok_and(|(case, _, _)| case.fluid.is_some());
+        let runs = if wet { setup.runs } else { 0 };
         let mut jobs: Vec<Job> = Vec::new();
         let main = Grid { method: None, full: false, axis: self.axis.clone() };
         for grid in std::iter::once(&main).chain(&self.grid).filter(|g| full || !g.full) {
@@ -260,7 +286,18 @@ impl Definition {
                 points = points.iter().flat_map(with).collect();
             }
             for picks in points {
-                jobs.push(self.job(&text, method, &picks, setup));
+                if runs == 0 {
+                    jobs.push(self.job(&text, method, &picks, setup));
+                }
+                for seed in 1..=runs {
+                    let start = Pick {
+                        axis: "run".into(),
+                        name: seed.to_string(),
+                        set: vec![format!("fluid.jitter={JITTER}"), format!("fluid.seed={seed}")],
+                        processor: None,
+                    };
+                    jobs.push(self.job(&text, method, &[picks.clone(), vec![start]].concat(), setup));
+                }
             }
         }
         Ok(jobs)

@@ -57,6 +57,7 @@ impl DryScene {
             solids: vec![],
             walls: vec![],
             static_wall_normal: vec![],
+            static_wall_shape: vec![],
             domain: (low, high),
             depth: 0.0,
             notes: vec![],

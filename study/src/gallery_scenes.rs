@@ -277,6 +277,7 @@ pub fn scenes(full: bool) -> Vec<Scene> {
         last.text += "[[body]]\nname = \"b\"\nsize = [0.1, 0.02, 0.1]\ncenter = [0.1, 0, 0.1]\ndensity = 500.0\n\
                       [contact]\nlaw = \"smooth\"\nspring = 1e4\n";
     }
+    all.extend(mistakes());
     if full {
         all.push(Scene::new("a heap of 1000 bodies", heap(1000), 500, still(0.0)));
         all.push(Scene::new(
@@ -287,4 +288,60 @@ pub fn scenes(full: bool) -> Vec<Scene> {
         ));
     }
     all
+}
+
+/// What users do by mistake: refused where it cannot be meant, and computed where it can.
+fn mistakes() -> Vec<Scene> {
+    let refused = |name, text: String| Scene::new(name, text, 10, Expect::Refuse);
+    let with = |more: &str| COLLAPSE.to_owned() + more;
+    let body = |center: &str, more: &str| {
+        with(&format!(
+            "[[body]]\nname = \"b\"\nsize = [0.1, 0.02, 0.1]\ncenter = {center}\ndensity = 500.0\n\
+             [contact]\nlaw = \"smooth\"\nspring = 1e4\n{more}"
+        ))
+    };
+    let gate = |motion: &str| {
+        with(&format!(
+            "[[moving_wall]]\nname = \"gate\"\nmin = [0.24, 0, 0]\nmax = [0.32, 1, 0.5]\nmotion = {motion}\n"
+        ))
+    };
+    let still = |speed| Expect::Finish { lost: 0, speed };
+    vec![
+        refused("gravity with four numbers", COLLAPSE.into()).set(&["run.gravity=[0,0,0,-9.81]"]),
+        refused("lengths in millimetres", COLLAPSE.into())
+            .set(&["tank.max=[800,1000,600]", "run.spacing=2e-5"]),
+        refused("corners the wrong way round", COLLAPSE.into()).set(&["tank.max=[-0.8,1,0.6]"]),
+        refused("water higher than its tank", COLLAPSE.into()).set(&["fluid.block.0.max=[0.2,1,0.8]"]),
+        refused("a tank without a floor", COLLAPSE.into()).set(&["tank.open=[\"z_min\",\"z_max\"]"]),
+        refused("a step longer than the run", COLLAPSE.into()).set(&["run.time_step=20"]),
+        refused("a step in milliseconds", COLLAPSE.into()).set(&["run.time_step=1"]),
+        refused("compressibility of 1", COLLAPSE.into()).set(&["fluid.compressibility=1"]),
+        refused("a gate whose table starts elsewhere", gate("[[0, 0, 0, 0.3], [1, 0, 0, 0.6]]")),
+        refused("a gate that is open at once", gate("[[0, 0, 0, 0], [1e-6, 0, 0, 0.5]]")),
+        refused("a gate at 50 m/s in fixed steps", gate("[[0, 0, 0, 0], [0.01, 0, 0, 0.5]]")),
+        Scene::new(
+            "a gate at 50 m/s, with the step adapted",
+            gate("[[0, 0, 0, 0], [0.01, 0, 0, 0.5]]"),
+            300,
+            still(8.0),
+        )
+        .set(&["run.adaptive=true"]),
+        refused("a gate that leaves for kilometres", gate("[[0, 0, 0, 0], [1e9, 0, 0, 1e12]]")),
+        refused("a body beside the tank", body("[1.2, 0, 0.3]", "")),
+        refused("a body below the tank", body("[0.5, 0, -0.6]", "")),
+        Scene::new("a body above the tank falls into it", body("[0.6, 0, 0.9]", ""), 300, still(5.0)),
+        refused("a body in the floor", body("[0.6, 0, 0.02]", "")),
+        refused("a spring that is none", body("[0.6, 0, 0.3]", "")).set(&["contact.spring=5e-324"]),
+        refused("a spring in kN/mm", body("[0.6, 0, 0.3]", "")).set(&["contact.spring=1e-3"]),
+        refused("sub-steps without end", body("[0.6, 0, 0.3]", "substeps = 4294967295\n")),
+        refused("one sub-step for a stiff spring", body("[0.6, 0, 0.3]", "substeps = 1\n"))
+            .set(&["contact.spring=1e9"]),
+        refused("a body that is called like a formula", body("[0.6, 0, 0.3]", ""))
+            .set(&["body.0.name=\"=1+1\""]),
+        Scene::new("a density in g/cm3", COLLAPSE.into(), 300, still(5.0)).set(&["fluid.density=1.0"]),
+        Scene::new("an angle in radians", body("[0.6, 0, 0.3]", ""), 300, still(5.0))
+            .set(&["body.0.orientation={axis=[0,1,0],angle_deg=0.785}"]),
+        Scene::new("one iteration a solve", COLLAPSE.into(), 100, Expect::FinishOrGuard)
+            .set(&["fluid.solver.max_iterations=1"]),
+    ]
 }

@@ -13,8 +13,10 @@
 
 pub mod bench;
 pub mod builtin;
+pub mod cases;
 pub mod command;
 pub mod compare;
+pub mod computers;
 pub mod contact_checks;
 pub mod contact_cost;
 pub mod contact_rest;
@@ -34,6 +36,7 @@ pub mod plot;
 mod plot_svg;
 pub mod pressure_size;
 pub mod pressure_solve;
+pub mod record;
 pub mod report;
 pub mod row;
 pub mod run_point;
@@ -43,6 +46,7 @@ pub mod spring_static;
 pub mod stability;
 pub mod stability_contact;
 pub mod stability_fluid;
+pub mod validation;
 pub mod wall_of_cubes;
 mod work_precision;
 

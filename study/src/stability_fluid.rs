@@ -166,7 +166,8 @@ fn viscous_limit(dimensions: u32, context: &Context) -> Result<Measured> {
         Ok(true)
     })?;
     out.put("limit [-]", limit);
-    out.put("theory [-]", Lattice::new(dimensions, 2.1).viscous_limit(dimensions));
+    let lattice = Lattice::new(dimensions, 2.1);
+    out.put("theory [-]", lattice.viscous_limit(dimensions, lattice.wall_shear));
     Ok(out)
 }
 

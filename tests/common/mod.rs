@@ -1,5 +1,6 @@
 //! Scenes for the tests, written as a user would write them.
 
+pub mod dry;
 pub mod moving;
 
 use seixo::backend::Processor;

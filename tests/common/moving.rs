@@ -181,6 +181,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         kind,
         solid,
         static_wall_normal: vec![normal; groups.static_wall],
+        static_wall_shape: vec![0; groups.static_wall],
         groups,
         solids,
         walls: Vec::new(),

@@ -1,6 +1,7 @@
 //! The CPU backend: the kernels in f64, over all particles, on all cores. Those that sum over neighbours have a fast
 //! version here, tested against the plain one in [`crate::kernels`].
 
+mod archive;
 mod ledger;
 mod moment;
 mod number_density;
@@ -487,6 +488,10 @@ impl Backend for Cpu {
         // The lists name the slots of the particles that were here before.
         self.neighbours = Neighbours::new(self.neighbours.rows());
         Ok(())
+    }
+
+    fn exchange(&mut self, archive: &mut crate::checkpoint::Archive) -> Result<()> {
+        Cpu::exchange(self, archive)
     }
 
     fn traffic(&mut self) -> Result<Traffic> {

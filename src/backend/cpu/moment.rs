@@ -1,4 +1,4 @@
-//! [`crate::kernels::moment`], several neighbours at a time.
+//! [`crate::neighbourhood`], several neighbours at a time.
 
 use super::row_arrays::{Columns, dot};
 use glam::{DMat3, DVec3};

@@ -5,8 +5,8 @@ use super::row_arrays::RowArrays;
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::moment::{inverse, scale};
 use crate::kernels::pressure_gradient::{acceleration, is_corrected};
+use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use glam::DVec3;
 

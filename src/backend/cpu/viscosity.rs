@@ -3,7 +3,7 @@
 use super::row_arrays::RowArrays;
 use super::wide::wide;
 use crate::kernels::Particles;
-use crate::kernels::viscosity::coefficient;
+use crate::kernels::viscosity::{coefficient, share};
 use crate::lattice::weight;
 use crate::neighbours::Chunk;
 use glam::DVec3;
@@ -14,7 +14,8 @@ wide! {
         let (mut arrays, nu) = (RowArrays::default(), coefficient(on.params));
         for (k, a) in acceleration.iter_mut().enumerate() {
             let neighbour = chunk.pressure(k).neighbour;
-            *a = nu * laplacian_sum(first + k, neighbour, |_| true, on, &mut arrays);
+            let share = |j| share(first + k, j, on);
+            *a = nu * laplacian_sum(first + k, neighbour, share, on, &mut arrays);
         }
     }
 }
@@ -22,16 +23,16 @@ wide! {
 /// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
 #[inline(always)]
 pub fn reaction(i: usize, carriers: &[u32], on: Particles, arrays: &mut RowArrays) -> DVec3 {
-    let wet = |j: u32| (j as usize) < on.fluid;
+    let wet = |j| if j < on.fluid { share(i, j, on) } else { 0.0 };
     on.params.particle_mass() * coefficient(on.params) * laplacian_sum(i, carriers, wet, on, arrays)
 }
 
-/// sum w (v_j - v_i) over the neighbours that `counts` admits.
+/// sum w (v_j - v_i) over the neighbours, each with its `share`.
 #[inline(always)]
 fn laplacian_sum(
     i: usize,
     neighbour: &[u32],
-    counts: impl Fn(u32) -> bool,
+    share: impl Fn(usize) -> f64,
     on: Particles,
     arrays: &mut RowArrays,
 ) -> DVec3 {
@@ -45,8 +46,8 @@ fn laplacian_sum(
     });
     let mut sum = DVec3::ZERO;
     for (&w, &j) in w.iter().zip(neighbour) {
-        let w = if counts(j) { w } else { 0.0 };
-        sum += w * (on.velocity[j as usize] - on.velocity[i]);
+        let j = j as usize;
+        sum += share(j) * w * (on.velocity[j] - on.velocity[i]);
     }
     sum
 }

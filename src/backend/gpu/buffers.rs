@@ -50,7 +50,7 @@ table! {
         acceleration: [f32; 4], Both, Fluid, |s, _| s.fluid;
     }
     "neighbour lists" {
-        neighbour_list: u32, Reads, Fluid, |s, _| s.capacity * s.pressure;
+        neighbour_list: u32, Both, Fluid, |s, _| s.capacity * s.pressure;
         neighbour_count: u32, Both, Fluid, |s, _| s.pressure;
     }
     "pressure solver" {

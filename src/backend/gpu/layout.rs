@@ -80,9 +80,10 @@ pub struct Constants {
     pub gradient_scale: f32,
     pub density: f32,
     pub tolerance_squared: f32,
-    pub wendland: f32,
+    pub smooth_density: f32,
     pub surface_head: f32,
-    pub pad: [f32; 2],
+    pub wall_shear: f32,
+    pub pad: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -212,9 +213,10 @@ impl Constants {
             gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
             density: params.density as f32,
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
-            wendland: params.wendland as f32,
+            smooth_density: params.smooth_density as f32,
             surface_head: missing_head(params) as f32,
-            pad: [0.0; 2],
+            wall_shear: params.wall_shear as f32,
+            pad: 0.0,
         }
     }
 }

@@ -9,9 +9,8 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 12] = [
+pub const SWITCHES: [&str; 11] = [
     "CORRECTED",
-    "CORRECTED_SURFACE",
     "COUPLED",
     "MIXED",
     "MOVING",
@@ -28,7 +27,6 @@ pub const SWITCHES: [&str; 12] = [
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         params.gradient != Gradient::Minimum,
-        params.gradient == Gradient::CorrectedSurface,
         plan.needs(Arrays::Coupling),
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),

@@ -56,7 +56,7 @@ pub(crate) fn nodes(
     half: DVec3,
     faces: Faces,
     least: f64,
-    visit: &mut dyn FnMut(f64, f64, Inside),
+    mut visit: impl FnMut(f64, f64, Inside),
 ) {
     let Some((low, high)) = clip(start, along, length, half) else { return };
     let mut below = [Below::default(); 6];
@@ -161,7 +161,7 @@ mod tests {
     /// Integral of depth^8 over the line and of depth^7 times the outward vector.
     fn integrals(start: DVec3, along: DVec3, half: DVec3, faces: Faces) -> (f64, DVec3) {
         let mut sums = (0.0, DVec3::ZERO);
-        nodes(start, along, 3.0, half, faces, 0.0, &mut |_, width, inside| {
+        nodes(start, along, 3.0, half, faces, 0.0, |_, width, inside| {
             sums.0 += width * inside.depth.powi(8);
             sums.1 += width * inside.depth.powi(7) * inside.outward;
         });

@@ -17,6 +17,24 @@ pub struct Cuboid {
     pub half: DVec3,
 }
 
+impl Cuboid {
+    #[inline]
+    pub(super) fn each_node(
+        &self,
+        (start, along, length): (DVec3, DVec3, f64),
+        faces: Faces,
+        least: f64,
+        visit: impl FnMut(f64, f64, Inside),
+    ) {
+        edges::nodes(start, along, length, self.half, faces, least, visit);
+    }
+
+    /// Part of the stretch `start` + s `along`, s in 0..`length`, inside: range of s.
+    pub(crate) fn clip(&self, start: DVec3, along: DVec3, length: f64) -> Option<(f64, f64)> {
+        edges::clip(start, along, length, self.half)
+    }
+}
+
 impl Geometry for Cuboid {
     fn name(&self) -> &'static str {
         "box"
@@ -60,6 +78,7 @@ impl Geometry for Cuboid {
         (d, beyond * q.signum() / d)
     }
 
+    #[inline]
     fn depth(&self, q: DVec3, faces: Faces) -> Option<Inside> {
         depth::depth(q, self.half, faces)
     }
@@ -74,12 +93,12 @@ impl Geometry for Cuboid {
 
     fn nodes(
         &self,
-        (start, along, length): (DVec3, DVec3, f64),
+        line: (DVec3, DVec3, f64),
         faces: Faces,
         least: f64,
         visit: &mut dyn FnMut(f64, f64, Inside),
     ) {
-        edges::nodes(start, along, length, self.half, faces, least, visit);
+        self.each_node(line, faces, least, visit);
     }
 
     /// n = max(2, round(L / l0)) along an edge, L / n apart, so that the outermost stand half a spacing inside

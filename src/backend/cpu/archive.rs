@@ -1,0 +1,133 @@
+//! The state of the CPU path.
+
+use super::Cpu;
+use crate::checkpoint::Archive;
+use crate::error::{Error, Result};
+use crate::fields::{Fields, State};
+use crate::neighbours::Neighbours;
+use crate::scene::Kind;
+
+impl Cpu {
+    /// Save the particles, or take them over.
+    pub(super) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            // Follows from the case.
+            params,
+            settings: _,
+            groups,
+            solids: _,
+            grid: _,
+            fixed: _,
+            active_set: _,
+            // Made anew in every step before it is used.
+            poses: _,
+            free_bodies: _,
+            fluid_start: _,
+            coordinates: _,
+            moving: _,
+            near_fluid: _,
+            scratch: _,
+            work: _,
+            multigrid: _,
+            // The state.
+            fields,
+            neighbours,
+            live,
+            counters,
+            dt,
+            ledger,
+        } = self;
+        let Fields {
+            position,
+            velocity,
+            kind,
+            id,
+            pressure,
+            number_density,
+            state,
+            // Made anew in every step before they are used.
+            source: _,
+            diagonal: _,
+            acceleration,
+            reaction,
+        } = fields;
+        archive.array("position", position, true)?;
+        archive.array("velocity", velocity, true)?;
+        archive.array("id", id, true)?;
+        archive.array("pressure", pressure, true)?;
+        archive.array("number_density", number_density, true)?;
+        archive.array("acceleration", acceleration, true)?;
+        archive.array("reaction", reaction, true)?;
+        codes(archive, "kind", kind, |k| k as u8, Kind::from_code)?;
+        codes(archive, "state", state, |s| s as u8, State::from_code)?;
+        // The lists of the last step serve viscosity, at the start of the next one.
+        if params.viscosity > 0.0 {
+            lists(archive, neighbours, position.len())?;
+        }
+        counters.exchange(archive)?;
+        // Its pressures and accelerations are made anew in every step.
+        if let Some(ledger) = ledger {
+            ledger.work.exchange(archive, "ledger.water")?;
+        }
+        archive.number("dt", dt)?;
+        let count = kind.iter().take(groups.fluid).filter(|&&k| k == Kind::Fluid).count();
+        let sorted = kind.iter().take(count).all(|&k| k == Kind::Fluid);
+        if !archive.is_saving() {
+            if !sorted || id.iter().any(|&i| i as usize >= groups.fluid) {
+                return Err(Error::Case("the checkpoint's particles are out of order".into()));
+            }
+            *live = count;
+        }
+        Ok(())
+    }
+}
+
+/// Values that are stored as codes of a byte.
+fn codes<T: Copy>(
+    archive: &mut Archive,
+    name: &str,
+    values: &mut [T],
+    to: impl Fn(T) -> u8,
+    from: impl Fn(u8) -> Option<T>,
+) -> Result<()> {
+    let mut bytes: Vec<u8> = values.iter().map(|&v| to(v)).collect();
+    archive.array(name, &mut bytes, true)?;
+    for (value, byte) in values.iter_mut().zip(bytes) {
+        *value = from(byte)
+            .ok_or_else(|| Error::Case(format!("the checkpoint's `{name}` holds a code {byte}")))?;
+    }
+    Ok(())
+}
+
+/// Neighbours of all rows; weights and what else belongs to them are made anew before they are used.
+fn lists(archive: &mut Archive, neighbours: &mut Neighbours, slots: usize) -> Result<()> {
+    let chunks = &mut neighbours.chunks;
+    let mut start: Vec<u32> = chunks.iter().flat_map(|c| c.start.iter().copied()).collect();
+    let mut dummies: Vec<u32> = chunks.iter().flat_map(|c| c.dummies.iter().copied()).collect();
+    let mut neighbour: Vec<u32> = chunks.iter().flat_map(|c| c.neighbour.iter().copied()).collect();
+    archive.array("list_start", &mut start, true)?;
+    archive.array("list_dummies", &mut dummies, true)?;
+    archive.array("list_neighbour", &mut neighbour, false)?;
+    if archive.is_saving() {
+        return Ok(());
+    }
+    let wrong = || Error::Case("the checkpoint's neighbour lists are damaged".into());
+    let (mut starts, mut ends, mut rest) = (&start[..], &dummies[..], &neighbour[..]);
+    for chunk in chunks {
+        let rows = chunk.rows();
+        let (own_starts, other_starts) = starts.split_at(rows + 1);
+        let (own_ends, other_ends) = ends.split_at(rows);
+        let length = own_starts.last().map_or(0, |&n| n as usize);
+        let whole = own_starts.windows(2).zip(own_ends).all(|(s, &d)| s[0] <= d && d <= s[1]);
+        let (own, others) = rest.split_at_checked(length).ok_or_else(wrong)?;
+        if !whole || own_starts.first() != Some(&0) || own.iter().any(|&j| j as usize >= slots) {
+            return Err(wrong());
+        }
+        chunk.start = own_starts.to_vec();
+        chunk.dummies = own_ends.to_vec();
+        chunk.neighbour = own.to_vec();
+        chunk.weight.clear();
+        (starts, ends, rest) = (other_starts, other_ends, others);
+    }
+    if rest.is_empty() { Ok(()) } else { Err(wrong()) }
+}

@@ -1,0 +1,150 @@
+//! The state of a run as named numbers and arrays.
+//!
+//! One function of each part both saves and restores it, and takes the part to pieces without `..`, so that a new
+//! field is either in the state or left out by name.
+
+use crate::error::{Error, Result};
+use bytemuck::Pod;
+use std::collections::BTreeMap;
+
+/// An array of the state.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Section {
+    /// Bytes of an element, for the shuffle: 1, 4 or 8.
+    pub width: usize,
+    /// The elements, as they lie in memory.
+    pub bytes: Vec<u8>,
+}
+
+/// The state of a run, on its way out or in.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Archive {
+    saving: bool,
+    /// Single numbers, bit by bit.
+    pub numbers: BTreeMap<String, u64>,
+    /// Arrays.
+    pub sections: BTreeMap<String, Section>,
+}
+
+impl Archive {
+    /// An empty state, to be filled.
+    pub fn new() -> Self {
+        Self { saving: true, ..Self::default() }
+    }
+
+    /// A state that was read, to be taken over.
+    pub fn read(numbers: BTreeMap<String, u64>, sections: BTreeMap<String, Section>) -> Self {
+        Self { saving: false, numbers, sections }
+    }
+
+    /// The same state, to be taken over.
+    pub fn to_restore(&self) -> Self {
+        Self { saving: false, ..self.clone() }
+    }
+
+    /// Whether values go into the state (or come out of it).
+    pub fn is_saving(&self) -> bool {
+        self.saving
+    }
+
+    fn missing(name: &str) -> Error {
+        Error::Case(format!(
+            "the checkpoint holds no `{name}`: another version of seixo, or another case, wrote it"
+        ))
+    }
+
+    /// A count.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if the state has none of this name; so with all of these.
+    pub fn count(&mut self, name: &str, value: &mut u64) -> Result<()> {
+        if self.saving {
+            self.numbers.insert(name.to_owned(), *value);
+        } else {
+            *value = *self.numbers.get(name).ok_or_else(|| Self::missing(name))?;
+        }
+        Ok(())
+    }
+
+    /// A count of `what` that must be the same in the state and in the case.
+    ///
+    /// # Errors
+    /// [`Error::Case`] with both counts if they differ.
+    pub fn same(&mut self, what: &str, count: u64) -> Result<()> {
+        let mut held = count;
+        self.count(what, &mut held)?;
+        if held == count {
+            return Ok(());
+        }
+        Err(Error::Case(format!("the checkpoint holds {held} {what}, the case {count}: their scenes differ")))
+    }
+
+    /// A number, to the last bit.
+    ///
+    /// # Errors
+    /// As [`Archive::count`].
+    pub fn number(&mut self, name: &str, value: &mut f64) -> Result<()> {
+        let mut bits = value.to_bits();
+        self.count(name, &mut bits)?;
+        *value = f64::from_bits(bits);
+        Ok(())
+    }
+
+    /// A small count.
+    ///
+    /// # Errors
+    /// As [`Archive::count`].
+    pub fn small(&mut self, name: &str, value: &mut u32) -> Result<()> {
+        let mut wide = u64::from(*value);
+        self.count(name, &mut wide)?;
+        *value = u32::try_from(wide).map_err(|_| Self::missing(name))?;
+        Ok(())
+    }
+
+    /// A switch.
+    ///
+    /// # Errors
+    /// As [`Archive::count`].
+    pub fn switch(&mut self, name: &str, value: &mut bool) -> Result<()> {
+        let mut wide = u64::from(*value);
+        self.count(name, &mut wide)?;
+        *value = wide != 0;
+        Ok(())
+    }
+
+    /// An array, of the length that it has if `fixed`.
+    ///
+    /// # Errors
+    /// As [`Archive::count`], and if the length differs.
+    pub fn array<T: Pod>(&mut self, name: &str, values: &mut Vec<T>, fixed: bool) -> Result<()> {
+        if self.saving {
+            let width = if size_of::<T>() % 8 == 0 {
+                8
+            } else if size_of::<T>() % 4 == 0 {
+                4
+            } else {
+                1
+            };
+            self.bytes(name, width, bytemuck::cast_slice(values).to_vec());
+            return Ok(());
+        }
+        let section = self.sections.get(name).ok_or_else(|| Self::missing(name))?;
+        let count = section.bytes.len() / size_of::<T>();
+        if section.bytes.len() % size_of::<T>() != 0 || fixed && count != values.len() {
+            let want = values.len();
+            return Err(Error::Case(format!("the checkpoint holds {count} of `{name}`, the case {want}")));
+        }
+        *values = bytemuck::pod_collect_to_vec(&section.bytes);
+        Ok(())
+    }
+
+    /// Put in an array of elements of `width` bytes.
+    pub fn bytes(&mut self, name: &str, width: usize, bytes: Vec<u8>) {
+        self.sections.insert(name.to_owned(), Section { width, bytes });
+    }
+
+    /// Bytes of all arrays.
+    pub fn size(&self) -> usize {
+        self.sections.values().map(|s| s.bytes.len()).sum()
+    }
+}

@@ -1,0 +1,7 @@
+//! Checkpoints: the whole state of a run, so that it goes on as if it had never stopped.
+
+pub mod archive;
+pub mod file;
+
+pub use archive::Archive;
+pub use file::{Found, Origin};

@@ -1,0 +1,107 @@
+//! The state of the solids, and of the lists of what may touch.
+
+use super::Solids;
+use super::candidates::Candidates;
+use super::substeps::{Cut, Limits};
+use crate::body::{Pose, Wrench};
+use crate::checkpoint::Archive;
+use crate::compute::Compute;
+use crate::error::Result;
+use glam::{DQuat, DVec3};
+
+/// A pose as numbers.
+const POSE: usize = 13;
+
+fn numbers(pose: &Pose) -> [f64; POSE] {
+    let Pose { position: x, orientation: q, velocity: v, angular_velocity: w } = *pose;
+    [x.x, x.y, x.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z]
+}
+
+fn pose(n: &[f64]) -> Pose {
+    Pose {
+        position: DVec3::new(n[0], n[1], n[2]),
+        orientation: DQuat::from_xyzw(n[3], n[4], n[5], n[6]),
+        velocity: DVec3::new(n[7], n[8], n[9]),
+        angular_velocity: DVec3::new(n[10], n[11], n[12]),
+    }
+}
+
+impl Solids {
+    /// Save the solids, or take them over. The lists of points that may touch are made anew, in the poses that they
+    /// were made in: sums over them run in the same order.
+    pub(crate) fn exchange(
+        &mut self,
+        archive: &mut Archive,
+        compute: Option<&mut dyn Compute>,
+    ) -> Result<()> {
+        let Self {
+            // Follows from the case.
+            names: _,
+            gravity: _,
+            spacing,
+            law: _,
+            limits,
+            // Made anew in every step, or from the state, or counters.
+            poses: _,
+            predicted: _,
+            traffic: _,
+            load: _,
+            bodies,
+            contact,
+            candidates,
+            planned,
+        } = self;
+        let Limits {
+            spring: _,
+            damping: _,
+            viscous_friction: _,
+            friction: _,
+            forced: _,
+            lambda: _,
+            lightest: _,
+            fastest: _,
+            falling: _,
+            longest_step,
+        } = limits;
+        archive.number("solids.longest_step", longest_step)?;
+        let none = Cut { substeps: 1, omega_dt: 0.0 };
+        let (mut dt, Cut { mut substeps, mut omega_dt }) = planned.unwrap_or((-1.0, none));
+        archive.number("solids.planned_step", &mut dt)?;
+        archive.number("solids.planned_omega_dt", &mut omega_dt)?;
+        archive.small("solids.planned_substeps", &mut substeps)?;
+        *planned = Some((dt, Cut { substeps, omega_dt })).filter(|p| p.0 > 0.0);
+        let mut now: Vec<[f64; POSE]> = bodies.iter().map(|b| numbers(&b.pose)).collect();
+        let mut momenta: Vec<DVec3> = bodies.iter().map(|b| b.momentum).collect();
+        let mut wrenches: Vec<[DVec3; 2]> = contact.iter().map(|w| [w.force, w.torque]).collect();
+        archive.array("solids.pose", &mut now, true)?;
+        archive.array("solids.momentum", &mut momenta, true)?;
+        archive.array("solids.contact", &mut wrenches, true)?;
+        let Candidates { travel, skin: _, valid, generation: _, close: _, made, made_dt } = candidates;
+        let mut made_numbers: Vec<[f64; POSE]> = made.iter().map(numbers).collect();
+        archive.array("solids.listed_pose", &mut made_numbers, true)?;
+        archive.array("solids.travel", travel, true)?;
+        archive.switch("solids.listed", valid)?;
+        archive.number("solids.listed_step", made_dt)?;
+        if archive.is_saving() {
+            return Ok(());
+        }
+        let (listed, dt_listed, travelled, spacing) = (*valid, *made_dt, travel.clone(), *spacing);
+        candidates.forget();
+        if listed {
+            bodies.iter_mut().zip(&made_numbers).for_each(|(b, n)| b.restore(pose(n), DVec3::ZERO));
+            candidates.refresh(bodies, spacing, dt_listed);
+            let step = dt.max(f64::MIN_POSITIVE);
+            self.evaluate(compute, step / f64::from(substeps.max(1)), step)?;
+            self.candidates.travel = travelled;
+        }
+        if let Some(law) = &mut self.law {
+            law.moved();
+        }
+        for (k, body) in self.bodies.iter_mut().enumerate() {
+            body.restore(pose(&now[k]), momenta[k]);
+            self.poses[k] = body.pose;
+            self.contact[k] = Wrench { force: wrenches[k][0], torque: wrenches[k][1] };
+        }
+        Ok(())
+    }
+}

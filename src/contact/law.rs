@@ -1,0 +1,122 @@
+//! What a contact law is: its search, its forces, what follows from them. A law is one folder here and one arm
+//! of [`of_case`].
+
+use super::candidates::Candidates;
+use super::device::Link;
+use super::probe::Probe;
+use super::substeps::{Limits, Worst};
+use super::{paper, pressure, smooth};
+use crate::body::{Body, Wrench};
+use crate::case;
+use crate::error::Result;
+use crate::scene::Scene;
+
+/// What a law sees of the solids.
+#[derive(Clone, Copy)]
+pub(crate) struct Now<'a> {
+    pub bodies: &'a [Body],
+    /// Which solids are close.
+    pub candidates: &'a Candidates,
+    pub limits: &'a Limits,
+    /// Length of a sub-step [s].
+    pub substep: f64,
+}
+
+/// What the last evaluation found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Summary {
+    /// Particle pairs or surface points in contact.
+    pub points: usize,
+    /// Pairs of solids in contact.
+    pub solids: usize,
+    /// Energy stored [J].
+    pub energy: f64,
+    /// Deepest contact [m].
+    pub depth: f64,
+}
+
+impl Summary {
+    /// Takes in a pair of solids.
+    pub fn add(&mut self, points: usize, energy: f64, depth: f64) {
+        self.points += points;
+        self.solids += usize::from(points > 0);
+        self.energy += energy;
+        self.depth = self.depth.max(depth);
+    }
+}
+
+/// Why a law cannot go on.
+#[derive(Clone, Debug)]
+pub(crate) struct Fault {
+    /// The solid that it is about.
+    pub a: usize,
+    /// The other one: a solid, or the name of a wall.
+    pub b: std::result::Result<usize, String>,
+    /// What the first one does, said of it.
+    pub what: String,
+}
+
+/// A contact law.
+pub(crate) trait Law: Send {
+    /// Searches what may touch where the lists no longer hold, and evaluates the forces, on a device if there is
+    /// one and the law has a kernel for these solids.
+    fn evaluate(&mut self, now: Now, device: Option<Link>) -> Result<()>;
+
+    /// Adds the wrenches of the last evaluation to `load`, one per solid.
+    fn add_loads(&self, load: &mut [Wrench]);
+
+    /// What acts on velocities, after the forces of a sub-step of `h` [s]: friction, or impulses. Returns how many
+    /// points and how many pairs of solids it acted on if that is all there is to the law.
+    fn act(&mut self, bodies: &mut [Body], limits: &Limits, h: f64) -> Summary;
+
+    /// What the last evaluation found.
+    fn summary(&self) -> Summary;
+
+    /// Whether the last evaluation has left what the law can be trusted with.
+    fn fault(&self, _: Now) -> Option<Fault> {
+        None
+    }
+
+    /// Sub-steps of a step of `dt` [s] at which no solid can go through another between two of them.
+    fn hurry(&self, _: Now, _: f64) -> std::result::Result<u32, Fault> {
+        Ok(1)
+    }
+
+    /// The solids have been put elsewhere, and the lists are no longer theirs.
+    fn forget(&mut self) {}
+
+    /// The solids have been put elsewhere, where the lists still hold: what was deep before says nothing.
+    fn moved(&mut self) {}
+
+    /// Energy stored at the poses of `now` [J], by the host alone.
+    fn energy(&mut self, now: Now) -> f64;
+
+    /// What the worst contact asks of the step `dt` [s].
+    fn worst(&self, limits: &Limits, bodies: &[Body], dt: f64) -> Worst;
+
+    /// K [N/m] that stops a body of kinetic energy `energy` / 2 [J], and what happens with a softer one; `None` if
+    /// there is no spring.
+    fn spring(&self, energy: f64) -> Option<(f64, &'static str)>;
+
+    /// Whether contacts that the sub-steps cannot carry are softened.
+    fn softens(&self) -> bool {
+        false
+    }
+
+    /// Candidates and patches of the last evaluation, for comparisons.
+    fn probe(&mut self, bodies: &[Body], device: Option<Link>, probe: &mut Probe) -> Result<()>;
+}
+
+/// The law that `contact` asks for, and the stiffness of contact for each body.
+pub(super) fn of_case(
+    contact: &case::Contact,
+    scene: &Scene,
+    bodies: &[Body],
+    limits: &mut Limits,
+) -> Result<Box<dyn Law>> {
+    Ok(match contact.law {
+        case::Law::Smooth => Box::new(smooth::Smooth::new(scene, bodies, limits)),
+        case::Law::Paper => Box::new(paper::Paper::new(contact, scene, bodies, limits)?),
+        case::Law::Pressure => Box::new(pressure::Pressure::new(scene)),
+    })
+}

@@ -1,0 +1,71 @@
+//! Which particles of two wall layers may come close.
+
+use super::pair::{Layer, Pair, Walls};
+use crate::body::Body;
+use crate::contact::broad::PointGrid;
+use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::scene::Scene;
+use rayon::prelude::*;
+
+/// Wall layers and lists of the pairs that may touch; the baseline has the same.
+pub(crate) struct Lists {
+    pub layers: Vec<Layer>,
+    pub walls: Walls,
+    pub pairs: Vec<Pair>,
+    generation: u64,
+}
+
+impl Lists {
+    pub fn new(scene: &Scene) -> Self {
+        let layers = scene.solids.iter().map(|s| Layer {
+            offsets: s.wall_offset.clone(),
+            normals: s.wall_area.iter().map(|a| a.normalize_or_zero()).collect(),
+        });
+        let positions = scene.position[scene.groups.static_wall_range()].to_vec();
+        Self {
+            layers: layers.collect(),
+            walls: Walls {
+                grid: PointGrid::new(positions, 2.0 * scene.spacing),
+                normals: scene.static_wall_normal.clone(),
+            },
+            pairs: vec![],
+            generation: 0,
+        }
+    }
+
+    /// Whether the lists are those of `candidates`.
+    pub fn is_current(&self, candidates: &Candidates) -> bool {
+        self.generation == candidates.generation()
+    }
+
+    /// Pairs of solids that are close, each with the reach of its particles [m]; without particles.
+    pub fn close(&self, candidates: &Candidates, bodies: &[Body], distance: f64) -> Vec<(Pair, f64)> {
+        let mut pairs: Vec<(Pair, f64)> = vec![];
+        for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
+            let reach = body.extent() + candidates.skin(a) + distance;
+            if self.walls.grid.meets(&(body.pose.position - reach, body.pose.position + reach)) {
+                pairs.push((Pair::new(a, None), distance + candidates.skin(a)));
+            }
+        }
+        for &(a, b) in &candidates.close {
+            let reach = distance + candidates.skin(a) + candidates.skin(b);
+            pairs.push((Pair::new(a, Some(b)), reach));
+        }
+        pairs
+    }
+
+    /// Makes the lists of particle pairs within `distance` [m].
+    pub fn collect(&mut self, candidates: &Candidates, bodies: &[Body], distance: f64) {
+        self.generation = candidates.generation();
+        let pairs = self.close(candidates, bodies, distance);
+        let fill = |(mut pair, reach): (Pair, f64)| {
+            pair.collect(bodies, &self.layers, &self.walls, reach);
+            (!pair.candidates.is_empty()).then_some(pair)
+        };
+        self.pairs = if pairs.len() >= MANY_PAIRS {
+            pairs.into_par_iter().filter_map(fill).collect()
+        } else {
+            pairs.into_iter().filter_map(fill).collect()
+        };
+    }
+}

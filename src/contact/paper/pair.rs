@@ -1,0 +1,154 @@
+//! Eqs. (10) to (14) for a pair of solids.
+
+use crate::body::{Body, Wrench};
+use crate::contact::broad::PointGrid;
+use glam::DVec3;
+
+/// Constants of the law.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Constants {
+    /// K [N/m].
+    pub spring: f64,
+    /// C [kg/s].
+    pub damping: f64,
+    /// eta [kg/s].
+    pub viscous_friction: f64,
+    /// d_c = sqrt(1.5) l0 [m].
+    pub distance: f64,
+    /// Whether forces turn bodies.
+    pub torque: bool,
+}
+
+/// The wall layer of a solid: offsets from its centre and unit normals, solid's frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Layer {
+    pub offsets: Vec<DVec3>,
+    pub normals: Vec<DVec3>,
+}
+
+/// The fixed wall particles.
+#[derive(Clone, Debug)]
+pub(crate) struct Walls {
+    pub grid: PointGrid,
+    pub normals: Vec<DVec3>,
+}
+
+/// A free solid and what it may touch: candidates (i, j), found once and kept while nothing has moved
+/// further than the skin.
+#[derive(Clone, Debug)]
+pub(crate) struct Pair {
+    /// A free solid.
+    pub a: usize,
+    /// Another solid, or the fixed walls.
+    pub b: Option<usize>,
+    /// Candidates: particle of `a`, particle of `b`.
+    pub candidates: Vec<(u32, u32)>,
+    /// Wrench on `a` and on `b`, of the last evaluation.
+    pub wrench: [Wrench; 2],
+    /// Pairs of particles within d_c, n_c.
+    pub count: usize,
+    /// Mean over the pairs of K (d_c - d)^2 / 2 [J].
+    pub energy: f64,
+    /// Smallest distance of two particles [m].
+    pub closest: f64,
+    /// Force on `a` along the normals [N].
+    pub normal_force: f64,
+}
+
+impl Pair {
+    pub fn new(a: usize, b: Option<usize>) -> Self {
+        Self {
+            a,
+            b,
+            candidates: vec![],
+            wrench: Default::default(),
+            count: 0,
+            energy: 0.0,
+            closest: f64::INFINITY,
+            normal_force: 0.0,
+        }
+    }
+
+    /// Candidates within `reach` [m].
+    pub fn collect(&mut self, bodies: &[Body], layers: &[Layer], walls: &Walls, reach: f64) {
+        self.candidates.clear();
+        let body = &bodies[self.a];
+        let at = |body: &Body, offset: DVec3| body.pose.position + body.rotation * offset;
+        let offsets = layers[self.a].offsets.iter().enumerate();
+        match self.b {
+            None => {
+                for (i, o) in offsets {
+                    walls.grid.near(at(body, *o), reach, |j| self.candidates.push((i as u32, j)));
+                }
+            }
+            Some(b) => {
+                // only what lies inside the other's box, widened by the reach
+                let near = |own: &Body, layer: &Layer, other: &Body| {
+                    let inside = |x: &DVec3| {
+                        let q = other.rotation.transpose() * (*x - other.pose.position);
+                        other.shape.outside(q) < reach
+                    };
+                    let points = layer.offsets.iter().enumerate().map(|(k, o)| (k as u32, at(own, *o)));
+                    points.filter(|(_, x)| inside(x)).collect::<Vec<_>>()
+                };
+                let theirs = near(&bodies[b], &layers[b], body);
+                for (i, x) in near(body, &layers[self.a], &bodies[b]) {
+                    let close = theirs.iter().filter(|(_, y)| y.distance_squared(x) < reach * reach);
+                    self.candidates.extend(close.map(|(j, _)| (i, *j)));
+                }
+            }
+        }
+    }
+
+    /// Eq. (14) at the bodies' poses and velocities.
+    pub fn evaluate(&mut self, law: &Constants, bodies: &[Body], layers: &[Layer], walls: &Walls) {
+        let a = &bodies[self.a];
+        let mut sum = [Wrench::default(); 2];
+        let (mut count, mut energy, mut closest, mut normal_force) = (0, 0.0, f64::INFINITY, 0.0);
+        let mut last = u32::MAX;
+        let (mut x_i, mut v_i) = (DVec3::ZERO, DVec3::ZERO);
+        for &(i, j) in &self.candidates {
+            if i != last {
+                x_i = a.pose.position + a.rotation * layers[self.a].offsets[i as usize];
+                v_i = a.pose.velocity_at(x_i);
+                last = i;
+            }
+            let x_j = match self.b {
+                None => walls.grid.point(j),
+                Some(b) => bodies[b].pose.position + bodies[b].rotation * layers[b].offsets[j as usize],
+            };
+            let r = x_j - x_i;
+            let squared = r.length_squared();
+            if squared >= law.distance * law.distance || squared == 0.0 {
+                continue;
+            }
+            let (v_j, normal) = match self.b {
+                None => (DVec3::ZERO, walls.normals[j as usize]),
+                Some(b) => {
+                    (bodies[b].pose.velocity_at(x_j), bodies[b].rotation * layers[b].normals[j as usize])
+                }
+            };
+            let d = squared.sqrt();
+            let e = r / d;
+            let v = v_j - v_i;
+            let along = (-law.spring * (law.distance - d) * e + law.damping * v).dot(normal);
+            let force = along * normal + law.viscous_friction * (v - v.dot(e) * e);
+            count += 1;
+            normal_force += along;
+            energy += 0.5 * law.spring * (law.distance - d).powi(2);
+            closest = closest.min(d);
+            sum[0] += Wrench { force, torque: (x_i - a.pose.position).cross(force) };
+            if let Some(b) = self.b {
+                let arm = x_i - bodies[b].pose.position;
+                sum[1] += Wrench { force: -force, torque: -arm.cross(force) };
+            }
+        }
+        let share = 1.0 / count.max(1) as f64;
+        self.wrench = sum.map(|w| Wrench {
+            force: w.force * share,
+            torque: if law.torque { w.torque * share } else { DVec3::ZERO },
+        });
+        (self.count, self.energy, self.closest) = (count, energy * share, closest);
+        self.normal_force = normal_force * share;
+    }
+}

@@ -1,0 +1,55 @@
+//! Eq. (18) for a pair of solids.
+
+use crate::body::Body;
+use crate::contact::paper::{Layer, Pair, Walls};
+use glam::DVec3;
+
+/// Applies Eq. (18) to the candidates of `pair` within `distance` = a l0 [m], restitution `b` [-].
+/// Returns how many pairs collided.
+pub(crate) fn collide(
+    pair: &Pair,
+    bodies: &mut [Body],
+    layers: &[Layer],
+    walls: &Walls,
+    distance: f64,
+    restitution: f64,
+) -> usize {
+    let mut count = 0;
+    for &(i, j) in &pair.candidates {
+        let at =
+            |k: usize, n: u32| bodies[k].pose.position + bodies[k].rotation * layers[k].offsets[n as usize];
+        let x_i = at(pair.a, i);
+        let x_j = pair.b.map_or_else(|| walls.grid.point(j), |b| at(b, j));
+        let r = x_j - x_i;
+        let d = r.length();
+        if d >= distance || d == 0.0 {
+            continue;
+        }
+        let e = r / d;
+        let middle = x_i + 0.5 * r;
+        let velocity_b = pair.b.map_or(DVec3::ZERO, |b| bodies[b].pose.velocity_at(middle));
+        let approach = (bodies[pair.a].pose.velocity_at(middle) - velocity_b).dot(e);
+        if approach <= 0.0 {
+            continue;
+        }
+        count += 1;
+        let give = |body: &Body| {
+            let turning = (middle - body.pose.position).cross(e);
+            e.dot(body.inverse_mass * e) + turning.dot(body.inverse_inertia * turning)
+        };
+        let response = give(&bodies[pair.a]) + pair.b.map_or(0.0, |b| give(&bodies[b]));
+        if response <= 0.0 {
+            continue;
+        }
+        let impulse = -(1.0 + restitution) * approach / response * e;
+        let kick = |body: &mut Body, impulse: DVec3| {
+            let angular = (middle - body.pose.position).cross(impulse);
+            body.kick(impulse, angular);
+        };
+        kick(&mut bodies[pair.a], impulse);
+        if let Some(b) = pair.b {
+            kick(&mut bodies[b], -impulse);
+        }
+    }
+    count
+}

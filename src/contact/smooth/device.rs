@@ -1,0 +1,436 @@
+//! The smooth law on a device: what shaders/contact_smooth.wgsl is given, and what becomes of its answers.
+
+use super::pair::{Contact, DeviceSums, Other, Pair, Patch};
+use super::{Smooth, set_constants};
+use crate::body::{Body, Wrench};
+use crate::compute::{Program, buffers, kernels, shader_structs};
+use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::contact::device::{Link, four, place, three, vector};
+use crate::contact::substeps::Limits;
+use crate::error::Result;
+use crate::shape::Surface;
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// Coordinates this close to the largest or smallest of a solid, over its size, are taken as equal to it: points
+/// of a face then lie in one plane in f32 too.
+const SNAP: f64 = 1e-9;
+/// The search takes in what f32 cannot tell from the skin, over the size of the solids.
+const ROUNDING: f64 = 1e-6;
+
+/// See `SmoothPair` in shaders/contact_smooth.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct SmoothPair {
+    pub low_a: [f32; 3],
+    pub spring: f32,
+    pub high_a: [f32; 3],
+    pub stop: f32,
+    pub low_b: [f32; 3],
+    pub stop_depth: f32,
+    pub high_b: [f32; 3],
+    pub damping: f32,
+    pub half_a: [f32; 3],
+    pub step: f32,
+    pub first: [u32; 2],
+    pub count: [u32; 2],
+    pub near: [u32; 2],
+    pub faces: [u32; 2],
+    pub list: u32,
+    pub sum: u32,
+    pub share: f32,
+    pub skin: f32,
+    pub open: u32,
+    pub pad: [u32; 3],
+}
+
+/// See `SmoothPose` in shaders/contact_smooth.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct SmoothPose {
+    pub row_x: [f32; 4],
+    pub row_y: [f32; 4],
+    pub row_z: [f32; 4],
+    pub spin: [f32; 4],
+    pub below_b: [f32; 4],
+    pub above_b: [f32; 4],
+    pub below_a: [f32; 4],
+    pub above_a: [f32; 4],
+    pub found: [f32; 4],
+    pub given: [u32; 4],
+}
+
+shader_structs!(SmoothPair, SmoothPose);
+kernels!(contact_smooth[64]: search force);
+buffers! {
+    contact_point: [f32; 4], Writes;
+    smooth_pair: SmoothPair, Writes;
+    smooth_pose: SmoothPose, Writes;
+    contact_list: u32, Reads;
+    contact_count: [u32; 2], Reads;
+    contact_state: [f32; 4], None;
+    contact_sum: [f32; 4], Reads;
+    /// As `contact_state`.
+    contact_given: [f32; 4], Writes;
+}
+
+/// The law on a device.
+pub const PROGRAM: Program = Program {
+    name: "contact_smooth",
+    text: contact_smooth::TEXT,
+    kernels: contact_smooth::ALL,
+    buffers: buffer::ALL,
+};
+
+/// Points in their frame, and the box around them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cloud {
+    first: u32,
+    count: u32,
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Cloud {
+    /// Adds `points` to `out`, each with its weight.
+    fn add(out: &mut Vec<[f32; 4]>, points: &[DVec3], weight: impl Fn(usize) -> f64) -> Result<Self> {
+        let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let near = SNAP * (high - low).max_element();
+        let first = place(out.len())?;
+        for (k, p) in points.iter().enumerate() {
+            let snapped = DVec3::from_array([0, 1, 2].map(|axis| match p[axis] {
+                x if x - low[axis] < near => low[axis],
+                x if high[axis] - x < near => high[axis],
+                x => x,
+            }));
+            out.push(four(snapped, weight(k)));
+        }
+        if points.is_empty() {
+            return Ok(Self { first, ..Self::default() });
+        }
+        Ok(Self { first, count: points.len() as u32, low, high })
+    }
+}
+
+/// The smooth law's pairs on a device.
+pub(crate) struct Pairs {
+    generation: u64,
+    clouds: Vec<Cloud>,
+    /// Pairs with points near each other, and of each what the device knows.
+    pub pairs: Vec<Pair>,
+    records: Vec<SmoothPair>,
+    poses: Vec<SmoothPose>,
+    /// Contacts found beside the device that it takes in.
+    given: Vec<[[f32; 4]; 3]>,
+    states: usize,
+    sums: usize,
+    /// Sub-step and longest step [s] that the device has the constants of.
+    constants: Option<(f64, f64)>,
+    sent: bool,
+}
+
+impl Pairs {
+    /// Gives the device the points of all solids.
+    pub fn new(surfaces: &[Surface], link: &mut Link) -> Result<Self> {
+        let mut points = vec![];
+        let clouds = surfaces
+            .iter()
+            .map(|s| Cloud::add(&mut points, &s.points, |k| s.weights[k]))
+            .collect::<Result<_>>()?;
+        link.write(buffer::contact_point, &points)?;
+        Ok(Self {
+            generation: 0,
+            clouds,
+            pairs: vec![],
+            records: vec![],
+            poses: vec![],
+            given: vec![],
+            states: 0,
+            sums: 0,
+            constants: None,
+            sent: false,
+        })
+    }
+
+    /// Whether the lists are those of `candidates`.
+    pub fn is_current(&self, candidates: &Candidates) -> bool {
+        self.generation == candidates.generation()
+    }
+
+    /// Searches the pairs anew.
+    pub fn search(
+        &mut self,
+        model: &Smooth,
+        candidates: &Candidates,
+        bodies: &[Body],
+        link: &mut Link,
+    ) -> Result<()> {
+        let mut list = 0;
+        let before = std::mem::take(&mut self.pairs);
+        self.records.clear();
+        for (mut pair, skin) in model.close(candidates, bodies) {
+            let (body, own) = (&bodies[pair.a], self.clouds[pair.a]);
+            let (theirs, faces_b, share) = match pair.b {
+                Other::Solid(b) => (self.clouds[b], model.surfaces[b].all_faces, 0.5),
+                Other::Wall(w) => (Cloud::default(), model.walls[w].faces, 1.0),
+            };
+            pair.collect_edges(bodies, &model.surfaces, &model.walls, skin);
+            let size = body.radius() + theirs.low.length().max(theirs.high.length());
+            self.records.push(SmoothPair {
+                low_a: three(own.low),
+                high_a: three(own.high),
+                low_b: three(theirs.low),
+                high_b: three(theirs.high),
+                half_a: three(body.shape.extent(DMat3::IDENTITY)),
+                first: [own.first, theirs.first],
+                count: [own.count, theirs.count],
+                faces: [u32::from(faces_b), u32::from(model.surfaces[pair.a].all_faces)],
+                list: place(list)?,
+                share: share as f32,
+                skin: (skin + ROUNDING * size) as f32,
+                ..SmoothPair::default()
+            });
+            list += (own.count + theirs.count) as usize;
+            self.pairs.push(pair);
+        }
+        if !self.pairs.is_empty() {
+            self.place_poses(model, bodies)?;
+            link.write(buffer::smooth_pair, &self.records)?;
+            link.write(buffer::smooth_pose, &self.poses)?;
+            link.reserve(buffer::contact_list, list)?;
+            link.reserve(buffer::contact_count, self.pairs.len())?;
+            link.run(&[(contact_smooth::search, self.pairs.len() as u64)])?;
+            let near = link.read(buffer::contact_count, self.pairs.len())?;
+            self.keep(&near)?;
+            link.reserve(buffer::contact_sum, self.sums)?;
+        }
+        Smooth::carry(&before, self.generation == 0, &mut self.pairs);
+        self.generation = candidates.generation();
+        (self.constants, self.sent) = (None, false);
+        Ok(())
+    }
+
+    /// Keeps the pairs with points near each other and gives each its place.
+    fn keep(&mut self, near: &[[u32; 2]]) -> Result<()> {
+        let mut sum = 0;
+        let (pairs, records) = (std::mem::take(&mut self.pairs), std::mem::take(&mut self.records));
+        for ((pair, mut record), &near) in pairs.into_iter().zip(records).zip(near) {
+            if near == [0, 0] && pair.is_empty() {
+                continue;
+            }
+            record.near = near;
+            // Faces that points, edges or corners of the other may press.
+            let pressed = [
+                near[0] > 0 || !pair.edges_a.is_empty(),
+                near[1] > 0 || !pair.edges_b.is_empty() || !pair.samples.is_empty(),
+            ];
+            let [on_b, on_a] = [0, 1].map(|k| if pressed[k] { record.faces[k] } else { 0 });
+            record.open = on_b | on_a << 6;
+            record.sum = place(sum)?;
+            sum += 1 + 3 * slots(&record).count();
+            self.pairs.push(pair);
+            self.records.push(record);
+        }
+        self.sums = sum;
+        Ok(())
+    }
+
+    /// Constants of every pair for sub-steps of `h` [s].
+    pub fn set_constants(&mut self, model: &Smooth, limits: &Limits, bodies: &[Body], spacing: f64, h: f64) {
+        let wanted = Some((h, limits.longest_step));
+        if self.constants != wanted {
+            set_constants(&mut self.pairs, &model.surfaces, limits, bodies, spacing, h);
+            (self.constants, self.sent) = (wanted, false);
+        }
+    }
+
+    /// How each pair lies now, and what the host finds beside the points.
+    fn place_poses(&mut self, model: &Smooth, bodies: &[Body]) -> Result<()> {
+        let clouds = &self.clouds;
+        let of = |(pair, record): (&mut Pair, &SmoothPair)| {
+            let (surfaces, walls) = (&model.surfaces, &model.walls);
+            let found = pair.find_beside_device(bodies, surfaces, walls, model.spacing, record.open);
+            let [deepest, eighth, sixth] = found.map(|x| x as f32);
+            SmoothPose { found: [deepest, eighth, sixth, 0.0], ..pose(pair, clouds, model, bodies) }
+        };
+        if self.pairs.len() >= MANY_PAIRS {
+            self.pairs.par_iter_mut().zip(&self.records).map(of).collect_into_vec(&mut self.poses);
+        } else {
+            self.poses.clear();
+            self.poses.extend(self.pairs.iter_mut().zip(&self.records).map(of));
+        }
+        self.given.clear();
+        let mut state = 0;
+        for ((pose, pair), record) in self.poses.iter_mut().zip(&self.pairs).zip(&self.records) {
+            let count = pair.given.len();
+            pose.given = [place(self.given.len())?, place(count)?, place(state)?, 0];
+            state += 3 * (record.near.iter().sum::<u32>() as usize + count);
+            let a = &bodies[pair.a];
+            self.given.extend(pair.given.iter().map(|c| given(c, a)));
+        }
+        self.states = state;
+        Ok(())
+    }
+
+    /// Normal forces of all pairs at the bodies' poses and velocities.
+    pub fn evaluate(&mut self, model: &Smooth, bodies: &[Body], link: &mut Link) -> Result<()> {
+        if self.pairs.is_empty() {
+            return Ok(());
+        }
+        self.place_poses(model, bodies)?;
+        link.reserve(buffer::contact_state, self.states)?;
+        if !self.sent {
+            for (record, pair) in self.records.iter_mut().zip(&self.pairs) {
+                let c = &pair.constants;
+                (record.spring, record.stop) = (c.spring as f32, c.stop as f32);
+                (record.stop_depth, record.damping) = (c.stop_depth as f32, c.damping as f32);
+                record.step = c.step as f32;
+            }
+            link.write(buffer::smooth_pair, &self.records)?;
+            self.sent = true;
+        }
+        link.write(buffer::smooth_pose, &self.poses)?;
+        link.write(buffer::contact_given, self.given.as_flattened())?;
+        link.run(&[(contact_smooth::force, self.pairs.len() as u64)])?;
+        let sums = link.read(buffer::contact_sum, self.sums)?;
+        let take = |(pair, record): (&mut Pair, &SmoothPair)| {
+            let sums = read(pair, record, &sums[record.sum as usize..], bodies);
+            pair.join(&sums, bodies);
+        };
+        if self.pairs.len() >= MANY_PAIRS {
+            self.pairs.par_iter_mut().zip(&self.records).for_each(take);
+        } else {
+            self.pairs.iter_mut().zip(&self.records).for_each(take);
+        }
+        Ok(())
+    }
+
+    /// Points on the lists: pair, side and place (world) of each.
+    pub fn listed(
+        &self,
+        surfaces: &[Surface],
+        bodies: &[Body],
+        link: &mut Link,
+    ) -> Result<Vec<(usize, Other, u8, DVec3)>> {
+        let end = self.records.iter().map(|r| r.list + r.count[0] + r.count[1]).max();
+        let list = link.read(buffer::contact_list, end.unwrap_or(0) as usize)?;
+        let mut out = vec![];
+        for (pair, record) in self.pairs.iter().zip(&self.records) {
+            for (side, solid) in [(0, Some(pair.a)), (1, pair.b.solid())] {
+                let Some(solid) = solid else { continue };
+                let from = record.list + if side == 1 { record.count[0] } else { 0 };
+                for &k in &list[from as usize..(from + record.near[side]) as usize] {
+                    let point = surfaces[solid].points[(k - record.first[side]) as usize];
+                    let at = bodies[solid].pose.position + bodies[solid].rotation * point;
+                    out.push((pair.a, pair.b, side as u8, at));
+                }
+            }
+            out.extend(pair.samples.iter().map(|x| (pair.a, pair.b, 1, *x)));
+        }
+        Ok(out)
+    }
+}
+
+/// Face of each sum of a pair, in their order: 0 to 5 of its second solid, 6 to 11 of the first.
+fn slots(record: &SmoothPair) -> impl Iterator<Item = u8> + use<> {
+    let open = record.open;
+    (0..12_u8).filter(move |key| open >> key & 1 == 1)
+}
+
+/// A contact as the shader keeps its own; see `contact_state` there.
+fn given(contact: &Contact, a: &Body) -> [[f32; 4]; 3] {
+    let still = a.rotation.transpose();
+    let face = contact.face().unwrap_or_default();
+    [
+        four(still * contact.normal, contact.depth),
+        four(still * (contact.at - a.pose.position), contact.speed),
+        [contact.weight as f32, f32::from(face), 0.0, 0.0],
+    ]
+}
+
+/// Largest clearances to the lower and upper faces of a box of half edges `half` among the corners of a cloud's
+/// box: `turn` and `shift` take its frame to the box's. Corners are chosen as the shader chooses them.
+fn clearances(turn: DMat3, shift: DVec3, half: DVec3, cloud: &Cloud) -> (DVec3, DVec3) {
+    let of = |sign: f64| {
+        DVec3::from_array([0, 1, 2].map(|k| {
+            let row = turn.row(k);
+            let corner = [0, 1, 2].map(|j| {
+                let up = (row[j] > 0.0) == (sign > 0.0);
+                if up { cloud.high[j] } else { cloud.low[j] }
+            });
+            half[k] + sign * (row.dot(DVec3::from_array(corner)) + shift[k])
+        }))
+    };
+    (of(1.0), of(-1.0))
+}
+
+fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> SmoothPose {
+    let a = &bodies[pair.a];
+    let still = a.rotation.transpose();
+    let (center, axes, half, velocity, spin) = match pair.b {
+        Other::Solid(b) => {
+            let Body { pose, rotation, shape, .. } = &bodies[b];
+            let half = shape.extent(DMat3::IDENTITY);
+            (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
+        }
+        Other::Wall(w) => {
+            let wall = &model.walls[w];
+            (wall.center, wall.axes, wall.half, DVec3::ZERO, DVec3::ZERO)
+        }
+    };
+    let theirs = pair.b.solid().map_or(Cloud::default(), |b| clouds[b]);
+    let back = axes.transpose();
+    let turn = back * a.rotation;
+    let (below_b, above_b) = clearances(turn, back * (a.pose.position - center), half, &clouds[pair.a]);
+    let half_a = a.shape.extent(DMat3::IDENTITY);
+    let (below_a, above_a) = clearances(still * axes, still * (center - a.pose.position), half_a, &theirs);
+    let u = still * (a.pose.velocity - velocity);
+    SmoothPose {
+        row_x: four(turn.row(0), u.x),
+        row_y: four(turn.row(1), u.y),
+        row_z: four(turn.row(2), u.z),
+        spin: four(still * (a.pose.angular_velocity - spin), 0.0),
+        below_b: four(below_b, 0.0),
+        above_b: four(above_b, 0.0),
+        below_a: four(below_a, 0.0),
+        above_a: four(above_a, 0.0),
+        found: [0.0; 4],
+        given: [0; 4],
+    }
+}
+
+/// The sums of a pair, which are in A's frame and about A's centre, in the world.
+fn read(pair: &Pair, record: &SmoothPair, sums: &[[f32; 4]], bodies: &[Body]) -> DeviceSums {
+    let [depth, deepest, count, shares] = sums[0];
+    if count == 0.0 {
+        return DeviceSums::default();
+    }
+    let a = &bodies[pair.a];
+    let mut on_a = Wrench::default();
+    let pressed = slots(record).zip(sums[1..].chunks_exact(3)).filter(|(_, s)| s[0][3] > 0.0);
+    let patches = pressed.map(|(key, s)| {
+        let force = a.rotation * vector(s[0]);
+        on_a += Wrench { force, torque: a.rotation * vector(s[1]) };
+        let at = a.pose.position + a.rotation * vector(s[2]);
+        let key = if key < 6 { key } else { key + 2 };
+        Patch::new(key, force, f64::from(s[0][3]), at, f64::from(s[1][3]))
+    });
+    let patches = patches.collect();
+    // The same forces at the same points act on B, so their moment about its centre follows.
+    let on_b = pair.b.solid().map_or(Wrench::default(), |b| {
+        let between = a.pose.position - bodies[b].pose.position;
+        Wrench { force: -on_a.force, torque: -(on_a.torque + between.cross(on_a.force)) }
+    });
+    DeviceSums {
+        count: count as usize,
+        depth: f64::from(depth),
+        deepest: f64::from(deepest),
+        shares: f64::from(shares),
+        wrench: [on_a, on_b],
+        patches,
+    }
+}

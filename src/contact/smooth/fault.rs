@@ -1,0 +1,142 @@
+//! What the smooth law cannot be trusted with, found before it becomes a force: solids that go through each other
+//! between two sub-steps, come out on the wrong side, or are driven into each other.
+
+use super::Smooth;
+use super::pair::{Other, Pair};
+use crate::contact::law::{Fault, Now};
+use crate::contact::substeps::MOST_SUBSTEPS;
+use glam::{DMat3, DVec3};
+
+/// Depth over half of a solid's thickness from which its other side may soon be the nearer one.
+pub(super) const THROUGH: f64 = 0.8;
+/// Depth over the spacing that a driven solid is not pressed beyond: its stop would have held by then.
+pub(super) const DRIVEN: f64 = 1.0;
+/// Way of a sub-step over half of the thickness of what is hit, at most: one sub-step at least sees it inside.
+const WAY: f64 = 0.5;
+
+impl Smooth {
+    /// Depth [m] at which a point in the pair's first and in its second solid reaches the middle between two faces.
+    fn middles(&self, pair: &Pair, now: &Now) -> [f64; 2] {
+        let half = |k: usize| now.bodies[k].shape.extent(DMat3::IDENTITY);
+        let thinnest = |half: DVec3, faces: u8| {
+            let open = |axis: usize| (faces >> (2 * axis) & 3).count_ones();
+            let of = |axis: usize| match open(axis) {
+                2 => half[axis],
+                1 => 2.0 * half[axis],
+                _ => f64::INFINITY,
+            };
+            (0..3).map(of).fold(f64::INFINITY, f64::min)
+        };
+        // of a ball there is one face, all round
+        let of = |k: usize| match self.surfaces[k].ball {
+            Some(radius) => radius,
+            None => thinnest(half(k), self.surfaces[k].all_faces),
+        };
+        let b = match pair.b {
+            Other::Solid(b) => of(b),
+            Other::Wall(w) => thinnest(self.walls[w].half, self.walls[w].faces),
+        };
+        [of(pair.a), b]
+    }
+
+    /// Largest speed of any point of the pair's solids against one of the other [m/s].
+    fn closing(pair: &Pair, now: &Now) -> f64 {
+        let of = |k: usize| now.bodies[k].pose.angular_velocity.length() * now.bodies[k].radius();
+        let b = pair.b.solid();
+        let between =
+            now.bodies[pair.a].pose.velocity - b.map_or(DVec3::ZERO, |b| now.bodies[b].pose.velocity);
+        between.length() + of(pair.a) + b.map_or(0.0, of)
+    }
+
+    /// The first pair of the last evaluation that has left what the law can be trusted with.
+    pub(super) fn first_fault(&self, now: &Now) -> Option<Fault> {
+        // few pairs are ever deep, or much deeper than before
+        let little = 1e-3 * self.spacing;
+        let deep = |p: &&Pair| p.depth > p.before + little || p.depth > self.harmless;
+        self.evaluated().iter().filter(deep).find_map(|pair| {
+            let [middle_a, middle_b] = self.middles(pair, now);
+            let (in_a, in_b) = pair.deepest();
+            let closing = Self::closing(pair, now);
+            let other = |b: Other| match b {
+                Other::Solid(b) => Ok(b),
+                Other::Wall(w) => Err(self.walls[w].name.clone()),
+            };
+            let driven = pair.b.solid().is_some_and(|b| !now.bodies[b].is_free());
+            let fault = |what: String| Fault { a: pair.a, b: other(pair.b), what };
+            if pair.depth > pair.before + 2.0 * closing * now.substep + little {
+                return Some(fault(format!(
+                    "is suddenly {:.3e} m deep, after {:.3e} m: it came in where contact does not look; use a \
+                     smaller run.time_step or a thicker wall",
+                    pair.depth, pair.before
+                )));
+            }
+            let unknown = self.on_device && pair.depth > THROUGH * middle_a.max(middle_b);
+            if in_a > THROUGH * middle_a || in_b > THROUGH * middle_b || unknown {
+                return Some(fault(format!(
+                    "is {:.3e} m deep, almost halfway through, at {closing:.3} m/s: contact would push it out on the \
+                     other side; use a smaller run.time_step (which carries a stiffer contact), a larger \
+                     contact.spring, or a thicker solid",
+                    pair.depth
+                )));
+            }
+            (driven && pair.depth > DRIVEN * self.spacing).then(|| {
+                fault(format!(
+                    "is driven {:.3e} m deep into it: the solid that follows a table cannot move on; change its \
+                     motion or make room",
+                    pair.depth
+                ))
+            })
+        })
+    }
+
+    /// Sub-steps of a step of `dt` [s] at which no solid can go through another between two of them.
+    ///
+    /// Most scenes are slow enough to be passed over at once: only pairs that may meet within the step count.
+    pub(super) fn substeps_of_way(&self, now: &Now, dt: f64) -> Result<u32, Fault> {
+        let speed = |k: usize| {
+            let pose = &now.bodies[k].pose;
+            pose.velocity.length() + pose.angular_velocity.length() * now.bodies[k].radius()
+        };
+        let fastest = (0..now.bodies.len()).map(speed).fold(0.0, f64::max);
+        // two solids close at twice the speed of the faster one at most; a lattice body is two spacings thick
+        if 2.0 * fastest * dt <= WAY * 0.5 * self.spacing {
+            return Ok(1);
+        }
+        let mut most = 1.0_f64;
+        for (pair, _) in self.close(now.candidates, now.bodies) {
+            let [middle_a, middle_b] = self.middles(&pair, now);
+            let way = Self::closing(&pair, now) * dt;
+            let wanted = way / (WAY * middle_a.min(middle_b));
+            if wanted <= most || !self.meets(&pair, now, dt) {
+                continue;
+            }
+            if wanted > f64::from(MOST_SUBSTEPS) {
+                let b = match pair.b {
+                    Other::Solid(b) => Ok(b),
+                    Other::Wall(w) => Err(self.walls[w].name.clone()),
+                };
+                let what = format!(
+                    "may go through it within a step: {:.3e} m of way in {MOST_SUBSTEPS} sub-steps, {:.3e} m from a \
+                     face to the middle; use run.time_step = {:.1e} or less",
+                    way,
+                    middle_a.min(middle_b),
+                    dt * f64::from(MOST_SUBSTEPS) / wanted
+                );
+                return Err(Fault { a: pair.a, b, what });
+            }
+            most = wanted;
+        }
+        Ok(most.ceil() as u32)
+    }
+
+    /// Whether the first solid, on its way of the step, may come to touch the second.
+    fn meets(&self, pair: &Pair, now: &Now, dt: f64) -> bool {
+        let a = &now.bodies[pair.a];
+        let other = pair.other(now.bodies, &self.surfaces, &self.walls);
+        let b = pair.b.solid().map(|b| &now.bodies[b]);
+        let way = dt * (a.pose.velocity - b.map_or(DVec3::ZERO, |b| b.pose.velocity));
+        let turned = dt * b.map_or(0.0, |b| b.pose.angular_velocity.length()) * b.map_or(0.0, |b| b.radius());
+        let along = other.axes.transpose() * way.normalize_or(DVec3::X);
+        other.shape.line_is_near(other.local(a.pose.position), along, way.length(), a.radius() + turned)
+    }
+}

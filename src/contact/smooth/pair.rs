@@ -1,0 +1,636 @@
+//! A pair of solids under the smooth law: what of each lies in the other, forces, friction patches.
+
+use super::round;
+use super::walls::WallBox;
+use crate::body::{Body, Wrench};
+use crate::shape::{Faces, Inside, Line, Shape, Surface};
+use glam::{DMat3, DVec3};
+
+/// What a free solid touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Other {
+    /// A moving solid.
+    Solid(usize),
+    /// A fixed wall.
+    Wall(usize),
+}
+
+impl Other {
+    /// Index of the moving solid; `None` for a wall.
+    pub fn solid(self) -> Option<usize> {
+        match self {
+            Self::Solid(b) => Some(b),
+            Self::Wall(_) => None,
+        }
+    }
+}
+
+/// Constants of a pair for one length of sub-step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Constants {
+    /// Stiffness of the whole contact [N/m].
+    pub spring: f64,
+    /// Stiffness beyond `stop_depth` [N/m]; not below `spring`.
+    pub stop: f64,
+    /// Depth at which the second spring joins [m].
+    pub stop_depth: f64,
+    /// Damping of the whole contact [kg/s].
+    pub damping: f64,
+    /// Length of a sub-step [s].
+    pub step: f64,
+}
+
+impl Constants {
+    /// Secant stiffness [N/m] and energy [J] of a contact of effective depth `depth` [m].
+    pub fn stored(&self, depth: f64) -> (f64, f64) {
+        let beyond = (depth - self.stop_depth).max(0.0);
+        let more = self.stop - self.spring;
+        let energy = 0.5 * self.spring * depth * depth + 0.5 * more * beyond * beyond;
+        (self.spring + more * beyond / depth, energy)
+    }
+
+    /// Constants that make sub-steps of `h` [s] follow the damped oscillator of mass `mass` [kg].
+    ///
+    /// The explicit dashpot takes C h / m of the speed where the exact one takes 1 - exp(-C h / m); it is
+    /// set to the latter. With `frequency` the spring too is set to that of the exact oscillator (the
+    /// step sees a damped spring up to exp(C h / 2 m) too stiff): right for a restitution, but K is then
+    /// no longer the K of a body at rest.
+    pub fn discretise(&mut self, mass: f64, h: f64, frequency: bool) {
+        self.step = h;
+        let a = 0.5 * self.damping * h / mass;
+        self.damping = -mass / h * (-2.0 * a).exp_m1();
+        if frequency {
+            let square = self.spring * h * h / mass;
+            let turn = square - a * a;
+            let cosine = if turn >= 0.0 { turn.sqrt().cos() } else { (-turn).sqrt().cosh() };
+            let ratio = 2.0 * (-a).exp() * (a.cosh() - cosine) / square;
+            self.spring *= ratio;
+            self.stop *= ratio;
+        }
+    }
+}
+
+/// Share of the dashpot that a point feels which entered `steps` sub-steps ago, at its speed.
+///
+/// A force acts from the middle of the last sub-step to the middle of this one, so a point that entered
+/// s < 1 sub-steps ago is due s + 1/2 of it, spread over two sub-steps: s/h + 3/2 is the sum of both
+/// values of this hat, whatever the phase, and the hat is continuous. Without it a restitution scatters
+/// by C h / 2 m with the phase of the impact.
+fn felt(steps: f64) -> f64 {
+    if steps < 1.0 { 1.5 * steps } else { (2.0 - 0.5 * steps).max(1.0) }
+}
+
+/// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
+const ALONG_NORMAL: f64 = 0.95;
+
+/// Where a shape stands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub center: DVec3,
+    pub axes: DMat3,
+    pub shape: Shape,
+    /// Faces that can be reached.
+    pub faces: Faces,
+}
+
+impl Frame {
+    pub fn body(body: &Body, faces: Faces) -> Self {
+        Self { center: body.pose.position, axes: body.rotation, shape: body.shape, faces }
+    }
+
+    pub fn wall(wall: &WallBox) -> Self {
+        Self { center: wall.center, axes: wall.axes, shape: wall.shape(), faces: wall.faces }
+    }
+
+    /// `x` [m] of the world in its own frame.
+    pub fn local(&self, x: DVec3) -> DVec3 {
+        self.axes.transpose() * (x - self.center)
+    }
+}
+
+/// A shape as the edges of another frame see it.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    other: Frame,
+    /// Turns the edges' frame into the shape's.
+    turn: DMat3,
+    /// The edges' frame in the shape's.
+    shift: DVec3,
+    /// Weight times depth^8 below which an edge is left out [m8].
+    least: f64,
+}
+
+impl View {
+    /// `other` as seen from the frame of `axes` about `center`.
+    fn new(center: DVec3, axes: DMat3, other: Frame, least: f64) -> Self {
+        let still = other.axes.transpose();
+        Self { other, turn: still * axes, shift: still * (center - other.center), least }
+    }
+}
+
+/// One point in contact.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contact {
+    /// Where, world [m].
+    pub at: DVec3,
+    /// Direction of the force on the pair's first solid: minus the gradient of the depth, of length 1
+    /// except near edges.
+    pub normal: DVec3,
+    pub depth: f64,
+    pub weight: f64,
+    /// Minus the rate of change of the depth [m/s].
+    pub speed: f64,
+    force: f64,
+    patch: u8,
+}
+
+impl Contact {
+    /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
+    pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
+        Self { at, normal, depth, weight, speed, force: 0.0, patch }
+    }
+
+    /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
+    /// cross.
+    pub fn face(&self) -> Option<u8> {
+        match self.patch {
+            patch @ 0..6 => Some(patch),
+            patch @ 8..14 => Some(patch - 2),
+            _ => None,
+        }
+    }
+
+    /// s_i of a point in a contact of effective depth `depth` [m].
+    fn share(&self, depth: f64) -> f64 {
+        let x = self.depth / depth;
+        self.weight * (x * x) * (x * x) * (x * x)
+    }
+}
+
+/// What a device sums over the points of a pair and the contacts given to it, world frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeviceSums {
+    /// Points and given ones in contact.
+    pub count: usize,
+    /// Effective depth D of all contacts [m].
+    pub depth: f64,
+    /// Deepest of all contacts [m].
+    pub deepest: f64,
+    /// Sum of the s_i of all contacts.
+    pub shares: f64,
+    /// Wrenches on the two solids, of these.
+    pub wrench: [Wrench; 2],
+    /// Patches of these.
+    pub patches: Vec<Patch>,
+}
+
+/// All points pressed by one face: where friction acts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Patch {
+    /// Which face, of which of the two solids.
+    key: u8,
+    /// Direction of the normal force on the first solid.
+    pub normal: DVec3,
+    /// Centre of the normal force [m].
+    pub at: DVec3,
+    /// Normal force [N].
+    pub force: f64,
+    /// Sum of the points' forces [N].
+    pressing: f64,
+    /// Mean distance of the normal force from its centre [m].
+    pub radius: f64,
+}
+
+impl Patch {
+    /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
+    /// mean distance from it [m].
+    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, radius: f64) -> Self {
+        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, radius }
+    }
+}
+
+/// A pair of solids close to each other.
+#[derive(Clone, Debug)]
+pub(crate) struct Pair {
+    /// A free solid.
+    pub a: usize,
+    /// The other one.
+    pub b: Other,
+    /// Points of `a` near `b`.
+    pub points_a: Vec<u32>,
+    /// Points of solid `b` near `a`.
+    pub points_b: Vec<u32>,
+    /// Corners of wall `b` near `a`, world [m].
+    pub samples: Vec<DVec3>,
+    /// Edges of `a` near `b`.
+    pub edges_a: Vec<u32>,
+    /// Edges of `b`, a solid or a wall, near `a`.
+    pub edges_b: Vec<u32>,
+    /// Whether round parts of one of both are near the other.
+    pub round: bool,
+    pub constants: Constants,
+    contacts: Vec<Contact>,
+    /// Contacts for the device to take in.
+    pub given: Vec<Contact>,
+    /// Patches of the last evaluation.
+    pub patches: Vec<Patch>,
+    /// Wrench on `a` and on `b`, of the last evaluation.
+    pub wrench: [Wrench; 2],
+    /// Energy stored [J].
+    pub energy: f64,
+    /// Deepest point [m]; infinite before the first evaluation.
+    pub depth: f64,
+    /// The same at the evaluation before; infinite if there was none.
+    pub before: f64,
+    /// Points in contact at the last evaluation, and those with the nodes of edges.
+    points: usize,
+    count: usize,
+}
+
+impl Pair {
+    pub fn new(a: usize, b: Other) -> Self {
+        Self {
+            a,
+            b,
+            points_a: vec![],
+            points_b: vec![],
+            samples: vec![],
+            edges_a: vec![],
+            edges_b: vec![],
+            round: false,
+            constants: Constants::default(),
+            contacts: vec![],
+            given: vec![],
+            patches: vec![],
+            wrench: Default::default(),
+            energy: 0.0,
+            depth: f64::INFINITY,
+            before: f64::INFINITY,
+            points: 0,
+            count: 0,
+        }
+    }
+
+    /// Deepest points [m] inside the first and inside the second solid. Of what a device has found only one is
+    /// known, which may be either.
+    pub fn deepest(&self) -> (f64, f64) {
+        let in_first = |c: &Contact| (8..32).contains(&c.patch) || c.patch >= 64;
+        self.contacts.iter().fold((0.0, 0.0), |(a, b): (f64, f64), c| {
+            if in_first(c) { (a.max(c.depth), b) } else { (a, b.max(c.depth)) }
+        })
+    }
+
+    /// Points and nodes of edges in contact at the last evaluation.
+    pub fn contact_count(&self) -> usize {
+        self.count
+    }
+
+    /// Points in contact at the last evaluation.
+    pub fn point_count(&self) -> usize {
+        self.points
+    }
+
+    /// Finds the contacts that a device does not look for, those of edges and of walls' corners. Those pressed
+    /// by a face in `open` (bits 0 to 5: of `b`, 6 to 11: of `a`) are to be given to the device; of the
+    /// others, their deepest depth d [m], and the sums of w_i (d_i / d)^8 and w_i (d_i / d)^6.
+    pub fn find_beside_device(
+        &mut self,
+        bodies: &[Body],
+        surfaces: &[Surface],
+        walls: &[WallBox],
+        spacing: f64,
+        open: u32,
+    ) -> [f64; 3] {
+        self.contacts.clear();
+        self.given.clear();
+        self.points = 0;
+        if self.is_empty() {
+            return [0.0; 3];
+        }
+        // its lists of points are empty
+        self.find(bodies, surfaces, walls);
+        self.points = self.contacts.len();
+        self.find_edges(bodies, surfaces, walls, spacing);
+        let given = &mut self.given;
+        self.contacts.retain(|c| {
+            let on_face = c.face().is_some_and(|face| open >> face & 1 == 1);
+            if on_face {
+                given.push(*c);
+            }
+            !on_face
+        });
+        let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
+        let sum = |power: i32| self.contacts.iter().map(|c| c.weight * (c.depth / deepest).powi(power)).sum();
+        if deepest > 0.0 { [deepest, sum(8), sum(6)] } else { [0.0; 3] }
+    }
+
+    /// Joins the contacts kept beside the device with what it sums over its own and those it was given.
+    pub fn join(&mut self, sums: &DeviceSums, bodies: &[Body]) {
+        self.patches.clear();
+        self.wrench = sums.wrench;
+        self.before = self.depth;
+        (self.energy, self.depth) = (0.0, sums.deepest);
+        self.points += sums.count - self.given.len();
+        self.count = sums.count + self.contacts.len();
+        if sums.count == 0 {
+            if !self.contacts.is_empty() {
+                self.press();
+                self.sum(bodies);
+            }
+            return;
+        }
+        self.push(sums.depth, sums.shares);
+        self.sum(bodies);
+        self.patches.extend(&sums.patches);
+    }
+
+    /// The second solid.
+    pub(super) fn other(&self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Frame {
+        match self.b {
+            Other::Solid(b) => Frame::body(&bodies[b], surfaces[b].all_faces),
+            Other::Wall(w) => Frame::wall(&walls[w]),
+        }
+    }
+
+    /// Velocity [m/s] of the second solid at the world point `at` [m].
+    fn velocity_b(&self, bodies: &[Body], at: DVec3) -> DVec3 {
+        self.b.solid().map_or(DVec3::ZERO, |b| bodies[b].pose.velocity_at(at))
+    }
+
+    /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's shape.
+    pub fn collect(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
+        let body = &bodies[self.a];
+        let near = |surface: &Surface, own: &Body, to: Frame| {
+            let turn = to.axes.transpose() * own.rotation;
+            let shift = to.local(own.pose.position);
+            let points = surface.points.iter().enumerate();
+            let points = points.filter(|(_, p)| to.shape.outside(turn * **p + shift) < skin);
+            points.map(|(k, _)| k as u32).collect::<Vec<u32>>()
+        };
+        let other = self.other(bodies, surfaces, walls);
+        let own = Frame::body(body, surfaces[self.a].all_faces);
+        let theirs = self.b.solid().map(|b| &surfaces[b]);
+        self.round = surfaces[self.a].is_round() || theirs.is_some_and(Surface::is_round);
+        self.round &= other.shape.outside(other.local(own.center)) < own.shape.radius() + skin
+            && own.shape.outside(own.local(other.center)) < other.shape.radius() + skin;
+        if surfaces[self.a].ball.is_some() || theirs.is_some_and(|s| s.ball.is_some()) {
+            return;
+        }
+        self.points_a = near(&surfaces[self.a], body, other);
+        if let Other::Solid(b) = self.b {
+            self.points_b = near(&surfaces[b], &bodies[b], own);
+        }
+        self.collect_edges(bodies, surfaces, walls, skin);
+    }
+
+    /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's shape.
+    pub fn collect_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
+        let body = &bodies[self.a];
+        let own = Frame::body(body, surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let near = |lines: &[Line], center: DVec3, axes: DMat3, to: Frame| {
+            let turn = to.axes.transpose() * axes;
+            let shift = to.axes.transpose() * (center - to.center);
+            let lines = lines.iter().enumerate().filter(|(_, e)| {
+                to.shape.line_is_near(turn * e.start + shift, turn * e.along, e.length, skin)
+            });
+            lines.map(|(k, _)| k as u32).collect::<Vec<u32>>()
+        };
+        self.samples.clear();
+        self.edges_a = near(&surfaces[self.a].edges, own.center, own.axes, other);
+        match self.b {
+            Other::Solid(b) => self.edges_b = near(&surfaces[b].edges, other.center, other.axes, own),
+            Other::Wall(w) => {
+                self.edges_b = near(&walls[w].edges, DVec3::ZERO, DMat3::IDENTITY, own);
+                let near = |x: &&DVec3| own.shape.outside(own.local(**x)) < skin;
+                self.samples.extend(walls[w].corners.iter().filter(near));
+            }
+        }
+    }
+
+    /// Whether any candidate is left.
+    pub fn is_empty(&self) -> bool {
+        let points = self.points_a.len() + self.points_b.len() + self.samples.len();
+        points + self.edges_a.len() + self.edges_b.len() == 0 && !self.round
+    }
+
+    /// Forces, energy and friction patches at the bodies' poses and velocities.
+    pub fn evaluate(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
+        self.contacts.clear();
+        self.patches.clear();
+        self.wrench = Default::default();
+        self.before = self.depth;
+        (self.energy, self.depth) = (0.0, 0.0);
+        self.find(bodies, surfaces, walls);
+        self.points = self.contacts.len();
+        self.find_edges(bodies, surfaces, walls, spacing);
+        if self.round {
+            self.find_round(bodies, surfaces, walls);
+        }
+        self.count = self.contacts.len();
+        if !self.contacts.is_empty() {
+            self.press();
+            self.sum(bodies);
+        }
+    }
+
+    /// The points inside the other solid, with depth, normal and separating speed.
+    fn find(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+        let a = &bodies[self.a];
+        let own = Frame::body(a, surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
+        let still = a.rotation.transpose();
+        let turn = other.axes.transpose() * a.rotation;
+        let shift = other.axes.transpose() * (a.pose.position - other.center);
+        let b = self.b.solid().map(|b| &bodies[b]);
+        let velocity_b = |at: DVec3| b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
+        for &k in &self.points_a {
+            let p = surfaces[self.a].points[k as usize];
+            if let Some(Inside { depth, outward, face }) = other.shape.depth(turn * p + shift, other.faces) {
+                let at = a.pose.position + a.rotation * p;
+                let normal = other.axes * outward;
+                let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
+                let weight = share * surfaces[self.a].weights[k as usize];
+                self.contacts.push(Contact::new(at, normal, depth, weight, speed, face));
+            }
+        }
+        let mut pushed = |at: DVec3, weight: f64| {
+            let q = still * (at - a.pose.position);
+            if let Some(Inside { depth, outward, face }) = own.shape.depth(q, own.faces) {
+                let normal = -(a.rotation * outward);
+                let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
+                self.contacts.push(Contact::new(at, normal, depth, weight, speed, 8 + face));
+            }
+        };
+        if let Other::Solid(b) = self.b {
+            for &k in &self.points_b {
+                let at = bodies[b].pose.position + bodies[b].rotation * surfaces[b].points[k as usize];
+                pushed(at, share * surfaces[b].weights[k as usize]);
+            }
+        }
+        let weight = surfaces[self.a].smallest_weight;
+        for &at in &self.samples {
+            pushed(at, weight);
+        }
+    }
+
+    /// Nodes of the edges inside the other solid, after the points.
+    fn find_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
+        let (edges_a, edges_b) = (std::mem::take(&mut self.edges_a), std::mem::take(&mut self.edges_b));
+        let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
+        // the end of an upright edge adds nothing to a face: what is a millionth of the sum is left out
+        let eighths: f64 = self.contacts.iter().map(|c| c.weight * c.depth.powi(8)).sum();
+        let least = 1e-6 * eighths;
+        let view = View::new(own.center, own.axes, other, least);
+        for &k in &edges_a {
+            let line = surfaces[self.a].edges[k as usize];
+            self.press_edge(line, &view, share * line.density, 1.0, 32 + k as u8, bodies);
+        }
+        match self.b {
+            Other::Solid(b) => {
+                let view = View::new(other.center, other.axes, own, least);
+                for &k in &edges_b {
+                    let line = surfaces[b].edges[k as usize];
+                    self.press_edge(line, &view, share * line.density, -1.0, 64 + k as u8, bodies);
+                }
+            }
+            Other::Wall(w) => {
+                let view = View::new(DVec3::ZERO, DMat3::IDENTITY, own, least);
+                let density = surfaces[self.a].smallest_weight / spacing;
+                for &k in &edges_b {
+                    self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, 64 + k as u8, bodies);
+                }
+            }
+        }
+        (self.edges_a, self.edges_b) = (edges_a, edges_b);
+    }
+
+    /// Balls, rings and round sides of both inside the other one.
+    fn find_round(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+        let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
+        let other = self.other(bodies, surfaces, walls);
+        let theirs = self.b.solid().map(|b| &surfaces[b]);
+        let mut contacts = std::mem::take(&mut self.contacts);
+        let mut add = |sign: f64, p: round::Pressed| {
+            let normal = sign * p.normal;
+            let speed = (bodies[self.a].pose.velocity_at(p.at) - self.velocity_b(bodies, p.at)).dot(normal);
+            let patch = if sign > 0.0 { p.face } else { 8 + p.face };
+            contacts.push(Contact::new(p.at, normal, p.depth, p.weight, speed, patch));
+        };
+        let share = if theirs.is_some() { 0.5 } else { 1.0 };
+        match (surfaces[self.a].ball, theirs.and_then(|s| s.ball)) {
+            (Some(radius), _) => round::ball(&own, radius, &other, &mut |p| add(1.0, p)),
+            (None, Some(radius)) => round::ball(&other, radius, &own, &mut |p| add(-1.0, p)),
+            (None, None) => {
+                round::press(&own, &surfaces[self.a], &other, share, &mut |p| add(1.0, p));
+                if let Some(theirs) = theirs {
+                    round::press(&other, theirs, &own, share, &mut |p| add(-1.0, p));
+                }
+            }
+        }
+        self.contacts = contacts;
+    }
+
+    /// Nodes of one edge inside a shape. `sign` turns outward of that shape into the direction of the force
+    /// on the pair's first solid.
+    ///
+    /// An edge that lies in a face belongs to the face's patch; one that crosses an edge makes its own,
+    /// so that friction acts across the cross product of both.
+    fn press_edge(&mut self, line: Line, view: &View, density: f64, sign: f64, key: u8, bodies: &[Body]) {
+        let other = &view.other;
+        let start = view.turn * line.start + view.shift;
+        let along = view.turn * line.along;
+        let first = self.contacts.len();
+        let mut push = DVec3::ZERO;
+        let a = &bodies[self.a];
+        let b = self.b.solid().map(|b| &bodies[b]);
+        let least = view.least / density;
+        other.shape.each_node((start, along, line.length), other.faces, least, |s, width, inside| {
+            let at = other.center + other.axes * (start + s * along);
+            let normal = sign * (other.axes * inside.outward);
+            let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
+            let speed = (a.pose.velocity_at(at) - velocity_b).dot(normal);
+            push += width * inside.depth.powi(7) * inside.outward;
+            self.contacts.push(Contact::new(at, normal, inside.depth, density * width, speed, key));
+        });
+        let toward = push.abs();
+        let axis = toward.max_position();
+        if toward[axis] > ALONG_NORMAL * push.length() {
+            let face = 2 * axis as u8 + u8::from(push[axis] > 0.0);
+            let patch = if sign > 0.0 { face } else { 8 + face };
+            self.contacts[first..].iter_mut().for_each(|c| c.patch = patch);
+        }
+    }
+
+    /// Normal forces of the points: the pair's spring and dashpot, no tension.
+    ///
+    /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
+    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i. The second spring
+    /// brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
+    fn press(&mut self) {
+        let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
+        let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
+        let sum: f64 = self.contacts.iter().map(|c| c.weight * eighth(c.depth / deepest)).sum();
+        let mean = sum.sqrt().sqrt().sqrt();
+        let depth = deepest * mean;
+        self.depth = deepest;
+        let shares = self.contacts.iter().map(|c| c.share(depth)).sum();
+        self.push(depth, shares);
+    }
+
+    /// Normal forces of the points and the energy, at the effective depth `depth` [m] and the sum of all
+    /// shares.
+    fn push(&mut self, depth: f64, shares: f64) {
+        let k = self.constants;
+        let (secant, energy) = k.stored(depth);
+        self.energy = energy;
+        let beyond = (depth - k.stop_depth).max(0.0);
+        let stop = (k.stop / k.spring).sqrt() - 1.0;
+        for c in &mut self.contacts {
+            let share = c.share(depth);
+            let since = |depth: f64| if c.speed < 0.0 { felt(depth / -c.speed / k.step) } else { 1.0 };
+            let stopping = if beyond > 0.0 { stop * since(beyond) } else { 0.0 };
+            let damping = k.damping / shares.sqrt() * (since(c.depth) + stopping);
+            c.force = (share * (secant * c.depth - damping * c.speed)).max(0.0);
+        }
+    }
+
+    /// Wrenches and patches. Both solids get the same force at the same point, so momentum and angular
+    /// momentum are exchanged exactly.
+    fn sum(&mut self, bodies: &[Body]) {
+        let center_a = bodies[self.a].pose.position;
+        let center_b = match self.b {
+            Other::Solid(b) => bodies[b].pose.position,
+            Other::Wall(_) => DVec3::ZERO,
+        };
+        for c in &self.contacts {
+            let force = c.force * c.normal;
+            self.wrench[0] += Wrench { force, torque: (c.at - center_a).cross(force) };
+            self.wrench[1] += Wrench { force: -force, torque: -(c.at - center_b).cross(force) };
+            let key = c.patch;
+            let known = self.patches.iter().position(|p| p.key == key);
+            let patch = known.unwrap_or_else(|| {
+                self.patches.push(Patch { key, ..Patch::default() });
+                self.patches.len() - 1
+            });
+            let patch = &mut self.patches[patch];
+            patch.normal += force;
+            patch.pressing += c.force;
+            patch.at += c.force * c.at;
+        }
+        self.patches.retain_mut(|p| {
+            p.force = p.normal.length();
+            p.normal = p.normal.normalize_or_zero();
+            p.at /= p.pressing.max(f64::MIN_POSITIVE);
+            p.force > 0.0
+        });
+        for c in &self.contacts {
+            if let Some(patch) = self.patches.iter_mut().find(|p| p.key == c.patch) {
+                patch.radius += c.force * (c.at - patch.at).length() / patch.pressing;
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Round parts of a surface pressed into another shape: balls, rings and sides of cylinders.
+//!
+//! They have no points that turn with the body, or it would roll over its own lattice. A ball touches with its
+//! deepest point alone; the side of a cylinder with the deepest line along it; of a ring the arc inside is
+//! integrated. At a deepest point the depth does not change with the place on the body, so the force, the
+//! gradient of the depth at that point, is still minus the derivative of the energy.
+
+use super::pair::Frame;
+use crate::shape::{Inside, Ring, Side, Surface, along, around};
+use glam::{DMat3, DVec3};
+
+/// A point of a round part inside another shape.
+pub(super) struct Pressed {
+    /// Where, world [m].
+    pub at: DVec3,
+    /// Direction of the force on the round part.
+    pub normal: DVec3,
+    /// Depth [m].
+    pub depth: f64,
+    /// Weight [-].
+    pub weight: f64,
+    /// The other's face.
+    pub face: u8,
+}
+
+/// Times that the deepest point of a circle is sought again: it moves by the bend of the other's surface only.
+const SEARCHES: usize = 4;
+
+/// The ball about the centre of `own` inside `other`.
+pub(super) fn ball(own: &Frame, radius: f64, other: &Frame, add: &mut dyn FnMut(Pressed)) {
+    let q = other.local(own.center);
+    // a centre under a face that is covered is pushed through one that is not
+    let (distance, outward, face) = match other.shape.depth(q, other.faces) {
+        Some(Inside { depth, outward, face }) => (-depth, outward, face),
+        None => {
+            let (distance, outward) = other.shape.distance(q);
+            (distance, outward, 0)
+        }
+    };
+    if distance >= radius {
+        return;
+    }
+    let normal = other.axes * outward;
+    add(Pressed { at: own.center - radius * normal, normal, depth: radius - distance, weight: 1.0, face });
+}
+
+/// The rings and the side of `own` inside `other`; weights times `share`.
+pub(super) fn press(own: &Frame, surface: &Surface, other: &Frame, share: f64, add: &mut dyn FnMut(Pressed)) {
+    let view = View { own, other, turn: other.axes.transpose() * own.axes, shift: other.local(own.center) };
+    for ring in &surface.rings {
+        view.ring(ring, share, add);
+    }
+    if let Some(side) = &surface.side {
+        view.side(side, share, add);
+    }
+}
+
+/// `other` as points of `own` see it.
+struct View<'a> {
+    own: &'a Frame,
+    other: &'a Frame,
+    turn: DMat3,
+    shift: DVec3,
+}
+
+impl View<'_> {
+    /// Distance of the point `p` of `own` from `other` [m], and its gradient in the frame of `own`.
+    fn distance(&self, p: DVec3) -> (f64, DVec3) {
+        let (distance, gradient) = self.other.shape.distance(self.turn * p + self.shift);
+        (distance, self.turn.transpose() * gradient)
+    }
+
+    fn add(&self, p: DVec3, weight: f64, add: &mut dyn FnMut(Pressed)) {
+        if let Some(Inside { depth, outward, face }) =
+            self.other.shape.depth(self.turn * p + self.shift, self.other.faces)
+        {
+            let at = self.own.center + self.own.axes * p;
+            add(Pressed { at, normal: self.other.axes * outward, depth, weight, face });
+        }
+    }
+
+    fn ring(&self, ring: &Ring, share: f64, add: &mut dyn FnMut(Pressed)) {
+        if self.distance(ring.z * DVec3::Z).0 >= ring.radius {
+            return;
+        }
+        let distance = |angle: f64| {
+            let (p, slope) = ring.point(angle);
+            let (distance, gradient) = self.distance(p);
+            (distance, gradient.dot(slope))
+        };
+        around(distance, |angle, part| self.add(ring.point(angle).0, share * ring.weight * part, add));
+    }
+
+    fn side(&self, side: &Side, share: f64, add: &mut dyn FnMut(Pressed)) {
+        let middle = self.distance(DVec3::ZERO).0;
+        if middle >= side.radius.hypot(side.half_height) {
+            return;
+        }
+        let length = 2.0 * side.half_height;
+        let at = |s: f64| self.deepest(side, s - side.half_height);
+        let distance = |s: f64| {
+            let (distance, gradient) = self.distance(at(s));
+            (distance, gradient.z)
+        };
+        along(length, distance, |s, width| self.add(at(s), share * width / length, add));
+    }
+
+    /// The deepest point of the circle of a side at the height `z` [m].
+    fn deepest(&self, side: &Side, z: f64) -> DVec3 {
+        let axis = z * DVec3::Z;
+        let mut p = axis;
+        for _ in 0..SEARCHES {
+            let gradient = self.distance(p).1;
+            let across = DVec3::new(gradient.x, gradient.y, 0.0);
+            // the end of an upright one: its rings hold it
+            let next = axis - side.radius * across.try_normalize().unwrap_or(DVec3::X);
+            if next.distance_squared(p) < 1e-24 * side.radius * side.radius {
+                break;
+            }
+            p = next;
+        }
+        p
+    }
+}

@@ -1,0 +1,217 @@
+//! Fixed walls as contact sees them: boxes with the faces, edges and corners that bodies can reach.
+//!
+//! All of a wall is real that no other wall covers: the back and the sides of a plane, the rims of an open tank.
+//! A face that counts for nothing although a body can reach it would give the distance to another face to
+//! whatever comes in through it, and a force to match.
+
+use crate::scene::Scene;
+use crate::shape::{ALL_FACES, Cuboid, Faces, Geometry, Line, Shape, face_normal};
+use glam::{DMat3, DVec3};
+
+/// A fixed wall.
+#[derive(Clone, Debug)]
+pub(crate) struct WallBox {
+    pub name: String,
+    pub center: DVec3,
+    pub axes: DMat3,
+    pub half: DVec3,
+    /// Faces that bodies can reach.
+    pub faces: Faces,
+    /// Edges that bodies can reach, world.
+    pub edges: Vec<Line>,
+    /// Corners that bodies can reach, world [m].
+    pub corners: Vec<DVec3>,
+}
+
+impl WallBox {
+    /// Its shape.
+    pub fn shape(&self) -> Shape {
+        Shape::Box(Cuboid { half: self.half })
+    }
+
+    /// `x` [m] of the world in its frame.
+    fn local(&self, x: DVec3) -> DVec3 {
+        self.axes.transpose() * (x - self.center)
+    }
+
+    fn world(&self, q: DVec3) -> DVec3 {
+        self.center + self.axes * q
+    }
+}
+
+/// Gap over the spacing up to which a wall covers what it faces: nothing fits in between.
+const COVERED: f64 = 2e-3;
+/// Most points along an edge of a face at which it is looked at whether it is covered.
+const MOST_LOOKS: f64 = 40.0;
+
+/// The walls of a scene.
+pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
+    let (spacing, flat) = (scene.spacing, scene.dimensions == 2);
+    let mut walls: Vec<WallBox> = scene
+        .walls
+        .iter()
+        .map(|wall| WallBox {
+            name: wall.name.clone(),
+            center: wall.center,
+            axes: wall.axes,
+            half: wall.half,
+            faces: 0,
+            edges: vec![],
+            corners: vec![],
+        })
+        .collect();
+    for k in 0..walls.len() {
+        let all: Faces = if flat { 0b11_0011 } else { ALL_FACES };
+        let open = |face: u8| all & 1 << face != 0 && !face_is_covered(&walls, k, face, spacing, flat);
+        walls[k].faces = (0..6).filter(|&face| open(face)).map(|face| 1 << face).sum();
+    }
+    for k in 0..walls.len() {
+        let (edges, corners) = wall_edges(&walls, k, spacing, flat);
+        (walls[k].edges, walls[k].corners) = (edges, corners);
+    }
+    walls
+}
+
+/// Whether another wall than `k` holds the point `q` of its frame or is next to it.
+fn is_covered(walls: &[WallBox], k: usize, q: DVec3, spacing: f64) -> bool {
+    let x = walls[k].world(q);
+    let near = |w: &WallBox| Cuboid { half: w.half }.outside(w.local(x)) < COVERED * spacing;
+    walls.iter().enumerate().any(|(other, w)| other != k && near(w))
+}
+
+/// Whether other walls leave nothing of a face of wall `k`, by points half a spacing apart just outside of it.
+fn face_is_covered(walls: &[WallBox], k: usize, face: u8, spacing: f64, flat: bool) -> bool {
+    let (half, out) = (walls[k].half, face_normal(face));
+    let normal = usize::from(face / 2);
+    let (u, v) = ((normal + 1) % 3, (normal + 2) % 3);
+    let looks = |axis: usize| {
+        if flat && axis == 1 { 1.0 } else { (4.0 * half[axis] / spacing).ceil().clamp(2.0, MOST_LOOKS) }
+    };
+    let places = |axis: usize| {
+        let n = looks(axis);
+        (0..n as usize).map(move |i| ((2.0 * i as f64 + 1.0) / n - 1.0) * half[axis])
+    };
+    places(u).all(|x| {
+        places(v).all(|y| {
+            let mut q = out * (half + 0.5 * COVERED * spacing);
+            (q[u], q[v]) = (x, y);
+            is_covered(walls, k, q, spacing)
+        })
+    })
+}
+
+/// Edges between two open faces of wall `k` and corners between three, as far as no other wall covers them. A
+/// body's face has points every spacing, so it could sink on an edge that lies between them. In two dimensions
+/// edges are seen end on and are the corners.
+fn wall_edges(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> (Vec<Line>, Vec<DVec3>) {
+    let wall = &walls[k];
+    let is_open = |axis: usize, side: f64| wall.faces & 1 << (2 * axis as u8 + u8::from(side > 0.0)) != 0;
+    // what leans on another wall is no edge of the union
+    let outside = |out: DVec3| out * (wall.half + 0.5 * COVERED * spacing);
+    let (mut edges, mut corners) = (vec![], vec![]);
+    for along in 0..3_usize {
+        let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+        for (su, sv) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+            if !is_open(u, su) || !is_open(v, sv) || flat && along != 1 {
+                continue;
+            }
+            let out = su * DVec3::AXES[u] + sv * DVec3::AXES[v];
+            if flat {
+                if !is_covered(walls, k, outside(out), spacing) {
+                    corners.push(wall.world(out * wall.half));
+                }
+                continue;
+            }
+            let (axis, length) = (DVec3::AXES[along], 2.0 * wall.half[along]);
+            let start = out * wall.half - axis * wall.half;
+            let just_outside = outside(out) - axis * wall.half;
+            for (from, to) in uncovered(walls, k, just_outside, axis, length, spacing) {
+                edges.push(Line {
+                    start: wall.world(start + from * axis),
+                    along: wall.axes * axis,
+                    length: to - from,
+                    density: 0.0,
+                });
+            }
+        }
+    }
+    for corner in 0..if flat { 0 } else { 8 } {
+        let side = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+        let out = DVec3::new(side(0), side(1), side(2));
+        let open = (0..3).all(|axis| is_open(axis, side(axis)));
+        if open && !is_covered(walls, k, outside(out), spacing) {
+            corners.push(wall.world(out * wall.half));
+        }
+    }
+    (edges, corners)
+}
+
+/// Stretches of the line from `start` along `along`, of the frame of wall `k`, that no other wall covers.
+fn uncovered(
+    walls: &[WallBox],
+    k: usize,
+    start: DVec3,
+    along: DVec3,
+    length: f64,
+    spacing: f64,
+) -> Vec<(f64, f64)> {
+    let (start, along) = (walls[k].world(start), walls[k].axes * along);
+    let mut open: Vec<(f64, f64)> = vec![(0.0, length)];
+    for (_, wall) in walls.iter().enumerate().filter(|(other, _)| *other != k) {
+        let grown = Cuboid { half: wall.half + COVERED * spacing };
+        let local = (wall.local(start), wall.axes.transpose() * along);
+        let Some((from, to)) = grown.clip(local.0, local.1, length) else { continue };
+        let parts = open.iter().flat_map(|&(a, b)| [(a, b.min(from)), (a.max(to), b)]);
+        open = parts.filter(|(a, b)| b - a > COVERED * spacing).collect();
+    }
+    open
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wall(low: [f64; 3], high: [f64; 3]) -> WallBox {
+        let (low, high) = (DVec3::from(low), DVec3::from(high));
+        WallBox {
+            name: String::new(),
+            center: 0.5 * (low + high),
+            axes: DMat3::IDENTITY,
+            half: 0.5 * (high - low),
+            faces: 0,
+            edges: vec![],
+            corners: vec![],
+        }
+    }
+
+    #[test]
+    fn what_another_wall_covers_is_not_there_and_all_else_is() {
+        // a floor with a lower step against it and a block on it
+        let mut walls = vec![
+            wall([0.0, 0.0, -1.0], [2.0, 1.0, 0.0]),
+            wall([2.0, 0.0, -1.0], [3.0, 1.0, -0.5]),
+            wall([0.5, 0.2, 0.0], [1.0, 0.4, 0.3]),
+        ];
+        let open = |k: usize| -> Faces {
+            (0..6).filter(|&f| !face_is_covered(&walls, k, f, 0.05, false)).map(|f| 1 << f).sum()
+        };
+        // x_min of the step lies against the floor, z_min of the block on it
+        let faces = [open(0), open(1), open(2)];
+        assert_eq!(faces, [ALL_FACES, ALL_FACES & !1, ALL_FACES & !(1 << 4)]);
+        for (wall, faces) in walls.iter_mut().zip(faces) {
+            wall.faces = faces;
+        }
+        let (edges, corners) = wall_edges(&walls, 0, 0.05, false);
+        // the lower edge at x = 2 leans on the step, whose own lower edges go on; of its upright ones at x = 2 half is left
+        let at = |x: f64, z: f64| {
+            let on =
+                |e: &&Line| e.along.y.abs() > 0.5 && (e.start - DVec3::new(x, e.start.y, z)).length() < 1e-9;
+            edges.iter().filter(on).map(|e| e.length).sum::<f64>()
+        };
+        assert!((at(2.0, 0.0) - 1.0).abs() < 1e-9 && (at(0.0, -1.0) - 1.0).abs() < 1e-9);
+        let upright: f64 =
+            edges.iter().filter(|e| e.along.z.abs() > 0.5 && e.start.x > 1.0).map(|e| e.length).sum();
+        assert!((upright - 1.0).abs() < 1e-2, "{upright}");
+        assert!(corners.contains(&DVec3::new(2.0, 1.0, 0.0)) && corners.len() >= 6, "{corners:?}");
+    }
+}

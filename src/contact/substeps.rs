@@ -1,0 +1,214 @@
+//! How a step is cut into contact sub-steps: what the case asks for, what the worst contact needs, what is refused.
+
+use super::candidates::reduced_mass;
+use super::law::Law;
+use super::stiffness::{Damping, Lambda};
+use crate::body::Body;
+use crate::case;
+use crate::error::{Error, Result};
+use crate::scene::{Drive, Scene, WallShape};
+
+/// Largest dt sqrt(K / m_e) of a sub-step; 2 is the limit of stability, energy errors grow as its square.
+pub(crate) const OMEGA_STEP: f64 = 0.5;
+/// The same where energy must come back: the law `smooth` undamped, or with a restitution.
+pub(crate) const ELASTIC_OMEGA_STEP: f64 = 0.2;
+/// Largest C dt / m_e of a sub-step.
+pub(crate) const DAMPING_STEP: f64 = 0.8;
+/// Most sub-steps of the smooth law. What would need more is softened: at 64 sub-steps a body still
+/// stops within v dt / 32, so a larger K changes nothing that a fluid step could resolve.
+pub(crate) const MOST_SUBSTEPS: u32 = 64;
+/// Sub-steps at which the paper's law, which is never softened, is refused.
+pub(crate) const ABSURD_SUBSTEPS: u32 = 10_000;
+
+/// What the case asks of contact, and the stiffness of each body.
+#[derive(Clone)]
+pub(crate) struct Limits {
+    pub spring: f64,
+    pub damping: Damping,
+    pub viscous_friction: f64,
+    pub friction: f64,
+    pub forced: Option<u32>,
+    pub lambda: Vec<Lambda>,
+    /// Mass of the lightest free body [kg].
+    pub lightest: f64,
+    /// Fastest speed that the case's heights and starting velocities allow [m/s].
+    pub fastest: f64,
+    /// Speed [m/s] of a body that falls from where it starts to the lowest wall.
+    pub falling: f64,
+    /// Largest time step so far [s]: softened contacts are never stiffened again, which would add energy.
+    pub longest_step: f64,
+}
+
+/// Numbers of the worst contact of a case for a whole step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Worst {
+    /// dt sqrt(K / m_e) with the K of the case [-].
+    pub omega_dt: f64,
+    /// C dt / m_e with what the case asks for [-].
+    pub damping_dt: f64,
+    /// Sub-steps that the contact as it will be treated asks for; 0 if the law needs none.
+    pub wanted: f64,
+    /// Stiffness of the softest contact [N/m].
+    pub softest: f64,
+}
+
+/// How a step is cut.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cut {
+    pub substeps: u32,
+    /// dt sqrt(K / m_e) of the whole step [-].
+    pub omega_dt: f64,
+}
+
+impl Limits {
+    /// What `contact` asks for; `None` asks for nothing.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if its numbers contradict each other.
+    pub fn new(contact: Option<&case::Contact>, scene: &Scene, bodies: &[Body]) -> Result<Self> {
+        let free = bodies.iter().filter(|b| b.is_free());
+        let lightest = free.map(|b| b.mass).fold(f64::INFINITY, f64::min);
+        Ok(Self {
+            spring: contact.map_or(0.0, |c| c.spring),
+            damping: contact.map_or(Ok(Damping::Coefficient(0.0)), |c| Damping::new(c, lightest))?,
+            viscous_friction: contact.map_or(0.0, |c| c.viscous_friction),
+            friction: contact.map_or(0.0, |c| c.friction),
+            forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
+            lambda: vec![Lambda::default(); bodies.len()],
+            lightest,
+            fastest: fastest_speed(scene),
+            falling: falling_speed(scene),
+            longest_step: 0.0,
+        })
+    }
+
+    /// Every kind of contact that can be the worst: each body on a wall, and the two most agile ones with each
+    /// other.
+    pub fn extremes(&self, bodies: &[Body]) -> Vec<(usize, Option<usize>)> {
+        let free: Vec<usize> = (0..bodies.len()).filter(|&k| bodies[k].is_free()).collect();
+        let mut agile = free.clone();
+        agile.sort_by(|&i, &j| self.lambda[j].spring.total_cmp(&self.lambda[i].spring));
+        let mut cases: Vec<(usize, Option<usize>)> = free.iter().map(|&k| (k, None)).collect();
+        if let [first, second, ..] = agile[..] {
+            cases.push((first, Some(second)));
+        }
+        cases
+    }
+
+    /// Eigenvalues of the contact of `a` with `b`, unit spring and unit dashpot [1/kg].
+    pub fn lambda_of(&self, a: usize, b: Option<usize>) -> (f64, f64) {
+        let both = |of: fn(&Lambda) -> f64| of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]));
+        (both(|l| l.spring), both(|l| l.damping))
+    }
+
+    /// Takes what the case asks of a pair over `dt` [s] into `worst`; `viscous` [kg/s] adds to the dashpot.
+    pub fn ask(
+        &self,
+        worst: &mut Worst,
+        bodies: &[Body],
+        (a, b): (usize, Option<usize>),
+        dt: f64,
+        viscous: f64,
+    ) {
+        let (spring, damping) = self.lambda_of(a, b);
+        let asked = self.damping.coefficient(self.spring, self.spring, reduced_mass(bodies, a, b));
+        worst.omega_dt = worst.omega_dt.max(dt * (self.spring * spring).sqrt());
+        worst.damping_dt = worst.damping_dt.max(dt * (asked + viscous) * damping);
+    }
+
+    /// What the worst contact asks of a step of `dt` [s].
+    pub fn worst(&self, law: &dyn Law, bodies: &[Body], dt: f64) -> Worst {
+        let longest_step = self.longest_step.max(dt);
+        law.worst(&Self { longest_step, ..self.clone() }, bodies, dt)
+    }
+
+    /// Number of sub-steps for `worst`.
+    ///
+    /// # Errors
+    /// [`Error::Case`] if a forced number is unstable, or if the law would need an absurd one.
+    pub fn substeps(&self, worst: &Worst) -> Result<u32> {
+        if worst.wanted == 0.0 {
+            return Ok(1);
+        }
+        if let Some(n) = self.forced {
+            let (omega, damping) = (worst.omega_dt / f64::from(n), worst.damping_dt / f64::from(n));
+            if omega > 1.0 || omega * omega + 2.0 * damping > 4.0 {
+                return Err(Error::Case(format!(
+                    "contact.substeps = {n} is unstable: dt sqrt(K / m_e) = {omega:.2} a sub-step (at most 1), \
+                     C dt / m_e = {damping:.2}; leave substeps out, or set it to at least {}, or lower \
+                     contact.spring or run.time_step",
+                    (worst.omega_dt / OMEGA_STEP).max(worst.damping_dt).ceil()
+                )));
+            }
+            return Ok(n);
+        }
+        let wanted = (worst.wanted - 1e-9).ceil().max(1.0);
+        if wanted > f64::from(ABSURD_SUBSTEPS) {
+            let key = if worst.omega_dt / OMEGA_STEP >= worst.damping_dt {
+                format!("contact.spring = {:.3e} N/m", self.spring)
+            } else {
+                "what damps contact (damping, damping_ratio, viscous_friction)".into()
+            };
+            return Err(Error::Case(format!(
+                "{key} asks for {wanted} contact sub-steps a step, more than {ABSURD_SUBSTEPS}, and law = \"paper\" \
+                 does not soften: lower it or run.time_step, or use law = \"smooth\""
+            )));
+        }
+        Ok(wanted as u32)
+    }
+
+    /// How the step `dt` [s] is cut.
+    ///
+    /// # Errors
+    /// As [`Limits::substeps`].
+    pub fn cut(&mut self, law: Option<&dyn Law>, bodies: &[Body], dt: f64) -> Result<Cut> {
+        self.longest_step = self.longest_step.max(dt);
+        let Some(law) = law else { return Ok(Cut { substeps: 1, omega_dt: 0.0 }) };
+        let worst = self.worst(law, bodies, dt);
+        Ok(Cut { substeps: self.substeps(&worst)?, omega_dt: worst.omega_dt })
+    }
+
+    /// dt sqrt(K / m_e) of a sub-step: smaller where the energy of an impact is what the case is about,
+    /// because it gives a restitution or has next to no damping to take an error away.
+    pub fn omega_step(&self) -> f64 {
+        let elastic = match self.damping {
+            Damping::Ratio(_) => true,
+            Damping::Coefficient(c) => c < 0.02 * (self.spring * self.lightest).sqrt(),
+        };
+        if elastic { ELASTIC_OMEGA_STEP } else { OMEGA_STEP }
+    }
+}
+
+/// Largest speed of a solid at t = 0, or by its table [m/s].
+fn starting_speed(scene: &Scene) -> f64 {
+    let start = scene.solids.iter().map(|s| match &s.drive {
+        Drive::Free(body) => body.velocity.length(),
+        Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY),
+    });
+    start.fold(0.0, f64::max)
+}
+
+/// Speed [m/s] of the fastest solid that there could be: the starting speed and the height of the domain.
+fn fastest_speed(scene: &Scene) -> f64 {
+    let (low, high) = scene.domain;
+    let height = (high - low).abs().dot(scene.gravity.normalize_or_zero().abs());
+    let height = if height.is_finite() { height } else { 0.0 };
+    let start = starting_speed(scene);
+    (start * start + 2.0 * scene.gravity.length() * height).sqrt()
+}
+
+/// Speed [m/s] of a body that falls from where it starts to the lowest wall, or of water that falls its depth.
+fn falling_speed(scene: &Scene) -> f64 {
+    let up = -scene.gravity.normalize_or_zero();
+    let free = scene.solids.iter().filter(|s| matches!(s.drive, Drive::Free(_)));
+    let highest = free.map(|s| s.position.dot(up) + s.shape.radius()).fold(f64::NEG_INFINITY, f64::max);
+    // of each wall the lowest corner of the face that looks up most
+    let floor = |w: &WallShape| {
+        let rise = (w.axes.transpose() * up).abs() * w.half;
+        w.center.dot(up) + 2.0 * rise.max_element() - rise.element_sum()
+    };
+    let lowest = scene.walls.iter().map(floor).fold(f64::INFINITY, f64::min);
+    let fall = if lowest < highest && lowest.is_finite() { highest - lowest } else { 0.0 };
+    let start = starting_speed(scene);
+    (start * start + 2.0 * scene.gravity.length() * fall.max(scene.depth)).sqrt()
+}

@@ -1,0 +1,237 @@
+//! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
+
+use crate::case::{Case, Encoding, Face, Obstacle, OutputKind, Vector};
+use serde::Serialize;
+
+/// Bytes on the host, as measured on the transport case from 27,000 to 115,000 particles: for each particle, for
+/// each one of water (the lists and the solver), for each cell of the search, for each cell of the lattice.
+const PARTICLE: f64 = 300.0;
+const WATER: f64 = 1200.0;
+const WATER_ON_DEVICE: f64 = 300.0;
+const SEARCH_CELL: f64 = 13.0;
+const LATTICE_CELL: f64 = 1.0;
+/// The program itself.
+const PROGRAM: f64 = 16e6;
+/// Bytes of a particle in a frame, by encoding, and in a checkpoint.
+const FRAME_BASE64: f64 = 45.0;
+const FRAME_RAW: f64 = 50.0;
+const CHECKPOINT: f64 = 120.0;
+/// Bytes of a row of the tables, and more for each solid.
+const ROW: f64 = 700.0;
+const ROW_OF_SOLID: f64 = 400.0;
+
+/// What a case will take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Particles of water.
+    pub water: f64,
+    /// All particles.
+    pub particles: f64,
+    /// Cells of the neighbour search.
+    pub cells: f64,
+    /// Memory of a run on the CPU [bytes].
+    pub memory_cpu: f64,
+    /// Memory on the host of a run on a device [bytes].
+    pub memory_beside_device: f64,
+    /// Frames.
+    pub frames: f64,
+    /// Bytes of a frame.
+    pub frame_bytes: f64,
+    /// Bytes of a row of all tables.
+    pub row_bytes: f64,
+    /// Bytes of the tables.
+    pub table_bytes: f64,
+    /// Bytes of the checkpoints that are kept.
+    pub checkpoint_bytes: f64,
+}
+
+/// A box that grows.
+#[derive(Clone, Copy)]
+struct Bounds {
+    lo: Vector,
+    hi: Vector,
+}
+
+impl Bounds {
+    const NONE: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
+
+    fn add(&mut self, lo: Vector, hi: Vector) {
+        for k in 0..3 {
+            self.lo[k] = self.lo[k].min(lo[k]);
+            self.hi[k] = self.hi[k].max(hi[k]);
+        }
+    }
+    /// A solid, wherever its table of motion takes it.
+    fn add_moving(&mut self, lo: Vector, hi: Vector, rows: &[[f64; 4]]) {
+        self.add(lo, hi);
+        for row in rows {
+            let at = |x: Vector| [x[0] + row[1], x[1] + row[2], x[2] + row[3]];
+            self.add(at(lo), at(hi));
+        }
+    }
+    fn size(&self, k: usize) -> f64 {
+        (self.hi[k] - self.lo[k]).max(0.0)
+    }
+}
+
+fn length(v: &Vector) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+impl Estimate {
+    /// Of `case`, which has passed the check.
+    pub fn new(case: &Case) -> Self {
+        let run = &case.run;
+        let (l0, flat) = (run.spacing, run.dimensions == 2);
+        let layers = run.effective_radius.ceil();
+        let axes = || (0..3).filter(move |&k| !(flat && k == 1));
+        let cells =
+            |size: &dyn Fn(usize) -> f64| axes().map(|k| (size(k) / l0).ceil().max(1.0)).product::<f64>();
+        let span = |lo: &Vector, hi: &Vector, k: usize| hi[k] - lo[k];
+        let blocks = case.fluid.iter().flat_map(|f| &f.block);
+        let water: f64 = blocks.clone().map(|b| cells(&|k| span(&b.min, &b.max, k))).sum();
+        // A shell of `layers` around or inside of a box.
+        let shell = |size: &dyn Fn(usize) -> f64, open: &[Face]| {
+            let closed = 1.0 - open.len() as f64 / if flat { 4.0 } else { 6.0 };
+            let area: f64 = axes()
+                .map(|k| {
+                    2.0 * axes().filter(|&j| j != k).map(|j| (size(j) / l0).ceil().max(1.0)).product::<f64>()
+                })
+                .sum();
+            (area * closed.max(0.0) * layers).min(f64::MAX)
+        };
+        let inside = |size: &dyn Fn(usize) -> f64, open: &[Face]| shell(size, open).min(cells(size));
+        let boxed = |o: &Obstacle| inside(&|k| span(&o.min, &o.max, k), &o.open);
+        let mut solids: f64 = case.obstacle.iter().map(boxed).sum();
+        solids += case.moving_wall.iter().map(|w| inside(&|k| span(&w.min, &w.max, k), &w.open)).sum::<f64>();
+        if let Some(tank) = &case.tank {
+            solids += shell(&|k| span(&tank.min, &tank.max, k), &tank.open);
+        }
+        let across = |p: &crate::case::Plane| if flat { 1.0 } else { (p.size[1] / l0).ceil().max(1.0) };
+        solids +=
+            case.plane.iter().map(|p| (p.size[0] / l0).ceil().max(1.0) * across(p) * layers).sum::<f64>();
+        let extent = |body: &crate::case::Body| {
+            let round = [2.0 * body.radius.unwrap_or_default(); 3];
+            let height = body.height.unwrap_or(round[0]);
+            body.size.unwrap_or([round[0], round[1], height])
+        };
+        solids += case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum::<f64>();
+
+        let mut lattice = Bounds::NONE;
+        case.tank.iter().for_each(|t| lattice.add(t.min, t.max));
+        blocks.for_each(|b| lattice.add(b.min, b.max));
+        case.obstacle.iter().for_each(|o| lattice.add(o.min, o.max));
+        case.moving_wall.iter().for_each(|w| lattice.add(w.min, w.max));
+        let mut domain = lattice;
+        case.moving_wall.iter().for_each(|w| domain.add_moving(w.min, w.max, &w.motion));
+        for body in &case.body {
+            let half = 0.5 * length(&extent(body));
+            let (lo, hi) = (body.center.map(|x| x - half), body.center.map(|x| x + half));
+            domain.add_moving(lo, hi, body.motion.as_deref().unwrap_or_default());
+        }
+        for plane in &case.plane {
+            let half = 0.5 * plane.size[0].hypot(if flat { 0.0 } else { plane.size[1] });
+            domain.add(plane.center.map(|x| x - half), plane.center.map(|x| x + half));
+        }
+        if let Some([lo, hi]) = run.domain {
+            domain = Bounds { lo, hi };
+        } else if length(&run.gravity) > 0.0 {
+            // Room for splashes, as the scene leaves it.
+            domain.hi[2] += axes().map(|k| domain.size(k)).fold(0.0, f64::max);
+        }
+        let reach = run.effective_radius * l0;
+        let wet = water > 0.0;
+        let searched = axes().map(|k| (domain.size(k) / reach).ceil() + 8.0).product::<f64>();
+        let searched = if wet { searched } else { 0.0 };
+        let ground = (cells(&|k| lattice.size(k)) * LATTICE_CELL).max(0.0);
+        let particles = water + solids;
+        let base = PROGRAM + particles * PARTICLE + searched * SEARCH_CELL + ground;
+
+        let output = &case.output;
+        let frames = if output.every > 0.0 { (run.end / output.every).floor() + 2.0 } else { 0.0 };
+        let shown = |kind| if output.kinds.contains(&kind) { 1.0 } else { 0.0 };
+        let bodies: f64 = case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum();
+        let each = if output.encoding == Encoding::Raw { FRAME_RAW } else { FRAME_BASE64 };
+        let moving = (case.body.len() + case.moving_wall.len()) as f64;
+        let rows = run.end / output.table_every.unwrap_or(run.time_step).max(run.time_step);
+        let saves = run.checkpoint.wall > 0.0 || run.checkpoint.every.is_some();
+        Self {
+            water,
+            particles,
+            cells: searched,
+            memory_cpu: base + water * WATER,
+            memory_beside_device: base + water * WATER_ON_DEVICE,
+            frames,
+            frame_bytes: each * (water * shown(OutputKind::Fluid) + bodies * shown(OutputKind::Body)),
+            row_bytes: ROW + moving * ROW_OF_SOLID,
+            table_bytes: rows * (ROW + moving * ROW_OF_SOLID),
+            checkpoint_bytes: if saves { 3.0 * CHECKPOINT * particles } else { 0.0 },
+        }
+    }
+
+    /// Of a run that stops after `steps`, if any.
+    pub fn at_most(self, steps: Option<u64>) -> Self {
+        let Some(steps) = steps.map(|n| n as f64) else { return self };
+        let frames = self.frames.min(steps + 2.0);
+        let table_bytes = self.table_bytes.min(steps * self.row_bytes);
+        Self { frames, table_bytes, ..self }
+    }
+
+    /// All bytes that will be written and kept.
+    pub fn disk(&self) -> f64 {
+        self.frames * self.frame_bytes + self.table_bytes + self.checkpoint_bytes
+    }
+}
+
+/// Bytes in words.
+pub fn bytes(n: f64) -> String {
+    match n {
+        n if n >= 1e12 => format!("{:.1} TB", n / 1e12),
+        n if n >= 1e9 => format!("{:.1} GB", n / 1e9),
+        n if n >= 1e6 => format!("{:.1} MB", n / 1e6),
+        n => format!("{:.0} kB", n / 1e3),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn case(more: &str) -> Case {
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n{more}[tank]\nmin = [0, 0, 0]\nmax = [3.5, 0.5, 0.5]\n\
+             open = [\"z_max\"]\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.35]\n"
+        );
+        toml::from_str(&text).expect("a case")
+    }
+
+    #[test]
+    fn counts_are_those_of_the_scene_nearly() {
+        let case = case("");
+        let scene = crate::scene::Scene::build(&case).expect("a scene");
+        let estimate = Estimate::new(&case);
+        let near = |a: f64, b: usize| (a / b as f64 - 1.0).abs();
+        assert!(near(estimate.water, scene.groups.fluid) < 0.05, "{estimate:?}");
+        assert!(
+            near(estimate.particles, scene.groups.total()) < 0.25,
+            "{estimate:?}, {}",
+            scene.groups.total()
+        );
+    }
+
+    #[test]
+    fn no_number_overflows() {
+        for (key, value) in [("spacing", 1e-300), ("end", 1e300)] {
+            let mut case = case("");
+            if key == "spacing" {
+                case.run.spacing = value
+            } else {
+                case.run.end = value
+            }
+            case.run.domain = Some([[-1e300; 3], [1e300; 3]]);
+            let estimate = Estimate::new(&case);
+            assert!(estimate.memory_cpu > 1e15 && !estimate.memory_cpu.is_nan(), "{estimate:?}");
+            assert!(!estimate.disk().is_nan());
+        }
+    }
+}

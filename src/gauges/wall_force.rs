@@ -1,0 +1,103 @@
+//! Force of the fluid on a fixed wall: pressure times area over its wall layer, as on bodies
+//! ([`crate::kernels::body_force`]), and the reaction of viscosity ([`crate::kernels::viscosity`]).
+//!
+//! Collisions of particles with the wall, Eq. (18), are not in it.
+
+use crate::body::Wrench;
+use crate::fields::Fields;
+use crate::kernels::body_force::surface_pressure;
+use crate::lattice::weight;
+use crate::params::Params;
+use crate::scene::{Groups, Kind, Scene};
+use glam::{DMat3, DVec3, IVec3};
+use std::collections::{HashMap, HashSet};
+
+/// The wall layer of a fixed wall.
+#[derive(Clone, Debug, Default)]
+pub struct FixedWall {
+    /// Slots of its wall particles that face the fluid.
+    pub slots: Vec<usize>,
+    position: Vec<DVec3>,
+    /// Area with its direction into the free space, one a slot [m2].
+    area: Vec<DVec3>,
+    /// From a particle's centre to the true surface, one a slot [m].
+    to_surface: Vec<DVec3>,
+    /// Torque counts about this point, the centre of the wall's box [m].
+    about: DVec3,
+}
+
+impl FixedWall {
+    /// The fixed wall `name`: an obstacle, a plane or a face of the tank (`tank.z_min`); `None` if there is none.
+    pub fn find(scene: &Scene, name: &str) -> Option<Self> {
+        let shape = scene.walls.iter().position(|w| w.name == name)?;
+        let about = scene.walls[shape].center;
+        let on_lattice = scene.walls[shape].axes == DMat3::IDENTITY;
+        let mut out = Self { about, ..Self::default() };
+        let l0 = scene.spacing;
+        // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
+        let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
+        let cell = |x: DVec3| ((x - origin) / l0).round().as_ivec3();
+        let solid: HashSet<IVec3> =
+            scene.position[scene.groups.static_range()].iter().map(|x| cell(*x)).collect();
+        for (k, slot) in scene.groups.static_wall_range().enumerate() {
+            let (normal, x) = (scene.static_wall_normal[k], scene.position[slot]);
+            if scene.static_wall_shape[k] as usize != shape {
+                continue;
+            }
+            // Particles on an edge of a box belong to all of its faces there, whole.
+            let open = |axis: usize| {
+                let face = DVec3::AXES[axis] * normal[axis].signum();
+                if normal[axis].abs() > 1e-6 && !solid.contains(&cell(x + l0 * face)) {
+                    face
+                } else {
+                    DVec3::ZERO
+                }
+            };
+            let faces = if on_lattice { open(0) + open(1) + open(2) } else { normal };
+            if faces == DVec3::ZERO {
+                continue;
+            }
+            out.slots.push(slot);
+            out.position.push(scene.position[slot]);
+            out.area.push(faces * l0 * l0);
+            out.to_surface.push(faces * 0.5 * l0);
+        }
+        Some(out)
+    }
+
+    /// Force and torque of the pressures of its slots [N, N m]. Pressure 0 is that of a dry particle.
+    pub fn pressure_force(&self, pressures: &[f64], params: &Params) -> Wrench {
+        let mut sum = Wrench::default();
+        for (k, &p) in pressures.iter().enumerate() {
+            let p = surface_pressure(p, p > 0.0, self.to_surface[k], params);
+            let force = -p * self.area[k];
+            sum.force += force;
+            sum.torque += (self.position[k] + self.to_surface[k] - self.about).cross(force);
+        }
+        sum
+    }
+
+    /// Force of the fluid's viscosity [N]: m 2 d nu / (lambda n0) sum w v over the water near its particles.
+    pub fn viscous_force(&self, fields: &Fields, groups: &Groups, params: &Params) -> DVec3 {
+        let re = params.effective_radius;
+        let cell = |x: DVec3| (x / re).floor().as_ivec3();
+        let mut cells: HashMap<IVec3, Vec<usize>> = HashMap::new();
+        for (k, x) in self.position.iter().enumerate() {
+            cells.entry(cell(*x)).or_default().push(k);
+        }
+        let mut sum = DVec3::ZERO;
+        for i in (0..groups.fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
+            let (x, at) = (fields.position[i], cell(fields.position[i]));
+            let around = (0..27).map(|k| at + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
+            for &k in around.filter_map(|c| cells.get(&c)).flatten() {
+                let r = x.distance(self.position[k]);
+                if r > 0.0 && r < re {
+                    sum += weight(r, re) * fields.velocity[i];
+                }
+            }
+        }
+        let coefficient = params.viscosity * 2.0 * f64::from(params.dimensions)
+            / (params.laplacian * params.number_density);
+        params.particle_mass() * coefficient * params.wall_shear * sum
+    }
+}

@@ -1,0 +1,37 @@
+//! What a stage does to the energy v^2 / 2 - g . x of a particle, per mass [m2/s2], from the state before the stage.
+
+use crate::kernels::correct::correct;
+use crate::kernels::predict::predict;
+use crate::params::Params;
+use glam::DVec3;
+
+/// Energy gained from position and velocity `before` to `after`.
+fn gain(before: (DVec3, DVec3), after: (DVec3, DVec3), gravity: DVec3) -> f64 {
+    let (way, change) = (after.0 - before.0, after.1 - before.1);
+    change.dot(before.1 + 0.5 * change) - gravity.dot(way)
+}
+
+/// Work of gravity, of viscosity with its acceleration `viscous`, and of the clamp, in `predict`.
+pub fn predict_work(x: DVec3, v: DVec3, viscous: DVec3, params: &Params, dt: f64) -> [f64; 3] {
+    let total = params.explicit_gravity() + viscous;
+    let (to, new, _) = predict(x, v, total, dt, params.spacing);
+    let viscosity = dt * viscous.dot(v + 0.5 * dt * total);
+    let free = gain((x, v), (x + dt * new, new), params.gravity);
+    let clamp = gain((x, v), (to, new), params.gravity) - free;
+    [free - viscosity, viscosity, clamp]
+}
+
+/// Work of the acceleration `part` where `total` acts, in `correct` without its clamp: the velocity is changed, and
+/// the position by what the change would have moved it.
+pub fn correct_work(v: DVec3, part: DVec3, total: DVec3, gravity: DVec3, dt: f64) -> f64 {
+    dt * part.dot(v + 0.5 * dt * total) - dt * dt * gravity.dot(part)
+}
+
+/// Work of the clamp in `correct`.
+pub fn correct_clamp(x: DVec3, v: DVec3, total: DVec3, params: &Params, dt: f64) -> f64 {
+    let (to, new, clamped) = correct(x, v, total, dt, params.spacing);
+    if !clamped {
+        return 0.0;
+    }
+    gain((x, v), (to, new), params.gravity) - correct_work(v, total, total, params.gravity, dt)
+}

@@ -1,0 +1,117 @@
+//! What an earlier run left in a folder, and whether another one may go on with it.
+
+use crate::case::Case;
+use crate::case::file::parse;
+use crate::checkpoint::Found;
+use crate::checkpoint::file::newest;
+use crate::error::{Error, Result};
+use crate::output::folder::{case_name, checkpoints};
+use std::path::Path;
+
+/// What a folder holds.
+#[derive(Debug)]
+pub enum Standing {
+    /// No run.
+    Nothing,
+    /// A run that reached its end: what it says of itself (`result.json`).
+    Done(String),
+    /// A run that was stopped before it saved anything: it starts again.
+    Lost,
+    /// A run that was stopped, in the state that it saved last.
+    Stopped(Box<Found>),
+}
+
+/// What `root` holds of a run of `case`.
+///
+/// # Errors
+/// [`Error::Case`] if the run there is one of another case, naming the key; if it diverged, which it would do again;
+/// or if all its checkpoints are damaged. [`Error::Io`].
+pub fn standing(root: &Path, case: &Case) -> Result<Standing> {
+    if case_name(root)?.is_none() {
+        return Ok(Standing::Nothing);
+    }
+    if let Ok(text) = std::fs::read_to_string(root.join("case.toml"))
+        && let Ok((old, ..)) = parse("case.toml", text, &[])
+    {
+        same(root, &old, case)?;
+    }
+    if let Ok(text) = std::fs::read_to_string(root.join("result.json"))
+        && let Ok(result) = serde_json::from_str::<serde_json::Value>(&text)
+    {
+        match (result["status"].as_str(), result["time_s"].as_f64()) {
+            (Some("done"), Some(time)) if time >= case.run.end * (1.0 - 1e-6) - 1e-6 * case.run.time_step => {
+                return Ok(Standing::Done(text));
+            }
+            (Some("diverged"), _) => {
+                return Err(Error::Senseless(format!(
+                    "the run in {} {}; gone on with, it would do so again: start another case from its last good state \
+                     with run.from = \"{0}\"",
+                    root.display(),
+                    result["exit_reason"].as_str().unwrap_or("diverged"),
+                )));
+            }
+            _ => {}
+        }
+    }
+    let Some(found) = newest(&checkpoints(root))? else { return Ok(Standing::Lost) };
+    let (old, ..) = parse("checkpoint", found.origin.case.clone(), &[])?;
+    same(root, &old, case)?;
+    Ok(Standing::Stopped(Box::new(found)))
+}
+
+/// Refuses a case that is another one than that of the run in `root`.
+fn same(root: &Path, old: &Case, new: &Case) -> Result<()> {
+    let changed = changed(old, new);
+    if changed.is_empty() {
+        return Ok(());
+    }
+    let most = 5;
+    let more = changed.len().saturating_sub(most);
+    let list = changed[..changed.len() - more].join("; ");
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    Err(Error::Case(format!(
+        "the case is another one than that of the run in {}: {list}{more}; run it as it was, or start a new run from \
+         that state with run.from = \"{0}\"",
+        root.display()
+    )))
+}
+
+/// Keys with other values, each with both of them.
+fn changed(old: &Case, new: &Case) -> Vec<String> {
+    let plain = |case: &Case| {
+        // When states are saved changes nothing about them.
+        let mut case = case.clone();
+        case.run.checkpoint = Default::default();
+        case.run.from = None;
+        toml::Value::try_from(case).ok()
+    };
+    let mut found = Vec::new();
+    compare("", plain(old).as_ref(), plain(new).as_ref(), &mut found);
+    found
+}
+
+fn compare(path: &str, old: Option<&toml::Value>, new: Option<&toml::Value>, found: &mut Vec<String>) {
+    use toml::Value::{Array, Table};
+    let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match (old, new) {
+        (Some(Table(a)), Some(Table(b))) => {
+            let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+            keys.into_iter().for_each(|k| compare(&join(k), a.get(k), b.get(k), found));
+        }
+        (Some(Array(a)), Some(Array(b))) if a.len() == b.len() => {
+            a.iter()
+                .zip(b)
+                .enumerate()
+                .for_each(|(k, (a, b))| compare(&join(&k.to_string()), Some(a), Some(b), found));
+        }
+        (Some(a), Some(b)) if a == b => {}
+        _ => {
+            let shown = |value: Option<&toml::Value>| match value {
+                None => "absent".to_owned(),
+                Some(Table(_) | Array(_)) => "other".to_owned(),
+                Some(value) => value.to_string(),
+            };
+            found.push(format!("{path} was {}, is {}", shown(old), shown(new)));
+        }
+    }
+}

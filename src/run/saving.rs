@@ -1,0 +1,78 @@
+//! When and where the state of a run is saved, and which states it may begin with.
+
+use super::due::Due;
+use crate::checkpoint::{Archive, Found, Origin, file};
+use crate::error::{Error, Result};
+use crate::output::folder::checkpoints;
+use crate::simulation::Simulation;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// When and where the state is saved.
+pub(super) struct Saving {
+    pub folder: PathBuf,
+    pub origin: Origin,
+    pub every: Due,
+    pub wall: Option<Duration>,
+    /// At all, but for signals.
+    pub planned: bool,
+    pub last: Instant,
+    /// Step of the file written last.
+    pub step: Option<u64>,
+    /// A state that was good, in case the run diverges.
+    pub good: Option<(u64, f64, Archive)>,
+}
+
+impl Saving {
+    pub fn new(simulation: &Simulation, name: &str, text: &str, folder: PathBuf) -> Self {
+        let checkpoint = simulation.case.run.checkpoint;
+        let origin = Origin {
+            version: env!("CARGO_PKG_VERSION").into(),
+            name: name.into(),
+            case: text.into(),
+            precision: simulation.backend.precision().into(),
+            step: 0,
+            time: 0.0,
+        };
+        let wall =
+            (checkpoint.wall > 0.0).then(|| Duration::try_from_secs_f64(checkpoint.wall).ok()).flatten();
+        Self {
+            folder,
+            origin,
+            every: Due::new(Some(checkpoint.every.unwrap_or(0.0))),
+            wall,
+            planned: checkpoint.wall > 0.0 || checkpoint.every.is_some(),
+            last: Instant::now(),
+            step: None,
+            good: None,
+        }
+    }
+
+    pub fn write(&mut self, step: u64, time: f64, archive: &Archive) -> Result<()> {
+        file::write(&self.folder, &Origin { step, time, ..self.origin.clone() }, archive)?;
+        (self.last, self.step, self.good) = (Instant::now(), Some(step), None);
+        Ok(())
+    }
+}
+
+/// The state that `run.from` names.
+pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
+    let Some(from) = &simulation.case.run.from else { return Ok(None) };
+    let found = file::newest(&checkpoints(Path::new(from)))?;
+    let found = found.ok_or_else(|| Error::Case(format!("run.from: `{from}` holds no checkpoint")))?;
+    fits(simulation, &found).map_err(|e| Error::Case(format!("run.from: {e}")))?;
+    Ok(Some(Found { archive: found.archive.to_restore(), ..found }))
+}
+
+/// Refuses a state of another kind of processor.
+pub(super) fn fits(simulation: &Simulation, found: &Found) -> Result<()> {
+    let (had, have) = (&found.origin.precision, simulation.backend.precision());
+    if had == have {
+        return Ok(());
+    }
+    let name = |precision: &str| if precision == "f64" { "cpu" } else { "gpu" };
+    let (path, had, have) = (found.path.display(), name(had), name(have));
+    Err(Error::Case(format!(
+        "{path} was saved by a run on the {had}, this one is on the {have}: use --backend {had}"
+    )))
+}

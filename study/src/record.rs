@@ -1,0 +1,219 @@
+//! Curves of a run, by the names that its tables give them: gauges, bodies, the water as a whole, profiles.
+//!
+//! | `measure.of` | curves |
+//! |---|---|
+//! | `gauges` | the columns of gauges.csv: `NAME [Pa]`, `NAME [m]`, `NAME_force_x [N]`, `NAME_torque_y [N m]` |
+//! | `bodies` | `NAME x [m]`, `NAME vx [m/s]`, `NAME tilt [deg]` of every body and moving wall |
+//! | `fluid` | `fluid x [m]` of the centroid, `fluid kinetic [J]`, `fluid momentum x [kg m/s]` |
+//! | `measure.profile` | the profile's name: mean over the window against a coordinate |
+
+use super::measure::{Measure, Spec};
+use super::row::Measured;
+use glam::DVec3;
+use seixo::error::{Error, Result};
+use seixo::fields::Fields;
+use seixo::gauges::Gauges;
+use seixo::output::table::Cell;
+use seixo::scene::{Kind, Scene};
+use seixo::simulation::Simulation;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// A coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Coordinate {
+    /// x.
+    X,
+    /// y.
+    Y,
+    /// z.
+    Z,
+}
+
+/// What a profile shows of the water.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Velocity along x [m/s].
+    Vx,
+    /// Velocity along y [m/s].
+    Vy,
+    /// Velocity along z [m/s].
+    Vz,
+    /// Pressure [Pa].
+    Pressure,
+}
+
+impl Quantity {
+    fn of(self, fields: &Fields, i: usize) -> f64 {
+        match self {
+            Self::Vx => fields.velocity[i].x,
+            Self::Vy => fields.velocity[i].y,
+            Self::Vz => fields.velocity[i].z,
+            Self::Pressure => fields.pressure[i],
+        }
+    }
+}
+
+/// A profile: what the water particles of a region have on average, against a coordinate.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Name of the curve.
+    pub name: String,
+    /// What it shows.
+    pub of: Quantity,
+    /// Against what.
+    pub along: Coordinate,
+    /// Lower and upper corner of the region [m].
+    pub within: [[f64; 3]; 2],
+    /// Number of bins along the coordinate.
+    pub bins: usize,
+}
+
+/// Sums of a profile: of coordinate, quantity and particles, one a bin.
+#[derive(Debug)]
+struct Sums {
+    profile: Profile,
+    bins: Vec<[f64; 3]>,
+}
+
+impl Sums {
+    fn add(&mut self, fields: &Fields, fluid: usize) {
+        let p = &self.profile;
+        let axis = p.along as usize;
+        let (low, high) = (DVec3::from(p.within[0]), DVec3::from(p.within[1]));
+        for i in (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
+            let x = fields.position[i];
+            if x.cmpge(low).all() && x.cmplt(high).all() {
+                let part = (x[axis] - low[axis]) / (high[axis] - low[axis]);
+                let bin = &mut self.bins[((part * p.bins as f64) as usize).min(p.bins - 1)];
+                bin[0] += x[axis];
+                bin[1] += p.of.of(fields, i);
+                bin[2] += 1.0;
+            }
+        }
+    }
+
+    fn curve(&self) -> Vec<[f64; 2]> {
+        self.bins.iter().filter(|b| b[2] > 0.0).map(|b| [b[0] / b[2], b[1] / b[2]]).collect()
+    }
+}
+
+/// Keeps the curves of a run.
+#[derive(Debug)]
+pub struct Recorder {
+    gauges: Option<Gauges>,
+    bodies: bool,
+    fluid: bool,
+    profiles: Vec<Sums>,
+    curves: BTreeMap<String, Vec<[f64; 2]>>,
+}
+
+impl Recorder {
+    /// For a run of `simulation`.
+    ///
+    /// # Errors
+    /// A gauge that hangs in the air, a profile without bins.
+    pub fn new(spec: &Spec, simulation: &Simulation, scene: &Scene) -> Result<Self> {
+        let has = |m| spec.of.contains(&m);
+        if let Some(p) = spec.profile.iter().find(|p| p.bins == 0) {
+            return Err(Error::Case(format!("measure.profile `{}`: give 1 bin or more", p.name)));
+        }
+        let sums = |p: &Profile| Sums { profile: p.clone(), bins: vec![[0.0; 3]; p.bins] };
+        Ok(Self {
+            gauges: if has(Measure::Gauges) { Some(Gauges::new(&simulation.case, scene)?) } else { None },
+            bodies: has(Measure::Bodies),
+            fluid: has(Measure::Fluid) && simulation.plan.wet(),
+            profiles: spec.profile.iter().map(sums).collect(),
+            curves: BTreeMap::new(),
+        })
+    }
+
+    /// The state now; `in_window` adds to the profiles as well.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn sample(&mut self, simulation: &mut Simulation, in_window: bool) -> Result<()> {
+        let t = simulation.time;
+        let mut put = |name: String, value: f64| {
+            // A gauge that sees no water, or no pressure before the first step, leaves a gap.
+            if value.is_finite() {
+                self.curves.entry(name).or_default().push([t, value]);
+            }
+        };
+        if let Some(gauges) = &self.gauges {
+            for (name, cell) in gauges.header().into_iter().zip(gauges.row(simulation)?).skip(1) {
+                if let Cell::Number(value) = cell {
+                    put(name, value);
+                }
+            }
+        }
+        if self.bodies {
+            for (k, pose) in simulation.solids.poses().iter().enumerate() {
+                let name = simulation.solids.name(k);
+                for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+                    put(format!("{name} {letter} [m]"), pose.position[axis]);
+                    put(format!("{name} v{letter} [m/s]"), pose.velocity[axis]);
+                }
+                let up = pose.orientation * DVec3::Z;
+                put(format!("{name} tilt [deg]"), up.z.clamp(-1.0, 1.0).acos().to_degrees());
+            }
+        }
+        if self.fluid {
+            let monitor = simulation.backend.monitor()?;
+            for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+                put(format!("fluid {letter} [m]"), monitor.centroid[axis]);
+                put(format!("fluid momentum {letter} [kg m/s]"), monitor.momentum[axis]);
+            }
+            put("fluid kinetic [J]".into(), monitor.kinetic);
+        }
+        if in_window && !self.profiles.is_empty() {
+            let fields = simulation.backend.read()?;
+            self.profiles.iter_mut().for_each(|p| p.add(&fields, simulation.groups.fluid));
+        }
+        Ok(())
+    }
+
+    /// The curves of the whole run.
+    pub fn finish(self, out: &mut Measured) {
+        out.curves.extend(self.curves);
+        out.curves.extend(self.profiles.iter().map(|p| (p.profile.name.clone(), p.curve())));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_is_the_mean_of_its_bins() {
+        let profile = Profile {
+            name: "u".into(),
+            of: Quantity::Vx,
+            along: Coordinate::Z,
+            within: [[0.0, -1.0, 0.0], [1.0, 1.0, 1.0]],
+            bins: 2,
+        };
+        let mut fields = Fields::default();
+        for (z, u, kind) in [
+            (0.1, 1.0, Kind::Fluid),
+            (0.3, 2.0, Kind::Fluid),
+            (0.9, 7.0, Kind::Fluid),
+            (0.95, 99.0, Kind::Ghost),
+            (1.5, 99.0, Kind::Fluid),
+        ] {
+            fields.position.push(DVec3::new(0.5, 0.0, z));
+            fields.velocity.push(DVec3::new(u, 0.0, 0.0));
+            fields.kind.push(kind);
+        }
+        let mut sums = Sums { bins: vec![[0.0; 3]; 2], profile };
+        sums.add(&fields, 5);
+        let curve = sums.curve();
+        assert!(
+            (curve[0][0] - 0.2).abs() < 1e-12 && curve[0][1] == 1.5 && curve[1] == [0.9, 7.0],
+            "{curve:?}"
+        );
+    }
+}

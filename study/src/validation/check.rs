@@ -1,0 +1,318 @@
+//! A check of a validation: a measured number or curve, what it should be, and how far off it may be.
+//!
+//! ```toml
+//! [[check]]
+//! name = "P1, peak over 10 ms [Pa]"
+//! curve = "P1 [Pa]"                      # or value = "..."
+//! take = "largest"                       # see [`Take`]; the rms distance from the reference if absent
+//! window = [0.3, 0.7]
+//! smooth = 0.01
+//! against = "../reference/spheric2_kleefsman_10ms.csv"   # or reference = 11239
+//! columns = ["t_s", "P1_Pa"]
+//! tolerance = 0.15                       # of the reference, or of `per`
+//! peers = [{ name = "MPS of the paper's group, l0 = 15 mm", value = 18505 }]
+//! ```
+
+use super::reduce::{Curve, Take, cut, distance, reduce, since_moved, smooth};
+use crate::definition::Files;
+use crate::row::{Class, Measured};
+use seixo::error::{Error, Result};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// A check, as in a validation file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    /// What is compared, with its unit.
+    pub name: String,
+    /// A measured value.
+    pub value: Option<String>,
+    /// A measured curve, instead of `value`.
+    pub curve: Option<String>,
+    /// What is taken from the curve.
+    #[serde(default)]
+    pub take: Take,
+    /// Only for points with these values on these axes.
+    #[serde(default)]
+    pub only: BTreeMap<String, String>,
+    /// First and last time (or place) that counts.
+    pub window: Option<[f64; 2]>,
+    /// Width of the moving mean that the curve goes through [s]; 0 for none.
+    #[serde(default)]
+    pub smooth: f64,
+    /// Level or time that `take` asks for.
+    #[serde(default)]
+    pub level: f64,
+    /// Second level, of `passage`.
+    #[serde(default)]
+    pub to: f64,
+    /// Added to the measured curve.
+    #[serde(default)]
+    pub plus: f64,
+    /// The measured curve, after `plus`, is multiplied by this.
+    #[serde(default = "one")]
+    pub times: f64,
+    /// Time counts from the moment at which the curve has moved by this much from its start.
+    pub since_moved: Option<f64>,
+    /// What the number should be.
+    pub reference: Option<f64>,
+    /// A CSV file with what the curve should be, relative to the validation file; the same is taken from it.
+    pub against: Option<String>,
+    /// Names of its two columns; the first two if absent.
+    pub columns: Option<[String; 2]>,
+    /// The difference is divided by this; by the reference's size if absent.
+    pub per: Option<f64>,
+    /// Largest error that is called right [-].
+    pub tolerance: f64,
+    /// What others reach.
+    #[serde(default)]
+    pub peers: Vec<Peer>,
+    /// Label of the chart's horizontal axis.
+    #[serde(default = "time")]
+    pub axis: String,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn time() -> String {
+    "time [s]".into()
+}
+
+/// What somebody else reaches: a number, or a curve.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Peer {
+    /// Who.
+    pub name: String,
+    /// The number.
+    pub value: Option<f64>,
+    /// A CSV file with the curve.
+    pub against: Option<String>,
+    /// Names of its two columns.
+    pub columns: Option<[String; 2]>,
+}
+
+/// What a check compares with, read.
+#[derive(Clone, Debug, Default)]
+pub struct Reference {
+    /// The curve, if there is one.
+    pub curve: Option<Curve>,
+    /// The curves of the peers that have one.
+    pub peers: Vec<Option<Curve>>,
+}
+
+/// What a check found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// The measured number.
+    pub result: f64,
+    /// What it should be.
+    pub reference: f64,
+    /// Their distance over `per` or the reference's size [-].
+    pub error: f64,
+    /// The moment from which time counts, if that is not the start [s].
+    pub origin: f64,
+}
+
+/// Two columns of a CSV text by their names, or the first two; lines that begin with `#` are passed over.
+///
+/// # Errors
+/// [`Error::Case`] naming file and column, or if there are fewer than two rows of numbers.
+pub fn columns(file: &str, text: &str, names: Option<&[String; 2]>) -> Result<Curve> {
+    let mut lines = text.lines().filter(|l| !l.starts_with('#') && !l.trim().is_empty());
+    let head: Vec<&str> = lines.next().unwrap_or_default().split(',').map(str::trim).collect();
+    let place = |k: usize| match names {
+        None => Ok(k),
+        Some(names) => head.iter().position(|h| *h == names[k]).ok_or_else(|| {
+            Error::Case(format!("{file}: no column `{}`; there are: {}", names[k], head.join(", ")))
+        }),
+    };
+    let (x, y) = (place(0)?, place(1)?);
+    let curve: Curve = lines
+        .filter_map(|l| {
+            let cells: Vec<&str> = l.split(',').map(str::trim).collect();
+            Some([cells.get(x)?.parse().ok()?, cells.get(y)?.parse().ok()?])
+        })
+        .collect();
+    if curve.len() < 2 {
+        return Err(Error::Case(format!("{file}: expected two rows of numbers or more")));
+    }
+    Ok(curve)
+}
+
+impl Check {
+    /// What is wrong with it, if anything.
+    ///
+    /// # Errors
+    /// [`Error::Case`] naming the check.
+    pub fn sound(&self) -> Result<()> {
+        let wrong = |what: &str| Err(Error::Case(format!("check `{}`: {what}", self.name)));
+        if self.value.is_some() == self.curve.is_some() {
+            return wrong("give `value` or `curve`, one of them");
+        }
+        if self.reference.is_some() == self.against.is_some() {
+            return wrong("give `reference` or `against`, one of them");
+        }
+        if self.value.is_some() && self.against.is_some() {
+            return wrong("`against` needs a `curve`");
+        }
+        if self.curve.is_some() && self.take == Take::Distance && self.against.is_none() {
+            return wrong("give `take`, or a curve to compare with as `against`");
+        }
+        if self.reference == Some(0.0) && self.per.is_none() {
+            return wrong("the reference is 0: give `per`, what the error is divided by");
+        }
+        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
+            return wrong("`tolerance` must be more than 0");
+        }
+        Ok(())
+    }
+
+    /// Whether it is for a point with `parameters`.
+    pub fn applies(&self, parameters: &BTreeMap<String, String>) -> bool {
+        self.only.iter().all(|(axis, value)| parameters.get(axis) == Some(value))
+    }
+
+    /// Reads what it compares with.
+    ///
+    /// # Errors
+    /// A file or a column that is not there.
+    pub fn read(&self, files: &Files) -> Result<Reference> {
+        let curve = |file: &Option<String>, names: &Option<[String; 2]>| match file {
+            Some(file) => columns(file, &files(file)?, names.as_ref()).map(Some),
+            None => Ok(None),
+        };
+        let peers = self.peers.iter().map(|p| curve(&p.against, &p.columns)).collect::<Result<_>>()?;
+        Ok(Reference { curve: curve(&self.against, &self.columns)?, peers })
+    }
+
+    /// The measured curve as it is compared, and the moment from which its time counts.
+    pub fn prepared(&self, measured: &Measured) -> Option<(Curve, f64)> {
+        let curve = measured.curves.get(self.curve.as_ref()?)?;
+        let curve: Curve = curve.iter().map(|p| [p[0], (p[1] + self.plus) * self.times]).collect();
+        let (curve, origin) = match self.since_moved {
+            Some(by) => since_moved(&curve, by)?,
+            None => (curve, 0.0),
+        };
+        Some((smooth(&curve, self.smooth), origin))
+    }
+
+    /// The number of a curve that is prepared, against that of the reference.
+    fn of_curve(&self, curve: &[[f64; 2]], reference: &Reference) -> Option<Verdict> {
+        let expected = reference.curve.as_ref().map(|c| cut(c, self.window));
+        if self.take == Take::Distance {
+            // The experiment's tank may be longer: what lies beyond the run's range is not compared.
+            let most = curve.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+            let reached: Curve = expected?.into_iter().filter(|r| r[1] <= most).collect();
+            let (rms, _) = distance(curve, &reached)?;
+            let size = reached.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
+            return Some(Verdict {
+                result: rms,
+                reference: 0.0,
+                error: rms / self.per.unwrap_or(size),
+                origin: 0.0,
+            });
+        }
+        let result = reduce(self.take, &cut(curve, self.window), [self.level, self.to])?;
+        let expected = match expected {
+            Some(curve) => reduce(self.take, &smooth(&curve, self.smooth), [self.level, self.to])?,
+            None => self.reference?,
+        };
+        self.of_numbers(result, expected)
+    }
+
+    fn of_numbers(&self, result: f64, reference: f64) -> Option<Verdict> {
+        let error = (result - reference).abs() / self.per.unwrap_or(reference.abs());
+        error.is_finite().then_some(Verdict { result, reference, error, origin: 0.0 })
+    }
+
+    /// Judges a run; `None` if it ended early or does not have what is asked for.
+    pub fn judge(&self, measured: &Measured, reference: &Reference) -> Option<Verdict> {
+        if measured.class > Class::Degraded {
+            return None;
+        }
+        if let Some(value) = &self.value {
+            return self.of_numbers(measured.value(value)?, self.reference?);
+        }
+        let (curve, origin) = self.prepared(measured)?;
+        Some(Verdict { origin, ..self.of_curve(&curve, reference)? })
+    }
+
+    /// Judges peer `k`.
+    pub fn judge_peer(&self, k: usize, reference: &Reference) -> Option<Verdict> {
+        if let Some(curve) = reference.peers.get(k)? {
+            return self.of_curve(curve, reference);
+        }
+        let expected = match &reference.curve {
+            Some(curve) => {
+                reduce(self.take, &smooth(&cut(curve, self.window), self.smooth), [self.level, self.to])?
+            }
+            None => self.reference?,
+        };
+        self.of_numbers(self.peers[k].value?, expected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(text: &str) -> Check {
+        toml::from_str(text).unwrap()
+    }
+
+    fn run(curve: &[[f64; 2]]) -> Measured {
+        let mut measured = Measured::default();
+        measured.curves.insert("c".into(), curve.to_vec());
+        measured.put("v", 3.0);
+        measured
+    }
+
+    #[test]
+    fn the_same_number_is_taken_from_run_experiment_and_peer() {
+        let check = check(
+            "name = 'n'\ncurve = 'c'\ntake = 'largest'\nplus = 1\ntimes = 2\nagainst = 'f'\ncolumns = ['t', 'b']\n\
+             tolerance = 0.1\npeers = [{ name = 'they', value = 8 }, { name = 'others', against = 'f', columns = ['t', 'a'] }]",
+        );
+        check.sound().unwrap();
+        let files = |_: &str| Ok("# source\nt,a,b\n0,1,2\n1,5,4\n2,0,0\n".to_string());
+        let reference = check.read(&files).unwrap();
+        let verdict = check.judge(&run(&[[0.0, 0.0], [1.0, 1.5], [2.0, 0.0]]), &reference).unwrap();
+        assert_eq!((verdict.result, verdict.reference, verdict.error), (5.0, 4.0, 0.25));
+        assert_eq!(check.judge_peer(0, &reference).unwrap().error, 1.0);
+        assert_eq!(check.judge_peer(1, &reference).unwrap().result, 5.0);
+        let failed = Measured { class: Class::Failed, ..run(&[[0.0, 0.0], [1.0, 1.0]]) };
+        assert_eq!(check.judge(&failed, &reference), None);
+        let missing = Check { columns: Some(["t".into(), "x".into()]), ..check };
+        assert!(missing.read(&files).unwrap_err().to_string().contains("there are: t, a, b"));
+    }
+
+    #[test]
+    fn distances_count_from_the_first_motion_and_over_the_range() {
+        let check = check("name = 'n'\ncurve = 'c'\nsince_moved = 0.1\nagainst = 'f'\ntolerance = 0.1");
+        let reference = check.read(&|_: &str| Ok("t,x\n0,1.1\n1,2\n".into())).unwrap();
+        let verdict =
+            check.judge(&run(&[[0.0, 1.0], [3.0, 1.0], [4.0, 2.0], [6.0, 2.0]]), &reference).unwrap();
+        assert!((verdict.origin - 3.1).abs() < 1e-12 && verdict.error < 1e-12, "{verdict:?}");
+        assert_eq!(check.judge(&run(&[[0.0, 1.0], [3.0, 1.0]]), &reference), None, "it never moved");
+    }
+
+    #[test]
+    fn a_value_needs_a_number_and_zero_needs_a_size() {
+        let whole = "name = 'n'\nvalue = 'v'\nreference = 0\nper = 2\ntolerance = 0.1";
+        let verdict = check(whole).judge(&run(&[]), &Reference::default()).unwrap();
+        assert_eq!((verdict.result, verdict.error), (3.0, 1.5));
+        for wrong in [
+            whole.replace("per = 2\n", ""),
+            whole.replace("reference = 0\n", ""),
+            whole.replace("value = 'v'\n", ""),
+            whole.replace("value", "curve"),
+            whole.replace("0.1", "0"),
+        ] {
+            assert!(check(&wrong).sound().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! A curve as one number: what a measured and a reference curve are compared by.
+
+use serde::Deserialize;
+
+/// What is taken from a curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Take {
+    /// Rms distance from the reference curve, at the reference's points.
+    #[default]
+    Distance,
+    /// Mean over the window.
+    Mean,
+    /// Largest value.
+    Largest,
+    /// Smallest value.
+    Smallest,
+    /// Largest less smallest.
+    Range,
+    /// Integral over the window, e.g. an impulse.
+    Integral,
+    /// Time at which the curve first rises above `level`.
+    FirstAbove,
+    /// Time at which the curve first falls below `level`.
+    FirstBelow,
+    /// Time from when the curve first rises above `level` to when it first rises above `to`.
+    Passage,
+    /// Value at the time `level`.
+    At,
+    /// Standard deviation over the window.
+    Deviation,
+    /// Slope of the line through the window, by least squares.
+    Slope,
+    /// Constant acceleration a of x0 + v0 t + a t^2 / 2 through the window, by least squares.
+    Acceleration,
+    /// Mean period of the oscillation about the mean.
+    Period,
+    /// Last amplitude over the first, to the power of one over the periods between: what a period leaves of the
+    /// amplitude.
+    Decay,
+}
+
+/// A curve: time or place against a value.
+pub type Curve = Vec<[f64; 2]>;
+
+/// The part of `curve` in `window`, ends included.
+pub fn cut(curve: &[[f64; 2]], window: Option<[f64; 2]>) -> Curve {
+    let [from, to] = window.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+    // Sums of time steps miss the ends by rounding errors.
+    let slack = 1e-9 * (1.0 + to.abs().min(1e9));
+    curve.iter().copied().filter(|p| p[0] >= from - slack && p[0] <= to + slack).collect()
+}
+
+/// Moving mean over `width`, centred; as it is if `width` is 0.
+pub fn smooth(curve: &[[f64; 2]], width: f64) -> Curve {
+    if width <= 0.0 {
+        return curve.to_vec();
+    }
+    let (mut from, mut to, mut sum) = (0, 0, 0.0);
+    let mut mean = |x: f64| {
+        while to < curve.len() && curve[to][0] <= x + 0.5 * width {
+            sum += curve[to][1];
+            to += 1;
+        }
+        while curve[from][0] < x - 0.5 * width {
+            sum -= curve[from][1];
+            from += 1;
+        }
+        sum / (to - from) as f64
+    };
+    curve.iter().map(|p| [p[0], mean(p[0])]).collect()
+}
+
+/// The curve with its time counted from when it has moved by `distance` from its start, and that moment; `None` if
+/// it never does.
+pub fn since_moved(curve: &[[f64; 2]], distance: f64) -> Option<(Curve, f64)> {
+    let start = curve.first()?[1];
+    let moved = curve.iter().position(|p| (p[1] - start).abs() >= distance)?;
+    let origin = if moved == 0 {
+        curve[0][0]
+    } else {
+        let (a, b) = (curve[moved - 1], curve[moved]);
+        let part = (distance - (a[1] - start).abs()) / ((b[1] - start).abs() - (a[1] - start).abs());
+        a[0] + part * (b[0] - a[0])
+    };
+    Some((curve.iter().map(|p| [p[0] - origin, p[1]]).collect(), origin))
+}
+
+/// First x at which the curve crosses `level` upwards.
+fn first_above(curve: &[[f64; 2]], level: f64) -> Option<f64> {
+    if curve.first()?[1] >= level {
+        return Some(curve[0][0]);
+    }
+    let pair = curve.windows(2).find(|w| w[1][1] >= level)?;
+    let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
+    Some(x0 + (x1 - x0) * (level - y0) / (y1 - y0))
+}
+
+/// The curve at `x`, linear between its points; `None` outside.
+pub fn at(curve: &[[f64; 2]], x: f64) -> Option<f64> {
+    let k = curve.partition_point(|p| p[0] < x);
+    if k == 0 || k == curve.len() {
+        let end = curve.get(k.min(curve.len().checked_sub(1)?))?;
+        return ((end[0] - x).abs() < 1e-9 * (1.0 + x.abs())).then_some(end[1]);
+    }
+    let ([x0, y0], [x1, y1]) = (curve[k - 1], curve[k]);
+    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+}
+
+/// Coefficients of the polynomial of `N` terms through `curve`, about its first x, by least squares.
+fn fit<const N: usize>(curve: &[[f64; 2]]) -> Option<[f64; N]> {
+    if curve.len() < N {
+        return None;
+    }
+    // Scaled, so that the normal equations are well conditioned.
+    let (origin, span) = (curve[0][0], curve[curve.len() - 1][0] - curve[0][0]);
+    let mut rows = [[0.0; N]; N];
+    let mut right = [0.0; N];
+    for p in curve {
+        let x = (p[0] - origin) / span;
+        let powers: [f64; N] = std::array::from_fn(|k| x.powi(k as i32));
+        for i in 0..N {
+            right[i] += powers[i] * p[1];
+            (0..N).for_each(|j| rows[i][j] += powers[i] * powers[j]);
+        }
+    }
+    for k in 0..N {
+        for i in k + 1..N {
+            let factor = rows[i][k] / rows[k][k];
+            (k..N).for_each(|j| rows[i][j] -= factor * rows[k][j]);
+            right[i] -= factor * right[k];
+        }
+    }
+    let mut out = [0.0; N];
+    for k in (0..N).rev() {
+        let known: f64 = (k + 1..N).map(|j| rows[k][j] * out[j]).sum();
+        out[k] = (right[k] - known) / rows[k][k];
+    }
+    let out: [f64; N] = std::array::from_fn(|k| out[k] / span.powi(k as i32));
+    out.iter().all(|c| c.is_finite()).then_some(out)
+}
+
+fn mean(curve: &[[f64; 2]]) -> f64 {
+    curve.iter().map(|p| p[1]).sum::<f64>() / curve.len() as f64
+}
+
+/// Times at which the oscillation about the mean passes it upwards, and the largest excursion of each half swing
+/// between passages of either direction. Passages closer than a tenth of the range are noise.
+fn oscillation(curve: &[[f64; 2]]) -> (Vec<f64>, Vec<f64>) {
+    let middle = mean(curve);
+    let range = range(curve);
+    let (mut upward, mut swings) = (Vec::new(), Vec::new());
+    let (mut side, mut excursion, mut crossing) = (0.0_f64, 0.0_f64, None);
+    for pair in curve.windows(2) {
+        let (a, b) = (pair[0][1] - middle, pair[1][1] - middle);
+        if a * b <= 0.0 && a != b {
+            crossing = Some(pair[0][0] + (pair[1][0] - pair[0][0]) * a / (a - b));
+        }
+        // A side counts once the curve is well on it.
+        if b.abs() > 0.1 * range && b.signum() != side {
+            if side != 0.0 {
+                swings.push(excursion);
+            }
+            if let Some(x) = crossing.filter(|_| side != 0.0 && b > 0.0) {
+                upward.push(x);
+            }
+            (side, excursion) = (b.signum(), 0.0);
+        }
+        excursion = excursion.max(b * side);
+    }
+    // The first half swing may be cut by the window.
+    (upward, swings.into_iter().skip(1).collect())
+}
+
+fn range(curve: &[[f64; 2]]) -> f64 {
+    let (low, high) =
+        curve.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[1]), b.max(p[1])));
+    high - low
+}
+
+/// `take` of a curve that is cut and smoothed already, with the levels `level` and `to`; `None` where the curve does
+/// not have it.
+pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
+    let [level, to] = levels;
+    if curve.is_empty() {
+        return None;
+    }
+    let values = || curve.iter().map(|p| p[1]);
+    match take {
+        Take::Distance => None,
+        Take::Mean => Some(mean(curve)),
+        Take::Largest => values().reduce(f64::max),
+        Take::Smallest => values().reduce(f64::min),
+        Take::Range => Some(range(curve)),
+        Take::Integral => {
+            Some(curve.windows(2).map(|w| 0.5 * (w[0][1] + w[1][1]) * (w[1][0] - w[0][0])).sum())
+        }
+        Take::FirstAbove => first_above(curve, level),
+        Take::FirstBelow => {
+            let mirrored: Curve = curve.iter().map(|p| [p[0], -p[1]]).collect();
+            first_above(&mirrored, -level)
+        }
+        Take::Passage => Some(first_above(curve, to)? - first_above(curve, level)?),
+        Take::At => at(curve, level),
+        Take::Deviation => {
+            let middle = mean(curve);
+            Some((values().map(|v| (v - middle).powi(2)).sum::<f64>() / curve.len() as f64).sqrt())
+        }
+        Take::Slope => fit::<2>(curve).map(|c| c[1]),
+        Take::Acceleration => fit::<3>(curve).map(|c| 2.0 * c[2]),
+        Take::Period => {
+            let (upward, _) = oscillation(curve);
+            let periods = upward.len().checked_sub(1).filter(|n| *n > 0)?;
+            Some((upward[periods] - upward[0]) / periods as f64)
+        }
+        Take::Decay => {
+            let (_, swings) = oscillation(curve);
+            let halves = swings.len().checked_sub(1).filter(|n| *n > 0)?;
+            Some((swings[halves] / swings[0]).powf(2.0 / halves as f64))
+        }
+    }
+}
+
+/// Rms distance of `curve` from the points of `reference` that it covers, and how many these are; `None` for fewer
+/// than two.
+pub fn distance(curve: &[[f64; 2]], reference: &[[f64; 2]]) -> Option<(f64, usize)> {
+    let squares: Vec<f64> =
+        reference.iter().filter_map(|r| at(curve, r[0]).map(|y| (y - r[1]).powi(2))).collect();
+    let n = squares.len();
+    (n > 1).then(|| ((squares.iter().sum::<f64>() / n as f64).sqrt(), n))
+}
+
+/// A damped wave, for tests: `periods` of 1 s that each leave `decay` of the amplitude.
+#[cfg(test)]
+fn wave(periods: f64, decay: f64) -> Curve {
+    let n = (periods * 200.0) as usize;
+    (0..n)
+        .map(|k| k as f64 / 200.0)
+        .map(|t| [t, 3.0 + decay.powf(t) * (std::f64::consts::TAU * t + 0.4).sin()])
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn period_and_decay_of_a_damped_wave() {
+        for decay in [1.0, 0.9, 0.7] {
+            let curve = wave(6.3, decay);
+            let period = reduce(Take::Period, &curve, [0.0; 2]).unwrap();
+            assert!((period - 1.0).abs() < 0.01, "{decay}: {period}");
+            let found = reduce(Take::Decay, &curve, [0.0; 2]).unwrap();
+            assert!((found - decay).abs() < 0.03, "{decay}: {found}");
+        }
+        assert_eq!(reduce(Take::Period, &[[0.0, 1.0], [1.0, 2.0]], [0.0; 2]), None);
+    }
+
+    #[test]
+    fn numbers_of_a_parabola() {
+        let curve: Curve = (0..=100).map(|k| f64::from(k) / 100.0).map(|t| [t, 1.0 + 2.0 * t * t]).collect();
+        let take = |take, level| reduce(take, &curve, [level, 2.0]).unwrap();
+        for (found, expected) in [
+            (take(Take::Mean, 0.0), 1.0 + 2.0 / 3.0),
+            (take(Take::Integral, 0.0), 1.0 + 2.0 / 3.0),
+            (take(Take::Largest, 0.0), 3.0),
+            (take(Take::Smallest, 0.0), 1.0),
+            (take(Take::Range, 0.0), 2.0),
+            (take(Take::FirstAbove, 1.5), 0.5),
+            (take(Take::Passage, 1.5), 0.5_f64.sqrt() - 0.5),
+            (take(Take::At, 0.5), 1.5),
+            (take(Take::Slope, 0.0), 2.0),
+            (take(Take::Acceleration, 0.0), 4.0),
+        ] {
+            assert!((found - expected).abs() < 0.01, "{found} for {expected}");
+        }
+        assert_eq!(reduce(Take::FirstAbove, &curve, [9.0; 2]), None);
+        assert!((reduce(Take::FirstBelow, &curve, [2.0; 2]).unwrap()).abs() < 1e-12);
+        assert_eq!(cut(&curve, Some([0.2, 0.4])).len(), 21);
+        let (moved, origin) = since_moved(&curve, 0.5).unwrap();
+        assert!((origin - 0.5).abs() < 1e-3 && (moved[0][0] + 0.5).abs() < 1e-3);
+        assert!(since_moved(&curve, 5.0).is_none());
+    }
+
+    #[test]
+    fn a_moving_mean_keeps_a_line_and_flattens_noise() {
+        let line: Curve = (0..100).map(|k| [f64::from(k), 2.0 * f64::from(k)]).collect();
+        let flat = smooth(&line, 6.0);
+        assert!((10..90).all(|k| (flat[k][1] - line[k][1]).abs() < 1e-9));
+        let noise: Curve = (0..100).map(|k| [f64::from(k), if k % 2 == 0 { 1.0 } else { -1.0 }]).collect();
+        assert!(smooth(&noise, 9.0)[10..90].iter().all(|p| p[1].abs() < 0.2));
+        assert_eq!(smooth(&noise, 0.0), noise);
+    }
+
+    #[test]
+    fn distances_count_where_both_are_known() {
+        let curve = [[0.0, 0.0], [2.0, 4.0]];
+        assert_eq!(distance(&curve, &[[0.5, 1.0], [2.0, 4.0], [9.0, 100.0]]), Some((0.0, 2)));
+        assert_eq!(distance(&curve, &[[0.0, 1.0], [1.0, 3.0]]), Some((1.0, 2)));
+        assert_eq!(distance(&curve, &[[5.0, 1.0], [1.0, 3.0]]), None);
+    }
+}

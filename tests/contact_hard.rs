@@ -1,0 +1,379 @@
+//! Contact where it is hard: backs and rims of walls, slender bodies, stiff springs, fast solids, driven ones; and
+//! that no scene whatever gains energy.
+
+use crate::common::dry::{Dry, G};
+use crate::common::{case, simulation};
+use glam::DVec3;
+use seixo::body::Wrench;
+use seixo::error::Error;
+
+/// Runs for `time` [s] and returns the largest energy over the first, and the highest any body came [m].
+fn watch(dry: &mut Dry, time: f64) -> (f64, f64) {
+    let start = dry.solids.energy().total();
+    let (mut most, mut highest) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+    while dry.time() < time {
+        dry.step();
+        most = most.max(dry.solids.energy().total() - start);
+        highest = dry.solids.poses().iter().fold(highest, |m, p| m.max(p.position.z));
+    }
+    (most, highest)
+}
+
+const PLANE: &str = "[[plane]]\nname = \"plane\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [0.5, 0.6]\n";
+
+#[test]
+fn a_plank_that_tips_over_the_edge_of_a_plane_falls() {
+    for spacing in [0.02, 0.01] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n{PLANE}\
+             [[body]]\nname = \"plank\"\nsize = [0.4, 0.1, 0.04]\ncenter = [0.27, 0, 0.02]\ndensity = 700\nstanding = true\n\
+             [contact]\nspring = 1e7\nfriction = 0.5\ndamping_ratio = 1\n"
+        ));
+        let start = dry.solids.poses()[0].position.z;
+        let (gain, highest) = watch(&mut dry, 0.8);
+        assert!(gain < 1e-3 && highest < start + 1e-3, "gains {gain} J, rises to {highest} m");
+        assert!(dry.solids.poses()[0].position.z < -0.3, "it tips and falls: {:?}", dry.solids.poses()[0]);
+    }
+}
+
+#[test]
+fn a_cube_is_stopped_by_the_back_and_the_sides_of_a_plane() {
+    for spacing in [0.02, 0.0125] {
+        for (center, velocity) in [
+            ([0.05, 0.02, -0.3], [0.0, 0.0, 3.5]),
+            ([0.5, 0.0, -0.02], [-3.5, 0.0, 0.0]),
+            ([0.48, 0.01, -0.28], [-2.5, 0.0, 2.5]),
+        ] {
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = {spacing}\ntime_step = 5e-4\nend = 1\ngravity = [0, 0, 0]\n{PLANE}\
+                 [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = {center:?}\nmass = 1.8\nvelocity = {velocity:?}\n\
+                 [contact]\nspring = 1e6\nfriction = 0.3\nrestitution = 0.8\n"
+            ));
+            let (gain, _) = watch(&mut dry, 0.3);
+            assert!(gain < 0.01 * 11.0, "{center:?}: {gain} J");
+            let turned = DVec3::from(velocity).dot(dry.solids.poses()[0].velocity);
+            assert!(turned < 0.5 * DVec3::from(velocity).length_squared(), "it was hit: {turned}");
+        }
+    }
+}
+
+#[test]
+fn a_body_dropped_on_the_rim_of_an_open_tank_gains_nothing() {
+    for spacing in [0.025, 0.0125] {
+        for (shape, x) in [
+            ("size = [0.1, 0.1, 0.1]", -0.01),
+            ("size = [0.1, 0.1, 0.1]", 0.02),
+            ("shape = \"sphere\"\nradius = 0.05", -0.02),
+            ("shape = \"cylinder\"\nradius = 0.05\nheight = 0.1", 0.01),
+        ] {
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = {spacing}\ntime_step = 5e-4\nend = 1\ngravity = [0, 0, -{G}]\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.2]\nopen = [\"z_max\"]\n\
+                 [[body]]\nname = \"it\"\n{shape}\ncenter = [{x}, 0.26, 0.45]\ndensity = 900\nangular_velocity = [1, 2, 3]\n\
+                 [contact]\nspring = 1e6\nfriction = 0.3\nrestitution = 0.6\n"
+            ));
+            let (gain, highest) = watch(&mut dry, 0.6);
+            assert!(gain < 0.02 && highest < 0.46, "{shape} at {x}: gains {gain} J, rises to {highest} m");
+        }
+    }
+}
+
+#[test]
+fn slender_bodies_bounce_as_asked_and_hardly_sink() {
+    for (size, spacing) in [
+        ([1.0, 0.02, 0.02], 0.01),
+        ([1.0, 0.02, 0.02], 0.005),
+        ([1.0, 0.04, 0.01], 0.005),
+        ([0.6, 0.1, 0.03], 0.01),
+    ] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = {spacing}\ntime_step = 5e-4\nend = 1\ngravity = [0, 0, 0]\n\
+             [[plane]]\nname = \"plane\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [2, 1]\n\
+             [[body]]\nname = \"bar\"\nsize = {size:?}\ncenter = [0, 0, {}]\ndensity = 2700\nvelocity = [0, 0, -2]\n\
+             [contact]\nspring = 1e7\nrestitution = 0.3\n",
+            0.5 * size[2] + 0.004
+        ));
+        let mut deepest = 0.0_f64;
+        while dry.time() < 0.1 {
+            deepest = deepest.max(dry.try_step().unwrap().penetration_max_over_l0);
+        }
+        let rebound = dry.solids.poses()[0].velocity.z / 2.0;
+        assert!((rebound - 0.3).abs() < 0.02, "{size:?} at {spacing}: {rebound}");
+        assert!(deepest > 0.0 && deepest < 0.3, "{size:?} at {spacing}: {deepest} l0 deep");
+    }
+}
+
+#[test]
+fn restitution_holds_on_springs_of_any_stiffness_and_may_be_zero() {
+    for spacing in [0.025, 0.0125] {
+        for spring in [1e6, 1e8, 1e10] {
+            for asked in [0.0, 0.01, 0.1, 0.3] {
+                let mut dry = Dry::new(&format!(
+                    "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, 0]\n{PLANE}\
+                     [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0.0533]\nmass = 1\nvelocity = [0, 0, -1]\n\
+                     [contact]\nspring = {spring:e}\nrestitution = {asked}\n"
+                ));
+                while dry.time() < 0.3 {
+                    assert!(dry.try_step().unwrap().substeps <= 64);
+                }
+                let measured = dry.solids.poses()[0].velocity.z;
+                assert!((measured - asked).abs() < 0.012, "K = {spring:e}, e = {asked}: {measured}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_energy_of_bodies_that_touch_at_the_start_is_a_number() {
+    for damping in ["restitution = 0.5", "damping_ratio = 1", ""] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n{PLANE}\
+             [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0.04999999]\nmass = 1\n\
+             [contact]\nspring = 1e6\n{damping}\n"
+        ));
+        let start = dry.solids.energy();
+        assert!((start.contact - 0.5 * 1e6 * 1e-16).abs() < 1e-12, "{start:?}");
+        let first = {
+            dry.step();
+            dry.solids.energy()
+        };
+        // the dashpot takes a little
+        let change = first.total() / start.total() - 1.0;
+        assert!(change < 1e-6 && change > -1e-4, "{start:?} {first:?}");
+    }
+}
+
+#[test]
+fn the_cap_of_sub_steps_holds_whatever_is_asked() {
+    for spring in [1e3, 1e7, 1e12] {
+        for damping in ["damping = 1e6", "damping_ratio = 30", "restitution = 0.001", "restitution = 1"] {
+            for mass in [1e-3, 1e4] {
+                let mut dry = Dry::new(&format!(
+                    "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n{PLANE}\
+                     [[body]]\nname = \"cube\"\nsize = [0.1, 0.06, 0.1]\ncenter = [0, 0, 0.2]\nmass = {mass}\n\
+                     [[body]]\nname = \"bar\"\nsize = [0.4, 0.04, 0.04]\ncenter = [0, 0, 0.3]\nmass = 0.1\n\
+                     [contact]\nspring = {spring:e}\n{damping}\n"
+                ));
+                for _ in 0..250 {
+                    let substeps = dry.try_step().unwrap().substeps;
+                    assert!(substeps <= 64, "{spring:e} {damping} {mass}: {substeps}");
+                }
+            }
+        }
+    }
+}
+
+fn thin_wall(dt: f64, speed: f64) -> Dry {
+    Dry::new(&format!(
+        "[run]\nspacing = 0.005\ntime_step = {dt:e}\nend = 1\ngravity = [0, 0, 0]\n\
+         [[obstacle]]\nname = \"pane\"\nmin = [0, 0, 0]\nmax = [0.02, 0.1, 0.1]\n\
+         [[body]]\nname = \"bullet\"\nsize = [0.01, 0.01, 0.01]\ncenter = [-0.0733, 0.05, 0.05]\ndensity = 1000\n\
+         velocity = [{speed}, 0, 0]\n[contact]\nspring = 1e6\nrestitution = 0.5\n"
+    ))
+}
+
+#[test]
+fn a_fast_cube_does_not_go_through_a_thin_wall() {
+    let mut refused = 0;
+    for (dt, speed) in [(1e-3, 200.0), (1e-4, 200.0), (2e-5, 200.0), (1e-3, 20.0), (1e-4, 20.0), (1e-2, 3.0)]
+    {
+        let mut dry = thin_wall(dt, speed);
+        let mut outcome = Ok(());
+        while dry.time() < 0.2 / speed {
+            if let Err(error) = dry.try_step() {
+                outcome = Err(error);
+                break;
+            }
+            assert!(dry.solids.poses()[0].position.x < 0.01, "it went through at {dt}, {speed}");
+        }
+        match outcome {
+            Ok(()) => assert!(dry.solids.poses()[0].velocity.x < 0.0, "it bounced at {dt}, {speed}"),
+            Err(Error::Diverged { what, .. }) => {
+                refused += 1;
+                assert!(
+                    what.contains("bullet") && what.contains("pane") && what.contains("run.time_step"),
+                    "{what}"
+                );
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+    assert!(refused < 4, "small steps do: {refused}");
+}
+
+#[test]
+fn a_piston_that_cannot_move_on_is_an_error_that_names_it() {
+    for spacing in [0.02, 0.01] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, 0]\n\
+             [[obstacle]]\nname = \"stop\"\nmin = [0.2, -0.2, -0.2]\nmax = [0.3, 0.2, 0.2]\n\
+             [[moving_wall]]\nname = \"piston\"\nmin = [-0.2, -0.2, -0.2]\nmax = [-0.1, 0.2, 0.2]\n\
+             motion = [[0, 0, 0, 0], [1, 0.5, 0, 0]]\n\
+             [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.1, 0.013, 0.007]\ndensity = 1000\n\
+             [contact]\nspring = 1e6\nrestitution = 0.5\n"
+        ));
+        let error = loop {
+            if let Err(error) = dry.try_step() {
+                break error;
+            }
+            let pose = dry.solids.poses()[0];
+            assert!(dry.time() < 0.5 && pose.velocity.length() < 5.0, "{pose:?} at {}", dry.time());
+        };
+        let text = error.to_string();
+        assert!(text.contains("piston") && text.contains("cannot move on"), "{text}");
+    }
+}
+
+#[test]
+fn a_block_sticks_on_a_tray_that_swings_below_its_friction() {
+    // amplitude and frequency such that the tray's acceleration is 0.8 mu g
+    let (friction, frequency): (f64, f64) = (0.3, 2.0);
+    let turn = std::f64::consts::TAU * frequency;
+    let amplitude = 0.8 * friction * G / turn.powi(2);
+    for rows in [0.01, 0.025] {
+        // the tray starts at rest
+        let ramp = |t: f64| if t < 0.5 { (t / 0.5).powi(2) * (3.0 - t / 0.25) } else { 1.0 };
+        let at = |t: f64| amplitude * ramp(t) * (turn * t).sin();
+        let table: Vec<String> = (0..)
+            .map(|k| rows * f64::from(k))
+            .take_while(|t| *t <= 3.0)
+            .map(|t| format!("[{t}, {}, 0, 0]", at(t)))
+            .collect();
+        for dt in [2e-3, 5e-4] {
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = 0.025\ntime_step = {dt}\nend = 1\ngravity = [0, 0, -{G}]\n\
+                 [[moving_wall]]\nname = \"tray\"\nmin = [-0.5, -0.5, -0.1]\nmax = [0.5, 0.5, 0]\nmotion = [{}]\n\
+                 [[body]]\nname = \"block\"\nsize = [0.1, 0.1, 0.05]\ncenter = [0, 0, 0.025]\ndensity = 1000\n\
+                 [contact]\nspring = 1e6\ndamping_ratio = 1\nfriction = {friction}\n",
+                table.join(", ")
+            ));
+            let mut worst = 0.0_f64;
+            while dry.time() < 2.5 {
+                let poses = dry.step();
+                worst = worst.max((poses[0].position.x - poses[1].position.x).abs());
+            }
+            assert!(worst < 2e-4, "rows of {rows} s, steps of {dt} s: slips by {worst} m");
+        }
+    }
+}
+
+#[test]
+fn a_body_that_diverges_is_reported_at_its_step() {
+    let case = case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n{PLANE}\
+         [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0.3]\nmass = 1\n[contact]\nspring = 1e6\n"
+    ));
+    let mut simulation = simulation(&case);
+    for _ in 0..7 {
+        simulation.step().unwrap();
+    }
+    simulation.fluid_force[0] = Wrench { force: DVec3::NAN, torque: DVec3::ZERO };
+    let error = simulation.step().unwrap_err();
+    assert!(matches!(&error, Error::Diverged { step: 7, what, .. } if what.contains("cube")), "{error}");
+}
+
+/// Numbers from a seed.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn vector(&mut self, most: f64) -> [f64; 3] {
+        [0; 3].map(|_| self.next(-most, most))
+    }
+}
+
+/// A tank with obstacles and bodies of all shapes, sizes to 1 : 100 and masses to 1 : 1e4 in it.
+fn random_scene(seed: u64) -> String {
+    let mut random = Random(seed.wrapping_mul(7919).wrapping_add(13));
+    for _ in 0..5 {
+        random.next(0.0, 1.0);
+    }
+    let restitution = random.next(0.0, 1.0);
+    let friction = random.next(0.0, 0.8);
+    let spring = 10_f64.powf(random.next(5.0, 9.0));
+    let mut text = format!(
+        "[run]\nspacing = 0.02\ntime_step = 2e-4\nend = 1\ngravity = [0, 0, -{G}]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [2, 2, 2]\n\
+         [[obstacle]]\nname = \"block\"\nmin = [0.8, 0.8, 0]\nmax = [1.2, 1.2, 0.4]\n\
+         [[obstacle]]\nname = \"step\"\nmin = [0, 0, 0]\nmax = [2, 0.4, 0.1]\n\
+         [contact]\nspring = {spring:e}\nrestitution = {restitution}\nfriction = {friction}\n"
+    );
+    let count = random.next(2.0, 8.99) as usize;
+    for k in 0..count {
+        // a place of its own for each: columns in the upper half of the tank
+        let (i, j) = (k % 3, k / 3);
+        let center = [0.4 + 0.6 * i as f64, 0.4 + 0.6 * j as f64, random.next(1.1, 1.6)];
+        let shape = match random.next(0.0, 3.0) as u32 {
+            0 => {
+                let mut size = [0; 3].map(|_| 10_f64.powf(random.next(-1.4, -0.6)));
+                size[random.next(0.0, 2.99) as usize] = 10_f64.powf(random.next(-1.4, -0.4));
+                format!("size = {size:?}")
+            }
+            1 => format!("shape = \"sphere\"\nradius = {}", random.next(0.03, 0.15)),
+            _ => format!(
+                "shape = \"cylinder\"\nradius = {}\nheight = {}",
+                random.next(0.03, 0.12),
+                random.next(0.05, 0.35)
+            ),
+        };
+        let mass = 10_f64.powf(random.next(-2.0, 2.0));
+        let speed = if random.next(0.0, 1.0) < 0.2 { 50.0 } else { 5.0 };
+        text += &format!(
+            "[[body]]\nname = \"b{k}\"\n{shape}\ncenter = {center:?}\nmass = {mass}\nvelocity = {:?}\n\
+             angular_velocity = {:?}\norientation = {{ axis = {:?}, angle_deg = {} }}\n",
+            random.vector(speed / 3_f64.sqrt()),
+            random.vector(10.0),
+            random.vector(1.0),
+            random.next(0.0, 360.0)
+        );
+    }
+    text
+}
+
+/// Runs random scenes; none may gain energy or lose a body.
+fn run_random(seeds: std::ops::Range<u64>) {
+    let (mut worst, mut ended, mut ran) = (f64::NEG_INFINITY, 0, 0);
+    for seed in seeds {
+        let mut dry = Dry::new(&random_scene(seed));
+        let start = dry.solids.energy();
+        let scale = start.kinetic + start.gravity;
+        while dry.time() < 0.4 {
+            match dry.try_step() {
+                Ok(_) => {}
+                Err(Error::Diverged { what, .. }) => {
+                    println!("{seed}: {what}");
+                    ended += 1;
+                    break;
+                }
+                Err(other) => panic!("{seed}: {other}"),
+            }
+            let now = dry.solids.energy();
+            let gain = (now.total() - start.total()) / scale;
+            assert!(gain < 0.01, "scene {seed} at {:.4} s gains {gain:e} of {scale} J", dry.time());
+            worst = worst.max(gain);
+            for (k, pose) in dry.solids.poses().iter().enumerate() {
+                let inside = pose.position.cmpge(DVec3::splat(-1e-3)).all()
+                    && pose.position.cmple(DVec3::splat(2.001)).all();
+                assert!(inside, "scene {seed}: body {k} is at {} at {:.4} s", pose.position, dry.time());
+            }
+        }
+        ran += 1;
+    }
+    println!("largest gain {worst:e}, {ended} of {ran} ended with an error");
+    assert!(worst.is_finite() && ended <= ran / 8, "{ended} of {ran} ended");
+}
+
+#[test]
+fn nothing_gains_energy_or_leaves_through_a_wall_in_random_scenes() {
+    run_random(0..6);
+}
+
+#[test]
+#[ignore = "minutes: cargo test --release --test seixo random_scenes -- --ignored"]
+fn nothing_gains_energy_or_leaves_through_a_wall_in_many_random_scenes() {
+    run_random(6..1000);
+}

@@ -1,0 +1,158 @@
+//! Gauges against statics and against the momentum that walls take from the water.
+
+use crate::common;
+use common::*;
+use seixo::backend::{Processor, gpu};
+use seixo::case::Case;
+use seixo::gauges::Gauges;
+use seixo::gauges::wall_force::FixedWall;
+use seixo::output::table::Cell;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The last row by column.
+fn row(gauges: &Gauges, sim: &mut Simulation) -> BTreeMap<String, f64> {
+    let cells = gauges.row(sim).expect("the gauges can be read");
+    let numbers = cells.into_iter().map(|c| if let Cell::Number(x) = c { x } else { f64::NAN });
+    gauges.header().into_iter().zip(numbers).collect()
+}
+
+/// Still water 0.24 x 0.24 x 0.2 m; `more` adds to it.
+fn still(more: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\nsound_speed = 4\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.24, 0.24, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.24, 0.24, 0.4]\nopen = [\"z_max\"]\n\
+         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n\
+         [[gauge.force]]\nname = \"side\"\non = \"tank.x_min\"\n\
+         [[gauge.pressure]]\nname = \"half\"\npoint = [0, 0.12, 0.1]\n\
+         [[gauge.pressure]]\nname = \"foot\"\npoint = [0.04, 0.04, 0]\n\
+         [[gauge.pressure]]\nname = \"dry\"\npoint = [0, 0.12, 0.35]\n{more}"
+    ))
+}
+
+/// Means of the gauges and of twice the height of the centroid, from `from` to `to` [s].
+fn means(case: &Case, processor: &Processor, from: f64, to: f64) -> BTreeMap<String, f64> {
+    let scene = Arc::new(Scene::build(case).expect("the scene builds"));
+    let gauges = Gauges::new(case, &scene).expect("the gauges find their walls");
+    let mut sim = Simulation::on(case, scene, processor).expect("the simulation starts");
+    let (mut sum, mut rows) = (BTreeMap::<String, f64>::new(), 0.0);
+    while sim.time < to {
+        sim.step().expect("still water stands");
+        if sim.time >= from {
+            rows += 1.0;
+            let depth = 2.0 * sim.backend.monitor().expect("the monitor").centroid[2];
+            let now = row(&gauges, &mut sim).into_iter().chain([("depth".to_string(), depth)]);
+            now.for_each(|(k, v)| *sum.entry(k).or_default() += v);
+        }
+    }
+    sum.into_iter().map(|(k, v)| (k, v / rows)).collect()
+}
+
+#[test]
+fn walls_of_still_water_carry_what_statics_say() {
+    // Once the lattice of the start has melted; one gauge swings by some percent, its mean over 0.8 s does not.
+    let mean = means(&still(""), &Processor::Cpu, 0.7, 1.5);
+    let (weight, depth) = (1000.0 * 9.81, mean["depth"]);
+    let side = 0.5 * weight * depth * depth * 0.24;
+    let mut wrong = Vec::new();
+    for (name, expected, within) in [
+        ("floor_force_z [N]", -weight * depth * 0.24 * 0.24, 0.02 * weight * depth * 0.24 * 0.24),
+        ("side_force_x [N]", -side, 0.03 * side),
+        ("side_force_z [N]", 0.0, 0.02 * side),
+        // Without the half spacing between P = 0 and the water's surface this would be 10 % lower.
+        ("half [Pa]", weight * (depth - 0.1), 0.04 * weight * 0.1),
+        ("foot [Pa]", weight * depth, 0.03 * weight * depth),
+        ("dry [Pa]", 0.0, 1e-9),
+    ] {
+        let found = mean[name];
+        println!("{name}: {found:.3} for {expected:.3}");
+        if (found - expected).abs() > within {
+            wrong.push(name);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?} in {mean:?}");
+}
+
+#[test]
+fn a_device_reads_the_same_gauges() {
+    if gpu::adapters().is_empty() {
+        let text = "NO GPU ADAPTER: gauges on a device are not tested";
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        eprintln!("SKIPPED, {text}");
+        return;
+    }
+    let cpu = means(&still(""), &Processor::Cpu, 0.02, 0.04);
+    let gpu = means(&still(""), &Processor::Gpu { adapter: None }, 0.02, 0.04);
+    for (name, size) in [("floor_force_z [N]", 100.0), ("side_force_x [N]", 50.0), ("half [Pa]", 1000.0)] {
+        println!("{name}: {} and {}", cpu[name], gpu[name]);
+        assert!((cpu[name] - gpu[name]).abs() < 5e-3 * size, "{name}: {} and {}", cpu[name], gpu[name]);
+    }
+}
+
+#[test]
+fn a_wall_under_pressure_feels_it_where_water_can_be() {
+    let pillar = "[[obstacle]]\nname = \"pillar\"\nmin = [0.08, 0.08, 0]\nmax = [0.16, 0.16, 0.3]\nopen = [\"z_min\"]\n";
+    let mut case = still(pillar);
+    case.run.gravity = [0.0; 3];
+    let scene = Scene::build(&case).expect("the scene builds");
+    let params = seixo::params::Params::new(&case, &scene).expect("parameters");
+    for (name, expected) in [
+        // The floor without the pillar's foot, a side, the pillar's top: 1 Pa makes as many newtons as it has m2.
+        ("tank.z_min", [0.0, 0.0, -(0.24 * 0.24 - 0.08 * 0.08)]),
+        ("tank.x_min", [-0.24 * 0.4, 0.0, 0.0]),
+        ("tank.y_max", [0.0, 0.24 * 0.4, 0.0]),
+        ("pillar", [0.0, 0.0, -0.08 * 0.08]),
+    ] {
+        let wall = FixedWall::find(&scene, name).expect("the wall is there");
+        let force = wall.pressure_force(&vec![1.0; wall.slots.len()], &params).force;
+        assert!(force.distance(expected.into()) < 1e-12, "{name}: {force} for {expected:?}");
+    }
+    assert!(FixedWall::find(&scene, "tank.z_max").is_none());
+}
+
+#[test]
+fn the_viscous_force_on_a_floor_is_the_momentum_that_the_water_loses() {
+    let case = case(
+        "[run]\nspacing = 0.02\ntime_step = 1e-5\nend = 1.0\ngravity = [0, 0, 0]\n\
+         [fluid]\nviscosity = 0.05\nsound_speed = 2\n\
+         [[fluid.block]]\nmin = [0.2, 0.2, 0]\nmax = [0.4, 0.4, 0.1]\nvelocity = [0.5, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.6, 0.3]\nopen = [\"z_max\"]\n\
+         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
+    );
+    let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
+    let gauges = Gauges::new(&case, &scene).expect("the gauge finds its wall");
+    let mut sim = cpu_simulation(&case, scene.clone());
+    // Viscosity acts on the neighbours of the last step: there are none in the first.
+    sim.step().expect("a step");
+    let start = sim.backend.monitor().expect("the monitor").momentum[0];
+    sim.step().expect("a step");
+    let lost = (start - sim.backend.monitor().expect("the monitor").momentum[0]) / 1e-5;
+    let force = row(&gauges, &mut sim)["floor_viscous_x [N]"];
+    println!("{force:.4} N on the floor, {lost:.4} N lost by the water");
+    assert!(lost > 0.0 && (force / lost - 1.0).abs() < 0.03, "{force} for {lost}");
+}
+
+#[test]
+fn a_gauge_finds_its_wall_at_every_spacing() {
+    let shipped =
+        std::fs::read_to_string(format!("{ROOT}/cases/dam_break_transport.toml")).expect("the case");
+    let shipped = case(&shipped);
+    for k in 0..30 {
+        let mut case = shipped.clone();
+        case.run.spacing = 0.021 + 0.001 * f64::from(k);
+        // The gauges and the walls that they are on; bodies and gates need spacings that fit them.
+        (case.body, case.moving_wall) = (Vec::new(), Vec::new());
+        (case.gauge.force, case.contact) = (Vec::new(), None);
+        case.fluid.as_mut().expect("water").block[0].max[0] = 3.5;
+        let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{}: {e}", case.run.spacing));
+        Gauges::new(&case, &scene).unwrap_or_else(|e| panic!("{}: {e}", case.run.spacing));
+    }
+    let mut case = shipped;
+    case.gauge.pressure[0].point = [1.5, 0.25, 0.2];
+    case.run.spacing = 0.03;
+    let error = Scene::build(&case).expect_err("a gauge in mid-air").to_string();
+    assert!(error.contains("no fixed wall there"), "{error}");
+}

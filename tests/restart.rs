@@ -1,0 +1,355 @@
+//! Restart: a run that is stopped, killed or damaged goes on as if nothing had happened.
+
+use crate::cli::{Ran, json, ran, seixo, small_case};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A free body that falls into the water, and a lid that keeps a second one in contact from the start.
+const BODIES: [&str; 4] = [
+    "body=[{name=\"falls\",size=[0.15,0.05,0.15],center=[1.2,0,0.3],density=600,velocity=[-1,0,-2],angular_velocity=[0,3,0]},\
+     {name=\"rests\",size=[0.2,0.05,0.1],center=[1.5,0,0.05],density=2000}]",
+    "contact={law=\"smooth\",spring=1e5,damping=20,friction=0.3}",
+    "run.time_step=2e-3",
+    "run.adaptive=true",
+];
+
+/// Everything that a run wrote and that does not tell times by the clock.
+fn results(root: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for folder in [root.to_path_buf(), root.join("vtu")] {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if !path.is_file() || name.starts_with('.') || name == "result.json" {
+                continue;
+            }
+            let mut bytes = std::fs::read(&path).unwrap();
+            if name == "monitors.csv" {
+                let text = String::from_utf8(bytes).unwrap();
+                let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+                let kept = |line: &str| {
+                    let cells = line.split(',').zip(&head).filter(|(_, h)| !h.starts_with("wall_"));
+                    cells.map(|(c, _)| c).collect::<Vec<_>>().join(",")
+                };
+                bytes = text.lines().map(kept).collect::<Vec<_>>().join("\n").into_bytes();
+            }
+            found.insert(name, bytes);
+        }
+    }
+    found
+}
+
+fn assert_same(a: &Path, b: &Path, what: &str) {
+    let (a, b) = (results(a), results(b));
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "{what}");
+    for (name, bytes) in &a {
+        if bytes != &b[name] {
+            let (x, y) = (String::from_utf8_lossy(bytes), String::from_utf8_lossy(&b[name]));
+            let line = x.lines().zip(y.lines()).position(|(x, y)| x != y).unwrap_or(0);
+            let show = |t: &str| t.lines().nth(line).unwrap_or("").chars().take(300).collect::<String>();
+            panic!("{what}: {name} differs in line {line}:\n{}\n{}", show(&x), show(&y));
+        }
+    }
+}
+
+struct Case {
+    folder: tempfile::TempDir,
+    path: String,
+    sets: Vec<String>,
+    backend: &'static str,
+}
+
+impl Case {
+    fn new(sets: &[&str], backend: &'static str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = small_case(folder.path());
+        Self {
+            folder,
+            path,
+            sets: sets.iter().flat_map(|s| ["--set".into(), (*s).into()]).collect(),
+            backend,
+        }
+    }
+
+    fn root(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn args<'a>(&'a self, root: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+        let mut args = vec!["run", &self.path, "--backend", self.backend, "-q", "--threads", "1", "-o", root];
+        args.push("--force-disk");
+        args.extend(self.sets.iter().map(String::as_str));
+        args.extend(more);
+        args
+    }
+
+    fn run(&self, name: &str, more: &[&str]) -> Ran {
+        ran(&self.args(&self.root(name).display().to_string(), more))
+    }
+
+    /// Undisturbed, and in three parts.
+    fn assert_goes_on(&self, what: &str) {
+        let whole = self.run("whole", &[]);
+        assert_eq!(whole.code, 0, "{what}: {}", whole.err);
+        for steps in [Some("7"), Some("21"), None] {
+            let more: Vec<&str> =
+                ["--resume"].into_iter().chain(steps.iter().flat_map(|s| ["--steps", s])).collect();
+            let part = self.run("parts", &more);
+            assert_eq!(part.code, 0, "{what}, {steps:?}: {}", part.err);
+        }
+        assert_same(&self.root("whole"), &self.root("parts"), what);
+        let result =
+            |name: &str| json(&std::fs::read_to_string(self.root(name).join("result.json")).unwrap());
+        let (mut a, mut b) = (result("whole"), result("parts"));
+        assert_eq!((a["parts"].as_u64(), b["parts"].as_u64()), (Some(1), Some(3)));
+        for times in ["wall_s", "parts", "stages", "memory_peak_bytes"] {
+            a[times] = serde_json::Value::Null;
+            b[times] = serde_json::Value::Null;
+        }
+        assert_eq!(a, b, "{what}");
+    }
+}
+
+#[test]
+fn a_run_in_parts_is_the_run_to_the_last_bit() {
+    let more = |own: &[&'static str]| [own, &BODIES[..]].concat();
+    for (what, sets) in [
+        ("a gate", vec!["fluid.viscosity=1e-3"]),
+        ("no viscosity, no warm start", vec!["fluid.viscosity=0", "fluid.solver.warm_start=false"]),
+        ("bodies", more(&[])),
+        (
+            "the paper's law and scheme",
+            more(&[
+                "contact.law=paper",
+                "contact.friction=0",
+                "fluid.preset=paper",
+                "body.1.center=[1.5,0,0.07]",
+            ]),
+        ),
+        ("multigrid", more(&["fluid.solver.preconditioner=multigrid"])),
+        ("tables now and then", more(&["output.table_every=0.007", "gauge.every=0.011"])),
+    ] {
+        let sets: Vec<&str> = match what {
+            // The order matters: the table comes before its keys.
+            "the paper's law and scheme" => [
+                &BODIES[..],
+                &[
+                    "contact.law=paper",
+                    "contact.friction=0",
+                    "fluid.preset=paper",
+                    "body.1.center=[1.5,0,0.07]",
+                ],
+            ]
+            .concat(),
+            _ => sets,
+        };
+        Case::new(&sets, "cpu").assert_goes_on(what);
+    }
+}
+
+#[test]
+fn a_dry_run_in_parts_is_the_run_to_the_last_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dry.toml");
+    let mut text =
+        "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 0.3\n[tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.8, 2]\n\
+                    [contact]\nspring = 1e5\nrestitution = 0.3\nfriction = 0.3\n[output]\nevery = 0.1\n"
+            .to_owned();
+    for k in 0..5 {
+        text += &format!(
+            "[[body]]\nname = \"b{k}\"\nsize = [0.1, 0.1, 0.1]\ndensity = 800.0\ncenter = [0.4, {:?}, {:?}]\n\
+             orientation = {{ axis = [1, 1, 0], angle_deg = {} }}\n",
+            0.4 + 0.02 * f64::from(k),
+            0.12 + 0.15 * f64::from(k),
+            10 * k
+        );
+    }
+    std::fs::write(&path, text).unwrap();
+    let case = Case { folder, path: path.display().to_string(), sets: Vec::new(), backend: "cpu" };
+    case.assert_goes_on("a heap");
+}
+
+#[test]
+fn a_run_on_the_device_in_parts_is_the_run_to_the_last_bit() {
+    if json(&ran(&["adapters", "--json"]).out).as_array().unwrap().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "no adapter: the GPU path is not tested");
+        eprintln!("SKIPPED: no adapter");
+        return;
+    }
+    let device = |own: &[&'static str]| [&BODIES[..], own].concat();
+    Case::new(&["fluid.viscosity=1e-3"], "gpu").assert_goes_on("a gate on the device");
+    Case::new(&device(&["fluid.solver.preconditioner=multigrid"]), "gpu")
+        .assert_goes_on("multigrid on the device");
+    Case::new(&device(&["contact.device=gpu"]), "gpu").assert_goes_on("contact on the device");
+}
+
+/// Killed at any moment, and started again by the same command, until it is done.
+#[test]
+fn a_run_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
+    // A checkpoint every other millisecond of simulated time, and by the clock all the time.
+    let sets = [&BODIES[..], &["run.checkpoint={every=2e-3,wall=0.02}", "run.end=0.2"]].concat();
+    let case = Case::new(&sets, "cpu");
+    assert_eq!(case.run("whole", &[]).code, 0);
+    let root = case.root("killed").display().to_string();
+    let start = |root: &str| -> Child {
+        let mut command = Command::new(seixo().get_program());
+        command.current_dir(crate::common::ROOT).args(case.args(root, &["--resume"]));
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let (mut kills, mut state) = (0, 0x2545_f491_4f6c_dd1d_u64);
+    let begun = Instant::now();
+    loop {
+        let mut child = start(&root);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        // Longer and longer, so that a slow machine comes to the end too.
+        let patience = Duration::from_millis(20 + (state >> 33) % (60 + 20 * kills));
+        let clock = Instant::now();
+        let ended = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break Some(status);
+            }
+            if clock.elapsed() > patience {
+                break None;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        };
+        if let Some(status) = ended {
+            assert_eq!(status.code(), Some(0));
+            break;
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        kills += 1;
+        assert!(begun.elapsed() < Duration::from_secs(240), "{kills} kills and no end");
+    }
+    assert!(kills >= 3, "only {kills} kills");
+    assert_same(&case.root("whole"), &case.root("killed"), &format!("{kills} kills"));
+}
+
+#[test]
+fn a_done_run_is_left_alone_and_a_changed_case_is_refused_by_key() {
+    let case = Case::new(&[], "cpu");
+    assert_eq!(case.run("a", &["--resume"]).code, 0, "nothing is there: it starts");
+    let before = std::fs::metadata(case.root("a").join("result.json")).unwrap().modified().unwrap();
+    let again = case.run("a", &["--resume"]);
+    assert_eq!((again.code, again.err.as_str()), (0, ""));
+    assert_eq!(std::fs::metadata(case.root("a").join("result.json")).unwrap().modified().unwrap(), before);
+    let root = case.root("a").display().to_string();
+    let by_folder = ran(&["run", "--resume", &root, "--backend", "cpu"]);
+    assert!(by_folder.code == 0 && by_folder.out.contains("is done"), "{} {}", by_folder.out, by_folder.err);
+    let longer = case.run("a", &["--resume", "--until", "0.1", "--set", "fluid.density=900.0"]);
+    assert_eq!(longer.code, 2);
+    for word in ["fluid.density was 1000.0, is 900.0", "run.end was 0.05, is 0.1", "run.from"] {
+        assert!(longer.err.contains(word), "{word}: {}", longer.err);
+    }
+    let none = ran(&["run", "--resume", &case.folder.path().display().to_string()]);
+    assert!(none.code == 2 && none.err.contains("holds no run"), "{}", none.err);
+}
+
+#[test]
+fn a_damaged_state_is_passed_over_for_the_older_one() {
+    let case = Case::new(&["run.checkpoint={every=0.01}"], "cpu");
+    assert_eq!(case.run("whole", &[]).code, 0);
+    assert_eq!(case.run("a", &["--steps", "33"]).code, 0);
+    let files = || {
+        let entries = std::fs::read_dir(case.root("a").join("checkpoint")).unwrap();
+        let mut files: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
+        files.sort();
+        files
+    };
+    let two = files();
+    assert_eq!(two.len(), 2, "{two:?}");
+    let mut bytes = std::fs::read(&two[1]).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&two[1], &bytes).unwrap();
+    let resumed = case.run("a", &["--resume"]);
+    assert_eq!(resumed.code, 0, "{}", resumed.err);
+    assert!(
+        resumed.err.contains("an older state is taken") && resumed.err.contains("is damaged"),
+        "{}",
+        resumed.err
+    );
+    assert_same(&case.root("whole"), &case.root("a"), "from the older state");
+    // Both of them: nothing is computed from what is left.
+    assert_eq!(case.run("b", &["--steps", "33"]).code, 0);
+    for entry in std::fs::read_dir(case.root("b").join("checkpoint")).unwrap() {
+        std::fs::write(entry.unwrap().path(), b"seixo checkpoint").unwrap();
+    }
+    let lost = case.run("b", &["--resume"]);
+    assert!(lost.code == 2 && lost.err.matches("cut off").count() == 2, "{}", lost.err);
+}
+
+#[test]
+fn a_state_starts_another_case() {
+    let case = Case::new(&[], "cpu");
+    assert_eq!(case.run("long", &["--until", "0.08"]).code, 0);
+    assert_eq!(case.run("first", &[]).code, 0);
+    let from = format!("run.from=\"{}\"", case.root("first").display());
+    let more = ["--until", "0.08", "--set", &from, "--set", "output.every=0.04", "--set", "gauge.every=0.02"];
+    let second = case.run("second", &more);
+    assert_eq!(second.code, 0, "{}", second.err);
+    let last = |name: &str, frame: &str| std::fs::read(case.root(name).join("vtu").join(frame)).unwrap();
+    assert_eq!(last("long", "fluid_0004.vtu"), last("second", "fluid_0001.vtu"), "the same water at 0.08 s");
+    let gauges = std::fs::read_to_string(case.root("second").join("gauges.csv")).unwrap();
+    assert!(gauges.lines().nth(1).unwrap().starts_with("0.05"), "{gauges}");
+    let other = case.run("third", &["--until", "0.08", "--set", &from, "--spacing", "0.04"]);
+    assert!(other.code == 2 && other.err.contains("particles of water, the case"), "{}", other.err);
+    assert!(!case.root("third").exists());
+    let nowhere = case.run("third", &["--set", "run.from=\"nowhere\""]);
+    assert!(nowhere.code == 2 && nowhere.err.contains("holds no checkpoint"), "{}", nowhere.err);
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
+    let case = Case::new(&["run.end=1e6", "output.every=0.005"], "cpu");
+    for (signal, code) in [("-USR1", 75), ("-HUP", 129), ("-XCPU", 75), ("-TERM", 143)] {
+        let root = case.root(signal).display().to_string();
+        let mut command = Command::new(seixo().get_program());
+        command.args(case.args(&root, &[])).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = command.spawn().unwrap();
+        let clock = Instant::now();
+        while !case.root(signal).join("vtu/fluid_0001.vtu").exists() {
+            assert!(clock.elapsed() < Duration::from_secs(60), "no frame after a minute");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
+        let result = json(&std::fs::read_to_string(case.root(signal).join("result.json")).unwrap());
+        assert!(result["exit_reason"].as_str().unwrap().contains("go on with --resume"), "{result}");
+        assert_eq!(std::fs::read_dir(case.root(signal).join("checkpoint")).unwrap().count(), 1);
+    }
+    let stopped = case.run("wall", &["--max-wall", "0.3s"]);
+    assert_eq!(stopped.code, 75, "{}", stopped.err);
+    let steps = |name: &str| {
+        json(&std::fs::read_to_string(case.root(name).join("result.json")).unwrap())["steps"]
+            .as_u64()
+            .unwrap()
+    };
+    let before = steps("wall");
+    assert_eq!(case.run("wall", &["--max-wall", "0.3s", "--resume"]).code, 75);
+    assert!(steps("wall") > before, "it went on");
+    for wrong in ["", "soon", "-3h", "0", "3x"] {
+        assert_eq!(case.run("wrong", &["--max-wall", wrong]).code, 2, "{wrong}");
+    }
+}
+
+#[test]
+fn a_run_that_diverges_keeps_its_last_good_state() {
+    let case = Case::new(&["fluid.block.0.velocity=[0,0,500]", "run.end=10", "output.every=2e-3"], "cpu");
+    let diverged = case.run("a", &[]);
+    assert!(diverged.code == 4 && diverged.err.contains("stage cell_list"), "{}", diverged.err);
+    let result = json(&std::fs::read_to_string(case.root("a").join("result.json")).unwrap());
+    assert!(result["exit_reason"].as_str().unwrap().contains("is in checkpoint/"), "{result}");
+    let again = case.run("a", &["--resume"]);
+    assert!(again.code == 4 && again.err.contains("would do so again"), "{} {}", again.code, again.err);
+    let from = format!("run.from=\"{}\"", case.root("a").display());
+    // It begins there, and its verdict is what such water deserves.
+    let other = case.run("b", &["--set", &from, "--steps", "1"]);
+    assert!(other.code == 4 && other.err.contains("means nothing"), "{} {}", other.code, other.err);
+    assert!(case.root("b").join("vtu/fluid_0000.vtu").exists());
+}
