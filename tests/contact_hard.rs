@@ -145,9 +145,11 @@ fn the_energy_of_bodies_that_touch_at_the_start_is_a_number() {
 
 #[test]
 fn the_cap_of_sub_steps_holds_whatever_is_asked() {
-    for spring in [1e3, 1e7, 1e12] {
+    for spring in [1e3_f64, 1e7, 1e12] {
         for damping in ["damping = 1e6", "damping_ratio = 30", "restitution = 0.001", "restitution = 1"] {
             for mass in [1e-3, 1e4] {
+                // a spring that a body's weight presses through is refused
+                let spring = if mass > 1.0 { spring.max(1e7) } else { spring };
                 let mut dry = Dry::new(&format!(
                     "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n{PLANE}\
                      [[body]]\nname = \"cube\"\nsize = [0.1, 0.06, 0.1]\ncenter = [0, 0, 0.2]\nmass = {mass}\n\
@@ -230,7 +232,8 @@ fn a_block_sticks_on_a_tray_that_swings_below_its_friction() {
     let (friction, frequency): (f64, f64) = (0.3, 2.0);
     let turn = std::f64::consts::TAU * frequency;
     let amplitude = 0.8 * friction * G / turn.powi(2);
-    for rows in [0.01, 0.025] {
+    // rows much further apart than this make a curve of larger accelerations, whose tray does slip
+    for rows in [0.005, 0.01] {
         // the tray starts at rest
         let ramp = |t: f64| if t < 0.5 { (t / 0.5).powi(2) * (3.0 - t / 0.25) } else { 1.0 };
         let at = |t: f64| amplitude * ramp(t) * (turn * t).sin();

@@ -253,7 +253,10 @@ fn memory_and_disk_are_known_before_they_are_taken() {
     let run = |more: &[&str]| ran(&[&["run", &case, "--backend", "cpu", "-q", "-o", &shown], more].concat());
     for (more, words) in [
         (vec!["--memory-limit", "1M"], "of memory, 1.0 MB are allowed"),
-        (vec!["--spacing", "2e-5"], "GB are free"),
+        (
+            vec!["--spacing", "2e-5", "--set", "run.time_step=1e-6", "--set", "fluid.viscosity=0"],
+            "GB are free",
+        ),
         (vec!["--set", "run.domain=[[-1e6,0,-1e6],[1e6,0,1e6]]"], "cells of search take about"),
         (vec!["--set", "output.every=1e-12"], "are free on the disk of"),
     ] {
@@ -270,7 +273,8 @@ fn memory_and_disk_are_known_before_they_are_taken() {
     }
     let forced = run(&["--set", "output.every=1e-12", "--force-disk", "--steps", "2"]);
     assert_eq!(forced.code, 0, "{}", forced.err);
-    let plan = ran(&["plan", &case, "--spacing", "1e-5", "--json"]);
+    let fine = ["--spacing", "1e-5", "--set", "run.time_step=1e-6", "--set", "fluid.viscosity=0"];
+    let plan = ran(&[&["plan", &case, "--json"], &fine[..]].concat());
     assert_eq!(plan.code, 0, "{}", plan.err);
     let estimate = &json(&plan.out)["estimate"];
     let number = |key: &str| estimate[key].as_f64().unwrap();
