@@ -233,7 +233,8 @@ fn a_small_cube_does_not_swing_itself_out_of_the_water() {
     let swing = (heights.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
     let expected = 0.135 + 0.027 - 0.4636 * 0.054;
     println!("height {mean:.4} m for {expected:.4}, rms {:.2} mm", 1e3 * swing);
-    assert!((mean - expected).abs() < 0.003 && swing < 3.5e-3, "{mean} {swing}");
+    // 13 mm where still water rocked itself; jittered starts differ by some tenths of a millimetre.
+    assert!((mean - expected).abs() < 0.003 && swing < 0.1 * 0.054, "{mean} {swing}");
 }
 
 #[test]

@@ -573,35 +573,42 @@ fn coupling() {
         pair.gpu.solve_pressure(&pair.step).expect("the device solves");
         pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
         let alone = pair.cpu.fields().clone();
-        // A body of a twentieth of the water's density, pressed and turned by something else as well.
         let volume = f64::from(if dimensions == 3 { 27 } else { 9 }) * pair.params.spacing.powi(3);
-        let mass = 0.05 * pair.params.density * volume;
-        let load = Wrench { force: DVec3::new(0.2, 0.0, -3.0), torque: DVec3::new(0.0, 0.01, 0.0) };
         let turns = DMat3::from_diagonal(DVec3::new(3.0, 2.0, 4.0));
-        let light = FreeBody {
-            inverse_mass: DVec3::splat(1.0 / mass),
-            inverse_inertia: turns / (mass * pair.params.spacing.powi(2)),
-            load,
-        };
-        let bodies = [FreeBody::default(), light];
-        pair.run(Stage::PressureSource);
-        pair.gpu.free_bodies(&bodies).expect("the device takes them");
-        pair.cpu.free_bodies(&bodies).expect("the CPU takes them");
-        let g = pair.gpu.solve_pressure(&pair.step).expect("the device solves");
-        let c = pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
-        println!("{dimensions}D, {preconditioner:?}\ndevice {g:?}\nCPU    {c:?}");
-        assert_eq!((g.outcome, c.outcome, g.unknowns), (Outcome::Converged, Outcome::Converged, c.unknowns));
-        assert!(g.iterations.abs_diff(c.iterations) <= 2 && g.residual < 2e-4, "{g:?} {c:?}");
-        for e in pair.errors(Stage::ConjugateGradient) {
-            assert!(e.l2_relative < SOLVE, "{:e}", e.l2_relative);
+        // A body brings outliers into the spectrum, the lighter the farther out; conjugate gradients in f32 find those
+        // again and again, one iteration each time.
+        for (ratio, apart, least) in [(1.0, 2, 0.01), (0.05, 4, 0.1)] {
+            // Pressed and turned by something else as well.
+            let mass = ratio * pair.params.density * volume;
+            let load = Wrench { force: DVec3::new(0.2, 0.0, -3.0), torque: DVec3::new(0.0, 0.01, 0.0) };
+            let body = FreeBody {
+                inverse_mass: DVec3::splat(1.0 / mass),
+                inverse_inertia: turns / (mass * pair.params.spacing.powi(2)),
+                load,
+            };
+            let bodies = [FreeBody::default(), body];
+            pair.run(Stage::PressureSource);
+            pair.gpu.free_bodies(&bodies).expect("the device takes them");
+            pair.cpu.free_bodies(&bodies).expect("the CPU takes them");
+            let g = pair.gpu.solve_pressure(&pair.step).expect("the device solves");
+            let c = pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
+            println!("{dimensions}D, {preconditioner:?}, density ratio {ratio}\ndevice {g:?}\nCPU    {c:?}");
+            assert_eq!(
+                (g.outcome, c.outcome, g.unknowns),
+                (Outcome::Converged, Outcome::Converged, c.unknowns)
+            );
+            assert!(g.iterations.abs_diff(c.iterations) <= apart && g.residual < 2e-4, "{g:?} {c:?}");
+            for e in pair.errors(Stage::ConjugateGradient) {
+                assert!(e.l2_relative < SOLVE, "{:e}", e.l2_relative);
+            }
+            // It takes up what presses on it: the pressure of a body that gives way is another one.
+            let slots = pair.scene.solids[1].wall_slots.clone();
+            let (held, free) = (&alone.pressure[slots.clone()], &pair.cpu.fields().pressure[slots]);
+            let (sum, difference) =
+                held.iter().zip(free).fold((0.0, 0.0), |(s, d), (a, b)| (s + a, d + (a - b).abs()));
+            println!("{sum:.1} Pa held, changed by {difference:.1}");
+            assert!(difference > least * sum && sum > 0.0);
         }
-        // It takes up what presses on it: the pressure of a body that gives way is another one.
-        let slots = pair.scene.solids[1].wall_slots.clone();
-        let (held, free) = (&alone.pressure[slots.clone()], &pair.cpu.fields().pressure[slots]);
-        let (sum, difference) =
-            held.iter().zip(free).fold((0.0, 0.0), |(s, d), (a, b)| (s + a, d + (a - b).abs()));
-        println!("{sum:.1} Pa held, changed by {difference:.1}");
-        assert!(difference > 0.1 * sum && sum > 0.0);
     }
 }
 
