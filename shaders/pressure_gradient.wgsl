@@ -1,5 +1,7 @@
 // Pressure gradient against the smallest pressure in the neighbourhood, Eq. (9), as an acceleration:
 // a_i = -1 / rho d / n0 sum w_ij (P_j - P_min) r_ij / r_ij^2 over neighbours that carry pressure.
+// Consistent below the surface: against max(P_min, min (P_j - rho g . r_ij)), with dummies at P_i + rho g . r_ij, times the
+// inverse of the moment matrix.
 // Twin: src/kernels/pressure_gradient.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -8,6 +10,14 @@
 @group(0) @binding(5) var<storage, read> neighbour_list: array<u32>;
 @group(0) @binding(6) var<storage, read> neighbour_count: array<u32>;
 @group(0) @binding(7) var<storage, read_write> acceleration: array<vec4f>;
+//#if CONSISTENT
+@group(0) @binding(8) var<storage, read_write> imbalance: array<vec4f>;
+
+// What still water's pressure grows by along r.
+fn hydrostatic(r: vec3f) -> f32 {
+    return params.density * dot(params.gravity, r);
+}
+//#endif
 
 @compute @workgroup_size(WORKGROUP)
 fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
@@ -18,38 +28,59 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     let x = position[i];
     if x.w != FLUID {
         acceleration[i] = vec4f(0.0);
+//#if CONSISTENT
+        imbalance[i] = vec4f(0.0);
+//#endif
         return;
     }
     let count = neighbour_count[i];
     let near = near_of(count);
-    var minimum = pressure[i];
+    let own = pressure[i];
+    var reference = own;
+//#if CONSISTENT
+    var level = own;
+//#endif
     for (var k = 0u; k < near; k++) {
-        minimum = min(minimum, pressure[neighbour_list[near_place(i, k)]]);
+        let j = neighbour_list[near_place(i, k)];
+        reference = min(reference, pressure[j]);
+//#if CONSISTENT
+        level = min(level, pressure[j] - hydrostatic(position[j].xyz - x.xyz));
+//#endif
     }
     var sum = vec3f(0.0);
-//#if CORRECTED
+//#if CONSISTENT
+    let inner = state[i] == INNER;
+    if inner {
+        reference = max(reference, level);
+    }
+    var one_side = vec3f(0.0);
     var moment = Moment(vec3f(0.0), vec3f(0.0));
 //#endif
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
         let r = position[j].xyz - x.xyz;
         let e = pair_vector(r);
-        sum += (pressure[j] - minimum) * e;
-//#if CORRECTED
+        sum += (pressure[j] - reference) * e;
+//#if CONSISTENT
+        one_side += e;
         moment = add_moment(moment, e, r);
 //#endif
     }
-    var gradient = params.gradient_scale * sum;
-//#if CORRECTED
-    if state[i] == INNER {
+//#if CONSISTENT
+    if inner {
         let dummies = dummies_of(count);
         for (var k = 0u; k < dummies; k++) {
             let r = position[neighbour_list[dummy_place(i, k)]].xyz - x.xyz;
-            moment = add_moment(moment, pair_vector(r), r);
+            let e = pair_vector(r);
+            sum += (own + hydrostatic(r) - reference) * e;
+            one_side += e;
+            moment = add_moment(moment, e, r);
         }
-        gradient = inverse_moment(moment) * gradient;
+        sum = inverse_moment(moment) * sum;
     }
+    imbalance[i] = select(vec4f(0.0), vec4f(params.gradient_scale * one_side, 0.0), inner);
 //#endif
+    let gradient = params.gradient_scale * sum;
     var a = -gradient / params.density;
 //#if MIXED
     // Gravity acts together with the pressure that balances it.

@@ -105,7 +105,7 @@ impl Params {
         let (source, gradient, free_surface) = if paper {
             (Source::NumberDensity, Gradient::Minimum, FreeSurface::Threshold)
         } else {
-            (Source::Mixed, Gradient::MinimumCorrected, FreeSurface::ThresholdOffset)
+            (Source::Mixed, Gradient::Consistent, FreeSurface::ThresholdOffset)
         };
         let g = scene.gravity.length();
         // 1 % compression of the wall layer in hydrostatics, and well above the speed of the collapse.

@@ -6,7 +6,7 @@ use crate::compute::Program;
 use crate::contact::device::{paper, smooth};
 use crate::params::Params;
 use crate::scene::{Drive, Scene};
-use crate::scheme::{Preconditioner, Source};
+use crate::scheme::{Gradient, Preconditioner, Source};
 
 macro_rules! stages {
     ($($(#[$doc:meta])* $name:ident = $text:literal [$($particles:ident)?];)*) => {
@@ -77,6 +77,8 @@ stages! {
     PressureGradient = "pressure_gradient" [PressureGradient];
     /// v, r.
     Correct = "correct" [Correct];
+    /// Particles move away from where they crowd.
+    Shift = "shift" [Shift];
     /// Force of the fluid on solids.
     BodyForce = "body_force" [];
     /// Contact and motion of the bodies; sums, friction and motion on the host.
@@ -92,6 +94,8 @@ pub enum Arrays {
     Solids,
     /// Of walls that never move.
     FixedWalls,
+    /// How unevenly neighbours lie, for the shift.
+    Imbalance,
     /// Of the fluid's force on solids.
     Force,
     /// Force of viscosity and collisions on the wall layer of moving solids, which the fluid's force takes in.
@@ -192,6 +196,10 @@ impl Plan {
                 Stage::MoveSolids => wet("solids move in the fluid"),
                 Stage::Collision if params.collision_distance == 0.0 => Err("collision distance is zero"),
                 Stage::Collision => wet("particles may come too close"),
+                Stage::Shift if params.gradient == Gradient::Minimum => {
+                    Err("the repulsion of the minimum-pressure gradient spaces the particles")
+                }
+                Stage::Shift => wet("the consistent gradient leaves it to the shift to space the particles"),
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
                 Stage::BodyForce if !free && !gauged && !case.output.ledger => {
                     Err("no body is free and no gauge asks for the force on one that moves")
@@ -230,6 +238,7 @@ impl Plan {
             Arrays::Fluid => self.wet(),
             Arrays::Solids => self.has(Stage::MoveSolids),
             Arrays::FixedWalls => self.fixed_walls,
+            Arrays::Imbalance => self.has(Stage::Shift),
             Arrays::Force => self.has(Stage::BodyForce),
             Arrays::Reaction => {
                 self.has(Stage::BodyForce) && (self.has(Stage::Viscosity) || self.has(Stage::Collision))

@@ -20,8 +20,9 @@ pub enum Source {
 pub enum Gradient {
     /// The paper's Eq. (9): against the smallest pressure in the neighbourhood.
     Minimum,
-    /// Eq. (9) times the inverse of the particle's moment matrix below the surface: exact for linear fields.
-    MinimumCorrected,
+    /// Below the surface exact for linear fields on any arrangement, by the inverse of the particle's moment matrix; against
+    /// the smallest pressure only as far as that is not the weight's doing. A shift spaces the particles.
+    Consistent,
 }
 
 /// Which particles lie on the free surface (P = 0).

@@ -39,6 +39,7 @@ impl Simulation {
             // Pressure gradient, Eq. (9), corrects velocity and position.
             self.run(ParticleStage::PressureGradient, &step)?;
             self.run(ParticleStage::Correct, &step)?;
+            self.run(ParticleStage::Shift, &step)?;
         }
         // Solids: fluid force, gravity and contact, Eqs. (10) to (14).
         report.contact = self.advance_solids(&step)?;

@@ -136,8 +136,7 @@ fn the_corrected_gradient_stays_exact_on_shaken_positions() {
         if !inside || fields.state[i] != State::Inner || x.z > 0.5 - 2.5 * l0 {
             continue;
         }
-        // Measured from this particle's own smallest pressure the field is linear in the offset, and Eq. (9)
-        // adds (P_i - P_min) sum w r / r^2: choose P_i as the minimum so that only the gradient is left.
+        // What is added to the gradient of the linear pressure is the repulsion.
         for j in fields.pressure.iter_mut() {
             *j = 1e9;
         }
@@ -147,10 +146,10 @@ fn the_corrected_gradient_stays_exact_on_shaken_positions() {
         fields.pressure[i] = 1e4;
         *cpu.fields_mut() = fields.clone();
         cpu.run(ParticleStage::PressureGradient, &step).unwrap();
-        let minimum = row_minimum(&fields.pressure, i, &cpu);
+        let reference = row_reference(&fields, i, &cpu, &params);
         let m = moment(&fields.position, i, &cpu, &params);
-        let shift = (1e4 - minimum) * (m.1.inverse() * m.0);
-        let expected = params.gravity - (gradient + shift) / params.density;
+        let repulsion = (1e4 - reference) * (m.1.inverse() * m.0);
+        let expected = params.gravity - (gradient + repulsion) / params.density;
         let a = cpu.fields().acceleration[i];
         assert!((a - expected).length() < 1e-9 * expected.length().max(1.0), "{a} for {expected}");
         checked += 1;
@@ -161,8 +160,34 @@ fn the_corrected_gradient_stays_exact_on_shaken_positions() {
     assert_eq!(checked, 20);
 }
 
-fn row_minimum(pressure: &[f64], i: usize, cpu: &Cpu) -> f64 {
-    cpu.neighbours().pressure(i).neighbour.iter().fold(pressure[i], |m, &j| m.min(pressure[j as usize]))
+/// What pressures are measured from: the smallest of the neighbourhood, or the smallest without the water's weight if
+/// that is larger.
+fn row_reference(fields: &seixo::fields::Fields, i: usize, cpu: &Cpu, params: &Params) -> f64 {
+    let near = cpu.neighbours().pressure(i).neighbour;
+    let smallest =
+        |of: &dyn Fn(usize) -> f64| near.iter().fold(fields.pressure[i], |m, &j| m.min(of(j as usize)));
+    let head = |j: usize| params.density * params.gravity.dot(fields.position[j] - fields.position[i]);
+    smallest(&|j| fields.pressure[j]).max(smallest(&|j| fields.pressure[j] - head(j)))
+}
+
+#[test]
+fn still_water_stays_still_on_any_arrangement() {
+    // The pressure of its weight on shaken particles, beside walls too: nothing is left of gravity, whichever way it points.
+    for gravity in [[0.0, 0.0, -9.81], [3.0, -2.0, -8.0]] {
+        let mut text = hydrostatic(0.025, 1e-3, "");
+        text.run.gravity = gravity;
+        let (mut cpu, params, step) = prepared(&text, 0.2);
+        let mut fields = cpu.fields().clone();
+        for i in 0..fields.pressure.len() {
+            fields.pressure[i] = 2e4 + params.density * params.gravity.dot(fields.position[i]);
+        }
+        *cpu.fields_mut() = fields.clone();
+        cpu.run(ParticleStage::PressureGradient, &step).unwrap();
+        let inner: Vec<usize> =
+            (0..cpu.groups().fluid).filter(|&i| fields.state[i] == State::Inner).collect();
+        let most = inner.iter().map(|&i| cpu.fields().acceleration[i].length()).fold(0.0, f64::max);
+        assert!(inner.len() > 1000 && most < 1e-9 * 9.81, "{} particles, {most} m/s2", inner.len());
+    }
 }
 
 /// (d / n0) sum w r / r^2 and the moment matrix.

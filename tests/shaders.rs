@@ -341,7 +341,9 @@ fn constant(text: &str, name: &str) -> f64 {
 fn constants_are_the_same_on_both_sides() {
     use seixo::backend::gpu::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};
     use seixo::fields::State;
-    use seixo::kernels::{number_density::CLOSEST, predict::DISPLACEMENT_MAX};
+    use seixo::kernels::{
+        number_density::CLOSEST, predict::DISPLACEMENT_MAX, shift::SHIFT, shift::SHIFT_MAX,
+    };
     use seixo::neighbourhood::EIGENVALUE_MIN;
     use seixo::pressure::Outcome;
     use seixo::scene::Kind;
@@ -385,6 +387,9 @@ fn constants_are_the_same_on_both_sides() {
         ("BACK", Operation::Back),
     ] {
         assert_eq!(constant(text("multigrid"), name), f64::from(operation as u32), "{name}");
+    }
+    for (name, value) in [("SHIFT", SHIFT), ("SHIFT_MAX", SHIFT_MAX)] {
+        assert_eq!(constant(text("shift"), name), value, "{name}");
     }
     for (name, outcome) in [
         ("CONVERGED", Outcome::Converged),

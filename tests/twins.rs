@@ -19,7 +19,7 @@ use seixo::pressure::cg::System;
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::{Kind, Scene};
-use seixo::scheme::Preconditioner;
+use seixo::scheme::{Gradient, Preconditioner};
 use seixo::simulation::Simulation;
 use seixo_study::device_compare::{self as compare, StageError};
 use std::sync::Arc;
@@ -648,6 +648,23 @@ fn correct() {
         let named = pair.gpu.counters().expect("readable").non_finite;
         assert_eq!(named, Some(broken.id[5]));
         assert_eq!(pair.cpu.counters().expect("readable").non_finite, named);
+    });
+}
+
+#[test]
+fn shift() {
+    each(|pair| {
+        if pair.params.gradient == Gradient::Minimum {
+            return assert!(!pair.plan.has(Stage::Shift));
+        }
+        pair.run_all(&LISTS);
+        pair.run(Stage::NumberDensity);
+        pair.run(Stage::PressureGradient);
+        let (before, _) = pair.fields();
+        pair.run(Stage::Shift);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.position)) > 1e-6);
+        pair.check(Stage::Shift);
     });
 }
 

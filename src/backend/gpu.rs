@@ -67,7 +67,7 @@ pub struct Gpu {
     counters: Counters,
     coefficients: Coefficients,
     dt: f64,
-    last_iterations: u32,
+    expected_iterations: f64,
     /// Levels of the multigrid preconditioner, if that is planned.
     levels: Option<Levels>,
 }
@@ -185,7 +185,7 @@ impl Gpu {
             counters: Counters::default(),
             coefficients: Coefficients::default(),
             dt: 0.0,
-            last_iterations: if levels.is_some() { 5 } else { 30 },
+            expected_iterations: if levels.is_some() { 5.0 } else { 30.0 },
             levels,
         };
         if plan.wet() {

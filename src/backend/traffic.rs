@@ -113,6 +113,7 @@ impl Sizes {
             (Stage::PressureSource, pairs * (4 + weight) + rows * (2 * vector + 3 * number)),
             (Stage::PressureGradient, pairs * (4 + weight) + rows * (vector + number) + fluid * vector),
             (Stage::Correct, update),
+            (Stage::Shift, fluid * 4 * vector),
         ];
         Traffic { pairs, rows, slots: pressure, stages: stages.into(), solve: self.solve() }
     }

@@ -119,7 +119,7 @@ impl Run {
 pub enum Preset {
     /// The paper's scheme: number_density, minimum, threshold.
     Paper,
-    /// The more accurate one: mixed, minimum_corrected, threshold_offset.
+    /// The more accurate one: mixed, consistent, threshold_offset.
     #[default]
     Accurate,
 }

@@ -17,6 +17,7 @@ pub mod number_density;
 pub mod predict;
 pub mod pressure_gradient;
 pub mod pressure_source;
+pub mod shift;
 pub mod viscosity;
 
 pub use crate::neighbourhood::Particles;

@@ -3,6 +3,11 @@
 //!
 //! Where the source of the PPE is balanced ([`crate::scheme::Source::Mixed`]), gravity acts together with the pressure
 //! that carries it, in this stage, and not in `predict`.
+//!
+//! The consistent gradient is, below the surface,
+//! M^-1 (d / n0) [sum (P_j - P_i + R) e + sum_dummies (rho g . r + R) e],  e = w r / r^2,
+//! exact for a linear pressure but for the repulsion R, which is that of Eq. (9), P_i - P_min, or what is left of it when
+//! the weight of the water is taken off, whichever is smaller: none in still water on any arrangement.
 
 use super::Particles;
 use crate::fields::State;
@@ -12,10 +17,16 @@ use crate::params::Params;
 use crate::scheme::{Gradient, Source};
 use glam::DVec3;
 
-/// Whether the gradient of a particle is multiplied by the inverse of its moment matrix.
+/// Whether the gradient of a particle is the consistent one.
 #[inline(always)]
-pub fn is_corrected(state: State, params: &Params) -> bool {
-    params.gradient == Gradient::MinimumCorrected && state == State::Inner
+pub fn is_consistent(state: State, params: &Params) -> bool {
+    params.gradient == Gradient::Consistent && state == State::Inner
+}
+
+/// What still water's pressure grows by along `r` [Pa].
+#[inline(always)]
+pub fn hydrostatic(r: DVec3, params: &Params) -> f64 {
+    params.density * params.gravity.dot(r)
 }
 
 /// Acceleration by a gradient of the pressure [m/s2], and by gravity where that acts in this stage.
@@ -38,13 +49,23 @@ pub fn pressure_gradient(
     pressure: &[f64],
 ) -> DVec3 {
     let carriers = || all.iter().take(carry);
-    let minimum = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j]));
+    let head = |j: usize| hydrostatic(on.position[j] - on.position[i], on.params);
+    let mut reference = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j]));
+    let consistent = is_consistent(state, on.params);
+    if consistent {
+        let level = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j] - head(j)));
+        reference = reference.max(level);
+    }
     let mut gradient: DVec3 =
-        carriers().map(|(j, w)| (pressure[j] - minimum) * pair_vector(i, j, w, on)).sum();
-    if is_corrected(state, on.params)
-        && let Some(inverse) = inverse(moment(i, all, on), on.params.dimensions)
-    {
-        gradient = inverse * gradient;
+        carriers().map(|(j, w)| (pressure[j] - reference) * pair_vector(i, j, w, on)).sum();
+    if consistent {
+        let dummies = all.iter().skip(carry);
+        gradient += dummies
+            .map(|(j, w)| (pressure[i] + head(j) - reference) * pair_vector(i, j, w, on))
+            .sum::<DVec3>();
+        if let Some(inverse) = inverse(moment(i, all, on), on.params.dimensions) {
+            gradient = inverse * gradient;
+        }
     }
     acceleration(gradient, on.params)
 }

@@ -25,6 +25,8 @@ pub enum Entry {
     Clip,
     /// Shortened displacements and corrections.
     Clamps,
+    /// Particles moved away from where they crowd.
+    Shift,
     /// Particles taken out.
     Lost,
     /// Put in by solids that follow a table of motion.
@@ -38,13 +40,14 @@ pub enum Entry {
 
 impl Entry {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Gravity,
         Self::Viscosity,
         Self::Collision,
         Self::Pressure,
         Self::Clip,
         Self::Clamps,
+        Self::Shift,
         Self::Lost,
         Self::Walls,
         Self::Exchange,
@@ -60,6 +63,7 @@ impl Entry {
             Self::Pressure => "pressure",
             Self::Clip => "clip",
             Self::Clamps => "clamps",
+            Self::Shift => "shift",
             Self::Lost => "lost",
             Self::Walls => "walls",
             Self::Exchange => "exchange",

@@ -130,7 +130,7 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
     let of_parts = |n: &[f64]| -> Vec<f64> { (0..n.len()).filter(part).map(|i| n[i]).collect() };
     match stage {
         Stage::Viscosity => vec![acceleration(), reaction()],
-        Stage::Predict | Stage::MoveSolids | Stage::Correct => vec![position(), velocity()],
+        Stage::Predict | Stage::MoveSolids | Stage::Correct | Stage::Shift => vec![position(), velocity()],
         Stage::CellList => vec![position(), velocity(), share(stage, "kind", &gpu.kind, &cpu.kind)],
         Stage::Collision => vec![position(), velocity(), reaction()],
         Stage::NumberDensity => vec![

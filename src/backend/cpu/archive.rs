@@ -29,6 +29,7 @@ impl Cpu {
             scratch: _,
             work: _,
             multigrid: _,
+            imbalance: _,
             // The state.
             fields,
             neighbours,

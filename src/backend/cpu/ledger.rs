@@ -42,6 +42,11 @@ impl WaterLedger {
         self.add([Entry::Gravity, Entry::Viscosity, Entry::Clamps], on.params, sums(live, of));
     }
 
+    /// Books `shift`, which is about to move particle i by `way(i)`.
+    pub fn shift(&mut self, live: usize, params: &Params, way: impl Fn(usize) -> DVec3 + Sync) {
+        self.add([Entry::Shift], params, sums(live, |i| [-params.gravity.dot(way(i))]));
+    }
+
     /// Books the particles that `cell_list` is about to take out.
     pub fn lost(&mut self, live: usize, on: Particles) {
         let (params, domain) = (on.params, (on.params.domain_min, on.params.domain_max));

@@ -27,7 +27,7 @@ use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::pressure_source::laplacian_coefficient;
-use crate::kernels::{Particles, body_force, collision, correct, monitor, move_solids, predict};
+use crate::kernels::{Particles, body_force, collision, correct, monitor, move_solids, predict, shift};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
@@ -68,6 +68,8 @@ pub struct Cpu {
     live: usize,
     counters: Counters,
     ledger: Option<Box<WaterLedger>>,
+    /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
+    imbalance: Vec<DVec3>,
     dt: f64,
 }
 
@@ -108,6 +110,7 @@ impl Cpu {
             live: groups.fluid,
             counters: Counters::default(),
             ledger: (wet && plan.ledger).then(Box::default),
+            imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
             dt: 0.0,
         })
     }
@@ -309,23 +312,40 @@ impl Cpu {
     }
 
     fn pressure_gradient(&mut self) {
-        let Self { fields, neighbours, params, groups, live, ledger, .. } = self;
+        let Self { fields, neighbours, params, groups, live, ledger, imbalance, .. } = self;
         let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let live = *live;
-        let rows = |pressure: &[f64], acceleration: &mut [DVec3]| {
-            (acceleration.par_chunks_mut(CHUNK), &neighbours.chunks, state.par_chunks(CHUNK))
+        let rows = |pressure: &[f64], acceleration: &mut [DVec3], imbalance: &mut [DVec3]| {
+            let shifted = imbalance.par_chunks_mut(CHUNK).map(Some);
+            let all =
+                shifted.chain(rayon::iter::repeat_n((), acceleration.len().div_ceil(CHUNK)).map(|()| None));
+            (acceleration.par_chunks_mut(CHUNK), all, &neighbours.chunks, state.par_chunks(CHUNK))
                 .into_par_iter()
                 .enumerate()
-                .for_each(|(c, (a, chunk, state))| {
-                    gradient_rows(c * CHUNK, live, chunk, a, state, pressure, on);
+                .for_each(|(c, (a, imbalance, chunk, state))| {
+                    let imbalance = imbalance.unwrap_or_default();
+                    gradient_rows(c * CHUNK, live, chunk, a, imbalance, state, pressure, on);
                 });
         };
-        rows(pressure, acceleration);
+        rows(pressure, acceleration, imbalance);
         if let Some(ledger) = ledger {
             ledger.unclipped.resize(acceleration.len(), DVec3::ZERO);
-            rows(&ledger.solution, &mut ledger.unclipped);
+            rows(&ledger.solution, &mut ledger.unclipped, &mut []);
         }
+    }
+
+    fn shift(&mut self, dt: f64) {
+        let Self { params, fields, imbalance, ledger, live, .. } = self;
+        let Fields { position, velocity, .. } = fields;
+        let n = *live;
+        if let Some(ledger) = ledger {
+            let way = |i: usize| shift::shift(imbalance[i], velocity[i], dt, params);
+            ledger.shift(n, params, way);
+        }
+        (&mut position[..n], &velocity[..n], &imbalance[..n])
+            .into_par_iter()
+            .for_each(|(x, &v, &imbalance)| *x += shift::shift(imbalance, v, dt, params));
     }
 
     fn correct(&mut self, dt: f64) {
@@ -371,6 +391,7 @@ impl Backend for Cpu {
             ParticleStage::NumberDensity => self.number_density(),
             ParticleStage::PressureSource => self.pressure_source(step),
             ParticleStage::PressureGradient => self.pressure_gradient(),
+            ParticleStage::Shift => self.shift(step.dt),
             ParticleStage::Correct => {
                 if let Some(ledger) = &mut self.ledger {
                     let Fields { position, velocity, acceleration, .. } = &self.fields;

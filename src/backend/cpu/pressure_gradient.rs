@@ -1,23 +1,25 @@
 //! [`crate::kernels::pressure_gradient`], several neighbours at a time.
 
 use super::moment::{moment, pair_vectors};
-use super::row_arrays::RowArrays;
+use super::row_arrays::{Columns, RowArrays, sum};
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::pressure_gradient::{acceleration, is_corrected};
+use crate::kernels::pressure_gradient::{acceleration, hydrostatic, is_consistent};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
+use crate::params::Params;
 use glam::DVec3;
 
 wide! {
-    /// Acceleration by the pressure of the fluid slots from `first` on, whose states are `state`; only those below
-    /// `live` hold a particle.
+    /// Acceleration by the pressure of the fluid slots from `first` on, whose states are `state`, and how unevenly
+    /// their neighbours lie if anybody asks; only those below `live` hold a particle.
     pub fn gradient_rows(
         first: usize,
         live: usize,
         chunk: &Chunk,
         accelerations: &mut [DVec3],
+        imbalance: &mut [DVec3],
         state: &[State],
         pressure: &[f64],
         on: Particles,
@@ -25,16 +27,22 @@ wide! {
         let mut arrays = RowArrays::default();
         for (k, a) in accelerations.iter_mut().enumerate() {
             let i = first + k;
+            let mut one_side = DVec3::ZERO;
             *a = DVec3::ZERO;
             if i < live {
-                let gradient = pressure_gradient(i, chunk.parts(k), state[k], on, pressure, &mut arrays);
+                let gradient;
+                (gradient, one_side) =
+                    pressure_gradient(i, chunk.parts(k), state[k], on, pressure, &mut arrays);
                 *a = acceleration(gradient, on.params);
+            }
+            if let Some(imbalance) = imbalance.get_mut(k) {
+                *imbalance = one_side;
             }
         }
     }
 }
 
-/// grad P at slot `i` [Pa/m].
+/// grad P at slot `i` [Pa/m], and its imbalance [1/m], zero on the surface.
 #[inline(always)]
 fn pressure_gradient(
     i: usize,
@@ -43,28 +51,45 @@ fn pressure_gradient(
     on: Particles,
     pressure: &[f64],
     arrays: &mut RowArrays,
-) -> DVec3 {
-    let corrected = is_corrected(state, on.params);
-    let n = if corrected { all.neighbour.len() } else { carry };
+) -> (DVec3, DVec3) {
+    let consistent = is_consistent(state, on.params);
+    let n = if consistent { all.neighbour.len() } else { carry };
     let RowArrays { r, e, w: p, s: w, .. } = arrays;
     let filled = r.differences(i, &all.neighbour[..n], on.position);
     let (p, w) = (&mut p[..filled], &mut w[..filled]);
-    let mut minimum = pressure[i];
+    let own = pressure[i];
+    let mut reference = own;
     for (p, &j) in p.iter_mut().zip(&all.neighbour[..carry]) {
         *p = pressure[j as usize];
-        minimum = minimum.min(*p);
+        reference = reference.min(*p);
     }
-    p[..carry].iter_mut().for_each(|p| *p -= minimum);
     p[carry..].fill(0.0);
+    if consistent {
+        reference = reference.max(level(r, &p[..carry], own, on.params));
+        let dummies = p[carry..n].iter_mut().enumerate();
+        dummies.for_each(|(k, p)| *p = own + head(r, carry + k, on.params));
+    }
+    p[..n].iter_mut().for_each(|p| *p -= reference);
     w[..n].copy_from_slice(&all.weight[..n]);
     w[n..].fill(0.0);
     pair_vectors(r, w, e);
     let gradient = scale(on) * e.weighted_sum(p);
-    if corrected
-        && let Some(inverse) =
-            inverse(moment(r, e, filled, scale(on), on.params.dimensions), on.params.dimensions)
-    {
-        return inverse * gradient;
+    if !consistent {
+        return (gradient, DVec3::ZERO);
     }
-    gradient
+    let one_side = scale(on) * DVec3::new(sum(&e.x[..filled]), sum(&e.y[..filled]), sum(&e.z[..filled]));
+    let moment = moment(r, e, filled, scale(on), on.params.dimensions);
+    (inverse(moment, on.params.dimensions).map_or(gradient, |inverse| inverse * gradient), one_side)
+}
+
+/// What still water's pressure grows by on the way to neighbour `k` [Pa].
+#[inline(always)]
+fn head(r: &Columns, k: usize, params: &Params) -> f64 {
+    hydrostatic(DVec3::new(r.x[k], r.y[k], r.z[k]), params)
+}
+
+/// The smallest of `own` and the pressures `p`, less the weight of the water in between [Pa].
+#[inline(always)]
+fn level(r: &Columns, p: &[f64], own: f64, params: &Params) -> f64 {
+    p.iter().enumerate().fold(own, |least, (k, p)| least.min(p - head(r, k, params)))
 }

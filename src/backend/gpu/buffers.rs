@@ -48,6 +48,7 @@ table! {
         number_density: f32, Both, Fluid, |s, _| s.pressure;
         state: u32, Both, Fluid, |s, _| s.pressure;
         acceleration: [f32; 4], Both, Fluid, |s, _| s.fluid;
+        imbalance: [f32; 4], None, Imbalance, |s, _| s.fluid;
     }
     "neighbour lists" {
         neighbour_list: u32, Both, Fluid, |s, _| s.capacity * s.pressure;

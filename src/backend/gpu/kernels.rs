@@ -71,6 +71,7 @@ files! {
     predict[super::WORKGROUP] Stage(Predict), Fluid: predict;
     pressure_gradient[super::WORKGROUP] Stage(PressureGradient), Fluid: pressure_gradient;
     pressure_source[super::WORKGROUP] Stage(PressureSource), Rows: pressure_source;
+    shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
     viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
 }
 

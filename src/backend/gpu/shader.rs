@@ -10,7 +10,7 @@ pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
 pub const SWITCHES: [&str; 11] = [
-    "CORRECTED",
+    "CONSISTENT",
     "COUPLED",
     "MIXED",
     "MOVING",

@@ -40,6 +40,8 @@ impl Gpu {
         let (v, n, k) = (buffers::position.size(), buffers::pressure.size(), buffers::neighbour_list.size());
         // Position and velocity in and out, acceleration in and out.
         let update = f * 6 * v;
+        // Position in, acceleration and perhaps the imbalance out.
+        let gradient = if self.plan.has(Stage::Shift) { 3 * v } else { 2 * v };
         let viscous = self.plan.has(Stage::Viscosity);
         // The walls of which the fluid is near, and as many layers of dummies behind them.
         let walls = 3 * v * rows.used.saturating_sub(f);
@@ -59,8 +61,9 @@ impl Gpu {
             (Stage::Collision, p.min(f + followed) * k + f * 4 * v),
             (Stage::NumberDensity, p * (v + n + 2 * k) + lists + walls),
             (Stage::PressureSource, p * (k + equation) + rows.used * (2 * v + n + k) + lists + 2 * walls),
-            (Stage::PressureGradient, f * (2 * v + n + 2 * k) + lists * f / rows.used.max(1) + walls),
+            (Stage::PressureGradient, f * (gradient + n + 2 * k) + lists * f / rows.used.max(1) + walls),
             (Stage::Correct, update),
+            (Stage::Shift, f * 4 * v),
             (Stage::BodyForce, s.moving_wall * (buffers::wall_layer.size() + 2 * v + n + k)),
         ];
         let unknowns = self.unknowns()?;
