@@ -17,6 +17,12 @@ pub enum Relaxation {
     Speed(f64),
 }
 
+/// Reach of the pressure within a step over the water's depth: what is missing at the floor of still water,
+/// 1 - tanh(1 / 5) 5 = 1.3 %, the density has to make up for.
+const REACH: f64 = 5.0;
+/// The same over the spacing, at most: alpha adds 1e-6 of itself to a row's diagonal.
+const REACH_MAX: f64 = 500.0;
+
 /// Largest gamma that [`Relaxation::Speed`] gives. The density error oscillates with
 /// omega dt = sqrt(gamma), unstable from 2 on; noise grows well before.
 pub const RELAXATION_MAX: f64 = 0.5;
@@ -173,6 +179,24 @@ impl Params {
         self.density * self.spacing.powi(3)
     }
 
+    /// alpha of Eq. (8) for a step of `dt` [s] [1/Pa]; never 0, or the pressure of a closed pocket has no level.
+    fn derived_compressibility(&self, dt: f64, relaxation: f64) -> f64 {
+        let head = self.gravity.length() * self.depth;
+        match self.source {
+            // 0.1 % bulk compression.
+            Source::NumberDensity if head > 0.0 => (1e-3 * relaxation / (self.density * head)).max(1e-9),
+            Source::NumberDensity => 1e-9,
+            Source::Mixed => (dt / self.pressure_reach()).powi(2) / self.density,
+        }
+    }
+
+    /// How far a pressure is felt within a step, dt / sqrt(rho alpha), where alpha is derived [m]. As far as single
+    /// precision can tell alpha from 0 it is several times the water's depth.
+    fn pressure_reach(&self) -> f64 {
+        let farthest = REACH_MAX * self.spacing;
+        if self.depth > 0.0 { (REACH * self.depth).min(farthest) } else { farthest }
+    }
+
     /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected [m/s].
     pub fn step(&self, time: f64, dt: f64, speed: f64) -> Step {
         let relaxation = match self.relaxation {
@@ -180,9 +204,8 @@ impl Params {
             Relaxation::Speed(c) => (c * dt / self.spacing).powi(2).min(RELAXATION_MAX),
         };
         let head = self.gravity.length() * self.depth;
-        // 0.1 % bulk compression; never 0, or the pressure of a closed pocket has no level.
-        let derived = if head > 0.0 { (1e-3 * relaxation / (self.density * head)).max(1e-9) } else { 1e-9 };
-        let compressibility = self.compressibility.unwrap_or(derived).max(1e-10);
+        let compressibility =
+            self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));
         let c = self.sound_speed(dt);
         let pressure_max = 5.0 * self.density * (c * c).max(speed * speed).max(head);
         Step { time, dt, relaxation, compressibility, pressure_max }

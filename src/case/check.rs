@@ -181,8 +181,8 @@ impl Checker<'_> {
             self.range(
                 "fluid.compressibility",
                 alpha,
-                alpha >= 1e-10,
-                "1e-10 1/Pa or more: 0 makes closed cavities singular",
+                alpha >= 1e-14,
+                "1e-14 1/Pa or more: 0 makes closed cavities singular",
             );
         }
         self.one_of(

@@ -160,7 +160,7 @@ pub struct Fluid {
     pub relaxation: Option<f64>,
     /// Reference speed c_s [m/s], gamma = (c_s dt / l0)^2. Derived from depth and spacing if neither is given.
     pub sound_speed: Option<f64>,
-    /// Artificial compressibility alpha of Eq. (8) [1/Pa]. Derived if absent; at least 1e-10.
+    /// Artificial compressibility alpha of Eq. (8) [1/Pa]. Derived if absent.
     pub compressibility: Option<f64>,
     /// Free-surface threshold beta [-].
     #[serde(default = "Fluid::default_beta")]
