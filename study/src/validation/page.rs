@@ -45,6 +45,10 @@ pub fn write(path: &Path, suite: &Suite, rows: &[Row]) -> Result<()> {
     let mut text = HEAD.to_string();
     let machines = work_precision::machines(rows);
     let _ = writeln!(text, "\nseixo {}; computed on: {machines}.\n", env!("CARGO_PKG_VERSION"));
+    let missing = suite.len() - rows.len();
+    if missing > 0 {
+        let _ = writeln!(text, "{missing} of {} points are still to be computed.\n", suite.len());
+    }
     summary(&mut text, suite, rows);
     for validation in &suite.validations {
         section(&mut text, validation, rows, &images)?;
