@@ -145,7 +145,7 @@ fn the_energy_of_bodies_that_touch_at_the_start_is_a_number() {
 
 #[test]
 fn the_cap_of_sub_steps_holds_whatever_is_asked() {
-    for spring in [1e3, 1e7, 1e12] {
+    for spring in [1e3_f64, 1e7, 1e12] {
         for damping in ["damping = 1e6", "damping_ratio = 30", "restitution = 0.001", "restitution = 1"] {
             for mass in [1e-3, 1e4] {
                 // a spring that a body's weight presses through is refused
