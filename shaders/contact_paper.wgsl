@@ -2,7 +2,7 @@
 // the sums over their pairs (`force`),
 //   f = [(K (d - d_c) e + C v) . N] N + eta (v - (v . e) e)  for d < d_c,  r = r_j - r_i, e = r / d, v = v_j - v_i.
 // The host divides by n_c.
-// Twin: src/contact/paper.rs
+// Twin: src/contact/paper/mod.rs
 //
 // One workgroup a pair of solids. All in the frame of the first solid A. Coordinates are two numbers: `high` of at most
 // 12 bits and the rest, `low`. Products of two high parts and their sums have at most 24 bits: they are exact, in any

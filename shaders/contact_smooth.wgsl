@@ -1,7 +1,7 @@
 // Contact of true surfaces: which points of one solid come near the other's box (`search`), and the normal forces of a
 // pair of solids (`force`),
 //   D = (sum_i w_i d_i^8)^(1/8),  f_i = s_i (K d_i - C v_i) >= 0,  s_i = w_i (d_i / D)^6.
-// Twin: src/contact/smooth.rs
+// Twin: src/contact/smooth/mod.rs
 //
 // Edges are integrated on the host. What they bring to a face is taken in as more points; where two edges cross, only
 // into D and the sum of shares.

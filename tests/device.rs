@@ -57,7 +57,9 @@ fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
             println!("{preconditioner}, body {free}: {submits} submissions, {waits} waits in 20 steps");
             // The solver's verdict and, with a free body, the force on it; every ten steps a look at the fluid.
             let answers = if free { 2 * 20 } else { 20 } + 2;
-            assert_eq!((submits, waits), (answers, answers), "{preconditioner}, body {free}");
+            // A solve that takes many more iterations than those before it is looked at a second time: rare in still water.
+            assert_eq!(submits, waits, "{preconditioner}, body {free}");
+            assert!((answers..=answers + 1).contains(&submits), "{preconditioner}, body {free}: {submits}");
             let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
             assert_eq!(count(Stage::CellList), 6 * 20);
             assert_eq!(count(Stage::MoveSolids), 2 * 20);
@@ -66,7 +68,9 @@ fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
             let solve = sim.backend.traffic().expect("it can be counted").solve;
             let once = solve.ends + solve.build;
             let verdict = u64::from(preconditioner == "multigrid");
-            let iterations = count(Stage::ConjugateGradient) - 20 * (once.dispatches + verdict);
+            // A second look ends another chunk of iterations: half of what starts and ends a solve.
+            let again = (submits - answers) * (solve.ends.dispatches / 2 + verdict);
+            let iterations = count(Stage::ConjugateGradient) - 20 * (once.dispatches + verdict) - again;
             let each = solve.iteration + solve.cycle;
             println!("{solve:?}");
             assert!(iterations >= 20 * each.dispatches && iterations % each.dispatches == 0);
@@ -99,7 +103,10 @@ fn contact_on_the_device_adds_its_round_trips_and_no_other_wait() {
     let (submits, waits) = (now.submits - before.submits, now.waits - before.waits);
     println!("{trips} round trips of contact, {submits} submissions, {waits} waits in 20 steps");
     assert!(trips >= 20, "the gate carries the cube");
-    assert_eq!((submits, waits), (2 * 20 + 2 + trips, 2 * 20 + 2 + trips));
+    // As above, one solve may be looked at twice.
+    let answers = 2 * 20 + 2 + trips;
+    assert_eq!(submits, waits);
+    assert!((answers..=answers + 1).contains(&submits), "{submits} for {answers}");
     let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
     assert_eq!(count(Stage::Contact), asks.dispatches - asked.dispatches);
     assert_eq!((count(Stage::MoveSolids), count(Stage::BodyForce)), (2 * 20, 20));

@@ -30,7 +30,7 @@ fn every_shader_has_a_twin_and_every_twin_a_shader() {
     let shaders = files("shaders", ".wgsl", "common");
     // The twins of contact's shaders are the laws themselves.
     let twin = |name: &str| match name.strip_prefix("contact_") {
-        Some(law) => format!("src/contact/{law}.rs"),
+        Some(law) => format!("src/contact/{law}/mod.rs"),
         None => format!("src/kernels/{name}.rs"),
     };
     let of_particles: BTreeSet<String> =

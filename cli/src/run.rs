@@ -96,7 +96,7 @@ fn size(text: &str) -> std::result::Result<u64, String> {
         _ => (text, 1.0),
     };
     let bytes = number.parse::<f64>().map_err(|_| "write a size like 8G or 500M")? * unit;
-    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err("write a size like 8G or 500M".into()) }
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("write a size like 8G or 500M".into()) }
 }
 
 /// Refuses a case that the machine cannot hold, before anything is built.

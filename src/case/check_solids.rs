@@ -213,7 +213,7 @@ impl Checker<'_> {
             self.not_negative("contact.damping_ratio", ratio, "");
         }
         if let Some(e) = contact.restitution {
-            self.range("contact.restitution", e, e >= 0.0 && e <= 1.0, "0 (plastic) to 1 (elastic)");
+            self.range("contact.restitution", e, (0.0..=1.0).contains(&e), "0 (plastic) to 1 (elastic)");
         }
         self.not_negative("contact.viscous_friction", contact.viscous_friction, "kg/s");
         self.not_negative("contact.friction", contact.friction, "");

@@ -118,9 +118,9 @@ impl Archive {
     /// As [`Archive::count`], and if the length differs.
     pub fn array<T: Pod>(&mut self, name: &str, values: &mut Vec<T>, fixed: bool) -> Result<()> {
         if self.saving {
-            let width = if size_of::<T>() % 8 == 0 {
+            let width = if size_of::<T>().is_multiple_of(8) {
                 8
-            } else if size_of::<T>() % 4 == 0 {
+            } else if size_of::<T>().is_multiple_of(4) {
                 4
             } else {
                 1

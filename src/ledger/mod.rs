@@ -85,8 +85,8 @@ impl Ledger {
 
     /// Save the work so far under `name`, or take it over.
     pub(crate) fn exchange(&mut self, archive: &mut Archive, name: &str) -> Result<()> {
-        let entries = Entry::ALL.iter().zip(&mut self.0);
-        entries.map(|(entry, work)| archive.number(&format!("{name}.{}", entry.name()), work)).collect()
+        let mut entries = Entry::ALL.iter().zip(&mut self.0);
+        entries.try_for_each(|(entry, work)| archive.number(&format!("{name}.{}", entry.name()), work))
     }
 
     /// Sum of all entries [J].

@@ -129,7 +129,7 @@ impl Totals {
         monitors.speed_max = monitors.speed_max.max(fluid.speed_max);
         monitors.energy_end = fluid.kinetic + fluid.potential + bodies;
         // The sum may not be a number, and then is not to be passed over.
-        if !(monitors.energy_end <= monitors.energy_max) {
+        if monitors.energy_end.partial_cmp(&monitors.energy_max).is_none_or(std::cmp::Ordering::is_gt) {
             monitors.energy_max = monitors.energy_end;
         }
         monitors.lost_particles = counters.lost;

@@ -117,7 +117,7 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     judge.bound(gain, (GAIN.0 * scale.energy, GAIN.1 * scale.energy), || {
         format!("the energy rose by {gain:.2e} J, where {:.2e} J is at hand", scale.energy)
     });
-    judge.0.sort_by(|a, b| b.0.cmp(&a.0));
+    judge.0.sort_by_key(|fault| std::cmp::Reverse(fault.0));
     Verdict {
         grade: judge.0.first().map_or(Grade::Fine, |(grade, _)| *grade),
         reasons: judge.0.into_iter().map(|(_, why)| why).collect(),

@@ -82,7 +82,7 @@ impl Geometry for Disc {
         let mut out = Particles::default();
         let count = (self.radius / spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
         let step = self.radius / f64::from(count);
-        let kept = if count >= layers + 1 { layers.max(1) } else { count };
+        let kept = if count > layers { layers.max(1) } else { count };
         for depth in 0..kept {
             let r = self.radius - (f64::from(depth) + 0.5) * step;
             let n = (TAU * r / spacing).round().max(3.0) as usize;

@@ -76,7 +76,7 @@ impl Geometry for Sphere {
         let mut out = Particles::default();
         let count = (self.radius / spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
         let step = self.radius / f64::from(count);
-        let kept = if count >= layers + 1 { layers.max(1) } else { count };
+        let kept = if count > layers { layers.max(1) } else { count };
         for depth in 0..kept {
             let r = self.radius - (f64::from(depth) + 0.5) * step;
             // as many as cells of the layer's volume

@@ -220,7 +220,7 @@ fn draw_mark(area: &Area, at: (i32, i32), mark: Mark, size: f64, ink: RGBColor) 
         Mark::Star => {
             let corner = |k: u32| {
                 let (sin, cos) = (f64::from(k) * std::f64::consts::PI / 5.0).sin_cos();
-                let r = if k % 2 == 0 { 1.4 } else { 0.6 };
+                let r = if k.is_multiple_of(2) { 1.4 } else { 0.6 };
                 [r * sin, -r * cos]
             };
             polygon(&(0..10).map(corner).collect::<Vec<_>>())

@@ -20,7 +20,8 @@ impl Gpu {
         let multigrid = self.levels.is_some();
         let first = report(&self.iterate(multigrid, self.settings.warm_start, self.last_iterations)?);
         if !(multigrid && first.outcome == Outcome::Breakdown) {
-            self.last_iterations = first.iterations;
+            // From step to step the number goes up and down: the most of late is expected again, and slowly forgotten.
+            self.last_iterations = first.iterations.max(self.last_iterations.saturating_sub(1));
             return Ok(first);
         }
         let again = report(&self.iterate(false, true, ALONE)?);
