@@ -13,6 +13,7 @@ mod contact;
 mod contact_device;
 mod contact_hard;
 mod device;
+mod errors;
 mod faults;
 mod fluid;
 mod fuzz;

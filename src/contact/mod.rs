@@ -73,9 +73,9 @@ impl Solids {
         let free = bodies.iter().position(Body::is_free);
         if let (None, Some(k)) = (contact, free) {
             let name = &scene.solids[k].name;
-            return Err(Error::Case(format!(
-                "body \"{name}\" moves freely, so the case needs [contact] with law and spring"
-            )));
+            let message =
+                format!("body \"{name}\" moves freely, so the case needs [contact] with law and spring");
+            return Err(Error::key("contact", message, ""));
         }
         let mut limits = Limits::new(contact, scene, &bodies)?;
         let law = match (contact, free) {
