@@ -21,6 +21,7 @@ impl Cpu {
             active_set: _,
             // Made anew in every step before it is used.
             poses: _,
+            free_bodies: _,
             fluid_start: _,
             coordinates: _,
             moving: _,

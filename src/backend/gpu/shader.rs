@@ -9,8 +9,9 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 10] = [
+pub const SWITCHES: [&str; 11] = [
     "CORRECTED",
+    "COUPLED",
     "MIXED",
     "MOVING",
     "MULTIGRID",
@@ -26,6 +27,7 @@ pub const SWITCHES: [&str; 10] = [
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         params.gradient != Gradient::Minimum,
+        plan.needs(Arrays::Coupling),
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
