@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 16 | `seixo checkpoint` |
 //! | 4, 8 | format, length of the header (little endian) |
-//! | | the header, [`Header`] as JSON |
+//! | | the header, `Header` as JSON |
 //! | 4 | CRC-32 of all that |
 //! | | the arrays, where the header says |
 //!

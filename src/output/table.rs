@@ -71,7 +71,7 @@ impl Table {
         Ok(table)
     }
 
-    /// The table of a run that goes on; [`Table::exchange`] says where.
+    /// The table of a run that goes on; its state says where.
     ///
     /// # Errors
     /// [`Error::Io`] if there is none.
