@@ -6,7 +6,7 @@
 use seixo::{Case, Options, Result, Simulation};
 use std::ops::ControlFlow::Continue;
 
-fn main() -> Result<()> {
+pub fn main() -> Result<()> {
     let case = Case::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cases/dam_break_2d.toml"))?;
     let mut simulation = Simulation::open(&case, &Options::default())?;
     let start = simulation.observe()?.0;

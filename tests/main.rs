@@ -14,6 +14,7 @@ mod contact_device;
 mod contact_hard;
 mod device;
 mod errors;
+mod examples;
 mod faults;
 mod fluid;
 mod fuzz;
