@@ -15,7 +15,7 @@ fn volume_beyond(simulation: &mut Simulation, x: f64) -> Result<f64> {
 }
 
 pub fn main() -> Result<()> {
-    let mut case = Case::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cases/dam_break.toml"))?;
+    let mut case: Case = include_str!("../cases/dam_break.toml").parse()?;
     case.run.spacing = 0.03;
     let mut simulation = Simulation::open(&case, &Options::default())?;
     println!("on {}", simulation.backend.description());
