@@ -11,13 +11,6 @@
 @group(0) @binding(7) var<storage, read> force_chunk: array<vec4u>; // first of the moving-wall slots, how many, solid
 @group(0) @binding(8) var<storage, read_write> wrench: array<vec4f>; // force and torque of each chunk
 
-// In the solid's frame: outward area, from the centre of mass to the surface, from the particle to the surface.
-struct WallParticle {
-    area: vec4f,
-    arm: vec4f,
-    to_surface: vec4f,
-}
-
 var<workgroup> force_of: array<vec3f, 256>;
 var<workgroup> torque_of: array<vec3f, 256>;
 var<workgroup> force_row: array<vec3f, 16>;

@@ -85,6 +85,14 @@ struct Pose {
     angular_velocity: vec4f,
 }
 
+// A wall-layer particle of a moving solid, in the solid's frame: outward area, from the centre of mass to the surface, from
+// the particle to the surface.
+struct WallParticle {
+    area: vec4f,
+    arm: vec4f,
+    to_surface: vec4f,
+}
+
 @group(0) @binding(0) var<uniform> params: Constants;
 @group(0) @binding(1) var<uniform> now: Coefficients;
 

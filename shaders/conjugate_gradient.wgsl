@@ -9,6 +9,7 @@
 //   descend:   its residual r - A z goes to the cells; the verdict of the iteration falls here
 //   (shaders/multigrid.wgsl adds the correction of the cells)
 //   ascend:    z = one more sweep from there, partial sums of r.z
+// With free bodies `respond` of shaders/coupling.wgsl goes before every dispatch that multiplies.
 // z lies next to the positions (one load a neighbour). Sums are trees of fixed shape: 16 x 16 in a workgroup, then every
 // workgroup of the next dispatch adds the workgroups' sums in the same order, so all come to the same scalars and the same
 // verdict without another dispatch. Scalars and verdict stay here; the host looks at `solve` every few iterations.
@@ -37,6 +38,22 @@ const DAMPING: f32 = 0.9;
 const DAMPING: f32 = 1.0;
 //#endif
 
+//#if COUPLED
+// Rows of free bodies and what the bodies answer; see shaders/coupling.wgsl.
+@group(0) @binding(15) var<storage, read> coupling: array<vec4f>;
+
+// Row i of kappa S M^-1 S^T z: what the body at i makes of z.
+fn of_body(i: u32) -> f32 {
+    let k = i - params.fluid;
+    if i < params.fluid || k >= params.moving_wall {
+        return 0.0;
+    }
+    let force = coupling[2u * k];
+    let y = u32(force.w);
+    return dot(force.xyz, coupling[y].xyz) + dot(coupling[2u * k + 1u].xyz, coupling[y + 1u].xyz);
+}
+
+//#endif
 // As crate::backend::gpu::layout::Solve.
 struct Solve {
     done: atomic<u32>,
@@ -132,6 +149,31 @@ fn pack(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
+// (A z)_i of a row with an unknown, with what a body adds.
+fn times(i: u32, diagonal: f32, z: vec4f) -> f32 {
+    let water = diagonal * z.w - neighbours(i, z.xyz);
+//#if COUPLED
+    return water + of_body(i);
+//#else
+    return water;
+//#endif
+}
+
+// The diagonal that z is divided by: multigrid goes by the water's alone.
+fn divisor(i: u32, diagonal: f32) -> f32 {
+//#if MULTIGRID
+    return diagonal;
+//#else
+//#if COUPLED
+    let k = i - params.fluid;
+    if i >= params.fluid && k < params.moving_wall {
+        return diagonal + coupling[2u * k + 1u].w;
+    }
+//#endif
+    return diagonal;
+//#endif
+}
+
 fn residuals(id: u32, t: u32) -> vec4f {
     var sum = vec4f(0.0);
     for (var i = id; i < params.pressure_slots; i += stride()) {
@@ -139,7 +181,7 @@ fn residuals(id: u32, t: u32) -> vec4f {
         var r = 0.0;
         if equation.y > 0.0 {
             let me = preconditioned[i];
-            r = equation.x - (equation.y * me.w - neighbours(i, me.xyz));
+            r = equation.x - times(i, equation.y, me);
             sum += vec4f(equation.x * equation.x, r * r, 1.0, 0.0);
         }
         residual[i] = r;
@@ -173,7 +215,7 @@ fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
                 residual[i] = equation.x;
             }
             let r = residual[i];
-            let z = DAMPING * r / equation.y;
+            let z = DAMPING * r / divisor(i, equation.y);
             preconditioned[i].w = z;
             sum += vec4f(r * z, r * r, 0.0, 0.0);
         }
@@ -298,7 +340,7 @@ fn multiply(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
         let diagonal = source_diagonal[i].y;
         if diagonal > 0.0 {
             let me = preconditioned[i];
-            var p = vec2f(me.w, diagonal * me.w - neighbours(i, me.xyz));
+            var p = vec2f(me.w, times(i, diagonal, me));
             if !first {
                 p += beta * search[i];
             }
@@ -335,7 +377,7 @@ fn advance(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_i
             pressure[i] += alpha * p.x;
             let r = residual[i] - alpha * p.y;
             residual[i] = r;
-            let z = DAMPING * r / diagonal;
+            let z = DAMPING * r / divisor(i, diagonal);
             preconditioned[i].w = z;
             sum += vec4f(r * z, r * r, 0.0, 0.0);
         }

@@ -98,6 +98,8 @@ pub enum Arrays {
     Reaction,
     /// Levels of the multigrid preconditioner.
     Multigrid,
+    /// Of free bodies in the pressure equation.
+    Coupling,
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
@@ -109,19 +111,6 @@ pub const MULTIGRID_UNKNOWNS: usize = 30_000;
 /// hundred bodies, which this is. It counts points and no microseconds, so that the same case computes in the same
 /// way on every machine.
 pub const DEVICE_CONTACT_POINTS: usize = 20_000;
-
-/// Density ratio of body to water below which the fluid's force is relaxed, in three dimensions [-].
-pub const LIGHT_3D: f64 = 0.4;
-/// The same in two dimensions, where a body drags more water along: unrelaxed, 0.5 swings and 0.7 does not.
-pub const LIGHT_2D: f64 = 0.7;
-/// Water that a body drags along over the water that it displaces [-]; rather too much.
-const ADDED_MASS: f64 = 0.7;
-
-/// Share s of the new force for a body of density ratio `ratio`. The force alternates by 1 - s - s C / ratio a step,
-/// C the added mass: s (1 + C / ratio) must stay below 2, and is 1 here or less.
-fn relaxation(ratio: f64) -> f64 {
-    (1.0 / (1.0 + ADDED_MASS / ratio)).min(0.2)
-}
 
 /// Where a backend with a device searches and presses the pairs of contact; a backend without one leaves it to the
 /// host.
@@ -176,8 +165,9 @@ pub struct Plan {
     pub reasons: Vec<(Stage, Result<&'static str, &'static str>)>,
     /// Preconditioner of the PPE.
     pub preconditioner: Preconditioner,
-    /// Under-relaxation of the fluid's force on bodies: F <- s F + (1 - s) F_old with this s; 1 for none.
-    pub force_relaxation: f64,
+    /// Whether bodies move in the fluid as its pressure acts on them. With the paper's source, the number density alone,
+    /// they follow the pressure a step later, as in the paper.
+    pub coupled: bool,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
     /// Whether the energy ledger is kept.
@@ -221,27 +211,12 @@ impl Plan {
             case::Preconditioner::Auto if unknowns >= MULTIGRID_UNKNOWNS => Preconditioner::Multigrid,
             case::Preconditioner::Auto | case::Preconditioner::Jacobi => Preconditioner::Jacobi,
         };
-        // With the velocity in the source, a body much lighter than the water it moves is thrown to and fro by
-        // its own added mass; the plain number density source is slow enough not to.
-        let lightest = scene
-            .solids
-            .iter()
-            .filter_map(|s| match &s.drive {
-                Drive::Free(b) => Some(b.mass / (s.shape.volume() * params.density)),
-                Drive::Prescribed(_) => None,
-            })
-            .fold(f64::INFINITY, f64::min);
-        let light = if scene.dimensions == 2 { LIGHT_2D } else { LIGHT_3D };
-        let force_relaxation = if fluid && params.source == Source::Mixed && lightest < light {
-            relaxation(lightest)
-        } else {
-            1.0
-        };
         let asked = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         let contact = ContactPlan::judge(case, scene, asked);
+        let coupled = fluid && free && params.source == Source::Mixed;
         let fixed_walls = fluid && !scene.groups.static_range().is_empty();
         let ledger = case.output.ledger;
-        Self { reasons: reasons.to_vec(), preconditioner, force_relaxation, contact, ledger, fixed_walls }
+        Self { reasons: reasons.to_vec(), preconditioner, coupled, contact, ledger, fixed_walls }
     }
 
     /// Whether `stage` runs.
@@ -259,6 +234,7 @@ impl Plan {
             Arrays::Reaction => {
                 self.has(Stage::BodyForce) && (self.has(Stage::Viscosity) || self.has(Stage::Collision))
             }
+            Arrays::Coupling => self.coupled,
             Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,
         }
     }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::params::{Params, Step};
-use crate::plan::{ParticleStage, Plan, Stage};
+use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::time_step::{collapse_speed, time_step};
@@ -107,14 +107,14 @@ impl Simulation {
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
-            let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
-                        what there is) or leave contact.device out";
-            return Err(Error::Case(text.into()));
+            let message = "contact.device = \"gpu\": this run is on the CPU";
+            let remedy =
+                "use --backend gpu (`seixo adapters` lists what there is) or leave contact.device out";
+            return Err(Error::key("contact.device", message, remedy));
         }
         if plan.ledger && plan.wet() && backend.ledger()?.is_none() {
-            let text =
-                "output.ledger = true: this backend keeps no ledger; use --backend cpu or leave it out";
-            return Err(crate::error::Error::Case(text.into()));
+            let message = "output.ledger = true: this backend keeps no ledger";
+            return Err(Error::key("output.ledger", message, "use --backend cpu or leave it out"));
         }
         Ok(Self {
             backend,
@@ -138,7 +138,7 @@ impl Simulation {
     /// Save the whole state between two steps, or take it over.
     ///
     /// # Errors
-    /// [`crate::error::Error::Case`] if the state is that of another scene, or what the backend says.
+    /// [`crate::error::Error::Checkpoint`] if the state is that of another scene, or what the backend says.
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self {
             // Follows from the case.
@@ -251,13 +251,19 @@ impl Simulation {
             return Ok(());
         }
         self.timed(Stage::MoveSolids, |s| {
-            let poses = s.solids.predict(t, dt, s.params.explicit_gravity());
+            let poses = s.solids.predict(t, dt, s.params.explicit_gravity(), !s.plan.needs(Arrays::Coupling));
             s.backend.move_solids(poses)
         })
     }
 
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
-        let report = self.timed(Stage::ConjugateGradient, |s| s.backend.solve_pressure(step))?;
+        let report = self.timed(Stage::ConjugateGradient, |s| {
+            if s.plan.needs(Arrays::Coupling) {
+                let rest = s.params.gravity - s.params.explicit_gravity();
+                s.backend.free_bodies(&s.solids.free_bodies(rest))?;
+            }
+            s.backend.solve_pressure(step)
+        })?;
         if report.outcome == Outcome::NonFinite {
             return Err(self.diverged(step, Stage::ConjugateGradient, "the residual is not a number".into()));
         }
@@ -270,15 +276,8 @@ impl Simulation {
             return Ok(ContactReport::default());
         }
         let before = self.solids_ledger.is_some().then(|| self.solids.poses().to_vec());
-        let mut given = vec![Wrench::default(); self.fluid_force.len()];
         if self.plan.has(Stage::BodyForce) {
-            let force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
-            let share = if self.steps == 0 { 1.0 } else { self.plan.force_relaxation };
-            given.clone_from(&force);
-            for (old, new) in self.fluid_force.iter_mut().zip(force) {
-                old.force = old.force.lerp(new.force, share);
-                old.torque = old.torque.lerp(new.torque, share);
-            }
+            self.fluid_force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
         }
         let force = std::mem::take(&mut self.fluid_force);
         let report = self
@@ -293,7 +292,7 @@ impl Simulation {
         })?;
         self.check_bodies(step)?;
         if let Some(before) = before {
-            self.book_solids(&given, &before, step.dt);
+            self.book_solids(&before, step.dt);
         }
         if self.plan.has(Stage::MoveSolids) {
             self.timed(Stage::MoveSolids, |s| s.backend.move_solids(s.solids.poses()))?;
@@ -301,14 +300,13 @@ impl Simulation {
         Ok(report)
     }
 
-    /// Books what the water gave the solids, what they received of it and what contact did, on the way from the
-    /// poses `before`.
-    fn book_solids(&mut self, given: &[Wrench], before: &[Pose], dt: f64) {
+    /// Books what the water gave the solids and what contact did, on the way from the poses `before`.
+    fn book_solids(&mut self, before: &[Pose], dt: f64) {
         let Some((ledger, energy)) = &mut self.solids_ledger else { return };
         let solids = &self.solids;
         let poses = solids.predicted().iter().zip(before).zip(solids.poses());
         for (k, ((told, before), after)) in poses.enumerate() {
-            ledger.solid(dt, solids.is_free(k), &given[k], &self.fluid_force[k], [told, before, after]);
+            ledger.solid(dt, solids.is_free(k), &self.fluid_force[k], [told, before, after]);
         }
         let now = self.solids.energy().total();
         ledger.add(Entry::Contact, now - *energy);

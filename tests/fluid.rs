@@ -194,6 +194,7 @@ fn system<'a>(cpu: &'a Cpu, params: &Params) -> System<'a> {
         state: &cpu.fields().state,
         diagonal: &cpu.fields().diagonal,
         coefficient: laplacian_coefficient(params),
+        bodies: &[],
     }
 }
 

@@ -44,18 +44,120 @@ fn a_heavy_cube_sinks_with_the_acceleration_of_its_added_mass() {
     }
 }
 
+/// What the cube's accelerations of the first steps say: the added mass C of a = g (s - 1) / (s + C), and how much they
+/// alternate from step to step, over g.
+fn added_mass(s: f64, a: &[f64]) -> (f64, f64) {
+    let a = &a[a.len() / 5..];
+    let mean = a.iter().sum::<f64>() / a.len() as f64;
+    let flip = |w: &[f64]| (w[0] - 2.0 * w[1] + w[2]).powi(2);
+    let alternation = (a.windows(3).map(flip).sum::<f64>() / a.len() as f64).sqrt() / 4.0;
+    (9.81 * (1.0 - s) / mean - s, alternation / 9.81)
+}
+
 #[test]
-fn a_light_cube_rises_without_being_thrown_to_and_fro() {
-    // Explicit coupling makes the acceleration of a body lighter than its added mass alternate; the force is
-    // therefore relaxed for such bodies.
-    let case = tank_with_cube(0.1, 0.15, "sound_speed = 4");
-    let a = accelerations(&case, 60);
-    let expected = 9.81 * 0.9 / 0.75;
-    let mean = a[20..].iter().sum::<f64>() / 40.0;
-    let flips = a[20..].windows(2).filter(|w| w[0] * w[1] < 0.0).count();
-    println!("{mean:.2} m/s2 for about {expected:.2}, {flips} changes of sign");
-    assert!(flips <= 2, "{a:?}");
-    assert!(mean > 0.6 * expected && mean < 1.5 * expected, "{mean}");
+fn bodies_of_any_density_carry_the_same_water_and_none_is_thrown_to_and_fro() {
+    let mut found = vec![];
+    for s in [0.02, 0.1, 0.4636, 2.0, 20.0] {
+        let case = tank_with_cube(s, 0.21, "sound_speed = 4");
+        let (c, alternation) = added_mass(s, &accelerations(&case, 30));
+        println!("s {s}: C {c:.3}, alternation {alternation:.4} g");
+        found.push((s, c, alternation));
+    }
+    for (s, c, alternation) in found {
+        assert!((0.75..1.0).contains(&c), "s {s}: C {c}");
+        assert!(alternation < 0.01, "s {s}: {alternation} g");
+    }
+}
+
+#[test]
+fn water_loses_the_momentum_that_a_body_gains() {
+    // A cube in the middle of a block of water that touches nothing, without gravity: all of its momentum stays there.
+    // Half of what a light body leaves behind is suction, which water without weight does not bear.
+    for (s, most) in [(0.3, 0.12), (1.0, 0.01), (3.0, 0.02)] {
+        let case = case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, 0]\n\
+             domain = [[-0.2, -0.2, -0.2], [0.6, 0.6, 0.6]]\n\
+             [fluid]\nsound_speed = 4\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.38, 0.38, 0.38]\n\
+             [contact]\nspring = 1e5\ndamping_ratio = 0.3\n\
+             [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.19, 0.19, 0.19]\ndensity = {}\n\
+             velocity = [0.2, 0, 0]\ndisplaces_fluid = true\n",
+            1000.0 * s
+        ));
+        let mut sim = simulation(&case);
+        let start = s * 0.2;
+        let total = |sim: &mut seixo::simulation::Simulation| {
+            let water = sim.backend.monitor().expect("water").momentum[0];
+            (water + s * sim.solids.poses()[0].velocity.x) / start
+        };
+        sim.step().expect("the cube moves freely");
+        let (first, speed) = (total(&mut sim), sim.solids.poses()[0].velocity.x / 0.2);
+        for _ in 1..100 {
+            sim.step().expect("the cube moves freely");
+        }
+        let (last, later) = (total(&mut sim), sim.solids.poses()[0].velocity.x / 0.2);
+        println!(
+            "s {s}: momentum {first:.4} after a step, {last:.4} after 100; cube's speed {speed:.3}, {later:.3}"
+        );
+        assert!((first - 1.0).abs() < 0.05 && (last - 1.0).abs() < most, "s {s}: {first} {last}");
+    }
+}
+
+#[test]
+fn the_floor_carries_a_light_cube_and_a_heavy_one_on_it() {
+    // Under water: the heavy one, of relative density 3, presses the light one, 0.1, onto the floor.
+    let mut case = tank_with_cube(0.1, 0.05, "sound_speed = 4");
+    let mut heavy = case.body[0].clone();
+    heavy.name = "heavy".into();
+    heavy.center[2] = 0.15;
+    heavy.density = Some(3000.0);
+    case.body.push(heavy);
+    let mut sim = simulation(&case);
+    let (mut contact, mut fluid, mut count) = ([0.0; 2], [0.0; 2], 0.0);
+    while sim.time < 0.3 {
+        sim.step().expect("the cubes stand");
+        if sim.time > 0.15 {
+            for k in 0..2 {
+                contact[k] += sim.solids.contact_wrenches()[k].force.z;
+                fluid[k] += sim.fluid_force[k].force.z;
+            }
+            count += 1.0;
+        }
+    }
+    for (k, weight) in [0.1 * 9.81, 3.0 * 9.81].into_iter().enumerate() {
+        let (contact, carried) = (contact[k] / count, weight - fluid[k] / count);
+        println!("cube {k}: contact {contact:.2} N for {carried:.2} N");
+        assert!((contact - carried).abs() < 0.1 * carried.abs());
+    }
+}
+
+#[test]
+fn eight_light_cubes_rise_as_one_does() {
+    let alone = accelerations(&tank_with_cube(0.05, 0.21, "sound_speed = 4"), 40);
+    let mut case = tank_with_cube(0.05, 0.21, "sound_speed = 4");
+    for (dim, width) in [(0, 0.84), (1, 0.84)] {
+        case.fluid.as_mut().expect("water").block[0].max[dim] = width;
+        case.tank.as_mut().expect("a tank").max[dim] = width;
+    }
+    let one = case.body[0].clone();
+    case.body.clear();
+    for k in 0..8 {
+        let mut cube = one.clone();
+        cube.name = format!("cube {k}");
+        let (x, y) = (k % 3, k / 3);
+        cube.center[0] = 0.17 + 0.26 * f64::from(x);
+        cube.center[1] = 0.17 + 0.26 * f64::from(y);
+        case.body.push(cube);
+    }
+    let mut sim = simulation(&case);
+    for _ in 0..40 {
+        sim.step().expect("the cubes rise");
+    }
+    let expected = alone.iter().sum::<f64>() * case.run.time_step;
+    let speeds: Vec<f64> = sim.solids.poses().iter().map(|p| p.velocity.z).collect();
+    println!("one {expected:.4} m/s, eight {speeds:.4?}");
+    for v in speeds {
+        assert!((v / expected - 1.0).abs() < 0.15, "{v} for {expected}");
+    }
 }
 
 #[test]
@@ -133,7 +235,8 @@ fn a_small_cube_does_not_swing_itself_out_of_the_water() {
     let swing = (heights.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
     let expected = 0.135 + 0.027 - 0.4636 * 0.054;
     println!("height {mean:.4} m for {expected:.4}, rms {:.2} mm", 1e3 * swing);
-    assert!((mean - expected).abs() < 0.003 && swing < 3.5e-3, "{mean} {swing}");
+    // 13 mm where still water rocked itself; jittered starts differ by some tenths of a millimetre.
+    assert!((mean - expected).abs() < 0.003 && swing < 0.1 * 0.054, "{mean} {swing}");
 }
 
 #[test]

@@ -3,7 +3,9 @@
 use crate::common::moving as common;
 
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
-use seixo::backend::gpu::layout::{Coefficients, Constants, MonitorSum, Pose, Solve, WallParticle, counter};
+use seixo::backend::gpu::layout::{
+    Coefficients, Constants, FreeBody, MonitorSum, Pose, Solve, WallParticle, counter,
+};
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
 use seixo::compute::{Host, Program};
 use seixo::contact::device::paper::{self, PaperLaw, PaperPair, PaperPose};
@@ -255,6 +257,10 @@ fn structs_lie_the_same_on_both_sides() {
     same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
     same_layout!("body_force", WallParticle { area, arm, to_surface });
+    same_layout!(
+        "coupling",
+        FreeBody { inverse_mass, inertia_x, inertia_y, inertia_z, force, torque, first, count, solid, pad }
+    );
     same_layout!(
         "conjugate_gradient",
         Solve {

@@ -26,19 +26,19 @@ pub use bandwidth::bandwidth;
 
 use super::traffic::Traffic;
 use super::{Backend, Commands, Counters, Timing};
-use crate::body::{Pose, Wrench};
+use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
-use crate::error::{Error, Result};
+use crate::error::{Error, GpuError, Result};
 use crate::fields::Fields;
 use crate::kernels::monitor::{speed_most, speed_range};
 use crate::monitor::{FluidMonitor, SPEED_BINS};
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{PressureReport, Settings};
-use crate::scene::{Groups, Scene};
+use crate::scene::{Groups, Scene, Solid};
 use context::Context;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use hierarchy::Levels;
 use kernels::Over;
 use layout::{
@@ -60,6 +60,10 @@ pub struct Gpu {
     /// Solid of each chunk of wall-layer particles.
     chunk_solid: Vec<usize>,
     solids: usize,
+    /// First of the moving-wall slots and number of each solid's wall layer.
+    wall_layers: Vec<(usize, usize)>,
+    /// Free bodies in the next solve.
+    coupled: u64,
     counters: Counters,
     coefficients: Coefficients,
     dt: f64,
@@ -118,7 +122,7 @@ impl Gpu {
             ..Default::default()
         };
         let device = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| Error::Gpu(format!("{}: {e}", info.name)))?;
+            .map_err(|e| Error::gpu(format!("{}: {e}", info.name)))?;
         Self::on(device, info, scene, params, plan, settings)
     }
 
@@ -148,12 +152,14 @@ impl Gpu {
     ) -> Result<Self> {
         let groups = scene.groups;
         if groups.fluid > layout::FLUID_MAX {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{} fluid particles are more than the GPU path numbers ({}); use a larger run.spacing or \
                  --backend cpu",
                 groups.fluid,
                 layout::FLUID_MAX
-            )));
+            );
+            let (needs, has) = (groups.fluid as u64, Some(layout::FLUID_MAX as u64));
+            return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
         }
         let grid = grid(params, plan)?;
         let mut sizes = Sizes::new(scene, params, &grid);
@@ -162,6 +168,8 @@ impl Gpu {
         }
         let memory = Memory::new(&sizes, plan);
         let switches = shader::switches(params, plan);
+        let layer = |s: &Solid| (s.wall_slots.start.saturating_sub(groups.fluid), s.wall_slots.len());
+        let wall_layers = scene.solids.iter().map(layer);
         let levels = plan.needs(Arrays::Multigrid).then(|| Levels::new(&sizes));
         let mut gpu = Self {
             context: Context::new(device, info, &memory, kernels::planned(plan), &switches)?,
@@ -174,6 +182,8 @@ impl Gpu {
             middle: layout::middle(params),
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
+            wall_layers: wall_layers.collect(),
+            coupled: 0,
             counters: Counters::default(),
             coefficients: Coefficients::default(),
             dt: 0.0,
@@ -365,6 +375,36 @@ impl Backend for Gpu {
         Ok(())
     }
 
+    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {
+        let p = &self.params;
+        let factor = p.density / p.spacing.powi(3) / layout::laplacian_coefficient(p);
+        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        let device = |(solid, (body, &(first, count))): (usize, (&FreeBody, &(usize, usize)))| {
+            let inertia = factor * body.inverse_inertia;
+            layout::FreeBody {
+                inverse_mass: four(factor * body.inverse_mass),
+                inertia_x: four(inertia.x_axis),
+                inertia_y: four(inertia.y_axis),
+                inertia_z: four(inertia.z_axis),
+                force: four(body.load.force),
+                torque: four(body.load.torque),
+                first: first as u32,
+                count: count as u32,
+                solid: solid as u32,
+                pad: 0,
+            }
+        };
+        let of = bodies.iter().zip(&self.wall_layers).enumerate();
+        let free = of.filter(|(_, (b, _))| b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO);
+        let free: Vec<_> = free.map(device).collect();
+        self.coupled = free.len() as u64;
+        if free.is_empty() {
+            return Ok(());
+        }
+        self.context.begin(Some(Stage::ConjugateGradient));
+        self.context.upload(buffers::free_body, &free)
+    }
+
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         self.context.begin(Some(Stage::ConjugateGradient));
         self.set_step(step)?;
@@ -510,10 +550,12 @@ impl Compute for Gpu {
     fn dispatch(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
         let most = self.context.workgroups_max();
         if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{groups} pairs of solids are close, {most} is what {} takes at a time; use contact.device = \"host\"",
                 self.context.info.name
-            )));
+            );
+            let limit = "max_compute_workgroups_per_dimension";
+            return Err(GpuError::TooSmall { limit, needs: *groups, has: Some(most), text }.into());
         }
         self.context.begin(Some(Stage::Contact));
         self.context.pass(kernels.iter().copied())

@@ -6,7 +6,7 @@ mod processor;
 pub mod traffic;
 
 use self::traffic::Traffic;
-use crate::body::{Pose, Wrench};
+use crate::body::{FreeBody, Pose, Wrench};
 use crate::checkpoint::Archive;
 use crate::compute::Compute;
 use crate::error::Result;
@@ -122,6 +122,9 @@ pub trait Backend: Send {
     fn precision(&self) -> &'static str;
     /// Run one stage.
     fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()>;
+    /// How the moving solids answer forces in the next solve, in the pose given last; needed where the plan has
+    /// [`crate::plan::Arrays::Coupling`].
+    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()>;
     /// Solve the PPE.
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport>;
     /// Give the particles of moving solids the poses of their solids.

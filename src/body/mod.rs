@@ -57,6 +57,17 @@ impl std::ops::AddAssign for Wrench {
     }
 }
 
+/// A solid as the pressure equation sees it: how it answers forces, and those that act on it beside the fluid's.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FreeBody {
+    /// 1/mass along each world axis [1/kg]; 0 where locked or prescribed.
+    pub inverse_mass: DVec3,
+    /// Inverse of the inertia, world axes [1/(kg m2)]; zero rows where locked or prescribed.
+    pub inverse_inertia: DMat3,
+    /// Weight and contact.
+    pub load: Wrench,
+}
+
 /// A solid that moves, with what its motion needs.
 #[derive(Clone, Debug)]
 pub(crate) struct Body {

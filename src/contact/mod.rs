@@ -24,7 +24,7 @@ pub use probe::{Probe, ProbePatch};
 pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 
-use crate::body::{Body, Pose, Wrench};
+use crate::body::{Body, FreeBody, Pose, Wrench};
 use crate::case;
 use crate::compute::Compute;
 use crate::error::{Error, Result};
@@ -75,9 +75,9 @@ impl Solids {
         let free = bodies.iter().position(Body::is_free);
         if let (None, Some(k)) = (contact, free) {
             let name = &scene.solids[k].name;
-            return Err(Error::Case(format!(
-                "body \"{name}\" moves freely, so the case needs [contact] with law and spring"
-            )));
+            let message =
+                format!("body \"{name}\" moves freely, so the case needs [contact] with law and spring");
+            return Err(Error::key("contact", message, ""));
         }
         let mut limits = Limits::new(contact, scene, &bodies)?;
         let law = match (contact, free) {
@@ -118,6 +118,20 @@ impl Solids {
         self.bodies[k].is_free()
     }
 
+    /// The solids as the pressure equation sees them, with the contact of the last step. `gravity` is what of it the
+    /// explicit stage has not had [m/s2].
+    pub fn free_bodies(&self, gravity: DVec3) -> Vec<FreeBody> {
+        let of = |(body, contact): (&Body, &Wrench)| {
+            if !body.is_free() {
+                return FreeBody::default();
+            }
+            let weight = body.mass * gravity;
+            let load = Wrench { force: weight + contact.force, torque: contact.torque };
+            FreeBody { inverse_mass: body.inverse_mass, inverse_inertia: body.inverse_inertia, load }
+        };
+        self.bodies.iter().zip(&self.contact).map(of).collect()
+    }
+
     /// Name of solid `k`, as in the case.
     pub fn name(&self, k: usize) -> &str {
         &self.names[k]
@@ -136,14 +150,14 @@ impl Solids {
     /// Poses at `t + dt` for the explicit stage of the fluid: V* = V + dt (`gravity` + contact acceleration of
     /// the last step), X* = X + dt V*, the same for the angular momentum; prescribed solids by their table.
     /// `gravity` is that of the fluid's explicit stage ([`crate::params::Params::explicit_gravity`]), so that body
-    /// and water fall together there.
-    pub fn predict(&mut self, t: f64, dt: f64, gravity: DVec3) -> &[Pose] {
+    /// and water fall together there. Without `contact` where that acts with the pressure, see [`Solids::free_bodies`].
+    pub fn predict(&mut self, t: f64, dt: f64, gravity: DVec3, contact: bool) -> &[Pose] {
         for (k, body) in self.bodies.iter().enumerate() {
             self.predicted[k] = match (body.prescribed_velocity(t, dt), body.prescribed_position(t + dt)) {
                 (Some(velocity), Some(position)) => Pose { position, velocity, ..body.pose },
                 _ => {
                     let mut body = body.clone();
-                    let contact = self.contact[k];
+                    let contact = if contact { self.contact[k] } else { Wrench::default() };
                     body.kick(dt * (body.mass * gravity + contact.force), dt * contact.torque);
                     body.drift(dt);
                     body.pose

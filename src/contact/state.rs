@@ -57,11 +57,11 @@ impl Solids {
     /// Continues from the states of a checkpoint.
     ///
     /// # Errors
-    /// [`Error::Case`] if the number of solids differs.
+    /// [`Error::Checkpoint`] if the number of solids differs.
     pub fn restore(&mut self, states: &[SolidState]) -> Result<()> {
         if states.len() != self.bodies.len() {
             let (have, want) = (states.len(), self.bodies.len());
-            return Err(Error::Case(format!("the checkpoint holds {have} solids, the case {want}")));
+            return Err(Error::misfit(format!("the checkpoint holds {have} solids, the case {want}")));
         }
         for (k, state) in states.iter().enumerate() {
             self.bodies[k].restore(state.pose, state.angular_momentum);

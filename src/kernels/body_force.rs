@@ -9,8 +9,13 @@ use glam::DVec3;
 /// (`to_surface`, world axes [m]). Particles that are no unknown feel no pressure.
 #[inline(always)]
 pub fn surface_pressure(pressure: f64, unknown: bool, to_surface: DVec3, params: &Params) -> f64 {
-    let head = params.density * params.gravity.dot(to_surface) + missing_head(params);
-    if unknown { (pressure + head).max(0.0) } else { 0.0 }
+    if unknown { (pressure + head(to_surface, params)).max(0.0) } else { 0.0 }
+}
+
+/// Pressure on the true surface over that of a wall-layer particle [Pa].
+#[inline(always)]
+pub fn head(to_surface: DVec3, params: &Params) -> f64 {
+    params.density * params.gravity.dot(to_surface) + missing_head(params)
 }
 
 /// What the pressure lacks at the water's surface [Pa].

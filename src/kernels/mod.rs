@@ -7,6 +7,7 @@ pub mod cell_list;
 pub mod collision;
 pub mod conjugate_gradient;
 pub mod correct;
+pub mod coupling;
 pub mod monitor;
 pub mod move_solids;
 pub mod multigrid;

@@ -101,8 +101,8 @@ impl Ledger {
     }
 
     /// Books the step of solid `k` = 0.. whose `force` by the water acts for `dt` [s]: the water gave it at the velocity
-    /// of `told`; a `free` solid received `taken`, from the pose `before` to `after`.
-    pub fn solid(&mut self, dt: f64, free: bool, force: &Wrench, taken: &Wrench, poses: [&Pose; 3]) {
+    /// of `told`; a `free` solid received it on the way from the pose `before` to `after`.
+    pub fn solid(&mut self, dt: f64, free: bool, force: &Wrench, poses: [&Pose; 3]) {
         let [told, before, after] = poses;
         let given = dt * power(force, told);
         self.add(Entry::Pressure, given);
@@ -110,7 +110,7 @@ impl Ledger {
             self.add(Entry::Walls, -given);
             return;
         }
-        let received = 0.5 * dt * (power(taken, before) + power(taken, after));
+        let received = 0.5 * dt * (power(force, before) + power(force, after));
         self.add(Entry::Exchange, received - given);
         self.add(Entry::Contact, -received);
     }

@@ -1,12 +1,13 @@
 //! Preconditioned conjugate gradients on the CPU.
 
+use super::coupling::CoupledBody;
 use super::{Outcome, PressureReport, Settings};
 use crate::fields::State;
 use crate::kernels::conjugate_gradient::apply;
 use crate::neighbours::{CHUNK, Chunk, Neighbours};
 use rayon::prelude::*;
 
-/// The system A P = b of one step. Vectors run over all pressure-carrying slots and are zero where the
+/// The system A P = b of one step, A with what free bodies add. Vectors run over all pressure-carrying slots and are zero where the
 /// pressure is no unknown.
 pub struct System<'a> {
     /// Neighbour lists with weights.
@@ -17,6 +18,8 @@ pub struct System<'a> {
     pub diagonal: &'a [f64],
     /// c of [`crate::kernels::pressure_source::laplacian_coefficient`] [1/m2].
     pub coefficient: f64,
+    /// Free bodies in the water.
+    pub bodies: &'a [CoupledBody],
 }
 
 /// Approximates z = A^-1 r.
@@ -25,7 +28,8 @@ pub trait Precondition {
     fn apply(&mut self, system: &System, r: &[f64], z: &mut [f64]);
 }
 
-/// The diagonal.
+/// The diagonal, with what free bodies add to it. Multigrid is that of the water alone: a body brings six outliers at
+/// most to its spectrum.
 pub struct Jacobi;
 
 impl Precondition for Jacobi {
@@ -34,6 +38,7 @@ impl Precondition for Jacobi {
             .into_par_iter()
             .filter(|(.., chunk)| !chunk.is_dry())
             .for_each(|(z, r, d, _)| z.iter_mut().zip(r).zip(d).for_each(|((z, r), d)| *z = r / d));
+        system.bodies.iter().for_each(|b| b.divide(r, system.diagonal, z));
     }
 }
 
@@ -73,7 +78,8 @@ impl System<'_> {
                 sum
             })
             .collect_into_vec(sums);
-        sums.iter().sum()
+        let water: f64 = sums.iter().sum();
+        self.bodies.iter().fold(water, |sum, body| sum + body.multiply(p, q))
     }
 
     /// a.b of vectors that are zero in dry chunks, in an order that does not depend on the number of threads.

@@ -252,7 +252,7 @@ pub fn compare_stages(
     pair.cpu.write(&start)?;
     let step = simulation.next_step();
     let gravity = simulation.params.explicit_gravity();
-    let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt, gravity).to_vec();
+    let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt, gravity, !plan.coupled).to_vec();
     // Viscosity takes the neighbours of the step before.
     for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
         pair.cpu.run(stage, &step)?;
@@ -271,6 +271,12 @@ pub fn compare_stages(
                 pair.gpu.move_solids(&poses)?;
             }
             Stage::ConjugateGradient => {
+                if plan.coupled {
+                    let rest = pair.params.gravity - pair.params.explicit_gravity();
+                    let bodies = simulation.solids.free_bodies(rest);
+                    pair.cpu.free_bodies(&bodies)?;
+                    pair.gpu.free_bodies(&bodies)?;
+                }
                 pair.cpu.solve_pressure(&step)?;
                 pair.gpu.solve_pressure(&step)?;
             }

@@ -63,7 +63,7 @@ impl Moment {
         }
         let step = simulation.next_step();
         let gravity = simulation.params.explicit_gravity();
-        let poses = simulation.solids.predict(step.time, step.dt, gravity).to_vec();
+        let poses = simulation.solids.predict(step.time, step.dt, gravity, !simulation.plan.coupled).to_vec();
         let fields = simulation.backend.read()?;
         let Simulation { params, plan, scene, .. } = simulation;
         Ok(Self { params, plan, step, poses, fields, scene })
@@ -122,6 +122,7 @@ fn on_cpu(moment: &Moment, kind: Preconditioner, tolerance: f64) -> Result<Measu
         state: &fields.state,
         diagonal: &fields.diagonal,
         coefficient: laplacian_coefficient(&moment.params),
+        bodies: &[],
     };
     let (b, settings) = (&fields.source, Settings { tolerance, ..TIGHT });
     let (grid, mut multigrid) = (Grid::new(&moment.params)?, Multigrid::default());
@@ -180,7 +181,7 @@ fn on_device(moment: &Moment, kind: Preconditioner, tolerance: f64, context: &Co
     let report = gpu.solve_pressure(&moment.step)?;
     out.timing = Timing::of(vec![clock.elapsed().as_secs_f64()]);
     let x = gpu.solution()?;
-    let x = x.ok_or_else(|| Error::Gpu("the device keeps no solution before the bounds".into()))?;
+    let x = x.ok_or_else(|| Error::gpu("the device keeps no solution before the bounds"))?;
     describe(&mut out, moment, report.unknowns, kind, report.iterations);
     out.put("true residual in f32 [-]", report.residual);
     out.put("true residual [-]", residual_in_double(moment, &system, &x)?);
@@ -207,6 +208,7 @@ fn residual_in_double(moment: &Moment, device: &Fields, x: &[f64]) -> Result<f64
         state: &state,
         diagonal: &diagonal,
         coefficient: laplacian_coefficient(&moment.params),
+        bodies: &[],
     };
     Ok(true_residual(&system, &b, &x))
 }

@@ -112,6 +112,7 @@ impl Column {
             state: &cpu.fields().state,
             diagonal: &cpu.fields().diagonal,
             coefficient: laplacian_coefficient(&self.params),
+            bodies: &[],
         }
     }
 }

@@ -21,7 +21,7 @@ use self::search::{Candidates, Coordinates, Search, neighbour_list};
 use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
-use crate::body::{Pose, Wrench};
+use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
@@ -34,11 +34,12 @@ use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan};
 use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve_or_fall_back};
+use crate::pressure::coupling::CoupledBody;
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -49,6 +50,8 @@ pub struct Cpu {
     groups: Groups,
     solids: Vec<Solid>,
     poses: Vec<Pose>,
+    /// One a solid where the pressure is to know how they answer, else none.
+    free_bodies: Vec<FreeBody>,
     fields: Fields,
     grid: Grid,
     fluid_start: Vec<u32>,
@@ -89,6 +92,7 @@ impl Cpu {
             groups,
             solids: scene.solids.clone(),
             poses: Vec::new(),
+            free_bodies: Vec::new(),
             fields: if wet { Fields::new(scene, plan.needs(Arrays::Reaction)) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
@@ -275,6 +279,35 @@ impl Cpu {
             .for_each(|(c, (chunk, given, out))| source_rows(c * CHUNK, chunk, given, out, on, step));
     }
 
+    /// The free bodies in the pressure equation; takes the forces that are known off its right side.
+    fn couple(&mut self) -> Vec<CoupledBody> {
+        let (params, fluid) = (&self.params, self.groups.fluid);
+        let density_over_volume = params.density / params.spacing.powi(3);
+        let Fields { state, reaction, source, .. } = &mut self.fields;
+        let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies);
+        let mut couple = |((solid, pose), body): ((&Solid, &Pose), &FreeBody)| {
+            let mut known = body.load;
+            let wall = |(k, i): (usize, usize)| {
+                let to_surface = pose.orientation * solid.wall_to_surface[k];
+                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let unknown = state[i] == State::Inner;
+                let area = if unknown { pose.orientation * solid.wall_area[k] } else { DVec3::ZERO };
+                let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
+                let force = body_force::body_force(body_force::head(to_surface, params), area, reaction);
+                known += Wrench { force, torque: arm.cross(force) };
+                (area, arm)
+            };
+            let wall: Vec<_> = solid.wall_slots.clone().enumerate().map(wall).collect();
+            let slots = solid.wall_slots.clone();
+            let coupled = CoupledBody::new(*body, density_over_volume, slots, wall.into_iter());
+            coupled.subtract_known(known, source);
+            coupled
+        };
+        free.filter(|(_, body)| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO)
+            .map(&mut couple)
+            .collect()
+    }
+
     fn pressure_gradient(&mut self) {
         let Self { fields, neighbours, params, groups, live, ledger, .. } = self;
         let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
@@ -350,13 +383,21 @@ impl Backend for Cpu {
         Ok(())
     }
 
+    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {
+        self.free_bodies.clear();
+        self.free_bodies.extend_from_slice(bodies);
+        Ok(())
+    }
+
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        let bodies = self.couple();
         let Self { fields, neighbours, params, settings, work, multigrid, grid, .. } = self;
         let system = System {
             neighbours,
             state: &fields.state,
             diagonal: &fields.diagonal,
             coefficient: laplacian_coefficient(params),
+            bodies: &bodies,
         };
         let preconditioner: &mut dyn Precondition = match multigrid {
             Some(multigrid) => {

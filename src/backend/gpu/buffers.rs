@@ -3,13 +3,13 @@
 
 use super::hierarchy::{Hierarchy, Levels};
 use super::layout::{
-    Coefficients, Constants, MonitorSum, Pose, SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
+    Coefficients, Constants, FreeBody, MonitorSum, Pose, SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
 };
 use crate::compute::{Buffer, Host, Spec, shader_structs};
 use crate::monitor::SPEED_BINS;
 use crate::plan::Arrays;
 
-shader_structs!(Constants, Coefficients, Hierarchy, MonitorSum, Pose, Solve, WallParticle);
+shader_structs!(Constants, Coefficients, FreeBody, Hierarchy, MonitorSum, Pose, Solve, WallParticle);
 
 /// A line of the table.
 pub struct Row {
@@ -96,6 +96,9 @@ table! {
         wall_layer: WallParticle, Writes, Force, |s, _| s.moving_wall;
         force_chunk: [u32; 4], Writes, Force, |s, _| s.force_chunks();
         wrench: [f32; 4], Reads, Force, |s, _| 2 * s.force_chunks();
+        free_body: FreeBody, Writes, Coupling, |s, _| s.solids;
+        /// Rows of the moving-wall slots, then what each body answers.
+        coupling: [f32; 4], None, Coupling, |s, _| 2 * (s.moving_wall + s.solids);
         monitor_sum: MonitorSum, Reads, Fluid, |s, _| s.monitor_groups();
         speed_bin: u32, Both, Fluid, |_, _| SPEED_BINS as u64;
     }

@@ -165,10 +165,10 @@ mod tests {
         Plan {
             reasons,
             preconditioner: Preconditioner::Multigrid,
-            force_relaxation: 1.0,
+            coupled: true,
             contact: Default::default(),
-            ledger: false,
             fixed_walls: true,
+            ledger: false,
         }
     }
 

@@ -59,6 +59,7 @@ files! {
     conjugate_gradient[super::WORKGROUP] Stage(ConjugateGradient), Own:
         pack start_residual start descend ascend multiply advance end_pack end_residual end;
     correct[super::WORKGROUP] Stage(Correct), Fluid: correct;
+    coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare respond;
     monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
     move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids;
     multigrid[super::WORKGROUP] Arrays(Multigrid), Own:

@@ -137,6 +137,23 @@ pub struct WallParticle {
     pub to_surface: [f32; 4],
 }
 
+/// A free body in the pressure equation; see `FreeBody` in shaders/coupling.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct FreeBody {
+    pub inverse_mass: [f32; 4],
+    pub inertia_x: [f32; 4],
+    pub inertia_y: [f32; 4],
+    pub inertia_z: [f32; 4],
+    pub force: [f32; 4],
+    pub torque: [f32; 4],
+    pub first: u32,
+    pub count: u32,
+    pub solid: u32,
+    pub pad: u32,
+}
+
 /// Sums of one workgroup of the monitor; see `MonitorSum` in shaders/monitor.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -408,7 +425,7 @@ mod tests {
         let plan = Plan {
             reasons,
             preconditioner: Preconditioner::Multigrid,
-            force_relaxation: 1.0,
+            coupled: true,
             contact: Default::default(),
             fixed_walls: true,
             ledger: false,
@@ -428,7 +445,7 @@ mod tests {
         let plan = Plan {
             reasons,
             preconditioner: Preconditioner::Jacobi,
-            force_relaxation: 1.0,
+            coupled: false,
             contact: Default::default(),
             fixed_walls: false,
             ledger: false,

@@ -9,8 +9,9 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 10] = [
+pub const SWITCHES: [&str; 11] = [
     "CORRECTED",
+    "COUPLED",
     "MIXED",
     "MOVING",
     "MULTIGRID",
@@ -26,6 +27,7 @@ pub const SWITCHES: [&str; 10] = [
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         params.gradient != Gradient::Minimum,
+        plan.needs(Arrays::Coupling),
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
@@ -107,11 +109,11 @@ fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> String {
 pub fn entries(file: &str, source: &str) -> Result<Vec<Entry>> {
     let path = format!("shaders/{file}.wgsl");
     let module = naga::front::wgsl::parse_str(source)
-        .map_err(|e| Error::Gpu(e.emit_to_string_with_path(source, &path)))?;
+        .map_err(|e| Error::gpu(e.emit_to_string_with_path(source, &path)))?;
     let info =
         naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
             .validate(&module)
-            .map_err(|e| Error::Gpu(e.emit_to_string_with_path(source, &path)))?;
+            .map_err(|e| Error::gpu(e.emit_to_string_with_path(source, &path)))?;
     let bindings = |k: usize| {
         let used = info.get_entry_point(k);
         let bound = |(handle, variable): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {

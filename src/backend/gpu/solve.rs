@@ -1,8 +1,9 @@
 //! The PPE on the device: the host queues iterations and looks at the verdict now and then.
 
-use super::kernels::conjugate_gradient as kernel;
+use super::kernels::{conjugate_gradient as kernel, coupling};
 use super::layout::Solve;
 use super::{Gpu, buffers};
+use crate::compute::Kernel;
 use crate::error::Result;
 use crate::kernels::multigrid_levels::LevelSums;
 use crate::pressure::{Outcome, PressureReport};
@@ -16,6 +17,9 @@ impl Gpu {
     /// Conjugate gradients with the planned preconditioner; where multigrid breaks them down, again with the diagonal
     /// alone, from where they stopped. The residual reported is the true one, ||b - A x|| / ||b||.
     pub(super) fn conjugate_gradient(&mut self) -> Result<PressureReport> {
+        if self.coupled > 0 {
+            self.context.pass([(coupling::prepare, self.coupled)])?;
+        }
         self.build_levels()?;
         let multigrid = self.levels.is_some();
         let first = report(&self.iterate(multigrid, self.settings.warm_start, self.last_iterations)?);
@@ -33,6 +37,8 @@ impl Gpu {
     fn iterate(&mut self, cycle: bool, warm_start: bool, expected: u32) -> Result<Solve> {
         let groups = self.sizes.reduction_groups();
         let over_rows = |kernel| (kernel, groups);
+        // How bodies answer the vector that is multiplied next.
+        let respond = (self.coupled > 0).then_some((coupling::respond, self.coupled));
         let mut iteration = Vec::new();
         // What judges the residual of the last iteration of a chunk; without levels the next chunk does.
         let mut judge = None;
@@ -46,20 +52,24 @@ impl Gpu {
             }
             judge = Some(descend);
         }
+        iteration.extend(respond);
         iteration.extend([kernel::multiply, kernel::advance].map(over_rows));
-        let end = [kernel::end_pack, kernel::end_residual, kernel::end];
+        let around = |pack, residual: [Kernel; 2]| {
+            [over_rows(pack)].into_iter().chain(respond).chain(residual.map(over_rows))
+        };
+        let end = around(kernel::end_pack, [kernel::end_residual, kernel::end]);
 
         let context = &mut self.context;
         context.clear(buffers::solve)?;
         if !warm_start {
             context.clear(buffers::pressure)?;
         }
-        context.pass([kernel::pack, kernel::start_residual, kernel::start].map(over_rows))?;
+        context.pass(around(kernel::pack, [kernel::start_residual, kernel::start]))?;
         // An iteration too many costs empty dispatches, one too few a round trip to the device.
         let mut chunk = expected + if cycle { 1 } else { expected / 8 + 2 };
         loop {
             let iterations = (0..chunk).flat_map(|_| iteration.iter().copied());
-            context.pass(iterations.chain(judge).chain(end.map(over_rows)))?;
+            context.pass(iterations.chain(judge).chain(end.clone()))?;
             let solve = context.download(buffers::solve, 1)?[0];
             if solve.done != 0 {
                 return Ok(solve);

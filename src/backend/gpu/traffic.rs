@@ -81,6 +81,8 @@ impl Gpu {
     fn solve_traffic(&mut self, rows: &Rows, unknowns: u64) -> Result<Solve> {
         let (slots, u) = (self.sizes.pressure, unknowns);
         let work = |bytes, dispatches| Work { bytes, dispatches };
+        let respond = u64::from(self.coupled > 0);
+        let prepare = respond;
         // z lies next to the positions, in one record.
         let (z, r, p) = (buffers::preconditioned.size(), buffers::residual.size(), buffers::pressure.size());
         let search = buffers::search.size();
@@ -91,10 +93,16 @@ impl Gpu {
         let residual = equation + lists + z * u + r * slots;
         let pack = equation + 2 * p * slots + 2 * z * slots;
         let start = equation + u * (r + 2 * z);
-        let ends = work(pack + 2 * residual + start + slots * (p + 2 * z) + 2 * p * slots, 6);
+        let ends = work(
+            pack + 2 * residual + start + slots * (p + 2 * z) + 2 * p * slots,
+            6 + prepare + 2 * respond,
+        );
+        // Rows of the bodies: read by `respond` beside the z there, and by `multiply`.
+        let coupled = respond * self.sizes.moving_wall * (4 * buffers::coupling.size() + z);
         let multiply = equation + lists + u * (z + 2 * search);
         let advance = equation + u * (search + 2 * p + 2 * r + 2 * z);
-        let mut out = Solve { ends, iteration: work(multiply + advance, 2), ..Solve::default() };
+        let mut out =
+            Solve { ends, iteration: work(multiply + advance + coupled, 2 + respond), ..Solve::default() };
         if let Some(levels) = self.levels.clone() {
             out.build = work(self.build_bytes(&levels, rows, u)?, levels.build().len() as u64);
             let cycle = levels.cycle(1).len() as u64 + 2;

@@ -1,0 +1,129 @@
+// Free bodies in the pressure equation:
+//   (A + kappa S M^-1 S^T) P = b - kappa S M^-1 f,
+// a row of S a wall-layer particle: force and torque of one pascal on it; f what acts on the body beside the pressure.
+// `prepare` makes the rows and takes the known forces off the right side; `respond` finds y = kappa M^-1 S^T z of the
+// vector beside the positions, and conjugate_gradient.wgsl adds S y. One workgroup a free body, 256 rows at a time.
+// Twin: src/kernels/coupling.rs
+
+@group(0) @binding(2) var<storage, read> poses: array<Pose>;
+@group(0) @binding(3) var<storage, read> wall_layer: array<WallParticle>;
+@group(0) @binding(4) var<storage, read> state: array<u32>;
+@group(0) @binding(5) var<storage, read> free_body: array<FreeBody>;
+@group(0) @binding(6) var<storage, read_write> source_diagonal: array<vec2f>;
+// Of each moving-wall slot force and the place of its y, torque and what it adds to the diagonal; then y of each body.
+@group(0) @binding(7) var<storage, read_write> coupling: array<vec4f>;
+@group(0) @binding(8) var<storage, read> preconditioned: array<vec4f>;
+//#if REACTION
+@group(0) @binding(9) var<storage, read> reaction: array<vec4f>;
+//#endif
+
+// How a body answers: M^-1 times rho / (c l0^3), with the c by which the device's equation is divided.
+struct FreeBody {
+    inverse_mass: vec4f,
+    inertia_x: vec4f, // columns of the inverse inertia
+    inertia_y: vec4f,
+    inertia_z: vec4f,
+    force: vec4f, // beside the fluid's
+    torque: vec4f,
+    first: u32, // of the moving-wall slots
+    count: u32,
+    solid: u32,
+    pad: u32,
+}
+
+struct Wrench {
+    force: vec3f,
+    torque: vec3f,
+}
+
+var<workgroup> force_of: array<vec3f, 256>;
+var<workgroup> torque_of: array<vec3f, 256>;
+var<workgroup> force_row: array<vec3f, 16>;
+var<workgroup> torque_row: array<vec3f, 16>;
+
+// Sum over the workgroup, the same on every thread and in a fixed order.
+fn workgroup_sum(value: Wrench, t: u32) -> Wrench {
+    force_of[t] = value.force;
+    torque_of[t] = value.torque;
+    workgroupBarrier();
+    if t < 16u {
+        var sum = Wrench(vec3f(0.0), vec3f(0.0));
+        for (var k = 0u; k < 16u; k++) {
+            sum.force += force_of[k * 16u + t];
+            sum.torque += torque_of[k * 16u + t];
+        }
+        force_row[t] = sum.force;
+        torque_row[t] = sum.torque;
+    }
+    workgroupBarrier();
+    var sum = Wrench(vec3f(0.0), vec3f(0.0));
+    for (var k = 0u; k < 16u; k++) {
+        sum.force += force_row[k];
+        sum.torque += torque_row[k];
+    }
+    return sum;
+}
+
+fn respond_to(b: u32, w: Wrench) -> Wrench {
+    let turned = free_body[b].inertia_x.xyz * w.torque.x + free_body[b].inertia_y.xyz * w.torque.y
+        + free_body[b].inertia_z.xyz * w.torque.z;
+    return Wrench(free_body[b].inverse_mass.xyz * w.force, turned);
+}
+
+fn product(row: Wrench, y: Wrench) -> f32 {
+    return dot(row.force, y.force) + dot(row.torque, y.torque);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let b = group.x;
+    let orientation = poses[free_body[b].solid].orientation;
+    let place = f32(2u * (params.moving_wall + b));
+    let end = free_body[b].first + free_body[b].count;
+    var known = Wrench(vec3f(0.0), vec3f(0.0));
+    for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
+        let wall = wall_layer[k];
+        let arm = rotate(orientation, wall.arm.xyz);
+        var row = Wrench(vec3f(0.0), vec3f(0.0));
+        var force = vec3f(0.0);
+        if state[params.fluid + k] == INNER {
+            row.force = -rotate(orientation, wall.area.xyz);
+            row.torque = cross(arm, row.force);
+            let inside = params.density * dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
+            force = (inside + params.surface_head) * row.force;
+        }
+//#if REACTION
+        force += reaction[k].xyz;
+//#endif
+        known.force += force;
+        known.torque += cross(arm, force);
+        coupling[2u * k] = vec4f(row.force, place);
+        coupling[2u * k + 1u] = vec4f(row.torque, product(row, respond_to(b, row)));
+    }
+    known = workgroup_sum(known, t);
+    known.force += free_body[b].force.xyz;
+    known.torque += free_body[b].torque.xyz;
+    let y = respond_to(b, known);
+    for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
+        let row = Wrench(coupling[2u * k].xyz, coupling[2u * k + 1u].xyz);
+        source_diagonal[params.fluid + k].x -= product(row, y);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn respond(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let b = group.x;
+    let end = free_body[b].first + free_body[b].count;
+    var sum = Wrench(vec3f(0.0), vec3f(0.0));
+    for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
+        let z = preconditioned[params.fluid + k].w;
+        sum.force += z * coupling[2u * k].xyz;
+        sum.torque += z * coupling[2u * k + 1u].xyz;
+    }
+    sum = workgroup_sum(sum, t);
+    if t == 0u {
+        let y = respond_to(b, sum);
+        coupling[2u * (params.moving_wall + b)] = vec4f(y.force, 0.0);
+        coupling[2u * (params.moving_wall + b) + 1u] = vec4f(y.torque, 0.0);
+    }
+}
