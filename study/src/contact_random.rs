@@ -54,7 +54,7 @@ pub fn examine(seed: u64, time: f64) -> Result<Scene> {
     let text = text(seed);
     let mut outcome = run(&text, time, None)?;
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let alone = alone.map_err(|e| Error::Case(e.to_string()))?;
+    let alone = alone.map_err(|e| Error::usage("--threads", e.to_string()))?;
     let again = alone.install(|| run(&text, time, None))?;
     let same_bits = again == outcome;
     let mut refusals = vec![];

@@ -7,7 +7,7 @@ use super::dry::GRAVITY;
 use glam::{DQuat, DVec3};
 use seixo::case::Case;
 use seixo::contact::Solids;
-use seixo::error::{Error, Result};
+use seixo::error::Result;
 use seixo::scene::Scene;
 use std::fmt::Write;
 
@@ -210,7 +210,7 @@ fn crosses(from: DVec3, to: DVec3, half: DVec3) -> bool {
 /// # Errors
 /// Those of [`Scene::build`]: the scene does not exist.
 pub fn run(text: &str, time: f64, time_step: Option<f64>) -> Result<Outcome> {
-    let case: Case = toml::from_str(text).map_err(|e| Error::Case(format!("{e}\n{text}")))?;
+    let case: Case = text.parse()?;
     let scene = Scene::build(&case)?;
     let mut solids = Solids::new(&scene, case.contact.as_ref())?;
     let dt = time_step.unwrap_or(case.run.time_step);
