@@ -14,8 +14,8 @@ fn volume_beyond(simulation: &mut Simulation, x: f64) -> Result<f64> {
     Ok(water.filter(|&i| fields.position[i].x > x).count() as f64 * volume)
 }
 
-fn main() -> Result<()> {
-    let mut case = Case::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cases/dam_break.toml"))?;
+pub fn main() -> Result<()> {
+    let mut case: Case = include_str!("../cases/dam_break.toml").parse()?;
     case.run.spacing = 0.03;
     let mut simulation = Simulation::open(&case, &Options::default())?;
     println!("on {}", simulation.backend.description());

@@ -6,8 +6,8 @@
 use seixo::{Case, Options, Result, Simulation};
 use std::ops::ControlFlow::Continue;
 
-fn main() -> Result<()> {
-    let case = Case::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cases/dam_break_2d.toml"))?;
+pub fn main() -> Result<()> {
+    let case: Case = include_str!("../cases/dam_break_2d.toml").parse()?;
     let mut simulation = Simulation::open(&case, &Options::default())?;
     let start = simulation.observe()?.0;
     println!("t [s]    front [m]   energy [-]");

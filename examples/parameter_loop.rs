@@ -38,7 +38,7 @@ restitution = 0.3
 friction = 0.3
 "#;
 
-fn main() -> Result<()> {
+pub fn main() -> Result<()> {
     let options = Options { processor: Processor::Cpu, ..Options::default() };
     println!("density [kg/m3]   centre [m]");
     for density in [300.0, 500.0, 700.0] {

@@ -25,11 +25,12 @@ impl Grid {
         let along_y = if params.dimensions == 2 { 1.0 } else { cells(extent.y) };
         let total = cells(extent.x) * along_y * cells(extent.z);
         if total.is_nan() || total >= 2e9 {
-            return Err(Error::Case(format!(
+            let message = format!(
                 "the domain of {:.3} x {:.3} x {:.3} m holds {total:.2e} cells of the neighbour search, more than \
-                 can be numbered; give run.domain or enlarge run.spacing",
+                 can be numbered",
                 extent.x, extent.y, extent.z
-            )));
+            );
+            return Err(Error::key("run.domain", message, "give run.domain or enlarge run.spacing"));
         }
         Ok(Self {
             origin: params.domain_min,

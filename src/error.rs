@@ -1,14 +1,32 @@
-//! Errors of the library, each with what a user can do about it.
+//! Errors of the library, each with what a user can do about it. Programs match on variants and fields; people read
+//! the text, which is that of [`std::fmt::Display`].
+
+use std::path::PathBuf;
 
 /// What can go wrong. `main` maps each to an exit code.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
-    /// The case file, or what was given on the command line, is wrong (exit code 2).
-    #[error("{0}")]
-    Case(String),
+    /// The case, or another file that was written by hand, is wrong (exit code 2).
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// What was asked beside the case is wrong: an argument of a command or of a call (exit code 2).
+    #[error("{message}")]
+    Usage {
+        /// The argument, e.g. `--resume`.
+        argument: String,
+        /// What is wrong with it, and what to do.
+        message: String,
+    },
+    /// A folder of results cannot be used (exit code 2).
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A saved state cannot be used (exit code 2).
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// No adapter that the run can use, or the device was lost (exit code 3).
-    #[error("{0}")]
-    Gpu(String),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// The computation left the range in which it means anything (exit code 4).
     #[error("diverged at step {step}, t = {time:.6} s, stage {stage}: {what}")]
     Diverged {
@@ -37,11 +55,189 @@ pub enum Error {
 /// Result with [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Something wrong, or worth a warning, about a key.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Problem {
+    /// The file, where there is one.
+    pub file: Option<String>,
+    /// Its line, from 1: of the key, or of the deepest part of it that is written there.
+    pub line: Option<usize>,
+    /// Column, from 1.
+    pub column: Option<usize>,
+    /// Dotted path of the key, e.g. `body.0.density`; empty where the whole file is at fault.
+    pub key: String,
+    /// What is wrong.
+    pub message: String,
+    /// What to do about it; empty where the message says it all.
+    pub remedy: String,
+    /// A warning: the case runs.
+    pub warning: bool,
+}
+
+impl Problem {
+    /// A problem with `key` that no place in a file is known of.
+    pub fn new(key: impl Into<String>, message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { key: key.into(), message: message.into(), remedy: remedy.into(), ..Self::default() }
+    }
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}: {}", self.key, self.message, self.remedy)
+    }
+}
+
+/// What is wrong with a case, or with a file of a study.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text}")]
+pub struct CaseError {
+    /// Everything that is wrong, never empty; nothing in it is a warning.
+    pub problems: Vec<Problem>,
+    /// All of it in words, with the lines of the file.
+    text: String,
+}
+
+impl CaseError {
+    /// `problems` as `text` tells them.
+    pub fn new(problems: Vec<Problem>, text: String) -> Self {
+        Self { problems, text }
+    }
+
+    /// One problem: `message; remedy`.
+    pub fn of(key: impl Into<String>, message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        let problem = Problem::new(key, message, remedy);
+        let text = match problem.remedy.as_str() {
+            "" => problem.message.clone(),
+            remedy => format!("{}; {remedy}", problem.message),
+        };
+        Self::new(vec![problem], text)
+    }
+
+    /// One problem of a `file`, in words.
+    pub fn file(file: impl Into<String>, key: impl Into<String>, text: impl Into<String>) -> Self {
+        let text = text.into();
+        Self::new(vec![Problem { file: Some(file.into()), ..Problem::new(key, text.clone(), "") }], text)
+    }
+
+    /// All problems of several, one after the other.
+    pub(crate) fn all(errors: Vec<Self>) -> Self {
+        let text: Vec<&str> = errors.iter().map(|e| e.text.as_str()).collect();
+        let text = text.join("\n");
+        Self::new(errors.into_iter().flat_map(|e| e.problems).collect(), text)
+    }
+}
+
+impl From<Problem> for CaseError {
+    fn from(problem: Problem) -> Self {
+        let text = problem.to_string();
+        Self::new(vec![problem], text)
+    }
+}
+
+/// Why a folder of results cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FolderError {
+    /// It holds the results of another run.
+    #[error(
+        "{} is not empty; choose another folder with --out, go on with the run in it with --resume, or replace the \
+         results in it with --force", .0.display()
+    )]
+    NotEmpty(PathBuf),
+    /// It holds something else.
+    #[error(
+        "{} holds files and no `{marker}`, so that it is no folder of results: nothing in it is touched; choose another \
+         folder with --out", folder.display()
+    )]
+    Foreign {
+        /// The folder.
+        folder: PathBuf,
+        /// The file that a folder of results holds.
+        marker: &'static str,
+    },
+    /// Another run writes there.
+    #[error(
+        "{} is in use: another run writes there; wait for its end, or choose another folder with --out", .0.display()
+    )]
+    InUse(PathBuf),
+    /// A result would take the place of this input.
+    #[error("{} would be overwritten by the results: choose another folder with --out", .0.display())]
+    Input(PathBuf),
+    /// The run in it is one of another case.
+    #[error(
+        "the case is another one than that of the run in {}: {}{}; run it as it was, or start a new run from that state \
+         with run.from = \"{}\"", folder.display(), first(changed), more(changed), folder.display()
+    )]
+    OtherCase {
+        /// The folder.
+        folder: PathBuf,
+        /// Keys that differ, each with both values.
+        changed: Vec<String>,
+    },
+    /// There is no run in it to go on with.
+    #[error("{} holds no run of seixo to go on with", .0.display())]
+    NoRun(PathBuf),
+    /// A file of it is shorter than when the run stopped.
+    #[error("{}: it is shorter than when the run stopped", .0.display())]
+    Shorter(PathBuf),
+}
+
+/// Changes that are told; nobody reads a hundred.
+const MOST_CHANGES: usize = 5;
+
+fn first(changed: &[String]) -> String {
+    changed[..changed.len().min(MOST_CHANGES)].join("; ")
+}
+
+fn more(changed: &[String]) -> String {
+    match changed.len().saturating_sub(MOST_CHANGES) {
+        0 => String::new(),
+        more => format!("; and {more} more"),
+    }
+}
+
+/// Why a saved state cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// It is no file that was written whole, or what it holds contradicts itself.
+    #[error("{0}")]
+    Damaged(String),
+    /// It is the state of another scene, another version or another kind of processor.
+    #[error("{0}")]
+    Misfit(String),
+}
+
+/// What is wrong with a device.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// There is none, or none of the name or number that was asked for.
+    #[error("{0}")]
+    NoAdapter(String),
+    /// The scene exceeds a limit of the adapter, or its free memory.
+    #[error("{text}")]
+    TooSmall {
+        /// What is too small: a limit by its name in WebGPU, or `memory`.
+        limit: &'static str,
+        /// What the scene needs, in the limit's unit (bytes for buffers and memory).
+        needs: u64,
+        /// What there is; `None` where the driver does not say.
+        has: Option<u64>,
+        /// All of it in words.
+        text: String,
+    },
+    /// The device was lost, or refuses what it should take.
+    #[error("{0}")]
+    Failed(String),
+}
+
 impl Error {
     /// Exit code of the command line.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Case(_) => 2,
+            Self::Case(_) | Self::Usage { .. } | Self::Folder(_) | Self::Checkpoint(_) => 2,
             Self::Gpu(_) => 3,
             Self::Diverged { .. } | Self::Senseless(_) => 4,
             Self::Io { .. } => 5,
@@ -52,5 +248,35 @@ impl Error {
     pub fn io(path: impl AsRef<std::path::Path>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.as_ref().display().to_string();
         move |source| Self::Io { path, source }
+    }
+
+    /// An [`Error::Usage`] of `argument`.
+    pub fn usage(argument: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Usage { argument: argument.into(), message: message.into() }
+    }
+
+    /// [`CaseError::of`] a key.
+    pub fn key(key: impl Into<String>, message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        CaseError::of(key, message, remedy).into()
+    }
+
+    /// [`CaseError::file`].
+    pub fn file(file: impl Into<String>, key: impl Into<String>, text: impl Into<String>) -> Self {
+        CaseError::file(file, key, text).into()
+    }
+
+    /// A [`CheckpointError::Damaged`].
+    pub(crate) fn damaged(text: impl Into<String>) -> Self {
+        CheckpointError::Damaged(text.into()).into()
+    }
+
+    /// A [`CheckpointError::Misfit`].
+    pub(crate) fn misfit(text: impl Into<String>) -> Self {
+        CheckpointError::Misfit(text.into()).into()
+    }
+
+    /// A [`GpuError::Failed`].
+    pub fn gpu(text: impl Into<String>) -> Self {
+        GpuError::Failed(text.into()).into()
     }
 }

@@ -50,9 +50,10 @@ impl Gauges {
         let mut out = Self::default();
         let first = scene.groups.static_wall_range().start;
         let wall = &scene.position[scene.groups.static_wall_range()];
-        for gauge in &case.gauge.pressure {
+        for (k, gauge) in case.gauge.pressure.iter().enumerate() {
             if scene.groups.fluid == 0 {
-                return Err(Error::Case(format!("gauge.pressure {}: there is no fluid", gauge.name)));
+                let message = format!("gauge.pressure {}: there is no fluid", gauge.name);
+                return Err(Error::key(format!("gauge.pressure.{k}"), message, ""));
             }
             let mut point = DVec3::from(gauge.point);
             if scene.dimensions == 2 {
@@ -62,7 +63,8 @@ impl Gauges {
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |at| {
                     format!("the nearest wall particle is {:.4} m away at {at:.4}", at.distance(point))
                 });
-                Error::Case(format!("gauge.pressure {}: no fixed wall at {point}; {hint}", gauge.name))
+                let message = format!("gauge.pressure {}: no fixed wall at {point}; {hint}", gauge.name);
+                Error::key(format!("gauge.pressure.{k}.point"), message, "")
             })?;
             out.pressure.push(WallPressure {
                 name: gauge.name.clone(),
@@ -71,18 +73,15 @@ impl Gauges {
             });
         }
         out.level.extend(case.gauge.level.iter().map(|g| (g.name.clone(), g.at)));
-        for gauge in &case.gauge.force {
+        for (k, gauge) in case.gauge.force.iter().enumerate() {
             let solid = scene.solids.iter().position(|s| s.name == gauge.on).map(Target::Solid);
             let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Target::Fixed));
             let Some(target) = target else {
                 let solids = scene.solids.iter().map(|s| s.name.as_str());
                 let names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
-                return Err(Error::Case(format!(
-                    "gauge.force {}: nothing is called `{}`; there are: {}",
-                    gauge.name,
-                    gauge.on,
-                    names.join(", ")
-                )));
+                let message = format!("gauge.force {}: nothing is called `{}`", gauge.name, gauge.on);
+                let remedy = format!("there are: {}", names.join(", "));
+                return Err(Error::key(format!("gauge.force.{k}.on"), message, remedy));
             };
             out.force.push((gauge.name.clone(), target));
         }

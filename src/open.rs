@@ -40,7 +40,7 @@ pub struct SolidState<'a> {
 /// Threads of the simulation's own.
 fn pool(threads: NonZeroUsize) -> Result<ThreadPool> {
     let pool = ThreadPoolBuilder::new().num_threads(threads.get()).build();
-    pool.map_err(|e| Error::Case(format!("{threads} threads cannot be started: {e}")))
+    pool.map_err(|e| Error::usage("threads", format!("{threads} threads cannot be started: {e}")))
 }
 
 impl Simulation {

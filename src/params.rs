@@ -100,10 +100,9 @@ impl Params {
         let run = &case.run;
         let lattice = Lattice::new(run.dimensions, run.effective_radius);
         if lattice.number_density == 0.0 {
-            return Err(Error::Case(format!(
-                "run.effective_radius = {}: no lattice neighbour lies inside; use 2.1 to 3.1",
-                run.effective_radius
-            )));
+            let message =
+                format!("run.effective_radius = {}: no lattice neighbour lies inside", run.effective_radius);
+            return Err(Error::key("run.effective_radius", message, "use 2.1 to 3.1"));
         }
         let l0 = run.spacing;
         let fluid = case.fluid.as_ref();

@@ -2,7 +2,7 @@
 
 use crate::case::Case;
 use crate::contact::Solids;
-use crate::error::{Error, Result};
+use crate::error::{CaseError, Problem, Result};
 use crate::params::Params;
 use crate::scene::Scene;
 use crate::time_step::{collapse_speed, time_step};
@@ -15,7 +15,7 @@ const COMPRESSION_REFUSED: f64 = 1.0;
 /// Refuses what no run can make sense of; `plan` and `run` ask the same.
 ///
 /// # Errors
-/// [`Error::Case`] with everything that is wrong.
+/// [`crate::error::Error::Case`] with everything that is wrong.
 pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> Result<()> {
     let mut problems = Vec::new();
     let wet = scene.groups.fluid > 0;
@@ -26,34 +26,34 @@ pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> R
         problems.extend(too_soft(case, params, dt));
     }
     problems.extend(solids.refuses(dt));
-    if problems.is_empty() { Ok(()) } else { Err(Error::Case(problems.join("\n"))) }
+    if problems.is_empty() { Ok(()) } else { Err(CaseError::all(problems).into()) }
 }
 
 /// A fixed time step against the speed of the collapse from rest.
-fn too_long(case: &Case, params: &Params) -> Option<String> {
+fn too_long(case: &Case, params: &Params) -> Option<CaseError> {
     let (dt, l0) = (case.run.time_step, params.spacing);
     let speed = collapse_speed(params);
     let courant = speed * dt / l0;
     (!case.run.adaptive && courant > COURANT_REFUSED).then(|| {
-        format!(
-            "run.time_step: {dt} s takes water that collapses at {speed:.2} m/s {courant:.1} particles far in a step: \
-             use {:.1e} s or less, or run.adaptive = true",
-            0.35 * l0 / speed
-        )
+        let message = format!(
+            "{dt} s takes water that collapses at {speed:.2} m/s {courant:.1} particles far in a step"
+        );
+        let remedy = format!("use {:.1e} s or less, or run.adaptive = true", 0.35 * l0 / speed);
+        Problem::new("run.time_step", message, remedy).into()
     })
 }
 
 /// Artificial compressibility against the weight of the water: the bulk modulus of Eq. (8) is gamma / alpha.
-fn too_soft(case: &Case, params: &Params, dt: f64) -> Option<String> {
+fn too_soft(case: &Case, params: &Params, dt: f64) -> Option<CaseError> {
     let alpha = case.fluid.as_ref()?.compressibility?;
     let head = params.density * params.gravity.length() * params.depth;
     let gamma = params.step(0.0, dt, collapse_speed(params)).relaxation;
     let compression = alpha * head / gamma;
     (compression > COMPRESSION_REFUSED).then(|| {
-        format!(
-            "fluid.compressibility: {alpha:e} 1/Pa lets the weight of the water press it together {compression:.1e} \
-             times (alpha rho g H / gamma): leave it out, or use {:.1e} 1/Pa or less",
-            1e-3 * gamma / head
-        )
+        let message = format!(
+            "{alpha:e} 1/Pa lets the weight of the water press it together {compression:.1e} times (alpha rho g H / gamma)"
+        );
+        let remedy = format!("leave it out, or use {:.1e} 1/Pa or less", 1e-3 * gamma / head);
+        Problem::new("fluid.compressibility", message, remedy).into()
     })
 }

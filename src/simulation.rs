@@ -107,14 +107,14 @@ impl Simulation {
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
-            let text = "contact.device = \"gpu\": this run is on the CPU; use --backend gpu (`seixo adapters` lists \
-                        what there is) or leave contact.device out";
-            return Err(Error::Case(text.into()));
+            let message = "contact.device = \"gpu\": this run is on the CPU";
+            let remedy =
+                "use --backend gpu (`seixo adapters` lists what there is) or leave contact.device out";
+            return Err(Error::key("contact.device", message, remedy));
         }
         if plan.ledger && plan.wet() && backend.ledger()?.is_none() {
-            let text =
-                "output.ledger = true: this backend keeps no ledger; use --backend cpu or leave it out";
-            return Err(crate::error::Error::Case(text.into()));
+            let message = "output.ledger = true: this backend keeps no ledger";
+            return Err(Error::key("output.ledger", message, "use --backend cpu or leave it out"));
         }
         Ok(Self {
             backend,
@@ -138,7 +138,7 @@ impl Simulation {
     /// Save the whole state between two steps, or take it over.
     ///
     /// # Errors
-    /// [`crate::error::Error::Case`] if the state is that of another scene, or what the backend says.
+    /// [`crate::error::Error::Checkpoint`] if the state is that of another scene, or what the backend says.
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self {
             // Follows from the case.

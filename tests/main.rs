@@ -13,6 +13,8 @@ mod contact;
 mod contact_device;
 mod contact_hard;
 mod device;
+mod errors;
+mod examples;
 mod faults;
 mod fluid;
 mod fuzz;

@@ -76,9 +76,8 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
     let end = setup.loaded.case.run.end;
     if !(0.0..=end).contains(&args.from) {
         let from = args.from;
-        return Err(Error::Case(format!(
-            "--from {from} lies outside of the run; allowed: 0 to {end} (run.end)"
-        )));
+        let text = format!("--from {from} lies outside of the run; allowed: 0 to {end} (run.end)");
+        return Err(Error::usage("--from", text));
     }
     let particles = setup.scene.groups.total();
     let device = DeviceArgs { backend, ..args.device.clone() };

@@ -12,7 +12,7 @@ use seixo::{Error, Processor, Result};
 pub fn processor(args: &DeviceArgs) -> Result<Processor> {
     match (args.backend, args.adapter.clone()) {
         (BackendName::Cpu, Some(_)) => {
-            Err(Error::Case("--adapter chooses a GPU; it does not go with --backend cpu".into()))
+            Err(Error::usage("--adapter", "--adapter chooses a GPU; it does not go with --backend cpu"))
         }
         (BackendName::Cpu, None) => Ok(Processor::Cpu),
         (BackendName::Gpu, adapter) | (BackendName::Auto, adapter @ Some(_)) => {

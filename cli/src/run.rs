@@ -7,7 +7,7 @@ use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
 use seixo::backend::gpu::Gpu;
 use seixo::case::Case;
 use seixo::console::{remark, say};
-use seixo::error::{Error, Result};
+use seixo::error::{Error, FolderError, Result};
 use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
 use seixo::output::folder::case_name;
@@ -113,7 +113,7 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool) -> Result<()>
     let on_cpu = on_cpu
         && (args.device.backend == BackendName::Cpu || needs(true) <= limit || !Gpu::hardware_available());
     if needs(on_cpu) > limit {
-        return Err(Error::Case(format!(
+        let text = format!(
             "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory, {} are {}: use a larger run.spacing \
              or a smaller domain, or say with --memory-limit what the run may take",
             asked.name,
@@ -122,18 +122,20 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool) -> Result<()>
             bytes(needs(on_cpu)),
             bytes(limit),
             if args.memory_limit.is_some() { "allowed" } else { "free" }
-        )));
+        );
+        return Err(Error::usage("--memory-limit", text));
     }
     let free = machine::disk(&asked.out).map_or(f64::INFINITY, |n| n as f64);
     if estimate.disk() > free && !args.force_disk && !resumes {
-        return Err(Error::Case(format!(
+        let text = format!(
             "{}: the results take about {}, {} are free on the disk of {}: raise output.every, output.table_every or \
              run.spacing, or run all the same with --force-disk",
             asked.name,
             bytes(estimate.disk()),
             bytes(free),
             asked.out.display()
-        )));
+        );
+        return Err(Error::usage("--force-disk", text));
     }
     Ok(())
 }
@@ -159,9 +161,8 @@ impl Asked {
             && out != folder
         {
             let (out, folder) = (out.display(), folder.display());
-            return Err(Error::Case(format!(
-                "--out {out} and --resume {folder} name two folders: leave one out"
-            )));
+            let text = format!("--out {out} and --resume {folder} name two folders: leave one out");
+            return Err(Error::usage("--resume", text));
         }
         let resume = given.is_some();
         let out = args.out.clone().or(folder);
@@ -172,11 +173,13 @@ impl Asked {
                 Ok(Self { inputs: vec![case.clone()], case, name, out, resume })
             }
             (None, Some(out)) => {
-                let none = || Error::Case(format!("{} holds no run of seixo to go on with", out.display()));
+                let none = || FolderError::NoRun(out.clone());
                 let name = case_name(&out)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
                 Ok(Self { case: out.join("case.toml"), name, out, resume, inputs: Vec::new() })
             }
-            (None, None) => Err(Error::Case("--resume: name the folder of the run, or its case".into())),
+            (None, None) => {
+                Err(Error::usage("--resume", "--resume: name the folder of the run, or its case"))
+            }
         }
     }
 }

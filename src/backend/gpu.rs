@@ -29,7 +29,7 @@ use super::{Backend, Commands, Counters, Timing};
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
-use crate::error::{Error, Result};
+use crate::error::{Error, GpuError, Result};
 use crate::fields::Fields;
 use crate::kernels::monitor::{speed_most, speed_range};
 use crate::monitor::{FluidMonitor, SPEED_BINS};
@@ -122,7 +122,7 @@ impl Gpu {
             ..Default::default()
         };
         let device = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| Error::Gpu(format!("{}: {e}", info.name)))?;
+            .map_err(|e| Error::gpu(format!("{}: {e}", info.name)))?;
         Self::on(device, info, scene, params, plan, settings)
     }
 
@@ -152,12 +152,14 @@ impl Gpu {
     ) -> Result<Self> {
         let groups = scene.groups;
         if groups.fluid > layout::FLUID_MAX {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{} fluid particles are more than the GPU path numbers ({}); use a larger run.spacing or \
                  --backend cpu",
                 groups.fluid,
                 layout::FLUID_MAX
-            )));
+            );
+            let (needs, has) = (groups.fluid as u64, Some(layout::FLUID_MAX as u64));
+            return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
         }
         let grid = grid(params, plan)?;
         let mut sizes = Sizes::new(scene, params, &grid);
@@ -548,10 +550,12 @@ impl Compute for Gpu {
     fn dispatch(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
         let most = self.context.workgroups_max();
         if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{groups} pairs of solids are close, {most} is what {} takes at a time; use contact.device = \"host\"",
                 self.context.info.name
-            )));
+            );
+            let limit = "max_compute_workgroups_per_dimension";
+            return Err(GpuError::TooSmall { limit, needs: *groups, has: Some(most), text }.into());
         }
         self.context.begin(Some(Stage::Contact));
         self.context.pass(kernels.iter().copied())

@@ -3,30 +3,11 @@
 //! Everything is listed at once; `file` adds line and column from the dotted path of each problem.
 
 use super::{Case, Face, Gauges, Vector};
-use crate::error::{Error, Result};
+use crate::error::{CaseError, Problem, Result};
 use crate::lattice::Lattice;
 
 /// Most iterations of a solve: beyond, a step would not come to its end.
 const MOST_ITERATIONS: u32 = 1_000_000;
-
-/// Something wrong, or worth a warning, about a key.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Problem {
-    /// Dotted path of the key, e.g. `body.0.density`.
-    pub path: String,
-    /// What is wrong.
-    pub message: String,
-    /// What to do about it.
-    pub remedy: String,
-    /// A warning: the case runs.
-    pub warning: bool,
-}
-
-impl std::fmt::Display for Problem {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}: {}", self.path, self.message, self.remedy)
-    }
-}
 
 /// All problems and warnings of a case.
 pub fn check(case: &Case) -> Vec<Problem> {
@@ -48,10 +29,10 @@ pub fn check(case: &Case) -> Vec<Problem> {
 /// Refuses a case with problems; for callers that have no file to point at.
 ///
 /// # Errors
-/// [`Error::Case`] with all problems.
+/// [`crate::error::Error::Case`] with all problems.
 pub fn refuse(case: &Case) -> Result<()> {
-    let lines: Vec<String> = check(case).iter().filter(|p| !p.warning).map(ToString::to_string).collect();
-    if lines.is_empty() { Ok(()) } else { Err(Error::Case(lines.join("\n"))) }
+    let wrong: Vec<CaseError> = check(case).into_iter().filter(|p| !p.warning).map(CaseError::from).collect();
+    if wrong.is_empty() { Ok(()) } else { Err(CaseError::all(wrong).into()) }
 }
 
 /// Collects problems.
@@ -67,12 +48,7 @@ impl Checker<'_> {
         message: impl Into<String>,
         remedy: impl Into<String>,
     ) {
-        self.problems.push(Problem {
-            path: path.into(),
-            message: message.into(),
-            remedy: remedy.into(),
-            warning: false,
-        });
+        self.problems.push(Problem::new(path, message, remedy));
     }
     fn warn(&mut self, path: &str, message: String, remedy: &str) {
         self.add(path, message, remedy);

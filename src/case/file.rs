@@ -1,10 +1,10 @@
 //! Reading a case file: text, overrides, parsing, checking; errors that point at file, line and key.
 
-use super::check::{Problem, check};
+use super::check::check;
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
 use super::{Case, overrides};
-use crate::error::{Error, Result};
+use crate::error::{CaseError, Error, Problem, Result};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -32,9 +32,10 @@ pub struct Loaded {
 /// exists but cannot be read.
 pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded> {
     let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
-        std::io::ErrorKind::NotFound => Error::Case(missing(path)),
+        std::io::ErrorKind::NotFound => Error::file(path.display().to_string(), "", missing(path)),
         std::io::ErrorKind::InvalidData => {
-            Error::Case(format!("{}: not a text file in UTF-8", path.display()))
+            let name = path.display().to_string();
+            Error::file(name.clone(), "", format!("{name}: not a text file in UTF-8"))
         }
         _ => Error::io(path)(source),
     })?;
@@ -63,7 +64,9 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
     let text = text.replace("\r\n", "\n");
     // Broken TOML is reported on the text as it stands in the file.
     if let Err(error) = DeTable::parse(&text) {
-        return Err(Error::Case(render(name, &text, &[explain(&error, None)])));
+        let message = explain(&error, None);
+        let problem = message.problem(name, &text);
+        return Err(CaseError::new(vec![problem], render(name, &text, &[message])).into());
     }
     let text = if sets.is_empty() { text } else { overrides::apply(&text, sets)? };
     let wrong = |messages: &[Message]| {
@@ -73,21 +76,23 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
         }
         report
     };
-    let table = DeTable::parse(&text).map_err(|e| Error::Case(wrong(&[explain(&e, None)])))?;
-    let case: Case =
-        toml::from_str(&text).map_err(|e| Error::Case(wrong(&[explain(&e, Some(table.get_ref()))])))?;
+    let unread = |message: Message| {
+        let problem = message.problem(name, &text);
+        CaseError::new(vec![problem], wrong(&[message]))
+    };
+    let table = DeTable::parse(&text).map_err(|e| unread(explain(&e, None)))?;
+    let case: Case = toml::from_str(&text).map_err(|e| unread(explain(&e, Some(table.get_ref()))))?;
     let located = |p: &Problem| Message {
-        span: span_of(&table, &p.path),
-        title: format!("{}: {}", p.path, p.message),
+        span: span_of(&table, &p.key),
+        key: p.key.clone(),
+        title: format!("{}: {}", p.key, p.message),
         label: p.message.clone(),
         remedy: Some(p.remedy.clone()),
         warning: p.warning,
     };
-    let too_long = surplus(table.get_ref(), &case).into_iter().map(|s| Problem {
-        message: format!("{} elements, of which only the first {} would be read", s.written, s.read),
-        remedy: format!("write {} elements", s.read),
-        path: s.path,
-        warning: false,
+    let too_long = surplus(table.get_ref(), &case).into_iter().map(|s| {
+        let message = format!("{} elements, of which only the first {} would be read", s.written, s.read);
+        Problem::new(s.path, message, format!("write {} elements", s.read))
     });
     let problems = too_long.chain(check(&case));
     let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
@@ -97,7 +102,8 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
         if errors.len() > MOST_SHOWN {
             report.push_str(&format!("\n\nerror: and {} more", errors.len() - MOST_SHOWN));
         }
-        return Err(Error::Case(report));
+        let problems = errors.iter().map(|p| located(p).problem(name, &text)).collect();
+        return Err(CaseError::new(problems, report).into());
     }
     let warnings = warnings.iter().take(MOST_SHOWN).map(|p| wrong(&[located(p)])).collect();
     drop(table);

@@ -7,11 +7,12 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 /// Applies `key=value` pairs in order.
 ///
 /// # Errors
-/// [`Error::Case`] naming the pair and the part of its key that fits nothing.
+/// [`Error::Usage`] naming the pair and the part of its key that fits nothing.
 pub(super) fn apply(text: &str, sets: &[String]) -> crate::error::Result<String> {
-    let mut document: DocumentMut = text.parse().map_err(|e| Error::Case(format!("{e}")))?;
+    let mut document: DocumentMut =
+        text.parse().map_err(|e: toml_edit::TomlError| Error::file("case", "", e.to_string()))?;
     for set in sets {
-        one(&mut document, set).map_err(|why| Error::Case(format!("--set {set}: {why}")))?;
+        one(&mut document, set).map_err(|why| Error::usage("--set", format!("--set {set}: {why}")))?;
     }
     Ok(document.to_string())
 }

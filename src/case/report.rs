@@ -1,5 +1,6 @@
 //! Messages about a case file: file, line and column, the line itself, what is allowed, a remedy.
 
+use crate::error::Problem;
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::ops::Range;
 use toml::Spanned;
@@ -8,10 +9,28 @@ use toml::de::{DeTable, DeValue};
 /// A message about a stretch of the text.
 pub(super) struct Message {
     pub span: Range<usize>,
+    /// Dotted path, empty where no key is known.
+    pub key: String,
     pub title: String,
     pub label: String,
     pub remedy: Option<String>,
     pub warning: bool,
+}
+
+impl Message {
+    /// The same for a program: where it is in `text` of the file `path`.
+    pub fn problem(&self, path: &str, text: &str) -> Problem {
+        let before = text.get(..self.span.start.min(text.len())).unwrap_or_default();
+        let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+        let message = self.title.strip_prefix(&format!("{}: ", self.key)).unwrap_or(&self.title);
+        Problem {
+            file: Some(path.to_owned()),
+            line: Some(before.matches('\n').count() + 1),
+            column: Some(column),
+            warning: self.warning,
+            ..Problem::new(&self.key, message, self.remedy.as_deref().unwrap_or_default())
+        }
+    }
 }
 
 /// All messages as one text.
@@ -56,7 +75,7 @@ pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> M
         [name, ..] if said.starts_with("missing field") => Some(format!("add `{name} = ...` here")),
         _ => None,
     };
-    Message { span, title, label: short(&said), remedy, warning: false }
+    Message { span, key: key.unwrap_or_default(), title, label: short(&said), remedy, warning: false }
 }
 
 /// The message up to the list of what is allowed, which stands in the remedy.

@@ -48,7 +48,7 @@ impl Archive {
     }
 
     fn missing(name: &str) -> Error {
-        Error::Case(format!(
+        Error::misfit(format!(
             "the checkpoint holds no `{name}`: another version of seixo, or another case, wrote it"
         ))
     }
@@ -56,7 +56,7 @@ impl Archive {
     /// A count.
     ///
     /// # Errors
-    /// [`Error::Case`] if the state has none of this name; so with all of these.
+    /// [`Error::Checkpoint`] if the state has none of this name; so with all of these.
     pub fn count(&mut self, name: &str, value: &mut u64) -> Result<()> {
         if self.saving {
             self.numbers.insert(name.to_owned(), *value);
@@ -69,14 +69,16 @@ impl Archive {
     /// A count of `what` that must be the same in the state and in the case.
     ///
     /// # Errors
-    /// [`Error::Case`] with both counts if they differ.
+    /// [`Error::Checkpoint`] with both counts if they differ.
     pub fn same(&mut self, what: &str, count: u64) -> Result<()> {
         let mut held = count;
         self.count(what, &mut held)?;
         if held == count {
             return Ok(());
         }
-        Err(Error::Case(format!("the checkpoint holds {held} {what}, the case {count}: their scenes differ")))
+        Err(Error::misfit(format!(
+            "the checkpoint holds {held} {what}, the case {count}: their scenes differ"
+        )))
     }
 
     /// A number, to the last bit.
@@ -132,7 +134,7 @@ impl Archive {
         let count = section.bytes.len() / size_of::<T>();
         if section.bytes.len() % size_of::<T>() != 0 || fixed && count != values.len() {
             let want = values.len();
-            return Err(Error::Case(format!("the checkpoint holds {count} of `{name}`, the case {want}")));
+            return Err(Error::misfit(format!("the checkpoint holds {count} of `{name}`, the case {want}")));
         }
         *values = bytemuck::pod_collect_to_vec(&section.bytes);
         Ok(())

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 16 | `seixo checkpoint` |
 //! | 4, 8 | format, length of the header (little endian) |
-//! | | the header, [`Header`] as JSON |
+//! | | the header, `Header` as JSON |
 //! | 4 | CRC-32 of all that |
 //! | | the arrays, where the header says |
 //!
@@ -236,7 +236,7 @@ pub struct Found {
 /// The newest state of `folder` that is whole; `None` if there is no file.
 ///
 /// # Errors
-/// [`Error::Case`] if there are files and none is whole, [`Error::Io`].
+/// [`Error::Checkpoint`] if there are files and none is whole, [`Error::Io`].
 pub fn newest(folder: &Path) -> Result<Option<Found>> {
     let mut damaged = Vec::new();
     for path in files(folder)? {
@@ -246,7 +246,7 @@ pub fn newest(folder: &Path) -> Result<Option<Found>> {
             Err(why) => damaged.push(format!("{}: {why}", path.display())),
         }
     }
-    if damaged.is_empty() { Ok(None) } else { Err(Error::Case(damaged.join("\n"))) }
+    if damaged.is_empty() { Ok(None) } else { Err(Error::damaged(damaged.join("\n"))) }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What a user should know about the numbers of contact.
 
 use super::Solids;
+use crate::error::CaseError;
 
 /// What contact will do at a time step, for `seixo plan`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,9 +22,9 @@ pub struct ContactAdvice {
 
 impl Solids {
     /// Why contact cannot be computed with steps of `dt` [s], if so.
-    pub(crate) fn refuses(&self, dt: f64) -> Option<String> {
+    pub(crate) fn refuses(&self, dt: f64) -> Option<CaseError> {
         let law = self.law.as_deref()?;
-        self.limits.substeps(&self.limits.worst(law, &self.bodies, dt)).err().map(|e| e.to_string())
+        self.limits.substeps(&self.limits.worst(law, &self.bodies, dt)).err()
     }
 
     /// What contact will do at the time step `dt` [s].

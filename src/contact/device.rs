@@ -75,8 +75,6 @@ pub(super) fn vector(v: [f32; 4]) -> DVec3 {
 /// A place in a buffer as a device counts.
 pub(super) fn place(n: usize) -> Result<u32> {
     u32::try_from(n).ok().filter(|n| n >> 31 == 0).ok_or_else(|| {
-        Error::Gpu(
-            "contact has more candidates than a device can number; use contact.device = \"host\"".into(),
-        )
+        Error::gpu("contact has more candidates than a device can number; use contact.device = \"host\"")
     })
 }

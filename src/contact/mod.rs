@@ -61,6 +61,8 @@ pub struct Solids {
     load: Vec<Wrench>,
     /// Time step [s] and how it is cut, as last planned.
     planned: Option<(f64, Cut)>,
+    /// Sub-step [s] of the last step; 0 before the first.
+    substep: f64,
 }
 
 impl Solids {
@@ -73,9 +75,9 @@ impl Solids {
         let free = bodies.iter().position(Body::is_free);
         if let (None, Some(k)) = (contact, free) {
             let name = &scene.solids[k].name;
-            return Err(Error::Case(format!(
-                "body \"{name}\" moves freely, so the case needs [contact] with law and spring"
-            )));
+            let message =
+                format!("body \"{name}\" moves freely, so the case needs [contact] with law and spring");
+            return Err(Error::key("contact", message, ""));
         }
         let mut limits = Limits::new(contact, scene, &bodies)?;
         let law = match (contact, free) {
@@ -97,6 +99,7 @@ impl Solids {
             traffic: Traffic::default(),
             limits,
             planned: None,
+            substep: 0.0,
         })
     }
 
@@ -189,6 +192,7 @@ impl Solids {
         let substeps = self.hurry(cut, t, dt)?;
         let mut report = ContactReport { substeps, omega_dt: cut.omega_dt, ..ContactReport::default() };
         let h = dt / f64::from(report.substeps);
+        self.substep = h;
         let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
         for body in &mut self.bodies {
             if let Some(velocity) = body.prescribed_velocity(t, dt) {

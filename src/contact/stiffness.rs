@@ -41,11 +41,13 @@ impl Damping {
             }
             (None, None, Some(e)) if contact.law == case::Law::Smooth => Ok(Self::Ratio(damping_ratio(e))),
             (None, None, Some(_)) => {
-                let text = "contact.restitution: needs law = \"smooth\"; give damping or damping_ratio";
-                Err(Error::Case(text.into()))
+                let message = "contact.restitution: needs law = \"smooth\"";
+                Err(Error::key("contact.restitution", message, "give damping or damping_ratio"))
             }
-            _ => Err(Error::Case(
-                "contact: give one of damping, damping_ratio and restitution, not several".into(),
+            _ => Err(Error::key(
+                "contact",
+                "contact: give one of damping, damping_ratio and restitution, not several",
+                "",
             )),
         }
     }

@@ -5,7 +5,7 @@ use super::law::Law;
 use super::stiffness::{Damping, Lambda};
 use crate::body::Body;
 use crate::case;
-use crate::error::{Error, Result};
+use crate::error::{CaseError, Problem, Result};
 use crate::scene::{Drive, Scene, WallShape};
 
 /// Largest dt sqrt(K / m_e) of a sub-step; 2 is the limit of stability, energy errors grow as its square.
@@ -64,7 +64,7 @@ impl Limits {
     /// What `contact` asks for; `None` asks for nothing.
     ///
     /// # Errors
-    /// [`Error::Case`] if its numbers contradict each other.
+    /// [`crate::error::Error::Case`] if its numbers contradict each other.
     pub fn new(contact: Option<&case::Contact>, scene: &Scene, bodies: &[Body]) -> Result<Self> {
         let free = bodies.iter().filter(|b| b.is_free());
         let lightest = free.map(|b| b.mass).fold(f64::INFINITY, f64::min);
@@ -125,34 +125,40 @@ impl Limits {
     /// Number of sub-steps for `worst`.
     ///
     /// # Errors
-    /// [`Error::Case`] if a forced number is unstable, or if the law would need an absurd one.
-    pub fn substeps(&self, worst: &Worst) -> Result<u32> {
+    /// [`crate::error::Error::Case`] if a forced number is unstable, or if the law would need an absurd one.
+    pub fn substeps(&self, worst: &Worst) -> std::result::Result<u32, CaseError> {
         if worst.wanted == 0.0 {
             return Ok(1);
         }
         if let Some(n) = self.forced {
             let (omega, damping) = (worst.omega_dt / f64::from(n), worst.damping_dt / f64::from(n));
             if omega > 1.0 || omega * omega + 2.0 * damping > 4.0 {
-                return Err(Error::Case(format!(
+                let message = format!(
                     "contact.substeps = {n} is unstable: dt sqrt(K / m_e) = {omega:.2} a sub-step (at most 1), \
-                     C dt / m_e = {damping:.2}; leave substeps out, or set it to at least {}, or lower \
-                     contact.spring or run.time_step",
+                     C dt / m_e = {damping:.2}"
+                );
+                let remedy = format!(
+                    "leave substeps out, or set it to at least {}, or lower contact.spring or run.time_step",
                     (worst.omega_dt / OMEGA_STEP).max(worst.damping_dt).ceil()
-                )));
+                );
+                return Err(CaseError::of("contact.substeps", message, remedy));
             }
             return Ok(n);
         }
         let wanted = (worst.wanted - 1e-9).ceil().max(1.0);
         if wanted > f64::from(ABSURD_SUBSTEPS) {
-            let key = if worst.omega_dt / OMEGA_STEP >= worst.damping_dt {
+            let what = if worst.omega_dt / OMEGA_STEP >= worst.damping_dt {
                 format!("contact.spring = {:.3e} N/m", self.spring)
             } else {
                 "what damps contact (damping, damping_ratio, viscous_friction)".into()
             };
-            return Err(Error::Case(format!(
-                "{key} asks for {wanted} contact sub-steps a step, more than {ABSURD_SUBSTEPS}, and law = \"paper\" \
-                 does not soften: lower it or run.time_step, or use law = \"smooth\""
-            )));
+            let message = format!(
+                "{what} asks for {wanted} contact sub-steps a step, more than {ABSURD_SUBSTEPS}, and law = \"paper\" \
+                 does not soften"
+            );
+            let remedy = "lower it or run.time_step, or use law = \"smooth\"";
+            let text = format!("{message}: {remedy}");
+            return Err(CaseError::new(vec![Problem::new("contact.spring", message, remedy)], text));
         }
         Ok(wanted as u32)
     }

@@ -5,7 +5,7 @@
 
 use super::write_whole;
 use crate::checkpoint::file::is_checkpoint;
-use crate::error::{Error, Result};
+use crate::error::{Error, FolderError, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
@@ -70,7 +70,7 @@ impl Folder {
     /// the run was made from: none of them is ever overwritten or removed.
     ///
     /// # Errors
-    /// [`Error::Case`] if the folder is not empty, is no folder of seixo's, is in use by another run, or if a
+    /// [`Error::Folder`] if the folder is not empty, is no folder of seixo's, is in use by another run, or if a
     /// result would take the place of an input; [`Error::Io`] if it cannot be made.
     pub fn open(root: &Path, name: &str, mode: Mode, inputs: &[PathBuf]) -> Result<Self> {
         let mut folder = Self { root: root.to_path_buf(), name: name.to_string(), lock: Arc::new(None) };
@@ -80,19 +80,12 @@ impl Folder {
             Err(e) if e.kind() == ErrorKind::NotFound => false,
             Err(e) => return Err(Error::io(root)(e)),
         };
-        let shown = root.display();
         if filled && mode == Mode::New {
-            return Err(Error::Case(format!(
-                "{shown} is not empty; choose another folder with --out, go on with the run in it with --resume, or \
-                 replace the results in it with --force"
-            )));
+            return Err(FolderError::NotEmpty(root.to_path_buf()).into());
         }
         let earlier = folder.marker()?;
         if filled && earlier.is_none() {
-            return Err(Error::Case(format!(
-                "{shown} holds files and no `{MARKER}`, so that it is no folder of results: nothing in it is touched; \
-                 choose another folder with --out"
-            )));
+            return Err(FolderError::Foreign { folder: root.to_path_buf(), marker: MARKER }.into());
         }
         std::fs::create_dir_all(root).map_err(Error::io(root))?;
         folder.lock = Arc::new(folder.take()?);
@@ -110,10 +103,7 @@ impl Folder {
         for input in inputs.iter().filter_map(|p| p.canonicalize().ok()) {
             let name = input.file_name().and_then(|n| n.to_str()).unwrap_or_default();
             if input.parent() == Some(&root) && self.is_ours(name, &self.name) {
-                return Err(Error::Case(format!(
-                    "{} would be overwritten by the results: choose another folder with --out",
-                    input.display()
-                )));
+                return Err(FolderError::Input(input).into());
             }
         }
         Ok(())
@@ -137,10 +127,7 @@ impl Folder {
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                return Err(Error::Case(format!(
-                    "{} is in use: another run writes there; wait for its end, or choose another folder with --out",
-                    self.root.display()
-                )));
+                return Err(FolderError::InUse(self.root.clone()).into());
             }
             // Some network file systems have no locks; then it is the user who keeps runs apart.
             Err(TryLockError::Error(e)) if matches!(e.kind(), ErrorKind::Unsupported) => return Ok(None),

@@ -2,7 +2,7 @@
 
 use super::write_whole;
 use crate::checkpoint::Archive;
-use crate::error::{Error, Result};
+use crate::error::{Error, FolderError, Result};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -30,7 +30,7 @@ impl Pvd {
     /// Save how long the list is, or cut the file back to what it was. Returns nothing to read otherwise.
     ///
     /// # Errors
-    /// [`Error::Case`] if the file is shorter than that, [`Error::Io`].
+    /// [`Error::Folder`] if the file is shorter than that, [`Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self { path, file, entries } = self;
         archive.count("pvd.bytes", entries)?;
@@ -40,7 +40,7 @@ impl Pvd {
         let io = |e| Error::io(&*path)(e);
         let mut opened = File::options().read(true).write(true).open(&*path).map_err(io)?;
         if opened.metadata().map_err(io)?.len() < *entries {
-            return Err(Error::Case(format!("{}: it is shorter than when the run stopped", path.display())));
+            return Err(FolderError::Shorter(path.to_path_buf()).into());
         }
         opened.seek(SeekFrom::Start(*entries)).and_then(|_| opened.write_all(FOOT.as_bytes())).map_err(io)?;
         opened.set_len(*entries + FOOT.len() as u64).map_err(io)?;

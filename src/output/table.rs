@@ -1,7 +1,7 @@
 //! CSV tables: one header with units, then rows that reach the file whole.
 
 use crate::checkpoint::Archive;
-use crate::error::{Error, Result};
+use crate::error::{Error, FolderError, Result};
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ impl Table {
         Ok(table)
     }
 
-    /// The table of a run that goes on; [`Table::exchange`] says where.
+    /// The table of a run that goes on; its state says where.
     ///
     /// # Errors
     /// [`Error::Io`] if there is none.
@@ -83,7 +83,7 @@ impl Table {
     /// Save how long the table is, once it has reached the disk, or cut it back to what it was.
     ///
     /// # Errors
-    /// [`Error::Case`] if it is shorter than that, [`Error::Io`].
+    /// [`Error::Folder`] if it is shorter than that, [`Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self { path, file, whole, columns: _, pending: _ } = self;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -93,7 +93,7 @@ impl Table {
             return file.sync_data().map_err(io);
         }
         if file.metadata().map_err(io)?.len() < *whole {
-            return Err(Error::Case(format!("{}: it is shorter than when the run stopped", path.display())));
+            return Err(FolderError::Shorter(path.to_path_buf()).into());
         }
         file.set_len(*whole).and_then(|()| file.seek(SeekFrom::Start(*whole)).map(|_| ())).map_err(io)
     }

@@ -4,7 +4,7 @@ use crate::case::Case;
 use crate::case::file::parse;
 use crate::checkpoint::Found;
 use crate::checkpoint::file::newest;
-use crate::error::{Error, Result};
+use crate::error::{Error, FolderError, Result};
 use crate::output::folder::{case_name, checkpoints};
 use std::path::Path;
 
@@ -24,8 +24,8 @@ pub enum Standing {
 /// What `root` holds of a run of `case`.
 ///
 /// # Errors
-/// [`Error::Case`] if the run there is one of another case, naming the key; if it diverged, which it would do again;
-/// or if all its checkpoints are damaged. [`Error::Io`].
+/// [`Error::Folder`] if the run there is one of another case, naming the keys; [`Error::Senseless`] if it diverged, which
+/// it would do again; [`Error::Checkpoint`] if all its states are damaged; [`Error::Io`].
 pub fn standing(root: &Path, case: &Case) -> Result<Standing> {
     if case_name(root)?.is_none() {
         return Ok(Standing::Nothing);
@@ -65,15 +65,7 @@ fn same(root: &Path, old: &Case, new: &Case) -> Result<()> {
     if changed.is_empty() {
         return Ok(());
     }
-    let most = 5;
-    let more = changed.len().saturating_sub(most);
-    let list = changed[..changed.len() - more].join("; ");
-    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
-    Err(Error::Case(format!(
-        "the case is another one than that of the run in {}: {list}{more}; run it as it was, or start a new run from \
-         that state with run.from = \"{0}\"",
-        root.display()
-    )))
+    Err(FolderError::OtherCase { folder: root.to_path_buf(), changed }.into())
 }
 
 /// Keys with other values, each with both of them.

@@ -59,8 +59,9 @@ impl Saving {
 pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
     let Some(from) = &simulation.case.run.from else { return Ok(None) };
     let found = file::newest(&checkpoints(Path::new(from)))?;
-    let found = found.ok_or_else(|| Error::Case(format!("run.from: `{from}` holds no checkpoint")))?;
-    fits(simulation, &found).map_err(|e| Error::Case(format!("run.from: {e}")))?;
+    let found =
+        found.ok_or_else(|| Error::key("run.from", format!("run.from: `{from}` holds no checkpoint"), ""))?;
+    fits(simulation, &found).map_err(|e| Error::misfit(format!("run.from: {e}")))?;
     Ok(Some(Found { archive: found.archive.to_restore(), ..found }))
 }
 
@@ -72,7 +73,7 @@ pub(super) fn fits(simulation: &Simulation, found: &Found) -> Result<()> {
     }
     let name = |precision: &str| if precision == "f64" { "cpu" } else { "gpu" };
     let (path, had, have) = (found.path.display(), name(had), name(have));
-    Err(Error::Case(format!(
+    Err(Error::misfit(format!(
         "{path} was saved by a run on the {had}, this one is on the {have}: use --backend {had}"
     )))
 }

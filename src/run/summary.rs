@@ -34,7 +34,7 @@ impl Totals {
     /// Save the sums, or take them over.
     ///
     /// # Errors
-    /// [`crate::error::Error::Case`] if the state has none.
+    /// [`crate::error::Error::Checkpoint`] if the state has none.
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self {
             solves,

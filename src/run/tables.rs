@@ -121,7 +121,7 @@ impl Tables {
     /// Save where the tables stand, or cut them back to that.
     ///
     /// # Errors
-    /// [`crate::error::Error::Case`] if one is shorter than that, [`crate::error::Error::Io`].
+    /// [`crate::error::Error::Folder`] if one is shorter than that, [`crate::error::Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self { monitors, bodies, gauges, due, gauges_due, stages: _, since, last } = self;
         monitors.exchange(archive)?;

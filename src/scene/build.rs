@@ -9,14 +9,14 @@ use super::walls::{self, Fixed, PlaneFrame};
 use super::water::Water;
 use super::{Scene, Solid, wall_at};
 use crate::case::{Case, Law};
-use crate::error::{Error, Result};
+use crate::error::{CaseError, Problem, Result};
 use glam::{DMat3, DVec3, IVec3};
 
 impl Scene {
     /// Builds the scene of a case: particles on their lattices, solids with their geometry, the domain.
     ///
     /// # Errors
-    /// [`Error::Case`] with every problem that the case or its geometry at t = 0 has: bodies that overlap
+    /// [`crate::error::Error::Case`] with every problem that the case or its geometry at t = 0 has: bodies that overlap
     /// walls, water or each other, water that would run away, things outside of the domain.
     pub fn build(case: &Case) -> Result<Self> {
         crate::case::check::refuse(case)?;
@@ -27,15 +27,16 @@ impl Scene {
         builder.gauges();
         let domain = builder.domain();
         if !builder.problems.is_empty() {
-            return Err(Error::Case(listed(&builder.problems)));
+            return Err(CaseError::new(builder.problems.clone(), listed(&builder.problems)).into());
         }
         Ok(builder.assemble(domain))
     }
 }
 
 /// Problems of a scene as one text.
-fn listed(problems: &[String]) -> String {
-    match problems {
+fn listed(problems: &[Problem]) -> String {
+    let lines: Vec<String> = problems.iter().map(|p| format!("{}: {}", p.message, p.remedy)).collect();
+    match lines.as_slice() {
         [one] => one.clone(),
         many => format!("{} problems at t = 0:\n  - {}", many.len(), many.join("\n  - ")),
     }
@@ -55,7 +56,7 @@ pub(super) struct Builder<'a> {
     pub(super) water: Water,
     pub(super) depth: f64,
     pub(super) notes: Vec<String>,
-    pub(super) problems: Vec<String>,
+    pub(super) problems: Vec<Problem>,
 }
 
 impl<'a> Builder<'a> {
@@ -162,11 +163,10 @@ impl<'a> Builder<'a> {
         for (k, block) in fluid.block.iter().enumerate() {
             let filled = self.water.fill(block, &self.lattice, &mut self.grid);
             if filled == 0 {
-                self.problems.push(format!(
-                    "fluid.block.{k}: no free cell in it at spacing {}: it lies inside walls or other water, \
-                     move it or use a smaller run.spacing",
-                    self.lattice.spacing
-                ));
+                let key = format!("fluid.block.{k}");
+                let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
+                let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
+                self.problems.push(Problem::new(key, message, remedy));
             }
             self.rounded(&format!("fluid.block.{k}"), block.min.into(), block.max.into());
         }
@@ -177,7 +177,7 @@ impl<'a> Builder<'a> {
         let case = self.case;
         let gravity = self.gravity();
         let law = case.contact.as_ref().map_or(Law::Smooth, |c| c.law);
-        for body in &case.body {
+        for (k, body) in case.body.iter().enumerate() {
             let mut solid = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
             let earlier: Vec<&Solid> = self.moving_walls.iter().chain(&self.bodies).collect();
             let surroundings = Surroundings {
@@ -189,7 +189,9 @@ impl<'a> Builder<'a> {
             };
             match surroundings.place(&mut solid, body.standing) {
                 Ok(note) => self.notes.extend(note),
-                Err(problem) => self.problems.push(problem),
+                Err((message, remedy)) => {
+                    self.problems.push(Problem::new(format!("body.{k}"), message, remedy));
+                }
             }
             let shape = solid.placed();
             let wet = self.water.inside(&shape, &self.lattice);
@@ -197,12 +199,11 @@ impl<'a> Builder<'a> {
                 self.water.remove(&shape, &self.lattice, &mut self.grid);
                 self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
             } else if wet > 0 {
-                self.problems.push(format!(
-                    "body `{}` at {} overlaps {wet} fluid particles at t = 0: set `displaces_fluid = true`, or move it \
-                     out of the water",
-                    body.name,
-                    point(solid.position)
-                ));
+                let place = point(solid.position);
+                let message =
+                    format!("body `{}` at {place} overlaps {wet} fluid particles at t = 0", body.name);
+                let remedy = "set `displaces_fluid = true`, or move it out of the water";
+                self.problems.push(Problem::new(format!("body.{k}.displaces_fluid"), message, remedy));
             }
             self.bodies.push(solid);
         }
@@ -213,7 +214,7 @@ impl<'a> Builder<'a> {
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     fn gauges(&mut self) {
         let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
-        for gauge in &self.case.gauge.pressure {
+        for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
             let mut at: DVec3 = gauge.point.into();
             if self.lattice.plane {
                 at.y = 0.0;
@@ -222,11 +223,10 @@ impl<'a> Builder<'a> {
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
                     format!("the nearest stands at {}", point(nearest))
                 });
-                self.problems.push(format!(
-                    "gauge.pressure `{}` at {}: no fixed wall there, {hint}: move the point onto a wall",
-                    gauge.name,
-                    point(at)
-                ));
+                let (name, at) = (&gauge.name, point(at));
+                let message = format!("gauge.pressure `{name}` at {at}: no fixed wall there, {hint}");
+                let remedy = "move the point onto a wall";
+                self.problems.push(Problem::new(format!("gauge.pressure.{k}.point"), message, remedy));
             }
         }
     }

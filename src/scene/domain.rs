@@ -3,6 +3,7 @@
 use super::Drive;
 use super::build::{AXES, Builder};
 use super::oriented::Placed;
+use crate::error::Problem;
 use glam::{DVec3, IVec3};
 
 impl Builder<'_> {
@@ -36,11 +37,12 @@ impl Builder<'_> {
             for (label, a, b) in &bounds.items {
                 let outside = |k: usize| a[k] < lo[k] - slack || b[k] > hi[k] + slack;
                 if let Some(k) = (0..3).find(|&k| !(self.lattice.plane && k == 1) && outside(k)) {
-                    self.problems.push(format!(
-                        "run.domain: {label} reaches from {} = {:.4} to {:.4} m, outside of {:.4} to {:.4} m: \
-                         enlarge run.domain or leave it out",
+                    let message = format!(
+                        "run.domain: {label} reaches from {} = {:.4} to {:.4} m, outside of {:.4} to {:.4} m",
                         AXES[k], a[k], b[k], lo[k], hi[k]
-                    ));
+                    );
+                    let remedy = "enlarge run.domain or leave it out";
+                    self.problems.push(Problem::new("run.domain", message, remedy));
                 }
             }
             return self.in_plane(lo, hi);

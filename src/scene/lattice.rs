@@ -1,6 +1,6 @@
 //! The background lattice: which cell belongs to which shape, as a dense grid.
 
-use crate::error::{Error, Result};
+use crate::error::{CaseError, Problem, Result};
 use glam::{DVec3, IVec3};
 
 /// What stands in a cell.
@@ -113,11 +113,13 @@ impl Grid {
     pub fn new(cells: Cells, spacing: f64) -> Result<Self> {
         let n = (cells.hi.as_dvec3() - cells.lo.as_dvec3()).max(DVec3::ZERO);
         if n.x * n.y * n.z > MOST_CELLS || n.max_element() > 2e9 {
-            return Err(Error::Case(format!(
-                "the tank, obstacles and water span {:.0} x {:.0} x {:.0} cells of {spacing} m, more than {MOST_CELLS:.0e}: \
-                 use a larger run.spacing, or check for a length that is far too large",
+            let message = format!(
+                "the tank, obstacles and water span {:.0} x {:.0} x {:.0} cells of {spacing} m, more than {MOST_CELLS:.0e}",
                 n.x, n.y, n.z
-            )));
+            );
+            let remedy = "use a larger run.spacing, or check for a length that is far too large";
+            let text = format!("{message}: {remedy}");
+            return Err(CaseError::new(vec![Problem::new("run.spacing", message, remedy)], text).into());
         }
         let n = [n.x as usize, n.y as usize, n.z as usize];
         Ok(Self { cells, n, state: vec![FREE; n[0] * n[1] * n[2]] })

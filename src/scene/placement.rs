@@ -36,8 +36,8 @@ impl Surroundings<'_> {
     /// Lifts a standing body; returns a note on how far.
     ///
     /// # Errors
-    /// A sentence that names the body, what it overlaps, by how much, and what to do.
-    pub fn place(&self, body: &mut Solid, standing: bool) -> Result<Option<String>, String> {
+    /// What is wrong, with the body, what it overlaps and by how much; and what to do.
+    pub fn place(&self, body: &mut Solid, standing: bool) -> Result<Option<String>, (String, String)> {
         let Some(Contact { with, overlap, out }) = self.deepest(body) else { return Ok(None) };
         // A lift over the rim of a wall is not what anyone means by standing.
         let lift = self
@@ -50,18 +50,17 @@ impl Surroundings<'_> {
                 let n = point(n);
                 format!("move it away, its center by {:.6} m along {n}", overlap + 1e-6)
             });
-            return Err(format!("{says}: {away}, lifting it would take more than half its height"));
+            return Err((says, format!("{away}, lifting it would take more than half its height")));
         };
         if !standing {
             let more = lift + 1e-6;
-            return Err(format!(
-                "{says}: set `standing = true`, or raise its center by {more:.6} m against gravity"
-            ));
+            let remedy = format!("set `standing = true`, or raise its center by {more:.6} m against gravity");
+            return Err((says, remedy));
         }
         let from = body.position;
         body.position += lift * up;
         if let Some(Contact { with, .. }) = self.deepest(body) {
-            return Err(format!("{says}: move it away, lifted by {lift:.6} m it would still overlap {with}"));
+            return Err((says, format!("move it away, lifted by {lift:.6} m it would still overlap {with}")));
         }
         Ok(Some(format!(
             "body `{}`: lifted by {lift:.6} m to stand free of contact, center {} becomes {}",

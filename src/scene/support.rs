@@ -4,6 +4,7 @@ use super::build::{AXES, Builder};
 use super::oriented::Placed;
 use super::placement::point;
 use super::{Drive, Solid};
+use crate::error::Problem;
 use glam::DVec3;
 
 impl Builder<'_> {
@@ -16,7 +17,7 @@ impl Builder<'_> {
         let mut beneath: Vec<Placed> = self.fixed.shapes.iter().map(Placed::from).collect();
         beneath.extend(solids().filter(|s| matches!(s.drive, Drive::Prescribed(_))).map(Solid::placed));
         let mut problems = Vec::new();
-        for solid in &self.bodies {
+        for (k, solid) in self.bodies.iter().enumerate() {
             let Drive::Free(free) = &solid.drive else { continue };
             // What cannot move along gravity does not fall.
             let falls =
@@ -32,15 +33,16 @@ impl Builder<'_> {
             else {
                 continue;
             };
-            problems.push(format!(
-                "body `{}` at {} lies outside of the tank, which spans {} to {} m along {}, with nothing beneath it: \
-                 move its `center` into the tank, or put an obstacle or a plane under it",
+            let message = format!(
+                "body `{}` at {} lies outside of the tank, which spans {} to {} m along {}, with nothing beneath it",
                 solid.name,
                 point(solid.position),
                 min[axis],
                 max[axis],
                 AXES[axis],
-            ));
+            );
+            let remedy = "move its `center` into the tank, or put an obstacle or a plane under it";
+            problems.push(Problem::new(format!("body.{k}.center"), message, remedy));
         }
         self.problems.extend(problems);
     }

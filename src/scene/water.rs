@@ -5,6 +5,7 @@ use super::oriented::Placed;
 use super::placement::point;
 use super::walls::face_name;
 use crate::case;
+use crate::error::Problem;
 use glam::{DVec3, IVec3};
 
 /// The cells that hold water, with the velocity at t = 0.
@@ -85,7 +86,7 @@ impl Water {
         lattice: &Lattice,
         grid: &mut Grid,
         tank: Option<Cells>,
-    ) -> Option<String> {
+    ) -> Option<Problem> {
         let g = gravity.length();
         if g == 0.0 || self.cell.is_empty() {
             return None;
@@ -127,7 +128,7 @@ fn margin(body: &Placed, spacing: f64) -> f64 {
 }
 
 /// The message of a leak: where the path crosses the tank's interior, if there is one.
-fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Option<Cells>) -> String {
+fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Option<Cells>) -> Problem {
     let mut at = end;
     let mut path = vec![queue[at].0];
     while queue[at].1 != usize::MAX {
@@ -136,16 +137,12 @@ fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Optio
     }
     let start = *path.last().unwrap_or(&queue[end].0);
     let Some(tank) = tank else {
-        return format!(
-            "water at {} has nothing that holds it: give a [tank], or set run.gravity to zero for a free drop",
-            point(lattice.center(start))
-        );
+        let message = format!("water at {} has nothing that holds it", point(lattice.center(start)));
+        return Problem::new("tank", message, "give a [tank], or set run.gravity to zero for a free drop");
     };
     if !tank.contains(start) {
-        return format!(
-            "water at {} lies outside of the tank: make the block smaller or the tank larger",
-            point(lattice.center(start))
-        );
+        let message = format!("water at {} lies outside of the tank", point(lattice.center(start)));
+        return Problem::new("fluid.block", message, "make the block smaller or the tank larger");
     }
     // The path runs from its end back to the water.
     let out = path.iter().rev().find(|&&c| !tank.contains(c)).copied();
@@ -153,9 +150,10 @@ fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Optio
         let (axis, c) = (f / 2, out.unwrap_or(queue[end].0));
         if f % 2 == 0 { c[axis] < tank.lo[axis] } else { c[axis] >= tank.hi[axis] }
     });
-    format!(
-        "water can leave through {} at {}: remove that face from tank.open, or put a wall in front of it",
+    let message = format!(
+        "water can leave through {} at {}",
         face.map_or("the tank's side", face_name),
         point(lattice.center(out.unwrap_or(queue[end].0)))
-    )
+    );
+    Problem::new("tank.open", message, "remove that face from tank.open, or put a wall in front of it")
 }

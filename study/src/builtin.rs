@@ -2,8 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, cases, compare, contact_cost, dry_studies, gallery, needs, pressure_size, pressure_solve,
-    stability, wall_of_cubes, work_precision,
+    Study, cases, compare, contact_cost, contact_random, dry_studies, gallery, needs, pressure_size,
+    pressure_solve, stability, wall_of_cubes, work_precision,
 };
 use seixo::error::{Error, Result};
 
@@ -106,12 +106,17 @@ pub const ENTRIES: &[Entry] = &[
         about: "what contact costs a step for 1 to 1000 bodies, on the host and on a device",
         make: Maker::Function(contact_cost::study),
     },
+    Entry {
+        name: "contact-random",
+        about: "random scenes of solids: energy never rises, nothing goes through a wall, the same bits twice",
+        make: Maker::Function(contact_random::study),
+    },
 ];
 
 /// The built-in study `name`; with what the command line adds.
 ///
 /// # Errors
-/// [`Error::Case`] if there is none of that name, or for an override that fits nothing.
+/// [`Error::Usage`] if there is none of that name, or for an override that fits nothing.
 pub fn find(name: &str, setup: &Setup) -> Result<Study> {
     let Some(entry) = ENTRIES.iter().find(|e| e.name == name) else {
         let mut names: Vec<&str> = ENTRIES.iter().map(|e| e.name).collect();
@@ -119,10 +124,9 @@ pub fn find(name: &str, setup: &Setup) -> Result<Study> {
         let hint = names.first().filter(|n| strsim::jaro_winkler(n, name) > 0.8);
         let hint = hint.map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
         names.sort_unstable();
-        return Err(Error::Case(format!(
-            "no study file and no built-in study is called `{name}`{hint}\nbuilt in: {}",
-            names.join(", ")
-        )));
+        let names = names.join(", ");
+        let text = format!("no study file and no built-in study is called `{name}`{hint}\nbuilt in: {names}");
+        return Err(Error::usage("study", text));
     };
     match entry.make {
         Maker::File(file) => {
@@ -130,7 +134,7 @@ pub fn find(name: &str, setup: &Setup) -> Result<Study> {
         }
         Maker::Function(make) if setup.sets.is_empty() => Ok(make(setup)),
         Maker::Function(_) => {
-            Err(Error::Case(format!("`{name}` sets up its own scenes: --set does not apply")))
+            Err(Error::usage("--set", format!("`{name}` sets up its own scenes: --set does not apply")))
         }
     }
 }
@@ -151,7 +155,10 @@ pub fn from_file(name: &str, text: &str, files: &Files, setup: &Setup) -> Result
         (definition.name.clone(), definition.title.clone(), definition.question.clone());
     let finish = Box::new(move |rows: &mut [super::row::Row], wanted| {
         let read = |file: &str| {
-            references.get(file).cloned().ok_or_else(|| Error::Case(format!("no reference `{file}`")))
+            references
+                .get(file)
+                .cloned()
+                .ok_or_else(|| Error::key("error.against", format!("no reference `{file}`"), ""))
         };
         compare::curves(&definition, rows, &read)?;
         let errors: Vec<String> = definition.error.iter().map(|e| e.name()).collect();

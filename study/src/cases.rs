@@ -8,7 +8,7 @@ static CASES: Dir = include_dir!("$CARGO_MANIFEST_DIR/../cases");
 /// The text of `name`, relative to `folder` of the cases (`study`, `validation`, or nothing).
 ///
 /// # Errors
-/// [`Error::Case`] if there is no such file.
+/// [`Error::Usage`] if there is no such file.
 pub fn text(folder: &str, name: &str) -> Result<String> {
     let (mut parts, whole): (Vec<&str>, _) = (Vec::new(), format!("{folder}/{name}"));
     for part in whole.split('/') {
@@ -21,7 +21,7 @@ pub fn text(folder: &str, name: &str) -> Result<String> {
         }
     }
     let text = CASES.get_file(parts.join("/")).and_then(|f| f.contents_utf8());
-    text.map(str::to_owned).ok_or_else(|| Error::Case(format!("`{name}` is not built in")))
+    text.map(str::to_owned).ok_or_else(|| Error::usage("name", format!("`{name}` is not built in")))
 }
 
 /// Names, without `.toml`, of the files of `folder`, sorted.

@@ -83,7 +83,9 @@ impl Manifest {
         let is_file = path.extension().is_some_and(|e| e == "toml");
         let file = if is_file {
             let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
-                std::io::ErrorKind::NotFound => Error::Case(format!("no study file at `{}`", path.display())),
+                std::io::ErrorKind::NotFound => {
+                    Error::usage("study", format!("no study file at `{}`", path.display()))
+                }
                 _ => Error::io(path)(e),
             })?;
             let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -102,9 +104,11 @@ impl Manifest {
 
     fn read(folder: &Path) -> Result<Self> {
         let path = folder.join("study.json");
-        let text = std::fs::read_to_string(&path)
-            .map_err(|_| Error::Case(format!("`{}` holds no study (no study.json)", folder.display())))?;
-        serde_json::from_str(&text).map_err(|e| Error::Case(format!("{}: {e}", path.display())))
+        let text = std::fs::read_to_string(&path).map_err(|_| {
+            Error::usage("collect", format!("`{}` holds no study (no study.json)", folder.display()))
+        })?;
+        serde_json::from_str(&text)
+            .map_err(|e| Error::file(path.display().to_string(), "", format!("{}: {e}", path.display())))
     }
 
     fn write(&self, folder: &Path) -> Result<()> {
@@ -142,11 +146,14 @@ pub fn command(args: &StudyArgs) -> Result<()> {
     let collect = args.what == "collect";
     let (manifest, folders) = if collect {
         let first = args.folders.first().ok_or_else(|| {
-            Error::Case("collect: name the folders to join, e.g. seixo study collect part-1 part-2".into())
+            Error::usage(
+                "collect",
+                "collect: name the folders to join, e.g. seixo study collect part-1 part-2",
+            )
         })?;
         (Manifest::read(first)?, args.folders.clone())
     } else if let Some(extra) = args.folders.first() {
-        return Err(Error::Case(format!("`{}`: only `collect` takes folders", extra.display())));
+        return Err(Error::usage("study", format!("`{}`: only `collect` takes folders", extra.display())));
     } else {
         (Manifest::new(args)?, Vec::new())
     };

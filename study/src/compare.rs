@@ -31,7 +31,7 @@ pub fn table(name: &str, text: &str) -> Result<Vec<[f64; 2]>> {
         })
         .collect();
     if rows.len() < 2 {
-        return Err(Error::Case(format!("{name}: expected two columns of numbers")));
+        return Err(Error::file(name, "", format!("{name}: expected two columns of numbers")));
     }
     Ok(rows)
 }

@@ -3,7 +3,7 @@
 use super::engine::Processor;
 use seixo::backend::gpu::Gpu;
 use seixo::backend::{self, Backend};
-use seixo::error::{Error, Result};
+use seixo::error::{GpuError, Result};
 use seixo::params::Params;
 use seixo::plan::Plan;
 use seixo::pressure::Settings;
@@ -27,7 +27,7 @@ impl Computers {
     /// A backend on `processor`. Drivers are asked only when the first point wants a GPU.
     ///
     /// # Errors
-    /// [`Error::Gpu`] without one, or what the backend says.
+    /// [`seixo::Error::Gpu`] without one, or what the backend says.
     pub fn backend(
         &self,
         processor: Processor,
@@ -39,9 +39,10 @@ impl Computers {
         let usable = || *self.hardware.get_or_init(|| self.named || Gpu::hardware_available());
         match processor {
             Processor::Cpu => backend::Processor::Cpu.open(scene, params, plan, settings),
-            Processor::Gpu if !usable() => Err(Error::Gpu(
+            Processor::Gpu if !usable() => Err(GpuError::NoAdapter(
                 "no hardware GPU; a software adapter is taken only if named with --adapter".into(),
-            )),
+            )
+            .into()),
             Processor::Gpu => self.gpu.open(scene, params, plan, settings),
         }
     }

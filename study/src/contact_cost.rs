@@ -38,7 +38,7 @@ pub fn backend<B>(
 ) -> Result<B> {
     let (l0, dimensions) = (scene.spacing, scene.dimensions);
     let text = format!("[run]\nspacing = {l0:?}\ntime_step = 1e-3\nend = 1.0\ndimensions = {dimensions}\n");
-    let mut case: Case = toml::from_str(&text).map_err(|e| Error::Case(e.to_string()))?;
+    let mut case: Case = toml::from_str(&text).map_err(|e| Error::file("case", "", e.to_string()))?;
     case.contact = Some(Contact { device: ContactDevice::Gpu, ..contact.clone() });
     let params = Params::new(&case, scene)?;
     let plan = Plan::new(&case, scene, &params);
@@ -110,7 +110,7 @@ fn measure(law: Law, bodies: usize, context: &Context) -> Result<Measured> {
     // Without a device the host alone is measured.
     let (mut gpu, missing) = match made {
         Ok(gpu) => (Some(gpu), None),
-        Err(Error::Gpu(why)) => (None, Some(why)),
+        Err(Error::Gpu(why)) => (None, Some(why.to_string())),
         Err(e) => return Err(e),
     };
     let threads = rayon::current_num_threads();

@@ -176,7 +176,9 @@ pub fn files_of(folder: &Path) -> impl Fn(&str) -> Result<String> {
     move |name| {
         let path = folder.join(name);
         std::fs::read_to_string(&path).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => Error::Case(format!("no file at `{}`", path.display())),
+            std::io::ErrorKind::NotFound => {
+                Error::file(path.display().to_string(), "", format!("no file at `{}`", path.display()))
+            }
             _ => Error::io(&path)(e),
         })
     }
@@ -207,7 +209,11 @@ impl Axis {
         }
         if picks.is_empty() {
             let name = &self.name;
-            return Err(Error::Case(format!("axis `{name}`: give `key` with `values`, or `choices`")));
+            return Err(Error::key(
+                "axis",
+                format!("axis `{name}`: give `key` with `values`, or `choices`"),
+                "",
+            ));
         }
         Ok(picks)
     }
@@ -219,29 +225,32 @@ impl Definition {
     /// # Errors
     /// [`Error::Case`] with line and column.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
-        let study: Self = toml::from_str(text).map_err(|e| Error::Case(format!("{name}: {e}")))?;
+        let wrong =
+            |key: &str, what: &dyn std::fmt::Display| Error::file(name, key, format!("{name}: {what}"));
+        let study: Self = toml::from_str(text).map_err(|e| wrong("", &e))?;
         for e in &study.error {
             let whole =
                 matches!((&e.value, &e.curve, &e.against), (Some(_), None, None) | (None, Some(_), Some(_)));
             if !whole {
-                return Err(Error::Case(format!("{name}: error: give `value`, or `curve` and `against`")));
+                return Err(wrong("error", &"error: give `value`, or `curve` and `against`"));
             }
         }
         for check in &study.check {
-            check.sound().map_err(|e| Error::Case(format!("{name}: {e}")))?;
+            check.sound().map_err(|e| wrong("check", &e))?;
         }
         if study.error.is_empty() && study.check.is_empty() {
-            return Err(Error::Case(format!("{name}: give [[error]] or [[check]]: what is to be found out")));
+            return Err(wrong("check", &"give [[error]] or [[check]]: what is to be found out"));
         }
         let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
         if study.name.is_empty() || study.name.starts_with('.') || !study.name.chars().all(plain) {
-            return Err(Error::Case(format!(
-                "{name}: name: `{}` becomes the name of files: use letters, digits, _, - and dots inside of it",
+            let what = format!(
+                "name: `{}` becomes the name of files: use letters, digits, _, - and dots inside of it",
                 study.name.escape_debug()
-            )));
+            );
+            return Err(wrong("name", &what));
         }
         if study.case.is_some() == study.text.is_some() {
-            return Err(Error::Case(format!("{name}: give `case` or `text`, one of them")));
+            return Err(wrong("case", &"give `case` or `text`, one of them"));
         }
         Ok(study)
     }
@@ -254,7 +263,7 @@ impl Definition {
         match (&self.text, &self.case) {
             (Some(text), _) => Ok(text.clone()),
             (None, Some(case)) => files(case),
-            (None, None) => Err(Error::Case(format!("study `{}` has no case", self.name))),
+            (None, None) => Err(Error::key("case", format!("study `{}` has no case", self.name), "")),
         }
     }
 
@@ -318,7 +327,7 @@ impl Definition {
             let steps = run.end / run.time_step;
             steps * run.spacing.powi(-(run.dimensions as i32))
         });
-        let effective = parsed.map(|(_, text, _)| text);
+        let effective = parsed.map(|(_, text, _)| text).map_err(|e| e.to_string());
         let parameters = picks.iter().map(|p| (p.axis.clone(), p.name.clone())).collect();
         let identity = match &effective {
             Ok(text) => format!("{text}\n{:?} {processor:?} {:?}", self.measure, self.limit),
@@ -333,7 +342,7 @@ impl Definition {
             task: Box::new(move |context| {
                 let text = match &effective {
                     Ok(text) => text.clone(),
-                    Err(error) => return Err(Error::Case(error.to_string())),
+                    Err(error) => return Err(Error::file("case", "", error)),
                 };
                 let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
                 limits.iter().for_each(|(name, most)| out.limit(name, *most));

@@ -8,7 +8,7 @@ use super::row::{FORMAT, Measured, Row, hash};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::console::remark;
-use seixo::error::{Error, Result};
+use seixo::error::{Error, GpuError, Result};
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::plan::Plan;
@@ -46,7 +46,7 @@ pub fn cpu_only(
 ) -> Result<Box<dyn Backend>> {
     match processor {
         Processor::Cpu => Ok(Box::new(Cpu::new(scene, params, plan, settings)?)),
-        Processor::Gpu => Err(Error::Gpu("no GPU adapter to compute on".into())),
+        Processor::Gpu => Err(GpuError::NoAdapter("no GPU adapter to compute on".into()).into()),
     }
 }
 
@@ -250,7 +250,7 @@ mod tests {
                 calls.fetch_add(1, Relaxed);
                 match k {
                     1 => panic!("on purpose"),
-                    2 => Err(Error::Case("no such thing".into())),
+                    2 => Err(Error::usage("k", "no such thing")),
                     _ => {
                         let mut m = Measured::default();
                         m.put("third [-]", k as f64 / 3.0);

@@ -67,7 +67,7 @@ pub fn faults(simulation: &mut Simulation) -> Result<Vec<String>> {
 fn play(extreme: &Extreme, processor: Processor, context: &Context) -> Result<(End, Measured)> {
     let mut out = Measured::default();
     let refused = |error: Error, out| match error {
-        Error::Case(text) => Ok((End::Refused(text), out)),
+        refusal if refusal.exit_code() == 2 => Ok((End::Refused(refusal.to_string()), out)),
         other => Err(other),
     };
     let scene = parse(extreme.name, extreme.text.clone(), &extreme.sets)

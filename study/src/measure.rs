@@ -92,7 +92,9 @@ impl Sampler {
         let has = |m| spec.of.contains(&m);
         let case = &simulation.case;
         let block = case.fluid.as_ref().and_then(|f| f.block.first());
-        let needs = |what: &str| Error::Case(format!("this study measures what the case lacks: {what}"));
+        let needs = |what: &str| {
+            Error::key("measure", format!("this study measures what the case lacks: {what}"), "")
+        };
         let dry = [Measure::BodyHeight, Measure::Bodies, Measure::Gauges, Measure::Fluid];
         if block.is_none() && spec.of.iter().any(|m| !dry.contains(m)) {
             return Err(needs("a fluid.block"));

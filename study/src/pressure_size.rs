@@ -181,7 +181,7 @@ fn on_device(moment: &Moment, kind: Preconditioner, tolerance: f64, context: &Co
     let report = gpu.solve_pressure(&moment.step)?;
     out.timing = Timing::of(vec![clock.elapsed().as_secs_f64()]);
     let x = gpu.solution()?;
-    let x = x.ok_or_else(|| Error::Gpu("the device keeps no solution before the bounds".into()))?;
+    let x = x.ok_or_else(|| Error::gpu("the device keeps no solution before the bounds"))?;
     describe(&mut out, moment, report.unknowns, kind, report.iterations);
     out.put("true residual in f32 [-]", report.residual);
     out.put("true residual [-]", residual_in_double(moment, &system, &x)?);

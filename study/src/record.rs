@@ -119,7 +119,11 @@ impl Recorder {
     pub fn new(spec: &Spec, simulation: &Simulation, scene: &Scene) -> Result<Self> {
         let has = |m| spec.of.contains(&m);
         if let Some(p) = spec.profile.iter().find(|p| p.bins == 0) {
-            return Err(Error::Case(format!("measure.profile `{}`: give 1 bin or more", p.name)));
+            return Err(Error::key(
+                "measure.profile.bins",
+                format!("measure.profile `{}`: give 1 bin or more", p.name),
+                "",
+            ));
         }
         let sums = |p: &Profile| Sums { profile: p.clone(), bins: vec![[0.0; 3]; p.bins] };
         Ok(Self {

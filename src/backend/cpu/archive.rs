@@ -75,7 +75,7 @@ impl Cpu {
         let sorted = kind.iter().take(count).all(|&k| k == Kind::Fluid);
         if !archive.is_saving() {
             if !sorted || id.iter().any(|&i| i as usize >= groups.fluid) {
-                return Err(Error::Case("the checkpoint's particles are out of order".into()));
+                return Err(Error::damaged("the checkpoint's particles are out of order"));
             }
             *live = count;
         }
@@ -95,7 +95,7 @@ fn codes<T: Copy>(
     archive.array(name, &mut bytes, true)?;
     for (value, byte) in values.iter_mut().zip(bytes) {
         *value = from(byte)
-            .ok_or_else(|| Error::Case(format!("the checkpoint's `{name}` holds a code {byte}")))?;
+            .ok_or_else(|| Error::damaged(format!("the checkpoint's `{name}` holds a code {byte}")))?;
     }
     Ok(())
 }
@@ -112,7 +112,7 @@ fn lists(archive: &mut Archive, neighbours: &mut Neighbours, slots: usize) -> Re
     if archive.is_saving() {
         return Ok(());
     }
-    let wrong = || Error::Case("the checkpoint's neighbour lists are damaged".into());
+    let wrong = || Error::damaged("the checkpoint's neighbour lists are damaged");
     let (mut starts, mut ends, mut rest) = (&start[..], &dummies[..], &neighbour[..]);
     for chunk in chunks {
         let rows = chunk.rows();

@@ -1,7 +1,7 @@
 //! Adapters: what the machine has, which one a run takes, what is asked of it.
 
 use super::layout::Memory;
-use crate::error::{Error, Result};
+use crate::error::{GpuError, Result};
 use serde::Serialize;
 
 /// A device that wgpu can drive.
@@ -79,7 +79,7 @@ pub fn adapters() -> Vec<AdapterInfo> {
 pub(super) fn choose(asked: Option<&str>) -> Result<(wgpu::Adapter, AdapterInfo)> {
     let mut found = enumerate();
     if found.is_empty() {
-        return Err(Error::Gpu(NO_ADAPTER.into()));
+        return Err(GpuError::NoAdapter(NO_ADAPTER.into()).into());
     }
     let k = match asked {
         None => 0,
@@ -90,7 +90,10 @@ pub(super) fn choose(asked: Option<&str>) -> Result<(wgpu::Adapter, AdapterInfo)
             number.or_else(named).ok_or_else(|| {
                 let names: Vec<_> =
                     found.iter().enumerate().map(|(k, (_, i))| format!("{k}: {}", i.name)).collect();
-                Error::Gpu(format!("no adapter is called \"{asked}\"; there is {}", names.join(", ")))
+                GpuError::NoAdapter(format!(
+                    "no adapter is called \"{asked}\"; there is {}",
+                    names.join(", ")
+                ))
             })?
         }
     };
@@ -114,22 +117,24 @@ pub(super) fn limits(memory: &Memory, have: &wgpu::Limits, name: &str) -> Result
         ("max_buffer_size", &mut ask.max_buffer_size, have.max_buffer_size),
     ] {
         if bytes > available {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{largest} needs a buffer of {}, but {name} allows {} ({what}); use a larger run.spacing, another \
                  adapter or --backend cpu",
                 megabytes(bytes),
                 megabytes(available)
-            )));
+            );
+            return Err(GpuError::TooSmall { limit: what, needs: bytes, has: Some(available), text }.into());
         }
         *limit = (*limit).max(bytes).min(available);
     }
     let groups = u64::from(have.max_compute_workgroups_per_dimension);
     if memory.workgroups > groups {
-        return Err(Error::Gpu(format!(
-            "a kernel needs {} workgroups, but {name} allows {groups} (max_compute_workgroups_per_dimension); use a \
-             larger run.spacing, a smaller run.domain or --backend cpu",
-            memory.workgroups
-        )));
+        let (limit, needs) = ("max_compute_workgroups_per_dimension", memory.workgroups);
+        let text = format!(
+            "a kernel needs {needs} workgroups, but {name} allows {groups} ({limit}); use a larger run.spacing, a \
+             smaller run.domain or --backend cpu"
+        );
+        return Err(GpuError::TooSmall { limit, needs, has: Some(groups), text }.into());
     }
     Ok(ask)
 }
@@ -140,6 +145,7 @@ mod tests {
     use super::super::layout::Allocation;
     use super::*;
     use crate::compute::Host;
+    use crate::error::Error;
 
     fn memory(bytes: u64, workgroups: u64) -> Memory {
         let id = buffers::neighbour_list.id();
@@ -149,7 +155,15 @@ mod tests {
     #[test]
     fn what_an_adapter_lacks_is_named() {
         let have = wgpu::Limits::default();
-        let text = |m: &Memory| limits(m, &have, "small").expect_err("too large").to_string();
+        let refusal = |m: &Memory| limits(m, &have, "small").expect_err("too large");
+        let text = |m: &Memory| refusal(m).to_string();
+        match refusal(&memory(300 << 20, 1)) {
+            Error::Gpu(GpuError::TooSmall { limit, needs, has, .. }) => {
+                assert_eq!((limit, needs), ("max_storage_buffer_binding_size", 300 << 20));
+                assert_eq!(has, Some(have.max_storage_buffer_binding_size));
+            }
+            other => panic!("{other:?}"),
+        }
         let large = text(&memory(300 << 20, 1));
         for part in ["neighbour_list", "315 MB", "134 MB", "max_storage_buffer_binding_size", "--backend cpu"]
         {

@@ -107,7 +107,7 @@ impl Gpu {
         archive.array(name, &mut values, false)?;
         if values.len() != count {
             let have = values.len();
-            return Err(Error::Case(format!("the checkpoint holds {have} of `{name}`, the case {count}")));
+            return Err(Error::misfit(format!("the checkpoint holds {have} of `{name}`, the case {count}")));
         }
         self.context.upload(buffer, &values)
     }
@@ -131,7 +131,7 @@ impl Gpu {
         }
         let fits = packed.len() == total && (0..rows).all(|i| near(i) <= capacity);
         if !fits || packed.iter().any(|&j| j as usize >= self.groups.total()) {
-            return Err(Error::Case("the checkpoint's neighbour lists are damaged".into()));
+            return Err(Error::damaged("the checkpoint's neighbour lists are damaged"));
         }
         let mut list = vec![0_u32; capacity * rows];
         let mut next = packed.into_iter();

@@ -17,7 +17,7 @@ const COPIES: u32 = 8;
 pub fn bandwidth(adapter: Option<&str>) -> Result<f64> {
     let (adapter, info) = adapter::choose(adapter)?;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))
-        .map_err(|e| Error::Gpu(format!("{}: {e}", info.name)))?;
+        .map_err(|e| Error::gpu(format!("{}: {e}", info.name)))?;
     let scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor {
@@ -30,7 +30,7 @@ pub fn bandwidth(adapter: Option<&str>) -> Result<f64> {
     let from = buffer(wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST);
     let to = buffer(wgpu::BufferUsages::COPY_DST);
     if let Some(e) = pollster::block_on(scope.pop()) {
-        return Err(Error::Gpu(format!("{}: {e}", info.name)));
+        return Err(Error::gpu(format!("{}: {e}", info.name)));
     }
     let copy = |count: u32| {
         let mut encoder = device.create_command_encoder(&Default::default());
@@ -41,7 +41,7 @@ pub fn bandwidth(adapter: Option<&str>) -> Result<f64> {
         queue.submit([encoder.finish()]);
         device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| Error::Gpu(format!("{}: {e}", info.name)))?;
+            .map_err(|e| Error::gpu(format!("{}: {e}", info.name)))?;
         Ok::<f64, Error>(start.elapsed().as_secs_f64())
     };
     // New buffers are cleared first.

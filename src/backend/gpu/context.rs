@@ -6,7 +6,7 @@ use super::layout::{Allocation, Memory};
 use super::shader;
 use crate::backend::Commands;
 use crate::compute::{Host, Id, Kernel, Program};
-use crate::error::{Error, Result};
+use crate::error::{Error, GpuError, Result};
 use crate::plan::Stage;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -97,14 +97,15 @@ impl Context {
         let mail = create("mail", MAIL, Usage::COPY_SRC | Usage::COPY_DST);
         let invalid = pollster::block_on(wrong.pop());
         if let Some(e) = pollster::block_on(full.pop()) {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{} has no {:.0} MB left for this scene ({e}); use a larger run.spacing or --backend cpu",
                 info.name,
                 memory.total() as f64 / 1e6
-            )));
+            );
+            return Err(no_room(memory.total(), text));
         }
         if let Some(e) = invalid {
-            return Err(Error::Gpu(format!("buffers: {e}")));
+            return Err(Error::gpu(format!("buffers: {e}")));
         }
 
         let mut context = Self {
@@ -150,7 +151,7 @@ impl Context {
         for entry in shader::entries(file, source)? {
             let name = format!("{file}.{}", entry.name);
             let listed = program.kernels.iter().find(|k| k.entry == entry.name);
-            let kernel = *listed.ok_or_else(|| Error::Gpu(format!("{name} is in no list of kernels")))?;
+            let kernel = *listed.ok_or_else(|| Error::gpu(format!("{name} is in no list of kernels")))?;
             let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&name),
                 layout: None,
@@ -165,7 +166,7 @@ impl Context {
             });
             let find = |field: &str| {
                 let found = self.buffers.keys().find(|id| id.name() == field).copied();
-                found.ok_or_else(|| Error::Gpu(format!("{name} binds {field}, which the plan leaves out")))
+                found.ok_or_else(|| Error::gpu(format!("{name} binds {field}, which the plan leaves out")))
             };
             let bound = entry.bindings.iter().map(|b| Ok((b.number, find(&b.name)?)));
             let bound = bound.collect::<Result<Vec<_>>>()?;
@@ -173,7 +174,7 @@ impl Context {
             self.pipelines.insert(kernel, Pipeline { pipeline, group, bound });
         }
         match pollster::block_on(scope.pop()) {
-            Some(e) => Err(Error::Gpu(format!("shaders/{file}.wgsl on {}: {e}", self.info.name))),
+            Some(e) => Err(Error::gpu(format!("shaders/{file}.wgsl on {}: {e}", self.info.name))),
             None => Ok(()),
         }
     }
@@ -207,13 +208,15 @@ impl Context {
         let limits = self.device.limits();
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         if bytes > most {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{name} needs a buffer of {:.0} MB, but {} was asked for {:.0} MB at most; use contact.device = \
                  \"host\"",
                 bytes as f64 / 1e6,
                 self.info.name,
                 most as f64 / 1e6
-            )));
+            );
+            let limit = "max_storage_buffer_binding_size";
+            return Err(GpuError::TooSmall { limit, needs: bytes, has: Some(most), text }.into());
         }
         // What is recorded still means the old one.
         self.submit();
@@ -230,11 +233,12 @@ impl Context {
         let larger = (usage.contains(wgpu::BufferUsages::COPY_SRC) && wanted > staging)
             .then(|| create("staging", wanted, self.staging.usage()));
         if let Some(e) = pollster::block_on(scope.pop()) {
-            return Err(Error::Gpu(format!(
+            let text = format!(
                 "{} has no {:.0} MB left for {name} ({e}); use contact.device = \"host\"",
                 self.info.name,
                 size as f64 / 1e6
-            )));
+            );
+            return Err(no_room(size, text));
         }
         self.bytes += size - have;
         if let Some(larger) = larger {
@@ -277,11 +281,11 @@ impl Context {
     /// An error if the driver has complained.
     pub fn check(&self) -> Result<()> {
         let fault = self.fault.lock().ok().and_then(|f| f.clone());
-        fault.map_or(Ok(()), |what| Err(Error::Gpu(format!("{}: {what}", self.info.name))))
+        fault.map_or(Ok(()), |what| Err(Error::gpu(format!("{}: {what}", self.info.name))))
     }
 
     pub(super) fn buffer(&self, id: Id) -> Result<&wgpu::Buffer> {
-        let missing = || Error::Gpu(format!("there is no buffer {}: the plan leaves it out", id.name()));
+        let missing = || Error::gpu(format!("there is no buffer {}: the plan leaves it out", id.name()));
         self.buffers.get(&id).ok_or_else(missing)
     }
 
@@ -314,7 +318,7 @@ impl Context {
         let mut pass = encoder.begin_compute_pass(&Default::default());
         for (kernel, groups) in kernels {
             let Kernel { file, entry, .. } = kernel;
-            let missing = || Error::Gpu(format!("there is no kernel {file}.{entry}: the plan leaves it out"));
+            let missing = || Error::gpu(format!("there is no kernel {file}.{entry}: the plan leaves it out"));
             let Pipeline { pipeline, group, .. } = pipelines.get(&kernel).ok_or_else(missing)?;
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
@@ -336,4 +340,9 @@ impl Context {
         self.record().copy_buffer_to_buffer(&source, first, &target, 0, bytes);
         Ok(())
     }
+}
+
+/// The device's memory is full.
+fn no_room(needs: u64, text: String) -> Error {
+    GpuError::TooSmall { limit: "memory", needs, has: None, text }.into()
 }

@@ -109,7 +109,7 @@ impl Context {
             return Ok(());
         }
         self.wait()?;
-        let lost = |e: String| Error::Gpu(format!("{}: reading back failed: {e}", self.info.name));
+        let lost = |e: String| Error::gpu(format!("{}: reading back failed: {e}", self.info.name));
         let mut read = Vec::with_capacity(wanted.len());
         for _ in &wanted {
             receive.try_recv().map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
@@ -136,7 +136,7 @@ impl Context {
         self.commands.waits += 1;
         let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
         self.check()?;
-        polled.map_err(|e| Error::Gpu(format!("{}: {e}", self.info.name)))?;
+        polled.map_err(|e| Error::gpu(format!("{}: {e}", self.info.name)))?;
         Ok(())
     }
 }

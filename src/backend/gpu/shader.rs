@@ -109,11 +109,11 @@ fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> String {
 pub fn entries(file: &str, source: &str) -> Result<Vec<Entry>> {
     let path = format!("shaders/{file}.wgsl");
     let module = naga::front::wgsl::parse_str(source)
-        .map_err(|e| Error::Gpu(e.emit_to_string_with_path(source, &path)))?;
+        .map_err(|e| Error::gpu(e.emit_to_string_with_path(source, &path)))?;
     let info =
         naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
             .validate(&module)
-            .map_err(|e| Error::Gpu(e.emit_to_string_with_path(source, &path)))?;
+            .map_err(|e| Error::gpu(e.emit_to_string_with_path(source, &path)))?;
     let bindings = |k: usize| {
         let used = info.get_entry_point(k);
         let bound = |(handle, variable): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {

@@ -66,7 +66,7 @@ impl Gpu {
     pub(super) fn write_fields(&mut self, fields: &Fields) -> Result<()> {
         let g = self.groups;
         if fields.position.len() != g.total() || fields.pressure.len() != g.pressure() {
-            return Err(Error::Gpu("the fields are those of another scene".into()));
+            return Err(Error::gpu("the fields are those of another scene"));
         }
         let position = packed(&fields.position, self.middle, |i| f32::from(fields.kind[i] as u8));
         let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| id as f32);

@@ -53,8 +53,8 @@ impl Paper {
     /// [`Error::Case`] if the case gives a restitution.
     pub fn new(contact: &case::Contact, scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Result<Self> {
         let Damping::Coefficient(damping) = limits.damping else {
-            let text = "contact.restitution: needs law = \"smooth\"; give damping or damping_ratio";
-            return Err(Error::Case(text.into()));
+            let message = "contact.restitution: needs law = \"smooth\"";
+            return Err(Error::key("contact.restitution", message, "give damping or damping_ratio"));
         };
         let lists = Lists::new(scene);
         let layers = bodies.iter().zip(&lists.layers);

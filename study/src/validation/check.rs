@@ -127,7 +127,8 @@ pub fn columns(file: &str, text: &str, names: Option<&[String; 2]>) -> Result<Cu
     let place = |k: usize| match names {
         None => Ok(k),
         Some(names) => head.iter().position(|h| *h == names[k]).ok_or_else(|| {
-            Error::Case(format!("{file}: no column `{}`; there are: {}", names[k], head.join(", ")))
+            let text = format!("{file}: no column `{}`; there are: {}", names[k], head.join(", "));
+            Error::file(file, names[k].as_str(), text)
         }),
     };
     let (x, y) = (place(0)?, place(1)?);
@@ -138,7 +139,7 @@ pub fn columns(file: &str, text: &str, names: Option<&[String; 2]>) -> Result<Cu
         })
         .collect();
     if curve.len() < 2 {
-        return Err(Error::Case(format!("{file}: expected two rows of numbers or more")));
+        return Err(Error::file(file, "", format!("{file}: expected two rows of numbers or more")));
     }
     Ok(curve)
 }
@@ -149,7 +150,7 @@ impl Check {
     /// # Errors
     /// [`Error::Case`] naming the check.
     pub fn sound(&self) -> Result<()> {
-        let wrong = |what: &str| Err(Error::Case(format!("check `{}`: {what}", self.name)));
+        let wrong = |what: &str| Err(Error::key("check", format!("check `{}`: {what}", self.name), ""));
         if self.value.is_some() == self.curve.is_some() {
             return wrong("give `value` or `curve`, one of them");
         }

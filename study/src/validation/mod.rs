@@ -55,7 +55,7 @@ impl Suite {
             if name.ends_with(".toml") {
                 let path = Path::new(name);
                 let text = std::fs::read_to_string(path)
-                    .map_err(|e| Error::Case(format!("validation file `{name}`: {e}")))?;
+                    .map_err(|e| Error::usage("validate", format!("validation file `{name}`: {e}")))?;
                 let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
                 suite.add(name, &text, &files_of(folder), setup)?;
             } else if all.contains(&name.as_str()) {
@@ -66,10 +66,8 @@ impl Suite {
                     .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
                 let hint = closest.filter(|n| strsim::jaro_winkler(n, name) > 0.8);
                 let hint = hint.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
-                return Err(Error::Case(format!(
-                    "no validation is called `{name}`{hint}\nthere are: {}",
-                    all.join(", ")
-                )));
+                let text = format!("no validation is called `{name}`{hint}\nthere are: {}", all.join(", "));
+                return Err(Error::usage("validate", text));
             }
         }
         if names.is_empty() {
@@ -86,10 +84,10 @@ impl Suite {
     fn add(&mut self, name: &str, text: &str, files: &Files, setup: &Setup) -> Result<()> {
         let definition = Definition::parse(name, text)?;
         if definition.check.is_empty() {
-            return Err(Error::Case(format!("{name}: a validation needs a [[check]]")));
+            return Err(Error::file(name, "check", format!("{name}: a validation needs a [[check]]")));
         }
         let references = definition.check.iter().map(|c| c.read(files)).collect::<Result<Vec<_>>>();
-        let references = references.map_err(|e| Error::Case(format!("{name}: {e}")))?;
+        let references = references.map_err(|e| Error::file(name, "check", format!("{name}: {e}")))?;
         let first = self.jobs.len();
         for mut job in definition.jobs(files, setup)? {
             job.parameters.insert(0, ("case".into(), definition.name.clone()));
