@@ -57,6 +57,7 @@
 //! | multigrid preconditioner | [`kernels::multigrid`], [`kernels::multigrid_levels`] | `twins`, study `pressure-size` |
 //! | pressure gradient (9) | [`kernels::pressure_gradient`] | `fluid` |
 //! | correction of v and r | [`kernels::correct`] | `twins`, `fluid` |
+//! | spacing of particles | [`kernels::shift`] | `twins`, `kernels` |
 //! | force on solids | [`kernels::body_force`] | `immersed` |
 //! | contact (10) to (16), friction (20), (21) | [`contact`] | `contact`, `contact_device` |
 //! | motion of bodies | [`body`] | `contact` |
