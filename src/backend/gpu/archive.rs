@@ -23,7 +23,8 @@ const SAVED: [&str; 9] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 36] = [
+const MADE_ANEW: [&str; 39] = [
+    "imbalance",
     "source_diagonal",
     "preconditioned",
     "residual",
@@ -58,6 +59,8 @@ const MADE_ANEW: [&str; 36] = [
     "wall_layer",
     "force_chunk",
     "wrench",
+    "free_body",
+    "coupling",
     "monitor_sum",
     "speed_bin",
 ];
