@@ -115,9 +115,10 @@ fn a_wall_under_pressure_feels_it_where_water_can_be() {
 
 #[test]
 fn the_viscous_force_on_a_floor_is_the_momentum_that_the_water_loses() {
+    // So soft a water (alpha) that its pressure, whose gradient does not keep momentum, has no reach in such short steps.
     let case = case(
         "[run]\nspacing = 0.02\ntime_step = 1e-5\nend = 1.0\ngravity = [0, 0, 0]\n\
-         [fluid]\nviscosity = 0.05\nsound_speed = 2\n\
+         [fluid]\nviscosity = 0.05\nsound_speed = 2\ncompressibility = 1e-9\n\
          [[fluid.block]]\nmin = [0.2, 0.2, 0]\nmax = [0.4, 0.4, 0.1]\nvelocity = [0.5, 0, 0]\n\
          [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.6, 0.3]\nopen = [\"z_max\"]\n\
          [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
