@@ -155,8 +155,8 @@ impl Checker<'_> {
             }
         }
         let flat = self.flat();
-        if flat && body.shape == BodyShape::Sphere {
-            let message = format!("body `{}`: there are no spheres in two dimensions", body.name);
+        if flat && body.shape.needs_space() {
+            let message = format!("body `{}`: there are no {name}s in two dimensions", body.name);
             self.add(
                 path("shape"),
                 message,
@@ -164,7 +164,7 @@ impl Checker<'_> {
             );
         }
         if let Some(axis) = body.axis {
-            if body.shape != BodyShape::Cylinder {
+            if !body.shape.has_axis() {
                 let message = format!("body `{}` is a {name}: it has no `axis`", body.name);
                 self.add(path("axis"), message, "remove `axis`; `orientation` turns a body");
             } else if length(&axis) == 0.0 {

@@ -29,6 +29,16 @@ impl BodyShape {
             Self::Cylinder => ("cylinder", &["radius", "height"]),
         }
     }
+
+    /// Whether a body of it has an `axis`.
+    pub(super) fn has_axis(self) -> bool {
+        matches!(self, Self::Cylinder)
+    }
+
+    /// Whether there is none of it in two dimensions.
+    pub(super) fn needs_space(self) -> bool {
+        matches!(self, Self::Sphere)
+    }
 }
 
 impl Body {

@@ -4,6 +4,7 @@ use super::buffers::TABLE;
 use super::hierarchy::Levels;
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
+pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
 use crate::kernels::body_force::missing_head;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
@@ -14,10 +15,6 @@ use crate::scene::{Groups, Scene};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-/// Threads of a workgroup; `WORKGROUP` in shaders/common.wgsl.
-pub const WORKGROUP: u64 = 256;
-/// Threads of a workgroup of the monitor; `WIDTH` in shaders/monitor.wgsl.
-pub const MONITOR_WIDTH: u64 = 128;
 /// Workgroups that share a reduction at most: every one of them adds the sums of all others.
 const REDUCTION_GROUPS_MAX: u64 = 1024;
 /// Keys of a scan that a workgroup takes at a time: four a thread.
