@@ -50,6 +50,7 @@ impl Solids {
             contact,
             candidates,
             planned,
+            substep,
         } = self;
         let Limits {
             spring: _,
@@ -70,6 +71,7 @@ impl Solids {
         archive.number("solids.planned_omega_dt", &mut omega_dt)?;
         archive.small("solids.planned_substeps", &mut substeps)?;
         *planned = Some((dt, Cut { substeps, omega_dt })).filter(|p| p.0 > 0.0);
+        archive.number("solids.substep", substep)?;
         let mut now: Vec<[f64; POSE]> = bodies.iter().map(|b| numbers(&b.pose)).collect();
         let mut momenta: Vec<DVec3> = bodies.iter().map(|b| b.momentum).collect();
         let mut wrenches: Vec<[DVec3; 2]> = contact.iter().map(|w| [w.force, w.torque]).collect();

@@ -67,6 +67,8 @@ pub struct Solids {
     load: Vec<Wrench>,
     /// Time step [s] and how it is cut, as last planned.
     planned: Option<(f64, Cut)>,
+    /// Sub-step [s] of the last step; 0 before the first.
+    substep: f64,
 }
 
 impl Solids {
@@ -103,6 +105,7 @@ impl Solids {
             traffic: Traffic::default(),
             limits,
             planned: None,
+            substep: 0.0,
         })
     }
 
@@ -195,6 +198,7 @@ impl Solids {
         let substeps = self.hurry(cut, t, dt)?;
         let mut report = ContactReport { substeps, omega_dt: cut.omega_dt, ..ContactReport::default() };
         let h = dt / f64::from(report.substeps);
+        self.substep = h;
         let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
         for body in &mut self.bodies {
             if let Some(velocity) = body.prescribed_velocity(t, dt) {

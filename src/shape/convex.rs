@@ -24,7 +24,7 @@ const GAUSS_8: [(f64, f64); 4] = [
 const AROUND: usize = 24;
 
 /// Where `f` changes its sign between `a` and `b`: false position with halved ends (Illinois), to round-off.
-fn root(mut a: (f64, f64), mut b: (f64, f64), mut f: impl FnMut(f64) -> f64) -> f64 {
+pub(crate) fn root(mut a: (f64, f64), mut b: (f64, f64), mut f: impl FnMut(f64) -> f64) -> f64 {
     let mut side = 0;
     for _ in 0..60 {
         let mut x = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);

@@ -10,7 +10,7 @@ mod disc;
 mod sphere;
 mod surface;
 
-pub(crate) use convex::{along, around};
+pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;
 pub(crate) use cuboid::{ALL_FACES, face_normal};
 pub use cylinder::Cylinder;

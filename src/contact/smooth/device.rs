@@ -1,7 +1,7 @@
 //! The smooth law on a device: what shaders/contact_smooth.wgsl is given, and what becomes of its answers.
 
+use super::Smooth;
 use super::pair::{Contact, DeviceSums, Other, Pair, Patch};
-use super::{Smooth, set_constants};
 use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
 use crate::contact::candidates::{Candidates, MANY_PAIRS};
@@ -240,10 +240,10 @@ impl Pairs {
     }
 
     /// Constants of every pair for sub-steps of `h` [s].
-    pub fn set_constants(&mut self, model: &Smooth, limits: &Limits, bodies: &[Body], spacing: f64, h: f64) {
+    pub fn set_constants(&mut self, model: &Smooth, limits: &Limits, bodies: &[Body], h: f64) {
         let wanted = Some((h, limits.longest_step));
         if self.constants != wanted {
-            set_constants(&mut self.pairs, &model.surfaces, limits, bodies, spacing, h);
+            model.set_constants(&mut self.pairs, limits, bodies, h);
             (self.constants, self.sent) = (wanted, false);
         }
     }

@@ -3,8 +3,12 @@
 
 use super::Smooth;
 use super::pair::{Other, Pair};
+use super::walls::WallBox;
+use crate::body::Body;
+use crate::contact::candidates::reduced_mass;
 use crate::contact::law::{Fault, Now};
-use crate::contact::substeps::MOST_SUBSTEPS;
+use crate::contact::substeps::{Limits, MOST_SUBSTEPS};
+use crate::shape::{Faces, Surface};
 use glam::{DMat3, DVec3};
 
 /// Depth over half of a solid's thickness from which its other side may soon be the nearer one.
@@ -14,11 +18,16 @@ pub(super) const DRIVEN: f64 = 1.0;
 /// Way of a sub-step over half of the thickness of what is hit, at most: one sub-step at least sees it inside.
 const WAY: f64 = 0.5;
 
-impl Smooth {
-    /// Depth [m] at which a point in the pair's first and in its second solid reaches the middle between two faces.
-    fn middles(&self, pair: &Pair, now: &Now) -> [f64; 2] {
-        let half = |k: usize| now.bodies[k].shape.extent(DMat3::IDENTITY);
-        let thinnest = |half: DVec3, faces: u8| {
+/// Depth [m] at which a point in each solid and in each wall reaches the middle between two faces.
+#[derive(Debug)]
+pub(super) struct Middles {
+    solids: Vec<f64>,
+    walls: Vec<f64>,
+}
+
+impl Middles {
+    pub fn new(bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Self {
+        let thinnest = |half: DVec3, faces: Faces| {
             let open = |axis: usize| (faces >> (2 * axis) & 3).count_ones();
             let of = |axis: usize| match open(axis) {
                 2 => half[axis],
@@ -28,17 +37,40 @@ impl Smooth {
             (0..3).map(of).fold(f64::INFINITY, f64::min)
         };
         // of a ball there is one face, all round
-        let of = |k: usize| match self.surfaces[k].ball {
-            Some(radius) => radius,
-            None => thinnest(half(k), self.surfaces[k].all_faces),
+        let of = |(b, s): (&Body, &Surface)| {
+            s.ball.unwrap_or_else(|| thinnest(b.shape.extent(DMat3::IDENTITY), s.all_faces))
         };
-        let b = match pair.b {
-            Other::Solid(b) => of(b),
-            Other::Wall(w) => thinnest(self.walls[w].half, self.walls[w].faces),
-        };
-        [of(pair.a), b]
+        Self {
+            solids: bodies.iter().zip(surfaces).map(of).collect(),
+            walls: walls.iter().map(|w| thinnest(w.half, w.faces)).collect(),
+        }
     }
 
+    /// Those of the pair's first and second solid.
+    pub fn of(&self, pair: &Pair) -> [f64; 2] {
+        let b = match pair.b {
+            Other::Solid(b) => self.solids[b],
+            Other::Wall(w) => self.walls[w],
+        };
+        [self.solids[pair.a], b]
+    }
+
+    /// The least of all.
+    pub fn least(&self) -> f64 {
+        self.solids.iter().chain(&self.walls).copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The least of solid `a` and of solid `b`, or of any wall.
+    pub fn between(&self, a: usize, b: Option<usize>) -> f64 {
+        let other = match b {
+            Some(b) => self.solids[b],
+            None => self.walls.iter().copied().fold(f64::INFINITY, f64::min),
+        };
+        self.solids[a].min(other)
+    }
+}
+
+impl Smooth {
     /// Largest speed of any point of the pair's solids against one of the other [m/s].
     fn closing(pair: &Pair, now: &Now) -> f64 {
         let of = |k: usize| now.bodies[k].pose.angular_velocity.length() * now.bodies[k].radius();
@@ -54,7 +86,7 @@ impl Smooth {
         let little = 1e-3 * self.spacing;
         let deep = |p: &&Pair| p.depth > p.before + little || p.depth > self.harmless;
         self.evaluated().iter().filter(deep).find_map(|pair| {
-            let [middle_a, middle_b] = self.middles(pair, now);
+            let [middle_a, middle_b] = self.middles.of(pair);
             let (in_a, in_b) = pair.deepest();
             let closing = Self::closing(pair, now);
             let other = |b: Other| match b {
@@ -74,9 +106,9 @@ impl Smooth {
             if in_a > THROUGH * middle_a || in_b > THROUGH * middle_b || unknown {
                 return Some(fault(format!(
                     "is {:.3e} m deep, almost halfway through, at {closing:.3} m/s: contact would push it out on the \
-                     other side; use a smaller run.time_step (which carries a stiffer contact), a larger \
-                     contact.spring, or a thicker solid",
-                    pair.depth
+                     other side; use {} or a thicker solid",
+                    pair.depth,
+                    self.stiff_enough(pair, now)
                 )));
             }
             (driven && pair.depth > DRIVEN * self.spacing).then(|| {
@@ -87,6 +119,33 @@ impl Smooth {
                 ))
             })
         })
+    }
+
+    /// What stops the pair's solids a little before the middle of the thinner one.
+    fn stiff_enough(&self, pair: &Pair, now: &Now) -> String {
+        let [middle_a, middle_b] = self.middles.of(pair);
+        let wanted = 0.5 * middle_a.min(middle_b);
+        // what leans on either of both presses as well
+        let mine = |k: usize| k == pair.a || pair.b.solid() == Some(k);
+        let leaning = self.evaluated().iter().filter(|p| p.contact_count() > 0).flat_map(|p| match p.b {
+            Other::Solid(b) if mine(p.a) != mine(b) => Some(if mine(b) { p.a } else { b }),
+            _ => None,
+        });
+        let leaning: f64 = leaning.map(|k| now.bodies[k].mass).filter(|m| m.is_finite()).sum();
+        let mass = reduced_mass(now.bodies, pair.a, pair.b.solid()) + leaning;
+        let energy = pair.energy + 0.5 * mass * pair.approach().powi(2);
+        // the energy goes as the square of the depth, or faster
+        let stiffer = energy / (pair.energy * (wanted / pair.depth).powi(2));
+        let any_step = Limits { longest_step: 1e-3 * now.limits.longest_step, ..now.limits.clone() };
+        let full = self.constants_of(pair, &any_step, now.bodies);
+        let step = now.limits.longest_step / stiffer.sqrt();
+        if full.spring >= 0.99 * stiffer * pair.constants.spring
+            || full.stop >= 0.99 * stiffer * pair.constants.stop
+        {
+            return format!("run.time_step = {step:.1e} or less, which carries a stiffer contact,");
+        }
+        let spring = stiffer * pair.constants.spring;
+        format!("contact.spring = {spring:.1e} or more with run.time_step = {step:.1e} or less")
     }
 
     /// Sub-steps of a step of `dt` [s] at which no solid can go through another between two of them.
@@ -104,7 +163,7 @@ impl Smooth {
         }
         let mut most = 1.0_f64;
         for (pair, _) in self.close(now.candidates, now.bodies) {
-            let [middle_a, middle_b] = self.middles(&pair, now);
+            let [middle_a, middle_b] = self.middles.of(&pair);
             let way = Self::closing(&pair, now) * dt;
             let wanted = way / (WAY * middle_a.min(middle_b));
             if wanted <= most || !self.meets(&pair, now, dt) {

@@ -16,7 +16,8 @@
 //! points. Larger p stiffens rocking, (p - 1) K, as fast as corners and wins nothing.
 //!
 //! Beyond a quarter spacing a second spring joins, stiff enough to stop the fastest body of the scene
-//! within half a spacing more; it is never reached with a sensible K, and it is conservative too.
+//! within half a spacing more; it is never reached with a sensible K, and it is conservative too. In solids of
+//! less than two spacings both lengths shrink with their thickness: they must not be pressed to their middle.
 
 pub mod device;
 mod fault;
@@ -36,9 +37,9 @@ use crate::body::{Body, Wrench};
 use crate::error::Result;
 use crate::scene::{Scene, Solid};
 use crate::shape::{Cuboid, Geometry, Surface};
+use fault::Middles;
 use friction::Friction;
-use glam::{DMat3, DVec3};
-use pair::{Other, Pair};
+use pair::{Constants, Other, Pair};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use walls::WallBox;
@@ -58,7 +59,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// Exponent p of the effective depth.
 pub(super) const EXPONENT: f64 = 8.0;
-/// Depth at which the second spring joins, over the spacing [-].
+/// Depth at which the second spring joins, over the spacing (or half of the thinner solid, if that is less) [-].
 const STOP_DEPTH: f64 = 0.25;
 
 /// The law: geometry, pairs, and those on a device.
@@ -67,6 +68,7 @@ pub(crate) struct Smooth {
     pub walls: Vec<WallBox>,
     pub pairs: Vec<Pair>,
     friction: Friction,
+    middles: Middles,
     /// Depth [m] below which no pair of the scene can be in trouble.
     harmless: f64,
     pub spacing: f64,
@@ -83,16 +85,13 @@ impl Smooth {
         let of = |s: &Solid| s.surface(scene.spacing, scene.dimensions);
         let surfaces: Vec<Surface> = scene.solids.iter().map(of).collect();
         let walls = walls::walls(scene);
-        let thinnest =
-            |half: DVec3| if scene.dimensions == 2 { half.x.min(half.z) } else { half.min_element() };
-        let solids = bodies.iter().map(|b| thinnest(b.shape.extent(DMat3::IDENTITY)));
-        let all = solids.chain(walls.iter().map(|w| thinnest(w.half)));
-        let harmless =
-            (fault::THROUGH * all.fold(f64::INFINITY, f64::min)).min(fault::DRIVEN * scene.spacing);
+        let middles = Middles::new(bodies, &surfaces, &walls);
+        let harmless = (fault::THROUGH * middles.least()).min(fault::DRIVEN * scene.spacing);
         limits.lambda = bodies.iter().zip(&surfaces).map(|(b, s)| stability::lambda(b, s)).collect();
         Self {
             surfaces,
             walls,
+            middles,
             harmless,
             pairs: vec![],
             friction: Friction::default(),
@@ -179,11 +178,30 @@ impl Smooth {
         }
         let wanted = Some((now.substep, now.limits.longest_step));
         if self.constants != wanted {
-            let (surfaces, spacing) = (&self.surfaces, self.spacing);
-            set_constants(&mut self.pairs, surfaces, now.limits, now.bodies, spacing, now.substep);
-            self.constants = wanted;
+            let mut pairs = std::mem::take(&mut self.pairs);
+            self.set_constants(&mut pairs, now.limits, now.bodies, now.substep);
+            (self.pairs, self.constants) = (pairs, wanted);
         }
         self.press(now.bodies);
+    }
+
+    /// Constants of `pair` for the longest sub-steps of `limits`.
+    fn constants_of(&self, pair: &Pair, limits: &Limits, bodies: &[Body]) -> Constants {
+        let [a, b] = self.middles.of(pair);
+        let weight = self.surfaces[pair.a].smallest_weight;
+        limits.constants(bodies, pair.a, pair.b.solid(), weight, self.spacing.min(a).min(b))
+    }
+
+    /// Constants of `pairs` for sub-steps of `h` [s].
+    fn set_constants(&self, pairs: &mut [Pair], limits: &Limits, bodies: &[Body], h: f64) {
+        for pair in pairs {
+            pair.constants = self.constants_of(pair, limits, bodies);
+            // before the first step there is no sub-step to follow
+            if h > 0.0 {
+                let mass = reduced_mass(bodies, pair.a, pair.b.solid());
+                pair.constants.discretise(mass, h, limits.damping.is_ratio());
+            }
+        }
     }
 
     fn press(&mut self, bodies: &[Body]) {
@@ -211,7 +229,7 @@ impl Law for Smooth {
         if !pairs.is_current(now.candidates) {
             pairs.search(self, now.candidates, now.bodies, &mut link)?;
         }
-        pairs.set_constants(self, now.limits, now.bodies, self.spacing, now.substep);
+        pairs.set_constants(self, now.limits, now.bodies, now.substep);
         pairs.evaluate(self, now.bodies, &mut link)?;
         (self.device, self.on_device) = (Some(pairs), true);
         Ok(())
@@ -278,25 +296,5 @@ impl Law for Smooth {
 
     fn probe(&mut self, bodies: &[Body], device: Option<Link>, probe: &mut Probe) -> Result<()> {
         probe::fill(self, bodies, device, probe)
-    }
-}
-
-/// Constants of `pairs` for sub-steps of `h` [s].
-pub(crate) fn set_constants(
-    pairs: &mut [Pair],
-    surfaces: &[Surface],
-    limits: &Limits,
-    bodies: &[Body],
-    spacing: f64,
-    h: f64,
-) {
-    for pair in pairs {
-        let b = pair.b.solid();
-        let weight = surfaces[pair.a].smallest_weight;
-        pair.constants = limits.constants(bodies, pair.a, b, weight, spacing);
-        // before the first step there is no sub-step to follow
-        if h > 0.0 {
-            pair.constants.discretise(reduced_mass(bodies, pair.a, b), h, limits.damping.is_ratio());
-        }
     }
 }

@@ -280,6 +280,11 @@ impl Pair {
         })
     }
 
+    /// Largest speed at which a depth grows [m/s].
+    pub fn approach(&self) -> f64 {
+        self.contacts.iter().map(|c| -c.speed).fold(0.0, f64::max)
+    }
+
     /// Points and nodes of edges in contact at the last evaluation.
     pub fn contact_count(&self) -> usize {
         self.count

@@ -6,7 +6,7 @@
 //! gradient of the depth at that point, is still minus the derivative of the energy.
 
 use super::pair::Frame;
-use crate::shape::{Inside, Ring, Side, Surface, along, around};
+use crate::shape::{Inside, Ring, Side, Surface, along, around, root};
 use glam::{DMat3, DVec3};
 
 /// A point of a round part inside another shape.
@@ -23,8 +23,10 @@ pub(super) struct Pressed {
     pub face: u8,
 }
 
-/// Times that the deepest point of a circle is sought again: it moves by the bend of the other's surface only.
-const SEARCHES: usize = 4;
+/// Slope of the depth along a circle that counts as none [-].
+const LEVEL: f64 = 1e-12;
+/// First angle at which the other side of the deepest point of a circle is looked for; then twice that, and so on.
+const BRACKET: f64 = 0.02;
 
 /// The ball about the centre of `own` inside `other`.
 pub(super) fn ball(own: &Frame, radius: f64, other: &Frame, add: &mut dyn FnMut(Pressed)) {
@@ -105,20 +107,37 @@ impl View<'_> {
         along(length, distance, |s, width| self.add(at(s), share * width / length, add));
     }
 
-    /// The deepest point of the circle of a side at the height `z` [m].
+    /// The deepest point of the circle of a side at the height `z` [m]: where the depth does not change with the angle.
+    ///
+    /// Under a face the gradient at the axis leads there at once. Near an edge it turns within a depth, which is much
+    /// less than the circle, so that the zero is bracketed from there.
     fn deepest(&self, side: &Side, z: f64) -> DVec3 {
         let axis = z * DVec3::Z;
-        let mut p = axis;
-        for _ in 0..SEARCHES {
-            let gradient = self.distance(p).1;
-            let across = DVec3::new(gradient.x, gradient.y, 0.0);
-            // the end of an upright one: its rings hold it
-            let next = axis - side.radius * across.try_normalize().unwrap_or(DVec3::X);
-            if next.distance_squared(p) < 1e-24 * side.radius * side.radius {
-                break;
-            }
-            p = next;
+        let at = |angle: f64| {
+            let (sin, cos) = angle.sin_cos();
+            (axis + side.radius * DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0))
+        };
+        let slope = |angle: f64| {
+            let (p, tangent) = at(angle);
+            self.distance(p).1.dot(tangent)
+        };
+        let toward = self.distance(axis).1;
+        // the end of an upright one: its rings hold it
+        let across = DVec3::new(toward.x, toward.y, 0.0).try_normalize().unwrap_or(DVec3::X);
+        let straight = axis - side.radius * across;
+        let tilt = self.distance(straight).1.dot(DVec3::new(across.y, -across.x, 0.0));
+        if tilt.abs() < LEVEL {
+            return straight;
         }
-        p
+        let first = (f64::atan2(-across.y, -across.x), tilt);
+        let mut step = -BRACKET * tilt.signum();
+        while step.abs() < std::f64::consts::PI {
+            let next = (first.0 + step, slope(first.0 + step));
+            if next.1 * tilt <= 0.0 {
+                return at(root(first, next, slope)).0;
+            }
+            step *= 2.0;
+        }
+        straight
     }
 }

@@ -76,7 +76,8 @@ pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> 
     for (a, b) in limits.extremes(bodies) {
         limits.ask(&mut worst, bodies, (a, b), dt, 0.0);
         let (spring, damping) = limits.lambda_of(a, b);
-        let c = limits.constants(bodies, a, b, law.surfaces[a].smallest_weight, law.spacing);
+        let reach = law.spacing.min(law.middles.between(a, b));
+        let c = limits.constants(bodies, a, b, law.surfaces[a].smallest_weight, reach);
         let stopping = c.damping * (c.stop / c.spring).sqrt();
         let for_spring = dt * (c.stop * spring).sqrt() / limits.omega_step();
         worst.wanted = worst.wanted.max(for_spring).max(dt * stopping * damping / DAMPING_STEP);
@@ -87,14 +88,15 @@ pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> 
 
 impl Limits {
     /// Constants of the contact of `a` with `b` as the smooth law uses them: what the case asks for, as
-    /// far as the sub-steps of the longest step so far can carry it.
+    /// far as the sub-steps of the longest step so far can carry it. Within `reach` [m] the second spring stops
+    /// the fastest body.
     pub fn constants(
         &self,
         bodies: &[Body],
         a: usize,
         b: Option<usize>,
         weight: f64,
-        spacing: f64,
+        reach: f64,
     ) -> Constants {
         let mass = reduced_mass(bodies, a, b);
         let both = |of: fn(&Lambda) -> f64| of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]));
@@ -109,7 +111,7 @@ impl Limits {
         let spring = if self.forced.is_some() { self.spring } else { self.spring.min(carried).min(fits) };
         let closing = if b.is_some() { 2.0 } else { 1.0 } * self.fastest;
         let corner = weight.powf(2.0 / EXPONENT);
-        let stop = mass * (2.0 * closing / spacing).powi(2) / corner;
+        let stop = mass * (2.0 * closing / reach).powi(2) / corner;
         let damping = self.damping.coefficient(spring, self.spring, mass);
         let damping = if self.forced.is_some() { damping } else { damping.min(carried_damping) };
         // the stop's dashpot is as much stronger as the root of its spring
@@ -117,7 +119,7 @@ impl Limits {
         Constants {
             spring,
             stop: stop.min(carried).min(stop_fits).max(spring),
-            stop_depth: STOP_DEPTH * spacing,
+            stop_depth: STOP_DEPTH * reach,
             step: shortest,
             damping,
         }
