@@ -103,14 +103,14 @@ pub enum Arrays {
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
-pub const MULTIGRID_UNKNOWNS: usize = 30_000;
+pub(crate) const MULTIGRID_UNKNOWNS: usize = 30_000;
 
 /// Surface points of bodies that move freely from which the device searches and presses their contacts. A sub-step
 /// costs a round trip to the device, 0.1 ms or so, however many bodies there are; the host takes 2.4 us for a cube
 /// of 200 points at rest, of which the smooth law's edges and the poses, 1.5 us, stay on it. The two meet at about a
 /// hundred bodies, which this is. It counts points and no microseconds, so that the same case computes in the same
 /// way on every machine.
-pub const DEVICE_CONTACT_POINTS: usize = 20_000;
+pub(crate) const DEVICE_CONTACT_POINTS: usize = 20_000;
 
 /// Where a backend with a device searches and presses the pairs of contact; a backend without one leaves it to the
 /// host.

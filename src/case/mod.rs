@@ -256,7 +256,7 @@ pub enum Face {
 }
 
 /// Faces of the tank and the names of their walls, in the order of [`Face`].
-pub const TANK_FACES: [(Face, &str); 6] = [
+pub(crate) const TANK_FACES: [(Face, &str); 6] = [
     (Face::XMin, "tank.x_min"),
     (Face::XMax, "tank.x_max"),
     (Face::YMin, "tank.y_min"),
