@@ -94,7 +94,7 @@ pub mod simulation;
 mod step;
 pub mod threads;
 pub mod time_step;
-pub mod whole;
+mod whole;
 
 pub use backend::Processor;
 pub use case::Case;

@@ -88,7 +88,7 @@ fn unshuffle(bytes: &[u8], width: usize) -> Vec<u8> {
 ///
 /// # Errors
 /// [`Error::Io`] if an array cannot be compressed.
-pub fn encode(origin: &Origin, archive: &Archive) -> Result<Vec<u8>> {
+pub(crate) fn encode(origin: &Origin, archive: &Archive) -> Result<Vec<u8>> {
     let sections: Vec<(&String, &Section)> = archive.sections.iter().collect();
     let stored: std::io::Result<Vec<Vec<u8>>> =
         sections.par_iter().map(|(_, s)| zstd::bulk::compress(&shuffle(&s.bytes, s.width), LEVEL)).collect();
@@ -194,7 +194,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Whether a file has the name of a checkpoint.
-pub fn is_checkpoint(name: &str) -> bool {
+pub(crate) fn is_checkpoint(name: &str) -> bool {
     let step = name.strip_prefix("step_").and_then(|n| n.strip_suffix(".seixo"));
     step.is_some_and(|n| n.len() >= 10 && n.bytes().all(|b| b.is_ascii_digit()))
 }
@@ -237,7 +237,7 @@ pub struct Found {
 ///
 /// # Errors
 /// [`Error::Checkpoint`] if there are files and none is whole, [`Error::Io`].
-pub fn newest(folder: &Path) -> Result<Option<Found>> {
+pub(crate) fn newest(folder: &Path) -> Result<Option<Found>> {
     let mut damaged = Vec::new();
     for path in files(folder)? {
         let bytes = std::fs::read(&path).map_err(Error::io(&path))?;

@@ -13,7 +13,7 @@ use glam::DVec3;
 wide! {
     /// Acceleration by the pressure of the fluid slots from `first` on, whose states are `state`; only those below
     /// `live` hold a particle.
-    pub fn gradient_rows(
+    pub(crate) fn gradient_rows(
         first: usize,
         live: usize,
         chunk: &Chunk,
