@@ -88,7 +88,7 @@ fn unshuffle(bytes: &[u8], width: usize) -> Vec<u8> {
 ///
 /// # Errors
 /// [`Error::Io`] if an array cannot be compressed.
-pub(crate) fn encode(origin: &Origin, archive: &Archive) -> Result<Vec<u8>> {
+pub fn encode(origin: &Origin, archive: &Archive) -> Result<Vec<u8>> {
     let sections: Vec<(&String, &Section)> = archive.sections.iter().collect();
     let stored: std::io::Result<Vec<Vec<u8>>> =
         sections.par_iter().map(|(_, s)| zstd::bulk::compress(&shuffle(&s.bytes, s.width), LEVEL)).collect();
