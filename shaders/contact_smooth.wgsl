@@ -301,7 +301,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let used = both.y;
 
     let open = smooth_pair[n].open;
-    for (var k = t; k < 1u + 3u * countOneBits(open); k += GROUP) {
+    for (var k = t; k < 1u + 4u * countOneBits(open); k += GROUP) {
         contact_sum[sum + k] = vec4f(0.0);
     }
     if used == 0u {
@@ -405,27 +405,41 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         part_z[t] /= max(part_x[t].w, 1e-30);
     }
     workgroupBarrier();
-    var radius = 0.0;
+    // Second moments about the centre: xx, yy, zz and xy, yz, zx.
+    let all = part_x[first];
+    let center = part_z[first].xyz;
+    var square = vec3f(0.0);
+    var product = vec3f(0.0);
     if face < pressed {
-        let center = part_z[first].xyz;
         for (var m = m_first; m < total; m += sharing) {
             let place = state + 3u * m;
             if u32(contact_state[place + 2u].y) == key {
-                radius += contact_state[place + 2u].z * distance(contact_state[place + 1u].xyz, center);
+                let arm = contact_state[place + 1u].xyz - center;
+                let weighed = contact_state[place + 2u].z * arm;
+                square += weighed * arm;
+                product += weighed * arm.yzx;
             }
         }
     }
-    part_y[t].w = radius;
+    workgroupBarrier();
+    part_x[t] = vec4f(square, 0.0);
+    part_z[t] = vec4f(product, 0.0);
     workgroupBarrier();
     if face < pressed && t == first {
         var turning = part_y[t];
         for (var k = 1u; k < sharing; k++) {
             turning += part_y[t + k];
+            square += part_x[t + k].xyz;
+            product += part_z[t + k].xyz;
         }
-        let slot = sum + 1u + 3u * countOneBits(open & ((1u << key) - 1u));
-        contact_sum[slot] = part_x[t];
-        contact_sum[slot + 1u] = vec4f(turning.xyz, turning.w / max(part_x[t].w, 1e-30));
-        contact_sum[slot + 2u] = part_z[t];
+        let each = 1.0 / max(all.w, 1e-30);
+        square *= each;
+        product *= each;
+        let slot = sum + 1u + 4u * countOneBits(open & ((1u << key) - 1u));
+        contact_sum[slot] = all;
+        contact_sum[slot + 1u] = vec4f(turning.xyz, square.x);
+        contact_sum[slot + 2u] = vec4f(center, square.y);
+        contact_sum[slot + 3u] = vec4f(square.z, product.y, product.z, product.x);
     }
     if t == 0u {
         contact_sum[sum] = vec4f(depth, deepest, parts.z, shares);

@@ -46,7 +46,7 @@ impl Grid {
 
     /// Cell coordinates of a position inside the domain.
     #[inline(always)]
-    pub fn coordinates(&self, x: DVec3) -> [u32; 3] {
+    pub(crate) fn coordinates(&self, x: DVec3) -> [u32; 3] {
         let c = (x - self.origin) / self.width;
         [
             (c.x.max(0.0) as u32).min(self.count[0] - 1),
@@ -63,7 +63,7 @@ impl Grid {
 
     /// Coordinates of the cell with this number.
     #[inline(always)]
-    pub fn coordinates_of(&self, cell: usize) -> [u32; 3] {
+    pub(crate) fn coordinates_of(&self, cell: usize) -> [u32; 3] {
         let (y, z) = (self.count[1] as usize, self.count[2] as usize);
         [(cell / (y * z)) as u32, (cell / z % y) as u32, (cell % z) as u32]
     }

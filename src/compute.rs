@@ -143,6 +143,11 @@ pub struct Program {
     pub buffers: &'static [Spec],
 }
 
+/// Threads of a workgroup; `WORKGROUP` in shaders/common.wgsl.
+pub const WORKGROUP: u64 = 256;
+/// Threads of a workgroup of the monitor; `WIDTH` in shaders/monitor.wgsl.
+pub const MONITOR_WIDTH: u64 = 128;
+
 /// The kernels of shaders/FILE.wgsl, one constant each, and their list `ALL`; called as the shader calls them.
 macro_rules! kernels {
     ($file:ident[$width:expr]: $($entry:ident)*) => {

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::sync::Mutex;
 
 /// `text` with control characters, but for line ends and tabs, replaced by their pictures.
-pub fn visible(text: &str) -> Cow<'_, str> {
+pub(crate) fn visible(text: &str) -> Cow<'_, str> {
     let hidden = |c: char| c.is_control() && c != '\n' && c != '\t';
     if !text.contains(hidden) {
         return Cow::Borrowed(text);

@@ -21,7 +21,7 @@ pub enum State {
 
 impl State {
     /// The state of a number, as `state as u8` gives it.
-    pub fn from_code(code: u8) -> Option<Self> {
+    pub(crate) fn from_code(code: u8) -> Option<Self> {
         [Self::Inactive, Self::Surface, Self::Inner].into_iter().find(|&s| s as u8 == code)
     }
 }

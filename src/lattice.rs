@@ -10,7 +10,7 @@ pub fn weight(r: f64, re: f64) -> f64 {
 /// which is Wendland's C2 of one dimension for a = 0 and of two and three for a = 1, a = 3/4 keeps its sum best on
 /// stretched and on other lattices of the same volume.
 #[inline(always)]
-pub fn smooth_weight(q: f64) -> f64 {
+pub(crate) fn smooth_weight(q: f64) -> f64 {
     let rest = (1.0 - q).max(0.0);
     rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q)
 }
@@ -22,7 +22,7 @@ pub struct Lattice {
     pub number_density: f64,
     /// Laplacian correction lambda, Eq. (7), over l0^2 [-].
     pub laplacian: f64,
-    /// Sum W0 of [`smooth_weight`], the particle itself among them [-].
+    /// Sum W0 of `smooth_weight`, the particle itself among them [-].
     pub smooth_density: f64,
     /// Neighbours closer than the effective radius.
     pub neighbours: u32,
@@ -71,7 +71,7 @@ impl Lattice {
 }
 
 /// Largest eigenvalue of the Laplacian's matrix over its diagonal, as measured (1.30 to 1.33).
-pub const LAPLACIAN_EIGENVALUE: f64 = 1.33;
+pub(crate) const LAPLACIAN_EIGENVALUE: f64 = 1.33;
 
 impl Lattice {
     /// Largest nu dt / l0^2 at which explicit viscosity in `dimensions` dimensions damps instead of growing [-]:

@@ -95,7 +95,7 @@ pub mod simulation;
 mod step;
 pub mod threads;
 pub mod time_step;
-pub mod whole;
+mod whole;
 
 pub use backend::Processor;
 pub use case::Case;

@@ -33,4 +33,4 @@ pub struct FluidMonitor {
 pub const SPEED_BINS: usize = 256;
 
 /// Width of a bin, as a part of the displacement clamp's speed.
-pub const SPEED_RANGE: f64 = 2.0;
+pub(crate) const SPEED_RANGE: f64 = 2.0;

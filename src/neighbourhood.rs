@@ -30,7 +30,7 @@ pub fn scale(on: Particles) -> f64 {
 }
 
 /// (d / n0) w r / r^2 of slot `i` and neighbour `j` of weight `w` [1/m].
-pub fn pair_vector(i: usize, j: usize, w: f64, on: Particles) -> DVec3 {
+pub(crate) fn pair_vector(i: usize, j: usize, w: f64, on: Particles) -> DVec3 {
     let r = on.position[j] - on.position[i];
     let r2 = r.length_squared();
     if r2 > 0.0 { scale(on) * w / r2 * r } else { DVec3::ZERO }

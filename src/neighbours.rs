@@ -1,12 +1,12 @@
 //! Neighbour lists of the CPU path, kept in chunks of rows.
 //!
 //! Row i holds the particles within the effective radius of particle i: first those that carry
-//! pressure, then the dummies. A chunk owns the rows of [`CHUNK`] particles; threads work on chunks, and
+//! pressure, then the dummies. A chunk owns the rows of `CHUNK` particles; threads work on chunks, and
 //! sums over particles are made per chunk and then in chunk order, so results do not depend on the
 //! number of threads.
 
 /// Rows of a chunk.
-pub const CHUNK: usize = 512;
+pub(crate) const CHUNK: usize = 512;
 
 /// Neighbours that a row holds at most, `lattice` those of a full lattice: twice as many, 64 for the usual 32. Healthy
 /// runs stay below 1.6 times; more means that the fluid has collapsed onto itself, and ends the run on every backend.
@@ -15,9 +15,9 @@ pub fn capacity(lattice: u32) -> usize {
 }
 
 /// The largest [`capacity`]: of the largest effective radius that a case may ask for, 4.1 spacings.
-pub const CAPACITY: usize = 512;
+pub(crate) const CAPACITY: usize = 512;
 
-/// Rows of [`CHUNK`] particles.
+/// Rows of `CHUNK` particles.
 #[derive(Clone, Default, Debug)]
 pub struct Chunk {
     /// Start of each row in `neighbour`, and the end of the last one.
@@ -81,7 +81,7 @@ impl Chunk {
 
     /// Whether no row has a neighbour: dry walls.
     #[inline(always)]
-    pub fn is_dry(&self) -> bool {
+    pub(crate) fn is_dry(&self) -> bool {
         self.neighbour.is_empty()
     }
 

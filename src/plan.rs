@@ -1,9 +1,9 @@
 //! Which stages and arrays a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{self, Case, ContactDevice, Law};
+use crate::case::{self, Case, ContactDevice};
 use crate::compute::Program;
-use crate::contact::device::{paper, smooth};
+use crate::contact;
 use crate::params::Params;
 use crate::scene::{Drive, Scene};
 use crate::scheme::{Gradient, Preconditioner, Source};
@@ -53,35 +53,35 @@ macro_rules! stages {
     };
 }
 
-// In brackets: once more if the stage sweeps over the particles.
+// A step plays them in this order. In brackets: once more if the stage sweeps over the particles.
 stages! {
-    /// Explicit viscosity.
+    /// Explicit viscosity, Eq. (2): acceleration at the positions and neighbours of the last step.
     Viscosity = "viscosity" [Viscosity];
-    /// v*, r*.
+    /// Explicit part of Eq. (2): viscosity and gravity move particles to r*.
     Predict = "predict" [Predict];
-    /// Moving solids take their pose.
+    /// Solids go where they would go without the fluid.
     MoveSolids = "move_solids" [];
-    /// Sort by cell.
+    /// Sort by cell at r*.
     CellList = "cell_list" [CellList];
-    /// Neighbour search.
+    /// Neighbours at r*.
     NeighbourList = "neighbour_list" [NeighbourList];
-    /// Particle collisions.
+    /// Particles that come too close rebound, Eq. (18).
     Collision = "collision" [Collision];
-    /// Number density and free surface.
+    /// Number density, Eq. (4), and free surface.
     NumberDensity = "number_density" [NumberDensity];
-    /// Right side and diagonal of the PPE.
+    /// Right side and diagonal of the pressure Poisson equation (PPE), Eq. (8).
     PressureSource = "pressure_source" [PressureSource];
-    /// The PPE.
+    /// Solution of the PPE.
     ConjugateGradient = "conjugate_gradient" [];
-    /// Pressure gradient.
+    /// Pressure gradient, Eq. (9).
     PressureGradient = "pressure_gradient" [PressureGradient];
-    /// v, r.
+    /// It corrects velocity and position.
     Correct = "correct" [Correct];
     /// Particles move away from where they crowd.
     Shift = "shift" [Shift];
     /// Force of the fluid on solids.
     BodyForce = "body_force" [];
-    /// Contact and motion of the bodies; sums, friction and motion on the host.
+    /// Contact and motion of the bodies, Eqs. (10) to (14); sums, friction and motion on the host.
     Contact = "contact" [];
 }
 
@@ -107,14 +107,14 @@ pub enum Arrays {
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
-pub const MULTIGRID_UNKNOWNS: usize = 30_000;
+pub(crate) const MULTIGRID_UNKNOWNS: usize = 30_000;
 
 /// Surface points of bodies that move freely from which the device searches and presses their contacts. A sub-step
 /// costs a round trip to the device, 0.1 ms or so, however many bodies there are; the host takes 2.4 us for a cube
 /// of 200 points at rest, of which the smooth law's edges and the poses, 1.5 us, stay on it. The two meet at about a
 /// hundred bodies, which this is. It counts points and no microseconds, so that the same case computes in the same
 /// way on every machine.
-pub const DEVICE_CONTACT_POINTS: usize = 20_000;
+pub(crate) const DEVICE_CONTACT_POINTS: usize = 20_000;
 
 /// Where a backend with a device searches and presses the pairs of contact; a backend without one leaves it to the
 /// host.
@@ -139,13 +139,10 @@ impl ContactPlan {
         let points: usize = scene.solids.iter().filter(free).map(|s| s.wall_offset.len()).sum();
         let program = match case.contact.as_ref().map(|c| c.law) {
             None => return host("no contact"),
-            Some(Law::Pressure) => return host("the baseline's impulses follow one another"),
-            // the kernel presses the points of boxes into boxes
-            Some(Law::Smooth) if scene.solids.iter().any(|s| s.shape.as_cuboid().is_none()) => {
-                return host("the device has no kernel of law \"smooth\" for round bodies");
-            }
-            Some(Law::Smooth) => Some(&smooth::PROGRAM),
-            Some(Law::Paper) => Some(&paper::PROGRAM),
+            Some(law) => match (contact::kind(law).program)(scene) {
+                Ok(program) => Some(program),
+                Err(why) => return host(why),
+            },
         };
         let most = DEVICE_CONTACT_POINTS;
         match asked {

@@ -1,7 +1,7 @@
 //! One time step: the algorithm of the paper's section 2, with the solids of section 3.
 
 use crate::error::{Error, Result};
-use crate::plan::{ParticleStage, Stage};
+use crate::plan::Stage;
 use crate::simulation::{Simulation, StepReport};
 
 impl Simulation {
@@ -22,27 +22,22 @@ impl Simulation {
         let (t, dt) = (step.time, step.dt);
         let mut report = StepReport { step: self.steps, time: t, dt, ..Default::default() };
 
-        if self.plan.wet() {
-            // Explicit part of Eq. (2): viscosity and gravity move particles to r*; solids go where they would
-            // go without the fluid.
-            self.run(ParticleStage::Viscosity, &step)?;
-            self.run(ParticleStage::Predict, &step)?;
-            self.move_solids(t, dt)?;
-            // Neighbours at r*; particles that come too close rebound, Eq. (18).
-            self.run(ParticleStage::CellList, &step)?;
-            self.run(ParticleStage::NeighbourList, &step)?;
-            self.run(ParticleStage::Collision, &step)?;
-            // Number density, Eq. (4); free surface; pressure Poisson equation, Eq. (8).
-            self.run(ParticleStage::NumberDensity, &step)?;
-            self.run(ParticleStage::PressureSource, &step)?;
-            report.pressure = self.solve_pressure(&step)?;
-            // Pressure gradient, Eq. (9), corrects velocity and position.
-            self.run(ParticleStage::PressureGradient, &step)?;
-            self.run(ParticleStage::Correct, &step)?;
-            self.run(ParticleStage::Shift, &step)?;
+        // The step reads in the list of the stages, src/plan.rs: they run in its order, those that the plan has.
+        for stage in Stage::ALL {
+            match stage {
+                // Part of the motion of the solids.
+                Stage::BodyForce => {}
+                Stage::Contact => report.contact = self.advance_solids(&step)?,
+                _ if !self.plan.wet() => {}
+                Stage::MoveSolids => self.move_solids(t, dt)?,
+                Stage::ConjugateGradient => report.pressure = self.solve_pressure(&step)?,
+                particles => {
+                    if let Some(stage) = particles.over_particles() {
+                        self.run(stage, &step)?;
+                    }
+                }
+            }
         }
-        // Solids: fluid force, gravity and contact, Eqs. (10) to (14).
-        report.contact = self.advance_solids(&step)?;
 
         report.look = self.look(&step)?;
         self.time = t + dt;

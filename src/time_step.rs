@@ -4,11 +4,11 @@ use crate::lattice::Lattice;
 use crate::params::{Params, Relaxation};
 
 /// Displacement of the fastest particles in a step over l0, v dt / l0, at most [-].
-pub const COURANT_MAX: f64 = 0.35;
+pub(crate) const COURANT_MAX: f64 = 0.35;
 /// c_s dt / l0 at most [-].
-pub const SOUND_MAX: f64 = 0.7;
+pub(crate) const SOUND_MAX: f64 = 0.7;
 /// nu dt / l0^2 at most, as a part of the limit of explicit viscosity [-].
-pub const VISCOUS_MAX: f64 = 0.5;
+pub(crate) const VISCOUS_MAX: f64 = 0.5;
 
 /// Longest time steps that each part of the scheme allows [s]; infinite where it sets no bound.
 #[derive(Clone, Copy, Debug, PartialEq)]

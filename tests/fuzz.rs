@@ -5,6 +5,10 @@
 //! `SEIXO_FUZZ_SEED=7 SEIXO_FUZZ_COUNT=5000 cargo test --release --test seixo fuzz::campaign -- --ignored --nocapture`.
 //! What fails is written to `target/fuzz`; once it is mended, it goes into the corpus.
 
+/// The bodies of the `cargo fuzz` targets, which are built by hand alone.
+#[path = "../fuzz/src/lib.rs"]
+mod targets;
+
 use crate::cli::seixo;
 use crate::common::ROOT;
 use seixo::case::file::parse;
@@ -266,6 +270,36 @@ fn mutated_states_are_refused_or_run() {
         }
     }
     assert!(refused > 40, "{refused}");
+}
+
+#[test]
+fn the_readers_of_the_fuzz_targets_take_any_bytes() {
+    let mut state = Archive::new();
+    let (mut values, mut count) = (vec![1.5_f64; 200], 7);
+    state.array("values", &mut values, true).unwrap();
+    state.count("count", &mut count).unwrap();
+    let whole = seixo::checkpoint::file::encode(&Default::default(), &state).unwrap();
+    let curve = b"# time, height\nt,h\n0,1\n0.5,1.25\n1,nan\n".to_vec();
+    targets::checkpoint(&whole);
+    targets::curve(&curve);
+    for k in 0..300 {
+        let mut random = Random(k);
+        let mut damaged = |bytes: &[u8]| {
+            let mut bytes = bytes.to_vec();
+            for _ in 0..random.below(6) {
+                let at = random.below(bytes.len());
+                match random.below(3) {
+                    0 => bytes.truncate(at + 1),
+                    1 => bytes.insert(at, random.next() as u8),
+                    _ => bytes[at] = random.next() as u8,
+                }
+            }
+            bytes
+        };
+        targets::case(&damaged(mutant(3, k).as_bytes()));
+        targets::checkpoint(&damaged(&whole));
+        targets::curve(&damaged(&curve));
+    }
 }
 
 /// By hand: see the head of this file.

@@ -23,6 +23,7 @@ mod immersed;
 mod kernels;
 mod layers;
 mod ledger;
+mod meshes;
 mod output;
 mod restart;
 mod scene;

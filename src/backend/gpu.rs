@@ -14,7 +14,6 @@ mod context;
 mod exchange;
 pub mod forecast;
 pub mod hierarchy;
-pub mod kernels;
 pub mod layout;
 pub mod shader;
 mod solve;
@@ -31,6 +30,8 @@ use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
 use crate::error::{Error, GpuError, Result};
 use crate::fields::Fields;
+pub use crate::kernels::device as kernels;
+use crate::kernels::device::Over;
 use crate::kernels::monitor::{speed_most, speed_range};
 use crate::monitor::{FluidMonitor, SPEED_BINS};
 use crate::params::{Params, Step};
@@ -40,7 +41,6 @@ use crate::scene::{Groups, Scene, Solid};
 use context::Context;
 use glam::{DMat3, DVec3, Vec3};
 use hierarchy::Levels;
-use kernels::Over;
 use layout::{
     Coefficients, Constants, Memory, MonitorSum, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, WallParticle,
     counter,

@@ -99,12 +99,13 @@ impl Checker<'_> {
         }
         let (spacing, flat) = (run.spacing, self.flat());
         let weight = |body: &Body| {
-            let (shape, share) = body.shape(spacing, flat);
+            let Ok((shape, share)) = body.shape(spacing, flat) else { return 0.0 };
             let mass = body.mass.map(|m| m * share).or(body.density.map(|d| d * shape.volume()));
             mass.unwrap_or(0.0) * length(&run.gravity)
         };
         let smallest = |body: &Body| {
-            let [x, y, z] = (2.0 * body.shape(spacing, flat).0.extent(DMat3::IDENTITY)).to_array();
+            let Ok((shape, _)) = body.shape(spacing, flat) else { return f64::INFINITY };
+            let [x, y, z] = (2.0 * shape.extent(DMat3::IDENTITY)).to_array();
             // what is missing is reported elsewhere
             let lengths = [x, if flat { x } else { y }, z].map(|l| if l > 0.0 { l } else { f64::INFINITY });
             lengths.into_iter().fold(f64::INFINITY, f64::min)
@@ -130,6 +131,7 @@ impl Checker<'_> {
             ("size", body.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
             ("radius", body.radius.is_some(), "0.1", "[m]"),
             ("height", body.height.is_some(), "0.2", "the length along the axis [m]"),
+            ("file", body.file.is_some(), "\"hull.stl\"", "an STL or OBJ file"),
         ];
         let mut complete = true;
         for (key, given, example, what) in keys {
@@ -138,7 +140,11 @@ impl Checker<'_> {
                 let message = format!("body `{}` is a {name} without `{key}`", body.name);
                 self.add(format!("body.{k}"), message, format!("add `{key} = {example}`, {what}"));
             } else if given && !needed.contains(&key) {
-                let other = if key == "size" { "box" } else { "cylinder" };
+                let other = match key {
+                    "size" => "box",
+                    "file" => "mesh",
+                    _ => "cylinder",
+                };
                 self.add(
                     path(key),
                     format!("body `{}` is a {name}: `{key}` does not belong to it", body.name),
@@ -155,8 +161,8 @@ impl Checker<'_> {
             }
         }
         let flat = self.flat();
-        if flat && body.shape == BodyShape::Sphere {
-            let message = format!("body `{}`: there are no spheres in two dimensions", body.name);
+        if flat && body.shape.needs_space() {
+            let message = format!("body `{}`: there are no {name}s in two dimensions", body.name);
             self.add(
                 path("shape"),
                 message,
@@ -164,7 +170,7 @@ impl Checker<'_> {
             );
         }
         if let Some(axis) = body.axis {
-            if body.shape != BodyShape::Cylinder {
+            if !body.shape.has_axis() {
                 let message = format!("body `{}` is a {name}: it has no `axis`", body.name);
                 self.add(path("axis"), message, "remove `axis`; `orientation` turns a body");
             } else if length(&axis) == 0.0 {
@@ -172,6 +178,13 @@ impl Checker<'_> {
             } else if flat && (axis[0] != 0.0 || axis[2] != 0.0) {
                 let message = "in two dimensions a cylinder lies along y";
                 self.add(path("axis"), message, "set axis = [0, 1, 0], or leave it out");
+            }
+        }
+        if let Some(scale) = body.scale {
+            self.positive(&path("scale"), scale, "m");
+            if body.shape != BodyShape::Mesh {
+                let message = format!("body `{}` is a {name}: it has no `scale`", body.name);
+                self.add(path("scale"), message, "remove `scale`");
             }
         }
         let (key, size) = body.across(flat);

@@ -47,10 +47,17 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
     let name = path.display().to_string();
     let (mut case, mut text, warnings) = parse(&name, text, &all)?;
     // What a case says of its place holds no more for its copy beside the results.
-    if let Some(from) = case.run.from.as_ref().map(PathBuf::from).filter(|p| p.is_relative()) {
-        let from = std::path::absolute(path.with_file_name("").join(from)).map_err(Error::io(path))?;
-        let from = toml_edit::Value::from(from.display().to_string());
-        (case, text, _) = parse(&name, text, &[format!("run.from={from}")])?;
+    let mut places = vec![("run.from".to_owned(), case.run.from.clone())];
+    places.extend(case.body.iter().enumerate().map(|(k, b)| (format!("body.{k}.file"), b.file.clone())));
+    let mut absolute = Vec::new();
+    for (key, place) in places {
+        if let Some(place) = place.map(PathBuf::from).filter(|p| p.is_relative()) {
+            let place = std::path::absolute(path.with_file_name("").join(place)).map_err(Error::io(path))?;
+            absolute.push(format!("{key}={}", toml_edit::Value::from(place.display().to_string())));
+        }
+    }
+    if !absolute.is_empty() {
+        (case, text, _) = parse(&name, text, &absolute)?;
     }
     Ok(Loaded { case, text, path: path.to_owned(), warnings })
 }

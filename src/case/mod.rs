@@ -256,7 +256,7 @@ pub enum Face {
 }
 
 /// Faces of the tank and the names of their walls, in the order of [`Face`].
-pub const TANK_FACES: [(Face, &str); 6] = [
+pub(crate) const TANK_FACES: [(Face, &str); 6] = [
     (Face::XMin, "tank.x_min"),
     (Face::XMax, "tank.x_max"),
     (Face::YMin, "tank.y_min"),
@@ -370,6 +370,10 @@ pub struct Body {
     pub radius: Option<f64>,
     /// Length of a cylinder along its axis [m].
     pub height: Option<f64>,
+    /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
+    pub file: Option<String>,
+    /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    pub scale: Option<f64>,
     /// Direction of a cylinder's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In two
     /// dimensions it is [0, 1, 0].
     pub axis: Option<Vector>,

@@ -19,7 +19,7 @@ pub(super) struct Message {
 
 impl Message {
     /// The same for a program: where it is in `text` of the file `path`.
-    pub fn problem(&self, path: &str, text: &str) -> Problem {
+    pub(crate) fn problem(&self, path: &str, text: &str) -> Problem {
         let before = text.get(..self.span.start.min(text.len())).unwrap_or_default();
         let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
         let message = self.title.strip_prefix(&format!("{}: ", self.key)).unwrap_or(&self.title);

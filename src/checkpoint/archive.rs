@@ -43,7 +43,7 @@ impl Archive {
     }
 
     /// Whether values go into the state (or come out of it).
-    pub fn is_saving(&self) -> bool {
+    pub(crate) fn is_saving(&self) -> bool {
         self.saving
     }
 

@@ -194,7 +194,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Whether a file has the name of a checkpoint.
-pub fn is_checkpoint(name: &str) -> bool {
+pub(crate) fn is_checkpoint(name: &str) -> bool {
     let step = name.strip_prefix("step_").and_then(|n| n.strip_suffix(".seixo"));
     step.is_some_and(|n| n.len() >= 10 && n.bytes().all(|b| b.is_ascii_digit()))
 }
@@ -237,7 +237,7 @@ pub struct Found {
 ///
 /// # Errors
 /// [`Error::Checkpoint`] if there are files and none is whole, [`Error::Io`].
-pub fn newest(folder: &Path) -> Result<Option<Found>> {
+pub(crate) fn newest(folder: &Path) -> Result<Option<Found>> {
     let mut damaged = Vec::new();
     for path in files(folder)? {
         let bytes = std::fs::read(&path).map_err(Error::io(&path))?;

@@ -1,13 +1,13 @@
 //! What a contact law is: its search, its forces, what follows from them. A law is one folder here and one arm
-//! of [`of_case`].
+//! of [`super::kind`].
 
 use super::candidates::Candidates;
 use super::device::Link;
 use super::probe::Probe;
 use super::substeps::{Limits, Worst};
-use super::{paper, pressure, smooth};
 use crate::body::{Body, Wrench};
 use crate::case;
+use crate::compute::Program;
 use crate::error::Result;
 use crate::scene::Scene;
 
@@ -107,16 +107,14 @@ pub(crate) trait Law: Send {
     fn probe(&mut self, bodies: &[Body], device: Option<Link>, probe: &mut Probe) -> Result<()>;
 }
 
-/// The law that `contact` asks for, and the stiffness of contact for each body.
-pub(super) fn of_case(
-    contact: &case::Contact,
-    scene: &Scene,
-    bodies: &[Body],
-    limits: &mut Limits,
-) -> Result<Box<dyn Law>> {
-    Ok(match contact.law {
-        case::Law::Smooth => Box::new(smooth::Smooth::new(scene, bodies, limits)),
-        case::Law::Paper => Box::new(paper::Paper::new(contact, scene, bodies, limits)?),
-        case::Law::Pressure => Box::new(pressure::Pressure::new(scene)),
-    })
+type Make = fn(&case::Contact, &Scene, &[Body], &mut Limits) -> Result<Box<dyn Law>>;
+
+/// What is asked of a law before there is one: the `KIND` of its folder.
+pub(crate) struct Kind {
+    /// The law between the solids of a scene, and the stiffness of contact for each body.
+    pub make: Make,
+    /// Gap between two facing surfaces at which contact begins [m], at a spacing [m].
+    pub gap: fn(f64) -> f64,
+    /// What a device runs for the solids of a scene, or why it runs nothing.
+    pub program: fn(&Scene) -> std::result::Result<&'static Program, &'static str>,
 }

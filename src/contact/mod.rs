@@ -28,19 +28,25 @@ use crate::body::{Body, FreeBody, Pose, Wrench};
 use crate::case;
 use crate::compute::Compute;
 use crate::error::{Error, Result};
-use crate::scene::{CONTACT_DISTANCE, Scene};
+use crate::scene::Scene;
 use candidates::Candidates;
 use device::{Link, Traffic};
 use glam::DVec3;
-use law::{Fault, Law, Now};
+use law::{Fault, Kind, Law, Now};
 use substeps::{Cut, Limits};
 
 /// Gap between two facing surfaces at which a law's contact begins [m]: d_c - l0 for the paper's,
 /// 0 for the smooth one. A body stands free of forces, and so starts without a jump, at this gap.
 pub fn standing_gap(law: case::Law, spacing: f64) -> f64 {
+    (kind(law).gap)(spacing)
+}
+
+/// The laws: a folder, and an arm here.
+pub(crate) fn kind(law: case::Law) -> &'static Kind {
     match law {
-        case::Law::Paper => (CONTACT_DISTANCE - 1.0) * spacing,
-        case::Law::Smooth | case::Law::Pressure => 0.0,
+        case::Law::Smooth => &smooth::KIND,
+        case::Law::Paper => &paper::KIND,
+        case::Law::Pressure => &pressure::KIND,
     }
 }
 
@@ -81,7 +87,7 @@ impl Solids {
         }
         let mut limits = Limits::new(contact, scene, &bodies)?;
         let law = match (contact, free) {
-            (Some(contact), Some(_)) => Some(law::of_case(contact, scene, &bodies, &mut limits)?),
+            (Some(contact), Some(_)) => Some((kind(contact.law).make)(contact, scene, &bodies, &mut limits)?),
             _ => None,
         };
         let poses: Vec<Pose> = bodies.iter().map(|b| b.pose).collect();

@@ -33,7 +33,7 @@ pub struct ProbePatch {
     pub at: DVec3,
     /// Normal force [N].
     pub force: f64,
-    /// Mean distance of the normal force from its centre [m].
+    /// Root of the mean square distance of the normal force from its centre [m].
     pub radius: f64,
 }
 

@@ -78,7 +78,7 @@ impl FixedWall {
     }
 
     /// Force of the fluid's viscosity [N]: m 2 d nu / (lambda n0) sum w v over the water near its particles.
-    pub fn viscous_force(&self, fields: &Fields, groups: &Groups, params: &Params) -> DVec3 {
+    pub(crate) fn viscous_force(&self, fields: &Fields, groups: &Groups, params: &Params) -> DVec3 {
         let re = params.effective_radius;
         let cell = |x: DVec3| (x / re).floor().as_ivec3();
         let mut cells: HashMap<IVec3, Vec<usize>> = HashMap::new();

@@ -21,3 +21,102 @@ pub mod shift;
 pub mod viscosity;
 
 pub use crate::neighbourhood::Particles;
+
+/// The shaders of the kernels: each with its entry points, what it serves, and what its threads run over. Contact's
+/// shaders stand with its laws.
+pub mod device {
+    use crate::compute::{Kernel, MONITOR_WIDTH, Program, WORKGROUP};
+    use crate::plan::{Arrays, ParticleStage, Plan, Stage};
+
+    /// What a shader serves.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Serves {
+        /// A stage of its own name.
+        Stage(Stage),
+        /// Everything that has certain arrays.
+        Arrays(Arrays),
+    }
+
+    /// What the threads of a stage's first kernel run over.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Over {
+        /// Fluid particles.
+        Fluid,
+        /// Fluid particles, then the wall layer of moving solids if it keeps a reaction.
+        FluidAndReaction,
+        /// Rows of the neighbour lists.
+        Rows,
+        /// A stage with commands of its own.
+        Own,
+    }
+
+    /// A shader of the list.
+    pub struct File {
+        /// Text and kernels.
+        pub program: Program,
+        /// What needs it.
+        pub serves: Serves,
+        /// What its threads run over.
+        pub over: Over,
+    }
+
+    macro_rules! files {
+        ($($file:ident[$width:expr] $serves:ident($what:ident), $over:ident: $($entry:ident)*;)*) => {
+            $(crate::compute::kernels!($file[$width]: $($entry)*);)*
+            /// The list.
+            pub const FILES: &[File] = &[$(File {
+                program: Program { name: stringify!($file), text: $file::TEXT, kernels: $file::ALL, buffers: &[] },
+                serves: files!(@ $serves $what),
+                over: Over::$over,
+            }),*];
+        };
+        (@ Stage $what:ident) => { Serves::Stage(Stage::$what) };
+        (@ Arrays $what:ident) => { Serves::Arrays(Arrays::$what) };
+    }
+
+    // File [threads of a workgroup], what needs it, what the threads run over: its kernels.
+    files! {
+        body_force[super::WORKGROUP] Stage(BodyForce), Own: body_force;
+        cell_list[super::WORKGROUP] Stage(CellList), Own: count scan_blocks scan_sums scan_add scatter place;
+        collision[super::WORKGROUP] Stage(Collision), FluidAndReaction: collision;
+        conjugate_gradient[super::WORKGROUP] Stage(ConjugateGradient), Own:
+            pack start_residual start descend ascend multiply advance end_pack end_residual end;
+        correct[super::WORKGROUP] Stage(Correct), Fluid: correct;
+        coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare respond;
+        monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
+        move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids;
+        multigrid[super::WORKGROUP] Arrays(Multigrid), Own:
+            gather down_first down_second up_first up_second back_first small spread;
+        multigrid_levels[super::WORKGROUP] Arrays(Multigrid), Own:
+            mark scan_blocks scan_sums number_rows members galerkin coarsen_second coarsen_rest;
+        neighbour_list[super::WORKGROUP] Stage(NeighbourList), Rows: neighbour_list_main;
+        number_density[super::WORKGROUP] Stage(NumberDensity), Rows: number_density_main;
+        predict[super::WORKGROUP] Stage(Predict), Fluid: predict;
+        pressure_gradient[super::WORKGROUP] Stage(PressureGradient), Fluid: pressure_gradient;
+        pressure_source[super::WORKGROUP] Stage(PressureSource), Rows: pressure_source;
+        shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
+        viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
+    }
+
+    /// The shaders that `plan` needs.
+    pub fn planned(plan: &Plan) -> impl Iterator<Item = &'static Program> {
+        let serves = |file: &&File| match file.serves {
+            Serves::Stage(stage) => plan.has(stage),
+            Serves::Arrays(arrays) => plan.needs(arrays),
+        };
+        let particles = if plan.wet() { FILES } else { &[] };
+        particles.iter().filter(serves).map(|f| &f.program).chain(plan.contact.program)
+    }
+
+    /// All shaders, those of contact as well.
+    pub fn programs() -> impl Iterator<Item = &'static Program> {
+        FILES.iter().map(|f| &f.program).chain(crate::contact::device::PROGRAMS)
+    }
+
+    /// Kernel of a stage that is one kernel over particles, and what it runs over; nothing for one with more.
+    pub fn of(stage: ParticleStage) -> Option<(Kernel, Over)> {
+        let file = FILES.iter().find(|f| f.serves == Serves::Stage(stage.into()))?;
+        let kernel = *file.program.kernels.first()?;
+        (file.over != Over::Own).then_some((kernel, file.over))
+    }
+}

@@ -12,7 +12,7 @@ fn gain(before: (DVec3, DVec3), after: (DVec3, DVec3), gravity: DVec3) -> f64 {
 }
 
 /// Work of gravity, of viscosity with its acceleration `viscous`, and of the clamp, in `predict`.
-pub fn predict_work(x: DVec3, v: DVec3, viscous: DVec3, params: &Params, dt: f64) -> [f64; 3] {
+pub(crate) fn predict_work(x: DVec3, v: DVec3, viscous: DVec3, params: &Params, dt: f64) -> [f64; 3] {
     let total = params.explicit_gravity() + viscous;
     let (to, new, _) = predict(x, v, total, dt, params.spacing);
     let viscosity = dt * viscous.dot(v + 0.5 * dt * total);
@@ -23,12 +23,12 @@ pub fn predict_work(x: DVec3, v: DVec3, viscous: DVec3, params: &Params, dt: f64
 
 /// Work of the acceleration `part` where `total` acts, in `correct` without its clamp: the velocity is changed, and
 /// the position by what the change would have moved it.
-pub fn correct_work(v: DVec3, part: DVec3, total: DVec3, gravity: DVec3, dt: f64) -> f64 {
+pub(crate) fn correct_work(v: DVec3, part: DVec3, total: DVec3, gravity: DVec3, dt: f64) -> f64 {
     dt * part.dot(v + 0.5 * dt * total) - dt * dt * gravity.dot(part)
 }
 
 /// Work of the clamp in `correct`.
-pub fn correct_clamp(x: DVec3, v: DVec3, total: DVec3, params: &Params, dt: f64) -> f64 {
+pub(crate) fn correct_clamp(x: DVec3, v: DVec3, total: DVec3, params: &Params, dt: f64) -> f64 {
     let (to, new, clamped) = correct(x, v, total, dt, params.spacing);
     if !clamped {
         return 0.0;

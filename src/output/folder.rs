@@ -209,11 +209,6 @@ impl Folder {
         &self.root
     }
 
-    /// Whether other runs are kept out; not on file systems without locks.
-    pub fn is_locked(&self) -> bool {
-        self.lock.is_some()
-    }
-
     /// A file directly in the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.root.join(name)

@@ -184,7 +184,7 @@ pub struct Summary {
 }
 
 /// Most memory that this process has held [bytes].
-pub fn memory_peak() -> Option<u64> {
+pub(crate) fn memory_peak() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)

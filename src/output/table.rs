@@ -75,7 +75,7 @@ impl Table {
     ///
     /// # Errors
     /// [`Error::Io`] if there is none.
-    pub fn reopen(path: &Path, header: &[String]) -> Result<Self> {
+    pub(crate) fn reopen(path: &Path, header: &[String]) -> Result<Self> {
         let file = File::options().read(true).write(true).open(path).map_err(Error::io(path))?;
         Ok(Self { path: path.to_path_buf(), file, whole: 0, columns: header.len(), pending: Vec::new() })
     }
@@ -133,11 +133,11 @@ impl Table {
 }
 
 /// Three columns of a vector: `name_x [unit]`, `name_y [unit]`, `name_z [unit]`.
-pub fn vector_columns(name: &str, unit: &str) -> [String; 3] {
+pub(crate) fn vector_columns(name: &str, unit: &str) -> [String; 3] {
     ["x", "y", "z"].map(|axis| format!("{name}_{axis} [{unit}]"))
 }
 
 /// Three cells of a vector.
-pub fn vector_cells(v: glam::DVec3) -> [Cell; 3] {
+pub(crate) fn vector_cells(v: glam::DVec3) -> [Cell; 3] {
     v.to_array().map(Cell::Number)
 }

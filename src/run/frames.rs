@@ -84,7 +84,7 @@ impl Frames {
     }
 
     /// Whether there is a frame of step `steps`.
-    pub fn is_fresh(&self, steps: u64) -> bool {
+    pub(crate) fn is_fresh(&self, steps: u64) -> bool {
         self.fresh == Some(steps)
     }
 
@@ -131,7 +131,7 @@ impl Frames {
     ///
     /// # Errors
     /// [`Error::Io`], or what the backend says when it is read.
-    pub fn write_last(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
+    pub(crate) fn write_last(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
         let fields = read(simulation)?;
         for (name, particles) in self.moving(simulation, scene, fields.as_ref()) {
             self.put(&format!("vtu/last_{name}.vtu"), &particles, simulation.time)?;
@@ -143,7 +143,7 @@ impl Frames {
     ///
     /// # Errors
     /// [`Error::Io`], or what the backend says when it is read.
-    pub fn write_final_picture(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
+    pub(crate) fn write_final_picture(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
         let Some(picture) = &self.picture else { return Ok(()) };
         let fields = read(simulation)?;
         let png = picture.draw(scene, simulation.solids.poses(), fields.as_ref());

@@ -66,7 +66,7 @@ const OUTCOMES: [Outcome; 5] =
     [Outcome::Converged, Outcome::ZeroSource, Outcome::MaxIterations, Outcome::Breakdown, Outcome::NonFinite];
 
 /// A word for a table.
-pub fn outcome_name(outcome: Outcome) -> &'static str {
+pub(crate) fn outcome_name(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Converged => "converged",
         Outcome::ZeroSource => "zero_source",

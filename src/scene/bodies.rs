@@ -4,12 +4,21 @@ use super::oriented::Placed;
 use super::walls::motion;
 use super::{Drive, FreeBody, Shape, Solid};
 use crate::case::{self, Freedom};
+use crate::error::Problem;
 use glam::{DMat3, DQuat, DVec3};
 
 /// A body without slots, at the position that the case asks for.
-pub(super) fn body(body: &case::Body, spacing: f64, dimensions: u32, layers: i32) -> Solid {
+///
+/// # Errors
+/// A shape that cannot be had; the key is that of the body's table.
+pub(super) fn body(
+    body: &case::Body,
+    spacing: f64,
+    dimensions: u32,
+    layers: i32,
+) -> Result<Solid, Box<Problem>> {
     let plane = dimensions == 2;
-    let (shape, share) = body.shape(spacing, plane);
+    let (shape, share) = body.shape(spacing, plane)?;
     let mut position: DVec3 = body.center.into();
     if plane {
         position.y = 0.0;
@@ -19,12 +28,12 @@ pub(super) fn body(body: &case::Body, spacing: f64, dimensions: u32, layers: i32
         None => Drive::Free(free(body, &shape, share, plane)),
     };
     let particles = shape.particles(spacing, dimensions, layers);
-    Solid {
+    Ok(Solid {
         name: body.name.clone(),
         is_body: true,
         shape,
         position,
-        orientation: orientation(body, plane),
+        orientation: orientation(body, plane) * shape.frame(),
         drive,
         wall_slots: 0..0,
         dummy_slots: 0..0,
@@ -32,7 +41,7 @@ pub(super) fn body(body: &case::Body, spacing: f64, dimensions: u32, layers: i32
         dummy_offset: particles.dummy,
         wall_area: particles.area,
         wall_to_surface: particles.to_surface,
-    }
+    })
 }
 
 /// The turn from the shape's frame; a cylinder stands along the z axis of its own.

@@ -178,7 +178,16 @@ impl<'a> Builder<'a> {
         let gravity = self.gravity();
         let law = case.contact.as_ref().map_or(Law::Smooth, |c| c.law);
         for (k, body) in case.body.iter().enumerate() {
-            let mut solid = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
+            let made = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
+            let mut solid = match made {
+                Ok(solid) => solid,
+                Err(problem) => {
+                    let key = format!("body.{k}.{}", problem.key);
+                    self.problems.push(Problem { key, ..*problem });
+                    continue;
+                }
+            };
+            self.thin(k, &solid);
             let earlier: Vec<&Solid> = self.moving_walls.iter().chain(&self.bodies).collect();
             let surroundings = Surroundings {
                 fixed: &self.fixed,
@@ -210,6 +219,30 @@ impl<'a> Builder<'a> {
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }
+
+    /// What is thinner than two particles has none inside, and what is thinner than one none at all.
+    #[cfg(feature = "mesh")]
+    fn thin(&mut self, k: usize, solid: &Solid) {
+        let super::Shape::Mesh(mesh) = solid.shape else { return };
+        let (thin, l0) = (mesh.thickness(), self.lattice.spacing);
+        let message = format!(
+            "body `{}` is {:.2e} m thin at {} of its file",
+            solid.name,
+            thin.least,
+            point(thin.place)
+        );
+        if thin.least < l0 * (1.0 - 1e-6) || solid.wall_offset.len() < 4 {
+            let message = format!("{message}, less than one particle of {l0} m");
+            let remedy = format!("use run.spacing = {:.1e} or less, or thicken it", thin.least);
+            self.problems.push(Problem::new(format!("body.{k}.file"), message, remedy));
+        } else if thin.least < 2.0 * l0 * (1.0 - 1e-6) {
+            self.notes
+                .push(format!("{message}: less than two particles of {l0} m, the force on it is rough"));
+        }
+    }
+
+    #[cfg(not(feature = "mesh"))]
+    fn thin(&mut self, _: usize, _: &Solid) {}
 
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     fn gauges(&mut self) {

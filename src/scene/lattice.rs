@@ -32,10 +32,10 @@ impl Cells {
         (lo.x..hi.x)
             .flat_map(move |i| (lo.y..hi.y).flat_map(move |j| (lo.z..hi.z).map(move |k| IVec3::new(i, j, k))))
     }
-    pub fn grown(self, by: IVec3) -> Self {
+    pub(crate) fn grown(self, by: IVec3) -> Self {
         Self { lo: self.lo - by, hi: self.hi + by }
     }
-    pub fn union(self, other: Self) -> Self {
+    pub(crate) fn union(self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
     pub fn contains(self, c: IVec3) -> bool {
@@ -81,7 +81,7 @@ impl Lattice {
         self.flat(Cells { lo, hi })
     }
     /// Cells of the tank: round(L / l0) an axis, halves up.
-    pub fn tank_cells(&self, min: DVec3, max: DVec3) -> Cells {
+    pub(crate) fn tank_cells(&self, min: DVec3, max: DVec3) -> Cells {
         let n = ((max - min) / self.spacing + 0.5 + SLACK).floor().as_ivec3();
         self.flat(Cells { lo: IVec3::ZERO, hi: n })
     }

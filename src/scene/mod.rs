@@ -26,7 +26,7 @@ mod water;
 
 pub use crate::shape::Shape;
 pub use motion::Motion;
-pub use placement::CONTACT_DISTANCE;
+pub(crate) use placement::CONTACT_DISTANCE;
 
 use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
@@ -38,7 +38,12 @@ use std::ops::Range;
 ///
 /// # Errors
 /// See above.
-pub fn wall_at(wall: &[DVec3], point: DVec3, reach: f64, spacing: f64) -> Result<Vec<usize>, Option<DVec3>> {
+pub(crate) fn wall_at(
+    wall: &[DVec3],
+    point: DVec3,
+    reach: f64,
+    spacing: f64,
+) -> Result<Vec<usize>, Option<DVec3>> {
     // A face moves by up to half a spacing to fit the lattice, its particles stand half a spacing behind it; along
     // the face it may end half a spacing short, and half a spacing from the last particle.
     let farthest = 3_f64.sqrt() * (1.0 + 1e-6) * spacing;
@@ -68,7 +73,7 @@ pub enum Kind {
 
 impl Kind {
     /// The kind of a number, as `kind as u8` gives it.
-    pub fn from_code(code: u8) -> Option<Self> {
+    pub(crate) fn from_code(code: u8) -> Option<Self> {
         let all = [Self::Fluid, Self::Wall, Self::Dummy, Self::BodyWall, Self::BodyDummy, Self::Ghost];
         all.into_iter().find(|&k| k as u8 == code)
     }

@@ -73,7 +73,7 @@ impl Motion {
     }
 
     /// Whether the velocity changes between `t` and `t + dt` [s].
-    pub fn bends(&self, t: f64, dt: f64) -> bool {
+    pub(crate) fn bends(&self, t: f64, dt: f64) -> bool {
         let inside = |x: f64| x > t && x < t + dt;
         self.time.len() > 2 || self.time.iter().any(|&x| inside(x))
     }

@@ -47,7 +47,7 @@ impl Placed {
         self.way_out(other).0
     }
     /// The same, with that direction, in which this shape would have to move.
-    pub fn way_out(&self, other: &Self) -> (f64, DVec3) {
+    pub(crate) fn way_out(&self, other: &Self) -> (f64, DVec3) {
         let d = self.center - other.center;
         let (overlap, n) = self.least(other, |n| self.reach(n) + other.reach(n) - d.dot(n).abs());
         (overlap, n * d.dot(n).signum())

@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 use std::collections::HashMap;
 
 /// Contact distance over the spacing, d_c / l0, section 3 of the paper.
-pub const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
+pub(crate) const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
 
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {

@@ -292,7 +292,7 @@ impl PlaneFrame {
         0.5 * self.spacing * DVec3::new(self.n[0].into(), self.n[1].into(), layers.into())
     }
     /// The layers as a box.
-    pub fn slab(&self, layers: i32) -> Placed {
+    pub(crate) fn slab(&self, layers: i32) -> Placed {
         let half = self.half(layers);
         Placed::cuboid(self.center - self.axes.z_axis * half.z, half, self.axes)
     }

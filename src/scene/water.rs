@@ -80,7 +80,7 @@ impl Water {
     /// moving walls are closed) and complains when it gets out of everything there is.
     ///
     /// Without gravity water has no reason to run, so a free drop is no leak.
-    pub fn leak(
+    pub(crate) fn leak(
         &self,
         gravity: DVec3,
         lattice: &Lattice,

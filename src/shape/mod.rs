@@ -7,6 +7,8 @@ mod convex;
 mod cuboid;
 mod cylinder;
 mod disc;
+#[cfg(feature = "mesh")]
+mod mesh;
 mod sphere;
 mod surface;
 
@@ -15,10 +17,14 @@ pub use cuboid::Cuboid;
 pub(crate) use cuboid::{ALL_FACES, face_normal};
 pub use cylinder::Cylinder;
 pub use disc::Disc;
+#[cfg(feature = "mesh")]
+pub use mesh::{Mesh, Thickness, Unfit};
 pub use sphere::Sphere;
+#[cfg(feature = "mesh")]
+use sphere::close;
 pub use surface::{Line, Ring, Side, Surface};
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use std::ops::Deref;
 
 /// Faces of a shape: bit 2 k for the lower face of axis k, bit 2 k + 1 for the upper one.
@@ -46,6 +52,9 @@ pub enum Shape {
     Cylinder(Cylinder),
     /// A round slice, of two dimensions.
     Disc(Disc),
+    /// A closed surface of triangles.
+    #[cfg(feature = "mesh")]
+    Mesh(&'static Mesh),
 }
 
 impl Deref for Shape {
@@ -57,6 +66,8 @@ impl Deref for Shape {
             Self::Sphere(shape) => shape,
             Self::Cylinder(shape) => shape,
             Self::Disc(shape) => shape,
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => *shape,
         }
     }
 }
@@ -65,6 +76,15 @@ impl Shape {
     /// A box of edge lengths `size` [m].
     pub fn cuboid(size: DVec3) -> Self {
         Self::Box(Cuboid { half: 0.5 * size })
+    }
+
+    /// Turn from its frame to the one it was given in: of a mesh, from its principal axes to the file's.
+    pub fn frame(&self) -> DQuat {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => shape.frame(),
+            _ => DQuat::IDENTITY,
+        }
     }
 
     /// [`Geometry::depth`], for boxes without asking which shape it is at every point.

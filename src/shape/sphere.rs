@@ -111,7 +111,7 @@ fn fibonacci(n: usize) -> impl Iterator<Item = DVec3> {
 
 /// Corrects areas that are even only nearly: an even pressure may not push, and one that grows with depth must
 /// push with the weight of `volume` [m3], so sum A = 0 and sum x A^T = volume.
-fn close(particles: &mut Particles, volume: f64) {
+pub(super) fn close(particles: &mut Particles, volume: f64) {
     let n = particles.area.len() as f64;
     let mean = particles.area.iter().sum::<DVec3>() / n;
     particles.area.iter_mut().for_each(|a| *a -= mean);

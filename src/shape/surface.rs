@@ -78,7 +78,7 @@ impl Surface {
     }
 
     /// Whether it has parts that a device has no kernel for.
-    pub fn is_round(&self) -> bool {
+    pub(crate) fn is_round(&self) -> bool {
         self.ball.is_some() || self.side.is_some() || !self.rings.is_empty()
     }
 

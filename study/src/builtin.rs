@@ -2,8 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, cases, compare, contact_cost, contact_random, dry_studies, gallery, needs, pressure_size,
-    pressure_solve, stability, wall_of_cubes, work_precision,
+    Study, cases, compare, contact_cost, contact_hard, contact_random, dry_studies, gallery, needs,
+    pressure_size, pressure_solve, stability, wall_of_cubes, work_precision,
 };
 use seixo::error::{Error, Result};
 
@@ -105,6 +105,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "contact-cost",
         about: "what contact costs a step for 1 to 1000 bodies, on the host and on a device",
         make: Maker::Function(contact_cost::study),
+    },
+    Entry {
+        name: "contact-hard",
+        about: "contact where it was wrong: each fault against its analytic answer, on the host and on a device",
+        make: Maker::Function(contact_hard::study),
     },
     Entry {
         name: "contact-random",

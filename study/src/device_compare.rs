@@ -130,7 +130,6 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
     let of_parts = |n: &[f64]| -> Vec<f64> { (0..n.len()).filter(part).map(|i| n[i]).collect() };
     match stage {
         Stage::Viscosity => vec![acceleration(), reaction()],
-        Stage::Predict | Stage::MoveSolids | Stage::Correct | Stage::Shift => vec![position(), velocity()],
         Stage::CellList => vec![position(), velocity(), share(stage, "kind", &gpu.kind, &cpu.kind)],
         Stage::Collision => vec![position(), velocity(), reaction()],
         Stage::NumberDensity => vec![
@@ -143,6 +142,7 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
         Stage::ConjugateGradient => vec![scalar("pressure", &gpu.pressure, &cpu.pressure)],
         Stage::PressureGradient => vec![acceleration()],
         Stage::NeighbourList | Stage::BodyForce | Stage::Contact => Vec::new(),
+        _ => vec![position(), velocity()],
     }
 }
 

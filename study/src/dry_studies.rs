@@ -44,7 +44,7 @@ fn law_name(law: Law) -> &'static str {
     match law {
         Law::Paper => "paper's law, one sub-step",
         Law::Smooth => "smooth law, sub-steps as needed",
-        Law::Pressure => "collision model",
+        _ => "collision model",
     }
 }
 

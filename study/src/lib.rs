@@ -19,6 +19,7 @@ pub mod compare;
 pub mod computers;
 pub mod contact_checks;
 pub mod contact_cost;
+pub mod contact_hard;
 pub mod contact_random;
 pub mod contact_rest;
 pub mod definition;

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 
 /// e = w / r^2 r of each neighbour into `e`, 0 for a coincident one; `r` and `w` are filled up with zeros.
 #[inline(always)]
-pub fn pair_vectors(r: &Columns, w: &[f64], e: &mut Columns) {
+pub(crate) fn pair_vectors(r: &Columns, w: &[f64], e: &mut Columns) {
     let n = w.len();
     let (x, y, z) = (&r.x[..n], &r.y[..n], &r.z[..n]);
     let (ex, ey, ez) = (&mut e.x[..n], &mut e.y[..n], &mut e.z[..n]);

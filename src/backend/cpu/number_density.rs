@@ -9,7 +9,7 @@ use crate::neighbours::Chunk;
 
 wide! {
     /// Weights, number densities and states of the slots from `first` on, of which those below `live` hold fluid.
-    pub fn density_rows(
+    pub(crate) fn density_rows(
         first: usize,
         live: usize,
         chunk: &mut Chunk,

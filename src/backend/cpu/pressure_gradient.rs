@@ -14,7 +14,7 @@ use glam::DVec3;
 wide! {
     /// Acceleration by the pressure of the fluid slots from `first` on, whose states are `state`, and how unevenly
     /// their neighbours lie if anybody asks; only those below `live` hold a particle.
-    pub fn gradient_rows(
+    pub(crate) fn gradient_rows(
         first: usize,
         live: usize,
         chunk: &Chunk,

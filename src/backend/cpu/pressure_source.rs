@@ -15,7 +15,7 @@ use glam::{DMat3, DVec3};
 
 wide! {
     /// Right sides and diagonals of the slots from `first` on, whose number densities and states are given.
-    pub fn source_rows(
+    pub(crate) fn source_rows(
         first: usize,
         chunk: &Chunk,
         given: (&[f64], &[State]),

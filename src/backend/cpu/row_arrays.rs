@@ -7,10 +7,10 @@ use crate::neighbours::CAPACITY;
 use glam::DVec3;
 
 /// Partial sums of a sum.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Longest row: as many neighbours that carry pressure as fit, as many dummies, and the filling.
-pub const LONGEST: usize = 2 * CAPACITY + LANES;
+pub(crate) const LONGEST: usize = 2 * CAPACITY + LANES;
 
 /// A number for each neighbour.
 pub type Column = [f64; LONGEST];
@@ -45,7 +45,7 @@ impl Columns {
 
     /// out_k <- f(|v_k|^2).
     #[inline(always)]
-    pub fn map_squares(&self, out: &mut [f64], f: impl Fn(f64) -> f64) {
+    pub(crate) fn map_squares(&self, out: &mut [f64], f: impl Fn(f64) -> f64) {
         let n = out.len();
         let (x, y, z) = (&self.x[..n], &self.y[..n], &self.z[..n]);
         for k in 0..n {
@@ -55,7 +55,7 @@ impl Columns {
 
     /// sum w_k v_k.
     #[inline(always)]
-    pub fn weighted_sum(&self, w: &[f64]) -> DVec3 {
+    pub(crate) fn weighted_sum(&self, w: &[f64]) -> DVec3 {
         DVec3::new(dot(w, &self.x), dot(w, &self.y), dot(w, &self.z))
     }
 }

@@ -68,12 +68,12 @@ impl Clock {
     }
 
     /// Whether the timestamps should be read before more come.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.marks.len() as u32 > MARKS - MARGIN
     }
 
     /// Record that the timestamps go to the host; the buffer to map, and its bytes.
-    pub fn fetch(&mut self, encoder: &mut wgpu::CommandEncoder) -> Option<(wgpu::Buffer, u64)> {
+    pub(crate) fn fetch(&mut self, encoder: &mut wgpu::CommandEncoder) -> Option<(wgpu::Buffer, u64)> {
         self.mark(encoder, None);
         let count = self.marks.len() as u32;
         if count < 2 {

@@ -199,7 +199,7 @@ impl Context {
 
     /// Make a buffer hold at least `bytes`; by half more than asked, so that it does not grow every time. What
     /// it held is lost if it grows.
-    pub fn reserve(&mut self, id: Id, bytes: u64) -> Result<()> {
+    pub(crate) fn reserve(&mut self, id: Id, bytes: u64) -> Result<()> {
         let (old, name) = (self.buffer(id)?, id.name());
         let (have, usage) = (old.size(), old.usage());
         if bytes <= have {
@@ -263,7 +263,7 @@ impl Context {
     }
 
     /// Workgroups of a dispatch at most.
-    pub fn workgroups_max(&self) -> u64 {
+    pub(crate) fn workgroups_max(&self) -> u64 {
         u64::from(self.device.limits().max_compute_workgroups_per_dimension)
     }
 
@@ -274,7 +274,7 @@ impl Context {
 
     /// Lose the device.
     #[cfg(test)]
-    pub fn destroy(&self) {
+    pub(crate) fn destroy(&self) {
         self.device.destroy();
     }
 

@@ -10,7 +10,7 @@ pub(super) type Part = (Id, u64, u64);
 
 impl Context {
     /// Hand what is recorded to the device.
-    pub fn submit(&mut self) {
+    pub(crate) fn submit(&mut self) {
         if let Some(mut encoder) = self.encoder.take() {
             if let Some(clock) = &mut self.clock {
                 clock.mark(&mut encoder, None);
@@ -23,12 +23,12 @@ impl Context {
 
     /// Write to the start of a buffer; what was recorded before still sees the old content. Little data goes with
     /// the next submission, much causes one.
-    pub fn upload<T: Element>(&mut self, buffer: Buffer<T>, data: &[T]) -> Result<()> {
+    pub(crate) fn upload<T: Element>(&mut self, buffer: Buffer<T>, data: &[T]) -> Result<()> {
         self.upload_bytes(buffer.id(), bytemuck::cast_slice(data))
     }
 
     /// [`Context::upload`] of bytes.
-    pub fn upload_bytes(&mut self, buffer: Id, data: &[u8]) -> Result<()> {
+    pub(crate) fn upload_bytes(&mut self, buffer: Id, data: &[u8]) -> Result<()> {
         let (mail, at) = (self.mail.0.clone(), self.mail.1);
         let end = at + data.len() as u64;
         let target = self.buffer(buffer)?.clone();
@@ -45,12 +45,12 @@ impl Context {
     }
 
     /// Read the first `count` elements of a buffer.
-    pub fn download<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<Vec<T>> {
+    pub(crate) fn download<T: Element>(&mut self, buffer: Buffer<T>, count: usize) -> Result<Vec<T>> {
         self.download_parts(buffer, &[(0, count)])
     }
 
     /// Read parts of a buffer, given as offset and length in elements, one after the other.
-    pub fn download_parts<T: Element>(
+    pub(crate) fn download_parts<T: Element>(
         &mut self,
         buffer: Buffer<T>,
         parts: &[(usize, usize)],
@@ -63,7 +63,7 @@ impl Context {
 
     /// Read parts of several buffers, one after the other, and the clock as well if `clock`: one wait, unless they
     /// are large.
-    pub fn download_bytes(&mut self, parts: &[Part], clock: bool) -> Result<Vec<u8>> {
+    pub(crate) fn download_bytes(&mut self, parts: &[Part], clock: bool) -> Result<Vec<u8>> {
         let total = parts.iter().map(|p| p.2).sum::<u64>();
         let mut out = Vec::with_capacity(total as usize);
         let mut filled = 0;

@@ -7,9 +7,9 @@ use crate::plan::Plan;
 use serde::Serialize;
 
 /// Bytes that a shader binds at most on any device [bytes].
-pub const BINDING_MAX: u64 = (1 << 31) - 1;
+pub(crate) const BINDING_MAX: u64 = (1 << 31) - 1;
 /// Workgroups that a dispatch starts along one dimension.
-pub const WORKGROUPS_MAX: u64 = 65_535;
+pub(crate) const WORKGROUPS_MAX: u64 = 65_535;
 
 /// Buffers that serve one purpose.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -79,7 +79,7 @@ impl Levels {
     }
 
     /// Levels that can have dispatches of their own.
-    pub fn large_max(&self) -> usize {
+    pub(crate) fn large_max(&self) -> usize {
         LARGE_MAX.min(self.count.len() - 1)
     }
 

@@ -4,6 +4,7 @@ use super::buffers::TABLE;
 use super::hierarchy::Levels;
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
+pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
 use crate::kernels::body_force::missing_head;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
@@ -14,20 +15,16 @@ use crate::scene::{Groups, Scene};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-/// Threads of a workgroup; `WORKGROUP` in shaders/common.wgsl.
-pub const WORKGROUP: u64 = 256;
-/// Threads of a workgroup of the monitor; `WIDTH` in shaders/monitor.wgsl.
-pub const MONITOR_WIDTH: u64 = 128;
 /// Workgroups that share a reduction at most: every one of them adds the sums of all others.
 const REDUCTION_GROUPS_MAX: u64 = 1024;
 /// Keys of a scan that a workgroup takes at a time: four a thread.
-pub const SCAN_BLOCK: u64 = 4 * WORKGROUP;
+pub(crate) const SCAN_BLOCK: u64 = 4 * WORKGROUP;
 /// Workgroups of a scan at most; they then take several blocks. A GPU is full with them.
-pub const SCAN_GROUPS_MAX: u64 = 1024;
+pub(crate) const SCAN_GROUPS_MAX: u64 = 1024;
 /// Fluid slots whose ghosts share a key of the counting sort; `GHOST_BLOCK` in shaders/common.wgsl.
 pub const GHOST_BLOCK: u64 = 64;
 /// Fluid particles at most: numbers travel in an f32.
-pub const FLUID_MAX: usize = 1 << 24;
+pub(crate) const FLUID_MAX: usize = 1 << 24;
 
 /// Places in the buffer of counters.
 pub mod counter {
@@ -327,12 +324,12 @@ impl Sizes {
     }
 
     /// Workgroups of the monitor: a few particles a thread.
-    pub fn monitor_groups(&self) -> u64 {
+    pub(crate) fn monitor_groups(&self) -> u64 {
         self.fluid.div_ceil(8 * MONITOR_WIDTH).clamp(1, 512)
     }
 
     /// Chunks of up to [`WORKGROUP`] wall-layer particles of one solid, at most.
-    pub fn force_chunks(&self) -> u64 {
+    pub(crate) fn force_chunks(&self) -> u64 {
         self.moving_wall.div_ceil(WORKGROUP) + self.solids
     }
 }

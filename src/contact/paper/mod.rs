@@ -22,7 +22,7 @@ pub(crate) use pair::{Constants, Layer, Pair, Walls};
 
 use super::candidates::MANY_PAIRS;
 use super::device::Link;
-use super::law::{Law, Now, Summary};
+use super::law::{Kind, Law, Now, Summary};
 use super::probe::Probe;
 use super::stiffness::{Damping, Lambda};
 use super::substeps::{Limits, OMEGA_STEP, Worst};
@@ -32,6 +32,13 @@ use crate::error::{Error, Result};
 use crate::scene::{CONTACT_DISTANCE, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
+
+/// The paper's law.
+pub(super) const KIND: Kind = Kind {
+    make: |contact, scene, bodies, limits| Ok(Box::new(Paper::new(contact, scene, bodies, limits)?)),
+    gap: |spacing| (CONTACT_DISTANCE - 1.0) * spacing,
+    program: |_| Ok(&device::PROGRAM),
+};
 
 /// K over Eq. (16) at which the law returns a falling body from every entry phase: measured 5.6 to 5.8, theory
 /// [d_c / (d_c - l0 / sqrt 2)]^2 = 5.60.

@@ -10,13 +10,20 @@
 mod collision;
 
 use super::device::Link;
-use super::law::{Law, Now, Summary};
+use super::law::{Kind, Law, Now, Summary};
 use super::paper::Lists;
 use super::probe::Probe;
 use super::substeps::{Limits, Worst};
 use crate::body::{Body, Wrench};
 use crate::error::Result;
 use crate::scene::Scene;
+
+/// The collision model.
+pub(super) const KIND: Kind = Kind {
+    make: |_, scene, _, _| Ok(Box::new(Pressure::new(scene))),
+    gap: |_| 0.0,
+    program: |_| Err("the baseline's impulses follow one another"),
+};
 
 /// Restitution b of Eq. (18) [-].
 const RESTITUTION: f64 = 0.2;

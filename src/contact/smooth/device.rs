@@ -231,7 +231,7 @@ impl Pairs {
             let [on_b, on_a] = [0, 1].map(|k| if pressed[k] { record.faces[k] } else { 0 });
             record.open = on_b | on_a << 6;
             record.sum = place(sum)?;
-            sum += 1 + 3 * slots(&record).count();
+            sum += 1 + 4 * slots(&record).count();
             self.pairs.push(pair);
             self.records.push(record);
         }
@@ -411,13 +411,17 @@ fn read(pair: &Pair, record: &SmoothPair, sums: &[[f32; 4]], bodies: &[Body]) ->
     }
     let a = &bodies[pair.a];
     let mut on_a = Wrench::default();
-    let pressed = slots(record).zip(sums[1..].chunks_exact(3)).filter(|(_, s)| s[0][3] > 0.0);
+    let pressed = slots(record).zip(sums[1..].chunks_exact(4)).filter(|(_, s)| s[0][3] > 0.0);
     let patches = pressed.map(|(key, s)| {
         let force = a.rotation * vector(s[0]);
         on_a += Wrench { force, torque: a.rotation * vector(s[1]) };
         let at = a.pose.position + a.rotation * vector(s[2]);
         let key = if key < 6 { key } else { key + 2 };
-        Patch::new(key, force, f64::from(s[0][3]), at, f64::from(s[1][3]))
+        let [[zz, yz, zx, _], xx, yy, xy] =
+            [s[3], [s[1][3]; 4], [s[2][3]; 4], [s[3][3]; 4]].map(|v| v.map(f64::from));
+        let own = DMat3::from_cols_array(&[xx[0], xy[0], zx, xy[0], yy[0], yz, zx, yz, zz]);
+        let spread = a.rotation * own * a.rotation.transpose();
+        Patch::new(key, force, f64::from(s[0][3]), at, spread)
     });
     let patches = patches.collect();
     // The same forces at the same points act on B, so their moment about its centre follows.

@@ -30,7 +30,7 @@ mod walls;
 
 use super::candidates::{Candidates, MANY_PAIRS, reduced_mass};
 use super::device::Link;
-use super::law::{Fault, Law, Now, Summary};
+use super::law::{Fault, Kind, Law, Now, Summary};
 use super::probe::Probe;
 use super::substeps::{Limits, Worst};
 use crate::body::{Body, Wrench};
@@ -43,6 +43,19 @@ use pair::{Constants, Other, Pair};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use walls::WallBox;
+
+/// The smooth law.
+pub(super) const KIND: Kind = Kind {
+    make: |_, scene, bodies, limits| Ok(Box::new(Smooth::new(scene, bodies, limits))),
+    gap: |_| 0.0,
+    program: |scene| {
+        // the kernel presses the points of boxes into boxes
+        if scene.solids.iter().any(|s| s.shape.as_cuboid().is_none()) {
+            return Err("the device has no kernel of law \"smooth\" for round bodies");
+        }
+        Ok(&device::PROGRAM)
+    },
+};
 
 /// Exponent p of the effective depth.
 pub(super) const EXPONENT: f64 = 8.0;

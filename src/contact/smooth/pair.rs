@@ -185,7 +185,7 @@ pub(crate) struct DeviceSums {
 }
 
 /// All points pressed by one face: where friction acts.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
     /// Which face, of which of the two solids.
     key: u8,
@@ -197,15 +197,15 @@ pub(crate) struct Patch {
     pub force: f64,
     /// Sum of the points' forces [N].
     pressing: f64,
-    /// Mean distance of the normal force from its centre [m].
-    pub radius: f64,
+    /// Second moments of the normal force about its centre [m2], world axes.
+    pub spread: DMat3,
 }
 
 impl Patch {
     /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
-    /// mean distance from it [m].
-    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, radius: f64) -> Self {
-        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, radius }
+    /// second moments about it [m2].
+    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
+        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, spread }
     }
 }
 
@@ -618,7 +618,7 @@ impl Pair {
             let key = c.patch;
             let known = self.patches.iter().position(|p| p.key == key);
             let patch = known.unwrap_or_else(|| {
-                self.patches.push(Patch { key, ..Patch::default() });
+                self.patches.push(Patch::new(key, DVec3::ZERO, 0.0, DVec3::ZERO, DMat3::ZERO));
                 self.patches.len() - 1
             });
             let patch = &mut self.patches[patch];
@@ -634,7 +634,9 @@ impl Pair {
         });
         for c in &self.contacts {
             if let Some(patch) = self.patches.iter_mut().find(|p| p.key == c.patch) {
-                patch.radius += c.force * (c.at - patch.at).length() / patch.pressing;
+                let arm = c.at - patch.at;
+                let weighed = c.force / patch.pressing * arm;
+                patch.spread += DMat3::from_cols(arm.x * weighed, arm.y * weighed, arm.z * weighed);
             }
         }
     }

@@ -30,7 +30,7 @@ pub(super) fn fill(law: &Smooth, bodies: &[Body], device: Option<Link>, probe: &
             normal: f.normal,
             at: f.at,
             force: f.force,
-            radius: f.radius,
+            radius: (f.spread.x_axis.x + f.spread.y_axis.y + f.spread.z_axis.z).sqrt(),
         });
         probe.patches.extend(patches);
         probe.energy += p.energy;

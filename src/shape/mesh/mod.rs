@@ -1,0 +1,387 @@
+//! A closed surface of triangles: a body from an STL or OBJ file.
+//!
+//! Volume, moments and distances are those of the triangles (parry). Particles stand on a lattice that fills the body; its
+//! wall layer is brought to half a spacing below the surface. Points of the surface press into others: those above the
+//! wall layer, the vertices and the sharp edges.
+
+mod particles;
+mod read;
+
+use super::surface::Surface;
+use super::{Faces, Geometry, Inside, Particles, WallLayer, along};
+use glam::{DMat3, DQuat, DVec3};
+use parry3d_f64::mass_properties::MassProperties;
+use parry3d_f64::query::{PointQuery, Ray, RayCast};
+use parry3d_f64::shape::{TriMesh, TriMeshFlags};
+use std::sync::Mutex;
+
+/// What is wrong with a file, and what to do about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unfit {
+    /// What is wrong.
+    pub message: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+impl Unfit {
+    fn new(message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { message: message.into(), remedy: remedy.into() }
+    }
+}
+
+/// A body's surface, in the frame of its principal axes.
+pub struct Mesh {
+    triangles: TriMesh,
+    volume: f64,
+    /// Principal moments per mass [m2].
+    moments: DVec3,
+    /// Turn from this frame to the file's.
+    frame: DQuat,
+    /// Centre of mass in the file's coordinates [m].
+    center: DVec3,
+    /// Corners of its convex hull [m].
+    hull: Vec<DVec3>,
+    radius: f64,
+    /// Lower and upper corner of the box around it [m].
+    bounds: (DVec3, DVec3),
+    /// Convex edges that are sharper than [`SHARP`]: their ends, and the faces that their triangles belong to.
+    sharp: Vec<(DVec3, DVec3, Faces)>,
+    thickness: Thickness,
+}
+
+/// Where a mesh is thinnest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thickness {
+    /// Thickness [m].
+    pub least: f64,
+    /// The middle of a triangle there, in the file's coordinates [m].
+    pub place: DVec3,
+}
+
+/// Angle between the normals of two triangles from which their edge presses by itself [rad].
+const SHARP: f64 = 0.5;
+/// Share of the inertia beside the diagonal that is round-off.
+const ROUND_OFF: f64 = 1e-6;
+
+/// A mesh is read once for all bodies, scenes and runs of a program that have it, and kept.
+static READ: Mutex<Vec<(u32, u64, &'static Mesh)>> = Mutex::new(Vec::new());
+
+impl std::fmt::Debug for Mesh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Mesh({} triangles)", self.triangles.num_triangles())
+    }
+}
+
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
+impl Mesh {
+    /// The mesh in the STL or OBJ file `path`, whose lengths times `scale` are metres.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a surface that encloses nothing: open, turned both ways, flat.
+    pub fn open(path: &str, scale: f64) -> Result<&'static Self, Unfit> {
+        let bytes = std::fs::read(path).map_err(|e| {
+            Unfit::new(format!("{path}: {e}"), "give an STL or OBJ file, by its path from the case")
+        })?;
+        let mut key = crc32fast::hash(&bytes);
+        key ^= crc32fast::hash(path.as_bytes());
+        let mut read = READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(known) = read.iter().find(|k| (k.0, k.1) == (key, scale.to_bits())) {
+            return Ok(known.2);
+        }
+        let (vertices, triangles) = read::soup(path, &bytes)?;
+        let vertices = vertices.into_iter().map(|v| scale * v).collect();
+        let mesh: &'static Self = Box::leak(Box::new(Self::new(path, vertices, triangles)?));
+        read.push((key, scale.to_bits(), mesh));
+        Ok(mesh)
+    }
+
+    /// A mesh of `vertices` [m]; `path` stands for it in messages.
+    fn new(path: &str, mut vertices: Vec<DVec3>, mut triangles: Vec<[u32; 3]>) -> Result<Self, Unfit> {
+        read::check(path, &vertices, &triangles)?;
+        let mass = MassProperties::from_trimesh(1.0, &vertices, &triangles);
+        let signed: f64 = triangles.iter().map(|t| tetrahedron(t.map(|k| vertices[k as usize]))).sum();
+        let volume = mass.mass();
+        let size = vertices.iter().map(|v| v.distance(vertices[0])).fold(0.0, f64::max);
+        if volume.is_nan() || volume < 1e-9 * size.powi(3) {
+            let message = format!("{path}: its surface encloses no volume");
+            return Err(Unfit::new(message, "give a closed solid with a volume"));
+        }
+        if signed < 0.0 {
+            triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        let tensor = mass.reconstruct_inertia_matrix();
+        let beside = [tensor.y_axis.x, tensor.z_axis.x, tensor.z_axis.y];
+        let diagonal = DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z);
+        let straight = beside.iter().all(|b| b.abs() < ROUND_OFF * diagonal.max_element());
+        let (moments, frame) = if straight {
+            (diagonal, DQuat::IDENTITY)
+        } else {
+            (mass.principal_inertia(), mass.principal_inertia_local_frame)
+        };
+        let center = mass.local_com;
+        let to_own = frame.inverse();
+        vertices.iter_mut().for_each(|v| *v = to_own * (*v - center));
+        let bounds = vertices.iter().fold((DVec3::MAX, DVec3::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+        let sharp = sharp(&vertices, &triangles);
+        let hull = parry3d_f64::transformation::try_convex_hull(&vertices);
+        let hull = hull.map_or_else(|_| vertices.clone(), |(hull, _)| hull);
+        let radius = hull.iter().map(|v| v.length()).fold(0.0, f64::max);
+        let triangles = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
+            .map_err(|e| Unfit::new(format!("{path}: {e}"), "repair the surface"))?;
+        let thickness = thinnest(&triangles);
+        let place = frame * thickness.place + center;
+        let thickness = Thickness { place, ..thickness };
+        let moments = moments / volume;
+        Ok(Self { triangles, volume, moments, frame, center, hull, radius, bounds, sharp, thickness })
+    }
+
+    /// Turn from the frame of its principal axes to the file's.
+    pub fn frame(&self) -> DQuat {
+        self.frame
+    }
+
+    /// Its centre of mass in the file's coordinates, scaled [m].
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Where it is thinnest.
+    pub fn thickness(&self) -> Thickness {
+        self.thickness
+    }
+
+    /// Edge lengths of the box around it [m].
+    pub fn size(&self) -> DVec3 {
+        self.bounds.1 - self.bounds.0
+    }
+
+    /// The nearest point of the surface, and whether `q` is inside.
+    fn nearest(&self, q: DVec3) -> (DVec3, bool) {
+        let found = self.triangles.project_local_point(q, false);
+        (found.point, found.is_inside)
+    }
+
+    /// Places along the line where it goes through the surface, in order.
+    fn crossings(&self, start: DVec3, along: DVec3, length: f64) -> Vec<f64> {
+        let step = 1e-9 * self.radius;
+        let (mut out, mut from) = (vec![], 0.0);
+        while let Some(way) =
+            self.triangles.cast_local_ray(&Ray::new(start + from * along, along), length - from, false)
+        {
+            from += way;
+            out.push(from);
+            from += step;
+            if from >= length {
+                break;
+            }
+        }
+        out
+    }
+}
+
+/// Volume of the tetrahedron with the origin, positive if the triangle is turned outwards [m3].
+fn tetrahedron([a, b, c]: [DVec3; 3]) -> f64 {
+    a.dot(b.cross(c)) / 6.0
+}
+
+/// The face of a box that looks like a triangle with this normal.
+fn face(normal: DVec3) -> Faces {
+    let axis = normal.abs().max_position();
+    1 << (2 * axis + usize::from(normal[axis] > 0.0))
+}
+
+/// Sharp convex edges.
+fn sharp(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<(DVec3, DVec3, Faces)> {
+    let at = |k: u32| vertices[k as usize];
+    let normal = |t: &[u32; 3]| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalize_or_zero();
+    let mut other = std::collections::HashMap::new();
+    for (k, t) in triangles.iter().enumerate() {
+        (0..3).for_each(|e| _ = other.insert((t[e], t[(e + 1) % 3]), k));
+    }
+    let mut out = vec![];
+    for t in triangles {
+        for e in 0..3 {
+            let (a, b, apex) = (t[e], t[(e + 1) % 3], t[(e + 2) % 3]);
+            let Some(&k) = other.get(&(b, a)).filter(|_| a < b) else { continue };
+            let (n, m) = (normal(t), normal(&triangles[k]));
+            let convex = m.dot(at(apex) - at(a)) < 0.0;
+            if convex && n.angle_between(m) > SHARP {
+                out.push((at(a), at(b), face(n) | face(m)));
+            }
+        }
+    }
+    out
+}
+
+/// The thinnest place: the shortest way from the middle of a triangle inwards to the surface again.
+fn thinnest(mesh: &TriMesh) -> Thickness {
+    let size = mesh.local_aabb().extents().length();
+    let mut thickness = Thickness { least: f64::INFINITY, place: DVec3::ZERO };
+    for triangle in mesh.triangles() {
+        let place = (triangle.a + triangle.b + triangle.c) / 3.0;
+        let inwards = -(triangle.b - triangle.a).cross(triangle.c - triangle.a).normalize_or_zero();
+        let start = place + 1e-7 * size * inwards;
+        if let Some(least) = mesh.cast_local_ray(&Ray::new(start, inwards), size, false)
+            && least < thickness.least
+        {
+            thickness = Thickness { least, place };
+        }
+    }
+    thickness
+}
+
+impl Geometry for Mesh {
+    fn name(&self) -> &'static str {
+        "mesh"
+    }
+
+    fn volume(&self) -> f64 {
+        self.volume
+    }
+
+    fn inertia(&self, mass: f64) -> DVec3 {
+        mass * self.moments
+    }
+
+    fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    fn reach(&self, n: DVec3) -> f64 {
+        self.hull.iter().map(|v| v.dot(n)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn extent(&self, rotation: DMat3) -> DVec3 {
+        let to_shape = rotation.transpose();
+        DVec3::from_array(
+            DVec3::AXES.map(|axis| self.reach(to_shape * axis).max(self.reach(to_shape * -axis))),
+        )
+    }
+
+    /// Of the box around it, and of its surface only near that.
+    fn outside(&self, q: DVec3) -> f64 {
+        let (low, high) = self.bounds;
+        let off = (low - q).max(q - high).max(DVec3::ZERO).length();
+        if off > 0.1 * self.radius { off } else { self.distance(q).0 }
+    }
+
+    fn distance(&self, q: DVec3) -> (f64, DVec3) {
+        let (nearest, inside) = self.nearest(q);
+        let (way, sign) = (q - nearest, if inside { -1.0 } else { 1.0 });
+        let d = way.length();
+        // on the surface itself
+        if d < 1e-12 * self.radius {
+            let away = q.try_normalize().unwrap_or(DVec3::Z);
+            let ahead = q + 1e-6 * self.radius * away;
+            let (n, inside) = self.nearest(ahead);
+            let outward = (ahead - n).normalize_or(away);
+            return (0.0, if inside { -outward } else { outward });
+        }
+        (sign * d, sign * way / d)
+    }
+
+    fn depth(&self, q: DVec3, _: Faces) -> Option<Inside> {
+        let (low, high) = self.bounds;
+        if q.cmplt(low).any() || q.cmpgt(high).any() {
+            return None;
+        }
+        let (distance, outward) = self.distance(q);
+        (distance < 0.0).then(|| Inside {
+            depth: -distance,
+            outward,
+            face: face(outward).trailing_zeros() as u8,
+        })
+    }
+
+    fn axes(&self) -> Vec<DVec3> {
+        DVec3::AXES.to_vec()
+    }
+
+    fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool {
+        let end = start + length * along;
+        let (low, high) = (self.bounds.0 - margin, self.bounds.1 + margin);
+        start.min(end).cmple(high).all() && start.max(end).cmpge(low).all()
+    }
+
+    /// The surface need not be convex: every stretch inside has its own nodes.
+    fn nodes(
+        &self,
+        (start, along_line, length): (DVec3, DVec3, f64),
+        faces: Faces,
+        _: f64,
+        visit: &mut dyn FnMut(f64, f64, Inside),
+    ) {
+        let mut ends = vec![0.0];
+        ends.extend(self.crossings(start, along_line, length));
+        ends.push(length);
+        for stretch in ends.windows(2) {
+            let (from, width) = (stretch[0], stretch[1] - stretch[0]);
+            let middle = start + (from + 0.5 * width) * along_line;
+            if width <= 0.0 || self.depth(middle, faces).is_none() {
+                continue;
+            }
+            let distance = |s: f64| {
+                let (d, gradient) = self.distance(start + (from + s) * along_line);
+                (d.min(-f64::MIN_POSITIVE), gradient.dot(along_line))
+            };
+            along(width, distance, |s, share| {
+                if let Some(inside) = self.depth(start + (from + s) * along_line, faces) {
+                    visit(from + s, share, inside);
+                }
+            });
+        }
+    }
+
+    fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
+        particles::fill(self, spacing, layers)
+    }
+
+    /// Points alone, all of one weight, which sum to 1 over the side of the body that has most of them.
+    fn surface(&self, particles: &WallLayer, spacing: f64, _: u32) -> Surface {
+        let mut points = vec![];
+        let mut faces = vec![];
+        for (at, to_surface) in particles.offset.iter().zip(particles.to_surface) {
+            points.push(*at + *to_surface);
+            faces.push(face(*to_surface));
+        }
+        let mut thinned = particles::Cells::new(0.4 * spacing);
+        for &(a, b, on) in &self.sharp {
+            let pieces = (a.distance(b) / (0.5 * spacing)).ceil().max(1.0);
+            for k in 0..=pieces as i32 {
+                let at = a.lerp(b, f64::from(k) / pieces);
+                match thinned.nearest(at, 0.05 * spacing) {
+                    Some(_) => {}
+                    None => {
+                        thinned.add(at);
+                        points.push(at);
+                        faces.push(on);
+                    }
+                }
+            }
+        }
+        for &at in self.triangles.vertices() {
+            if thinned.nearest(at, 0.4 * spacing).is_none() {
+                thinned.add(at);
+                points.push(at);
+                faces.push(face(at));
+            }
+        }
+        let on = |side: u8| faces.iter().filter(|f| *f & (1 << side) != 0).count();
+        let most = (0..6).map(on).max().unwrap_or(1).max(1);
+        let weight = 1.0 / most as f64;
+        Surface {
+            weights: vec![weight; points.len()],
+            points,
+            faces,
+            all_faces: super::ALL_FACES,
+            smallest_weight: weight,
+            ..Surface::default()
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! STL and OBJ files: vertices and triangles, and whether they enclose a body.
+
+use super::Unfit;
+use glam::DVec3;
+use std::collections::HashMap;
+use std::io::Cursor;
+
+/// Vertices [the file's length], each once.
+pub(super) type Soup = (Vec<DVec3>, Vec<[u32; 3]>);
+
+/// Vertices and triangles of `bytes`; `path` says by its end what they are.
+pub(super) fn soup(path: &str, bytes: &[u8]) -> Result<Soup, Unfit> {
+    let end = path.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    let corners = match end.as_str() {
+        "stl" => stl(path, bytes)?,
+        "obj" => obj(path, bytes)?,
+        _ => {
+            let message = format!("{path}: a file that ends in `.{end}` is not read");
+            return Err(Unfit::new(message, "give an STL or OBJ file: other programs export both"));
+        }
+    };
+    let (mut known, mut vertices): (HashMap<[u64; 3], u32>, Vec<DVec3>) = Default::default();
+    let mut triangles = vec![];
+    for triangle in corners {
+        // Adding zero makes -0 the same place as 0.
+        let index = triangle.map(|v| {
+            let v = v + DVec3::ZERO;
+            *known.entry(v.to_array().map(f64::to_bits)).or_insert_with(|| {
+                vertices.push(v);
+                vertices.len() as u32 - 1
+            })
+        });
+        // What has no area bounds nothing.
+        if index[0] != index[1] && index[1] != index[2] && index[2] != index[0] {
+            triangles.push(index);
+        }
+    }
+    Ok((vertices, triangles))
+}
+
+fn stl(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
+    let repair = "save it again as binary STL";
+    let wrong = |e: std::io::Error| Unfit::new(format!("{path}: no STL file: {e}"), repair);
+    let mut cursor = Cursor::new(bytes);
+    let reader = stl_io::create_stl_reader(&mut cursor).map_err(wrong)?;
+    let mut out = vec![];
+    for (k, triangle) in reader.enumerate() {
+        let triangle =
+            triangle.map_err(|e| Unfit::new(format!("{path}: triangle {}: {e}", k + 1), repair))?;
+        let corners = triangle.vertices.map(|v| DVec3::from_array(v.0.map(f64::from)));
+        out.push(finite(path, k, corners)?);
+    }
+    Ok(out)
+}
+
+fn obj(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
+    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let none = |_: &std::path::Path| Ok(Default::default());
+    let load = |bytes: &[u8]| tobj::load_obj_buf(&mut Cursor::new(bytes), &options, none);
+    let (models, _) = load(bytes).map_err(|e| {
+        let message =
+            format!("{path}: line {}: no OBJ file: {e}", broken_line(bytes, |part| load(part).is_ok()));
+        Unfit::new(message, "save it again as OBJ")
+    })?;
+    let mut out = vec![];
+    for model in models {
+        let at = |k: u32| {
+            let p = model.mesh.positions.get(3 * k as usize..3 * k as usize + 3);
+            p.map_or(DVec3::NAN, |p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))
+        };
+        for corners in model.mesh.indices.chunks_exact(3) {
+            let corners = [at(corners[0]), at(corners[1]), at(corners[2])];
+            out.push(finite(path, out.len(), corners)?);
+        }
+    }
+    Ok(out)
+}
+
+/// The first line, from 1, up to which a file does not read: halved.
+fn broken_line(bytes: &[u8], reads: impl Fn(&[u8]) -> bool) -> usize {
+    let ends: Vec<usize> = (0..bytes.len()).filter(|&k| bytes[k] == b'\n').chain([bytes.len()]).collect();
+    ends.partition_point(|&end| reads(&bytes[..end])) + 1
+}
+
+fn finite(path: &str, k: usize, corners: [DVec3; 3]) -> Result<[DVec3; 3], Unfit> {
+    if corners.iter().all(|c| c.is_finite()) {
+        return Ok(corners);
+    }
+    let message = format!("{path}: triangle {}: a corner is not a finite place", k + 1);
+    Err(Unfit::new(message, "save the file again"))
+}
+
+/// A body's surface has no border, and its triangles turn the same way round.
+pub(super) fn check(path: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Unfit> {
+    if triangles.is_empty() {
+        let message = format!("{path}: there is no triangle in it");
+        return Err(Unfit::new(message, "give a file that holds a solid"));
+    }
+    let mut edges: HashMap<(u32, u32), usize> = HashMap::new();
+    for (k, t) in triangles.iter().enumerate() {
+        for e in 0..3 {
+            if let Some(other) = edges.insert((t[e], t[(e + 1) % 3]), k) {
+                let at = vertices[t[e] as usize];
+                let message = format!(
+                    "{path}: triangles {} and {} at {at} m turn opposite ways or lie on each other",
+                    other + 1,
+                    k + 1
+                );
+                return Err(Unfit::new(
+                    message,
+                    "let the program that made it turn all normals outwards and save it again",
+                ));
+            }
+        }
+    }
+    let mut open: Vec<_> = edges.iter().filter(|((a, b), _)| !edges.contains_key(&(*b, *a))).collect();
+    open.sort_by_key(|(_, k)| **k);
+    if let Some(((a, _), k)) = open.first() {
+        let message = format!(
+            "{path}: the surface is open: {} edges have a triangle on one side alone, the first of triangle {} at {} m",
+            open.len(),
+            *k + 1,
+            vertices[*a as usize]
+        );
+        return Err(Unfit::new(message, "close the holes: a body needs a watertight surface"));
+    }
+    Ok(())
+}

@@ -1,0 +1,292 @@
+//! Bodies from STL and OBJ files: against the analytic shapes, apart from each other, afloat; what a file must be.
+
+use crate::common::case;
+use crate::common::dry::{Dry, G};
+use glam::DVec3;
+use seixo::scene::{Drive, Scene, Solid};
+use seixo::{Error, Options, Processor, Simulation};
+use std::fmt::Write;
+use tempfile::TempDir;
+
+type Triangles = Vec<[DVec3; 3]>;
+
+/// A box with its lower corner in the origin, triangles turned outwards.
+fn cuboid(size: DVec3) -> Triangles {
+    let corner = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2 & 1) as f64) * size;
+    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+        .map(|q| q.map(corner));
+    quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
+}
+
+/// A ball about the origin: an octahedron, each triangle of which is cut in four `times`.
+fn ball(radius: f64, times: u32) -> Triangles {
+    let mut out: Triangles = vec![];
+    for signs in
+        [[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1], [1, 1, -1], [-1, 1, -1], [1, -1, -1], [-1, -1, -1]]
+    {
+        let [a, b, c] = [0, 1, 2].map(|k| DVec3::AXES[k] * f64::from(signs[k]));
+        out.push(if signs.iter().product::<i32>() > 0 { [a, b, c] } else { [a, c, b] });
+    }
+    for _ in 0..times {
+        let cut = |[a, b, c]: [DVec3; 3]| {
+            let [ab, bc, ca] = [(a + b).normalize(), (b + c).normalize(), (c + a).normalize()];
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        };
+        out = out.into_iter().flat_map(cut).collect();
+    }
+    out.into_iter().map(|t| t.map(|v| radius * v)).collect()
+}
+
+fn stl(triangles: &Triangles) -> String {
+    let mut out = String::from("solid it\n");
+    for t in triangles {
+        out += "facet normal 0 0 0\nouter loop\n";
+        t.iter().for_each(|v| writeln!(out, "vertex {} {} {}", v.x, v.y, v.z).expect("written"));
+        out += "endloop\nendfacet\n";
+    }
+    out + "endsolid it\n"
+}
+
+fn obj(triangles: &Triangles) -> String {
+    let mut out = String::new();
+    triangles.iter().flatten().for_each(|v| writeln!(out, "v {} {} {}", v.x, v.y, v.z).expect("written"));
+    (0..triangles.len())
+        .for_each(|k| writeln!(out, "f {} {} {}", 3 * k + 1, 3 * k + 2, 3 * k + 3).expect("written"));
+    out
+}
+
+/// A file in a folder that goes with the test.
+fn file(folder: &TempDir, name: &str, text: &str) -> String {
+    let path = folder.path().join(name);
+    std::fs::write(&path, text).expect("written");
+    path.display().to_string()
+}
+
+fn body(scene: &Scene) -> (&Solid, f64, DVec3) {
+    let solid = &scene.solids[0];
+    let Drive::Free(free) = &solid.drive else { panic!("it moves freely") };
+    (solid, free.mass, free.inertia)
+}
+
+#[test]
+fn a_box_from_a_file_is_the_box() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let size = DVec3::new(0.2, 0.3, 0.4);
+    let inside_out = cuboid(1e3 * size).into_iter().map(|[a, b, c]| [a, c, b]).collect();
+    let files =
+        [file(&folder, "box.stl", &stl(&cuboid(1e3 * size))), file(&folder, "box.obj", &obj(&inside_out))];
+    let scene = |keys: &str| {
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\n{keys}\ncenter = [1, 2, 3]\n\
+             density = 500\n[contact]\nspring = 1e5\n"
+        );
+        Scene::build(&case(&text)).expect("builds")
+    };
+    let analytic = scene("size = [0.2, 0.3, 0.4]");
+    let (own, mass, inertia) = body(&analytic);
+    for path in files {
+        let from_file = scene(&format!("shape = \"mesh\"\nfile = \"{path}\"\nscale = 0.001"));
+        let (solid, m, i) = body(&from_file);
+        assert!((m / mass - 1.0).abs() < 1e-6, "{path}: {m} kg for {mass} kg");
+        assert!((i / inertia - 1.0).abs().max_element() < 1e-6, "{path}: {i} for {inertia}");
+        assert_eq!(solid.position, DVec3::new(1.0, 2.0, 3.0));
+        assert_eq!(solid.wall_offset.len(), own.wall_offset.len());
+        assert_eq!(solid.dummy_offset.len(), own.dummy_offset.len());
+        for at in &solid.wall_offset {
+            let nearest = own.wall_offset.iter().map(|o| o.distance(*at)).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1e-6, "{path}: no particle of the box at {at}");
+        }
+        for k in 0..200 {
+            let q = 0.3
+                * DVec3::from_array(
+                    [0.618_034, 0.754_877, 0.569_84].map(|n| 2.0 * (f64::from(k) * n).fract() - 1.0),
+                );
+            let (have, want) = (solid.shape.distance(q).0, own.shape.distance(q).0);
+            assert_eq!(have < 0.0, want < 0.0, "{q}");
+            assert!(want < 0.0 || (have - want).abs() < 1e-6, "{q}: {have} {want}");
+        }
+        let sum: DVec3 = solid.wall_area.iter().sum();
+        assert!(sum.length() < 1e-12, "{sum}");
+    }
+}
+
+#[test]
+fn volume_inertia_and_particles_of_a_ball_from_a_file_are_those_of_the_ball() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "ball.stl", &stl(&ball(0.1, 4)));
+    let text = format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"{path}\"\n\
+         center = [0, 0, 0]\ndensity = 1000\n[contact]\nspring = 1e5\n"
+    );
+    let scene = Scene::build(&case(&text)).expect("builds");
+    let (solid, mass, inertia) = body(&scene);
+    let exact = 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+    assert!((mass / exact - 1.0).abs() < 0.01, "{mass} {exact}");
+    assert!((inertia / (0.4 * exact * 0.01) - 1.0).abs().max_element() < 0.015, "{inertia}");
+    for (at, to) in solid.wall_offset.iter().zip(&solid.wall_to_surface) {
+        assert!((at.length() - 0.09).abs() < 2e-3, "{at}");
+        assert!(((*at + *to).length() - 0.1).abs() < 1e-3);
+    }
+    // as many as the layer's volume holds, within a tenth
+    let layer = 4.0 / 3.0 * std::f64::consts::PI * (0.1_f64.powi(3) - 0.08_f64.powi(3)) / 0.02_f64.powi(3);
+    let count = solid.wall_offset.len() as f64;
+    assert!((count / layer - 1.0).abs() < 0.15, "{count} {layer}");
+    let moment: DVec3 = (solid.wall_offset.iter().zip(&solid.wall_to_surface).zip(&solid.wall_area))
+        .map(|((x, s), a)| (*x + *s) * *a)
+        .sum();
+    assert!((moment / solid.shape.volume() - 1.0).abs().max_element() < 1e-9, "{moment}");
+}
+
+#[test]
+fn a_ball_from_a_file_rolls_down_a_slope_with_five_sevenths_of_gravity() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "ball.stl", &stl(&ball(0.1, 4)));
+    let slope = 0.3_f64;
+    let (along, down) = (G * slope.sin(), G * slope.cos());
+    let mut dry = Dry::new(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [{along}, 0, -{down}]\n\
+         [[plane]]\nname = \"slope\"\ncenter = [1, 0, 0]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [4, 1]\n\
+         [[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"{path}\"\ncenter = [0, 0, 0.1]\ndensity = 800\n\
+         [contact]\nspring = 1e6\nrestitution = 0.5\nfriction = 0.6\n"
+    ));
+    let pose = dry.run(0.5)[0];
+    let share = pose.velocity.x / 0.5 / along;
+    assert!((share / (5.0 / 7.0) - 1.0).abs() < 0.05, "{share} of g sin a: {pose:?}");
+    let slip = pose.velocity.x - 0.1 * pose.angular_velocity.y;
+    assert!(slip.abs() < 0.05 * pose.velocity.x, "slips at {slip}");
+    assert!((pose.position.z - 0.1).abs() < 2e-3, "{pose:?}");
+}
+
+#[test]
+fn two_bodies_from_files_stay_apart_and_come_to_rest_on_each_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "box.stl", &stl(&cuboid(DVec3::new(0.2, 0.2, 0.1))));
+    for law in ["smooth\"\nfriction = 0.4\ndamping_ratio = 1", "paper\"\ndamping_ratio = 1"] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -9.8]\n\
+             [tank]\nmin = [-0.5, -0.5, 0]\nmax = [0.5, 0.5, 1]\nopen = [\"z_max\"]\n\
+             [[body]]\nname = \"low\"\nshape = \"mesh\"\nfile = \"{path}\"\ncenter = [0, 0, 0.06]\ndensity = 900\n\
+             [[body]]\nname = \"high\"\nshape = \"mesh\"\nfile = \"{path}\"\ncenter = [0.02, 0.01, 0.19]\ndensity = 500\n\
+             [contact]\nspring = 1e6\nlaw = \"{law}\n"
+        ));
+        let poses = dry.run(1.5);
+        let (low, high) = (poses[0], poses[1]);
+        let gap = high.position.z - low.position.z - 0.1;
+        let (least, most) = if law.starts_with("smooth") { (-1e-3, 1e-3) } else { (-0.02, 0.02) };
+        assert!(gap > least && gap < most, "{law}: {gap} m apart");
+        let floor = low.position.z - 0.05;
+        assert!(floor > least && floor < most, "{law}: {floor} m above the floor");
+        let speed = low.velocity.length() + high.velocity.length();
+        assert!(speed < 0.02, "{law}: {low:?} {high:?}");
+    }
+}
+
+#[test]
+fn a_hull_from_a_file_floats_at_its_draft() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A barge: its section is a trapezium, 0.24 m wide on deck and 0.16 m at the bottom, 0.08 m high.
+    let hull: Triangles = cuboid(DVec3::new(0.24, 0.16, 0.08))
+        .into_iter()
+        .map(|t| {
+            t.map(|v| if v.z == 0.0 { DVec3::new(0.12 + (v.x - 0.12) * 2.0 / 3.0, v.y, 0.0) } else { v })
+        })
+        .collect();
+    let path = file(&folder, "hull.stl", &stl(&hull));
+    let case = case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 2\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.28, 0.16]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.28, 0.36]\nopen = [\"z_max\"]\n\
+         [[body]]\nname = \"hull\"\nshape = \"mesh\"\nfile = \"{path}\"\ncenter = [0.2, 0.14, 0.17]\ndensity = 500\n\
+         displaces_fluid = true\nlocked = [\"x\", \"y\", \"rotation_z\"]\n[contact]\nspring = 1e5\nrestitution = 0.3\n"
+    ));
+    let options = Options { processor: Processor::Cpu, ..Options::default() };
+    let mut sim = Simulation::open(&case, &options).expect("opens");
+    let (mut height, mut tilt, mut count) = (0.0, 0.0_f64, 0.0);
+    sim.run_until(1.6, |sim, _| {
+        if sim.time > 0.8 {
+            let pose = sim.solids().next().expect("the hull").pose;
+            height += pose.position.z;
+            tilt = tilt.max((pose.orientation * DVec3::Z).angle_between(DVec3::Z));
+            count += 1.0;
+        }
+        std::ops::ControlFlow::Continue(())
+    })
+    .expect("floats");
+    let Drive::Free(free) = &sim.scene.solids[0].drive else { panic!("free") };
+    assert!((free.mass - 500.0 * 0.016 * 0.16).abs() < 1e-6, "{} kg", free.mass);
+    // Half of the section is wetted, 0.16 d + d^2 / 2 = 0.008; the metacentre lies 0.07 m above the centre of mass.
+    let draft = -0.16 + (0.0256_f64 + 0.016).sqrt();
+    let water = (sim.groups.fluid as f64) * 0.02_f64.powi(3);
+    let level = (water + free.mass / 1000.0) / (0.4 * 0.28);
+    // The centroid of the trapezium above its bottom.
+    let centroid = 0.08 / 3.0 * (2.0 * 0.24 + 0.16) / 0.4;
+    let have = level - (height / count - centroid);
+    println!("draft {have:.4} m for {draft:.4} m, tilted by {tilt:.3} at most");
+    assert!((have - draft).abs() < 0.3 * 0.02, "{have} m for {draft} m");
+    assert!(tilt < 0.15, "tilted by {tilt}");
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_said_with_the_key_and_the_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let solid = cuboid(DVec3::splat(0.2));
+    let open: Triangles = solid[..11].to_vec();
+    let mut turned = solid.clone();
+    turned[3].swap(1, 2);
+    let thin = cuboid(DVec3::new(0.2, 0.2, 0.01));
+    let huge = cuboid(DVec3::splat(100.0));
+    for (name, text, key, parts) in [
+        ("open.stl", stl(&open), "body.0.file", &["open", "3 edges", "triangle", "watertight"][..]),
+        ("turned.stl", stl(&turned), "body.0.file", &["triangles", "and 4", "opposite ways"]),
+        ("thin.stl", stl(&thin), "body.0.file", &["1.00e-2 m thin", "run.spacing"]),
+        ("huge.stl", stl(&huge), "body.0.scale", &["100 m long", "millimetres", "scale = 0.001"]),
+        ("none.stl", "solid it\nendsolid it\n".into(), "body.0.file", &["no triangle"]),
+        (
+            "not.stl",
+            "solid it\nfacet normal 0 0 0\nouter loop\nvertex a b c\n".into(),
+            "body.0.file",
+            &["STL"],
+        ),
+        ("line.obj", "v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n".into(), "body.0.file", &["line 3", "OBJ"]),
+        ("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n".into(), "body.0.file", &["OBJ"]),
+        ("it.ply", "ply\n".into(), "body.0.file", &[".ply", "STL or OBJ"]),
+    ] {
+        let path = file(&folder, name, &text);
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"{path}\"\n\
+             center = [0, 0, 0]\ndensity = 500\n[contact]\nspring = 1e5\n"
+        );
+        match Scene::build(&case(&text)) {
+            Err(Error::Case(why)) => {
+                let problem = &why.problems[0];
+                assert_eq!(problem.key, key, "{name}: {why}");
+                let said = why.to_string();
+                assert!(parts.iter().all(|p| said.contains(p)), "{name}: {said}");
+                assert!(!problem.remedy.is_empty(), "{name}: {said}");
+            }
+            other => panic!("{name}: expected a refusal, got {:?}", other.map(|_| ())),
+        }
+    }
+    let missing = case(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\n\
+         file = \"/no/such/hull.stl\"\ncenter = [0, 0, 0]\ndensity = 500\n[contact]\nspring = 1e5\n",
+    );
+    let why = Scene::build(&missing).expect_err("refused").to_string();
+    assert!(why.contains("/no/such/hull.stl"), "{why}");
+}
+
+#[test]
+fn a_file_is_found_beside_its_case() {
+    let folder = tempfile::tempdir().expect("a folder");
+    file(&folder, "box.stl", &stl(&cuboid(DVec3::splat(0.2))));
+    let path = file(
+        &folder,
+        "my.toml",
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"box.stl\"\n\
+         center = [0, 0, 0]\ndensity = 500\n[contact]\nspring = 1e5\n",
+    );
+    let loaded = seixo::case::file::load(path.as_ref(), None, &[]).expect("loads");
+    assert!(std::path::Path::new(loaded.case.body[0].file.as_deref().expect("a file")).is_absolute());
+    Scene::build(&loaded.case).expect("builds");
+    assert!(loaded.text.contains("box.stl"), "{}", loaded.text);
+}
