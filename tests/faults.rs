@@ -52,6 +52,7 @@ fn numbers_and_names_that_are_none_are_refused_on_the_command_line() {
         vec!["run", "cases/hydrostatic.toml", "--until", "inf"],
         vec!["run", "cases/hydrostatic.toml", "--spacing", "NaN"],
         vec!["run", "cases/hydrostatic.toml", "--adapter", ""],
+        vec!["validate", "--dry-run", "--adapter", ""],
         vec!["run", "cases/hydrostatic.toml", "--threads", "60000"],
         vec!["study", "hydrostatic", "--threads", "60000"],
     ] {

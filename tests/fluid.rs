@@ -30,9 +30,14 @@ fn prepared(text: &seixo::case::Case, shake: f64) -> (Cpu, Params, Step) {
         scene.position[i] += shake * scene.spacing * r();
         scene.velocity[i] += 0.1 * r();
     }
-    let params = Params::new(text, &scene).unwrap();
-    let plan = Plan::new(text, &scene, &params);
-    let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
+    stopped_at_the_source(text, &scene)
+}
+
+/// A backend with the particles of `scene`, stopped after the right side of the PPE.
+fn stopped_at_the_source(text: &seixo::case::Case, scene: &Scene) -> (Cpu, Params, Step) {
+    let params = Params::new(text, scene).unwrap();
+    let plan = Plan::new(text, scene, &params);
+    let mut cpu = Cpu::new(scene, &params, &plan, TIGHT).unwrap();
     let step = params.step(0.0, text.run.time_step, 1.0);
     for stage in [
         ParticleStage::CellList,
@@ -463,18 +468,7 @@ fn deviation_of_stretched(factors: DVec3) -> f64 {
     }
     let reach = scene.domain.1 - scene.domain.0;
     scene.domain = (scene.domain.0 - reach, scene.domain.1 + reach);
-    let params = Params::new(&text, &scene).unwrap();
-    let plan = Plan::new(&text, &scene, &params);
-    let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).unwrap();
-    let step = params.step(0.0, text.run.time_step, 1.0);
-    for stage in [
-        ParticleStage::CellList,
-        ParticleStage::NeighbourList,
-        ParticleStage::NumberDensity,
-        ParticleStage::PressureSource,
-    ] {
-        cpu.run(stage, &step).unwrap();
-    }
+    let (cpu, params, step) = stopped_at_the_source(&text, &scene);
     let at = |i: &usize| cpu.fields().position[*i].distance(middle);
     let i = (0..scene.groups.fluid).min_by(|a, b| at(a).total_cmp(&at(b))).unwrap();
     assert_eq!(cpu.fields().state[i], State::Inner);

@@ -2,7 +2,7 @@
 
 use super::Study;
 use super::builtin::{self, ENTRIES};
-use super::computers::Computers;
+use super::computers::ComputerArgs;
 use super::definition::{Setup, files_of};
 use super::engine::{Context, Make, Options, Processor, Shard};
 use seixo::console::say;
@@ -36,34 +36,15 @@ pub struct StudyArgs {
     /// Runs of each point, for the median time.
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub repetitions: u32,
-    /// Where points compute that do not say: cpu or gpu.
-    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor)]
-    pub backend: Processor,
-    /// Adapter of the GPU's points, a number or a part of a name as `seixo adapters` lists them. Without it a
-    /// hardware GPU is taken, and no software one.
-    #[arg(long, value_name = "N", value_parser = clap::builder::NonEmptyStringValueParser::new())]
-    pub adapter: Option<String>,
-    /// Threads of the CPU's points; all cores if absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
-    pub threads: Option<u16>,
+    /// On what.
+    #[command(flatten)]
+    pub computers: ComputerArgs,
     /// List the points and compute nothing.
     #[arg(long)]
     pub dry_run: bool,
     /// No progress on stderr.
     #[arg(short, long)]
     pub quiet: bool,
-}
-
-/// What `--backend` takes.
-///
-/// # Errors
-/// What it takes, for anything else.
-pub fn processor(text: &str) -> std::result::Result<Processor, String> {
-    match text {
-        "cpu" => Ok(Processor::Cpu),
-        "gpu" => Ok(Processor::Gpu),
-        _ => Err("expected cpu or gpu".into()),
-    }
 }
 
 /// What `collect` needs to know of a study: `study.json` in its folder.
@@ -98,7 +79,7 @@ impl Manifest {
             file,
             full: args.full,
             sets: args.sets.clone(),
-            gpu: args.backend == Processor::Gpu,
+            gpu: args.computers.backend == Processor::Gpu,
         })
     }
 
@@ -132,8 +113,7 @@ impl Manifest {
 /// # Errors
 /// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
 pub fn command(args: &StudyArgs) -> Result<()> {
-    seixo::threads::start(args.threads)?;
-    let computers = Computers::new(args.adapter.clone());
+    let computers = args.computers.start()?;
     let make: &Make = &|processor, scene, params, plan, settings| {
         computers.backend(processor, scene, params, plan, settings)
     };

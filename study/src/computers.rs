@@ -17,6 +17,41 @@ pub struct Computers {
     hardware: OnceLock<bool>,
 }
 
+/// What can be typed of the computers.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ComputerArgs {
+    /// Where points compute that do not say: cpu or gpu.
+    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor)]
+    pub backend: Processor,
+    /// Adapter of the GPU's points, a number or a part of a name as `seixo adapters` lists them. Without it a
+    /// hardware GPU is taken, and no software one.
+    #[arg(long, value_name = "N", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    pub adapter: Option<String>,
+    /// Threads of the CPU's points; all cores if absent.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
+    pub threads: Option<u16>,
+}
+
+impl ComputerArgs {
+    /// The computers, with as many threads as asked for.
+    ///
+    /// # Errors
+    /// Where the threads cannot be had.
+    pub fn start(&self) -> Result<Computers> {
+        seixo::threads::start(self.threads)?;
+        Ok(Computers::new(self.adapter.clone()))
+    }
+}
+
+/// What `--backend` takes.
+fn processor(text: &str) -> std::result::Result<Processor, String> {
+    match text {
+        "cpu" => Ok(Processor::Cpu),
+        "gpu" => Ok(Processor::Gpu),
+        _ => Err("expected cpu or gpu".into()),
+    }
+}
+
 impl Computers {
     /// With the GPU that `adapter` names, a hardware one if `None`.
     pub fn new(adapter: Option<String>) -> Self {

@@ -3,10 +3,9 @@
 use super::Suite;
 use super::page;
 use crate::cases;
-use crate::command::processor;
-use crate::computers::Computers;
+use crate::computers::ComputerArgs;
 use crate::definition::{Definition, Setup};
-use crate::engine::{Context, Make, Options, Processor, Shard};
+use crate::engine::{Context, Make, Options, Shard};
 use crate::report::write_table;
 use seixo::console::say;
 use seixo::error::Result;
@@ -38,15 +37,9 @@ pub struct ValidateArgs {
     /// Change a value of every case; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
-    /// Where to compute: cpu or gpu.
-    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor)]
-    pub backend: Processor,
-    /// Adapter, a number or a part of a name as `seixo adapters` lists them. Without it a hardware GPU is taken.
-    #[arg(long, value_name = "N")]
-    pub adapter: Option<String>,
-    /// Threads of the CPU path; all cores if absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
-    pub threads: Option<u16>,
+    /// On what.
+    #[command(flatten)]
+    pub computers: ComputerArgs,
     /// List the points and compute nothing.
     #[arg(long)]
     pub dry_run: bool,
@@ -69,14 +62,18 @@ pub fn command(args: &ValidateArgs) -> Result<()> {
         }
         return Ok(());
     }
-    let setup = Setup { full: args.full, sets: args.sets.clone(), processor: args.backend, runs: args.runs };
+    let setup = Setup {
+        full: args.full,
+        sets: args.sets.clone(),
+        processor: args.computers.backend,
+        runs: args.runs,
+    };
     let suite = Suite::new(&args.names, &setup)?;
     if args.dry_run {
         suite.points().for_each(|point| say(&point));
         return Ok(());
     }
-    seixo::threads::start(args.threads)?;
-    let computers = Computers::new(args.adapter.clone());
+    let computers = args.computers.start()?;
     let options = Options {
         out: args.out.clone(),
         shard: args.shard,
