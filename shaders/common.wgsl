@@ -122,10 +122,10 @@ fn add_moment(sum: Moment, e: vec3f, r: vec3f) -> Moment {
     return Moment(sum.diagonal + e * r, sum.mixed + e.yxx * r.zzy);
 }
 
-// w r / r^2 of a pair, 0 for a coincident one.
-fn pair_vector(r: vec3f) -> vec3f {
-    let distance_squared = dot(r, r);
-    return select(weight(distance_squared) / distance_squared, 0.0, distance_squared == 0.0) * r;
+// w r / r^2 of a pair of weight w = re / r - 1: without a division, and finite where the weight is, at r = 0.
+fn pair_vector(w: f32, r: vec3f) -> vec3f {
+    let inverse = (1.0 + w) / params.effective_radius;
+    return w * inverse * inverse * r;
 }
 
 // Inverse of M = d / n0 times the sum, or 1 where a lower bound of its smallest eigenvalue is too small. M is symmetric:

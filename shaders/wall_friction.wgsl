@@ -38,7 +38,7 @@ fn friction(i: u32) -> vec4f {
             let w = pair_weight(r);
             sum += w;
             wall += w * velocity[j].xyz;
-            normal += pair_vector(r);
+            normal += pair_vector(w, r);
         }
     }
     if sum == 0.0 {

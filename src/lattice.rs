@@ -6,6 +6,12 @@ pub fn weight(r: f64, re: f64) -> f64 {
     re / r - 1.0
 }
 
+/// r / re of a pair of weight `w`, Eq. (3) [-].
+#[inline(always)]
+pub(crate) fn reach(w: f64) -> f64 {
+    1.0 / (1.0 + w)
+}
+
 /// Weight W of the smooth density sum, (1 - q)^3 (1 + 3 q - 3 q^2) at `q` = r / re [-]. Of (1 - q)^3 (1 + 3 q - 4 a q^2),
 /// which is Wendland's C2 of one dimension for a = 0 and of two and three for a = 1, a = 3/4 keeps its sum best on
 /// stretched and on other lattices of the same volume.

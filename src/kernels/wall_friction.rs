@@ -14,6 +14,7 @@
 
 use super::Particles;
 use crate::lattice::weight;
+use crate::neighbourhood::weight_over_square;
 use glam::DVec3;
 
 /// Weight of the pair of slots `i` and `j` at their present positions [-].
@@ -32,7 +33,7 @@ pub fn wall_friction(i: usize, carriers: &[u32], on: Particles, dt: f64) -> (DVe
         if w > 0.0 {
             sum += w;
             velocity += w * on.velocity[j];
-            normal += w / r.length_squared() * r;
+            normal += weight_over_square(w, on.params.effective_radius) * r;
         }
     }
     if sum == 0.0 {

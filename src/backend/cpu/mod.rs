@@ -242,8 +242,7 @@ impl Cpu {
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let carriers = |i: usize| neighbours.pressure(i).neighbour;
-        // Water comes first in a row.
-        let at_wall = |i: usize| carriers(i).last().is_some_and(|&j| j as usize >= groups.fluid);
+        let at_wall = |i: usize| neighbours.chunks[i / CHUNK].walls[i % CHUNK];
         fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
             let near = i < *live && at_wall(i);
             *a = if near { wall_friction::wall_friction(i, carriers(i), on, step.dt).0 } else { DVec3::ZERO };
