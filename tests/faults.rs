@@ -204,6 +204,57 @@ fn a_disk_that_fills_up_leaves_whole_files_and_a_summary() {
     assert!(result["exit_reason"].as_str().unwrap().contains("File too large"), "{result}");
 }
 
+/// Runs `line` where `$DISK` is a file system of its own, of a megabyte and a half. As root it is mounted, else in a
+/// namespace of one's own; where the system allows neither, this cannot be tested and says so by failing.
+#[cfg(target_os = "linux")]
+fn on_a_small_disk(folder: &Path, line: &str, args: &[&str]) -> std::process::Output {
+    let disk = folder.join("disk");
+    std::fs::create_dir(&disk).unwrap();
+    let script = format!("mount -t tmpfs -o size=1536k tmpfs \"$DISK\" || exit 99; {line}");
+    let run = |own: &[&str]| {
+        let all: Vec<&str> = [own, &["bash", "-c", &script, "bash"], args].concat();
+        Command::new(all[0]).args(&all[1..]).env("DISK", &disk).output()
+    };
+    // A mount in a namespace is gone with its last process, whatever happens to this one.
+    for own in [&["unshare", "--mount"][..], &["unshare", "--user", "--map-root-user", "--mount"]] {
+        if let Ok(output) = run(own)
+            && output.status.code() != Some(99)
+            && !String::from_utf8_lossy(&output.stderr).starts_with("unshare: ")
+        {
+            return output;
+        }
+    }
+    panic!("no small disk can be mounted here, neither as root nor in a user namespace: allow one of them");
+}
+
+/// The whole disk is full: tables are cut to whole rows, the summary says why, and the last state is there to go on with.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_whole_files_a_state_and_a_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let kept = folder.path().join("kept");
+    let sets = "--set run.end=5 --set output.every=0.004 --set run.checkpoint={every=0.02} --backend cpu --threads 1 -q";
+    // What is there is copied away before the disk is gone; then room is made, and the run goes on on it.
+    let line = format!(
+        "\"$1\" run \"$2\" -o \"$DISK/out\" {sets} --force-disk; code=$?; cp -r \"$DISK/out\" \"$3\" || exit 98; \
+         rm -r \"$DISK/out/vtu\"; mount -o remount,size=64m \"$DISK\" || exit 97; cp -r \"$3/vtu\" \"$DISK/out/vtu\"; \
+         \"$1\" run \"$2\" -o \"$DISK/out\" {sets} --resume --until 5 --max-wall 1s; echo \"resumed $?\"; exit $code"
+    );
+    let program = seixo().get_program().to_string_lossy().into_owned();
+    let output = on_a_small_disk(folder.path(), &line, &[&program, &case, &kept.display().to_string()]);
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(5), "{out}{err}");
+    assert!(err.contains("No space left on device"), "{err}");
+    assert_whole(&kept);
+    let result = json(&std::fs::read_to_string(kept.join("result.json")).unwrap());
+    assert_eq!(result["status"], "failed");
+    assert!(result["exit_reason"].as_str().unwrap().contains("No space left on device"), "{result}");
+    let states = std::fs::read_dir(kept.join("checkpoint")).unwrap();
+    assert!(states.count() >= 1, "a state is kept");
+    assert!(out.contains("resumed 75"), "with room again it goes on: {out}{err}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_cannot_start_are_an_error() {

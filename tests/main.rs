@@ -16,6 +16,7 @@ mod device;
 mod errors;
 mod examples;
 mod faults;
+mod first_minute;
 mod fluid;
 mod fuzz;
 mod gauges;

@@ -39,6 +39,14 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
         }
         _ => Error::io(path)(source),
     })?;
+    load_text(path, text, spacing, sets)
+}
+
+/// [`load`], of a text that stands for the file `path`.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String]) -> Result<Loaded> {
     let mut all = Vec::new();
     if let Some(l0) = spacing {
         all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
