@@ -91,6 +91,14 @@ fn a_result_that_means_nothing_is_no_success() {
         (result["status"].as_str(), result["verdict"]["grade"].as_str()),
         (Some("failed"), Some("failed"))
     );
+    // A body that turns a thousand times in a step is none that the water could feel.
+    let body =
+        "body=[{name=\"b\",size=[0.2,0.05,0.2],center=[1.3,0,0.7],density=500,angular_velocity=[0,1e7,0]}]";
+    let spins = with(&[body, "contact={spring=1e5}"]);
+    assert!(spins.code == 4 && spins.err.contains("particles far in a step"), "{} {}", spins.code, spins.err);
+    let fast =
+        with(&[&body.replace("angular_velocity=[0,1e7,0]", "velocity=[100,0,0]"), "contact={spring=1e5}"]);
+    assert_eq!(json(&fast.out)["verdict"]["grade"], "degraded", "{}", fast.err);
     let some = with(&["fluid.solver.max_iterations=12"]);
     assert_eq!(some.code, 0, "{}", some.err);
     assert!(some.err.starts_with("verdict: degraded because "), "{}", some.err);
@@ -132,6 +140,19 @@ fn adaptive_steps_see_solids() {
         }
     }
     assert!(fast >= 28, "{fast} steps while the gate moves: {monitors}");
+}
+
+/// What never ends is no case, and takes no memory.
+#[cfg(unix)]
+#[test]
+fn a_case_that_does_not_end_is_refused() {
+    let refused = ran(&["plan", "/dev/zero"]);
+    assert!(
+        refused.code == 5 && refused.err.contains("longer than 64 MB"),
+        "{} {}",
+        refused.code,
+        refused.err
+    );
 }
 
 #[test]

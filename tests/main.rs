@@ -25,6 +25,7 @@ mod kernels;
 mod layers;
 mod ledger;
 mod meshes;
+mod motion_file;
 mod output;
 mod restart;
 mod scene;

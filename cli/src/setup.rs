@@ -1,7 +1,7 @@
 //! From what was typed to a simulation.
 
 use super::{CaseArgs, DeviceArgs, device};
-use seixo::case::file::{Loaded, load, load_text};
+use seixo::case::file::{Loaded, load, load_text, read_text};
 use seixo::console::remark;
 use seixo::error::{Error, Result};
 use seixo::scene::Scene;
@@ -59,7 +59,7 @@ pub fn read(args: &CaseArgs) -> Result<Loaded> {
     if !is_stdin(&args.case) {
         return load(&args.case, spacing, &sets);
     }
-    let text = std::io::read_to_string(std::io::stdin()).map_err(|e| match e.kind() {
+    let text = read_text(std::io::stdin()).map_err(|e| match e.kind() {
         std::io::ErrorKind::InvalidData => {
             Error::file("standard input", "", "standard input: not a text in UTF-8")
         }
