@@ -27,6 +27,8 @@ mod ledger;
 mod meshes;
 mod motion_file;
 mod output;
+mod render;
+mod report;
 mod restart;
 mod scene;
 mod shaders;

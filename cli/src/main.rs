@@ -7,6 +7,8 @@ mod device;
 mod init;
 mod plan;
 mod progress;
+mod render;
+mod report;
 mod run;
 mod setup;
 mod shell;
@@ -43,6 +45,10 @@ enum Command {
     Init(init::InitArgs),
     /// Run a case and write its results.
     Run(run::RunArgs),
+    /// Draw the frames of a run as PNG.
+    Render(render::RenderArgs),
+    /// Tell of a run on one page (HTML) that holds everything: verdict, pictures, curves, times.
+    Report(report::ReportArgs),
     /// Show what a run would compute, and what it would leave out and why; compute nothing.
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
@@ -161,6 +167,8 @@ fn main() -> ExitCode {
     let exit = match args.command {
         Command::Init(args) => init::init(&args),
         Command::Run(args) => run::run(&args),
+        Command::Render(args) => render::render(&args),
+        Command::Report(args) => report::report(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
