@@ -224,7 +224,7 @@ impl Checker<'_> {
             let dt = 0.5 * limit * l0 * l0 / viscosity;
             self.add(
                 "fluid.viscosity",
-                format!("nu dt / l0^2 = {number:.3} is unstable, the limit is {limit:.3}"),
+                format!("nu dt / l0^2 = {number:.3e} is unstable, the limit is {limit:.3}"),
                 format!("use run.time_step = {dt:.1e} or less, or run.adaptive = true"),
             );
         }
