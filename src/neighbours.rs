@@ -145,7 +145,9 @@ impl Neighbours {
     pub fn bytes(&self) -> usize {
         self.chunks
             .iter()
-            .map(|c| c.neighbour.capacity() * 4 + c.weight.capacity() * 8 + c.start.len() * 8 + c.close.len() * 2)
+            .map(|c| {
+                c.neighbour.capacity() * 4 + c.weight.capacity() * 8 + c.start.len() * 8 + c.close.len() * 2
+            })
             .sum()
     }
 }
