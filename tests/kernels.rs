@@ -213,7 +213,7 @@ fn water_gives_solids_what_friction_takes_and_never_turns_round() {
                 let alone = |&&i: &&u32| {
                     (i as usize) < g.fluid && !row(i as usize).iter().any(|&k| k as usize >= walls.end)
                 };
-                let carriers: Vec<u32> = row(j).iter().filter(|i| alone(&i)).copied().collect();
+                let carriers: Vec<u32> = row(j).iter().filter(|i| alone(i)).copied().collect();
                 gained += wall_friction::reaction(j, &carriers, row, on, dt);
             }
             println!("{seen} particles, {lost} N lost, {gained} N gained");
