@@ -28,6 +28,8 @@ fn run_and_plan_refuse_the_same_and_leave_no_folder() {
         (vec!["run.gravity=[0,0,0,-9.81]"], "4 elements"),
         (vec!["run.time_step=0.05"], "particles far in a step"),
         (vec!["fluid.compressibility=1"], "fluid.compressibility: 1e0 1/Pa"),
+        (vec!["fluid.density=-1e300"], "fluid.density: -1e300 is out of range"),
+        (vec!["fluid.viscosity=1e300"], "nu dt / l0^2 = 4.000e299 is unstable"),
         (vec![&beside, contact], "body `b` at (3.0000, 0.0000, 0.3000) lies outside of the tank"),
         (vec![&below, contact], "which spans 0 to 1 m along z, with nothing beneath it"),
         (vec![&over, "contact={spring=1e9,substeps=1}"], "contact.substeps = 1 is unstable"),

@@ -398,6 +398,38 @@ fn a_long_step_is_given_up_and_nothing_is_lost() {
     assert_same(&case.root("whole"), &case.root("-INT"), "a step that was given up");
 }
 
+/// The same on the device, where the solver is looked at now and then.
+#[cfg(unix)]
+#[test]
+fn a_long_step_on_the_device_is_given_up_and_nothing_is_lost() {
+    if json(&ran(&["adapters", "--json"]).out).as_array().unwrap().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "no adapter: the GPU path is not tested");
+        eprintln!("SKIPPED: no adapter");
+        return;
+    }
+    let sets = [
+        "run.time_step=1e-4",
+        "run.end=2e-4",
+        "output.every=1e-4",
+        "fluid.relaxation=1e-9",
+        "fluid.solver={tolerance=1e-6,max_iterations=100000,preconditioner=\"jacobi\"}",
+        "fluid.block.0.max=[0.6,0,0.6]",
+    ];
+    let case = Case::new(&sets, "gpu");
+    let fine = ["--spacing", "0.006"];
+    let clock = Instant::now();
+    assert_eq!(case.run("whole", &fine).code, 0);
+    let two_steps = clock.elapsed();
+    let root = case.root("parts").display().to_string();
+    let begun = || case.root("parts").join("small.pvd").exists();
+    let (ended, err, took) = interrupted(&case.args(&root, &fine), "-TERM", begun);
+    assert_eq!(ended, Some(143), "{err}");
+    assert!(took < Duration::from_secs(4), "{took:?} for steps of {two_steps:?} / 2");
+    let ended = case.run("parts", &[&fine[..], &["--resume"]].concat());
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_same(&case.root("whole"), &case.root("parts"), "a step that was given up on the device");
+}
+
 /// While millions of particles are built there is nothing to save: the run ends at once, with its exit code, and leaves
 /// nothing.
 #[cfg(unix)]

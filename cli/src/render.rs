@@ -67,7 +67,7 @@ pub struct LookArgs {
     /// What the water is coloured by.
     #[arg(long, value_enum, default_value_t = Shown::Speed)]
     field: Shown,
-    /// Values of the first and the last colour, e.g. 0,2.5.
+    /// Values of the first and the last colour, e.g. 0,2.5 [default: those of the frames].
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
     /// Only the water within half a spacing of a plane, e.g. y=0.25 [m].
@@ -181,15 +181,19 @@ pub struct Show {
 }
 
 impl Show {
-    /// The run of the case `name` in `root`, seen as `look` says.
+    /// The run in `root`, of which `frames` are shown, seen as `look` says.
     ///
     /// # Errors
-    /// A folder without a run, a case that cannot be read any more.
-    pub fn open(root: &Path, look: &LookArgs) -> Result<Self> {
+    /// A folder without a run, a case or a frame that cannot be read any more.
+    pub fn open(root: &Path, look: &LookArgs, frames: &[&Frame]) -> Result<Self> {
         let case = load(&root.join("case.toml"), None, &[])?.case;
         let scene = Scene::build(&case)?;
         let params = Params::new(&case, &scene)?;
-        Ok(Self { painter: Painter::new(&scene, &look.style(scene.dimensions), &params), scene })
+        let mut style = look.style(scene.dimensions);
+        if style.range.is_none() {
+            style.range = range_of(frames, &style, &params)?;
+        }
+        Ok(Self { painter: Painter::new(&scene, &style, &params), scene })
     }
 
     /// The picture of a frame.
@@ -202,6 +206,21 @@ impl Show {
         let poses = placed_by(&self.scene, &solids);
         Ok(self.painter.paint(&self.scene, frame.time, &poses, drops_of(&fluid)))
     }
+}
+
+/// Frames that are looked at for the range of the colours.
+const LOOKED_AT: usize = 5;
+
+/// The range of what `frames` show, from some of them.
+fn range_of(frames: &[&Frame], style: &Style, params: &Params) -> Result<Option<[f64; 2]>> {
+    let step = frames.len().div_ceil(LOOKED_AT).max(1);
+    let mut values = Vec::new();
+    // From the end on, so that a start from rest alone sets no range.
+    for path in frames.iter().rev().step_by(step).filter_map(|f| f.fluid.as_deref()) {
+        let water = particles(path)?;
+        values.extend(drops_of(&water).map(|drop| style.field.of(&drop, params.number_density)));
+    }
+    Ok(style.field.range(&mut values))
 }
 
 /// The frames of the run in `root`.
@@ -235,7 +254,8 @@ pub fn render(args: &RenderArgs) -> Exit {
         let text = format!("{} holds no frames: the case has output.every = 0", args.dir.display());
         return Err(Error::usage("DIR", text));
     }
-    let show = Show::open(&args.dir, &args.look)?;
+    let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
+    let show = Show::open(&args.dir, &args.look, &seen)?;
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("pictures"));
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let joined = args.sheet.is_some() || args.animation.is_some();

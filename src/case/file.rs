@@ -1,7 +1,7 @@
 //! Reading a case file: text, overrides, parsing, checking; errors that point at file, line and key.
 
 use super::check::check;
-use super::motion_file::{inline, inline_set};
+use super::motion_file::{allow_files, inline, inline_set};
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
 use super::{Case, overrides};
@@ -174,8 +174,9 @@ impl Case {
 
     /// The JSON schema of a case file, for editors (`#:schema` in the first line) and for `seixo schema`.
     pub fn schema() -> String {
-        let schema = schemars::schema_for!(Case);
-        let mut text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
+        let mut schema = schemars::schema_for!(Case).to_value();
+        allow_files(&mut schema);
+        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
         text.push('\n');
         text
     }

@@ -52,6 +52,23 @@ pub(super) fn inline_set(path: &Path, set: &str) -> Result<String> {
     Ok(format!("{key}={}", rows(path, file)?))
 }
 
+/// Lets a schema of cases have the name of a file where the rows of a motion stand.
+pub(super) fn allow_files(schema: &mut serde_json::Value) {
+    use serde_json::Value::{Array, String};
+    for solid in ["Body", "MovingWall"] {
+        let Some(motion) = schema.pointer_mut(&format!("/$defs/{solid}/properties/motion")) else { continue };
+        let mut types = match motion["type"].take() {
+            Array(types) => types,
+            one => vec![one],
+        };
+        types.push("string".into());
+        motion["type"] = Array(types);
+        if let String(words) = &mut motion["description"] {
+            words.push_str(" Or the name of a CSV file with these rows, relative to the case.");
+        }
+    }
+}
+
 /// The rows of `file`, a name relative to the case at `path`.
 fn rows(path: &Path, file: &str) -> Result<Array> {
     let place = path.with_file_name("").join(file);

@@ -85,14 +85,13 @@ impl Picture {
         self.write(edge, edge, &text);
     }
 
-    /// A bar of the colours in the lower right corner, from `range[0]` to `range[1]`, called `name`.
+    /// A bar of the colours in the upper right corner, from `range[0]` to `range[1]`, called `name`.
     pub fn bar(&mut self, name: &str, range: [f64; 2]) {
         let letter = self.letters().val();
         let (width, edge) = ((self.width / 4).clamp(8 * letter, self.width.max(1)), letter / 2);
         let (left, high) = (self.width.saturating_sub(width + 2 * edge), letter / 2);
-        let bottom = self.height().saturating_sub(2 * letter + edge);
-        let top = bottom.saturating_sub(letter + edge);
-        self.plate(left.saturating_sub(edge), top, width + 2 * edge, self.height() - top - edge / 2);
+        let bottom = edge + letter + letter / 8;
+        self.plate(left.saturating_sub(edge), edge / 2, width + 2 * edge, bottom + high + letter + edge / 2);
         for x in 0..width {
             let color = water(x as f32 / width.max(2) as f32).to_array().map(|c| (255.0 * c).round() as u8);
             (0..high).for_each(|y| self.mix(left + x, bottom + y, color, 255));
@@ -103,7 +102,7 @@ impl Picture {
         self.write(left + width - self.length(&most), below, &most);
         let middle = (width.saturating_sub(self.length(name))) / 2;
         // Above the bar, so that it meets no number.
-        self.write(left + middle, bottom.saturating_sub(letter + letter / 8), name);
+        self.write(left + middle, edge, name);
     }
 }
 

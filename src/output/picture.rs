@@ -42,6 +42,34 @@ impl Field {
             Self::Density => "n / n0 [-]",
         }
     }
+
+    /// Its value at `drop`; `number_density` is that of a full neighbourhood.
+    pub fn of(self, drop: &Drop, number_density: f64) -> f64 {
+        match self {
+            Self::Speed => drop.velocity.length(),
+            Self::Velocity(axis) => drop.velocity[axis],
+            Self::Pressure => drop.pressure,
+            Self::Density => drop.number_density / number_density,
+        }
+    }
+
+    /// A range for `values`, which it sorts: all but the most extreme ones have a colour. None for nothing, and for what
+    /// has a range of its own.
+    pub fn range(self, values: &mut [f64]) -> Option<[f64; 2]> {
+        if self == Self::Density {
+            return None;
+        }
+        values.iter_mut().for_each(|v| *v = v.abs());
+        values.sort_by(f64::total_cmp);
+        let most = *values.get((0.995 * values.len() as f64) as usize)?;
+        if !(most > 0.0 && most.is_finite()) {
+            return None;
+        }
+        // Two digits, upwards: a bar with round ends.
+        let unit = 10_f64.powf(most.log10().floor() - 1.0);
+        let most = (most / unit).ceil() * unit;
+        Some([if matches!(self, Self::Velocity(_)) { -most } else { 0.0 }, most])
+    }
 }
 
 /// How pictures are made.
@@ -126,15 +154,6 @@ impl Painter {
         Self { camera, style: style.clone(), range, number_density: params.number_density, walls }
     }
 
-    fn value(&self, drop: &Drop) -> f64 {
-        match self.style.field {
-            Field::Speed => drop.velocity.length(),
-            Field::Velocity(axis) => drop.velocity[axis],
-            Field::Pressure => drop.pressure,
-            Field::Density => drop.number_density / self.number_density,
-        }
-    }
-
     /// The picture at `time` [s] with the solids of `scene` in `poses` (positions and orientations) and this water.
     pub fn paint(
         &self,
@@ -156,7 +175,8 @@ impl Painter {
         for drop in drops {
             let near = |(axis, at): (usize, f64)| (drop.position[axis] - at).abs() <= 0.5 * l0;
             if self.style.slice.is_none_or(near) {
-                let place = (self.value(&drop) - self.range[0]) / (self.range[1] - self.range[0]);
+                let place = (self.style.field.of(&drop, self.number_density) - self.range[0])
+                    / (self.range[1] - self.range[0]);
                 fluid.ball(&self.camera, drop.position, RADIUS * l0, water(place as f32));
             }
         }
@@ -290,6 +310,16 @@ fn farthest(pairs: &[(DVec3, DVec3)], middle: DVec3) -> Option<[(DVec3, DVec3); 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_range_leaves_out_the_extremes_and_ends_round() {
+        let mut speeds: Vec<f64> = (0..1000).map(|k| 1.234 * f64::from(k) / 999.0).collect();
+        speeds[0] = 50.0;
+        assert_eq!(Field::Speed.range(&mut speeds.clone()), Some([0.0, 1.3]));
+        assert_eq!(Field::Velocity(2).range(&mut speeds), Some([-1.3, 1.3]));
+        assert_eq!(Field::Speed.range(&mut [0.0, 0.0]), None);
+        assert_eq!(Field::Speed.range(&mut []), None);
+    }
 
     #[test]
     fn a_pose_is_found_from_the_particles() {

@@ -35,7 +35,7 @@ pub(super) struct Kept {
 
 /// Times of its making that a state in memory lasts, so that it costs no more than one part in so many; and the shortest
 /// time that it lasts.
-const COST: u32 = 50;
+const COST: u32 = 100;
 const SHORTEST: Duration = Duration::from_secs(1);
 
 impl Saving {

@@ -113,10 +113,11 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
     if count == 0 {
         return Ok(Vec::new());
     }
-    let show = Show::open(&args.dir, &args.look)?;
     let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
+    let seen: Vec<&Frame> = (0..count).map(|k| &run.frames[pick(k)]).collect();
+    let show = Show::open(&args.dir, &args.look, &seen)?;
     let draw = |k: usize| {
-        let frame = &run.frames[pick(k)];
+        let frame = seen[k];
         Ok((frame.time, STANDARD.encode(show.picture(frame)?.png())))
     };
     (0..count).into_par_iter().map(draw).collect()
