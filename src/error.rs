@@ -39,6 +39,9 @@ pub enum Error {
         /// What was seen, with the particle or body.
         what: String,
     },
+    /// It was asked to end in the middle of a step, which was given up: the state is that of no moment (exit code 75).
+    #[error("stopped in the middle of a step")]
+    Interrupted,
     /// The end was reached, but what was computed means nothing (exit code 4).
     #[error("{0}")]
     Senseless(String),
@@ -241,6 +244,7 @@ impl Error {
             Self::Gpu(_) => 3,
             Self::Diverged { .. } | Self::Senseless(_) => 4,
             Self::Io { .. } => 5,
+            Self::Interrupted => 75,
         }
     }
 
@@ -271,7 +275,7 @@ impl Error {
     }
 
     /// A [`CheckpointError::Misfit`].
-    pub(crate) fn misfit(text: impl Into<String>) -> Self {
+    pub fn misfit(text: impl Into<String>) -> Self {
         CheckpointError::Misfit(text.into()).into()
     }
 

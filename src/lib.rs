@@ -93,6 +93,7 @@ pub mod sense;
 pub mod shape;
 pub mod simulation;
 mod step;
+pub mod stop;
 pub mod threads;
 pub mod time_step;
 mod whole;

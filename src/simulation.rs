@@ -13,6 +13,7 @@ use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
+use crate::stop::Stop;
 use crate::time_step::{collapse_speed, time_step};
 use glam::DVec3;
 use rayon::ThreadPool;
@@ -67,6 +68,7 @@ pub struct Simulation {
     /// Work of and on the solids, and the energy of the free ones [J], if the ledger is kept.
     solids_ledger: Option<(Ledger, f64)>,
     speed: f64,
+    pub(crate) stop: Stop,
     pub(crate) threads: Option<ThreadPool>,
 }
 
@@ -131,6 +133,7 @@ impl Simulation {
             stages: BTreeMap::new(),
             wait_for_stages: false,
             speed: 0.0,
+            stop: Stop::default(),
             threads: None,
         })
     }
@@ -149,6 +152,7 @@ impl Simulation {
             groups,
             wait_for_stages: _,
             threads: _,
+            stop: _,
             // Times by the clock are those of each process.
             stages: _,
             backend,
@@ -181,6 +185,13 @@ impl Simulation {
         }
         backend.exchange(archive)?;
         solids.exchange(archive, backend.compute())
+    }
+
+    /// Give up a step in progress with [`Error::Interrupted`] when `stop` has become overdue. The state is that of no
+    /// moment then; one that was kept before can be taken over with [`Self::exchange`].
+    pub fn stop_with(&mut self, stop: &Stop) {
+        self.stop = stop.clone();
+        self.backend.stop_with(stop);
     }
 
     /// When the PPE's solver stops.

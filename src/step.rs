@@ -24,6 +24,9 @@ impl Simulation {
 
         // The step reads in the list of the stages, src/plan.rs: they run in its order, those that the plan has.
         for stage in Stage::ALL {
+            if self.stop.is_overdue() {
+                return Err(Error::Interrupted);
+            }
             match stage {
                 // Part of the motion of the solids.
                 Stage::BodyForce => {}
@@ -39,6 +42,9 @@ impl Simulation {
             }
         }
 
+        if self.stop.is_overdue() {
+            return Err(Error::Interrupted);
+        }
         report.look = self.look(&step)?;
         self.time = t + dt;
         self.steps += 1;

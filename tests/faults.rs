@@ -28,6 +28,8 @@ fn run_and_plan_refuse_the_same_and_leave_no_folder() {
         (vec!["run.gravity=[0,0,0,-9.81]"], "4 elements"),
         (vec!["run.time_step=0.05"], "particles far in a step"),
         (vec!["fluid.compressibility=1"], "fluid.compressibility: 1e0 1/Pa"),
+        (vec!["fluid.density=-1e300"], "fluid.density: -1e300 is out of range"),
+        (vec!["fluid.viscosity=1e300"], "nu dt / l0^2 = 4.000e299 is unstable"),
         (vec![&beside, contact], "body `b` at (3.0000, 0.0000, 0.3000) lies outside of the tank"),
         (vec![&below, contact], "which spans 0 to 1 m along z, with nothing beneath it"),
         (vec![&over, "contact={spring=1e9,substeps=1}"], "contact.substeps = 1 is unstable"),
@@ -91,6 +93,14 @@ fn a_result_that_means_nothing_is_no_success() {
         (result["status"].as_str(), result["verdict"]["grade"].as_str()),
         (Some("failed"), Some("failed"))
     );
+    // A body that turns a thousand times in a step is none that the water could feel.
+    let body =
+        "body=[{name=\"b\",size=[0.2,0.05,0.2],center=[1.3,0,0.7],density=500,angular_velocity=[0,1e7,0]}]";
+    let spins = with(&[body, "contact={spring=1e5}"]);
+    assert!(spins.code == 4 && spins.err.contains("particles far in a step"), "{} {}", spins.code, spins.err);
+    let fast =
+        with(&[&body.replace("angular_velocity=[0,1e7,0]", "velocity=[100,0,0]"), "contact={spring=1e5}"]);
+    assert_eq!(json(&fast.out)["verdict"]["grade"], "degraded", "{}", fast.err);
     let some = with(&["fluid.solver.max_iterations=12"]);
     assert_eq!(some.code, 0, "{}", some.err);
     assert!(some.err.starts_with("verdict: degraded because "), "{}", some.err);
@@ -132,6 +142,19 @@ fn adaptive_steps_see_solids() {
         }
     }
     assert!(fast >= 28, "{fast} steps while the gate moves: {monitors}");
+}
+
+/// What never ends is no case, and takes no memory.
+#[cfg(unix)]
+#[test]
+fn a_case_that_does_not_end_is_refused() {
+    let refused = ran(&["plan", "/dev/zero"]);
+    assert!(
+        refused.code == 5 && refused.err.contains("longer than 64 MB"),
+        "{} {}",
+        refused.code,
+        refused.err
+    );
 }
 
 #[test]
@@ -202,6 +225,57 @@ fn a_disk_that_fills_up_leaves_whole_files_and_a_summary() {
     let result = json(&std::fs::read_to_string(out.join("result.json")).unwrap());
     assert_eq!(result["status"], "failed");
     assert!(result["exit_reason"].as_str().unwrap().contains("File too large"), "{result}");
+}
+
+/// Runs `line` where `$DISK` is a file system of its own, of a megabyte and a half. As root it is mounted, else in a
+/// namespace of one's own; where the system allows neither, this cannot be tested and says so by failing.
+#[cfg(target_os = "linux")]
+fn on_a_small_disk(folder: &Path, line: &str, args: &[&str]) -> std::process::Output {
+    let disk = folder.join("disk");
+    std::fs::create_dir(&disk).unwrap();
+    let script = format!("mount -t tmpfs -o size=1536k tmpfs \"$DISK\" || exit 99; {line}");
+    let run = |own: &[&str]| {
+        let all: Vec<&str> = [own, &["bash", "-c", &script, "bash"], args].concat();
+        Command::new(all[0]).args(&all[1..]).env("DISK", &disk).output()
+    };
+    // A mount in a namespace is gone with its last process, whatever happens to this one.
+    for own in [&["unshare", "--mount"][..], &["unshare", "--user", "--map-root-user", "--mount"]] {
+        if let Ok(output) = run(own)
+            && output.status.code() != Some(99)
+            && !String::from_utf8_lossy(&output.stderr).starts_with("unshare: ")
+        {
+            return output;
+        }
+    }
+    panic!("no small disk can be mounted here, neither as root nor in a user namespace: allow one of them");
+}
+
+/// The whole disk is full: tables are cut to whole rows, the summary says why, and the last state is there to go on with.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_whole_files_a_state_and_a_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let kept = folder.path().join("kept");
+    let sets = "--set run.end=5 --set output.every=0.004 --set run.checkpoint={every=0.02} --backend cpu --threads 1 -q";
+    // What is there is copied away before the disk is gone; then room is made, and the run goes on on it.
+    let line = format!(
+        "\"$1\" run \"$2\" -o \"$DISK/out\" {sets} --force-disk; code=$?; cp -r \"$DISK/out\" \"$3\" || exit 98; \
+         rm -r \"$DISK/out/vtu\"; mount -o remount,size=64m \"$DISK\" || exit 97; cp -r \"$3/vtu\" \"$DISK/out/vtu\"; \
+         \"$1\" run \"$2\" -o \"$DISK/out\" {sets} --resume --until 5 --max-wall 1s; echo \"resumed $?\"; exit $code"
+    );
+    let program = seixo().get_program().to_string_lossy().into_owned();
+    let output = on_a_small_disk(folder.path(), &line, &[&program, &case, &kept.display().to_string()]);
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(5), "{out}{err}");
+    assert!(err.contains("No space left on device"), "{err}");
+    assert_whole(&kept);
+    let result = json(&std::fs::read_to_string(kept.join("result.json")).unwrap());
+    assert_eq!(result["status"], "failed");
+    assert!(result["exit_reason"].as_str().unwrap().contains("No space left on device"), "{result}");
+    let states = std::fs::read_dir(kept.join("checkpoint")).unwrap();
+    assert!(states.count() >= 1, "a state is kept");
+    assert!(out.contains("resumed 75"), "with room again it goes on: {out}{err}");
 }
 
 #[cfg(target_os = "linux")]

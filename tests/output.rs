@@ -1,12 +1,14 @@
 //! The VTU files, read back byte for byte by a reader written for the test, and the list of frames.
 
+use glam::DQuat;
 use seixo::case::{Case, Encoding};
 use seixo::fields::Fields;
 use seixo::output::folder::{Folder, Mode};
-use seixo::output::picture::Picture;
+use seixo::output::picture::{Painter, Style, drops, placed};
 use seixo::output::pvd::Pvd;
 use seixo::output::table::{Cell, Table};
 use seixo::output::vtu::{BLOCK, Values, vtu};
+use seixo::params::Params;
 use seixo::scene::Scene;
 use std::io::Read;
 
@@ -322,19 +324,24 @@ fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
              [contact]\nspring = 1e4\n"
         ))
         .unwrap();
-        Scene::build(&case).unwrap()
+        (Scene::build(&case).unwrap(), case)
     };
     let orange = |[r, g, b]: [u8; 3]| r > 150 && i32::from(r) - i32::from(b) > 60 && g < r;
     let blue = |[r, g, b]: [u8; 3]| b > r && b > g && b - g > 20;
-    let draw = |scene: &Scene| {
-        let poses = seixo::contact::Solids::new(scene, Some(&contact())).unwrap();
-        Picture::new(scene).draw(scene, poses.poses(), Some(&Fields::new(scene, true)))
+    let turned = |(scene, case): &(Scene, Case), turn: DQuat| {
+        let solids = seixo::contact::Solids::new(scene, Some(&contact())).unwrap();
+        let poses: Vec<_> = placed(solids.poses()).into_iter().map(|(x, q)| (x, turn * q)).collect();
+        let painter = Painter::new(scene, &Style::of(3), &Params::new(case, scene).unwrap());
+        painter.paint(scene, 0.0, &poses, drops(scene, Some(&Fields::new(scene, true)))).png()
     };
+    let draw = |seen: &(Scene, Case)| turned(seen, DQuat::IDENTITY);
     let open = scene("");
     let picture = draw(&open);
     assert_eq!(picture, draw(&open), "the same state gives the same picture");
     let (cube, water) = (pixels(&picture, orange), pixels(&picture, blue));
     assert!((1000..20_000).contains(&cube) && (10_000..200_000).contains(&water), "{cube} {water}");
+    // A quarter turn brings the cube's faces onto each other, but not its pattern.
+    assert!(turned(&open, DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2)) != picture);
     // An obstacle in front of the cube tints it but does not hide it.
     let hidden = scene("[[obstacle]]\nname = \"o\"\nmin = [0.9, 0.1, 0]\nmax = [1.6, 0.3, 1]\n");
     let tinted = pixels(&draw(&hidden), |[r, _, b]| r > b.saturating_add(25));

@@ -338,6 +338,115 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     }
 }
 
+/// Spacing at which the steps of that case take seconds.
+#[cfg(unix)]
+const LONG: &str = "0.002";
+
+/// Sends `signal` to a run of `args` after `wait`; its exit code, its remarks and how long it took to end.
+#[cfg(unix)]
+fn interrupted(args: &[&str], signal: &str, wait: impl Fn() -> bool) -> (Option<i32>, String, Duration) {
+    let mut command = Command::new(seixo().get_program());
+    let child = command.args(args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let clock = Instant::now();
+    while !wait() {
+        assert!(clock.elapsed() < Duration::from_secs(60), "it never came so far");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    let clock = Instant::now();
+    let output = child.wait_with_output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned(), clock.elapsed())
+}
+
+/// A solve of many seconds is given up when a signal comes; what is left goes on to the same end. The clock does so, too.
+#[cfg(unix)]
+#[test]
+fn a_long_step_is_given_up_and_nothing_is_lost() {
+    // Nothing damps the pressure, the diagonal alone preconditions, and only the last digits end a solve.
+    let sets = [
+        "run.time_step=1e-4",
+        "run.end=2e-4",
+        "fluid.relaxation=1e-9",
+        "fluid.solver={tolerance=1e-13,max_iterations=1000000,preconditioner=\"jacobi\"}",
+        "fluid.block.0.max=[0.6,0,0.6]",
+    ];
+    let case = Case::new(&sets, "cpu");
+    let fine = ["--spacing", LONG];
+    let clock = Instant::now();
+    assert_eq!(case.run("whole", &fine).code, 0);
+    let two_steps = clock.elapsed();
+    assert!(two_steps > Duration::from_secs(4), "its steps are not long: {two_steps:?}");
+    for (signal, code) in [("-INT", 130), ("-USR1", 75)] {
+        let root = case.root(signal).display().to_string();
+        // The first step begins when the first frame is there.
+        let begun = || case.root(signal).join("small.pvd").exists();
+        let (ended, err, took) = interrupted(&case.args(&root, &fine), signal, begun);
+        assert_eq!(ended, Some(code), "{err}");
+        assert!(
+            took < two_steps / 2 && took < Duration::from_secs(3),
+            "{took:?} for a step of {two_steps:?} / 2"
+        );
+        let result = json(&std::fs::read_to_string(case.root(signal).join("result.json")).unwrap());
+        assert_eq!((result["status"].as_str(), result["steps"].as_u64()), (Some("interrupted"), Some(0)));
+    }
+    let clock = Instant::now();
+    let stopped = case.run("-INT", &[&fine[..], &["--resume", "--max-wall", "0.5s"]].concat());
+    assert_eq!(stopped.code, 75, "{}", stopped.err);
+    assert!(clock.elapsed() < Duration::from_secs(4), "{:?}", clock.elapsed());
+    let ended = case.run("-INT", &[&fine[..], &["--resume"]].concat());
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_same(&case.root("whole"), &case.root("-INT"), "a step that was given up");
+}
+
+/// The same on the device, where the solver is looked at now and then.
+#[cfg(unix)]
+#[test]
+fn a_long_step_on_the_device_is_given_up_and_nothing_is_lost() {
+    if json(&ran(&["adapters", "--json"]).out).as_array().unwrap().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "no adapter: the GPU path is not tested");
+        eprintln!("SKIPPED: no adapter");
+        return;
+    }
+    let sets = [
+        "run.time_step=1e-4",
+        "run.end=2e-4",
+        "output.every=1e-4",
+        "fluid.relaxation=1e-9",
+        "fluid.solver={tolerance=1e-6,max_iterations=100000,preconditioner=\"jacobi\"}",
+        "fluid.block.0.max=[0.6,0,0.6]",
+    ];
+    let case = Case::new(&sets, "gpu");
+    let fine = ["--spacing", "0.006"];
+    let clock = Instant::now();
+    assert_eq!(case.run("whole", &fine).code, 0);
+    let two_steps = clock.elapsed();
+    let root = case.root("parts").display().to_string();
+    let begun = || case.root("parts").join("small.pvd").exists();
+    let (ended, err, took) = interrupted(&case.args(&root, &fine), "-TERM", begun);
+    assert_eq!(ended, Some(143), "{err}");
+    assert!(took < Duration::from_secs(4), "{took:?} for steps of {two_steps:?} / 2");
+    let ended = case.run("parts", &[&fine[..], &["--resume"]].concat());
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_same(&case.root("whole"), &case.root("parts"), "a step that was given up on the device");
+}
+
+/// While millions of particles are built there is nothing to save: the run ends at once, with its exit code, and leaves
+/// nothing.
+#[cfg(unix)]
+#[test]
+fn a_long_build_is_ended_at_once() {
+    let case = Case::new(&["run.time_step=1e-6", "run.end=1e-5"], "cpu");
+    for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-USR1", 75), ("-XCPU", 75)] {
+        let root = case.root("none").display().to_string();
+        let args = case.args(&root, &["--spacing", "2e-4", "--memory-limit", "100G"]);
+        let clock = Instant::now();
+        let (ended, err, took) = interrupted(&args, signal, || clock.elapsed() > Duration::from_millis(300));
+        assert_eq!((ended, err.as_str()), (Some(code), ""), "{signal}");
+        assert!(took < Duration::from_secs(1), "{took:?}");
+        assert!(!case.root("none").exists(), "nothing was computed, nothing is left");
+    }
+}
+
 #[test]
 fn a_run_that_diverges_keeps_its_last_good_state() {
     let case = Case::new(&["fluid.block.0.velocity=[0,0,500]", "run.end=10", "output.every=2e-3"], "cpu");

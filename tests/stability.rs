@@ -11,7 +11,7 @@ fn rows(name: &str, keep: impl Fn(&str) -> bool) -> Vec<Row> {
     assert!(!study.jobs.is_empty());
     let folder = tempfile::tempdir().expect("a temporary folder");
     let options = Options { out: folder.path().into(), quiet: true, ..Options::default() };
-    let context = Context { make: &cpu_only, repetitions: 1 };
+    let context = Context { repetitions: 1, ..Context::new(&cpu_only) };
     let (rows, _) = study.run(&options, &context, None).expect("the study runs");
     assert_eq!(rows.len(), study.jobs.len());
     rows

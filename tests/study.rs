@@ -1,5 +1,12 @@
 //! The study command: resumed after a kill, split into shards, failures as rows, mistakes told.
 
+use seixo::Error;
+use seixo::checkpoint::Found;
+use seixo::checkpoint::file::{newest, write};
+use seixo::stop::Stop;
+use seixo_study::engine::{Context, cpu_only};
+use seixo_study::row::{Measured, Timing};
+use seixo_study::run_point::{Point, run as run_point};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -216,4 +223,144 @@ tolerance = 0.1
     assert!(folder.join("docs/img/validation-small-floor-curve.svg").exists());
     let (code, text) = validate(&["hydrostatics"]);
     assert_eq!((code, text.contains("did you mean `hydrostatic`")), (2, true), "{text}");
+}
+
+/// Everything that a point can measure, of water, bodies, gauges and profiles.
+const RICH: &str = r#"
+[run]
+spacing = 0.02
+time_step = 1e-3
+end = 0.06
+dimensions = 2
+[tank]
+min = [0, 0, 0]
+max = [0.4, 1, 0.4]
+open = ["z_max"]
+[fluid]
+viscosity = 1e-4
+[[fluid.block]]
+min = [0, 0, 0]
+max = [0.4, 1, 0.2]
+[[body]]
+name = "falls"
+size = [0.1, 1, 0.06]
+center = [0.2, 0, 0.26]
+density = 500
+velocity = [0, 0, -0.3]
+[contact]
+spring = 1e4
+[[gauge.pressure]]
+name = "floor"
+point = [0.1, 0, 0]
+"#;
+const ALL_MEASURES: &str = r#"
+of = ["hydrostatic_pressure", "sensor", "kinetic_energy", "volume", "front", "energy", "draft", "body_height",
+      "gauges", "bodies", "fluid"]
+from = 0.01
+every = 0.004
+profile = [{ name = "p", of = "pressure", along = "z", within = [[0, -1, 0], [0.4, 1, 0.2]], bins = 5 }]
+"#;
+
+/// Stopped again and again a point ends as the undisturbed one, because it goes on from the state that it kept.
+#[test]
+fn a_point_that_is_stopped_goes_on_from_its_state() {
+    let spec = toml::from_str(ALL_MEASURES).expect("measures");
+    let point = Point { text: RICH.into(), spec, processor: Default::default(), repetitions: 2 };
+    let folder = tempfile::tempdir().expect("a folder");
+    let attempt = |name: &str, time: Duration| {
+        let stop = Stop::default().at(Some(Instant::now() + time));
+        let states = Some(folder.path().join(name));
+        run_point(&point, &Context { states, stop, ..Context::new(&cpu_only) })
+    };
+    let without_times = |m: Measured| {
+        let repetitions = m.timing.map(|t: Timing| t.repetitions);
+        (repetitions, Measured { timing: None, ..m })
+    };
+    let whole = run_point(&point, &Context::new(&cpu_only)).expect("it runs");
+    assert!(whole.values.len() > 20 && whole.curves.len() > 15, "{:?}", whole.curves.keys());
+    let mut parts = 0;
+    let ended = loop {
+        // Longer and longer, so that a slow machine comes to the end too.
+        match attempt("parts", Duration::from_millis(10 + 5 * parts)) {
+            Err(Error::Interrupted) => parts += 1,
+            ended => break ended.expect("it runs"),
+        }
+        assert!(parts < 1000, "no end");
+    };
+    assert!(parts >= 3, "{parts} parts");
+    assert_eq!(without_times(ended), without_times(whole), "{parts} parts");
+
+    // What is in the state is what the rest is added to.
+    assert!(matches!(attempt("other", Duration::from_millis(10)), Err(Error::Interrupted)));
+    let states = folder.path().join("other");
+    let Found { origin, mut archive, .. } = newest(&states).expect("it is whole").expect("a state");
+    archive.numbers.insert("measure.rise".into(), 123_f64.to_bits());
+    write(&states, &origin, &archive).expect("it is written");
+    let doctored = attempt("other", Duration::from_secs(600)).expect("it runs");
+    assert_eq!(doctored.value("energy rise [-]"), Some(123.0));
+}
+
+/// Killed in the middle of a point, the sweep goes on with the point's own state.
+#[test]
+fn a_sweep_that_is_killed_within_a_point_goes_on_within_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let long = STUDY
+        .replace("[\"paper\", \"accurate\"]", "[\"accurate\"]")
+        .replace("[0.02, 0.01, 0.005]", "[0.005]")
+        .replace("[1e-3, 7.0]", "[1e-3]")
+        .replace("[[error]]\ncurve = \"front\"\nagainst = \"finest\"\n", "");
+    std::fs::write(folder.join("long.toml"), long).expect("a file");
+    assert_eq!(run(folder, &["long.toml", "-o", "whole", "-q"]).0, 0);
+    let states = |folder: &Path| -> Vec<std::path::PathBuf> {
+        let points = std::fs::read_dir(folder.join("killed/states")).into_iter().flatten().flatten();
+        let files = points.flat_map(|p| std::fs::read_dir(p.path()).into_iter().flatten().flatten());
+        files.map(|f| f.path()).filter(|p| p.extension().is_some_and(|e| e == "seixo")).collect()
+    };
+    let again = ["long.toml", "-o", "killed", "--save-every", "0.02", "-q"];
+    let mut last = None;
+    for _ in 0..3 {
+        let mut child = seixo(folder, &again).spawn().expect("the program starts");
+        let start = Instant::now();
+        // Until it has come further than the last time.
+        while states(folder).into_iter().max() <= last && start.elapsed() < Duration::from_secs(60) {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        child.kill().expect("a kill");
+        child.wait().expect("an end");
+        let newest = states(folder).into_iter().max();
+        assert!(newest > last, "{newest:?} after {last:?}");
+        last = newest;
+    }
+    assert_eq!(
+        std::fs::read_dir(folder.join("killed/points")).expect("points").count(),
+        0,
+        "killed too late"
+    );
+    let (code, text) = run(folder, &again);
+    assert_eq!(code, 0, "{text}");
+    assert_eq!(table(&folder.join("killed")), table(&folder.join("whole")));
+    assert!(!folder.join("killed/states").exists(), "states of a finished point are of no use");
+}
+
+/// A signal ends a sweep with the state of its point saved and the signal's exit code.
+#[cfg(unix)]
+#[test]
+fn a_sweep_that_is_interrupted_says_so_and_goes_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::write(folder.join("small.toml"), STUDY.replace("end = 0.3", "end = 30.0")).expect("a file");
+    for (signal, code) in [("-INT", 130), ("-USR1", 75)] {
+        let child = seixo(folder, &["small.toml", "-o", "out"]).spawn().expect("the program starts");
+        // After set-up, where there is nothing to save yet and it would end at once.
+        std::thread::sleep(Duration::from_millis(1500));
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
+        assert!(sent.success());
+        let clock = Instant::now();
+        let out = child.wait_with_output().expect("an end");
+        let err = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{err}");
+        assert!(clock.elapsed() < Duration::from_secs(5), "{:?}", clock.elapsed());
+        assert!(err.contains("the same command goes on there"), "{err}");
+    }
 }

@@ -4,15 +4,20 @@
 mod bench;
 mod compare;
 mod device;
+mod init;
 mod plan;
 mod progress;
+mod render;
+mod report;
 mod run;
 mod setup;
+mod shell;
 mod signals;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use seixo::console::{lost, remark, say};
 use seixo::error::Error;
+use seixo::stop::Stop;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -36,8 +41,14 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a commented case to begin with: dam-break, floating-body, sliding-block or flume.
+    Init(init::InitArgs),
     /// Run a case and write its results.
     Run(run::RunArgs),
+    /// Draw the frames of a run as PNG.
+    Render(render::RenderArgs),
+    /// Tell of a run on one page (HTML) that holds everything: verdict, pictures, curves, times.
+    Report(report::ReportArgs),
     /// Show what a run would compute, and what it would leave out and why; compute nothing.
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
@@ -56,12 +67,19 @@ enum Command {
     },
     /// Print the JSON schema of case files.
     Schema,
+    /// Print the completions for a shell, e.g. `seixo completions bash > ~/.local/share/bash-completion/completions/seixo`.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write those of all commands.
+    Man(shell::ManArgs),
 }
 
 /// Which case, and what to change in it.
 #[derive(Debug, clap::Args)]
 struct CaseArgs {
-    /// The case file (TOML).
+    /// The case file (TOML); - reads it from standard input.
     case: PathBuf,
     #[command(flatten)]
     changes: Changes,
@@ -119,20 +137,52 @@ enum BackendName {
 /// How a command ended, if it did not fail: its exit code.
 type Exit = Result<u8, Error>;
 
+/// A sweep, with its exit code where a signal ended it.
+fn sweep(quiet: bool, command: impl FnOnce(&Stop) -> Result<(), Error>) -> Exit {
+    let stop = signals::watch(quiet)?;
+    match (command(&stop), stop.signal()) {
+        (Err(Error::Interrupted), Some(signal)) => {
+            remark("the state of the point in progress is saved: the same command goes on there");
+            Ok(signals::exit_code(signal))
+        }
+        (ended, _) => ended.map(|()| 0),
+    }
+}
+
+/// Mesa's layer that picks a default device looks for a desktop session, and where there is none, a library of that session
+/// prints an error. Nothing here depends on that pick: adapters are chosen by rank or by name.
+#[cfg(target_os = "linux")]
+fn hush_device_select() {
+    let unset = |name| std::env::var_os(name).is_none();
+    if unset("XDG_RUNTIME_DIR") && unset("MESA_VK_DEVICE_SELECT") {
+        // SAFETY: no other thread has been started.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+}
+
 fn main() -> ExitCode {
+    #[cfg(target_os = "linux")]
+    hush_device_select();
     let args = Args::parse();
     let exit = match args.command {
+        Command::Init(args) => init::init(&args),
         Command::Run(args) => run::run(&args),
+        Command::Render(args) => render::render(&args),
+        Command::Report(args) => report::report(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
-        Command::Study(args) => seixo_study::command::command(&args).map(|()| 0),
-        Command::Validate(args) => seixo_study::validation::command::command(&args).map(|()| 0),
+        Command::Study(args) => sweep(args.quiet, |stop| seixo_study::command::command(&args, stop)),
+        Command::Validate(args) => {
+            sweep(args.quiet, |stop| seixo_study::validation::command::command(&args, stop))
+        }
         Command::Adapters { json } => device::list(json),
         Command::Schema => {
             say(seixo::case::Case::schema().trim_end());
             Ok(0)
         }
+        Command::Completions { shell } => shell::completions(shell),
+        Command::Man(args) => shell::man(&args),
     };
     // Only a command that did what it was asked for can fail at being heard.
     match exit.and_then(|code| if code == 0 { lost().map(|()| 0) } else { Ok(code) }) {

@@ -147,7 +147,7 @@ fn report(seen: &Seen) -> Result<Report> {
     let plan = Plan::new(case, scene, &params);
     let dt = time_step(&params, case.run.time_step, case.run.adaptive && plan.wet(), collapse_speed(&params));
     let mut advice =
-        if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive) } else { vec![] };
+        if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive).0 } else { vec![] };
     let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
     if built {
         // What `run` refuses.
@@ -236,7 +236,14 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
     })
 }
 
-fn step_advice(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
+/// What `run` says of the time step: nothing, unless there is something to change.
+pub fn step_warnings(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
+    let (words, matters) = step_advice(params, typed, adaptive);
+    if matters { words } else { Vec::new() }
+}
+
+/// What there is to say of the time step, and whether there is something to change.
+fn step_advice(params: &Params, typed: f64, adaptive: bool) -> (Vec<String>, bool) {
     let speed = collapse_speed(params);
     let bounds = Bounds::new(params, speed);
     let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous)];
@@ -247,6 +254,7 @@ fn step_advice(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
         bounds.flow
     )];
     let bound = bounds.shortest();
+    let mut matters = typed > bound && !adaptive;
     if typed > bound {
         advice.push(if adaptive {
             format!("the adaptive time step starts at {bound:.3e} s")
@@ -262,11 +270,12 @@ fn step_advice(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
         Relaxation::Speed(c) => (c * dt / params.spacing).powi(2),
     };
     if wanted > RELAXATION_MAX {
+        matters = true;
         advice.push(format!(
             "gamma = {wanted:.2} is above {RELAXATION_MAX}, where noise grows; lower the time step or the sound speed"
         ));
     }
-    advice
+    (advice, matters)
 }
 
 fn words(report: &Report) -> String {

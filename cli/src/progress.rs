@@ -24,7 +24,7 @@ impl Display {
     pub fn new(quiet: bool, wet: bool) -> Self {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(Some(BAR_LENGTH), ProgressDrawTarget::stderr_with_hz(4));
-            let style = ProgressStyle::with_template("[{bar:24}] {percent:>3} %  {wide_msg}");
+            let style = ProgressStyle::with_template("[{bar:10}] {percent:>3} %  {wide_msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar
         });
@@ -58,18 +58,28 @@ impl Display {
 
     fn line(&self, progress: &Progress) -> String {
         let report = &progress.report;
-        let mut line = format!("t={:.3} s  step {}  dt {:.2e}", progress.time, report.step + 1, report.dt);
+        // What is waited for comes first: a terminal of 80 columns cuts the rest.
+        let mut line = format!(
+            "ETA {}  t={:.3} s  step {}  dt {:.1e}",
+            clock(progress.remaining),
+            progress.time,
+            report.step + 1,
+            report.dt
+        );
         if self.wet {
             let (iterations, speed) = (report.pressure.iterations, progress.speed_max);
-            line += &format!("  CG {iterations} it  |v|max {speed:.2}");
+            line += &format!("  CG {iterations}  |v| {speed:.2}");
         }
-        line + &format!("  wall {}  ETA {}", clock(progress.wall), clock(progress.remaining))
+        line + &format!("  wall {}", clock(progress.wall))
     }
 }
 
-/// hh:mm:ss.
+/// hh:mm:ss, hours alone if they are many, and a question mark for what nobody knows.
 pub fn clock(time: Duration) -> String {
     let s = time.as_secs();
+    if time == Duration::MAX {
+        return "?".into();
+    }
     if s > 99 * 3600 {
         return format!("{} h", s / 3600);
     }

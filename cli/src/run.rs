@@ -1,5 +1,6 @@
 //! `seixo run`.
 
+use super::plan::step_warnings;
 use super::progress::{Display, clock};
 use super::setup::{self, Setup};
 use super::signals::{self, RESUME};
@@ -19,7 +20,7 @@ use std::time::{Duration, Instant};
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// The case file (TOML); with --resume DIR the case is that of DIR.
+    /// The case file (TOML), - for standard input; with --resume DIR the case is that of DIR.
     #[arg(required_unless_present = "resume")]
     case: Option<PathBuf>,
     #[command(flatten)]
@@ -170,7 +171,8 @@ impl Asked {
             (Some(case), out) => {
                 let name = setup::name(&case);
                 let out = out.unwrap_or_else(|| Path::new("out").join(&name));
-                Ok(Self { inputs: vec![case.clone()], case, name, out, resume })
+                let inputs = if setup::is_stdin(&case) { Vec::new() } else { vec![case.clone()] };
+                Ok(Self { inputs, case, name, out, resume })
             }
             (None, Some(out)) => {
                 let none = || FolderError::NoRun(out.clone());
@@ -186,6 +188,7 @@ impl Asked {
 
 pub fn run(args: &RunArgs) -> Exit {
     let deadline = args.max_wall.map(|wall| Instant::now() + wall);
+    let stop = signals::watch(args.quiet)?;
     seixo::threads::start(args.device.threads)?;
     let asked = Asked::new(args)?;
     let loaded = setup::read(&CaseArgs { case: asked.case.clone(), changes: args.changes.clone() })?;
@@ -237,11 +240,14 @@ pub fn run(args: &RunArgs) -> Exit {
             groups.total(),
             groups.fluid
         ));
+        if simulation.plan.wet() {
+            let run = &simulation.case.run;
+            let words = step_warnings(&simulation.params, run.time_step, run.adaptive);
+            words.iter().for_each(|line| remark(line));
+        }
         let advice = simulation.solids.advice(simulation.case.run.time_step);
         advice.words.iter().for_each(|line| remark(line));
     }
-    // Until here there is nothing to save, and a signal ends the program at once.
-    let stop = signals::watch(args.quiet)?;
     let mut display = Display::new(args.quiet, simulation.plan.wet());
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
     let finished =

@@ -1,9 +1,9 @@
 //! From what was typed to a simulation.
 
 use super::{CaseArgs, DeviceArgs, device};
-use seixo::case::file::{Loaded, load};
+use seixo::case::file::{Loaded, load, load_text, read_text};
 use seixo::console::remark;
-use seixo::error::Result;
+use seixo::error::{Error, Result};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use std::path::Path;
@@ -55,10 +55,29 @@ impl Setup {
 /// # Errors
 /// What is wrong with it.
 pub fn read(args: &CaseArgs) -> Result<Loaded> {
-    load(&args.case, args.changes.spacing, &args.changes.all_sets())
+    let (spacing, sets) = (args.changes.spacing, args.changes.all_sets());
+    if !is_stdin(&args.case) {
+        return load(&args.case, spacing, &sets);
+    }
+    let text = read_text(std::io::stdin()).map_err(|e| match e.kind() {
+        std::io::ErrorKind::InvalidData => {
+            Error::file("standard input", "", "standard input: not a text in UTF-8")
+        }
+        _ => Error::io("standard input")(e),
+    })?;
+    // What it names is relative to the folder that one is in.
+    load_text(Path::new("standard input"), text, spacing, &sets)
 }
 
-/// Name of a case: its file without the extension.
+/// Whether the case comes from standard input.
+pub fn is_stdin(case: &Path) -> bool {
+    case.as_os_str() == "-"
+}
+
+/// Name of a case: its file without the extension, or `stdin`.
 pub fn name(case: &Path) -> String {
+    if is_stdin(case) {
+        return "stdin".into();
+    }
     case.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned())
 }

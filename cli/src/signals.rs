@@ -1,9 +1,10 @@
-//! Signals that ask a run to end: the step in progress is finished, then the state is saved.
+//! Signals that ask a command to end: the state is saved, unless there is none yet.
 
 use seixo::console::remark;
 use seixo::error::{Error, Result};
+use seixo::stop::Stop;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Exit code of a run that was stopped with its state saved, to be resumed (EX_TEMPFAIL).
@@ -29,38 +30,48 @@ pub fn exit_code(signal: i32) -> u8 {
     128 + signal as u8
 }
 
-/// A number that turns from 0 to that of the signal that asked the run to end. A second signal ends the
-/// program on the spot. Signals that the caller has switched off (nohup) stay so.
+/// What signals ask to end. As long as nobody attends to it, while a scene is built, say, there is nothing to save, and
+/// a signal ends the program on the spot with its exit code; so does a second one. Signals that the caller has switched
+/// off (nohup) stay so.
 ///
 /// # Errors
 /// [`Error::Io`] if the system takes no handlers.
-pub fn watch(quiet: bool) -> Result<Arc<AtomicUsize>> {
-    let stop = Arc::new(AtomicUsize::new(0));
-    let armed = Arc::new(AtomicBool::new(false));
+pub fn watch(quiet: bool) -> Result<Stop> {
+    let stop = Stop::default();
+    let second = Arc::new(AtomicBool::new(false));
     let ignored = ignored();
     for signal in ASKING.into_iter().filter(|s| ignored >> (s - 1) & 1 == 0) {
-        // The order matters: at the first signal the shutdown is not armed yet.
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&armed))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&armed)))
-            .and_then(|_| signal_hook::flag::register_usize(signal, Arc::clone(&stop), signal as usize))
+        let (attended, asked) = (stop.attended_cell().clone(), stop.signal_cell().clone());
+        let at_once = move || {
+            if !attended.load(Ordering::SeqCst) {
+                signal_hook::low_level::exit(i32::from(exit_code(signal)));
+            }
+        };
+        // The order matters: at the first signal the second is not expected yet.
+        // SAFETY: the closure loads an atomic and may call _exit, both of which are safe in a signal handler.
+        unsafe { signal_hook::low_level::register(signal, at_once) }
+            .and_then(|_| {
+                signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, second.clone())
+            })
+            .and_then(|_| signal_hook::flag::register(signal, second.clone()))
+            .and_then(|_| signal_hook::flag::register_usize(signal, asked, signal as usize))
             .map_err(Error::io("signal handler"))?;
     }
     if !quiet {
-        tell(Arc::clone(&stop));
+        tell(stop.clone());
     }
     Ok(stop)
 }
 
 /// Says that a signal was seen, however long the step in progress takes.
-fn tell(stop: Arc<AtomicUsize>) {
+fn tell(stop: Stop) {
     std::thread::spawn(move || {
         loop {
             std::thread::sleep(Duration::from_millis(200));
-            let signal = stop.load(Ordering::Relaxed);
-            if signal != 0 {
+            if let Some(signal) = stop.signal() {
                 remark(&format!(
-                    "signal {signal}: the step in progress is finished and the state saved; a second signal ends the \
-                     program at once"
+                    "signal {signal}: the step in progress is finished, or given up if it takes long, and the state saved; \
+                     a second signal ends the program at once"
                 ));
                 return;
             }

@@ -38,6 +38,7 @@ use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Scene, Solid};
+use crate::stop::Stop;
 use context::Context;
 use glam::{DMat3, DVec3, Vec3};
 use hierarchy::Levels;
@@ -70,6 +71,7 @@ pub struct Gpu {
     expected_iterations: f64,
     /// Levels of the multigrid preconditioner, if that is planned.
     levels: Option<Levels>,
+    stop: Stop,
 }
 
 /// Numbers of things of `scene` on a device.
@@ -189,6 +191,7 @@ impl Gpu {
             dt: 0.0,
             expected_iterations: if levels.is_some() { 5.0 } else { 30.0 },
             levels,
+            stop: Stop::default(),
         };
         if plan.wet() {
             let constants = Constants::new(params, &groups, &gpu.grid, &gpu.settings, &gpu.sizes);
@@ -517,6 +520,10 @@ impl Backend for Gpu {
 
     fn wait(&mut self) -> Result<()> {
         self.context.wait()
+    }
+
+    fn stop_with(&mut self, stop: &Stop) {
+        self.stop = stop.clone();
     }
 
     fn bytes(&self) -> u64 {

@@ -16,6 +16,7 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{ParticleStage, Stage};
 use crate::pressure::PressureReport;
+use crate::stop::Stop;
 pub use processor::Processor;
 use std::collections::BTreeMap;
 
@@ -167,6 +168,8 @@ pub trait Backend: Send {
     fn wait(&mut self) -> Result<()> {
         Ok(())
     }
+    /// A solve in progress may be given up when `stop` has become overdue; it ends as if its iterations had run out.
+    fn stop_with(&mut self, stop: &Stop);
     /// Bytes that the backend holds for particles.
     fn bytes(&self) -> u64;
     /// The device on which contact may search and press its pairs, where the plan has it do so.

@@ -59,7 +59,10 @@ impl Checker<'_> {
     /// Finite numbers outside of a range; what is not finite has been reported already.
     pub(super) fn range(&mut self, path: &str, value: f64, fits: bool, allowed: &str) {
         if value.is_finite() && !fits {
-            self.add(path, format!("{value} is out of range"), format!("allowed: {allowed}"));
+            // Nobody counts three hundred digits.
+            let plain = value == 0.0 || (1e-6..1e9).contains(&value.abs());
+            let shown = if plain { value.to_string() } else { format!("{value:e}") };
+            self.add(path, format!("{shown} is out of range"), format!("allowed: {allowed}"));
         }
     }
     pub(super) fn positive(&mut self, path: &str, value: f64, unit: &str) {
@@ -220,7 +223,7 @@ impl Checker<'_> {
             let dt = 0.5 * limit * l0 * l0 / viscosity;
             self.add(
                 "fluid.viscosity",
-                format!("nu dt / l0^2 = {number:.3} is unstable, the limit is {limit:.3}"),
+                format!("nu dt / l0^2 = {number:.3e} is unstable, the limit is {limit:.3}"),
                 format!("use run.time_step = {dt:.1e} or less, or run.adaptive = true"),
             );
         }

@@ -1,6 +1,7 @@
 //! Reading a case file: text, overrides, parsing, checking; errors that point at file, line and key.
 
 use super::check::check;
+use super::motion_file::{allow_files, inline, inline_set};
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
 use super::{Case, overrides};
@@ -31,7 +32,8 @@ pub struct Loaded {
 /// [`Error::Case`] with everything that is wrong with the file or the overrides, [`Error::Io`] when the file
 /// exists but cannot be read.
 pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded> {
-    let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
+    let read = std::fs::File::open(path).and_then(read_text);
+    let text = read.map_err(|source| match source.kind() {
         std::io::ErrorKind::NotFound => Error::file(path.display().to_string(), "", missing(path)),
         std::io::ErrorKind::InvalidData => {
             let name = path.display().to_string();
@@ -39,11 +41,40 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
         }
         _ => Error::io(path)(source),
     })?;
+    load_text(path, text, spacing, sets)
+}
+
+/// Most bytes of a case; what is longer is something else.
+const LONGEST: u64 = 64 << 20;
+
+/// The text of a case from `source`.
+///
+/// # Errors
+/// What the source says, and [`std::io::ErrorKind::InvalidData`] if it is no text, [`std::io::ErrorKind::FileTooLarge`] if it
+/// does not end within 64 MB.
+pub fn read_text(source: impl std::io::Read) -> std::io::Result<String> {
+    let mut text = String::new();
+    let length = std::io::Read::read_to_string(&mut source.take(LONGEST + 1), &mut text)?;
+    if length as u64 > LONGEST {
+        let why = "longer than 64 MB, which no case is";
+        return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, why));
+    }
+    Ok(text)
+}
+
+/// [`load`], of a text that stands for the file `path`.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String]) -> Result<Loaded> {
     let mut all = Vec::new();
     if let Some(l0) = spacing {
         all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
     }
-    all.extend_from_slice(sets);
+    for set in sets {
+        all.push(inline_set(path, set)?);
+    }
+    let text = inline(path, text)?;
     let name = path.display().to_string();
     let (mut case, mut text, warnings) = parse(&name, text, &all)?;
     // What a case says of its place holds no more for its copy beside the results.
@@ -143,8 +174,9 @@ impl Case {
 
     /// The JSON schema of a case file, for editors (`#:schema` in the first line) and for `seixo schema`.
     pub fn schema() -> String {
-        let schema = schemars::schema_for!(Case);
-        let mut text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
+        let mut schema = schemars::schema_for!(Case).to_value();
+        allow_files(&mut schema);
+        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
         text.push('\n');
         text
     }

@@ -6,6 +6,7 @@ pub mod check;
 mod check_geometry;
 mod check_solids;
 pub mod file;
+mod motion_file;
 mod overrides;
 mod report;
 mod shape;

@@ -20,6 +20,8 @@ pub struct Section {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Archive {
     saving: bool,
+    /// It goes to the disk, and so must the files that it belongs to.
+    lasting: bool,
     /// Single numbers, bit by bit.
     pub numbers: BTreeMap<String, u64>,
     /// Arrays.
@@ -27,24 +29,39 @@ pub struct Archive {
 }
 
 impl Archive {
-    /// An empty state, to be filled.
+    /// An empty state, to be filled and written to the disk.
     pub fn new() -> Self {
+        Self { saving: true, lasting: true, ..Self::default() }
+    }
+
+    /// An empty state, to be filled and kept in memory.
+    pub fn in_memory() -> Self {
         Self { saving: true, ..Self::default() }
     }
 
     /// A state that was read, to be taken over.
     pub fn read(numbers: BTreeMap<String, u64>, sections: BTreeMap<String, Section>) -> Self {
-        Self { saving: false, numbers, sections }
+        Self { saving: false, lasting: false, numbers, sections }
     }
 
     /// The same state, to be taken over.
     pub fn to_restore(&self) -> Self {
-        Self { saving: false, ..self.clone() }
+        Self { saving: false, lasting: false, ..self.clone() }
+    }
+
+    /// The state itself, to be taken over.
+    pub fn into_restore(self) -> Self {
+        Self { saving: false, lasting: false, ..self }
     }
 
     /// Whether values go into the state (or come out of it).
-    pub(crate) fn is_saving(&self) -> bool {
+    pub fn is_saving(&self) -> bool {
         self.saving
+    }
+
+    /// Whether the state goes to the disk.
+    pub(crate) fn is_lasting(&self) -> bool {
+        self.lasting
     }
 
     fn missing(name: &str) -> Error {

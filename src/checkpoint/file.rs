@@ -220,6 +220,14 @@ pub fn write(folder: &Path, origin: &Origin, archive: &Archive) -> Result<(PathB
     Ok((path, bytes.len() as u64))
 }
 
+/// Removes all states in `folder`, and nothing else.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn remove(folder: &Path) -> Result<()> {
+    files(folder)?.iter().try_for_each(|path| std::fs::remove_file(path).map_err(Error::io(path)))
+}
+
 /// A state that was found, and what was wrong with newer ones.
 #[derive(Debug)]
 pub struct Found {
@@ -237,7 +245,7 @@ pub struct Found {
 ///
 /// # Errors
 /// [`Error::Checkpoint`] if there are files and none is whole, [`Error::Io`].
-pub(crate) fn newest(folder: &Path) -> Result<Option<Found>> {
+pub fn newest(folder: &Path) -> Result<Option<Found>> {
     let mut damaged = Vec::new();
     for path in files(folder)? {
         let bytes = std::fs::read(&path).map_err(Error::io(&path))?;

@@ -19,8 +19,16 @@ const RESERVE: &str = ".reserve";
 /// Bytes of it.
 const RESERVED: usize = 32 << 10;
 /// Files of a run in the folder itself, beside `NAME.pvd`.
-const FILES: [&str; 7] =
-    ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", RESERVE];
+const FILES: [&str; 8] = [
+    "case.toml",
+    "result.json",
+    "monitors.csv",
+    "bodies.csv",
+    "gauges.csv",
+    "final.png",
+    "report.html",
+    RESERVE,
+];
 
 /// The folder of the checkpoints of a run in `root`.
 pub fn checkpoints(root: &Path) -> PathBuf {

@@ -17,10 +17,12 @@
 //! be read.
 
 pub mod folder;
+pub mod label;
 pub mod particles;
 pub mod picture;
 pub mod pvd;
 pub mod render;
+pub mod replay;
 pub mod result;
 pub mod table;
 pub mod vtu;

@@ -1,24 +1,42 @@
-//! A small software renderer: balls in a parallel projection, shaded by light and by depth.
+//! A small software renderer: balls and solids in a parallel projection, shaded by light and by depth.
 
-use glam::{DVec3, Vec3};
+use crate::shape::Shape;
+use glam::{DQuat, DVec3, Vec3};
 
-/// Width of a picture [pixels].
-pub const WIDTH: usize = 960;
-/// Height of a picture [pixels].
-pub const HEIGHT: usize = 480;
 /// Samples along each edge of a pixel.
 const SAMPLES: usize = 2;
 /// Part of the picture's edge that is left free.
 const MARGIN: f64 = 0.03;
-/// Part of a wall's own colour where something lies behind it.
+/// Part of a wall's own colour where something lies behind it, and of the water's where a body does.
 const GLASS: f32 = 0.5;
+const CLEAR: f32 = 0.55;
 const BACKGROUND: Vec3 = Vec3::new(0.965, 0.97, 0.975);
 /// Direction to the light: from the upper left, before the picture (right, up, out of the picture).
 const LIGHT: Vec3 = Vec3::new(-0.42, 0.6, 0.68);
+/// Steps towards a solid's surface, and how near is there, over the solid's radius.
+const STEPS: u32 = 48;
+const NEAR: f64 = 1e-4;
+
+/// From where a scene is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Width and height of the picture [pixels].
+    pub size: [usize; 2],
+    /// Turn to the right about the vertical, from a view along +y [rad].
+    pub azimuth: f64,
+    /// Height above the horizon [rad].
+    pub elevation: f64,
+    /// Magnification; at 1 the whole scene fills the picture.
+    pub zoom: f64,
+    /// Point in the middle of the picture [m]; that of the scene if absent.
+    pub target: Option<DVec3>,
+}
 
 /// A parallel projection.
 #[derive(Clone, Debug)]
 pub struct Camera {
+    /// Samples across and down.
+    samples: [usize; 2],
     right: DVec3,
     up: DVec3,
     /// Into the picture.
@@ -29,10 +47,9 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Look along +y, from `azimuth` to the right and `elevation` above (both in radians), at the box from
-    /// `min` to `max` [m].
-    pub fn new(azimuth: f64, elevation: f64, min: DVec3, max: DVec3) -> Self {
-        let ((sa, ca), (se, ce)) = (azimuth.sin_cos(), elevation.sin_cos());
+    /// Look with `view` at the box from `min` to `max` [m].
+    pub fn new(view: &View, min: DVec3, max: DVec3) -> Self {
+        let ((sa, ca), (se, ce)) = (view.azimuth.sin_cos(), view.elevation.sin_cos());
         let right = DVec3::new(ca, sa, 0.0);
         let forward = DVec3::new(-sa * ce, ca * ce, -se);
         let up = right.cross(forward);
@@ -45,45 +62,68 @@ impl Camera {
                 high[k] = high[k].max(along.dot(x));
             }
         }
+        let samples = view.size.map(|n| n * SAMPLES);
         let free = 1.0 - 2.0 * MARGIN;
-        let fit = |pixels: usize, k: usize| free * (pixels * SAMPLES) as f64 / (high[k] - low[k]).max(1e-9);
+        let fit = |k: usize| free * samples[k] as f64 / (high[k] - low[k]).max(1e-9);
+        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
         Self {
+            samples,
             right,
             up,
             forward,
-            center: [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])],
-            scale: fit(WIDTH, 0).min(fit(HEIGHT, 1)),
+            center: view.target.map_or(middle, |t| [right.dot(t), up.dot(t)]),
+            scale: view.zoom * fit(0).min(fit(1)),
         }
     }
 
     /// Column, row [samples] and depth [m] of a point.
     fn project(&self, x: DVec3) -> (f64, f64, f64) {
-        let column = (self.right.dot(x) - self.center[0]) * self.scale + (WIDTH * SAMPLES) as f64 / 2.0;
-        let row = (HEIGHT * SAMPLES) as f64 / 2.0 - (self.up.dot(x) - self.center[1]) * self.scale;
+        let column = (self.right.dot(x) - self.center[0]) * self.scale + self.samples[0] as f64 / 2.0;
+        let row = self.samples[1] as f64 / 2.0 - (self.up.dot(x) - self.center[1]) * self.scale;
         (column, row, self.forward.dot(x))
+    }
+
+    /// The point of the plane through the origin across the view that lies behind a sample.
+    fn behind(&self, column: f64, row: f64) -> DVec3 {
+        let along = (column - self.samples[0] as f64 / 2.0) / self.scale + self.center[0];
+        let up = (self.samples[1] as f64 / 2.0 - row) / self.scale + self.center[1];
+        along * self.right + up * self.up
+    }
+
+    /// A direction as the light sees it: right, up, out of the picture.
+    fn seen(&self, n: DVec3) -> Vec3 {
+        DVec3::new(n.dot(self.right), n.dot(self.up), -n.dot(self.forward)).as_vec3()
     }
 }
 
-/// A picture in the making.
+/// A layer of a picture in the making.
 #[derive(Clone, Debug)]
 pub struct Canvas {
+    width: usize,
     color: Vec<Vec3>,
     depth: Vec<f32>,
 }
 
-impl Default for Canvas {
-    fn default() -> Self {
-        let samples = WIDTH * HEIGHT * SAMPLES * SAMPLES;
-        Self { color: vec![BACKGROUND; samples], depth: vec![f32::INFINITY; samples] }
-    }
+fn lit(color: Vec3, normal: Vec3) -> Vec3 {
+    color * (0.62 + 0.38 * normal.dot(LIGHT).max(0.0))
 }
 
 impl Canvas {
+    /// An empty one for `camera`.
+    pub fn new(camera: &Camera) -> Self {
+        let [width, height] = camera.samples;
+        Self { width, color: vec![BACKGROUND; width * height], depth: vec![f32::INFINITY; width * height] }
+    }
+
+    fn put(&mut self, at: usize, depth: f64, color: Vec3) {
+        if (depth as f32) < self.depth[at] {
+            (self.depth[at], self.color[at]) = (depth as f32, color);
+        }
+    }
+
     /// Draw a ball at `x` of `radius` [m] in `color` (sRGB, 0 to 1). What is not finite is left out.
     pub fn ball(&mut self, camera: &Camera, x: DVec3, radius: f64, color: Vec3) {
-        self.splat(camera, x, radius, |normal| {
-            (color * (0.62 + 0.38 * normal.dot(LIGHT).max(0.0)), radius * f64::from(normal.z))
-        });
+        self.splat(camera, x, radius, |normal| (lit(color, normal), radius * f64::from(normal.z)));
     }
 
     /// Draw a disc that faces the viewer, in one tone: many of them make a smooth wall.
@@ -94,85 +134,84 @@ impl Canvas {
     /// Draw a ball's outline; `paint` tells colour and height [m] from the normal.
     fn splat(&mut self, camera: &Camera, x: DVec3, radius: f64, paint: impl Fn(Vec3) -> (Vec3, f64)) {
         let (column, row, depth) = camera.project(x);
+        // Smaller than a sample, a ball would fall through the grid.
+        let r = (radius * camera.scale).max(0.75);
+        self.each_sample(camera, (column, row, depth), r, |canvas, at, i, j| {
+            let (dx, dy) = ((i as f64 - column) / r, (row - j as f64) / r);
+            let rest = 1.0 - dx * dx - dy * dy;
+            if rest > 0.0 {
+                let (color, height) = paint(Vec3::new(dx as f32, dy as f32, rest.sqrt() as f32));
+                canvas.put(at, depth - height, color);
+            }
+        });
+    }
+
+    /// Draw `shape` in a pose; `paint` tells the colour from a point of its surface in its own frame.
+    pub fn solid(
+        &mut self,
+        camera: &Camera,
+        shape: &Shape,
+        (position, orientation): (DVec3, DQuat),
+        paint: impl Fn(DVec3) -> Vec3,
+    ) {
+        let (center, radius) = (camera.project(position), shape.radius());
+        let to_own = orientation.conjugate();
+        let forward = to_own * camera.forward;
+        self.each_sample(camera, center, radius * camera.scale + 1.0, |canvas, at, i, j| {
+            // From before the solid on, each time as far as nothing can be in the way.
+            let start = camera.behind(i as f64, j as f64) + (center.2 - radius) * camera.forward;
+            let (mut q, mut way) = (to_own * (start - position), 0.0);
+            for _ in 0..STEPS {
+                let (distance, slope) = shape.distance(q);
+                if distance < NEAR * radius {
+                    let normal = camera.seen(orientation * slope);
+                    canvas.put(at, center.2 - radius + way, lit(paint(q), normal));
+                    return;
+                }
+                way += distance;
+                if way > 2.0 * radius {
+                    return;
+                }
+                q += distance * forward;
+            }
+        });
+    }
+
+    /// Calls `visit` for every sample within `r` samples of a projected point.
+    fn each_sample(
+        &mut self,
+        camera: &Camera,
+        (column, row, depth): (f64, f64, f64),
+        r: f64,
+        mut visit: impl FnMut(&mut Self, usize, usize, usize),
+    ) {
         if !(column.is_finite() && row.is_finite() && depth.is_finite()) {
             return;
         }
-        // Smaller than a sample, a ball would fall through the grid.
-        let r = (radius * camera.scale).max(0.75);
         let span = |center: f64, end: usize| {
             let low = (center - r).ceil().clamp(0.0, end as f64) as usize;
             let high = (center + r).floor().clamp(-1.0, end as f64 - 1.0) + 1.0;
             low..high as usize
         };
-        for j in span(row, HEIGHT * SAMPLES) {
-            for i in span(column, WIDTH * SAMPLES) {
-                let (dx, dy) = ((i as f64 - column) / r, (row - j as f64) / r);
-                let rest = 1.0 - dx * dx - dy * dy;
-                if rest <= 0.0 {
-                    continue;
-                }
-                let normal = Vec3::new(dx as f32, dy as f32, rest.sqrt() as f32);
-                let (color, height) = paint(normal);
-                let z = (depth - height) as f32;
-                let at = j * WIDTH * SAMPLES + i;
-                if z < self.depth[at] {
-                    self.depth[at] = z;
-                    self.color[at] = color;
-                }
+        for j in span(row, camera.samples[1]) {
+            for i in span(column, camera.samples[0]) {
+                visit(self, j * self.width + i, i, j);
             }
         }
-    }
-
-    /// The picture as PNG, before and behind the `walls`, which are seen through where they stand in front.
-    /// Places that lie more than about `length` [m] behind what is beside them are darkened, which sets heaps
-    /// of balls off from each other.
-    pub fn png(&self, walls: &Self, length: f64) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(WIDTH * HEIGHT * 3);
-        for row in 0..HEIGHT {
-            for column in 0..WIDTH {
-                let mut sum = Vec3::ZERO;
-                for s in 0..SAMPLES * SAMPLES {
-                    let (i, j) = (column * SAMPLES + s % SAMPLES, row * SAMPLES + s / SAMPLES);
-                    let at = j * WIDTH * SAMPLES + i;
-                    let wall = || walls.color[at] * walls.shade(i, j, length as f32);
-                    let glass = match (self.depth[at], walls.depth[at]) {
-                        (f32::INFINITY, _) => 1.0,
-                        (own, wall) if wall < own => GLASS,
-                        _ => 0.0,
-                    };
-                    sum += if glass == 1.0 {
-                        wall()
-                    } else {
-                        let own = self.color[at] * self.shade(i, j, length as f32);
-                        if glass > 0.0 { own.lerp(wall(), glass) } else { own }
-                    };
-                }
-                let mean = sum / (SAMPLES * SAMPLES) as f32;
-                bytes.extend(mean.to_array().map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));
-            }
-        }
-        let mut file = Vec::new();
-        let mut encoder = png::Encoder::new(&mut file, WIDTH as u32, HEIGHT as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&bytes).and_then(|()| writer.finish()))
-            .expect("a Vec takes everything");
-        file
     }
 
     fn shade(&self, i: usize, j: usize, length: f32) -> f32 {
         const REACH: isize = 3;
-        let depth = self.depth[j * WIDTH * SAMPLES + i];
+        let depth = self.depth[j * self.width + i];
         if depth == f32::INFINITY {
             return 1.0;
         }
+        let height = self.depth.len() / self.width;
         let mut behind = 0.0;
         for (di, dj) in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)] {
             let (i, j) = (i as isize + REACH * di, j as isize + REACH * dj);
-            if (0..(WIDTH * SAMPLES) as isize).contains(&i) && (0..(HEIGHT * SAMPLES) as isize).contains(&j) {
-                let beside = self.depth[j as usize * WIDTH * SAMPLES + i as usize];
+            if (0..self.width as isize).contains(&i) && (0..height as isize).contains(&j) {
+                let beside = self.depth[j as usize * self.width + i as usize];
                 if beside.is_finite() {
                     behind += ((depth - beside) / length).clamp(0.0, 4.0);
                 }
@@ -182,8 +221,59 @@ impl Canvas {
     }
 }
 
-/// Water from still (0) to fast (1): dark blue over teal to pale green, even to the eye (after seaborn's
-/// "mako", without its darkest part).
+/// The layers of a picture: each is a canvas of the same camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Layers<'a> {
+    /// The water.
+    pub water: &'a Canvas,
+    /// Bodies; seen through the water.
+    pub bodies: &'a Canvas,
+    /// Walls; what is behind them is seen through them.
+    pub walls: &'a Canvas,
+}
+
+impl Layers<'_> {
+    /// One picture, three bytes a pixel in rows. Places that lie more than about `length` [m] behind what is beside
+    /// them are darkened, which sets heaps of balls off from each other.
+    pub fn pixels(&self, length: f64) -> Vec<u8> {
+        let width = self.water.width / SAMPLES;
+        let height = self.water.color.len() / self.water.width / SAMPLES;
+        let mut bytes = Vec::with_capacity(width * height * 3);
+        for row in 0..height {
+            for column in 0..width {
+                let mut sum = Vec3::ZERO;
+                for s in 0..SAMPLES * SAMPLES {
+                    let (i, j) = (column * SAMPLES + s % SAMPLES, row * SAMPLES + s / SAMPLES);
+                    sum += self.sample(i, j, length as f32);
+                }
+                let mean = sum / (SAMPLES * SAMPLES) as f32;
+                bytes.extend(mean.to_array().map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));
+            }
+        }
+        bytes
+    }
+
+    fn sample(&self, i: usize, j: usize, length: f32) -> Vec3 {
+        let at = j * self.water.width + i;
+        let of = |canvas: &Canvas| (canvas.depth[at], canvas.color[at] * canvas.shade(i, j, length));
+        let ((water, body, wall), nothing) =
+            ((self.water.depth[at], self.bodies.depth[at], self.walls.depth[at]), f32::INFINITY);
+        if water == nothing && body == nothing {
+            return of(self.walls).1;
+        }
+        let own = if body <= water {
+            of(self.bodies).1
+        } else if body < nothing {
+            of(self.bodies).1.lerp(of(self.water).1, CLEAR)
+        } else {
+            of(self.water).1
+        };
+        if wall < water.min(body) { own.lerp(of(self.walls).1, GLASS) } else { own }
+    }
+}
+
+/// From little (0) to much (1): dark blue over teal to pale green, even to the eye (after seaborn's "mako", without its
+/// darkest part).
 pub fn water(value: f32) -> Vec3 {
     const COLORS: [[u8; 3]; 6] = [
         [0x41, 0x3d, 0x7b],

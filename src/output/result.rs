@@ -95,6 +95,8 @@ pub struct Monitors {
     pub density_error_mean: f64,
     /// Largest v dt / l0 of the fluid [-].
     pub courant_max: f64,
+    /// Longest way of a point of a solid within a step over l0 [-].
+    pub solid_courant_max: f64,
     /// Largest speed of the fluid [m/s].
     #[serde(rename = "speed_max_m_s")]
     pub speed_max: f64,

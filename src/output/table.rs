@@ -90,7 +90,7 @@ impl Table {
         archive.count(&format!("{name}.bytes"), whole)?;
         let io = |e| Error::io(&*path)(e);
         if archive.is_saving() {
-            return file.sync_data().map_err(io);
+            return if archive.is_lasting() { file.sync_data().map_err(io) } else { Ok(()) };
         }
         if file.metadata().map_err(io)?.len() < *whole {
             return Err(FolderError::Shorter(path.to_path_buf()).into());

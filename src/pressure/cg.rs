@@ -5,6 +5,7 @@ use super::{Outcome, PressureReport, Settings};
 use crate::fields::State;
 use crate::kernels::conjugate_gradient::apply;
 use crate::neighbours::{CHUNK, Chunk, Neighbours};
+use crate::stop::Stop;
 use rayon::prelude::*;
 
 /// The system A P = b of one step, A with what free bodies add. Vectors run over all pressure-carrying slots and are zero where the
@@ -50,6 +51,8 @@ pub struct Workspace {
     p: Vec<f64>,
     q: Vec<f64>,
     sums: Vec<f64>,
+    /// A solve that is overdue ends as if its iterations had run out: whoever set this throws the step away.
+    pub stop: Stop,
 }
 
 impl System<'_> {
@@ -93,7 +96,7 @@ impl System<'_> {
 
     /// r <- b - A x with x set to zero where there is no unknown, or everywhere unless `warm`. Returns r.r.
     fn start(&self, warm: bool, b: &[f64], x: &mut [f64], work: &mut Workspace) -> f64 {
-        let Workspace { r, z, p, q, sums } = work;
+        let Workspace { r, z, p, q, sums, .. } = work;
         (
             x.par_chunks_mut(CHUNK),
             r.par_chunks_mut(CHUNK),
@@ -213,10 +216,10 @@ pub fn solve(
             Outcome::NonFinite
         } else if report.residual <= settings.tolerance {
             Outcome::Converged
-        } else if report.iterations >= settings.max_iterations {
+        } else if report.iterations >= settings.max_iterations || work.stop.is_overdue() {
             Outcome::MaxIterations
         } else {
-            let Workspace { r, z, p, q, sums } = &mut *work;
+            let Workspace { r, z, p, q, sums, .. } = &mut *work;
             preconditioner.apply(system, r, z);
             let rz = system.dot(r, z, sums);
             if rz > 0.0 {

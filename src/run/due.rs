@@ -34,7 +34,10 @@ impl Due {
     }
 
     /// Save the next moment, or take it over.
-    pub(crate) fn exchange(&mut self, name: &str, archive: &mut Archive) -> Result<()> {
+    ///
+    /// # Errors
+    /// As [`Archive::count`].
+    pub fn exchange(&mut self, name: &str, archive: &mut Archive) -> Result<()> {
         let Self { every: _, next } = self;
         archive.number(&format!("due.{name}"), next)
     }

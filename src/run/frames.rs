@@ -6,9 +6,10 @@ use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::output::folder::Folder;
 use crate::output::particles::Particles;
-use crate::output::picture::Picture;
+use crate::output::picture::{Painter, Style, drops, placed};
 use crate::output::pvd::Pvd;
 use crate::output::write_whole;
+use crate::params::Params;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ pub struct Frames {
     solids: bool,
     walls: (bool, bool),
     every: f64,
-    picture: Option<Picture>,
+    picture: Option<Painter>,
     written: u64,
     /// The last frame is that of the present step.
     fresh: Option<u64>,
@@ -35,10 +36,16 @@ impl Frames {
     ///
     /// # Errors
     /// [`Error::Io`] if the folder of the pictures cannot be made.
-    pub fn new(folder: &Folder, output: &Output, scene: &Scene, pictures: bool) -> Result<Self> {
+    pub fn new(
+        folder: &Folder,
+        output: &Output,
+        scene: &Scene,
+        params: &Params,
+        pictures: bool,
+    ) -> Result<Self> {
         let asked = |kind| output.kinds.contains(&kind);
         let groups = &scene.groups;
-        let picture = pictures.then(|| Picture::new(scene));
+        let picture = pictures.then(|| Painter::new(scene, &Style::of(scene.dimensions), params));
         if pictures {
             std::fs::create_dir_all(folder.pictures()).map_err(Error::io(folder.pictures()))?;
         }
@@ -119,7 +126,7 @@ impl Frames {
         }
         self.pvd.push(time, &parts)?;
         if let Some(picture) = &self.picture {
-            let png = picture.draw(scene, simulation.solids.poses(), fields.as_ref());
+            let png = paint(picture, simulation, scene, fields.as_ref());
             write_whole(&self.folder.pictures().join(format!("frame_{number:04}.png")), &png)?;
         }
         self.written += 1;
@@ -146,7 +153,7 @@ impl Frames {
     pub(crate) fn write_final_picture(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
         let Some(picture) = &self.picture else { return Ok(()) };
         let fields = read(simulation)?;
-        let png = picture.draw(scene, simulation.solids.poses(), fields.as_ref());
+        let png = paint(picture, simulation, scene, fields.as_ref());
         write_whole(&self.folder.file("final.png"), &png)
     }
 
@@ -170,6 +177,12 @@ impl Frames {
         let path: PathBuf = self.folder.root().join(file);
         write_whole(&path, &particles.vtu(time, self.encoding))
     }
+}
+
+/// The present state as PNG.
+fn paint(painter: &Painter, simulation: &Simulation, scene: &Scene, fields: Option<&Fields>) -> Vec<u8> {
+    let poses = placed(simulation.solids.poses());
+    painter.paint(scene, simulation.time, &poses, drops(scene, fields)).png()
 }
 
 /// All fields; a dry scene has none, and its backend is not asked.

@@ -7,6 +7,7 @@
 
 mod due;
 pub mod frames;
+mod pace;
 pub mod resume;
 mod saving;
 pub mod summary;
@@ -21,11 +22,12 @@ use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
+use crate::stop::Stop;
 pub use due::Due;
 use frames::Frames;
-use saving::{Saving, earlier, fits};
+use pace::Pace;
+use saving::{Kept, Saving, earlier, fits};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use summary::Totals;
 use tables::Tables;
@@ -94,8 +96,9 @@ pub struct Finished {
     pub resumable: bool,
 }
 
-/// Run `simulation` of `scene` to its end. `text` is the case as a TOML file; `stop` holds the number of a
-/// signal once the run should stop; `observe` is called after every step.
+/// Run `simulation` of `scene` to its end. `text` is the case as a TOML file; `stop` asks it to end early: in
+/// the middle of a step only if that takes long, and then it ends as it was shortly before; `observe` is called after every
+/// step.
 ///
 /// # Errors
 /// Only for what keeps a run from starting: a folder that is not empty or in use, a gauge that hangs in the air, a
@@ -105,9 +108,11 @@ pub fn run(
     scene: &Scene,
     text: &str,
     options: Options,
-    stop: &AtomicUsize,
+    stop: &Stop,
     observe: &mut dyn FnMut(&Progress),
 ) -> Result<Finished> {
+    let stop = &stop.at(options.deadline);
+    let _attended = stop.attend();
     let gauges = Gauges::new(&simulation.case, scene)?;
     let mut archive = None;
     let mode = match &options.start {
@@ -127,13 +132,13 @@ pub fn run(
     let folder = Folder::open(&options.out, &options.name, mode, &options.inputs)?;
     let mut run = Run {
         start: Instant::now(),
-        frames: Frames::new(&folder, &simulation.case.output, scene, options.pictures)?,
+        frames: Frames::new(&folder, &simulation.case.output, scene, &simulation.params, options.pictures)?,
         tables: Tables::create(&folder, simulation, scene, gauges, resumes)?,
         totals: Totals::default(),
         steps_max: options.steps.unwrap_or(u64::MAX),
-        deadline: options.deadline,
         due: Due::new(Some(simulation.case.output.every)),
         saving: Saving::new(simulation, &options.name, text, folder.checkpoints()),
+        pace: Pace::default(),
         walls: 0.0,
         parts: 0,
         // A run always does a step, however short it is.
@@ -170,9 +175,9 @@ struct Run {
     tables: Tables,
     totals: Totals,
     steps_max: u64,
-    deadline: Option<Instant>,
     due: Due,
     saving: Saving,
+    pace: Pace,
     /// Wall-clock time of the processes before this one [s].
     walls: f64,
     /// Processes that the run took.
@@ -184,7 +189,7 @@ struct Run {
 impl Run {
     /// Save how far files and sums are, or go back to that.
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self { start, frames, tables, totals, steps_max: _, deadline: _, due, saving, walls, parts, dt } =
+        let Self { start, frames, tables, totals, steps_max: _, due, saving, pace: _, walls, parts, dt } =
             self;
         frames.exchange(archive)?;
         tables.exchange(archive)?;
@@ -209,15 +214,41 @@ impl Run {
         }
     }
 
-    fn state(&mut self, simulation: &mut Simulation) -> Result<Archive> {
-        let mut archive = Archive::new();
+    fn state(&mut self, simulation: &mut Simulation, mut archive: Archive) -> Result<Archive> {
         simulation.exchange(&mut archive)?;
         self.exchange(&mut archive)?;
         Ok(archive)
     }
 
+    /// Keep a state of late in memory, to go back to if a long step is given up.
+    fn keep(&mut self, simulation: &mut Simulation) -> Result<()> {
+        if !self.saving.keeps() {
+            return Ok(());
+        }
+        // Two at a time would be one too many: they may be large.
+        self.saving.kept = None;
+        let clock = Instant::now();
+        let archive = self.state(simulation, Archive::in_memory())?;
+        self.saving.kept = Some(Kept { archive, at: Instant::now(), cost: clock.elapsed() });
+        Ok(())
+    }
+
+    /// Go back to it.
+    fn go_back(&mut self, simulation: &mut Simulation) -> Result<()> {
+        simulation.backend.wait()?;
+        let Some(kept) = self.saving.kept.take() else { return Err(Error::Interrupted) };
+        let mut archive = kept.archive.into_restore();
+        simulation.exchange(&mut archive)?;
+        let walls = self.walls;
+        self.exchange(&mut archive)?;
+        // The clock of this process has not gone back.
+        self.walls = walls;
+        Ok(())
+    }
+
     fn save(&mut self, simulation: &mut Simulation) -> Result<()> {
-        let archive = self.state(simulation)?;
+        self.saving.kept = None;
+        let archive = self.state(simulation, Archive::new())?;
         self.saving.write(simulation.steps, simulation.time, &archive)
     }
 
@@ -228,7 +259,7 @@ impl Run {
             self.save(simulation)?;
         } else if self.saving.planned && self.frames.is_fresh(simulation.steps) {
             // In memory, beside a frame: what is saved if the run diverges.
-            let archive = self.state(simulation)?;
+            let archive = self.state(simulation, Archive::in_memory())?;
             self.saving.good = Some((simulation.steps, simulation.time, archive));
         }
         Ok(())
@@ -241,7 +272,7 @@ impl Run {
         scene: &Scene,
         options: &Options,
         folder: &Folder,
-        stop: &AtomicUsize,
+        stop: &Stop,
         observe: &mut dyn FnMut(&Progress),
         resumes: bool,
     ) -> Result<Finished> {
@@ -316,7 +347,7 @@ impl Run {
         &mut self,
         simulation: &mut Simulation,
         scene: &Scene,
-        stop: &AtomicUsize,
+        stop: &Stop,
         observe: &mut dyn FnMut(&Progress),
         resumes: bool,
     ) -> Result<End> {
@@ -327,6 +358,7 @@ impl Run {
             self.frames.write(simulation, scene)?;
             self.totals.output += writing.elapsed();
         }
+        simulation.stop_with(stop);
         let mut progress = Progress { time: simulation.time, ..Progress::default() };
         progress.report.dt = self.dt;
         let ended = loop {
@@ -337,14 +369,18 @@ impl Run {
             if simulation.steps >= self.steps_max {
                 break End::Steps;
             }
-            let signal = stop.load(Ordering::Relaxed);
-            if signal != 0 {
-                break End::Signal(signal as i32);
+            if stop.is_asked() {
+                break stop.signal().map_or(End::Deadline, End::Signal);
             }
-            if self.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-                break End::Deadline;
-            }
-            let report = simulation.step()?;
+            self.keep(simulation)?;
+            let report = match simulation.step() {
+                Err(Error::Interrupted) => {
+                    self.go_back(simulation)?;
+                    progress.report = StepReport { dt: self.dt, ..StepReport::default() };
+                    continue;
+                }
+                report => report?,
+            };
             self.dt = report.dt;
             let writing = Instant::now();
             self.totals.add(&report, simulation);
@@ -363,6 +399,7 @@ impl Run {
             observe(&progress);
         };
         let writing = Instant::now();
+        self.saving.kept = None;
         // Before the last frame and the last rows, which a run that goes on would not have written.
         let stopped = matches!(ended, End::Signal(_) | End::Deadline);
         if (stopped || self.saving.planned) && self.saving.step != Some(simulation.steps) {
@@ -377,12 +414,11 @@ impl Run {
         Ok(ended)
     }
 
-    fn clock(&self, progress: &mut Progress, steps: u64, end: f64) {
+    fn clock(&mut self, progress: &mut Progress, steps: u64, end: f64) {
         progress.wall = self.start.elapsed();
         let by_time = progress.time / end;
         let by_steps = steps as f64 / self.steps_max as f64;
         progress.done = by_time.max(by_steps).clamp(1e-9, 1.0);
-        let remaining = progress.wall.as_secs_f64() * (1.0 / progress.done - 1.0);
-        progress.remaining = Duration::try_from_secs_f64(remaining).unwrap_or(Duration::MAX);
+        progress.remaining = self.pace.remaining(progress.wall, progress.done);
     }
 }

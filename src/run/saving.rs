@@ -21,7 +21,22 @@ pub(super) struct Saving {
     pub step: Option<u64>,
     /// A state that was good, in case the run diverges.
     pub good: Option<(u64, f64, Archive)>,
+    /// A state of late, in case a long step is given up.
+    pub kept: Option<Kept>,
 }
+
+/// A state in memory.
+pub(super) struct Kept {
+    pub archive: Archive,
+    pub at: Instant,
+    /// How long it took to make.
+    pub cost: Duration,
+}
+
+/// Times of its making that a state in memory lasts, so that it costs no more than one part in so many; and the shortest
+/// time that it lasts.
+const COST: u32 = 100;
+const SHORTEST: Duration = Duration::from_secs(1);
 
 impl Saving {
     pub fn new(simulation: &Simulation, name: &str, text: &str, folder: PathBuf) -> Self {
@@ -45,7 +60,13 @@ impl Saving {
             last: Instant::now(),
             step: None,
             good: None,
+            kept: None,
         }
+    }
+
+    /// Whether a state should be kept in memory before the next step.
+    pub fn keeps(&self) -> bool {
+        self.kept.as_ref().is_none_or(|k| k.at.elapsed() > SHORTEST.max(COST * k.cost))
     }
 
     pub fn write(&mut self, step: u64, time: f64, archive: &Archive) -> Result<()> {

@@ -73,6 +73,7 @@ impl Totals {
             density_error_max,
             density_error_mean: _,
             courant_max,
+            solid_courant_max,
             speed_max,
             energy_start,
             energy_end,
@@ -86,6 +87,7 @@ impl Totals {
         for (name, value) in [
             ("density_error_max", density_error_max),
             ("courant_max", courant_max),
+            ("solid_courant_max", solid_courant_max),
             ("speed_max", speed_max),
             ("energy_start", energy_start),
             ("energy_end", energy_end),
@@ -112,6 +114,8 @@ impl Totals {
             self.pressure.failures += u64::from(!solved(solve.outcome));
         }
         let (monitors, contact) = (&mut self.monitors, &report.contact);
+        let way = report.dt * simulation.solids.fastest(report.time, report.dt) / simulation.params.spacing;
+        monitors.solid_courant_max = monitors.solid_courant_max.max(way);
         monitors.penetration_max_over_l0 =
             monitors.penetration_max_over_l0.max(contact.penetration_max_over_l0);
         monitors.contact_omega_dt = monitors.contact_omega_dt.max(contact.omega_dt);

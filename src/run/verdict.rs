@@ -17,6 +17,8 @@ const SPEED: (f64, f64) = (5.0, 25.0);
 const GAIN: (f64, f64) = (0.1, 1.0);
 /// v dt / l0 [-]. Splashes are faster than the flow, and do no harm.
 const COURANT: (f64, f64) = (1.0, 10.0);
+/// The same of the points of solids; water does not feel what jumps over it.
+const SOLID_COURANT: (f64, f64) = (1.0, 10.0);
 /// Depth to which solids sank into each other over l0 [-].
 const PENETRATION: (f64, f64) = (0.5, 3.0);
 
@@ -108,6 +110,12 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
         });
         judge.bound(m.courant_max, COURANT, || {
             format!("water moved {:.1} particles far in a step", m.courant_max)
+        });
+    }
+    if wet {
+        judge.bound(m.solid_courant_max, SOLID_COURANT, || {
+            let way = m.solid_courant_max;
+            format!("a solid moved {way:.1} particles far in a step; use a shorter run.time_step, or run.adaptive = true")
         });
     }
     judge.bound(m.penetration_max_over_l0, PENETRATION, || {

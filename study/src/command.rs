@@ -8,6 +8,7 @@ use super::engine::{Context, Make, Options, Processor, Shard};
 use seixo::console::say;
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
+use seixo::stop::Stop;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -108,11 +109,11 @@ impl Manifest {
     }
 }
 
-/// Run `args`. Findings go to stdout, progress to stderr.
+/// Run `args` until `stop` asks to end. Findings go to stdout, progress to stderr.
 ///
 /// # Errors
-/// [`Error::Case`] for a study that cannot be set up, [`Error::Io`]. Points that fail are results.
-pub fn command(args: &StudyArgs) -> Result<()> {
+/// [`Error::Case`] for a study that cannot be set up, [`Error::Io`], [`Error::Interrupted`]. Points that fail are results.
+pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
     let computers = args.computers.start()?;
     let make: &Make = &|processor, scene, params, plan, settings| {
         computers.backend(processor, scene, params, plan, settings)
@@ -154,7 +155,12 @@ pub fn command(args: &StudyArgs) -> Result<()> {
         quiet: args.quiet,
         collect: collect.then_some(folders),
     };
-    let context = Context { make, repetitions: args.repetitions };
+    let context = Context {
+        repetitions: args.repetitions,
+        stop: stop.clone(),
+        save_every: args.computers.save_every,
+        ..Context::new(make)
+    };
     let (rows, text) = study.run(&options, &context, args.error)?;
     say(text.trim_end_matches('\n'));
     let missing = study.jobs.len() - rows.len();

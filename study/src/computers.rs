@@ -9,6 +9,7 @@ use seixo::plan::Plan;
 use seixo::pressure::Settings;
 use seixo::scene::Scene;
 use std::sync::OnceLock;
+use std::time::Duration;
 
 /// The processors of this machine.
 pub struct Computers {
@@ -30,6 +31,9 @@ pub struct ComputerArgs {
     /// Threads of the CPU's points; all cores if absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=seixo::threads::MOST))]
     pub threads: Option<u16>,
+    /// Wall-clock time between the states that a point keeps of its run, so that it goes on there after a kill [s].
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = seconds)]
+    pub save_every: Duration,
 }
 
 impl ComputerArgs {
@@ -41,6 +45,13 @@ impl ComputerArgs {
         seixo::threads::start(self.threads)?;
         Ok(Computers::new(self.adapter.clone()))
     }
+}
+
+/// What `--save-every` takes.
+fn seconds(text: &str) -> std::result::Result<Duration, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let time = number.and_then(|s| Duration::try_from_secs_f64(s).ok());
+    time.ok_or_else(|| "write a number of seconds".to_owned())
 }
 
 /// What `--backend` takes.

@@ -14,9 +14,10 @@ use seixo::params::Params;
 use seixo::plan::Plan;
 use seixo::pressure::Settings;
 use seixo::scene::Scene;
+use seixo::stop::Stop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Where a point computes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -56,7 +57,23 @@ pub struct Context<'a> {
     pub make: &'a Make<'a>,
     /// How often a run is repeated for its time; 0 for what the study asks for.
     pub repetitions: u32,
+    /// Asks the sweep to end early.
+    pub stop: Stop,
+    /// Wall-clock time between the states that a point keeps of its run.
+    pub save_every: Duration,
+    /// Where the point at work keeps them; nowhere without a folder.
+    pub states: Option<PathBuf>,
 }
+
+impl<'a> Context<'a> {
+    /// A context whose points keep no states and are not asked to end.
+    pub fn new(make: &'a Make<'a>) -> Self {
+        Self { make, repetitions: 0, stop: Stop::default(), save_every: SAVE_EVERY, states: None }
+    }
+}
+
+/// Wall-clock time between the states that a point keeps of its run, unless said otherwise.
+pub const SAVE_EVERY: Duration = Duration::from_secs(60);
 
 /// What a point does.
 pub type Task = Box<dyn Fn(&Context) -> Result<Measured> + Send + Sync>;
@@ -166,6 +183,17 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
     let (start, mut done) = (Instant::now(), 0.0);
     for (n, &k) in open.iter().enumerate() {
         let job = &jobs[k];
+        if context.stop.is_asked() {
+            return Err(Error::Interrupted);
+        }
+        let states = options.out.join("states").join(job.hash(study));
+        let here = Context {
+            states: Some(states.clone()),
+            stop: context.stop.clone(),
+            repetitions: context.repetitions,
+            save_every: context.save_every,
+            make: context.make,
+        };
         let row = Row {
             format: FORMAT,
             study: study.into(),
@@ -173,10 +201,11 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
             hash: job.hash(study),
             method: job.method.clone(),
             parameters: job.parameters.iter().cloned().collect(),
-            measured: attempt(job, context),
+            measured: attempt(job, &here)?,
         };
         let text = json(&row);
         write_whole(&point(&folder, &row.hash), text.as_bytes())?;
+        forget(&states)?;
         done += job.weight;
         if !options.quiet {
             let elapsed = start.elapsed().as_secs_f64();
@@ -202,10 +231,11 @@ pub(crate) fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
 }
 
-/// The point, or the reason why there is none: a point never takes the sweep with it.
-fn attempt(job: &Job, context: &Context) -> Measured {
-    match catch_unwind(AssertUnwindSafe(|| (job.task)(context))) {
+/// The point, or the reason why there is none: a point never takes the sweep with it, unless the sweep was to end.
+fn attempt(job: &Job, context: &Context) -> Result<Measured> {
+    Ok(match catch_unwind(AssertUnwindSafe(|| (job.task)(context))) {
         Ok(Ok(measured)) => measured,
+        Ok(Err(Error::Interrupted)) => return Err(Error::Interrupted),
         Ok(Err(error)) => Measured::failed(&error),
         Err(panic) => {
             let text = panic.downcast_ref::<String>().map(String::as_str);
@@ -216,7 +246,20 @@ fn attempt(job: &Job, context: &Context) -> Measured {
                 ..Measured::default()
             }
         }
+    })
+}
+
+/// Removes the states of a finished point, and the folder of all of them after the last.
+fn forget(states: &Path) -> Result<()> {
+    if !states.exists() {
+        return Ok(());
     }
+    seixo::checkpoint::file::remove(states)?;
+    for folder in [Some(states), states.parent()].into_iter().flatten() {
+        // Somebody else's files, or another point's states, keep their folder.
+        let _ = std::fs::remove_dir(folder);
+    }
+    Ok(())
 }
 
 fn point(folder: &Path, hash: &str) -> PathBuf {
@@ -270,7 +313,8 @@ mod tests {
     ) -> Vec<Row> {
         let shard = shard.map(|s| s.parse().unwrap());
         let options = Options { out: out.into(), shard, quiet: true, collect };
-        sweep("test", &jobs(5, calls), &options, &Context { make: &cpu_only, repetitions: 1 }).unwrap()
+        sweep("test", &jobs(5, calls), &options, &Context { repetitions: 1, ..Context::new(&cpu_only) })
+            .unwrap()
     }
 
     #[test]

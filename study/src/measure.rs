@@ -3,6 +3,7 @@
 use super::record::{Profile, Recorder};
 use super::row::Measured;
 use glam::DVec3;
+use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
 use seixo::fields::{Fields, State};
 use seixo::gauges::level;
@@ -138,6 +139,59 @@ impl Sampler {
             energy: Vec::new(),
             height: Vec::new(),
         })
+    }
+
+    /// Save what was measured so far, or take it over.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] if the state holds none of it.
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            // From the study and the case.
+            spec: _,
+            floor: _,
+            width: _,
+            left: _,
+            weight: _,
+            sensor: _,
+            // What was measured.
+            recorder,
+            due,
+            samples,
+            square,
+            slope,
+            kinetic,
+            depth,
+            sensed,
+            draft,
+            tilt,
+            speed_body,
+            energy_start,
+            rise,
+            density_error,
+            iterations_max,
+            front,
+            energy,
+            height,
+        } = self;
+        recorder.exchange(archive)?;
+        due.exchange("measure", archive)?;
+        archive.number("measure.samples", samples)?;
+        archive.number("measure.square", square)?;
+        archive.number("measure.slope", slope)?;
+        archive.number("measure.kinetic", kinetic)?;
+        archive.number("measure.depth", depth)?;
+        archive.number("measure.tilt", tilt)?;
+        archive.number("measure.speed_body", speed_body)?;
+        archive.number("measure.energy_start", energy_start)?;
+        archive.number("measure.rise", rise)?;
+        archive.number("measure.density_error", density_error)?;
+        archive.small("measure.iterations_max", iterations_max)?;
+        archive.array("measure.sensed", sensed, false)?;
+        archive.array("measure.draft", draft, false)?;
+        archive.array("measure.front", front, false)?;
+        archive.array("measure.energy", energy, false)?;
+        archive.array("measure.height", height, false)
     }
 
     fn has(&self, measure: Measure) -> bool {

@@ -349,13 +349,13 @@ mod tests {
         let make: &crate::engine::Make = &|_, s, p, plan, settings| {
             Ok(Box::new(Gpu::new(s, p, plan, settings, None)?) as Box<dyn Backend>)
         };
-        let none = Context { make: &cpu_only, repetitions: 0 };
+        let none = Context::new(&cpu_only);
         assert!(matches!(on_device(&moment, Preconditioner::Jacobi, STAGNANT, &none), Err(Error::Gpu(_))));
         if adapters().is_empty() {
             assert!(std::env::var_os("CI").is_none(), "NO GPU ADAPTER: single precision is not tested");
             return;
         }
-        let context = Context { make, repetitions: 0 };
+        let context = Context::new(make);
         for kind in [Preconditioner::Jacobi, Preconditioner::Multigrid] {
             let measured = on_device(&moment, kind, STAGNANT, &context).unwrap();
             let (double, single) = ("true residual [-]", "true residual in f32 [-]");

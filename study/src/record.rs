@@ -10,6 +10,7 @@
 use super::measure::{Measure, Spec};
 use super::row::Measured;
 use glam::DVec3;
+use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
 use seixo::fields::Fields;
 use seixo::gauges::Gauges;
@@ -133,6 +134,25 @@ impl Recorder {
             profiles: spec.profile.iter().map(sums).collect(),
             curves: BTreeMap::new(),
         })
+    }
+
+    /// Save the curves and sums, or take them over.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] if the state holds none of them.
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        // What is recorded follows from study and case.
+        let Self { gauges: _, bodies: _, fluid: _, profiles, curves } = self;
+        for Sums { profile, bins } in profiles {
+            archive.array(&format!("profile.{}", profile.name), bins, true)?;
+        }
+        let names: Vec<&str> = curves.keys().map(String::as_str).collect();
+        let mut names = names.join("\n").into_bytes();
+        archive.array("curves", &mut names, false)?;
+        for name in String::from_utf8_lossy(&names).lines() {
+            archive.array(&format!("curve.{name}"), curves.entry(name.to_owned()).or_default(), false)?;
+        }
+        Ok(())
     }
 
     /// The state now; `in_window` adds to the profiles as well.

@@ -39,6 +39,7 @@ use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
+use crate::stop::Stop;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -533,6 +534,10 @@ impl Backend for Cpu {
             multigrid: self.multigrid.as_ref().map(|m| (4, m.stored())),
         };
         Ok(sizes.traffic())
+    }
+
+    fn stop_with(&mut self, stop: &Stop) {
+        self.work.stop = stop.clone();
     }
 
     fn bytes(&self) -> u64 {

@@ -10,6 +10,10 @@ use crate::pressure::{Outcome, PressureReport};
 
 /// Iterations between looks once the last solve's number is used up, with the diagonal and with multigrid.
 const CHUNK: [u32; 2] = [8, 2];
+/// Most iterations between looks, with the diagonal and with multigrid: so long a signal waits at least.
+const MOST: [u32; 2] = [64, 16];
+/// The device's word for a solve whose iterations ran out.
+const ITERATIONS_RAN_OUT: u32 = 2;
 /// Iterations to expect of the diagonal where multigrid has failed.
 const ALONE: u32 = 30;
 
@@ -68,13 +72,16 @@ impl Gpu {
         }
         context.pass(around(kernel::pack, [kernel::start_residual, kernel::start]))?;
         // An iteration too many costs empty dispatches, one too few a round trip to the device.
-        let mut chunk = expected + if cycle { 1 } else { expected / 8 + 2 };
+        let mut chunk = (expected + if cycle { 1 } else { expected / 8 + 2 }).min(MOST[usize::from(cycle)]);
         loop {
             let iterations = (0..chunk).flat_map(|_| iteration.iter().copied());
             context.pass(iterations.chain(judge).chain(end.clone()))?;
             let solve = context.download(buffers::solve, 1)?[0];
             if solve.done != 0 {
                 return Ok(solve);
+            }
+            if self.stop.is_overdue() {
+                return Ok(Solve { outcome: ITERATIONS_RAN_OUT, ..solve });
             }
             chunk = CHUNK[usize::from(cycle)];
         }
@@ -122,7 +129,7 @@ fn report(solve: &Solve) -> PressureReport {
     let outcome = match solve.outcome {
         0 => Outcome::Converged,
         1 => Outcome::ZeroSource,
-        2 => Outcome::MaxIterations,
+        ITERATIONS_RAN_OUT => Outcome::MaxIterations,
         3 => Outcome::Breakdown,
         _ => Outcome::NonFinite,
     };

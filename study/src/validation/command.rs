@@ -9,6 +9,7 @@ use crate::engine::{Context, Make, Options, Shard};
 use crate::report::write_table;
 use seixo::console::say;
 use seixo::error::Result;
+use seixo::stop::Stop;
 use std::path::PathBuf;
 
 /// Hold runs against experiments and analytic solutions: one page with tables and charts.
@@ -48,12 +49,12 @@ pub struct ValidateArgs {
     pub quiet: bool,
 }
 
-/// Run `args`. A line for each check goes to stdout, progress to stderr.
+/// Run `args` until `stop` asks to end. A line for each check goes to stdout, progress to stderr.
 ///
 /// # Errors
 /// [`seixo::error::Error::Case`] for a validation that cannot be set up, [`seixo::error::Error::Io`]. Points that
 /// fail, and checks that do, are results.
-pub fn command(args: &ValidateArgs) -> Result<()> {
+pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
     if args.names == ["list"] {
         for name in cases::names("validation") {
             let definition = Definition::parse(name, &cases::text("validation", &format!("{name}.toml"))?)?;
@@ -83,7 +84,8 @@ pub fn command(args: &ValidateArgs) -> Result<()> {
     let make: &Make = &|processor, scene, params, plan, settings| {
         computers.backend(processor, scene, params, plan, settings)
     };
-    let rows = suite.run(&options, &Context { make, repetitions: 0 })?;
+    let context = Context { stop: stop.clone(), save_every: args.computers.save_every, ..Context::new(make) };
+    let rows = suite.run(&options, &context)?;
     write_table(&args.out.join("results.csv"), &rows)?;
     let path = args.page.clone().unwrap_or_else(|| args.out.join("validation.md"));
     page::write(&path, &suite, &rows)?;

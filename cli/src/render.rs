@@ -1,0 +1,290 @@
+//! `seixo render`: pictures of the frames that a run wrote.
+
+use super::Exit;
+use clap::ValueEnum;
+use glam::DVec3;
+use rayon::prelude::*;
+use seixo::case::file::load;
+use seixo::console::{remark, say};
+use seixo::error::{Error, FolderError, Result};
+use seixo::output::folder::case_name;
+use seixo::output::label::{Picture, animation, sheet};
+use seixo::output::particles::Particles;
+use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
+use seixo::output::replay::{Frame, frames, particles};
+use seixo::output::write_whole;
+use seixo::params::Params;
+use seixo::scene::Scene;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub struct RenderArgs {
+    /// Folder of a run.
+    dir: PathBuf,
+    /// Folder of the pictures [default: DIR/pictures].
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    look: LookArgs,
+    /// Every so many frames one.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Only the frames nearest to these times [s], e.g. 0.5,1,1.5.
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',', value_parser = super::finite, conflicts_with = "every")]
+    times: Vec<f64>,
+    /// Put all pictures on one sheet, so many in a row: sheet.png.
+    #[arg(long, value_name = "COLUMNS", value_parser = clap::value_parser!(u16).range(1..))]
+    sheet: Option<u16>,
+    /// Join all pictures to an animation (animated PNG), so many a second: animation.png.
+    #[arg(long, value_name = "RATE", value_parser = clap::value_parser!(u16).range(1..=100))]
+    animation: Option<u16>,
+    /// Say nothing.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// How pictures look.
+#[derive(Clone, Debug, clap::Args)]
+pub struct LookArgs {
+    /// From where; two dimensions are always seen from the front unless an angle is given.
+    #[arg(long, value_enum)]
+    view: Option<Standpoint>,
+    /// Turn of the camera to the right [degrees].
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = super::finite)]
+    azimuth: Option<f64>,
+    /// Height of the camera above the horizon [degrees].
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = angle)]
+    elevation: Option<f64>,
+    /// Magnification.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = magnification)]
+    zoom: f64,
+    /// Point in the middle of the picture [m].
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point)]
+    target: Option<DVec3>,
+    /// Width and height [pixels].
+    #[arg(long, value_name = "WxH", default_value = "960x480", value_parser = size)]
+    size: [usize; 2],
+    /// What the water is coloured by.
+    #[arg(long, value_enum, default_value_t = Shown::Speed)]
+    field: Shown,
+    /// Values of the first and the last colour, e.g. 0,2.5 [default: those of the frames].
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, value_parser = range)]
+    range: Option<[f64; 2]>,
+    /// Only the water within half a spacing of a plane, e.g. y=0.25 [m].
+    #[arg(long, value_name = "AXIS=AT", value_parser = slice)]
+    slice: Option<(usize, f64)>,
+    /// No time and no colour bar.
+    #[arg(long)]
+    no_labels: bool,
+}
+
+/// From where a scene is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Standpoint {
+    /// From the right and above.
+    Corner,
+    /// Along +y.
+    Front,
+    /// Against the x axis.
+    Side,
+    /// From above.
+    Top,
+}
+
+/// What the water is coloured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Shown {
+    Speed,
+    Pressure,
+    Density,
+    Vx,
+    Vy,
+    Vz,
+}
+
+fn angle(text: &str) -> std::result::Result<f64, String> {
+    let angle = super::finite(text)?;
+    if angle.abs() <= 90.0 { Ok(angle) } else { Err("write an angle from -90 to 90".into()) }
+}
+
+fn magnification(text: &str) -> std::result::Result<f64, String> {
+    let zoom = super::finite(text)?;
+    if (0.01..=1000.0).contains(&zoom) { Ok(zoom) } else { Err("write a number from 0.01 to 1000".into()) }
+}
+
+fn numbers<const N: usize>(text: &str, example: &str) -> std::result::Result<[f64; N], String> {
+    let wrong = || format!("write {N} numbers, e.g. {example}");
+    let all: std::result::Result<Vec<f64>, String> = text.split(',').map(super::finite).collect();
+    all.map_err(|_| wrong())?.try_into().map_err(|_| wrong())
+}
+
+fn point(text: &str) -> std::result::Result<DVec3, String> {
+    numbers(text, "1,0.25,0.1").map(DVec3::from_array)
+}
+
+fn range(text: &str) -> std::result::Result<[f64; 2], String> {
+    let [low, high] = numbers(text, "0,2.5")?;
+    if low < high { Ok([low, high]) } else { Err("the second number is to be larger".into()) }
+}
+
+/// Edges of a picture that make sense, and fit memory [pixels].
+const EDGES: std::ops::RangeInclusive<usize> = 16..=8192;
+
+fn size(text: &str) -> std::result::Result<[usize; 2], String> {
+    let wrong =
+        || format!("write width and height in pixels, {} to {}, e.g. 1920x1080", EDGES.start(), EDGES.end());
+    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+    let edge = |text: &str| text.trim().parse().ok().filter(|n| EDGES.contains(n)).ok_or_else(wrong);
+    Ok([edge(width)?, edge(height)?])
+}
+
+fn slice(text: &str) -> std::result::Result<(usize, f64), String> {
+    let wrong = || "write an axis and a place, e.g. y=0.25".to_owned();
+    let (axis, at) = text.split_once('=').ok_or_else(wrong)?;
+    let axis = ["x", "y", "z"].iter().position(|a| *a == axis.trim()).ok_or_else(wrong)?;
+    Ok((axis, super::finite(at).map_err(|_| wrong())?))
+}
+
+impl LookArgs {
+    /// The style for a scene of so many dimensions.
+    fn style(&self, dimensions: u32) -> Style {
+        let mut style = Style::of(dimensions);
+        let view = &mut style.view;
+        let preset = match self.view {
+            None => None,
+            Some(Standpoint::Corner) => Some((0.38, 0.42)),
+            Some(Standpoint::Front) => Some((0.0, 0.0)),
+            Some(Standpoint::Side) => Some((std::f64::consts::FRAC_PI_2, 0.0)),
+            Some(Standpoint::Top) => Some((0.0, std::f64::consts::FRAC_PI_2)),
+        };
+        (view.azimuth, view.elevation) = preset.unwrap_or((view.azimuth, view.elevation));
+        view.azimuth = self.azimuth.map_or(view.azimuth, f64::to_radians);
+        view.elevation = self.elevation.map_or(view.elevation, f64::to_radians);
+        (view.zoom, view.target, view.size) = (self.zoom, self.target, self.size);
+        style.field = match self.field {
+            Shown::Speed => Field::Speed,
+            Shown::Pressure => Field::Pressure,
+            Shown::Density => Field::Density,
+            Shown::Vx => Field::Velocity(0),
+            Shown::Vy => Field::Velocity(1),
+            Shown::Vz => Field::Velocity(2),
+        };
+        (style.range, style.slice, style.labels) = (self.range, self.slice, !self.no_labels);
+        style
+    }
+}
+
+/// A run that is looked at.
+pub struct Show {
+    scene: Scene,
+    painter: Painter,
+}
+
+impl Show {
+    /// The run in `root`, of which `frames` are shown, seen as `look` says.
+    ///
+    /// # Errors
+    /// A folder without a run, a case or a frame that cannot be read any more.
+    pub fn open(root: &Path, look: &LookArgs, frames: &[&Frame]) -> Result<Self> {
+        let case = load(&root.join("case.toml"), None, &[])?.case;
+        let scene = Scene::build(&case)?;
+        let params = Params::new(&case, &scene)?;
+        let mut style = look.style(scene.dimensions);
+        if style.range.is_none() {
+            style.range = range_of(frames, &style, &params)?;
+        }
+        Ok(Self { painter: Painter::new(&scene, &style, &params), scene })
+    }
+
+    /// The picture of a frame.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn picture(&self, frame: &Frame) -> Result<Picture> {
+        let read = |path: &Option<PathBuf>| path.as_deref().map_or(Ok(Particles::default()), particles);
+        let (fluid, solids) = (read(&frame.fluid)?, read(&frame.solids)?);
+        let poses = placed_by(&self.scene, &solids);
+        Ok(self.painter.paint(&self.scene, frame.time, &poses, drops_of(&fluid)))
+    }
+}
+
+/// Frames that are looked at for the range of the colours.
+const LOOKED_AT: usize = 5;
+
+/// The range of what `frames` show, from some of them.
+fn range_of(frames: &[&Frame], style: &Style, params: &Params) -> Result<Option<[f64; 2]>> {
+    let step = frames.len().div_ceil(LOOKED_AT).max(1);
+    let mut values = Vec::new();
+    // From the end on, so that a start from rest alone sets no range.
+    for path in frames.iter().rev().step_by(step).filter_map(|f| f.fluid.as_deref()) {
+        let water = particles(path)?;
+        values.extend(drops_of(&water).map(|drop| style.field.of(&drop, params.number_density)));
+    }
+    Ok(style.field.range(&mut values))
+}
+
+/// The frames of the run in `root`.
+///
+/// # Errors
+/// [`FolderError::NoRun`], [`Error::Io`].
+pub fn frames_of(root: &Path) -> Result<Vec<Frame>> {
+    let none = || FolderError::NoRun(root.to_path_buf());
+    let name = case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
+    frames(root, &name)
+}
+
+/// The frames nearest to each of `times`, or every `every`th, with their numbers.
+fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
+    let nearest = |t: &f64| {
+        let distance = |k: &usize| (all[*k].time - t).abs();
+        (0..all.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    };
+    let picked: Vec<usize> = if times.is_empty() {
+        (0..all.len()).step_by(every as usize).collect()
+    } else {
+        times.iter().filter_map(nearest).collect()
+    };
+    picked.into_iter().map(|k| (k, all[k].clone())).collect()
+}
+
+pub fn render(args: &RenderArgs) -> Exit {
+    seixo::threads::start(None)?;
+    let chosen = chosen(&frames_of(&args.dir)?, &args.times, args.every);
+    if chosen.is_empty() {
+        let text = format!("{} holds no frames: the case has output.every = 0", args.dir.display());
+        return Err(Error::usage("DIR", text));
+    }
+    let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
+    let show = Show::open(&args.dir, &args.look, &seen)?;
+    let out = args.out.clone().unwrap_or_else(|| args.dir.join("pictures"));
+    std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
+    let joined = args.sheet.is_some() || args.animation.is_some();
+    let one = |(number, frame): &(usize, Frame)| -> Result<Option<Picture>> {
+        let picture = show.picture(frame)?;
+        if joined {
+            return Ok(Some(picture));
+        }
+        write_whole(&out.join(format!("frame_{number:04}.png")), &picture.png())?;
+        if !args.quiet {
+            remark(&format!("frame {number}, t = {:.3} s", frame.time));
+        }
+        Ok(None)
+    };
+    let pictures: Result<Vec<Option<Picture>>> = chosen.par_iter().map(one).collect();
+    let pictures: Vec<Picture> = pictures?.into_iter().flatten().collect();
+    let mut written = format!("{} pictures in {}", chosen.len(), out.display());
+    let whole = [
+        ("sheet.png", args.sheet.and_then(|n| sheet(&pictures, n.into())).map(|p| p.png())),
+        ("animation.png", args.animation.and_then(|rate| animation(&pictures, rate))),
+    ];
+    for (name, bytes) in whole {
+        if let Some(bytes) = bytes {
+            write_whole(&out.join(name), &bytes)?;
+            written = format!("{} pictures in {}", chosen.len(), out.join(name).display());
+        }
+    }
+    if !args.quiet {
+        say(&written);
+    }
+    Ok(0)
+}

@@ -1,0 +1,234 @@
+//! Curves over time and bars as SVG that takes the colours of the page.
+
+use super::escape;
+use std::fmt::Write;
+
+/// Size of a chart and what is left free around it [pixels].
+const SIZE: [f64; 2] = [480.0, 240.0];
+const LEFT: f64 = 62.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 10.0;
+const BOTTOM: f64 = 38.0;
+/// Points of a curve; more would not be seen.
+const POINTS: usize = 600;
+/// Colours of the page.
+const COLORS: usize = 6;
+
+/// A curve.
+#[derive(Clone, Debug, Default)]
+pub struct Curve {
+    /// What it is, for the key.
+    pub name: String,
+    /// Time [s] and value.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Curves that share their axes.
+#[derive(Clone, Debug, Default)]
+pub struct Chart {
+    /// What is seen, with its unit.
+    pub title: String,
+    /// The curves.
+    pub curves: Vec<Curve>,
+}
+
+/// Places of round numbers in a range, about `count` of them.
+fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
+    let rough = (high - low) / count;
+    let power = 10_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|s| *s >= rough);
+    let step = step.unwrap_or(rough);
+    let first = (low / step).ceil() as i64;
+    let last = (high / step).floor() as i64;
+    (first..=last.min(first + 20)).map(|k| k as f64 * step).collect()
+}
+
+/// A number as an axis has it.
+fn short(x: f64) -> String {
+    let x = if x.abs() < 1e-300 { 0.0 } else { x };
+    if x == 0.0 || (1e-3..1e5).contains(&x.abs()) {
+        let text = format!("{x:.4}");
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    format!("{x:.1e}")
+}
+
+/// As many points as are seen: of each stretch the lowest and the highest.
+fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let points: Vec<[f64; 2]> =
+        points.iter().copied().filter(|p| p[0].is_finite() && p[1].is_finite()).collect();
+    if points.len() <= POINTS {
+        return points;
+    }
+    let stretch = points.len().div_ceil(POINTS / 2);
+    let ends = points.chunks(stretch).flat_map(|part| {
+        let by = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
+        let (low, high) = (part.iter().min_by(by), part.iter().max_by(by));
+        let mut both: Vec<[f64; 2]> = low.into_iter().chain(high).copied().collect();
+        both.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        both
+    });
+    ends.collect()
+}
+
+impl Chart {
+    /// The chart as a figure of the page; nothing if there is nothing to see.
+    pub fn figure(&self) -> String {
+        let curves: Vec<(usize, &Curve, Vec<[f64; 2]>)> =
+            self.curves.iter().enumerate().map(|(k, c)| (k, c, thinned(&c.points))).collect();
+        let all = || curves.iter().flat_map(|(_, _, points)| points);
+        if all().count() < 2 {
+            return String::new();
+        }
+        let range = |k: usize| {
+            let (low, high) =
+                all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+            // What never changes is a line in the middle.
+            let room =
+                if high - low > 1e-12 * high.abs().max(low.abs()) { 0.0 } else { 0.5 * high.abs().max(1.0) };
+            (low - room, high + room)
+        };
+        let ((t0, t1), (y0, y1)) = (range(0), range(1));
+        let x = |t: f64| LEFT + (t - t0) / (t1 - t0) * (SIZE[0] - LEFT - RIGHT);
+        let y = |v: f64| SIZE[1] - BOTTOM - (v - y0) / (y1 - y0) * (SIZE[1] - TOP - BOTTOM);
+        let mut svg = String::new();
+        for v in ticks(y0, y1, 4.0) {
+            let (at, label) = (y(v), short(v));
+            let _ = write!(
+                svg,
+                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>\
+                 <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+                SIZE[0] - RIGHT,
+                LEFT - 6.0,
+                at + 4.0
+            );
+        }
+        for t in ticks(t0, t1, 5.0) {
+            let _ = write!(
+                svg,
+                "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+                x(t),
+                SIZE[1] - BOTTOM + 17.0,
+                short(t)
+            );
+        }
+        let _ = write!(
+            svg,
+            "<line class=\"axis\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{1}\" y2=\"{1}\"/>\
+             <text x=\"{2}\" y=\"{3}\" text-anchor=\"middle\">t [s]</text>",
+            SIZE[0] - RIGHT,
+            SIZE[1] - BOTTOM,
+            0.5 * (LEFT + SIZE[0] - RIGHT),
+            SIZE[1] - 4.0
+        );
+        let mut key = String::new();
+        for (k, curve, points) in &curves {
+            let color = format!("var(--c{})", k % COLORS);
+            let line: Vec<String> = points.iter().map(|p| format!("{:.1},{:.1}", x(p[0]), y(p[1]))).collect();
+            let _ = write!(
+                svg,
+                "<polyline class=\"curve\" style=\"stroke:{color}\" points=\"{}\"/>",
+                line.join(" ")
+            );
+            if curves.len() > 1 {
+                let name = escape(&curve.name);
+                let _ = write!(key, "<span class=\"key\"><i style=\"background:{color}\"></i>{name}</span>");
+            }
+        }
+        let said = self.said(&curves);
+        format!(
+            "<figure><h3>{}</h3><svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{svg}</svg>\
+             <figcaption>{key}</figcaption></figure>\n",
+            escape(&self.title),
+            SIZE[0],
+            SIZE[1],
+            escape(&said)
+        )
+    }
+
+    /// The chart in words, for those who hear it.
+    fn said(&self, curves: &[(usize, &Curve, Vec<[f64; 2]>)]) -> String {
+        let curve = |(_, curve, points): &(usize, &Curve, Vec<[f64; 2]>)| {
+            let (Some(first), Some(last)) = (points.first(), points.last()) else { return String::new() };
+            let low = points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+            let high = points.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+            let [a, b, low, high] = [first[1], last[1], low, high].map(short);
+            format!("{}: from {a} to {b}, between {low} and {high}", curve.name)
+        };
+        let words: Vec<String> = curves.iter().map(curve).filter(|w| !w.is_empty()).collect();
+        format!("{} over time. {}.", self.title, words.join("; "))
+    }
+}
+
+/// Named amounts as bars, the largest first.
+pub fn bars(title: &str, unit: &str, amounts: &[(String, f64)]) -> String {
+    let mut amounts = amounts.to_vec();
+    amounts.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let most = amounts.first().map_or(0.0, |a| a.1);
+    if most <= 0.0 {
+        return String::new();
+    }
+    let total: f64 = amounts.iter().map(|a| a.1).sum();
+    let (row, left) = (20.0, 165.0);
+    let height = row * amounts.len() as f64 + 6.0;
+    let mut svg = String::new();
+    for (k, (name, amount)) in amounts.iter().enumerate() {
+        let y = row * k as f64;
+        let width = amount / most * 210.0;
+        let _ = write!(
+            svg,
+            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\
+             <rect class=\"bar\" x=\"{left}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{}\"/>\
+             <text x=\"{:.1}\" y=\"{:.1}\">{} {unit}, {:.0} %</text>",
+            left - 6.0,
+            y + 15.0,
+            escape(name),
+            y + 4.0,
+            row - 6.0,
+            left + width + 6.0,
+            y + 15.0,
+            short((amount * 1e3).round() / 1e3),
+            100.0 * amount / total
+        );
+    }
+    let said: Vec<String> = amounts.iter().map(|(name, x)| format!("{name} {} {unit}", short(*x))).collect();
+    format!(
+        "<figure><h3>{}</h3><svg viewBox=\"0 0 {} {height}\" role=\"img\" aria-label=\"{}\">{svg}</svg></figure>\n",
+        escape(title),
+        SIZE[0],
+        escape(&format!("{title}: {}", said.join(", ")))
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_on_axes_are_round_and_few() {
+        assert_eq!(ticks(0.0, 1.0, 4.0), [0.0, 0.5, 1.0]);
+        assert_eq!(ticks(-3.0, 7.0, 5.0).len(), 5);
+        for (x, text) in [(0.5, "0.5"), (1000.0, "1000"), (2e6, "2.0e6"), (-0.02, "-0.02")] {
+            assert_eq!(short(x), text);
+        }
+    }
+
+    #[test]
+    fn peaks_survive_the_thinning() {
+        let mut points: Vec<[f64; 2]> = (0..100_000).map(|k| [f64::from(k), 0.0]).collect();
+        points[54_321][1] = 9.0;
+        let thin = thinned(&points);
+        assert!(thin.len() <= POINTS + 2 && thin.contains(&[54_321.0, 9.0]), "{}", thin.len());
+    }
+
+    #[test]
+    fn a_chart_of_nothing_is_none_and_a_constant_is_a_line() {
+        assert_eq!(Chart::default().figure(), "");
+        let curve = Curve { name: "a<b".into(), points: vec![[0.0, 2.0], [1.0, 2.0], [2.0, f64::NAN]] };
+        let figure = Chart { title: "x [m]".into(), curves: vec![curve] }.figure();
+        assert!(
+            figure.contains("<polyline") && !figure.contains("NaN") && figure.contains("a&lt;b"),
+            "{figure}"
+        );
+    }
+}

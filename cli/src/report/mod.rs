@@ -1,0 +1,371 @@
+//! `seixo report`: one page that tells of a run, with everything in it and nothing fetched.
+
+mod chart;
+mod table;
+
+use super::Exit;
+use super::progress::clock;
+use super::render::{LookArgs, Show, frames_of};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use chart::{Chart, Curve, bars};
+use rayon::prelude::*;
+use seixo::case::Case;
+use seixo::case::file::load;
+use seixo::console::say;
+use seixo::error::{Error, FolderError, Result};
+use seixo::output::folder::case_name;
+use seixo::output::replay::Frame;
+use seixo::output::write_whole;
+use seixo::params::Params;
+use seixo::scene::Scene;
+use seixo::time_step::{Bounds, collapse_speed};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use table::Table;
+
+#[derive(Debug, clap::Args)]
+pub struct ReportArgs {
+    /// Folder of a run.
+    dir: PathBuf,
+    /// The page [default: DIR/report.html].
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Most pictures on it; they make its size.
+    #[arg(long, value_name = "N", default_value_t = 24)]
+    pictures: u16,
+    #[command(flatten)]
+    look: LookArgs,
+    /// Say nothing.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Text as HTML.
+fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c if c.is_control() && c != '\n' && c != '\t' => out.push(char::REPLACEMENT_CHARACTER),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// What a run left.
+struct Run {
+    name: String,
+    case: Case,
+    text: String,
+    /// `result.json`, if the run has ended.
+    result: Value,
+    monitors: Table,
+    bodies: Vec<(String, Table)>,
+    gauges: Table,
+    frames: Vec<Frame>,
+}
+
+impl Run {
+    fn read(root: &Path) -> Result<Self> {
+        let none = || FolderError::NoRun(root.to_path_buf());
+        let name = case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
+        let loaded = load(&root.join("case.toml"), None, &[])?;
+        let result = std::fs::read_to_string(root.join("result.json")).ok();
+        Ok(Self {
+            name,
+            case: loaded.case,
+            text: loaded.text,
+            result: result.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default(),
+            monitors: Table::read(&root.join("monitors.csv"))?,
+            bodies: Table::read_by(&root.join("bodies.csv"), "body")?,
+            gauges: Table::read(&root.join("gauges.csv"))?,
+            // A run may have been told to write none.
+            frames: if root.join("vtu").exists() { frames_of(root).unwrap_or_default() } else { Vec::new() },
+        })
+    }
+}
+
+/// `seixo report`.
+pub fn report(args: &ReportArgs) -> Exit {
+    seixo::threads::start(None)?;
+    let run = Run::read(&args.dir)?;
+    let pictures = pictures(args, &run)?;
+    let page = page(&run, &pictures)?;
+    let path = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
+    write_whole(&path, page.as_bytes())?;
+    if !args.quiet {
+        say(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
+    }
+    Ok(0)
+}
+
+/// Times and pictures of frames spread evenly over the run.
+fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
+    let (all, most) = (run.frames.len(), usize::from(args.pictures));
+    let count = all.min(most);
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
+    let seen: Vec<&Frame> = (0..count).map(|k| &run.frames[pick(k)]).collect();
+    let show = Show::open(&args.dir, &args.look, &seen)?;
+    let draw = |k: usize| {
+        let frame = seen[k];
+        Ok((frame.time, STANDARD.encode(show.picture(frame)?.png())))
+    };
+    (0..count).into_par_iter().map(draw).collect()
+}
+
+fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
+    let title = escape(&run.name);
+    let sections = [
+        section("what", "What was run", &what(run)),
+        section("seen", "Pictures", &film(pictures)),
+        section("bodies", "Bodies and moving walls", &charts(bodies(run))),
+        section("gauges", "Gauges", &charts(gauges(run))),
+        section("energy", "Energies", &charts(energies(run))),
+        section("steps", "Steps", &(charts(steps(run)) + &limits(run)?)),
+        section("time", "Where the time went", &times(run)),
+        section(
+            "case",
+            "The case",
+            &format!(
+                "<details><summary>case.toml</summary><pre tabindex=\"0\">{}</pre></details>",
+                escape(&run.text)
+            ),
+        ),
+    ];
+    Ok(format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+         style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
+         <title>{title} - seixo</title>\n<style>\n{}</style>\n</head>\n<body>\n\
+         <header><h1>{title}</h1>{}</header>\n<main>\n{}</main>\n\
+         <footer><p class=\"faint\">Made by seixo {}. The page holds everything and fetches nothing.</p></footer>\n\
+         <script>\n{}</script>\n</body>\n</html>\n",
+        include_str!("page.css"),
+        verdict(&run.result),
+        sections.concat(),
+        env!("CARGO_PKG_VERSION"),
+        include_str!("page.js"),
+    ))
+}
+
+fn section(id: &str, title: &str, inside: &str) -> String {
+    if inside.is_empty() {
+        return String::new();
+    }
+    format!("<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{title}</h2>\n{inside}</section>\n")
+}
+
+fn charts(charts: Vec<Chart>) -> String {
+    let figures: String = charts.iter().map(Chart::figure).collect();
+    if figures.is_empty() { figures } else { format!("<div class=\"charts\">\n{figures}</div>\n") }
+}
+
+/// The verdict in plain words.
+fn verdict(result: &Value) -> String {
+    let grade = result["verdict"]["grade"].as_str().unwrap_or("none");
+    let (class, word, words) = match grade {
+        "fine" => ("fine", "Fine", "Nothing that was watched speaks against this result."),
+        "degraded" => ("degraded", "Degraded", "The result can be looked at, with these reasons in mind:"),
+        "failed" => ("failed", "Failed", "The result means nothing:"),
+        _ => {
+            ("degraded", "Not finished", "There is no result.json: the run goes on still, or it was killed.")
+        }
+    };
+    let reasons = result["verdict"]["reasons"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let reasons: String = reasons.map(|r| format!("<li>{}</li>", escape(r))).collect();
+    let list = if reasons.is_empty() { reasons } else { format!("<ul>{reasons}</ul>") };
+    let ended = result["exit_reason"]
+        .as_str()
+        .map_or(String::new(), |r| format!("<p class=\"faint\">{}</p>", escape(r)));
+    format!("<div class=\"verdict {class}\"><strong>{word}</strong><p>{words}</p>{list}{ended}</div>")
+}
+
+fn what(run: &Run) -> String {
+    let (case, r) = (&run.case.run, &run.result);
+    let number = |key: &str| r[key].as_f64();
+    let mut rows = vec![
+        ("Dimensions", case.dimensions.to_string()),
+        ("Particle spacing", format!("{} m", case.spacing)),
+        ("End", format!("{} s", case.end)),
+    ];
+    let mut put = |name, text: Option<String>| rows.extend(text.map(|t| (name, t)));
+    let p = &r["particles"];
+    put("Particles", p["total"].as_u64().map(|n| format!("{n}, of them {} of water", p["fluid"])));
+    put(
+        "Steps",
+        r["steps"].as_u64().map(|n| format!("{n}, to t = {:.4} s", number("time_s").unwrap_or(f64::NAN))),
+    );
+    let wall = number("wall_s").and_then(|s| Duration::try_from_secs_f64(s).ok());
+    let parts = match r["parts"].as_u64() {
+        Some(n) if n > 1 => format!(", resumed {} times", n - 1),
+        _ => String::new(),
+    };
+    put("Run time", wall.map(|w| clock(w) + &parts));
+    put(
+        "Processor",
+        r["adapter"].as_str().map(|a| format!("{a}, {}", r["precision"].as_str().unwrap_or(""))),
+    );
+    let solves = &r["pressure"];
+    put(
+        "Pressure",
+        solves["preconditioner"].as_str().map(|name| {
+            let mean = solves["iterations_mean"].as_f64().unwrap_or(f64::NAN);
+            format!("{mean:.1} iterations a solve with {name}, {} failures", solves["failures"])
+        }),
+    );
+    put("Program", r["version"].as_str().map(|v| format!("seixo {v}")));
+    let rows: String = rows.iter().map(|(k, v)| format!("<dt>{k}</dt><dd>{}</dd>", escape(v))).collect();
+    format!("<dl>{rows}</dl>\n")
+}
+
+/// Pictures with a slider; the last one alone where no script runs.
+fn film(pictures: &[(f64, String)]) -> String {
+    let Some((time, png)) = pictures.last() else { return String::new() };
+    let frames: Vec<Value> = pictures
+        .iter()
+        .map(|(t, png)| serde_json::json!({ "time": format!("{t:.3}"), "png": png }))
+        .collect();
+    let frames = serde_json::to_string(&frames).unwrap_or_default();
+    let last = pictures.len() - 1;
+    format!(
+        "<img id=\"picture\" alt=\"The scene at t = {time:.3} s\" src=\"data:image/png;base64,{png}\">\n\
+         <div class=\"film\"><button id=\"play\" type=\"button\" hidden>Play</button>\
+         <label for=\"moment\">Time</label>\
+         <input id=\"moment\" type=\"range\" min=\"0\" max=\"{last}\" step=\"1\" value=\"{last}\">\
+         <output id=\"said\" for=\"moment\">t = {time:.3} s</output></div>\n\
+         <script type=\"application/json\" id=\"frames\">{frames}</script>\n"
+    )
+}
+
+fn chart(title: impl Into<String>, table: &Table, columns: &[(&str, &str)]) -> Chart {
+    let curves = columns.iter().filter_map(|(column, name)| {
+        table.curve(column).map(|points| Curve { name: (*name).to_owned(), points })
+    });
+    Chart { title: title.into(), curves: curves.collect() }
+}
+
+/// Bodies whose way is drawn; more would be no page.
+const MOST_BODIES: usize = 12;
+
+fn bodies(run: &Run) -> Vec<Chart> {
+    let of = |(name, table): &(String, Table)| {
+        let three = |what: &str, unit: &str| {
+            let columns = ["x", "y", "z"].map(|axis| format!("{what}{axis} [{unit}]"));
+            let [x, y, z] = &columns;
+            chart(
+                format!("{name}: {} [{unit}]", if what.is_empty() { "place" } else { "force of the water" }),
+                table,
+                &[(x, "x"), (y, "y"), (z, "z")],
+            )
+        };
+        let mut seen = vec![three("", "m")];
+        if run.case.fluid.is_some() {
+            seen.push(three("fluid_force_", "N"));
+        }
+        seen
+    };
+    run.bodies.iter().take(MOST_BODIES).flat_map(of).collect()
+}
+
+/// Gauges that are drawn.
+const MOST_GAUGES: usize = 36;
+
+fn gauges(run: &Run) -> Vec<Chart> {
+    let columns = run.gauges.columns().iter().skip(1).take(MOST_GAUGES);
+    columns.map(|c| chart(c.clone(), &run.gauges, &[(c, c)])).collect()
+}
+
+fn energies(run: &Run) -> Vec<Chart> {
+    let m = &run.monitors;
+    let water = [("kinetic [J]", "of motion"), ("potential [J]", "of height")];
+    let body = [
+        ("body_kinetic [J]", "of motion"),
+        ("body_potential [J]", "of height"),
+        ("body_contact [J]", "in contacts"),
+    ];
+    vec![
+        chart("all together [J]", m, &[("energy [J]", "energy")]),
+        chart("water [J]", m, &water),
+        chart("bodies [J]", m, &body),
+    ]
+}
+
+fn steps(run: &Run) -> Vec<Chart> {
+    let m = &run.monitors;
+    vec![
+        chart("time step [s]", m, &[("dt [s]", "time step")]),
+        chart("iterations of the pressure solver", m, &[("iterations [-]", "iterations")]),
+        chart("way of the fastest water in a step over l0", m, &[("courant [-]", "Courant number")]),
+        chart(
+            "error of the particle number density [-]",
+            m,
+            &[("density_error_mean [-]", "mean"), ("density_error_max [-]", "largest")],
+        ),
+    ]
+}
+
+/// What set the time step, as a part of the rows.
+fn limits(run: &Run) -> Result<String> {
+    let Some(points) = run.monitors.curve("dt [s]").filter(|_| run.case.fluid.is_some()) else {
+        return Ok(String::new());
+    };
+    let scene = Scene::build(&run.case)?;
+    let params = Params::new(&run.case, &scene)?;
+    let bounds = Bounds::new(&params, collapse_speed(&params));
+    let same = |a: f64, b: f64| (a - b).abs() < 1e-6 * b;
+    let mut counts = [
+        ("run.time_step, as typed", 0),
+        ("the sound speed", 0),
+        ("viscosity", 0),
+        ("the speed of water or solids", 0),
+    ];
+    let steps: Vec<f64> = points.iter().map(|p| p[1]).filter(|dt| *dt > 0.0).collect();
+    for &dt in &steps {
+        let which = if same(dt, run.case.run.time_step) {
+            0
+        } else if same(dt, bounds.sound) {
+            1
+        } else if same(dt, bounds.viscous) {
+            2
+        } else {
+            3
+        };
+        counts[which].1 += 1;
+    }
+    let parts: Vec<String> = counts
+        .iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(what, n)| format!("{what} ({:.0} %)", 100.0 * f64::from(*n) / steps.len() as f64))
+        .collect();
+    Ok(if parts.is_empty() {
+        String::new()
+    } else {
+        format!("<p>The time step was set by {}.</p>\n", parts.join(", "))
+    })
+}
+
+fn times(run: &Run) -> String {
+    let stages = run.result["stages"].as_object().into_iter().flatten();
+    let stages: Vec<(String, f64)> = stages
+        .filter_map(|(name, s)| Some((name.replace('_', " "), s.as_f64()?)))
+        .filter(|s| s.1 > 0.0)
+        .collect();
+    let chart = bars("seconds of each stage", "s", &stages);
+    if chart.is_empty() { chart } else { format!("<div class=\"charts\">\n{chart}</div>\n") }
+}
+
+/// The error of a table that is none.
+fn damaged(path: &Path, why: impl std::fmt::Display) -> Error {
+    Error::io(path)(std::io::Error::new(std::io::ErrorKind::InvalidData, why.to_string()))
+}

@@ -1,0 +1,242 @@
+//! Reads the frames of a run back, from the VTU files that [`super::vtu`] wrote.
+
+use super::particles::Particles;
+use super::vtu::BLOCK;
+use crate::error::{Error, Result};
+use bytemuck::Pod;
+use flate2::read::ZlibDecoder;
+use rayon::prelude::*;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// A frame of a run: where its files are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// Time [s].
+    pub time: f64,
+    /// The water, if it was written.
+    pub fluid: Option<PathBuf>,
+    /// Bodies and moving walls, if they were.
+    pub solids: Option<PathBuf>,
+}
+
+/// The frames that the run in the folder `root` wrote for the case `name`, in the order of time.
+///
+/// # Errors
+/// [`Error::Io`] if there is no list of them.
+pub fn frames(root: &Path, name: &str) -> Result<Vec<Frame>> {
+    let path = root.join(format!("{name}.pvd"));
+    let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+    let mut frames: Vec<Frame> = Vec::new();
+    for line in text.lines().filter(|line| line.contains("<DataSet ")) {
+        let (Some(time), Some(part), Some(file)) =
+            (attribute(line, "timestep"), attribute(line, "name"), attribute(line, "file"))
+        else {
+            continue;
+        };
+        let Ok(time) = time.parse::<f64>() else { continue };
+        if frames.last().is_none_or(|f| f.time != time) {
+            frames.push(Frame { time, ..Frame::default() });
+        }
+        // A list that somebody changed leads nowhere else.
+        let inside = Path::new(file).components().all(|c| matches!(c, std::path::Component::Normal(_)));
+        if let Some(frame) = frames.last_mut().filter(|_| inside) {
+            match part {
+                "fluid" => frame.fluid = Some(root.join(file)),
+                "solids" => frame.solids = Some(root.join(file)),
+                _ => {}
+            }
+        }
+    }
+    Ok(frames)
+}
+
+/// The particles of a file.
+///
+/// # Errors
+/// [`Error::Io`], also for a file that is damaged or that another program wrote.
+pub fn particles(path: &Path) -> Result<Particles> {
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let wrong = |why: String| Error::io(path)(std::io::Error::new(std::io::ErrorKind::InvalidData, why));
+    parse(&bytes).map_err(wrong)
+}
+
+fn attribute<'a>(line: &'a str, name: &str) -> Option<&'a str> {
+    let start = line.find(&format!(" {name}=\""))? + name.len() + 3;
+    line[start..].split('"').next()
+}
+
+/// Where the appended arrays begin, and how they are written.
+struct Appended<'a> {
+    head: &'a str,
+    data: &'a [u8],
+    raw: bool,
+    compressed: bool,
+}
+
+fn parse(bytes: &[u8]) -> std::result::Result<Particles, String> {
+    let mark = b"<AppendedData encoding=\"";
+    let at = bytes.windows(mark.len()).position(|w| w == mark).ok_or("it holds no appended data")?;
+    let head = std::str::from_utf8(&bytes[..at]).map_err(|_| "its head is no text")?;
+    let rest = &bytes[at + mark.len()..];
+    let start = rest.iter().position(|&b| b == b'_').ok_or("it is cut off")?;
+    if !head.contains(if cfg!(target_endian = "little") { "\"LittleEndian\"" } else { "\"BigEndian\"" }) {
+        return Err("its byte order is that of another machine".into());
+    }
+    let file = Appended {
+        head,
+        data: &rest[start + 1..],
+        raw: rest.starts_with(b"raw"),
+        compressed: head.contains(" compressor=\"vtkZLibDataCompressor\""),
+    };
+    let position: Vec<[f32; 3]> = file.array("Points")?;
+    let n = position.len();
+    let out = Particles {
+        velocity: file.array("Velocity")?,
+        pressure: file.array("Pressure")?,
+        number_density: file.array("ParticleNumberDensity")?,
+        kind: file.array("Kind")?,
+        body: file.array("Body")?,
+        id: file.array("Id")?,
+        position,
+    };
+    let lengths = [out.velocity.len(), out.pressure.len(), out.number_density.len(), out.kind.len()];
+    if lengths.iter().chain(&[out.body.len(), out.id.len()]).any(|&m| m != n) {
+        return Err("its arrays differ in length".into());
+    }
+    Ok(out)
+}
+
+impl Appended<'_> {
+    fn array<T: Pod>(&self, name: &str) -> std::result::Result<Vec<T>, String> {
+        let of = format!("Name=\"{name}\"");
+        let line = self.head.lines().find(|l| l.contains("<DataArray") && l.contains(&of));
+        let offset = line.and_then(|l| attribute(l, "offset")).and_then(|o| o.parse::<usize>().ok());
+        let offset = offset.ok_or_else(|| format!("it holds no `{name}`"))?;
+        let from = self.data.get(offset..).ok_or("it is cut off")?;
+        let bytes = if self.compressed { self.inflate(from) } else { self.plain(from) }?;
+        if bytes.len() % size_of::<T>() != 0 {
+            return Err(format!("its `{name}` is damaged"));
+        }
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// `count` bytes of `from`, as they are or from base64.
+    fn take(&self, from: &[u8], count: usize) -> std::result::Result<Vec<u8>, String> {
+        let stored = if self.raw { count } else { digits(count) };
+        let stored = from.get(..stored).ok_or("it is cut off")?;
+        if self.raw { Ok(stored.to_vec()) } else { base64(stored, count) }
+    }
+
+    fn plain(&self, from: &[u8]) -> std::result::Result<Vec<u8>, String> {
+        let length = number(&self.take(from, 8)?);
+        let whole = length.checked_add(8).filter(|&n| n <= from.len()).ok_or("it is cut off")?;
+        Ok(self.take(from, whole)?.split_off(8))
+    }
+
+    fn inflate(&self, from: &[u8]) -> std::result::Result<Vec<u8>, String> {
+        let blocks = number(&self.take(from, 8)?);
+        let head = blocks.checked_add(3).and_then(|n| n.checked_mul(8)).filter(|&n| n <= from.len());
+        let head = head.ok_or("it is cut off")?;
+        let sizes = self.take(from, head)?;
+        let sizes: Vec<usize> = sizes.chunks_exact(8).skip(3).map(number).collect();
+        let total = sizes.iter().try_fold(0_usize, |sum, &n| sum.checked_add(n));
+        let total = total.filter(|&n| n <= from.len()).ok_or("it is cut off")?;
+        let stored = self.take(from.get(digits(head)..).ok_or("it is cut off")?, total)?;
+        let mut parts = Vec::new();
+        let mut rest = &stored[..];
+        for size in sizes {
+            let (part, others) = rest.split_at(size);
+            parts.push(part);
+            rest = others;
+        }
+        let block = |part: &[u8]| {
+            let mut out = Vec::new();
+            // A block that is larger than it may be is damage, not memory to be had.
+            let read = ZlibDecoder::new(part).take(BLOCK as u64 + 1).read_to_end(&mut out);
+            read.ok().filter(|&n| n <= BLOCK).map(|_| out).ok_or_else(|| "a block is damaged".to_owned())
+        };
+        let blocks: std::result::Result<Vec<Vec<u8>>, String> = parts.into_par_iter().map(block).collect();
+        Ok(blocks?.concat())
+    }
+}
+
+fn number(bytes: &[u8]) -> usize {
+    let bytes: [u8; 8] = bytes[..8].try_into().unwrap_or_default();
+    usize::try_from(u64::from_ne_bytes(bytes)).unwrap_or(usize::MAX)
+}
+
+/// Digits of base64 for so many bytes.
+fn digits(bytes: usize) -> usize {
+    bytes.div_ceil(3).saturating_mul(4)
+}
+
+fn base64(text: &[u8], count: usize) -> std::result::Result<Vec<u8>, String> {
+    let value = |c: u8| match c {
+        b'A'..=b'Z' => Ok(c - b'A'),
+        b'a'..=b'z' => Ok(c - b'a' + 26),
+        b'0'..=b'9' => Ok(c - b'0' + 52),
+        b'+' => Ok(62),
+        b'/' => Ok(63),
+        b'=' => Ok(0),
+        _ => Err("its base64 is damaged".to_owned()),
+    };
+    let mut out = Vec::with_capacity(digits(count) / 4 * 3);
+    for group in text.chunks(4) {
+        let mut word = 0_u32;
+        for &c in group {
+            word = word << 6 | u32::from(value(c)?);
+        }
+        out.extend_from_slice(&word.to_be_bytes()[1..]);
+    }
+    out.truncate(count);
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Encoding;
+
+    fn some(n: usize) -> Particles {
+        let number = |k: usize| (k as f32).sqrt();
+        Particles {
+            position: (0..n).map(|k| [number(k), -1.0, number(k + 3)]).collect(),
+            velocity: (0..n).map(|k| [0.0, number(k), 1.0]).collect(),
+            pressure: (0..n).map(number).collect(),
+            number_density: (0..n).map(|k| 1.0 / (1.0 + number(k))).collect(),
+            kind: (0..n).map(|k| (k % 5) as u8).collect(),
+            body: (0..n).map(|k| (k % 3) as u32).collect(),
+            id: (0..n as u32).rev().collect(),
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_read_back_to_the_last_bit() {
+        // None, one, a whole block and a part of one more, blocks that end with the array.
+        for n in [0, 1, 7, 6000, BLOCK / 12, BLOCK / 4, BLOCK] {
+            for encoding in [Encoding::Base64, Encoding::Raw] {
+                let written = some(n);
+                let read = parse(&written.vtu(0.5, encoding)).unwrap_or_else(|e| panic!("{n}: {e}"));
+                assert_eq!(format!("{read:?}"), format!("{written:?}"));
+            }
+        }
+    }
+
+    #[test]
+    fn damage_is_an_error() {
+        for encoding in [Encoding::Base64, Encoding::Raw] {
+            let bytes = some(40).vtu(0.5, encoding);
+            // The last third holds cells, which are not read.
+            for cut in (0..bytes.len() / 2).step_by(7) {
+                assert!(parse(&bytes[..cut]).is_err(), "cut at {cut} of {}", bytes.len());
+            }
+            for at in (0..bytes.len()).step_by(11) {
+                let mut wrong = bytes.clone();
+                wrong[at] ^= 0x55;
+                // Whatever comes of it, it is no panic.
+                let _ = parse(&wrong);
+            }
+        }
+    }
+}

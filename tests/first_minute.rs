@@ -1,0 +1,91 @@
+//! The first minute with the program: a case to begin with, one from a pipe, completions, no word that is not its own.
+
+use crate::cli::{json, ran, seixo};
+
+const STARTERS: [&str; 4] = ["dam-break", "floating-body", "sliding-block", "flume"];
+
+#[test]
+fn every_case_to_begin_with_fits_its_lattice_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in STARTERS {
+        let run = |args: &[&str]| {
+            let output = seixo().current_dir(folder.path()).args(args).output().unwrap();
+            let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+            (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+        };
+        let file = format!("{name}.toml");
+        let (code, out, err) = run(&["init", name]);
+        assert!(code == 0 && out.contains(&format!("`seixo run {file}`")), "{out}{err}");
+        let again = run(&["init", name]);
+        assert!(again.0 == 2 && again.2.contains("is there already"), "{}", again.2);
+        // No length is rounded and nothing is warned of.
+        let (code, _, err) = run(&["plan", &file]);
+        assert!(code == 0 && !err.contains("becomes") && !err.contains("warning"), "{name}: {err}");
+        let (code, out, err) = run(&["run", &file, "--backend", "cpu", "--steps", "40", "--json", "-q"]);
+        assert_eq!((code, err.as_str()), (0, ""), "{name}");
+        assert_eq!(json(&out)["verdict"]["grade"], "fine", "{name}: {out}");
+        assert!(folder.path().join("out").join(name).join("case.toml").exists());
+    }
+    assert_eq!(ran(&["init", "dambreak"]).code, 2);
+}
+
+#[test]
+fn a_case_comes_from_a_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = ran(&["init", "dam-break", "-"]).out;
+    let run = |text: &[u8]| {
+        let args = ["run", "-", "--backend", "cpu", "--steps", "2", "-q", "--spacing", "0.02"];
+        let output =
+            seixo().current_dir(folder.path()).args(args).write_stdin(text.to_vec()).output().unwrap();
+        (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    assert_eq!(run(text.as_bytes()), (0, String::new()));
+    assert!(folder.path().join("out/stdin/stdin.pvd").exists());
+    std::fs::remove_dir_all(folder.path().join("out")).unwrap();
+    let (code, err) = run(text.replace("spacing", "spacin").as_bytes());
+    assert!(code == 2 && err.contains("--> standard input:"), "{err}");
+    let (code, err) = run(b"\xff\xfe");
+    assert!(code == 2 && err.contains("UTF-8"), "{err}");
+}
+
+#[test]
+fn shells_and_man_know_the_program() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = ran(&["completions", shell]);
+        assert!(script.code == 0 && script.out.contains("max-wall"), "{shell}");
+    }
+    assert!(ran(&["man"]).out.contains(".TH seixo 1"));
+    let folder = tempfile::tempdir().unwrap();
+    let pages = ran(&["man", "--out", &folder.path().display().to_string()]);
+    assert_eq!(pages.code, 0, "{}", pages.err);
+    let page = std::fs::read_to_string(folder.path().join("seixo-run.1")).unwrap();
+    assert!(page.contains("max\\-wall"), "{page}");
+}
+
+/// Where no desktop session runs, a layer of Mesa's speaks up on its own.
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_else_speaks_on_stderr() {
+    let mut command = seixo();
+    let output = command.env_remove("XDG_RUNTIME_DIR").args(["adapters", "--json"]).output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    json(&String::from_utf8_lossy(&output.stdout));
+}
+
+#[test]
+fn a_run_says_what_plan_says_where_there_is_something_to_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let run = |step: &str| {
+        let set = format!("run.time_step={step}");
+        let more = ["--set", "run.adaptive=false", "--set", &set, "--spacing", "0.02", "--steps", "1"];
+        let args = ["run", "cases/dam_break_2d.toml", "-o", &out, "--backend", "cpu", "--force"];
+        ran(&[&args[..], &more].concat()).err
+    };
+    assert!(
+        run("8e-3").contains("the fixed time step is above that; set run.time_step ="),
+        "{}",
+        run("8e-3")
+    );
+    assert!(!run("1e-3").contains("time step"), "{}", run("1e-3"));
+}

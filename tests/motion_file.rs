@@ -1,0 +1,74 @@
+//! Tables of motion from files.
+
+use crate::cli::{ran, small_case};
+use std::path::Path;
+
+const ROWS: &str = "# a gate\n time [s], x [m], y [m], z [m]\r\n0, 0, 0, 0\n\n0.02,0,0,0.004\n1e0,0,0,0.5\n";
+
+fn case(folder: &Path, motion: &str) -> String {
+    let path = small_case(folder);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let rows = "motion = [[0, 0, 0, 0], [1, 0, 0, 0.5]]";
+    assert!(text.contains(rows));
+    std::fs::write(&path, text.replace(rows, motion)).unwrap();
+    path
+}
+
+#[test]
+fn a_wall_follows_its_file_as_it_follows_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("curves")).unwrap();
+    std::fs::write(folder.path().join("curves/gate.csv"), ROWS).unwrap();
+    let run = |name: &str, motion: &str, more: &[&str]| {
+        let path = case(folder.path(), motion);
+        let out = folder.path().join(name);
+        let shown = out.display().to_string();
+        let ran = ran(&[&["run", &path, "-o", &shown, "--backend", "cpu", "-q"], more].concat());
+        assert_eq!((ran.code, ran.err.as_str()), (0, ""), "{name}");
+        let read = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+        (read("bodies.csv"), read("case.toml"))
+    };
+    let rows = run("rows", "motion = [[0, 0, 0, 0], [0.02, 0, 0, 0.004], [1, 0, 0, 0.5]]", &[]);
+    let file = run("file", "motion = \"curves/gate.csv\"  # up", &[]);
+    assert_eq!(file.0, rows.0);
+    // The case beside the results is whole without the file.
+    assert!(file.1.contains("[0.02, 0.0, 0.0, 0.004]") && file.1.contains("# up"), "{}", file.1);
+    let set = ["--set", "moving_wall.0.motion=curves/gate.csv"];
+    assert_eq!(run("set", "motion = [[0, 0, 0, 0], [1, 0, 0, 0.1]]", &set).0, rows.0);
+    // A file that has changed since is another case.
+    std::fs::write(folder.path().join("curves/gate.csv"), ROWS.replace("0.004", "0.003")).unwrap();
+    let path = case(folder.path(), "motion = \"curves/gate.csv\"");
+    let shown = folder.path().join("file").display().to_string();
+    let changed = ran(&["run", &path, "-o", &shown, "--resume", "--backend", "cpu"]);
+    assert!(changed.code == 2 && changed.err.contains("moving_wall.0.motion"), "{}", changed.err);
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_told_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = case(folder.path(), "motion = \"gate.csv\"");
+    let told = |text: &[u8]| {
+        std::fs::write(folder.path().join("gate.csv"), text).unwrap();
+        let plan = ran(&["plan", &path]);
+        assert_eq!(plan.code, 2, "{}", plan.err);
+        plan.err
+    };
+    for (text, words) in [
+        (&b"0,0,0,0\n1,0,0\n"[..], "gate.csv:2: expected time [s] and displacement x, y, z [m]"),
+        (b"t,x,y,z\n0,0,0,0\n1,0,0,a\n", "gate.csv:3: expected time"),
+        (b"0,0,0,0\n1,0,0,nan\n", "gate.csv:2: expected time"),
+        (b"0,0,0,0\n1,0,0,1\n1,0,0,2\n", "gate.csv:3: time 1 does not come after 1"),
+        (b"# nothing\n", "gate.csv: it holds no rows"),
+        (b"\xff\xfe\n", "gate.csv: not a text file"),
+        (b"0,0,0,0.3\n1,0,0,0.5\n", "so that the solid would jump there in the first step"),
+    ] {
+        let err = told(text);
+        assert!(err.contains(words), "{words}: {err}");
+        assert_eq!(err.matches("error").count(), 1, "{err}");
+    }
+    std::fs::remove_file(folder.path().join("gate.csv")).unwrap();
+    let plan = ran(&["plan", &path]);
+    assert!(plan.code == 2 && plan.err.contains("gate.csv: no such file"), "{}", plan.err);
+    let number = case(folder.path(), "motion = 7");
+    assert_eq!(ran(&["plan", &number]).code, 2);
+}

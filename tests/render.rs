@@ -1,0 +1,115 @@
+//! `seixo render`: pictures of what a run left.
+
+use crate::cli::{json, ran, small_case};
+use std::path::Path;
+
+/// Width, height, frames and pixels of a PNG.
+fn read(path: &Path) -> (u32, u32, u32, Vec<u8>) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let frames = reader.info().animation_control().map_or(1, |a| a.num_frames);
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    (info.width, info.height, frames, bytes)
+}
+
+fn differing(a: &[u8], b: &[u8]) -> usize {
+    a.iter().zip(b).filter(|(a, b)| a.abs_diff(**b) > 2).count()
+}
+
+#[test]
+fn frames_become_pictures_as_the_run_itself_draws_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let body =
+        "body=[{name=\"b\",size=[0.15,0.05,0.1],center=[1.2,0,0.6],density=500,angular_velocity=[0,20,0]}]";
+    let sets = ["--set", body, "--set", "contact={spring=1e5}"];
+    for encoding in ["base64", "raw"] {
+        let root = folder.path().join(encoding);
+        let shown = root.display().to_string();
+        let set = format!("output.encoding=\"{encoding}\"");
+        let run = ["run", &case, "-o", &shown, "--backend", "cpu", "-q", "--picture", "--set", &set];
+        let run = ran(&[&run[..], &sets].concat());
+        assert_eq!(run.code, 0, "{}", run.err);
+        let out = folder.path().join(format!("{encoding}-again"));
+        let again = out.display().to_string();
+        // The run itself cannot know what is to come, and takes the speed of a fall.
+        let drawn = ran(&["render", &shown, "-o", &again, "-q", "--range", "0,3.131560"]);
+        assert_eq!((drawn.code, drawn.err.as_str()), (0, ""));
+        for frame in 0..4 {
+            let name = format!("frame_{frame:04}.png");
+            let ((w, h, _, own), (_, _, _, new)) =
+                (read(&root.join("pictures").join(&name)), read(&out.join(name)));
+            assert_eq!((w, h), (960, 480));
+            // Files hold single precision: an edge may fall on the next sample.
+            assert!(differing(&own, &new) < own.len() / 500, "{encoding} {frame}: {}", differing(&own, &new));
+        }
+    }
+    let root = folder.path().join("raw").display().to_string();
+    let draw = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let args =
+            ["render", &root, "-q", "-o", &out.display().to_string(), "--size", "320x200"].map(String::from);
+        let args: Vec<&str> = args.iter().map(String::as_str).chain(more.iter().copied()).collect();
+        let drawn = ran(&args);
+        assert_eq!((drawn.code, drawn.err.as_str()), (0, ""), "{more:?}");
+        out
+    };
+    let sheet = read(&draw("sheet", &["--times", "0,0.02,0.04", "--sheet", "2"]).join("sheet.png"));
+    assert_eq!((sheet.0, sheet.1), (640, 400));
+    let animation = read(&draw("animation", &["--animation", "10"]).join("animation.png"));
+    assert_eq!((animation.0, animation.1, animation.2), (320, 200, 4));
+    let plain = read(&draw("plain", &["--times", "0.04"]).join("frame_0002.png")).3;
+    for (name, more) in [
+        ("zoom", &["--zoom", "2", "--target", "0.2,0,0.2"][..]),
+        ("pressure", &["--field", "pressure"]),
+        ("range", &["--range", "0,0.1"]),
+        ("slice", &["--slice", "x=0.2"]),
+        ("angle", &["--azimuth", "-30", "--elevation", "20"]),
+        ("top", &["--view", "top"]),
+        ("bare", &["--no-labels"]),
+    ] {
+        let other = read(&draw(name, &[&["--times", "0.04"], more].concat()).join("frame_0002.png")).3;
+        assert!(differing(&plain, &other) > 500, "{name} changes nothing");
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("results");
+    let shown = root.display().to_string();
+    assert_eq!(ran(&["run", &case, "-o", &shown, "--backend", "cpu", "-q", "--steps", "1"]).code, 0);
+    for (args, word) in [
+        (vec!["render", "no/such"], "holds no run"),
+        (vec!["render", &shown, "--size", "0x7"], "width and height in pixels"),
+        (vec!["render", &shown, "--size", "100000x100000"], "width and height in pixels"),
+        (vec!["render", &shown, "--slice", "w=1"], "an axis and a place"),
+        (vec!["render", &shown, "--range", "2,1"], "is to be larger"),
+        (vec!["render", &shown, "--zoom", "nan"], "--zoom"),
+        (vec!["render", &shown, "--elevation", "100"], "-90 to 90"),
+    ] {
+        let drawn = ran(&args);
+        assert!(drawn.code == 2 && drawn.err.contains(word), "{args:?}: {} {}", drawn.code, drawn.err);
+    }
+    // A frame that is damaged is named.
+    std::fs::write(root.join("vtu/fluid_0000.vtu"), "<VTKFile>").unwrap();
+    let drawn = ran(&["render", &shown]);
+    assert!(drawn.code == 5 && drawn.err.contains("fluid_0000.vtu: "), "{} {}", drawn.code, drawn.err);
+    let none = ran(&[
+        "run",
+        &case,
+        "-o",
+        &shown,
+        "--backend",
+        "cpu",
+        "-q",
+        "--force",
+        "--set",
+        "output.every=0",
+        "--json",
+    ]);
+    assert_eq!(json(&none.out)["frames"], 0);
+    assert!(ran(&["render", &shown]).code != 0);
+}
