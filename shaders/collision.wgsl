@@ -52,7 +52,7 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
     }
     let count = neighbour_count[i];
     var change = vec3f(0.0);
-    if (count >> 24u) != 0u {
+    if is_close(count) {
         let x = position[i].xyz;
         let v = velocity[i].xyz;
         let near = near_of(count);

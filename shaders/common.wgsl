@@ -62,7 +62,7 @@ struct Constants {
     smooth_density: f32,   // W0
     surface_head: f32,     // of the missing half spacing, Pa
     wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
-    pad: f32,
+    wall_friction: f32,    // C_f / l0 / sum w of a wall particle with the water above it
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
@@ -122,10 +122,10 @@ fn add_moment(sum: Moment, e: vec3f, r: vec3f) -> Moment {
     return Moment(sum.diagonal + e * r, sum.mixed + e.yxx * r.zzy);
 }
 
-// w r / r^2 of a pair, 0 for a coincident one.
-fn pair_vector(r: vec3f) -> vec3f {
-    let distance_squared = dot(r, r);
-    return select(weight(distance_squared) / distance_squared, 0.0, distance_squared == 0.0) * r;
+// w r / r^2 of a pair of weight w = re / r - 1: without a division, and finite where the weight is, at r = 0.
+fn pair_vector(w: f32, r: vec3f) -> vec3f {
+    let inverse = (1.0 + w) / params.effective_radius;
+    return w * inverse * inverse * r;
 }
 
 // Inverse of M = d / n0 times the sum, or 1 where a lower bound of its smallest eigenvalue is too small. M is symmetric:
@@ -156,13 +156,22 @@ fn inverse_moment(sum: Moment) -> mat3x3f {
     );
 }
 
-// A word of `neighbour_count`: 12 bits neighbours that carry pressure, 12 bits dummies, 1 bit "a pair is close".
+// A word of `neighbour_count`: 12 bits neighbours that carry pressure, 12 bits dummies, 1 bit "a pair is close", 1 bit "one of
+// those that carry pressure is a wall".
 fn near_of(word: u32) -> u32 {
     return word & 0xfffu;
 }
 
 fn dummies_of(word: u32) -> u32 {
     return (word >> 12u) & 0xfffu;
+}
+
+fn is_close(word: u32) -> bool {
+    return (word & 0x1000000u) != 0u;
+}
+
+fn sees_wall(word: u32) -> bool {
+    return (word & 0x2000000u) != 0u;
 }
 
 // Places in `neighbour_list`, column after column so that neighbouring threads read neighbouring words: those that carry

@@ -17,6 +17,7 @@
 var<private> near: u32;
 var<private> dummies: u32;
 var<private> smallest: f32;
+var<private> wall: bool;
 
 fn see(i: u32, j: u32, r: vec3f) {
     let distance_squared = dot(r, r);
@@ -30,6 +31,7 @@ fn see(i: u32, j: u32, r: vec3f) {
             neighbour_list[near_place(i, near)] = j;
         }
         near += 1u;
+        wall = wall || j >= params.fluid;
     } else {
         if room {
             neighbour_list[dummy_place(i, dummies)] = j;
@@ -69,6 +71,7 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     }
     near = 0u;
     dummies = 0u;
+    wall = false;
     smallest = params.effective_radius * params.effective_radius;
     for (var x = low.x; x <= high.x; x++) {
         for (var y = low.y; y <= high.y; y++) {
@@ -106,5 +109,5 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
         dummies = min(dummies, params.capacity - near);
     }
     let close = smallest < params.collision_distance * params.collision_distance;
-    neighbour_count[i] = near | (dummies << 12u) | (u32(close) << 24u);
+    neighbour_count[i] = near | (dummies << 12u) | (u32(close) << 24u) | (u32(wall) << 25u);
 }

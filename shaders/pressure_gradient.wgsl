@@ -59,7 +59,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
         let r = position[j].xyz - x.xyz;
-        let e = pair_vector(r);
+        let e = pair_vector(weight(dot(r, r)), r);
         sum += (pressure[j] - reference) * e;
 //#if CONSISTENT
         one_side += e;
@@ -71,7 +71,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
         let dummies = dummies_of(count);
         for (var k = 0u; k < dummies; k++) {
             let r = position[neighbour_list[dummy_place(i, k)]].xyz - x.xyz;
-            let e = pair_vector(r);
+            let e = pair_vector(weight(dot(r, r)), r);
             sum += (own + hydrostatic(r) - reference) * e;
             one_side += e;
             moment = add_moment(moment, e, r);

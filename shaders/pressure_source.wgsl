@@ -20,18 +20,18 @@ struct Sums {
     normal: vec3f,   // e of those solids
 }
 
-// W, as crate::lattice::smooth_weight.
-fn smooth_weight(distance_squared: f32) -> f32 {
-    let q = sqrt(distance_squared) / params.effective_radius;
+// W of a pair of weight w, as crate::lattice::smooth_weight.
+fn smooth_weight(w: f32) -> f32 {
+    let q = 1.0 / (1.0 + w);
     let rest = max(1.0 - q, 0.0);
     return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
 }
 
-fn add_neighbour(sums: Sums, r: vec3f, v: vec3f, slips: bool) -> Sums {
+fn add_neighbour(sums: Sums, w: f32, r: vec3f, v: vec3f, slips: bool) -> Sums {
     var out = sums;
-    let e = pair_vector(r);
+    let e = pair_vector(w, r);
     let rate = mat3x3f(e * v.x, e * v.y, e * v.z);
-    out.density += smooth_weight(dot(r, r));
+    out.density += smooth_weight(w);
     out.moment = add_moment(out.moment, e, r);
     if slips {
         out.solid += rate;
@@ -82,7 +82,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         links += w;
 //#if MIXED
         first_moment += w * r;
-        sums = add_neighbour(sums, r, velocity[j].xyz - v, i < params.fluid && j >= params.fluid);
+        sums = add_neighbour(sums, w, r, velocity[j].xyz - v, i < params.fluid && j >= params.fluid);
 //#endif
     }
     if links <= 0.0 {
@@ -93,7 +93,8 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let dummies = dummies_of(count);
     for (var k = 0u; k < dummies; k++) {
         let j = neighbour_list[dummy_place(i, k)];
-        sums = add_neighbour(sums, position[j].xyz - x, velocity[j].xyz - v, i < params.fluid);
+        let r = position[j].xyz - x;
+        sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);
     }
     let b = now.source_density * (sums.density - params.smooth_density) / params.smooth_density
         - now.source_divergence * divergence(sums)

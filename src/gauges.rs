@@ -118,7 +118,9 @@ impl Gauges {
         let known = simulation.steps > 0;
         let mut row = vec![Cell::from(simulation.time)];
         self.pressures(simulation, known, &mut row)?;
-        let viscous = simulation.params.viscosity > 0.0 && self.force.iter().any(|(_, t)| t.is_fixed());
+        let params = &simulation.params;
+        let viscous = (params.viscosity > 0.0 || params.wall_friction > 0.0)
+            && self.force.iter().any(|(_, t)| t.is_fixed());
         let fields = if viscous || !self.level.is_empty() { Some(simulation.fields()?) } else { None };
         let params = &simulation.params;
         for &(_, line) in &self.level {

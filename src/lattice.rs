@@ -6,6 +6,12 @@ pub fn weight(r: f64, re: f64) -> f64 {
     re / r - 1.0
 }
 
+/// r / re of a pair of weight `w`, Eq. (3) [-].
+#[inline(always)]
+pub(crate) fn reach(w: f64) -> f64 {
+    1.0 / (1.0 + w)
+}
+
 /// Weight W of the smooth density sum, (1 - q)^3 (1 + 3 q - 3 q^2) at `q` = r / re [-]. Of (1 - q)^3 (1 + 3 q - 4 a q^2),
 /// which is Wendland's C2 of one dimension for a = 0 and of two and three for a = 1, a = 3/4 keeps its sum best on
 /// stretched and on other lattices of the same volume.
@@ -30,6 +36,8 @@ pub struct Lattice {
     pub wall_share: f64,
     /// Weight of a pair of fluid and wall in the viscous sum [-], see [`Self::new`].
     pub wall_shear: f64,
+    /// Sum of the weights of a particle of a flat wall's layer with the water above [-].
+    pub wall_contact: f64,
 }
 
 impl Lattice {
@@ -42,7 +50,7 @@ impl Lattice {
     pub fn new(dimensions: u32, radius: f64) -> Self {
         let m = radius.ceil() as i32;
         let (mut n, mut s, mut smooth, mut count) = (0.0, 0.0, smooth_weight(0.0), 0);
-        let (mut layer, mut above) = (0.0, 0.0);
+        let (mut layer, mut above, mut contact) = (0.0, 0.0, 0.0);
         for x in -m..=m {
             for y in if dimensions == 3 { -m..=m } else { 0..=0 } {
                 for z in -m..=m {
@@ -52,6 +60,7 @@ impl Lattice {
                         n += w;
                         layer += if z == 1 { w } else { 0.0 };
                         above += if z > 0 { w * f64::from(z) } else { 0.0 };
+                        contact += if z > 0 { w } else { 0.0 };
                         s += r2 * w;
                         smooth += smooth_weight(r2.sqrt() / radius);
                         count += 1;
@@ -66,6 +75,7 @@ impl Lattice {
             neighbours: count,
             wall_share: layer / n,
             wall_shear: 2.0 * above / layer,
+            wall_contact: contact,
         }
     }
 }

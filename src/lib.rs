@@ -50,6 +50,7 @@
 //! | explicit step (2) | [`kernels::predict`] | `twins`, `fluid` |
 //! | solids take their pose | [`kernels::move_solids`] | `twins`, `immersed` |
 //! | cells and neighbours within re | [`kernels::cell_list`], [`kernels::neighbour_list`] | `twins` by brute force |
+//! | friction of walls | [`kernels::wall_friction`] | `kernels`, `twins` |
 //! | collision (18) | [`kernels::collision`] | `twins`, `fluid` |
 //! | number density (4), free surface | [`kernels::number_density`] | `fluid` |
 //! | source and diagonal of the PPE (8) | [`kernels::pressure_source`] | `fluid`, `twins` |

@@ -29,11 +29,16 @@ pub fn scale(on: Particles) -> f64 {
     f64::from(on.params.dimensions) / on.params.number_density
 }
 
+/// w / r^2 of a pair of weight `w` = re / r - 1 [1/m2]: without a division, and finite where the weight is, at r = 0.
+#[inline(always)]
+pub(crate) fn weight_over_square(w: f64, re: f64) -> f64 {
+    let inverse = (1.0 + w) / re;
+    w * inverse * inverse
+}
+
 /// (d / n0) w r / r^2 of slot `i` and neighbour `j` of weight `w` [1/m].
 pub(crate) fn pair_vector(i: usize, j: usize, w: f64, on: Particles) -> DVec3 {
-    let r = on.position[j] - on.position[i];
-    let r2 = r.length_squared();
-    if r2 > 0.0 { scale(on) * w / r2 * r } else { DVec3::ZERO }
+    scale(on) * weight_over_square(w, on.params.effective_radius) * (on.position[j] - on.position[i])
 }
 
 /// M of slot `i` over `all` its neighbours [-].

@@ -30,6 +30,8 @@ pub struct Chunk {
     pub weight: Vec<f64>,
     /// Rows with a pair closer than the collision distance.
     pub close: Vec<bool>,
+    /// Rows with a wall among those that carry pressure.
+    pub walls: Vec<bool>,
 }
 
 /// A row: neighbours and their weights.
@@ -107,6 +109,7 @@ impl Neighbours {
                 start: vec![0; rows + 1],
                 dummies: vec![0; rows],
                 close: vec![false; rows],
+                walls: vec![false; rows],
                 ..Chunk::default()
             }
         };
@@ -142,7 +145,9 @@ impl Neighbours {
     pub fn bytes(&self) -> usize {
         self.chunks
             .iter()
-            .map(|c| c.neighbour.capacity() * 4 + c.weight.capacity() * 8 + c.start.len() * 8 + c.close.len())
+            .map(|c| {
+                c.neighbour.capacity() * 4 + c.weight.capacity() * 8 + c.start.len() * 8 + c.close.len() * 2
+            })
             .sum()
     }
 }

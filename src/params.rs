@@ -23,6 +23,9 @@ const REACH: f64 = 5.0;
 /// The same over the spacing, at most: alpha adds 1e-6 of itself to a row's diagonal.
 const REACH_MAX: f64 = 500.0;
 
+/// C_f of walls unless typed: smooth ones at the Reynolds numbers of a laboratory's dam break, 1e5 to 1e6 [-].
+const WALL_FRICTION: f64 = 0.0025;
+
 /// Largest gamma that [`Relaxation::Speed`] gives. The density error oscillates with
 /// omega dt = sqrt(gamma), unstable from 2 on; noise grows well before.
 pub const RELAXATION_MAX: f64 = 0.5;
@@ -53,6 +56,8 @@ pub struct Params {
     /// Weight of a pair of fluid and wall in the viscous sum [-]: 1 in the paper's scheme, else that of
     /// [`Lattice::wall_shear`].
     pub wall_shear: f64,
+    /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
+    pub wall_friction: f64,
     /// Free-surface threshold beta [-].
     pub free_surface_threshold: f64,
     /// Source term of the PPE.
@@ -120,6 +125,7 @@ impl Params {
             Some((None, Some(c))) => Relaxation::Speed(c),
             _ => Relaxation::Speed(derived_speed),
         };
+        let friction = fluid.and_then(|f| f.wall_friction).unwrap_or(if paper { 0.0 } else { WALL_FRICTION });
         Ok(Self {
             dimensions: run.dimensions,
             spacing: l0,
@@ -132,6 +138,7 @@ impl Params {
             density: fluid.map_or(1000.0, |f| f.density),
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
             wall_shear: if paper { 1.0 } else { lattice.wall_shear },
+            wall_friction: friction / (l0 * lattice.wall_contact),
             free_surface_threshold: fluid.map_or(0.97, |f| f.free_surface_threshold),
             source: fluid.and_then(|f| f.source).unwrap_or(source),
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),

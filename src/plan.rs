@@ -65,6 +65,8 @@ stages! {
     CellList = "cell_list" [CellList];
     /// Neighbours at r*.
     NeighbourList = "neighbour_list" [NeighbourList];
+    /// Friction on walls whose boundary layer is thinner than a spacing.
+    WallFriction = "wall_friction" [WallFriction];
     /// Particles that come too close rebound, Eq. (18).
     Collision = "collision" [Collision];
     /// Number density, Eq. (4), and free surface.
@@ -98,7 +100,7 @@ pub enum Arrays {
     Imbalance,
     /// Of the fluid's force on solids.
     Force,
-    /// Force of viscosity and collisions on the wall layer of moving solids, which the fluid's force takes in.
+    /// Force of viscosity, friction and collisions on the wall layer of moving solids, which the fluid's force takes in.
     Reaction,
     /// Levels of the multigrid preconditioner.
     Multigrid,
@@ -191,6 +193,9 @@ impl Plan {
                 Stage::Viscosity => wet("viscosity is given"),
                 Stage::MoveSolids if !moving => Err("nothing solid moves"),
                 Stage::MoveSolids => wet("solids move in the fluid"),
+                Stage::WallFriction if params.wall_friction == 0.0 => Err("the friction of walls is zero"),
+                Stage::WallFriction if scene.groups.pressure() == scene.groups.fluid => Err("no walls"),
+                Stage::WallFriction => wet("water slides along walls"),
                 Stage::Collision if params.collision_distance == 0.0 => Err("collision distance is zero"),
                 Stage::Collision => wet("particles may come too close"),
                 Stage::Shift if params.gradient == Gradient::Minimum => {
@@ -238,7 +243,9 @@ impl Plan {
             Arrays::Imbalance => self.has(Stage::Shift),
             Arrays::Force => self.has(Stage::BodyForce),
             Arrays::Reaction => {
-                self.has(Stage::BodyForce) && (self.has(Stage::Viscosity) || self.has(Stage::Collision))
+                let acts = |stage| self.has(stage);
+                self.has(Stage::BodyForce)
+                    && [Stage::Viscosity, Stage::WallFriction, Stage::Collision].into_iter().any(acts)
             }
             Arrays::Coupling => self.coupled,
             Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,

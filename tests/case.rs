@@ -313,10 +313,18 @@ fn overrides_that_fit_nothing() {
         ("run.0=1", "unknown field `0`"),
         ("run.sapcing=1", "did you mean `spacing`?"),
         ("run..end=1", "empty part"),
+        ("body=1", "`body` is a list: set one of its keys, e.g. body.0.name=..., or []"),
     ] {
         let message = file::parse("test.toml", SOUND.into(), &strings(&[set])).unwrap_err().to_string();
         assert!(message.contains(words), "`{set}`: {message}");
     }
+}
+
+#[test]
+fn an_empty_list_leaves_none_of_its_tables() {
+    let (case, _, _) =
+        file::parse("test.toml", SOUND.into(), &strings(&["gauge.force=[]", "body=[]"])).unwrap();
+    assert!(case.body.is_empty() && case.gauge.force.is_empty());
 }
 
 #[test]

@@ -10,7 +10,9 @@ use seixo::cells::Grid;
 use seixo::fields::State;
 use seixo::kernels::cell_list::{CellList, Scratch};
 use seixo::kernels::neighbour_list::{Candidates, neighbour_list};
-use seixo::kernels::{Particles, number_density, pressure_gradient, pressure_source, shift, viscosity};
+use seixo::kernels::{
+    Particles, number_density, pressure_gradient, pressure_source, shift, viscosity, wall_friction,
+};
 use seixo::params::{Params, Step};
 use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::Settings;
@@ -129,6 +131,95 @@ fn the_fast_viscosity_is_the_plain_one() {
         let walls = g.moving_wall_range();
         let plain: Vec<DVec3> = walls.map(|i| viscosity::reaction(i, row(i), on)).collect();
         assert!(close(&s.cpu.fields().reaction, &plain) > 1e-6);
+    });
+}
+
+/// Sum of the friction of water on its lattice that slides at `speed` over a floor, over rho C_f A speed^2, and the same with
+/// the lattice moved by part of a spacing along the floor.
+fn drag_of_a_floor(dimensions: u32, speed: f64) -> [f64; 2] {
+    let case: seixo::case::Case = toml::from_str(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = {dimensions}\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.6, 0.3]\nopen = [\"z_max\"]\n\
+         [fluid]\nwall_friction = 0.004\n[[fluid.block]]\nmin = [0.2, 0.2, 0]\nmax = [0.4, 0.4, 0.1]\n"
+    ))
+    .expect("a case");
+    [0.0, 0.3].map(|moved| {
+        let mut scene = Scene::build(&case).expect("a scene");
+        for i in 0..scene.groups.fluid {
+            scene.position[i].x += moved * scene.spacing;
+            scene.velocity[i] = DVec3::new(speed, 0.0, 0.0);
+        }
+        let params = Params::new(&case, &scene).expect("valid");
+        let plan = Plan::new(&case, &scene, &params);
+        let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
+        let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+        let step = params.step(0.0, 1e-3, 2.0);
+        for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
+            cpu.run(stage, &step).expect("runs");
+        }
+        let (f, fluid) = (cpu.fields(), scene.groups.fluid);
+        let on = Particles { params: &params, position: &f.position, velocity: &f.velocity, fluid };
+        let row = |i: usize| cpu.neighbours().pressure(i).neighbour;
+        // In no time the implicit rate is the explicit one.
+        let sum: f64 = (0..fluid).map(|i| wall_friction::wall_friction(i, row(i), on, 0.0).0.x).sum();
+        let area = 0.2 * if dimensions == 3 { 0.2 } else { 0.02 };
+        -sum * params.particle_mass() / (1000.0 * 0.004 * area * speed * speed)
+    })
+}
+
+#[test]
+fn friction_of_a_floor_is_its_stress_times_its_area() {
+    for dimensions in [2, 3] {
+        for speed in [0.01, 3.0] {
+            let [on_lattice, between] = drag_of_a_floor(dimensions, speed);
+            println!("{dimensions}D, {speed} m/s: {on_lattice:.4}, {between:.4}");
+            assert!((on_lattice - 1.0).abs() < 1e-6, "{on_lattice}");
+            assert!((between - 1.0).abs() < 0.05, "{between}");
+        }
+    }
+}
+
+#[test]
+fn water_gives_solids_what_friction_takes_and_never_turns_round() {
+    each(|s| {
+        for dt in [1e-6, 1e3] {
+            s.step.dt = dt;
+            let (on, g) = (s.particles(), s.groups());
+            let friction = 1e3 * s.params.spacing.recip();
+            let params = Params { wall_friction: friction, ..s.params.clone() };
+            let on = Particles { params: &params, ..on };
+            let row = |i: usize| s.cpu.neighbours().pressure(i).neighbour;
+            let walls = g.moving_wall_range();
+            let mut seen = 0;
+            let mut lost = DVec3::ZERO;
+            for i in 0..g.fluid {
+                let (a, sum) = wall_friction::wall_friction(i, row(i), on, dt);
+                let others = row(i).iter().any(|&j| j as usize >= walls.end);
+                let near = row(i).iter().any(|&j| walls.contains(&(j as usize)));
+                assert_eq!(sum > 0.0, row(i).iter().any(|&j| j as usize >= g.fluid));
+                if others && !near {
+                    // Against walls at rest.
+                    let (v, after) = (on.velocity[i], on.velocity[i] + dt * a);
+                    assert!(after.dot(v) >= -1e-12 && after.length() <= v.length() + 1e-12, "{v} to {after}");
+                }
+                // Those that see solids that move alone: the solids get all of it.
+                if near && !others {
+                    lost -= params.particle_mass() * a;
+                    seen += 1;
+                }
+            }
+            let mut gained = DVec3::ZERO;
+            for j in walls.clone() {
+                let alone = |&&i: &&u32| {
+                    (i as usize) < g.fluid && !row(i as usize).iter().any(|&k| k as usize >= walls.end)
+                };
+                let carriers: Vec<u32> = row(j).iter().filter(|i| alone(i)).copied().collect();
+                gained += wall_friction::reaction(j, &carriers, row, on, dt);
+            }
+            println!("{seen} particles, {lost} N lost, {gained} N gained");
+            assert!(seen > 10 && lost.length() > 0.0);
+            assert!((lost - gained).length() < 1e-10 * lost.length(), "{lost} for {gained}");
+        }
     });
 }
 

@@ -238,7 +238,7 @@ fn structs_lie_the_same_on_both_sides() {
             smooth_density,
             surface_head,
             wall_shear,
-            pad,
+            wall_friction,
         }
     );
     same_layout!(

@@ -291,6 +291,22 @@ fn neighbour_list() {
 }
 
 #[test]
+fn wall_friction() {
+    // The paper's preset has none.
+    for (dimensions, fluid) in [(3, "preset = \"accurate\""), (2, "preset = \"paper\"\nwall_friction = 0.01")]
+    {
+        let Some(mut pair) = Pair::new(dimensions, fluid) else { continue };
+        pair.run_all(&LISTS);
+        let (before, _) = pair.fields();
+        pair.run(Stage::WallFriction);
+        let (after, _) = pair.fields();
+        assert!(moved(&before, &after, |f| flat(&f.velocity)) > 1e-5);
+        assert!(moved(&before, &after, |f| flat(&f.reaction)) > 1e-5);
+        pair.check(Stage::WallFriction);
+    }
+}
+
+#[test]
 fn collision() {
     each(|pair| {
         pair.run_all(&LISTS);

@@ -269,7 +269,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Wall-layer particles that keep what viscosity and collisions do to them.
+    /// Wall-layer particles that keep what viscosity, friction and collisions do to them.
     fn felt(&self) -> u64 {
         if self.plan.needs(Arrays::Reaction) { self.sizes.moving_wall } else { 0 }
     }
@@ -371,8 +371,8 @@ impl Backend for Gpu {
             Over::Rows => s.pressure,
         };
         self.context.pass([(kernel, groups(threads))])?;
-        if stage == ParticleStage::Collision {
-            // What it found is applied as any acceleration is.
+        if matches!(stage, ParticleStage::WallFriction | ParticleStage::Collision) {
+            // What they found is applied as any acceleration is.
             self.context.pass([(kernels::correct::correct, groups(s.fluid))])?;
         }
         Ok(())

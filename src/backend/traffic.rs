@@ -108,6 +108,7 @@ impl Sizes {
             (Stage::Predict, update),
             (Stage::CellList, fluid * 2 * (2 * vector + number + 5) + cells * 8),
             (Stage::NeighbourList, rows * vector + pairs * 4),
+            (Stage::WallFriction, fluid * (4 + vector) + update),
             (Stage::Collision, rows + update),
             (Stage::NumberDensity, pairs * (4 + weight) + rows * (vector + number + 1)),
             (Stage::PressureSource, pairs * (4 + weight) + rows * (2 * vector + 3 * number)),

@@ -145,6 +145,10 @@ impl Checker<'_> {
         self.positive("fluid.density", fluid.density, "kg/m3");
         self.not_negative("fluid.viscosity", fluid.viscosity, "m2/s");
         self.viscosity(fluid.viscosity);
+        if let Some(friction) = fluid.wall_friction {
+            let what = "0 to 1 (0.0025 for smooth walls, 0 for none)";
+            self.range("fluid.wall_friction", friction, (0.0..=1.0).contains(&friction), what);
+        }
         let beta = fluid.free_surface_threshold;
         self.range(
             "fluid.free_surface_threshold",

@@ -148,6 +148,9 @@ pub struct Fluid {
     /// Kinematic viscosity [m2/s]; 0 leaves the viscous stage out.
     #[serde(default = "Fluid::default_viscosity")]
     pub viscosity: f64,
+    /// Friction C_f of walls whose boundary layer is thinner than a spacing, tau = rho C_f |u_t| u_t [-]: half the skin
+    /// friction coefficient. 0 leaves the stage out. If absent 0.0025, smooth walls; none with the paper's preset.
+    pub wall_friction: Option<f64>,
     /// Set of scheme switches; the keys below override single ones.
     #[serde(default)]
     pub preset: Preset,

@@ -116,6 +116,16 @@ impl<'a> Place<'a> {
                     *old = value;
                     Ok(())
                 }
+                Some(list @ Item::ArrayOfTables(_)) => {
+                    // `[]` leaves none of them; a list of tables in line takes their place.
+                    if !value.is_array() {
+                        return Err(format!(
+                            "`{last}` is a list: set one of its keys, e.g. {last}.0.name=..., or []"
+                        ));
+                    }
+                    *list = Item::Value(value);
+                    Ok(())
+                }
                 Some(_) => Err(format!("`{last}` is a table: set one of its keys")),
                 None => {
                     table.insert(last, Item::Value(value));

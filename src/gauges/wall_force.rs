@@ -1,5 +1,6 @@
 //! Force of the fluid on a fixed wall: pressure times area over its wall layer, as on bodies
-//! ([`crate::kernels::body_force`]), and the reaction of viscosity ([`crate::kernels::viscosity`]).
+//! ([`crate::kernels::body_force`]), and the reactions of viscosity ([`crate::kernels::viscosity`]) and of the friction of
+//! unresolved boundary layers ([`crate::kernels::wall_friction`]).
 //!
 //! Collisions of particles with the wall, Eq. (18), are not in it.
 
@@ -77,7 +78,8 @@ impl FixedWall {
         sum
     }
 
-    /// Force of the fluid's viscosity [N]: m 2 d nu / (lambda n0) sum w v over the water near its particles.
+    /// Force of the water that flows along [N]: of viscosity, m 2 d nu / (lambda n0) sum w v over the water near its
+    /// particles, and of friction, m C_f / l0 |u_t| u_t with the share of its particles in a flat wall's weights.
     pub(crate) fn viscous_force(&self, fields: &Fields, groups: &Groups, params: &Params) -> DVec3 {
         let re = params.effective_radius;
         let cell = |x: DVec3| (x / re).floor().as_ivec3();
@@ -85,19 +87,26 @@ impl FixedWall {
         for (k, x) in self.position.iter().enumerate() {
             cells.entry(cell(*x)).or_default().push(k);
         }
-        let mut sum = DVec3::ZERO;
+        let (mut viscous, mut friction) = (DVec3::ZERO, DVec3::ZERO);
         for i in (0..groups.fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
             let (x, at) = (fields.position[i], cell(fields.position[i]));
+            let (mut weights, mut normal) = (0.0, DVec3::ZERO);
             let around = (0..27).map(|k| at + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
             for &k in around.filter_map(|c| cells.get(&c)).flatten() {
-                let r = x.distance(self.position[k]);
+                let to_wall = self.position[k] - x;
+                let r = to_wall.length();
                 if r > 0.0 && r < re {
-                    sum += weight(r, re) * fields.velocity[i];
+                    weights += weight(r, re);
+                    normal += weight(r, re) / (r * r) * to_wall;
                 }
             }
+            let (v, normal) = (fields.velocity[i], normal.normalize_or_zero());
+            let along = v - v.dot(normal) * normal;
+            viscous += weights * v;
+            friction += weights * along.length() * along;
         }
         let coefficient = params.viscosity * 2.0 * f64::from(params.dimensions)
             / (params.laplacian * params.number_density);
-        params.particle_mass() * coefficient * params.wall_shear * sum
+        params.particle_mass() * (coefficient * params.wall_shear * viscous + params.wall_friction * friction)
     }
 }

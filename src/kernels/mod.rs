@@ -19,6 +19,7 @@ pub mod pressure_gradient;
 pub mod pressure_source;
 pub mod shift;
 pub mod viscosity;
+pub mod wall_friction;
 
 pub use crate::neighbourhood::Particles;
 
@@ -96,6 +97,7 @@ pub mod device {
         pressure_source[super::WORKGROUP] Stage(PressureSource), Rows: pressure_source;
         shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
         viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
+        wall_friction[super::WORKGROUP] Stage(WallFriction), FluidAndReaction: wall_friction;
     }
 
     /// The shaders that `plan` needs.

@@ -10,7 +10,7 @@
 //! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles.
 
 use super::Particles;
-use crate::lattice::smooth_weight;
+use crate::lattice::{reach, smooth_weight};
 use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::{Params, Step};
@@ -43,7 +43,7 @@ pub fn pressure_source(
         Source::Mixed => {
             let first_moment: DVec3 =
                 all.iter().take(carry).map(|(j, w)| w * (on.position[j] - on.position[i])).sum();
-            step.relaxation * per_time / step.dt * deviation(i, all, on)
+            step.relaxation * per_time / step.dt * deviation(all, params)
                 - (1.0 - step.relaxation) * per_time * divergence(i, all, on)
                 - c * params.density * params.gravity.dot(first_moment)
         }
@@ -60,10 +60,9 @@ pub fn number_density_source(n: f64, params: &Params, step: &Step) -> f64 {
 
 /// (1 + sum W) / W0 - 1 [-]: W is smooth where it ends and finite at r = 0, so that the sum keeps its value on
 /// stretched and on disordered arrangements, where n of Eq. (4) rises.
-fn deviation(i: usize, all: Row, on: Particles) -> f64 {
-    let (x, re) = (on.position[i], on.params.effective_radius);
-    let near: f64 = all.iter().map(|(j, _)| smooth_weight(on.position[j].distance(x) / re)).sum();
-    (1.0 + near) / on.params.smooth_density - 1.0
+fn deviation(all: Row, params: &Params) -> f64 {
+    let near: f64 = all.iter().map(|(_, w)| smooth_weight(reach(w))).sum();
+    (1.0 + near) / params.smooth_density - 1.0
 }
 
 /// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Solids count with their

@@ -17,6 +17,8 @@ pub enum Entry {
     Gravity,
     /// Explicit viscosity, friction on solids included.
     Viscosity,
+    /// Friction on walls, the work on solids that move included.
+    Friction,
     /// Collisions of particles.
     Collision,
     /// Pressure as solved, on the water and on what moves in it.
@@ -40,9 +42,10 @@ pub enum Entry {
 
 impl Entry {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Gravity,
         Self::Viscosity,
+        Self::Friction,
         Self::Collision,
         Self::Pressure,
         Self::Clip,
@@ -59,6 +62,7 @@ impl Entry {
         match self {
             Self::Gravity => "gravity",
             Self::Viscosity => "viscosity",
+            Self::Friction => "friction",
             Self::Collision => "collision",
             Self::Pressure => "pressure",
             Self::Clip => "clip",

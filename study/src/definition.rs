@@ -396,6 +396,21 @@ value = "e [-]"
     }
 
     #[test]
+    fn every_point_of_what_comes_with_the_program_is_a_valid_case() {
+        for folder in ["study", "validation"] {
+            for name in crate::cases::names(folder) {
+                let text = crate::cases::text(folder, &format!("{name}.toml")).unwrap();
+                let definition = Definition::parse(name, &text).unwrap();
+                let file = |file: &str| crate::cases::text(folder, file);
+                let setup = Setup { full: true, runs: 2, ..Setup::default() };
+                for job in definition.jobs(&file, &setup).unwrap() {
+                    assert!(job.weight > 0.0, "{folder}/{name}, {:?}: its case is refused", job.parameters);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn mistakes_are_told() {
         for (from, to) in
             [("value = \"e [-]\"", "curve = \"c\""), ("title", "tilte"), ("text", "case = 'c'\ntext")]

@@ -131,7 +131,7 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
     match stage {
         Stage::Viscosity => vec![acceleration(), reaction()],
         Stage::CellList => vec![position(), velocity(), share(stage, "kind", &gpu.kind, &cpu.kind)],
-        Stage::Collision => vec![position(), velocity(), reaction()],
+        Stage::WallFriction | Stage::Collision => vec![position(), velocity(), reaction()],
         Stage::NumberDensity => vec![
             scalar("number_density", &of_parts(&gpu.number_density), &of_parts(&cpu.number_density)),
             share(stage, "state", &gpu.state, &cpu.state),

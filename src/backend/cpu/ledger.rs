@@ -58,14 +58,14 @@ impl WaterLedger {
         self.add([Entry::Lost], params, sums(live, of));
     }
 
-    /// Books `correct`, which is about to run with the accelerations `by_collision`.
-    pub fn collision(&mut self, live: usize, on: Particles, by_collision: &[DVec3], dt: f64) {
+    /// Books `correct`, which is about to run with the accelerations `kick` by what `entry` says.
+    pub fn kick(&mut self, entry: Entry, live: usize, on: Particles, kick: &[DVec3], dt: f64) {
         let of = |i: usize| {
-            let (v, a) = (on.velocity[i], by_collision[i]);
+            let (v, a) = (on.velocity[i], kick[i]);
             let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
             [correct_work(v, a, a, on.params.gravity, dt), clamp]
         };
-        self.add([Entry::Collision, Entry::Clamps], on.params, sums(live, of));
+        self.add([entry, Entry::Clamps], on.params, sums(live, of));
     }
 
     /// Books `correct`, which is about to run with the accelerations `total` of pressure and gravity.

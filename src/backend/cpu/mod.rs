@@ -27,8 +27,10 @@ use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::pressure_source::laplacian_coefficient;
-use crate::kernels::{Particles, body_force, collision, correct, monitor, move_solids, predict, shift};
-use crate::ledger::Ledger;
+use crate::kernels::{
+    Particles, body_force, collision, correct, monitor, move_solids, predict, shift, wall_friction,
+};
+use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
 use crate::params::{Params, Step};
@@ -236,6 +238,26 @@ impl Cpu {
         }
     }
 
+    fn wall_friction(&mut self, step: &Step) {
+        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let (position, velocity) = (&fields.position, &fields.velocity);
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let carriers = |i: usize| neighbours.pressure(i).neighbour;
+        let at_wall = |i: usize| neighbours.chunks[i / CHUNK].walls[i % CHUNK];
+        fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
+            let near = i < *live && at_wall(i);
+            *a = if near { wall_friction::wall_friction(i, carriers(i), on, step.dt).0 } else { DVec3::ZERO };
+        });
+        fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
+            let i = groups.fluid + k;
+            *f += wall_friction::reaction(i, carriers(i), carriers, on, step.dt);
+        });
+        if let Some(ledger) = &mut self.ledger {
+            ledger.kick(Entry::Friction, self.live, on, &fields.acceleration, step.dt);
+        }
+        self.correct(step.dt);
+    }
+
     fn collision(&mut self, step: &Step) {
         let Self { fields, neighbours, params, groups, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
@@ -252,7 +274,7 @@ impl Cpu {
             }
         });
         if let Some(ledger) = &mut self.ledger {
-            ledger.collision(self.live, on, &fields.acceleration, step.dt);
+            ledger.kick(Entry::Collision, self.live, on, &fields.acceleration, step.dt);
         }
         self.correct(step.dt);
     }
@@ -388,6 +410,7 @@ impl Backend for Cpu {
             ParticleStage::Predict => self.predict(step.dt),
             ParticleStage::CellList => self.cell_list(),
             ParticleStage::NeighbourList => self.neighbour_list(),
+            ParticleStage::WallFriction => self.wall_friction(step),
             ParticleStage::Collision => self.collision(step),
             ParticleStage::NumberDensity => self.number_density(),
             ParticleStage::PressureSource => self.pressure_source(step),

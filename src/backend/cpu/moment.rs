@@ -1,17 +1,17 @@
 //! [`crate::neighbourhood`], several neighbours at a time.
 
 use super::row_arrays::{Columns, dot};
+use crate::neighbourhood::weight_over_square;
 use glam::{DMat3, DVec3};
 
-/// e = w / r^2 r of each neighbour into `e`, 0 for a coincident one; `r` and `w` are filled up with zeros.
+/// e = w / r^2 r of each neighbour into `e`; `r` and `w` are filled up with zeros.
 #[inline(always)]
-pub(crate) fn pair_vectors(r: &Columns, w: &[f64], e: &mut Columns) {
+pub(crate) fn pair_vectors(r: &Columns, w: &[f64], re: f64, e: &mut Columns) {
     let n = w.len();
     let (x, y, z) = (&r.x[..n], &r.y[..n], &r.z[..n]);
     let (ex, ey, ez) = (&mut e.x[..n], &mut e.y[..n], &mut e.z[..n]);
     for k in 0..n {
-        let r2 = x[k] * x[k] + y[k] * y[k] + z[k] * z[k];
-        let s = if r2 > 0.0 { w[k] / r2 } else { 0.0 };
+        let s = weight_over_square(w[k], re);
         (ex[k], ey[k], ez[k]) = (s * x[k], s * y[k], s * z[k]);
     }
 }

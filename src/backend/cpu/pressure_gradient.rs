@@ -1,11 +1,11 @@
 //! [`crate::kernels::pressure_gradient`], several neighbours at a time.
 
 use super::moment::{moment, pair_vectors};
-use super::row_arrays::{Columns, RowArrays, sum};
+use super::row_arrays::{Columns, RowArrays, least, sum};
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::pressure_gradient::{acceleration, hydrostatic, is_consistent};
+use crate::kernels::pressure_gradient::{acceleration, is_consistent};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use crate::params::Params;
@@ -54,25 +54,26 @@ fn pressure_gradient(
 ) -> (DVec3, DVec3) {
     let consistent = is_consistent(state, on.params);
     let n = if consistent { all.neighbour.len() } else { carry };
-    let RowArrays { r, e, w: p, s: w, .. } = arrays;
+    let RowArrays { r, e, w: p, s: w, h, .. } = arrays;
     let filled = r.differences(i, &all.neighbour[..n], on.position);
-    let (p, w) = (&mut p[..filled], &mut w[..filled]);
+    let (p, w, h) = (&mut p[..filled], &mut w[..filled], &mut h[..filled]);
     let own = pressure[i];
-    let mut reference = own;
     for (p, &j) in p.iter_mut().zip(&all.neighbour[..carry]) {
         *p = pressure[j as usize];
-        reference = reference.min(*p);
     }
-    p[carry..].fill(0.0);
+    p[carry..].fill(own);
+    let mut reference = least(p).min(own);
     if consistent {
-        reference = reference.max(level(r, &p[..carry], own, on.params));
-        let dummies = p[carry..n].iter_mut().enumerate();
-        dummies.for_each(|(k, p)| *p = own + head(r, carry + k, on.params));
+        heads(r, h, on.params);
+        // Those of dummies stand at the particle's own level.
+        p[carry..n].iter_mut().zip(&h[carry..n]).for_each(|(p, h)| *p += h);
+        w.iter_mut().zip(&*p).zip(&*h).for_each(|((level, p), h)| *level = p - h);
+        reference = reference.max(least(w).min(own));
     }
-    p[..n].iter_mut().for_each(|p| *p -= reference);
+    p.iter_mut().for_each(|p| *p -= reference);
     w[..n].copy_from_slice(&all.weight[..n]);
     w[n..].fill(0.0);
-    pair_vectors(r, w, e);
+    pair_vectors(r, w, on.params.effective_radius, e);
     let gradient = scale(on) * e.weighted_sum(p);
     if !consistent {
         return (gradient, DVec3::ZERO);
@@ -82,14 +83,13 @@ fn pressure_gradient(
     (inverse(moment, on.params.dimensions).map_or(gradient, |inverse| inverse * gradient), one_side)
 }
 
-/// What still water's pressure grows by on the way to neighbour `k` [Pa].
+/// What still water's pressure grows by on the way to each neighbour [Pa].
 #[inline(always)]
-fn head(r: &Columns, k: usize, params: &Params) -> f64 {
-    hydrostatic(DVec3::new(r.x[k], r.y[k], r.z[k]), params)
-}
-
-/// The smallest of `own` and the pressures `p`, less the weight of the water in between [Pa].
-#[inline(always)]
-fn level(r: &Columns, p: &[f64], own: f64, params: &Params) -> f64 {
-    p.iter().enumerate().fold(own, |least, (k, p)| least.min(p - head(r, k, params)))
+fn heads(r: &Columns, out: &mut [f64], params: &Params) {
+    let n = out.len();
+    let (x, y, z) = (&r.x[..n], &r.y[..n], &r.z[..n]);
+    let g = params.density * params.gravity;
+    for k in 0..n {
+        out[k] = g.x * x[k] + g.y * y[k] + g.z * z[k];
+    }
 }

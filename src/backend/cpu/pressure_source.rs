@@ -6,7 +6,7 @@ use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
 use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source};
-use crate::lattice::smooth_weight;
+use crate::lattice::{reach, smooth_weight};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use crate::params::Step;
@@ -55,14 +55,15 @@ fn mixed_source(
     arrays: &mut RowArrays,
 ) -> f64 {
     let (params, n) = (on.params, all.neighbour.len());
-    let RowArrays { r, v, w, s, e } = arrays;
+    let RowArrays { r, v, w, s, e, .. } = arrays;
     let filled = r.differences(i, all.neighbour, on.position);
     let (w, s) = (&mut w[..filled], &mut s[..filled]);
     w[..n].copy_from_slice(all.weight);
     w[n..].fill(0.0);
-    r.map_squares(s, |r2| smooth_weight(r2.sqrt() / params.effective_radius));
-    let deviation = (1.0 + sum(&s[..n])) / params.smooth_density - 1.0;
-    pair_vectors(r, w, e);
+    // The filling has no weight and no part in the smooth sum either.
+    s.iter_mut().zip(&*w).for_each(|(s, &w)| *s = smooth_weight(reach(w)));
+    let deviation = (1.0 + sum(s)) / params.smooth_density - 1.0;
+    pair_vectors(r, w, params.effective_radius, e);
     let m = moment(r, e, filled, scale(on), params.dimensions);
     let inverse = inverse(m, params.dimensions).unwrap_or(DMat3::IDENTITY);
     v.differences(i, all.neighbour, on.velocity);

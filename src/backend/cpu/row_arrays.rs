@@ -73,12 +73,14 @@ pub struct RowArrays {
     pub w: Column,
     /// Another number.
     pub s: Column,
+    /// A third one.
+    pub h: Column,
 }
 
 impl Default for RowArrays {
     fn default() -> Self {
         let v = Columns { x: [0.0; LONGEST], y: [0.0; LONGEST], z: [0.0; LONGEST] };
-        Self { r: v, v, e: v, w: [0.0; LONGEST], s: [0.0; LONGEST] }
+        Self { r: v, v, e: v, w: [0.0; LONGEST], s: [0.0; LONGEST], h: [0.0; LONGEST] }
     }
 }
 
@@ -94,6 +96,19 @@ pub fn sum(a: &[f64]) -> f64 {
         }
     }
     total(lanes) + rest
+}
+
+/// The smallest a_k; the length is a multiple of [`LANES`].
+#[inline(always)]
+pub fn least(a: &[f64]) -> f64 {
+    let mut lanes = [f64::INFINITY; LANES];
+    for a in a.chunks_exact(LANES) {
+        for k in 0..LANES {
+            // A comparison is one instruction; `f64::min` minds what is not a number.
+            lanes[k] = if a[k] < lanes[k] { a[k] } else { lanes[k] };
+        }
+    }
+    lanes.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// sum a_k b_k over the length of `a`, a multiple of [`LANES`].

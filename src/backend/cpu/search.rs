@@ -228,13 +228,16 @@ impl Search {
 
     /// Append the row found last to `chunk` as row `k`.
     #[inline(always)]
-    fn append(&self, chunk: &mut Chunk, k: usize) {
+    fn append(&self, chunk: &mut Chunk, k: usize, from: &Candidates) {
         chunk.neighbour.extend_from_slice(self.near.kept());
         chunk.dummies[k] = chunk.neighbour.len() as u32;
         chunk.neighbour.extend_from_slice(self.dummy.kept());
         chunk.start[k + 1] = chunk.neighbour.len() as u32;
         // The particle itself is always close.
         chunk.close[k] = self.near.close > 1;
+        // Water comes first in a row, and its slots below those of solids.
+        let water = from.fluid_start.last();
+        chunk.walls[k] = self.near.kept().last().zip(water).is_some_and(|(last, water)| last >= water);
     }
 }
 
@@ -257,11 +260,11 @@ fn chunk_rows(
         if let Some((i, x)) = active(k) {
             let found = search.row(i, x, reach, from, below);
             largest = largest.max((found, i));
-            search.append(chunk, k);
+            search.append(chunk, k, from);
         } else {
             chunk.dummies[k] = chunk.neighbour.len() as u32;
             chunk.start[k + 1] = chunk.dummies[k];
-            chunk.close[k] = false;
+            (chunk.close[k], chunk.walls[k]) = (false, false);
         }
     }
     chunk.weight.resize(chunk.neighbour.len(), 0.0);

@@ -80,7 +80,7 @@ pub struct Constants {
     pub smooth_density: f32,
     pub surface_head: f32,
     pub wall_shear: f32,
-    pub pad: f32,
+    pub wall_friction: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -213,7 +213,7 @@ impl Constants {
             smooth_density: params.smooth_density as f32,
             surface_head: missing_head(params) as f32,
             wall_shear: params.wall_shear as f32,
-            pad: 0.0,
+            wall_friction: params.wall_friction as f32,
         }
     }
 }

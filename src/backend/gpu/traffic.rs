@@ -58,6 +58,7 @@ impl Gpu {
                 keys * k * 6 + s.sorted() * (2 * v + 9 * k) + f * 4 * (2 * v + n) + k * s.moving,
             ),
             (Stage::NeighbourList, p * (v + k) + lists + k * (keys + s.cells) + walls),
+            (Stage::WallFriction, (f + followed) * k + f * v + update),
             (Stage::Collision, p.min(f + followed) * k + f * 4 * v),
             (Stage::NumberDensity, p * (v + n + 2 * k) + lists + walls),
             (Stage::PressureSource, p * (k + equation) + rows.used * (2 * v + n + k) + lists + 2 * walls),

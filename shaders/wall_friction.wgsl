@@ -1,0 +1,80 @@
+// Friction of the fluid on walls whose boundary layer is thinner than a spacing, tau = rho C_f |u_t| u_t, implicit:
+// a_i = -k |u_t| u_t / (1 + dt k |u_t|), k = C_f sum w / (l0 sum w above a flat wall), u_t what lies along the wall of the
+// velocity over it; and its reaction on the wall layers of moving solids. Written as an acceleration.
+// Twin: src/kernels/wall_friction.rs
+
+@group(0) @binding(2) var<storage, read> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(4) var<storage, read> neighbour_list: array<u32>;
+@group(0) @binding(5) var<storage, read> neighbour_count: array<u32>;
+@group(0) @binding(6) var<storage, read_write> acceleration: array<vec4f>;
+@group(0) @binding(7) var<storage, read_write> reaction: array<vec4f>;
+
+// Weight of a pair, 0 for a coincident one.
+fn pair_weight(r: vec3f) -> f32 {
+    let distance_squared = dot(r, r);
+    return select(
+        max(params.effective_radius * inverseSqrt(distance_squared) - 1.0, 0.0),
+        0.0,
+        distance_squared == 0.0,
+    );
+}
+
+// Acceleration of fluid slot i, and the sum of its weights with wall layers.
+fn friction(i: u32) -> vec4f {
+    let word = neighbour_count[i];
+    if !sees_wall(word) {
+        return vec4f(0.0);
+    }
+    let x = position[i].xyz;
+    let neighbours = near_of(word);
+    var sum = 0.0;
+    var wall = vec3f(0.0);
+    var normal = vec3f(0.0);
+    for (var k = 0u; k < neighbours; k++) {
+        let j = neighbour_list[near_place(i, k)];
+        if j >= params.fluid {
+            let r = position[j].xyz - x;
+            let w = pair_weight(r);
+            sum += w;
+            wall += w * velocity[j].xyz;
+            normal += pair_vector(w, r);
+        }
+    }
+    if sum == 0.0 {
+        return vec4f(0.0);
+    }
+    let over = velocity[i].xyz - wall / sum;
+    let length_squared = dot(normal, normal);
+    if length_squared > 0.0 {
+        normal *= inverseSqrt(length_squared);
+    }
+    let along = over - dot(over, normal) * normal;
+    let rate = params.wall_friction * sum * length(along);
+    return vec4f(-rate / (1.0 + now.dt * rate) * along, sum);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if i < params.fluid {
+        acceleration[i] = vec4f(friction(i).xyz, 0.0);
+    }
+//#if REACTION
+    else if i < params.fluid + params.moving_wall {
+        let x = position[i].xyz;
+        let neighbours = near_of(neighbour_count[i]);
+        var taken = vec3f(0.0);
+        for (var k = 0u; k < neighbours; k++) {
+            let j = neighbour_list[near_place(i, k)];
+            if j < params.fluid {
+                let other = friction(j);
+                if other.w > 0.0 {
+                    taken += pair_weight(position[j].xyz - x) / other.w * other.xyz;
+                }
+            }
+        }
+        reaction[i - params.fluid] -= vec4f(params.particle_mass * taken, 0.0);
+    }
+//#endif
+}
