@@ -61,10 +61,16 @@ impl Bounds {
             self.hi[k] = self.hi[k].max(hi[k]);
         }
     }
-    /// A solid, wherever its table of motion takes it.
-    fn add_moving(&mut self, lo: Vector, hi: Vector, rows: &[[f64; 4]]) {
+    /// A solid, wherever its tables take it; one that turns about `pivot` in a sphere about it.
+    fn add_moving(&mut self, lo: Vector, hi: Vector, rows: &[[f64; 4]], pivot: Option<Vector>) {
         self.add(lo, hi);
-        for row in rows {
+        let (lo, hi) = pivot.map_or((lo, hi), |pivot| {
+            let far = [0, 1, 2].map(|k| (lo[k] - pivot[k]).abs().max((hi[k] - pivot[k]).abs()));
+            let reach = length(&far);
+            (pivot.map(|x| x - reach), pivot.map(|x| x + reach))
+        });
+        let still = [[0.0; 4]];
+        for row in if rows.is_empty() { &still } else { rows } {
             let at = |x: Vector| [x[0] + row[1], x[1] + row[2], x[2] + row[3]];
             self.add(at(lo), at(hi));
         }
@@ -123,11 +129,16 @@ impl Estimate {
         case.obstacle.iter().for_each(|o| lattice.add(o.min, o.max));
         case.moving_wall.iter().for_each(|w| lattice.add(w.min, w.max));
         let mut domain = lattice;
-        case.moving_wall.iter().for_each(|w| domain.add_moving(w.min, w.max, &w.motion));
+        for w in &case.moving_wall {
+            let center = [0, 1, 2].map(|k| 0.5 * (w.min[k] + w.max[k]));
+            let pivot = (!w.rotation.is_empty()).then_some(w.pivot.unwrap_or(center));
+            domain.add_moving(w.min, w.max, &w.motion, pivot);
+        }
         for body in &case.body {
             let half = 0.5 * length(&extent(body));
             let (lo, hi) = (body.center.map(|x| x - half), body.center.map(|x| x + half));
-            domain.add_moving(lo, hi, body.motion.as_deref().unwrap_or_default());
+            let pivot = (!body.rotation.is_empty()).then_some(body.pivot.unwrap_or(body.center));
+            domain.add_moving(lo, hi, body.motion.as_deref().unwrap_or_default(), pivot);
         }
         for plane in &case.plane {
             let half = 0.5 * plane.size[0].hypot(if flat { 0.0 } else { plane.size[1] });

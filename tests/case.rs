@@ -130,6 +130,21 @@ const WRONG: &[(&str, &str, &[&str])] = &[
             "write 3 elements",
         ],
     ),
+    (
+        "motion = [[0, 0, 0, 0], [1, 0, 0, 1]]",
+        "rotation = [[0, 0, 5, 0], [1, 0, 90, 0]]",
+        &["moving_wall.0.rotation.0: the table is at (0, 5, 0) degrees at t = 0", "begin with [0, 0, 0, 0]"],
+    ),
+    (
+        "motion = [[0, 0, 0, 0], [1, 0, 0, 1]]",
+        "motion = [[0, 0, 0, 0], [1, 0, 0, 1]]\npivot = [0, 0, 0]",
+        &["moving_wall.0.pivot: nothing turns about it", "remove `pivot`"],
+    ),
+    (
+        "motion = [[0, 0, 0, 0], [1, 0, 0, 1]]",
+        "rotation = [[0, 0, 0, 0], [1e-5, 0, 90, 0]]",
+        &["moving_wall.0.rotation.1:", "particles in a time step"],
+    ),
     ("[1, 0, 0, 1]]", "[1, 0, 0, 1, 5]]", &["moving_wall.0.motion.1: 5 elements", "first 4"]),
     ("max = [0.5, 1.0, 0.5]", "max = [0.5, 1.0, 0.5, 1]", &["fluid.block.0.max: 4 elements"]),
     // motion

@@ -5,7 +5,7 @@ use seixo::body::Wrench;
 use seixo::case::{Contact, Law};
 use seixo::contact::Solids;
 use seixo::error::Error;
-use seixo::scene::Motion;
+use seixo::scene::{Curve, Motion};
 use seixo_study::contact_checks::{DAM_BREAK_CUBE, collide, edge_drop, elastic_drop, restitution, smooth};
 use seixo_study::contact_rest::{demolish, drop_on_body, random_drops, sliding_stop, stack};
 use seixo_study::dry::{DryScene, FreeBox, GRAVITY};
@@ -324,7 +324,7 @@ fn a_body_does_not_sink_on_the_edge_of_a_step_between_its_points() {
 #[test]
 fn a_moving_wall_pushes_a_body() {
     let size = DVec3::splat(0.2);
-    let motion = Motion { time: vec![0.0, 0.5, 1.5], displacement: vec![DVec3::ZERO, DVec3::ZERO, DVec3::X] };
+    let motion = Motion::shift(Curve::new(vec![0.0, 0.5, 1.5], vec![DVec3::ZERO, DVec3::ZERO, DVec3::X]));
     for law in [Law::Smooth, Law::Paper] {
         let scene = DryScene::new(0.025, DVec3::splat(-2.0), DVec3::splat(2.0))
             .gravity(DVec3::ZERO)

@@ -63,6 +63,8 @@ fn the_ledger_closes_with_a_gate_and_a_body_and_shows_what_they_put_in() {
         max: [0.036, 0.252, 0.225],
         open: vec![],
         motion: vec![[0.0; 4], [0.1, 0.0, 0.0, -0.05]],
+        rotation: vec![],
+        pivot: None,
     }];
     let (ledger, start) = closes(&mut case, 250, 0);
     for entry in [Entry::Walls, Entry::Exchange, Entry::Contact] {

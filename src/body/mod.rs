@@ -88,8 +88,8 @@ pub(crate) struct Body {
     pub locked_rotation: [bool; 3],
     /// Shape, in the body's frame.
     pub shape: Shape,
-    /// Table of motion, of a prescribed solid.
-    motion: Option<(DVec3, Motion)>,
+    /// Place and orientation at the start, and tables of motion, of a prescribed solid.
+    motion: Option<(DVec3, DQuat, Motion)>,
     /// The inertia does not depend on the orientation.
     isotropic: bool,
 }
@@ -116,7 +116,9 @@ impl Body {
             isotropic: false,
         };
         match &solid.drive {
-            Drive::Prescribed(motion) => body.motion = Some((solid.position, motion.clone())),
+            Drive::Prescribed(motion) => {
+                body.motion = Some((solid.position, body.pose.orientation, motion.clone()));
+            }
             Drive::Free(free) => {
                 let flat = dimensions == 2;
                 let translation = [0, 1, 2].map(|k| free.locked_translation[k] || flat && k == 1);
@@ -246,26 +248,54 @@ impl Body {
         self.pose.angular_velocity = self.inverse_inertia * self.momentum;
     }
 
-    /// Velocity [m/s] of a prescribed solid over the step from `t` to `t + dt`: its displacement over dt,
-    /// so that it arrives where the table says whatever kink lies inside the step.
-    pub fn prescribed_velocity(&self, t: f64, dt: f64) -> Option<DVec3> {
-        self.motion.as_ref().map(|(_, m)| (m.displacement(t + dt) - m.displacement(t)) / dt)
+    /// Pose of a prescribed solid at `t + dt`, with its mean velocities since `t`: its way and its turn over dt, so that it
+    /// arrives where the table says whatever kink lies inside the step.
+    pub fn prescribed(&self, t: f64, dt: f64) -> Option<Pose> {
+        let (position, orientation, motion) = self.motion.as_ref()?;
+        let end = motion.displacement(t + dt);
+        let velocity = (end - motion.displacement(t)) / dt;
+        let mut pose = Pose { position: *position + end, velocity, ..self.pose };
+        if motion.turns() {
+            let turned = motion.turn(t + dt);
+            let mut way = turned * motion.turn(t).inverse();
+            if way.w < 0.0 {
+                way = -way;
+            }
+            pose.orientation = (turned * *orientation).normalize();
+            pose.angular_velocity = way.to_scaled_axis() / dt;
+        }
+        Some(pose)
+    }
+
+    /// Gives a prescribed solid its mean velocities from `t` to `t + h` [s].
+    pub fn follow(&mut self, t: f64, h: f64) {
+        if let Some(pose) = self.prescribed(t, h) {
+            self.pose.velocity = pose.velocity;
+            self.pose.angular_velocity = pose.angular_velocity;
+        }
+    }
+
+    /// Moves a prescribed solid for a sub-step of `h` [s] that ends at `now` [s]; the `last` of a step puts it onto its table.
+    pub fn carry(&mut self, now: f64, h: f64, last: bool) {
+        let Some((position, orientation, motion)) = &self.motion else { return };
+        let way = h * self.pose.velocity;
+        self.pose.position =
+            if last { *position + motion.displacement(now) } else { self.pose.position + way };
+        if motion.turns() {
+            self.pose.orientation = (motion.turn(now) * *orientation).normalize();
+            self.rotation = DMat3::from_quat(self.pose.orientation);
+        }
     }
 
     /// Whether a prescribed solid's velocity changes between `t` and `t + dt` [s].
     pub fn bends(&self, t: f64, dt: f64) -> bool {
-        self.motion.as_ref().is_some_and(|(_, m)| m.bends(t, dt))
-    }
-
-    /// Position [m] of a prescribed solid at `t`.
-    pub fn prescribed_position(&self, t: f64) -> Option<DVec3> {
-        self.motion.as_ref().map(|(start, m)| *start + m.displacement(t))
+        self.motion.as_ref().is_some_and(|(.., m)| m.bends(t, dt))
     }
 
     /// Speed of its fastest point [m/s] within the step from `t` to `t + dt`, forces left aside.
     pub fn fastest(&self, t: f64, dt: f64) -> f64 {
         match &self.motion {
-            Some((_, motion)) => motion.fastest(t, t + dt),
+            Some((.., motion)) => motion.fastest(t, t + dt, self.radius()),
             None => self.pose.velocity.length() + self.pose.angular_velocity.length() * self.radius(),
         }
     }

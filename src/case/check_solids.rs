@@ -18,7 +18,7 @@ impl Checker<'_> {
             &format!("body.{k}"),
             &[("mass", body.mass.is_some()), ("density", body.density.is_some())],
         );
-        if given == 0 && body.motion.is_none() {
+        if given == 0 && !body.is_driven() {
             self.add(
                 format!("body.{k}"),
                 format!("body `{}` has neither mass nor density", body.name),
@@ -55,12 +55,17 @@ impl Checker<'_> {
         }
         if let Some(rows) = &body.motion {
             self.motion(&path("motion"), rows);
+        }
+        let far = body.size.map_or(0.0, |s| 0.5 * length(&s));
+        let far = far.max(body.radius.unwrap_or(0.0).hypot(0.5 * body.height.unwrap_or(0.0)));
+        self.rotation(&format!("body.{k}"), &body.rotation, (body.pivot, body.center), far);
+        if body.is_driven() {
             for (key, given) in [("locked", !body.locked.is_empty()), ("standing", body.standing)] {
                 if given {
                     self.add(
                         path(key),
                         format!("body `{}` follows a table: `{key}` has no effect", body.name),
-                        format!("remove `{key}` or `motion`"),
+                        format!("remove `{key}`, or `motion` and `rotation`"),
                     );
                 }
             }
@@ -69,7 +74,7 @@ impl Checker<'_> {
                     self.add(
                         path(key),
                         format!("body `{}` follows a table: `{key}` has no effect", body.name),
-                        format!("remove `{key}` or `motion`"),
+                        format!("remove `{key}`, or `motion` and `rotation`"),
                     );
                 }
             }
@@ -110,7 +115,7 @@ impl Checker<'_> {
             let lengths = [x, if flat { x } else { y }, z].map(|l| if l > 0.0 { l } else { f64::INFINITY });
             lengths.into_iter().fold(f64::INFINITY, f64::min)
         };
-        let free = self.case.body.iter().filter(|b| b.motion.is_none() && b.locked.len() < 6);
+        let free = self.case.body.iter().filter(|b| !b.is_driven() && b.locked.len() < 6);
         let sinks = |b: &&Body| weight(b) / spring > smallest(b);
         let found = free.filter(sinks).max_by(|a, b| weight(a).total_cmp(&weight(b)));
         if let Some((name, weight, edge)) = found.map(|b| (b.name.clone(), weight(b), smallest(b))) {
@@ -194,7 +199,7 @@ impl Checker<'_> {
     }
 
     pub(super) fn contact(&mut self) {
-        let moves = |b: &&Body| b.motion.is_none() && b.locked.len() < 6;
+        let moves = |b: &&Body| !b.is_driven() && b.locked.len() < 6;
         let Some(contact) = &self.case.contact else {
             if let Some(body) = self.case.body.iter().find(moves) {
                 let message = format!("body `{}` can move, but there is no [contact]", body.name);

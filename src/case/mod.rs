@@ -327,8 +327,15 @@ pub struct MovingWall {
     #[serde(default)]
     pub open: Vec<Face>,
     /// Rows of time [s] and displacement x, y, z [m]. Two rows: a constant velocity; more: a smooth curve through them
-    /// with a continuous velocity. At rest before the first and after the last.
+    /// with a continuous velocity. At rest before the first and after the last. May be left out if there is `rotation`.
+    #[serde(default)]
     pub motion: Vec<[f64; 4]>,
+    /// Rows of time [s] and angles [degrees] about the axes x, y and z of the world, turned in this order; smooth as
+    /// `motion` is, with rows of its own. In two dimensions only the angle about y.
+    #[serde(default)]
+    pub rotation: Vec<[f64; 4]>,
+    /// What `rotation` turns about, at t = 0 [m]; it moves with `motion`. The middle of the wall if absent.
+    pub pivot: Option<Vector>,
 }
 
 /// Orientation as a turn about an axis.
@@ -405,6 +412,12 @@ pub struct Body {
     /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table, as a moving wall does,
     /// instead of forces.
     pub motion: Option<Vec<[f64; 4]>>,
+    /// Rows of time [s] and angles [degrees] about the axes x, y and z of the world, from the orientation at t = 0: the
+    /// body then follows the table, as a moving wall does.
+    #[serde(default)]
+    pub rotation: Vec<[f64; 4]>,
+    /// What `rotation` turns about, at t = 0 [m]; it moves with `motion`. `center` if absent.
+    pub pivot: Option<Vector>,
     /// Remove the water that the body displaces at t = 0 (otherwise an overlap is an error).
     #[serde(default)]
     pub displaces_fluid: bool,

@@ -52,6 +52,11 @@ impl BodyShape {
 }
 
 impl Body {
+    /// Whether it follows a table instead of forces.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.motion.is_some() || !self.rotation.is_empty()
+    }
+
     /// Its shape, and the share of a given mass that it stands for: in two dimensions (`plane`) a body is a slice as
     /// wide as the `spacing` [m].
     ///

@@ -159,9 +159,9 @@ impl Solids {
     /// and water fall together there. Without `contact` where that acts with the pressure, see [`Solids::free_bodies`].
     pub fn predict(&mut self, t: f64, dt: f64, gravity: DVec3, contact: bool) -> &[Pose] {
         for (k, body) in self.bodies.iter().enumerate() {
-            self.predicted[k] = match (body.prescribed_velocity(t, dt), body.prescribed_position(t + dt)) {
-                (Some(velocity), Some(position)) => Pose { position, velocity, ..body.pose },
-                _ => {
+            self.predicted[k] = match body.prescribed(t, dt) {
+                Some(pose) => pose,
+                None => {
                     let mut body = body.clone();
                     let contact = if contact { self.contact[k] } else { Wrench::default() };
                     body.kick(dt * (body.mass * gravity + contact.force), dt * contact.torque);
@@ -195,34 +195,25 @@ impl Solids {
         fluid: &[Wrench],
     ) -> Result<ContactReport> {
         let cut = self.prepare(dt)?;
+        self.bodies.iter_mut().for_each(|b| b.follow(t, dt));
         let substeps = self.hurry(cut, t, dt)?;
         let mut report = ContactReport { substeps, omega_dt: cut.omega_dt, ..ContactReport::default() };
         let h = dt / f64::from(report.substeps);
         self.substep = h;
         let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
-        for body in &mut self.bodies {
-            if let Some(velocity) = body.prescribed_velocity(t, dt) {
-                body.pose.velocity = velocity;
-            }
-        }
         for step in 0..report.substeps {
             let start = t + h * f64::from(step);
-            for body in self.bodies.iter_mut().filter(|b| b.bends(t, dt)) {
-                if let Some(velocity) = body.prescribed_velocity(start, h) {
-                    body.pose.velocity = velocity;
-                }
-            }
+            self.bodies.iter_mut().filter(|b| b.bends(t, dt)).for_each(|b| b.follow(start, h));
             // a plain as_deref_mut would keep the borrow for the whole loop
             let compute = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
             self.substep(compute, (start, h, dt), fluid, &mut report)?;
+            let last = step + 1 == report.substeps;
             let now = t + dt * f64::from(step + 1) / f64::from(report.substeps);
             for (k, body) in self.bodies.iter_mut().enumerate() {
                 if body.is_free() {
                     body.drift(h);
-                } else if step + 1 == report.substeps {
-                    body.pose.position = body.prescribed_position(now).unwrap_or(body.pose.position);
                 } else {
-                    body.pose.position += h * body.pose.velocity;
+                    body.carry(now, h, last);
                 }
                 self.candidates.travelled(k, body, h);
             }

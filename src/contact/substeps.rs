@@ -6,12 +6,15 @@ use super::stiffness::{Damping, Lambda};
 use crate::body::Body;
 use crate::case;
 use crate::error::{CaseError, Problem, Result};
-use crate::scene::{Drive, Scene, WallShape};
+use crate::scene::{Drive, Scene, Solid, WallShape};
+use glam::DMat3;
 
 /// Largest dt sqrt(K / m_e) of a sub-step; 2 is the limit of stability, energy errors grow as its square.
 pub(crate) const OMEGA_STEP: f64 = 0.5;
 /// The same where energy must come back: the law `smooth` undamped, or with a restitution.
 pub(crate) const ELASTIC_OMEGA_STEP: f64 = 0.2;
+/// The same of the second spring, the stop, which hardly any contact reaches.
+pub(crate) const STOP_OMEGA_STEP: f64 = 0.3;
 /// Largest C dt / m_e of a sub-step.
 pub(crate) const DAMPING_STEP: f64 = 0.8;
 /// Most sub-steps of the smooth law. What would need more is softened: at 64 sub-steps a body still
@@ -189,7 +192,7 @@ impl Limits {
 fn starting_speed(scene: &Scene) -> f64 {
     let start = scene.solids.iter().map(|s| match &s.drive {
         Drive::Free(body) => body.velocity.length(),
-        Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY),
+        Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.shape.radius()),
     });
     start.fold(0.0, f64::max)
 }
@@ -213,7 +216,14 @@ fn falling_speed(scene: &Scene) -> f64 {
         let rise = (w.axes.transpose() * up).abs() * w.half;
         w.center.dot(up) + 2.0 * rise.max_element() - rise.element_sum()
     };
-    let lowest = scene.walls.iter().map(floor).fold(f64::INFINITY, f64::min);
+    let table = |s: &Solid| match &s.drive {
+        Drive::Prescribed(_) => {
+            Some(s.position.dot(up) + s.shape.extent(DMat3::from_quat(s.orientation)).dot(up.abs()))
+        }
+        Drive::Free(_) => None,
+    };
+    let tables = scene.solids.iter().filter_map(table);
+    let lowest = scene.walls.iter().map(floor).chain(tables).fold(f64::INFINITY, f64::min);
     let fall = if lowest < highest && lowest.is_finite() { highest - lowest } else { 0.0 };
     let start = starting_speed(scene);
     (start * start + 2.0 * scene.gravity.length() * fall.max(scene.depth)).sqrt()

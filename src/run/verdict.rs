@@ -42,7 +42,7 @@ impl Scale {
         let start = scene.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         // Tables of motion put in any energy: as much as all the water and all the bodies at their speed.
         let driven = scene.solids.iter().filter_map(|s| match &s.drive {
-            Drive::Prescribed(motion) => Some(motion.fastest(0.0, simulation.case.run.end)),
+            Drive::Prescribed(motion) => Some(motion.fastest(0.0, simulation.case.run.end, s.shape.radius())),
             Drive::Free(_) => None,
         });
         let driven = driven.fold(0.0, f64::max);

@@ -23,9 +23,11 @@ pub(super) fn body(
     if plane {
         position.y = 0.0;
     }
-    let drive = match &body.motion {
-        Some(rows) => Drive::Prescribed(motion(rows, plane)),
-        None => Drive::Free(free(body, &shape, share, plane)),
+    let drive = if body.is_driven() {
+        let rows = body.motion.as_deref().unwrap_or_default();
+        Drive::Prescribed(motion((rows, &body.rotation, body.pivot), position, plane))
+    } else {
+        Drive::Free(free(body, &shape, share, plane))
     };
     let particles = shape.particles(spacing, dimensions, layers);
     Ok(Solid {

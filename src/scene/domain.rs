@@ -4,7 +4,7 @@ use super::Drive;
 use super::build::{AXES, Builder};
 use super::oriented::Placed;
 use crate::error::Problem;
-use glam::{DVec3, IVec3};
+use glam::{DMat3, DVec3, IVec3};
 
 impl Builder<'_> {
     /// The case's domain, or one with room around everything; complains of what lies outside.
@@ -21,8 +21,11 @@ impl Builder<'_> {
             let label = format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name);
             bounds.add(&label, lo, hi);
             if let Drive::Prescribed(motion) = &solid.drive {
-                for &d in &motion.displacement {
-                    bounds.add(&label, lo + d, hi + d);
+                for t in motion.samples() {
+                    let center = shape.center + motion.displacement(t);
+                    let axes = DMat3::from_quat(motion.turn(t)) * shape.axes;
+                    let reach = Placed { center, axes, ..shape }.bounds();
+                    bounds.add(&label, center - reach, center + reach);
                 }
             }
         }

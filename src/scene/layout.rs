@@ -96,7 +96,10 @@ impl Layout {
             let arm = solid.orientation * offset;
             let velocity = match &solid.drive {
                 Drive::Free(free) => free.velocity + free.angular_velocity.cross(arm),
-                Drive::Prescribed(motion) => motion.velocity(0.0),
+                Drive::Prescribed(motion) => {
+                    let (velocity, spin) = motion.velocity(0.0);
+                    velocity + spin.cross(arm)
+                }
             };
             self.push(solid.position + arm, velocity, kind, k as u32 + 1);
         }

@@ -13,6 +13,7 @@
 
 mod bodies;
 mod build;
+mod curve;
 mod domain;
 mod jitter;
 mod lattice;
@@ -25,6 +26,7 @@ mod walls;
 mod water;
 
 pub use crate::shape::Shape;
+pub use curve::Curve;
 pub use motion::Motion;
 pub(crate) use placement::CONTACT_DISTANCE;
 

@@ -30,13 +30,13 @@ impl Placed {
     pub fn cuboid(center: DVec3, half: DVec3, axes: DMat3) -> Self {
         Self { center, shape: Shape::Box(Cuboid { half }), axes }
     }
-    /// Half of the shape's extent along a unit vector [m].
+    /// Largest coordinate along a unit vector from the centre [m].
     pub fn reach(&self, n: DVec3) -> f64 {
         self.shape.reach(self.axes.transpose() * n)
     }
     /// Half of the edges of the enclosing box along the world's axes [m].
     pub fn bounds(&self) -> DVec3 {
-        DVec3::new(self.reach(DVec3::X), self.reach(DVec3::Y), self.reach(DVec3::Z))
+        DVec3::from_array(DVec3::AXES.map(|n| self.reach(n).max(self.reach(-n))))
     }
     /// Whether a point lies inside by more than `margin` [m] (negative: within that distance).
     pub fn holds(&self, p: DVec3, margin: f64) -> bool {
@@ -49,16 +49,22 @@ impl Placed {
     /// The same, with that direction, in which this shape would have to move.
     pub(crate) fn way_out(&self, other: &Self) -> (f64, DVec3) {
         let d = self.center - other.center;
-        let (overlap, n) = self.least(other, |n| self.reach(n) + other.reach(n) - d.dot(n).abs());
+        // a shape need not reach as far one way as the other
+        let (overlap, n) = self.least(other, |n| self.between(other, n * d.dot(n).signum()) - d.dot(n).abs());
         (overlap, n * d.dot(n).signum())
+    }
+    /// Distance of the centres along `n`, the direction to this shape from `other`, at which they touch [m].
+    fn between(&self, other: &Self, n: DVec3) -> f64 {
+        self.reach(-n) + other.reach(n)
     }
     /// Least distance >= 0 by which this shape has to move along the unit vector `up` to touch `other` only
     /// [m]; infinite if it cannot.
     pub fn lift(&self, other: &Self, up: DVec3) -> f64 {
         let d = self.center - other.center;
         let lift = self.least(other, |n| {
-            let (reach, at, rate) = (self.reach(n) + other.reach(n), d.dot(n), up.dot(n));
-            if at.abs() >= reach {
+            let (at, rate) = (d.dot(n), up.dot(n));
+            let reach = self.between(other, n * rate.signum());
+            if at.abs() >= self.between(other, n * at.signum()) {
                 0.0
             } else if rate.abs() > 1e-9 {
                 (reach - at * rate.signum()) / rate.abs()

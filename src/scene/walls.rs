@@ -2,7 +2,7 @@
 
 use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
 use super::oriented::Placed;
-use super::{Drive, Motion, Shape, Solid, WallShape};
+use super::{Curve, Drive, Motion, Shape, Solid, WallShape};
 use crate::case::{self, Face, TANK_FACES};
 use glam::{DMat3, DQuat, DVec3, IVec3};
 
@@ -230,7 +230,7 @@ pub(super) fn moving_wall(
         shape: Shape::cuboid(hi - lo),
         position,
         orientation: DQuat::IDENTITY,
-        drive: Drive::Prescribed(motion(&wall.motion, lattice.plane)),
+        drive: Drive::Prescribed(motion((&wall.motion, &wall.rotation, wall.pivot), position, lattice.plane)),
         wall_slots: 0..0,
         dummy_slots: 0..0,
         wall_offset: Vec::new(),
@@ -252,12 +252,27 @@ pub(super) fn moving_wall(
     (solid, taken)
 }
 
-/// A table of motion from rows of a case.
-pub(super) fn motion(rows: &[[f64; 4]], plane: bool) -> Motion {
-    Motion {
-        time: rows.iter().map(|r| r[0]).collect(),
-        displacement: rows.iter().map(|r| DVec3::new(r[1], if plane { 0.0 } else { r[2] }, r[3])).collect(),
+/// The motion of a solid whose centre is `center` at the start, from a case's rows of displacement and of angles and the
+/// place that it turns about.
+pub(super) fn motion(
+    (rows, angles, pivot): (&[[f64; 4]], &[[f64; 4]], Option<case::Vector>),
+    center: DVec3,
+    plane: bool,
+) -> Motion {
+    let curve = |rows: &[[f64; 4]], of: &dyn Fn(&[f64; 4]) -> DVec3| {
+        Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(of).collect())
+    };
+    let still = [[0.0; 4]];
+    let rows = if rows.is_empty() { &still } else { rows };
+    let motion = Motion::shift(curve(rows, &|r| DVec3::new(r[1], if plane { 0.0 } else { r[2] }, r[3])));
+    if angles.is_empty() {
+        return motion;
     }
+    let mut arm = center - pivot.map_or(center, DVec3::from);
+    if plane {
+        arm.y = 0.0;
+    }
+    motion.turned(curve(angles, &|r| DVec3::new(r[1], r[2], r[3]) * (std::f64::consts::PI / 180.0)), arm)
 }
 
 /// Frame and size in particles of a plane.

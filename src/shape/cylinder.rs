@@ -1,7 +1,7 @@
 //! A cylinder with flat ends about the z axis of its frame: rings and a side, particles on rings.
 
 use super::surface::{Ring, Side, Surface};
-use super::{ALL_FACES, Faces, Geometry, Inside, Particles, WallLayer, convex};
+use super::{ALL_FACES, Faces, Geometry, Inside, Node, Particles, WallLayer, convex};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -102,7 +102,7 @@ impl Geometry for Cylinder {
         (start, along, length): (DVec3, DVec3, f64),
         faces: Faces,
         _: f64,
-        visit: &mut dyn FnMut(f64, f64, Inside),
+        visit: &mut dyn FnMut(Node, Inside),
     ) {
         let distance = |s: f64| {
             let (d, gradient) = self.distance(start + s * along);
@@ -110,7 +110,7 @@ impl Geometry for Cylinder {
         };
         convex::along(length, distance, |s, width| {
             if let Some(inside) = self.depth(start + s * along, faces) {
-                visit(s, width, inside);
+                visit(Node::point(s, width), inside);
             }
         });
     }

@@ -1,7 +1,7 @@
 //! A round slice in the plane y = 0: the cylinder of two dimensions. It has no ends.
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Particles, WallLayer, convex};
+use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, convex};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -64,7 +64,7 @@ impl Geometry for Disc {
         (start, along, length): (DVec3, DVec3, f64),
         faces: Faces,
         _: f64,
-        visit: &mut dyn FnMut(f64, f64, Inside),
+        visit: &mut dyn FnMut(Node, Inside),
     ) {
         let distance = |s: f64| {
             let (d, gradient) = self.distance(start + s * along);
@@ -72,7 +72,7 @@ impl Geometry for Disc {
         };
         convex::along(length, distance, |s, width| {
             if let Some(inside) = self.depth(start + s * along, faces) {
-                visit(s, width, inside);
+                visit(Node::point(s, width), inside);
             }
         });
     }

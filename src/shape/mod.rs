@@ -30,6 +30,24 @@ use std::ops::Deref;
 /// Faces of a shape: bit 2 k for the lower face of axis k, bit 2 k + 1 for the upper one.
 pub type Faces = u8;
 
+/// A node of a rule along a stretch of a line.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Place along the line [m].
+    pub place: f64,
+    /// Length that it stands for [m].
+    pub length: f64,
+    /// Deviation along the line of the force that it stands for, from its place [m]; 0 for a point.
+    pub deviation: f64,
+}
+
+impl Node {
+    /// A point at `place` that stands for `length` [m].
+    pub fn point(place: f64, length: f64) -> Self {
+        Self { place, length, deviation: 0.0 }
+    }
+}
+
 /// Where a point lies inside a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inside {
@@ -103,7 +121,7 @@ impl Shape {
         line: (DVec3, DVec3, f64),
         faces: Faces,
         least: f64,
-        mut visit: impl FnMut(f64, f64, Inside),
+        mut visit: impl FnMut(Node, Inside),
     ) {
         match self {
             Self::Box(shape) => shape.each_node(line, faces, least, visit),
@@ -160,16 +178,9 @@ pub trait Geometry: std::fmt::Debug + Sync {
     /// Whether the stretch `start` + s `along`, s in 0..`length`, may come within `margin` [m] of it.
     fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool;
 
-    /// Calls `visit` with s, the length that it stands for [m] and its depth for every node of the rule that
-    /// integrates depth^8 over the stretch `start` + s `along`, s in 0..`length`. One of which length times
+    /// Calls `visit` with every node of the rule that integrates depth^8, and its depth, over the stretch `start` + s `along`, s in 0..`length`. One of which length times
     /// depth^8 stays below `least` may be left out.
-    fn nodes(
-        &self,
-        line: (DVec3, DVec3, f64),
-        faces: Faces,
-        least: f64,
-        visit: &mut dyn FnMut(f64, f64, Inside),
-    );
+    fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, least: f64, visit: &mut dyn FnMut(Node, Inside));
 
     /// Particles about `spacing` [m] apart: the wall layer and what lies below it, hollow beyond `layers`.
     fn particles(&self, spacing: f64, dimensions: u32, layers: i32) -> Particles;

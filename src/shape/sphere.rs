@@ -1,7 +1,7 @@
 //! A sphere: one ball of a surface, particles on concentric layers.
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Particles, WallLayer, convex};
+use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, convex};
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 
@@ -58,7 +58,7 @@ impl Geometry for Sphere {
         (start, along, length): (DVec3, DVec3, f64),
         faces: Faces,
         _: f64,
-        visit: &mut dyn FnMut(f64, f64, Inside),
+        visit: &mut dyn FnMut(Node, Inside),
     ) {
         let distance = |s: f64| {
             let (d, gradient) = self.distance(start + s * along);
@@ -66,7 +66,7 @@ impl Geometry for Sphere {
         };
         convex::along(length, distance, |s, width| {
             if let Some(inside) = self.depth(start + s * along, faces) {
-                visit(s, width, inside);
+                visit(Node::point(s, width), inside);
             }
         });
     }

@@ -3,11 +3,12 @@
 use super::Study;
 use super::contact_checks::none;
 use super::contact_cost::backend;
+use super::contact_statics::{STRUCTURES, Structure, measured, stands};
 use super::definition::Setup;
 use super::dry::GRAVITY;
 use super::engine::{Context, Job, Processor};
 use super::report::{Report, short};
-use super::row::{Measured, Row, Work};
+use super::row::{Measured, Row};
 use seixo::case::Case;
 use seixo::compute::Compute;
 use seixo::contact::{ContactReport, Solids};
@@ -35,7 +36,10 @@ impl Run<'_> {
     }
 
     /// A step.
-    fn step(&mut self) -> Result<ContactReport> {
+    ///
+    /// # Errors
+    /// Those of [`Solids::advance_on`].
+    pub fn step(&mut self) -> Result<ContactReport> {
         let (still, now) = (none(self.solids.poses().len()), self.time());
         let compute = self.compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
         let report = self.solids.advance_on(compute, now, self.dt, &still)?;
@@ -316,15 +320,18 @@ const FAULTS: &[Fault] = &[
     },
 ];
 
-fn measure(fault: &Fault, spacing: f64, paper: bool, device: bool, context: &Context) -> Result<Measured> {
-    let mut text = format!("[run]\nspacing = {spacing}\n{}", (fault.text)());
-    if paper {
-        text += "law = \"paper\"\n";
-    }
+/// Does `use_it` with the case of `text`, whose pairs are on a device if that is wanted. `Err` of the inside: there is none.
+fn with<T>(
+    text: &str,
+    device: bool,
+    context: &Context,
+    out: &mut Measured,
+    use_it: impl FnOnce(&mut Run) -> Result<T>,
+) -> Result<std::result::Result<T, Measured>> {
     let case: Case = text.parse()?;
     let scene = Scene::build(&case)?;
     let Some(contact) = &case.contact else { return Err(Error::key("contact", "is missing", "give it")) };
-    let mut out = Measured { machine: "CPU, f64".into(), ..Measured::default() };
+    out.machine = "CPU, f64".into();
     let mut gpu = None;
     if device {
         let made = backend(&scene, contact, |s, p, plan, settings| {
@@ -332,7 +339,7 @@ fn measure(fault: &Fault, spacing: f64, paper: bool, device: bool, context: &Con
         });
         match made {
             Ok(made) => gpu = Some(made),
-            Err(error @ Error::Gpu(_)) => return Ok(Measured::failed(&error)),
+            Err(error @ Error::Gpu(_)) => return Ok(Err(Measured::failed(&error))),
             Err(error) => return Err(error),
         }
         out.machine = gpu.as_ref().map_or(String::new(), |g| g.description());
@@ -340,7 +347,21 @@ fn measure(fault: &Fault, spacing: f64, paper: bool, device: bool, context: &Con
     let solids = Solids::new(&scene, Some(contact))?;
     let compute = gpu.as_mut().and_then(|g| g.compute());
     let mut run = Run { solids, compute, dt: case.run.time_step, step: 0 };
-    let (value, exact) = (fault.measure)(&mut run)?;
+    let used = use_it(&mut run)?;
+    out.work.steps += u64::from(run.step);
+    Ok(Ok(used))
+}
+
+fn measure(fault: &Fault, spacing: f64, paper: bool, device: bool, context: &Context) -> Result<Measured> {
+    let mut text = format!("[run]\nspacing = {spacing}\n{}", (fault.text)());
+    if paper {
+        text += "law = \"paper\"\n";
+    }
+    let mut out = Measured::default();
+    let (value, exact) = match with(&text, device, context, &mut out, fault.measure)? {
+        Ok(found) => found,
+        Err(none) => return Ok(none),
+    };
     let scale = if fault.scale > 0.0 { fault.scale } else { exact };
     out.put(VALUE, value);
     out.put(EXACT, exact);
@@ -349,7 +370,30 @@ fn measure(fault: &Fault, spacing: f64, paper: bool, device: bool, context: &Con
         out.put(BEFORE, if fault.scale > 0.0 { before } else { before * exact });
     }
     out.limit(ERROR, fault.most);
-    out.work = Work { steps: run.step.into(), ..Work::default() };
+    Ok(out)
+}
+
+/// The value from which on `structure` stands, against that of statics.
+fn threshold(structure: &Structure, spacing: f64, device: bool, context: &Context) -> Result<Measured> {
+    let (mut out, mut missing) = (Measured::default(), None);
+    let value = measured(structure, |at| {
+        let text = format!("[run]\nspacing = {spacing}\n{}", (structure.text)(at));
+        match with(&text, device, context, &mut out, |run| stands(run, structure.time))? {
+            Ok(stands) => Ok(stands),
+            Err(none) => {
+                missing = Some(none);
+                Ok(false)
+            }
+        }
+    })?;
+    if let Some(none) = missing {
+        return Ok(none);
+    }
+    let exact = (structure.threshold)();
+    out.put(VALUE, value);
+    out.put(EXACT, exact);
+    out.put(ERROR, (value / exact - 1.0).abs());
+    out.limit(ERROR, 0.03);
     Ok(out)
 }
 
@@ -386,6 +430,17 @@ pub fn study(_: &Setup) -> Study {
                     let task = move |context: &Context| measure(fault, spacing, paper, device, context);
                     jobs.push(Job::new(fault.name, &parameters, weight, task));
                 }
+            }
+        }
+    }
+    for structure in STRUCTURES {
+        for (k, spacing) in structure.spacings.into_iter().enumerate() {
+            for device in [false, true].into_iter().filter(|d| !d || k == 0) {
+                let place = if device { "device" } else { "host" };
+                let parameters =
+                    [("spacing", spacing.to_string()), ("law", "smooth".into()), ("pairs", place.into())];
+                let task = move |context: &Context| threshold(structure, spacing, device, context);
+                jobs.push(Job::new(structure.name, &parameters, if device { 60.0 } else { 6.0 }, task));
             }
         }
     }

@@ -22,6 +22,7 @@ pub mod contact_cost;
 pub mod contact_hard;
 pub mod contact_random;
 pub mod contact_rest;
+pub mod contact_statics;
 pub mod definition;
 pub mod device_compare;
 pub mod drop_rows;

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 use seixo::body::Pose;
 use seixo::case::Case;
 use seixo::plan::Stage;
-use seixo::scene::{Drive, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid};
+use seixo::scene::{Curve, Drive, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid};
 
 /// Spacing of the scene [m].
 pub const SPACING: f64 = 0.02;
@@ -123,7 +123,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
                 locked_rotation: [false; 3],
             })
         } else {
-            Drive::Prescribed(Motion { time: vec![0.0, 1.0], displacement: vec![DVec3::ZERO, DVec3::Z] })
+            Drive::Prescribed(Motion::shift(Curve::new(vec![0.0, 1.0], vec![DVec3::ZERO, DVec3::Z])))
         };
         solids.push(Solid {
             name: if is_body { "body" } else { "gate" }.into(),

@@ -83,6 +83,9 @@ fn felt(steps: f64) -> f64 {
 /// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
 const ALONG_NORMAL: f64 = 0.95;
 
+/// Share of the sum of w d^8 below which an edge is left out: the end of an upright one adds nothing to a face.
+pub(super) const LEAST: f64 = 1e-6;
+
 /// Where a shape stands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
@@ -140,6 +143,8 @@ pub(crate) struct Contact {
     pub weight: f64,
     /// Minus the rate of change of the depth [m/s].
     pub speed: f64,
+    /// Deviation of the place of the force that it stands for, along an edge, world [m].
+    stretch: DVec3,
     force: f64,
     patch: u8,
 }
@@ -147,7 +152,7 @@ pub(crate) struct Contact {
 impl Contact {
     /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
     pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
-        Self { at, normal, depth, weight, speed, force: 0.0, patch }
+        Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, patch }
     }
 
     /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
@@ -207,6 +212,12 @@ impl Patch {
     pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
         Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, spread }
     }
+}
+
+/// `share` times the products of the parts of `arm` [m].
+fn square(arm: DVec3, share: f64) -> DMat3 {
+    let weighed = share * arm;
+    DMat3::from_cols(arm.x * weighed, arm.y * weighed, arm.z * weighed)
 }
 
 /// A pair of solids close to each other.
@@ -315,7 +326,7 @@ impl Pair {
         // its lists of points are empty
         self.find(bodies, surfaces, walls);
         self.points = self.contacts.len();
-        self.find_edges(bodies, surfaces, walls, spacing);
+        self.find_edges(bodies, surfaces, walls, spacing, LEAST);
         let given = &mut self.given;
         self.contacts.retain(|c| {
             let on_face = c.face().is_some_and(|face| open >> face & 1 == 1);
@@ -347,6 +358,15 @@ impl Pair {
         self.push(sums.depth, sums.shares);
         self.sum(bodies);
         self.patches.extend(&sums.patches);
+        // the device takes those that it was given for points
+        std::mem::swap(&mut self.contacts, &mut self.given);
+        self.push(sums.depth, sums.shares);
+        for c in &self.contacts {
+            if let Some(patch) = self.patches.iter_mut().find(|p| p.key == c.patch) {
+                patch.spread += square(c.stretch, c.force / patch.pressing);
+            }
+        }
+        std::mem::swap(&mut self.contacts, &mut self.given);
     }
 
     /// The second solid.
@@ -419,8 +439,16 @@ impl Pair {
         points + self.edges_a.len() + self.edges_b.len() == 0 && !self.round
     }
 
-    /// Forces, energy and friction patches at the bodies' poses and velocities.
-    pub fn evaluate(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
+    /// Forces, energy and friction patches at the bodies' poses and velocities; edges that would add less than the share
+    /// `least` to the sum of w d^8 of the points are left out.
+    pub fn evaluate(
+        &mut self,
+        bodies: &[Body],
+        surfaces: &[Surface],
+        walls: &[WallBox],
+        spacing: f64,
+        least: f64,
+    ) {
         self.contacts.clear();
         self.patches.clear();
         self.wrench = Default::default();
@@ -428,7 +456,7 @@ impl Pair {
         (self.energy, self.depth) = (0.0, 0.0);
         self.find(bodies, surfaces, walls);
         self.points = self.contacts.len();
-        self.find_edges(bodies, surfaces, walls, spacing);
+        self.find_edges(bodies, surfaces, walls, spacing, least);
         if self.round {
             self.find_round(bodies, surfaces, walls);
         }
@@ -481,14 +509,20 @@ impl Pair {
     }
 
     /// Nodes of the edges inside the other solid, after the points.
-    fn find_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], spacing: f64) {
+    fn find_edges(
+        &mut self,
+        bodies: &[Body],
+        surfaces: &[Surface],
+        walls: &[WallBox],
+        spacing: f64,
+        least: f64,
+    ) {
         let (edges_a, edges_b) = (std::mem::take(&mut self.edges_a), std::mem::take(&mut self.edges_b));
         let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
         let other = self.other(bodies, surfaces, walls);
         let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
-        // the end of an upright edge adds nothing to a face: what is a millionth of the sum is left out
         let eighths: f64 = self.contacts.iter().map(|c| c.weight * c.depth.powi(8)).sum();
-        let least = 1e-6 * eighths;
+        let least = least * eighths;
         let view = View::new(own.center, own.axes, other, least);
         for &k in &edges_a {
             let line = surfaces[self.a].edges[k as usize];
@@ -553,13 +587,16 @@ impl Pair {
         let a = &bodies[self.a];
         let b = self.b.solid().map(|b| &bodies[b]);
         let least = view.least / density;
-        other.shape.each_node((start, along, line.length), other.faces, least, |s, width, inside| {
+        other.shape.each_node((start, along, line.length), other.faces, least, |node, inside| {
+            let (s, width) = (node.place, node.length);
             let at = other.center + other.axes * (start + s * along);
             let normal = sign * (other.axes * inside.outward);
             let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
             let speed = (a.pose.velocity_at(at) - velocity_b).dot(normal);
             push += width * inside.depth.powi(7) * inside.outward;
-            self.contacts.push(Contact::new(at, normal, inside.depth, density * width, speed, key));
+            let stretch = node.deviation * (other.axes * along);
+            let contact = Contact::new(at, normal, inside.depth, density * width, speed, key);
+            self.contacts.push(Contact { stretch, ..contact });
         });
         let toward = push.abs();
         let axis = toward.max_position();
@@ -634,9 +671,8 @@ impl Pair {
         });
         for c in &self.contacts {
             if let Some(patch) = self.patches.iter_mut().find(|p| p.key == c.patch) {
-                let arm = c.at - patch.at;
-                let weighed = c.force / patch.pressing * arm;
-                patch.spread += DMat3::from_cols(arm.x * weighed, arm.y * weighed, arm.z * weighed);
+                let share = c.force / patch.pressing;
+                patch.spread += square(c.at - patch.at, share) + square(c.stretch, share);
             }
         }
     }

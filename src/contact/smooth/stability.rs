@@ -5,7 +5,7 @@ use super::{EXPONENT, STOP_DEPTH, Smooth};
 use crate::body::Body;
 use crate::contact::candidates::reduced_mass;
 use crate::contact::stiffness::{Damping, Lambda};
-use crate::contact::substeps::{DAMPING_STEP, Limits, MOST_SUBSTEPS, Worst};
+use crate::contact::substeps::{DAMPING_STEP, Limits, MOST_SUBSTEPS, STOP_OMEGA_STEP, Worst};
 use crate::shape::Surface;
 use glam::DVec3;
 
@@ -79,8 +79,9 @@ pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> 
         let reach = law.spacing.min(law.middles.between(a, b));
         let c = limits.constants(bodies, a, b, law.surfaces[a].smallest_weight, reach);
         let stopping = c.damping * (c.stop / c.spring).sqrt();
-        let for_spring = dt * (c.stop * spring).sqrt() / limits.omega_step();
-        worst.wanted = worst.wanted.max(for_spring).max(dt * stopping * damping / DAMPING_STEP);
+        let for_spring = dt * (c.spring * spring).sqrt() / limits.omega_step();
+        let for_stop = dt * (c.stop * spring).sqrt() / limits.omega_step().max(STOP_OMEGA_STEP);
+        worst.wanted = worst.wanted.max(for_spring).max(for_stop).max(dt * stopping * damping / DAMPING_STEP);
         worst.softest = worst.softest.min(c.spring);
     }
     worst

@@ -12,7 +12,7 @@
 //! with the depth, weight and place that give them exactly. Where faces are blended, five Gauss nodes are
 //! good to 3e-4, of which depth^8 leaves a quarter for the energy.
 
-use super::super::{Faces, Inside};
+use super::super::{Faces, Inside, Node};
 use super::depth;
 use crate::shape::convex::GAUSS_5;
 use glam::DVec3;
@@ -46,8 +46,7 @@ impl Below {
     }
 }
 
-/// Calls `visit` with s, the length that the node stands for [m] and its depth for every node of a line
-/// inside a box; arguments in the frame of the box. A line of which length times depth^8 stays below
+/// Calls `visit` with every node of a line inside a box, and its depth; arguments in the frame of the box. A line of which length times depth^8 stays below
 /// `least` is left out.
 pub(crate) fn nodes(
     start: DVec3,
@@ -56,7 +55,7 @@ pub(crate) fn nodes(
     half: DVec3,
     faces: Faces,
     least: f64,
-    mut visit: impl FnMut(f64, f64, Inside),
+    mut visit: impl FnMut(Node, Inside),
 ) {
     let Some((low, high)) = clip(start, along, length, half) else { return };
     let mut below = [Below::default(); 6];
@@ -114,10 +113,12 @@ pub(crate) fn nodes(
             let outward = depth::face_normal(nearest.face);
             let middle = 0.5 * (from + to);
             for (t0, t1) in [(from, middle), (middle, to)] {
-                let (share, node, depth) = whole(nearest.at(t0).max(0.0), nearest.at(t1).max(0.0));
+                let (share, node, deviation, depth) = whole(nearest.at(t0).max(0.0), nearest.at(t1).max(0.0));
                 if share > 0.0 {
                     let inside = Inside { depth, outward, face: nearest.face };
-                    visit(place(t0 + node * (t1 - t0)), share * (t1 - t0) * (high - low), inside);
+                    let stretch = (t1 - t0) * (high - low);
+                    let (place, length) = (place(t0 + node * (t1 - t0)), share * stretch);
+                    visit(Node { place, length, deviation: deviation * stretch }, inside);
                 }
             }
             continue;
@@ -125,32 +126,36 @@ pub(crate) fn nodes(
         for (node, weight) in GAUSS_5 {
             let s = place(from + node * (to - from));
             if let Some(inside) = depth::depth(start + s * along, half, faces) {
-                visit(s, weight * (to - from) * (high - low), inside);
+                visit(Node::point(s, weight * (to - from) * (high - low)), inside);
             }
         }
     }
 }
 
 /// The point that stands for a stretch of unit length on which the depth goes from `a` to `b`: weight w,
-/// place t in 0..1 and depth d with w d^8, w d^7 and w t d^7 equal to the integrals.
-fn whole(a: f64, b: f64) -> (f64, f64, f64) {
+/// place t in 0..1, deviation from it and depth d with w d^8, w d^7, w t d^7 and w (t^2 + deviation^2) d^7 equal to the
+/// integrals.
+fn whole(a: f64, b: f64) -> (f64, f64, f64, f64) {
     let largest = a.max(b);
     if largest <= 0.0 {
-        return (0.0, 0.5, 0.0);
+        return (0.0, 0.5, 0.0, 0.0);
     }
     let (x, y) = (a / largest, b / largest);
-    let (mut seventh, mut moment) = (0.0, 0.0);
-    // sums of x^(n - k) y^k by Horner's rule; n = 7 has the moment's factors k + 1
+    let (mut seventh, mut moment, mut second) = (0.0, 0.0, 0.0);
+    // sums of x^(n - k) y^k by Horner's rule; n = 7 has the moments' factors k + 1 and (k + 1) (k + 2)
     let mut power = 1.0;
-    for k in 0..8 {
+    for k in 0..8_u32 {
         seventh = seventh * x + power;
         moment = moment * x + f64::from(k + 1) * power;
+        second = second * x + f64::from((k + 1) * (k + 2)) * power;
         power *= y;
     }
     let eighth = seventh * x + power;
     let (eighth, seventh, moment) = (eighth / 9.0, seventh / 8.0, moment / 72.0);
     let depth = eighth / seventh;
-    (eighth / depth.powi(8), moment / seventh, largest * depth)
+    let place = moment / seventh;
+    let deviation = (second / 720.0 / seventh - place * place).max(0.0).sqrt();
+    (eighth / depth.powi(8), place, deviation, largest * depth)
 }
 
 #[cfg(test)]
@@ -161,7 +166,8 @@ mod tests {
     /// Integral of depth^8 over the line and of depth^7 times the outward vector.
     fn integrals(start: DVec3, along: DVec3, half: DVec3, faces: Faces) -> (f64, DVec3) {
         let mut sums = (0.0, DVec3::ZERO);
-        nodes(start, along, 3.0, half, faces, 0.0, |_, width, inside| {
+        nodes(start, along, 3.0, half, faces, 0.0, |node, inside| {
+            let width = node.length;
             sums.0 += width * inside.depth.powi(8);
             sums.1 += width * inside.depth.powi(7) * inside.outward;
         });
@@ -206,7 +212,7 @@ mod tests {
     #[test]
     fn a_stretch_is_one_point_with_its_integrals() {
         for (a, b) in [(0.0_f64, 1.0_f64), (1.0, 0.0), (2.0, 2.0), (0.3e-6, 1.1e-6)] {
-            let (weight, place, depth) = whole(a, b);
+            let (weight, place, deviation, depth) = whole(a, b);
             let n = 20_000;
             let sum = |f: fn(f64, f64) -> f64| {
                 let t = (0..n).map(|k| (f64::from(k) + 0.5) / f64::from(n));
@@ -214,6 +220,8 @@ mod tests {
             };
             let (eighth, seventh) = (sum(|_, d| d.powi(8)), sum(|_, d| d.powi(7)));
             let moment = sum(|t, d| t * d.powi(7));
+            let second = sum(|t, d| t * t * d.powi(7)) / seventh;
+            assert!(((place * place + deviation * deviation) / second - 1.0).abs() < 1e-6, "{a} {b}");
             assert!((weight * depth.powi(8) / eighth - 1.0).abs() < 1e-6, "{a} {b}");
             assert!((weight * depth.powi(7) / seventh - 1.0).abs() < 1e-6, "{a} {b}");
             assert!((weight * place * depth.powi(7) / moment - 1.0).abs() < 1e-6, "{a} {b}");

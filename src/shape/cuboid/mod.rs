@@ -7,7 +7,7 @@ mod surface;
 pub(crate) use depth::{ALL_FACES, face_normal};
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Particles, WallLayer};
+use super::{Faces, Geometry, Inside, Node, Particles, WallLayer};
 use glam::{DMat3, DVec3, IVec3};
 
 /// A box.
@@ -24,7 +24,7 @@ impl Cuboid {
         (start, along, length): (DVec3, DVec3, f64),
         faces: Faces,
         least: f64,
-        visit: impl FnMut(f64, f64, Inside),
+        visit: impl FnMut(Node, Inside),
     ) {
         edges::nodes(start, along, length, self.half, faces, least, visit);
     }
@@ -96,7 +96,7 @@ impl Geometry for Cuboid {
         line: (DVec3, DVec3, f64),
         faces: Faces,
         least: f64,
-        visit: &mut dyn FnMut(f64, f64, Inside),
+        visit: &mut dyn FnMut(Node, Inside),
     ) {
         self.each_node(line, faces, least, visit);
     }

@@ -3,7 +3,12 @@
 use super::super::surface::{Line, Surface};
 use super::super::{Faces, WallLayer};
 use super::ALL_FACES;
-use glam::DVec3;
+use glam::{DMat2, DVec2, DVec3};
+
+/// Second moments, over the weight of a face, that are not worth making up for.
+const LACKS: f64 = 1e-9;
+/// Share of its weight that a point keeps.
+const LEAST: f64 = 0.2;
 
 impl Surface {
     /// The surface of a box of half edges `half` [m]. A point on several faces gets the mean of its shares of them: constant
@@ -38,6 +43,9 @@ impl Surface {
             surface.spread_edges(half);
         }
         surface.balance();
+        if dimensions == 3 {
+            surface.even_out(half);
+        }
         surface.normalise();
         surface
     }
@@ -83,6 +91,37 @@ impl Surface {
         self.weights.iter_mut().zip(border).filter(|(_, b)| *b).for_each(|(w, _)| *w *= high);
         self.edges.iter_mut().for_each(|e| e.density *= high);
         self.smallest_weight *= high;
+    }
+
+    /// Lets the points inside of each face make up for what its border lacks: the second moments of every face become those
+    /// of an even pressure of its weight, along both edges, where points in two rows or more can. The border is shared
+    /// by faces of different proportions, which its weights cannot all suit.
+    fn even_out(&mut self, half: DVec3) {
+        let samples = self.samples();
+        for face in 0..6_u8 {
+            let axis = usize::from(face / 2);
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            // an even pressure has no mean of these
+            let terms = |p: DVec3| DVec2::new(p[u] / half[u], p[v] / half[v]).powf(2.0) - 1.0 / 3.0;
+            let on: Vec<_> = samples.iter().filter(|s| s.2 & (1 << face) != 0).collect();
+            let (all, lacks) =
+                (on.iter().map(|s| s.1).sum::<f64>(), on.iter().map(|s| -s.1 * terms(s.0)).sum::<DVec2>());
+            let inner: Vec<usize> = (0..self.points.len()).filter(|&k| self.faces[k] == 1 << face).collect();
+            if inner.is_empty() || lacks.abs().max_element() < LACKS * all {
+                continue;
+            }
+            // weights that change as little as possible: combinations of the terms; one row of points has but one
+            let column = |k: usize| inner.iter().map(|&n| terms(self.points[n])).map(|t| t * t[k]).sum();
+            let gram = DMat2::from_cols(column(0), column(1));
+            let least = LACKS * (gram.x_axis.x + gram.y_axis.y);
+            let slope = (gram + DMat2::from_diagonal(DVec2::splat(least))).inverse() * lacks;
+            let change = |n: usize| slope.dot(terms(self.points[n]));
+            let allowed = |n: usize| (LEAST - 1.0) * self.weights[n] / change(n).min(-f64::MIN_POSITIVE);
+            let share = inner.iter().map(|&n| allowed(n)).fold(1.0, f64::min);
+            let changes: Vec<(usize, f64)> = inner.iter().map(|&n| (n, share * change(n))).collect();
+            changes.into_iter().for_each(|(n, change)| self.weights[n] += change);
+        }
+        self.smallest_weight = self.weights.iter().copied().fold(self.smallest_weight, f64::min);
     }
 
     /// Turns the points along each edge into a line of their weight.

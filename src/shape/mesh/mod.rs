@@ -8,7 +8,7 @@ mod particles;
 mod read;
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Particles, WallLayer, along};
+use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, along};
 use glam::{DMat3, DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
@@ -315,7 +315,7 @@ impl Geometry for Mesh {
         (start, along_line, length): (DVec3, DVec3, f64),
         faces: Faces,
         _: f64,
-        visit: &mut dyn FnMut(f64, f64, Inside),
+        visit: &mut dyn FnMut(Node, Inside),
     ) {
         let mut ends = vec![0.0];
         ends.extend(self.crossings(start, along_line, length));
@@ -332,7 +332,7 @@ impl Geometry for Mesh {
             };
             along(width, distance, |s, share| {
                 if let Some(inside) = self.depth(start + (from + s) * along_line, faces) {
-                    visit(from + s, share, inside);
+                    visit(Node::point(from + s, share), inside);
                 }
             });
         }
