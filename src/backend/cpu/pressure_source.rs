@@ -31,7 +31,7 @@ wide! {
             if state[k] != State::Inner {
                 continue;
             }
-            let links: f64 = chunk.pressure(k).weight.iter().sum();
+            let links = sum(chunk.pressure(k).weight);
             if links <= 0.0 {
                 diagonal[k] = c;
                 continue;
