@@ -88,7 +88,7 @@ impl Picture {
     /// A bar of the colours in the upper right corner, from `range[0]` to `range[1]`, called `name`.
     pub fn bar(&mut self, name: &str, range: [f64; 2]) {
         let letter = self.letters().val();
-        let (width, edge) = ((self.width / 4).clamp(8 * letter, self.width.max(1)), letter / 2);
+        let (width, edge) = ((self.width / 4).max(8 * letter).min(self.width), letter / 2);
         let (left, high) = (self.width.saturating_sub(width + 2 * edge), letter / 2);
         let bottom = edge + letter + letter / 8;
         self.plate(left.saturating_sub(edge), edge / 2, width + 2 * edge, bottom + high + letter + edge / 2);
@@ -99,7 +99,7 @@ impl Picture {
         let below = bottom + high + letter / 8;
         let (low, most) = (short(range[0]), short(range[1]));
         self.write(left, below, &low);
-        self.write(left + width - self.length(&most), below, &most);
+        self.write((left + width).saturating_sub(self.length(&most)), below, &most);
         let middle = (width.saturating_sub(self.length(name))) / 2;
         // Above the bar, so that it meets no number.
         self.write(left + middle, edge, name);

@@ -6,9 +6,11 @@ use std::time::Duration;
 const LATE: f64 = 0.4;
 /// Growth of the time between two marks.
 const GROWTH: f64 = 1.05;
+/// Part that the pace of the whole way has in the estimate.
+const WHOLE: f64 = 0.25;
 
-/// The pace of a run since its process began: that of the whole way, and that of late, in equal parts. Steps get dearer
-/// and shorter as water spreads, but not for good.
+/// The pace of a run since its process began: a quarter that of the whole way, three quarters that of late. Steps get
+/// dearer and shorter as water spreads, but not for good.
 #[derive(Debug, Default)]
 pub(super) struct Pace {
     /// Time by the clock [s] and part of the run that was done, from the start of the process on.
@@ -29,9 +31,9 @@ impl Pace {
         let late = self.marks.partition_point(|&[t, _]| t <= (1.0 - LATE) * now);
         let [then, had] = self.marks[late.saturating_sub(1)];
         let rates = [(done - first) / now, (done - had) / (now - then)];
-        let rate = rates.into_iter().filter(|r| r.is_finite() && *r > 0.0);
-        let (sum, count) = rate.fold((0.0, 0.0), |(s, n), r| (s + r, n + 1.0));
-        Duration::try_from_secs_f64((1.0 - done) * count / sum).unwrap_or(Duration::MAX)
+        let known = rates.into_iter().zip([WHOLE, 1.0 - WHOLE]).filter(|(r, _)| r.is_finite() && *r > 0.0);
+        let (sum, parts) = known.fold((0.0, 0.0), |(s, n), (r, part)| (s + part * r, n + part));
+        Duration::try_from_secs_f64((1.0 - done) * parts / sum).unwrap_or(Duration::MAX)
     }
 }
 
