@@ -333,9 +333,10 @@ impl System {
             loop {
                 let next = u - share * full;
                 let there = at(next);
-                // the slope along the step may have turned, but not to as much as it was
+                // the slope along the step may have turned, but not to as much as it was; what is no number ends it
                 let slope = there.0.dot(full);
-                if slope > -0.5 * downhill || share < 1e-3 {
+                let too_far = slope <= -0.5 * downhill && share >= 1e-3;
+                if !too_far {
                     (u, residual, second, gradient) = (next, there.0, there.1, there.2);
                     break;
                 }
