@@ -20,6 +20,7 @@ mod first_minute;
 mod fluid;
 mod fuzz;
 mod gauges;
+mod guide;
 mod immersed;
 mod kernels;
 mod layers;
