@@ -5,6 +5,7 @@ mod bench;
 mod compare;
 mod device;
 mod init;
+mod keys;
 mod plan;
 mod progress;
 mod render;
@@ -65,8 +66,14 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Print the JSON schema of case files.
-    Schema,
+    /// List the keys of a case file: what each is, what is allowed, what it is if left out, an example.
+    Keys(keys::KeysArgs),
+    /// Print the JSON schema of case files, or of study files.
+    Schema {
+        /// Of which files.
+        #[arg(value_enum, default_value_t = SchemaOf::Case)]
+        of: SchemaOf,
+    },
     /// Print the completions for a shell, e.g. `seixo completions bash > ~/.local/share/bash-completion/completions/seixo`.
     Completions {
         /// The shell.
@@ -134,6 +141,15 @@ enum BackendName {
     Cpu,
 }
 
+/// Files that have a schema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SchemaOf {
+    /// Case files.
+    Case,
+    /// Study and validation files.
+    Study,
+}
+
 /// How a command ended, if it did not fail: its exit code.
 type Exit = Result<u8, Error>;
 
@@ -177,8 +193,13 @@ fn main() -> ExitCode {
             sweep(args.quiet, |stop| seixo_study::validation::command::command(&args, stop))
         }
         Command::Adapters { json } => device::list(json),
-        Command::Schema => {
-            say(seixo::case::Case::schema().trim_end());
+        Command::Keys(args) => keys::keys(&args),
+        Command::Schema { of } => {
+            let text = match of {
+                SchemaOf::Case => seixo::case::Case::schema(),
+                SchemaOf::Study => seixo_study::definition::Definition::schema(),
+            };
+            say(text.trim_end());
             Ok(0)
         }
         Command::Completions { shell } => shell::completions(shell),
