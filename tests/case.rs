@@ -395,10 +395,10 @@ fn alternatives_in_comments_are_right() {
     assert!(tried > 10, "{tried}");
 }
 
-/// What the program makes of itself for editors and the guide: write it anew with SEIXO_WRITE_SCHEMA=1 after a change of the
+/// So are the schema of studies and the guide's page of keys: write all three anew with SEIXO_WRITE_SCHEMA=1 after a change of the
 /// case's structs or of what is said of them.
 #[test]
-fn schemas_and_the_reference_of_keys_are_current() {
+fn the_committed_schema_is_current() {
     let made: [(&str, &[&str]); 3] = [
         ("schema/case.schema.json", &["schema"]),
         ("schema/study.schema.json", &["schema", "study"]),

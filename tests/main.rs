@@ -25,6 +25,7 @@ mod immersed;
 mod kernels;
 mod layers;
 mod ledger;
+mod measure;
 mod meshes;
 mod motion_file;
 mod output;

@@ -6,6 +6,7 @@ mod compare;
 mod device;
 mod init;
 mod keys;
+mod measure;
 mod plan;
 mod progress;
 mod render;
@@ -50,6 +51,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Tell of a run on one page (HTML) that holds everything: verdict, pictures, curves, times.
     Report(report::ReportArgs),
+    /// Velocity and pressure at points or along lines, from the frames of a run, as CSV.
+    Measure(measure::MeasureArgs),
     /// Show what a run would compute, and what it would leave out and why; compute nothing.
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
@@ -185,6 +188,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),
+        Command::Measure(args) => measure::measure(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
