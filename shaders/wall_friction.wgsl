@@ -10,16 +10,6 @@
 @group(0) @binding(6) var<storage, read_write> acceleration: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> reaction: array<vec4f>;
 
-// Weight of a pair, 0 for a coincident one.
-fn pair_weight(r: vec3f) -> f32 {
-    let distance_squared = dot(r, r);
-    return select(
-        max(params.effective_radius * inverseSqrt(distance_squared) - 1.0, 0.0),
-        0.0,
-        distance_squared == 0.0,
-    );
-}
-
 // Acceleration of fluid slot i, and the sum of its weights with wall layers.
 fn friction(i: u32) -> vec4f {
     let word = neighbour_count[i];
@@ -35,7 +25,7 @@ fn friction(i: u32) -> vec4f {
         let j = neighbour_list[near_place(i, k)];
         if j >= params.fluid {
             let r = position[j].xyz - x;
-            let w = pair_weight(r);
+            let w = weight(dot(r, r));
             sum += w;
             wall += w * velocity[j].xyz;
             normal += pair_vector(w, r);
@@ -70,7 +60,8 @@ fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
             if j < params.fluid {
                 let other = friction(j);
                 if other.w > 0.0 {
-                    taken += pair_weight(position[j].xyz - x) / other.w * other.xyz;
+                    let r = position[j].xyz - x;
+                    taken += weight(dot(r, r)) / other.w * other.xyz;
                 }
             }
         }

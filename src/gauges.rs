@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::kernels::body_force::surface_pressure;
 use crate::output::table::{Cell, vector_cells, vector_columns};
+use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
@@ -120,9 +121,8 @@ impl Gauges {
         let known = simulation.steps > 0;
         let mut row = vec![Cell::from(simulation.time)];
         self.pressures(simulation, known, &mut row)?;
-        let params = &simulation.params;
-        let viscous = (params.viscosity > 0.0 || params.wall_friction > 0.0)
-            && self.force.iter().any(|(_, t)| t.is_fixed());
+        let Params { viscosity, wall_friction, .. } = simulation.params;
+        let viscous = viscosity + wall_friction > 0.0 && self.force.iter().any(|(_, t)| t.is_fixed());
         let fields = if viscous || !self.level.is_empty() { Some(simulation.fields()?) } else { None };
         let params = &simulation.params;
         for &(_, line) in &self.level {

@@ -4,6 +4,9 @@ use crate::error::{Error, Result};
 use std::io::Write;
 use std::path::Path;
 
+/// How the names of files begin that are not yet whole.
+pub(crate) const UNFINISHED: &str = ".writing-";
+
 /// Write `bytes` to `path` so that the file holds either what it held before or all of them.
 ///
 /// # Errors
@@ -19,7 +22,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
 /// A file in `folder` that takes its name when it is whole.
 pub(crate) fn beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".writing-");
+    builder.prefix(UNFINISHED);
     // A file of the run is no secret: the usual permissions instead of the private ones of temporary files.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));

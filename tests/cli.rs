@@ -388,7 +388,7 @@ fn schema_and_adapters_answer_on_stdout() {
 /// Start a long run and wait until it has written a frame.
 #[cfg(unix)]
 fn long_run(case: &str, root: &Path) -> std::process::Child {
-    let child = std::process::Command::new(env!("CARGO_BIN_EXE_seixo"))
+    let child = crate::common::program()
         .args(["run", case, "--backend", "cpu", "--json", "--until", "1e6", "--force-disk", "-o"])
         .arg(root)
         .stdout(std::process::Stdio::piped())

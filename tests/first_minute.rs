@@ -42,6 +42,13 @@ fn a_case_comes_from_a_pipe() {
     assert_eq!(run(text.as_bytes()), (0, String::new()));
     assert!(folder.path().join("out/stdin/stdin.pvd").exists());
     std::fs::remove_dir_all(folder.path().join("out")).unwrap();
+    // Its text is there once, also where a coarser scene stands for it.
+    for spacing in ["0.02", "0.00007"] {
+        let args = ["plan", "-", "--json", "--spacing", spacing];
+        let output = seixo().args(args).write_stdin(text.clone()).output().unwrap();
+        assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+        assert_eq!(json(&String::from_utf8_lossy(&output.stdout))["spacing_m"].to_string(), spacing);
+    }
     let (code, err) = run(text.replace("spacing", "spacin").as_bytes());
     assert!(code == 2 && err.contains("--> standard input:"), "{err}");
     let (code, err) = run(b"\xff\xfe");

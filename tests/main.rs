@@ -27,6 +27,7 @@ mod ledger;
 mod meshes;
 mod motion_file;
 mod output;
+mod packages;
 mod render;
 mod report;
 mod restart;

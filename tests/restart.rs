@@ -1,6 +1,6 @@
 //! Restart: a run that is stopped, killed or damaged goes on as if nothing had happened.
 
-use crate::cli::{Ran, json, ran, seixo, small_case};
+use crate::cli::{Ran, json, ran, small_case};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -194,11 +194,12 @@ fn a_run_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
     assert_eq!(case.run("whole", &[]).code, 0);
     let root = case.root("killed").display().to_string();
     let start = |root: &str| -> Child {
-        let mut command = Command::new(seixo().get_program());
+        let mut command = crate::common::program();
         command.current_dir(crate::common::ROOT).args(case.args(root, &["--resume"]));
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     };
     let (mut kills, mut state) = (0, 0x2545_f491_4f6c_dd1d_u64);
+    let half = ["", "vtu", "checkpoint"].map(|f| case.root("killed").join(f).join(".writing-half"));
     let begun = Instant::now();
     loop {
         let mut child = start(&root);
@@ -222,10 +223,15 @@ fn a_run_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
         child.kill().unwrap();
         child.wait().unwrap();
         kills += 1;
+        for path in half.iter().filter(|path| path.parent().is_some_and(Path::exists)) {
+            std::fs::write(path, "half").unwrap();
+        }
         assert!(begun.elapsed() < Duration::from_secs(240), "{kills} kills and no end");
     }
     assert!(kills >= 3, "only {kills} kills");
     assert_same(&case.root("whole"), &case.root("killed"), &format!("{kills} kills"));
+    // What a kill cuts off while it is written is cleared by whoever goes on.
+    assert!(half.iter().all(|path| !path.exists()), "left behind");
 }
 
 #[test]
@@ -308,7 +314,7 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     let case = Case::new(&["run.end=1e6", "output.every=0.005"], "cpu");
     for (signal, code) in [("-USR1", 75), ("-HUP", 129), ("-XCPU", 75), ("-TERM", 143)] {
         let root = case.root(signal).display().to_string();
-        let mut command = Command::new(seixo().get_program());
+        let mut command = crate::common::program();
         command.args(case.args(&root, &[])).stdout(Stdio::null()).stderr(Stdio::null());
         let mut child = command.spawn().unwrap();
         let clock = Instant::now();
@@ -345,7 +351,7 @@ const LONG: &str = "0.002";
 /// Sends `signal` to a run of `args` after `wait`; its exit code, its remarks and how long it took to end.
 #[cfg(unix)]
 fn interrupted(args: &[&str], signal: &str, wait: impl Fn() -> bool) -> (Option<i32>, String, Duration) {
-    let mut command = Command::new(seixo().get_program());
+    let mut command = crate::common::program();
     let child = command.args(args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let clock = Instant::now();
     while !wait() {

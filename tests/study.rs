@@ -57,7 +57,7 @@ against = "finest"
 "#;
 
 fn seixo(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_seixo"));
+    let mut command = crate::common::program();
     command.current_dir(folder).args(["study"]).args(arguments);
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command
@@ -183,11 +183,7 @@ tolerance = 0.1
     std::fs::write(folder.join("floor.csv"), "# source: analytic\nt_s,p_Pa\n0.1,1961\n0.3,1961\n")
         .expect("a file");
     let validate = |arguments: &[&str]| {
-        let out = Command::new(env!("CARGO_BIN_EXE_seixo"))
-            .current_dir(folder)
-            .arg("validate")
-            .args(arguments)
-            .output();
+        let out = crate::common::program().current_dir(folder).arg("validate").args(arguments).output();
         let out = out.expect("the program starts");
         let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
         (out.status.code().unwrap_or(-1), text)

@@ -8,6 +8,7 @@ use seixo::backend::gpu::forecast::{Forecast, Group, groups};
 use seixo::backend::gpu::layout::{Memory, Sizes};
 use seixo::backend::gpu::sizes;
 use seixo::case::Case;
+use seixo::case::file::load_text;
 use seixo::cells::Grid;
 use seixo::console::{say, say_json};
 use seixo::contact::Solids;
@@ -109,23 +110,20 @@ struct Seen {
 
 impl Seen {
     fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let mut case = setup::read(args)?.case;
+        let mut loaded = setup::read(args)?;
+        let case = loaded.case.clone();
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
         let blocks = case.fluid.iter().flat_map(|f| &f.block);
         let extent = |b: &seixo::case::Block, k: usize| (b.max[k] - b.min[k]).abs();
         let fluid = |b| extent(b, 0) * extent(b, 2) * if d == 3.0 { extent(b, 1) } else { 1.0 } / l0.powf(d);
         let fluid: f64 = blocks.map(fluid).sum();
         let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
-        let mut changes = args.changes.clone();
         if coarser > 1.0 {
-            changes.sets.push(format!("run.spacing={:?}", coarser * l0));
+            // From its text: standard input is read once.
+            loaded = load_text(&loaded.path.clone(), loaded.text, Some(coarser * l0), &[])?;
         }
-        let typed = CaseArgs { changes, case: args.case.clone() };
         // What the coarser lattice rounds is no news.
-        let setup = Setup::new(&typed, quiet || coarser > 1.0)?;
-        if coarser == 1.0 {
-            case = setup.loaded.case.clone();
-        }
+        let setup = Setup::build(loaded, setup::name(&args.case), quiet || coarser > 1.0)?;
         Ok(Self { setup, case, coarser })
     }
 }

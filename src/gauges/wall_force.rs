@@ -7,7 +7,8 @@
 use crate::body::Wrench;
 use crate::fields::Fields;
 use crate::kernels::body_force::surface_pressure;
-use crate::lattice::weight;
+use crate::kernels::number_density::pair_weight;
+use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene};
 use glam::{DMat3, DVec3, IVec3};
@@ -93,12 +94,10 @@ impl FixedWall {
             let (mut weights, mut normal) = (0.0, DVec3::ZERO);
             let around = (0..27).map(|k| at + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
             for &k in around.filter_map(|c| cells.get(&c)).flatten() {
-                let to_wall = self.position[k] - x;
-                let r = to_wall.length();
-                if r > 0.0 && r < re {
-                    weights += weight(r, re);
-                    normal += weight(r, re) / (r * r) * to_wall;
-                }
+                let r = self.position[k] - x;
+                let w = pair_weight(r.length_squared(), params);
+                weights += w;
+                normal += weight_over_square(w, re) * r;
             }
             let (v, normal) = (fields.velocity[i], normal.normalize_or_zero());
             let along = v - v.dot(normal) * normal;

@@ -13,28 +13,20 @@
 //! u_t <- u_t / (1 + dt k |u_t|): it slows the water at any time step and never turns it round. First order in dt.
 
 use super::Particles;
-use crate::lattice::weight;
+use super::number_density::pair_weight;
 use crate::neighbourhood::weight_over_square;
 use glam::DVec3;
-
-/// Weight of the pair of slots `i` and `j` at their present positions [-].
-#[inline(always)]
-fn pair_weight(i: usize, j: usize, on: Particles) -> f64 {
-    let (r, re) = (on.position[j].distance(on.position[i]), on.params.effective_radius);
-    if r > 0.0 && r < re { weight(r, re) } else { 0.0 }
-}
 
 /// Acceleration of fluid slot `i` [m/s2], and the sum of its weights with wall layers [-]; `carriers` are its
 /// neighbours that carry pressure.
 pub fn wall_friction(i: usize, carriers: &[u32], on: Particles, dt: f64) -> (DVec3, f64) {
     let (mut sum, mut velocity, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
     for j in carriers.iter().map(|&j| j as usize).filter(|&j| j >= on.fluid) {
-        let (w, r) = (pair_weight(i, j, on), on.position[j] - on.position[i]);
-        if w > 0.0 {
-            sum += w;
-            velocity += w * on.velocity[j];
-            normal += weight_over_square(w, on.params.effective_radius) * r;
-        }
+        let r = on.position[j] - on.position[i];
+        let w = pair_weight(r.length_squared(), on.params);
+        sum += w;
+        velocity += w * on.velocity[j];
+        normal += weight_over_square(w, on.params.effective_radius) * r;
     }
     if sum == 0.0 {
         return (DVec3::ZERO, 0.0);
@@ -57,7 +49,8 @@ pub fn reaction<'a>(
     let wet = carriers.iter().map(|&i| i as usize).filter(|&i| i < on.fluid);
     let taken = wet.map(|i| {
         let (acceleration, sum) = wall_friction(i, row(i), on, dt);
-        if sum > 0.0 { -pair_weight(i, j, on) / sum * acceleration } else { DVec3::ZERO }
+        let w = pair_weight(on.position[j].distance_squared(on.position[i]), on.params);
+        if sum > 0.0 { -w / sum * acceleration } else { DVec3::ZERO }
     });
     on.params.particle_mass() * taken.sum::<DVec3>()
 }

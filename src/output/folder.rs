@@ -3,9 +3,9 @@
 //! A file `.seixo` marks a folder as one of seixo's own and is locked as long as a run writes there. Only in a
 //! marked folder does `--force` remove anything, and only files with the names that a run gives.
 
-use super::write_whole;
 use crate::checkpoint::file::is_checkpoint;
 use crate::error::{Error, FolderError, Result};
+use crate::whole::{UNFINISHED, write_whole};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
@@ -100,6 +100,7 @@ impl Folder {
         if let (Mode::Replace, Some(earlier)) = (mode, earlier) {
             folder.clear(&earlier.name)?;
         }
+        folder.clear_unfinished()?;
         std::fs::create_dir_all(folder.vtu()).map_err(Error::io(folder.vtu()))?;
         folder.reserve()?;
         Ok(folder)
@@ -163,7 +164,7 @@ impl Folder {
 
     /// Whether a run of the case `name` gives files of the folder itself this name.
     fn is_ours(&self, file: &str, name: &str) -> bool {
-        FILES.contains(&file) || file == format!("{name}.pvd") || file.starts_with(".writing-")
+        FILES.contains(&file) || file == format!("{name}.pvd") || file.starts_with(UNFINISHED)
     }
 
     /// Removes the files of an earlier run of the case `name`; folders go if nothing else was in them.
@@ -177,18 +178,25 @@ impl Folder {
             ["walls.vtu", "last_fluid.vtu", "last_solids.vtu"].contains(&file)
                 || numbered(file, "fluid_", ".vtu")
                 || numbered(file, "solids_", ".vtu")
-                || file.starts_with(".writing-")
+                || file.starts_with(UNFINISHED)
         };
         self.remove(&self.vtu(), frame)?;
         self.remove(&self.pictures(), |file| {
-            numbered(file, "frame_", ".png") || file.starts_with(".writing-")
+            numbered(file, "frame_", ".png") || file.starts_with(UNFINISHED)
         })?;
-        self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(".writing-"))?;
+        self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(UNFINISHED))?;
         for folder in [self.vtu(), self.pictures(), self.checkpoints()] {
             // Somebody else's files keep their folder.
             let _ = std::fs::remove_dir(folder);
         }
         Ok(())
+    }
+
+    /// Removes what a run that was killed had not written to the end. The lock says that nobody writes there; pictures
+    /// may be drawn beside a run and are left alone.
+    fn clear_unfinished(&self) -> Result<()> {
+        let folders = [self.root.clone(), self.vtu(), self.checkpoints()];
+        folders.iter().try_for_each(|folder| self.remove(folder, |file| file.starts_with(UNFINISHED)))
     }
 
     /// Removes the plain files of `folder` that are `ours`; links and folders are left alone.

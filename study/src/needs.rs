@@ -26,15 +26,15 @@ struct Sort {
     steps: u64,
 }
 
-const HYDROSTATIC: &str = include_str!("../../cases/hydrostatic.toml");
-const DAM_BREAK: &str = include_str!("../../cases/dam_break.toml");
+const HYDROSTATIC: &str = seixo_cases::HYDROSTATIC;
+const DAM_BREAK: &str = seixo_cases::DAM_BREAK;
 const GATE: &str = "[run]\nspacing = 0.04\ntime_step = 2e-3\nend = 1\n\
     [tank]\nmin = [0, 0, 0]\nmax = [2.0, 0.48, 0.48]\nopen = [\"z_max\"]\n\
     [[moving_wall]]\nname = \"gate\"\nmin = [0.48, 0, 0]\nmax = [0.52, 0.48, 0.4]\nopen = [\"y_min\", \"y_max\"]\n\
     motion = [[0, 0, 0, 0], [3, 0, 0, 0.33]]\n\
     [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.48, 0.48, 0.36]\n";
-const RESTING: &str = include_str!("../../cases/resting_cube.toml");
-const FLOATING: &str = include_str!("../../cases/floating_cube.toml");
+const RESTING: &str = seixo_cases::RESTING_CUBE;
+const FLOATING: &str = seixo_cases::FLOATING_CUBE;
 
 const SORTS: [Sort; 7] = [
     Sort { name: "dry: a cube on a floor", text: RESTING, sets: &[], steps: 400 },

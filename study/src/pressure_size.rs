@@ -30,8 +30,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-const DAM: &str = include_str!("../../cases/dam_break_transport.toml");
-const COLUMN: &str = include_str!("../../cases/hydrostatic.toml");
+const DAM: &str = seixo_cases::DAM_BREAK_TRANSPORT;
+const COLUMN: &str = seixo_cases::HYDROSTATIC;
 
 /// Steps that a run has behind it when it meets the system.
 const STEPS: u64 = 20;

@@ -133,7 +133,7 @@ fn relative(a: &[f64], b: &[f64]) -> f64 {
     (difference / b.iter().map(|b| b * b).sum::<f64>()).sqrt()
 }
 
-const CASE: &str = include_str!("../../cases/hydrostatic.toml");
+const CASE: &str = seixo_cases::HYDROSTATIC;
 
 fn sets(spacing: f64, method: Method, tolerance: f64) -> Vec<String> {
     let preconditioner = if method == Method::Multigrid { "multigrid" } else { "jacobi" };

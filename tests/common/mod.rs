@@ -12,6 +12,19 @@ use std::sync::Arc;
 /// The repository.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
+/// The program, which heeds every signal: whoever runs the tests may ignore some (`nohup` does), and a child inherits
+/// that.
+pub fn program() -> std::process::Command {
+    let program = env!("CARGO_BIN_EXE_seixo");
+    if cfg!(target_os = "linux") {
+        let mut command = std::process::Command::new("env");
+        command.args(["--default-signal=HUP,INT,TERM,USR1,XCPU", program]);
+        command
+    } else {
+        std::process::Command::new(program)
+    }
+}
+
 pub fn case(text: &str) -> Case {
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }

@@ -1,0 +1,34 @@
+"""Water that carries solids, from Python: run cases, read results.
+
+    import seixo
+
+    run = seixo.run("floating-body.toml", spacing=0.02)
+    run.verdict                      # 'fine'
+    run.body("box").z                # a column of bodies.csv
+    run.frames[-1].fluid.velocity    # an array, read when it is asked for
+
+`seixo.run` starts the program `seixo` and returns when it has ended; there is no stepping from Python and no view of a
+computation that is under way. `seixo.read` opens what any run has written.
+"""
+
+from ._errors import CaseError, DeviceError, DivergedError, FileError, SeixoError
+from ._program import program
+from ._results import Frame, Frames, Particles, Run, Table, read
+from ._run import plan, run
+
+__all__ = [
+    "CaseError",
+    "DeviceError",
+    "DivergedError",
+    "FileError",
+    "Frame",
+    "Frames",
+    "Particles",
+    "Run",
+    "SeixoError",
+    "Table",
+    "plan",
+    "program",
+    "read",
+    "run",
+]

@@ -1,0 +1,322 @@
+"""Reads what a run has written."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import json
+import os
+import re
+import tomllib
+import xml.etree.ElementTree
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Union, cast, overload
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import pandas
+
+#: A table: a pandas.DataFrame, or without pandas a numpy.recarray. Both give a column by its name, as `t["time"]` and `t.time`.
+Table = Union["pandas.DataFrame", "np.recarray[Any, Any]"]
+
+Array = npt.NDArray[Any]
+
+
+def read(folder: str | os.PathLike[str]) -> Run:
+    """The results in the folder of a run, also of one that is under way, was stopped or has failed.
+
+    Raises FileNotFoundError if there are none.
+    """
+    return Run(Path(folder))
+
+
+class Run:
+    """The results of a run. Files are read when they are asked for, and then kept; `read` again to see what was added."""
+
+    def __init__(self, path: Path) -> None:
+        if not (path / "case.toml").is_file():
+            raise FileNotFoundError(f"{path}: no results of seixo (no case.toml)")
+        #: The folder.
+        self.path = path
+
+    def __repr__(self) -> str:
+        return f"<seixo.Run {str(self.path)!r}: {self.result.get('status', 'no result yet')}, {len(self.frames)} frames>"
+
+    @functools.cached_property
+    def result(self) -> dict[str, Any]:
+        """result.json: how the run ended, its verdict, sums and extremes; empty while it is under way."""
+        try:
+            text = (self.path / "result.json").read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return {}
+        found: dict[str, Any] = json.loads(text)
+        return found
+
+    @property
+    def status(self) -> str | None:
+        """`done`, `interrupted`, `diverged` or `failed`; None while it is under way."""
+        return self.result.get("status")
+
+    @property
+    def verdict(self) -> str | None:
+        """`fine`, `degraded` or `failed`; the reasons stand in `result["verdict"]["reasons"]`."""
+        grade: str | None = self.result.get("verdict", {}).get("grade")
+        return grade
+
+    @functools.cached_property
+    def case(self) -> dict[str, Any]:
+        """The case as it was run."""
+        return tomllib.loads((self.path / "case.toml").read_text(encoding="utf-8"))
+
+    @functools.cached_property
+    def monitors(self) -> Table:
+        """monitors.csv: time step, energies, iterations, seconds per stage and more over time."""
+        return self.table("monitors")
+
+    @functools.cached_property
+    def bodies(self) -> Table:
+        """bodies.csv: a row for each time and solid. `body` picks one."""
+        return self.table("bodies")
+
+    @functools.cached_property
+    def gauges(self) -> Table:
+        """gauges.csv: what the case asks to measure."""
+        return self.table("gauges")
+
+    def body(self, name: str) -> Table:
+        """The rows of bodies.csv of the body or moving wall `name`."""
+        table = self.bodies
+        names = [str(n) for n in table["body"]]
+        if name not in names:
+            known = ", ".join(dict.fromkeys(names))
+            raise KeyError(f"no solid is called {name!r}; there are: {known}")
+        rows: Any = table[table["body"] == name]
+        return cast(Table, rows.reset_index(drop=True) if hasattr(rows, "reset_index") else rows)
+
+    def table(self, name: str) -> Table:
+        """The table `name`.csv. Columns are called as in the file without the unit, as Python names: `gate_x [m]` is `gate_x`.
+        The units are in `attrs["units"]` of a DataFrame, and in `units(name)`.
+
+        Raises FileNotFoundError if the run wrote none: there is no bodies.csv without solids, no gauges.csv without gauges.
+        """
+        headers, rows = self._rows(name)
+        columns = [_column([row[k] for row in rows]) for k in range(len(headers))]
+        names = _names(headers)
+        try:
+            import pandas
+        except ImportError:
+            return cast(Table, np.rec.fromarrays(columns, names=",".join(names)))  # type: ignore[call-overload]
+        frame = pandas.DataFrame(dict(zip(names, columns)))
+        frame.attrs["units"] = _units(names, headers)
+        return frame
+
+    def units(self, name: str) -> dict[str, str]:
+        """The unit of each column of the table `name`.csv."""
+        headers, _ = self._rows(name)
+        return _units(_names(headers), headers)
+
+    def _rows(self, name: str) -> tuple[list[str], list[list[str]]]:
+        path = self.path / f"{name}.csv"
+        if not path.is_file():
+            there = ", ".join(sorted(p.stem for p in self.path.glob("*.csv"))) or "none"
+            raise FileNotFoundError(f"{path}: this run wrote no such table; tables: {there}")
+        with path.open(newline="", encoding="utf-8") as file:
+            headers, *rows = list(csv.reader(file))
+        return headers, [row for row in rows if len(row) == len(headers)]
+
+    @functools.cached_property
+    def frames(self) -> Frames:
+        """The moments that were written, in the order of time."""
+        return Frames(_frames(self.path))
+
+    @functools.cached_property
+    def walls(self) -> Particles:
+        """The particles of fixed walls."""
+        return Particles(self.path / "vtu" / "walls.vtu")
+
+
+class Particles:
+    """The particles of a file, read when a field is asked for. Rows belong together across fields."""
+
+    def __init__(self, path: Path) -> None:
+        #: The file.
+        self.path = path
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __repr__(self) -> str:
+        return f"<seixo.Particles {str(self.path)!r}>"
+
+    @functools.cached_property
+    def _fields(self) -> dict[str, Array]:
+        if not self.path.is_file():
+            raise FileNotFoundError(f"{self.path}: not written; `output.kinds` of the case says which particles are")
+        return _vtu(self.path)
+
+    def field(self, name: str) -> Array:
+        """The field `name` as it is called in the file, e.g. `Velocity`."""
+        if name not in self._fields:
+            raise KeyError(f"no field is called {name!r}; there are: {', '.join(self._fields)}")
+        return self._fields[name]
+
+    @property
+    def position(self) -> Array:
+        """Positions [m], a row each."""
+        return self._fields["Points"]
+
+    @property
+    def velocity(self) -> Array:
+        """Velocities [m/s], a row each."""
+        return self.field("Velocity")
+
+    @property
+    def pressure(self) -> Array:
+        """Pressures [Pa]."""
+        return self.field("Pressure")
+
+    @property
+    def number_density(self) -> Array:
+        """Particle number densities [-]."""
+        return self.field("ParticleNumberDensity")
+
+    @property
+    def kind(self) -> Array:
+        """0 fluid, 1 wall, 2 dummy, 3 body wall, 4 body dummy."""
+        return self.field("Kind")
+
+    @property
+    def body(self) -> Array:
+        """0 for none, then the number of the solid in the order of bodies.csv."""
+        return self.field("Body")
+
+    @property
+    def id(self) -> Array:
+        """Stays with a particle."""
+        return self.field("Id")
+
+
+class Frame:
+    """A moment of a run."""
+
+    def __init__(self, time: float, fluid: Path | None, solids: Path | None) -> None:
+        #: Time [s].
+        self.time = time
+        self._fluid, self._solids = fluid, solids
+
+    def __repr__(self) -> str:
+        return f"<seixo.Frame at {self.time:g} s>"
+
+    @functools.cached_property
+    def fluid(self) -> Particles:
+        """The water."""
+        return self._part(self._fluid, "water")
+
+    @functools.cached_property
+    def solids(self) -> Particles:
+        """Bodies and moving walls."""
+        return self._part(self._solids, "bodies")
+
+    def _part(self, path: Path | None, what: str) -> Particles:
+        if path is None:
+            raise LookupError(f"no {what} at {self.time:g} s; `output.kinds` of the case says what is written")
+        return Particles(path)
+
+
+class Frames(Sequence[Frame]):
+    """Frames in the order of time."""
+
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        self._frames = list(frames)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(self._frames)
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> Frames: ...
+    def __getitem__(self, index: int | slice) -> Frame | Frames:
+        return Frames(self._frames[index]) if isinstance(index, slice) else self._frames[index]
+
+    def __repr__(self) -> str:
+        return f"<seixo.Frames: {len(self)}>"
+
+    @property
+    def times(self) -> npt.NDArray[np.float64]:
+        """Their times [s]."""
+        return np.array([frame.time for frame in self._frames])
+
+    def at(self, time: float) -> Frame:
+        """The frame nearest to `time` [s]."""
+        if not self._frames:
+            raise LookupError("the run wrote no frames: `output.every` of the case")
+        return min(self._frames, key=lambda frame: abs(frame.time - time))
+
+
+def _frames(folder: Path) -> list[Frame]:
+    """The frames that the list of the run, its PVD file, names."""
+    lists = list(folder.glob("*.pvd"))
+    if not lists:
+        return []
+    found: dict[float, dict[str, Path]] = {}
+    for item in xml.etree.ElementTree.parse(lists[0]).iter("DataSet"):
+        file = Path(item.get("file", ""))
+        # A list that somebody changed leads nowhere else.
+        if not file.is_absolute() and ".." not in file.parts:
+            found.setdefault(float(item.get("timestep", "nan")), {})[item.get("name", "")] = folder / file
+    return [Frame(time, parts.get("fluid"), parts.get("solids")) for time, parts in found.items()]
+
+
+def _vtu(path: Path) -> dict[str, Array]:
+    """Points and fields of a VTU file, by whichever library is there."""
+    try:
+        import pyvista
+    except ImportError:
+        pass
+    else:
+        mesh = pyvista.read(path)
+        return {"Points": np.asarray(mesh.points), **{k: np.asarray(v) for k, v in mesh.point_data.items()}}
+    try:
+        import meshio
+    except ImportError:
+        raise ImportError("frames are read by pyvista or meshio: `pip install meshio` or `pip install pyvista`") from None
+    with path.open("rb") as file:
+        # The head of a file stands before its arrays.
+        if b'<AppendedData encoding="raw">' in file.read(1 << 14):
+            raise ImportError(f'{path}: `output.encoding = "raw"` is read by pyvista alone: `pip install pyvista`')
+    mesh = meshio.read(path)
+    # It keeps a column of fields with one component.
+    fields = {name: values.reshape(-1) if values.shape[1:] == (1,) else values for name, values in mesh.point_data.items()}
+    return {"Points": mesh.points, **fields}
+
+
+def _column(cells: list[str]) -> Array:
+    """Numbers, if all are; what is empty is none."""
+    try:
+        return np.array([float(cell) if cell else np.nan for cell in cells])
+    except ValueError:
+        return np.array(cells, dtype=object)
+
+
+def _names(headers: list[str]) -> list[str]:
+    """Python names from headers such as `fluid x [m]`; no name twice."""
+    names: list[str] = []
+    for header in headers:
+        bare = re.sub(r"\s*\[[^\]]*\]\s*$", "", header)
+        name = re.sub(r"\W+", "_", bare).strip("_") or "column"
+        name = f"_{name}" if name[0].isdigit() else name
+        again = sum(1 for n in names if n == name or re.fullmatch(rf"{re.escape(name)}_\d+", n))
+        names.append(f"{name}_{again + 1}" if name in names else name)
+    return names
+
+
+def _units(names: list[str], headers: list[str]) -> dict[str, str]:
+    found = (re.search(r"\[([^\]]*)\]\s*$", header) for header in headers)
+    return {name: unit.group(1) for name, unit in zip(names, found) if unit}

@@ -1,0 +1,179 @@
+"""Starts the program."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Union
+
+import tomli_w
+
+from ._errors import DivergedError, error
+from ._program import program
+from ._results import Run, read
+
+#: A case: its file, or what such a file would hold.
+Case = Union[str, "os.PathLike[str]", Mapping[str, Any]]
+
+#: Stopped with its state saved, to be resumed: no error.
+RESUMABLE = 75
+
+
+def run(
+    case: Case,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    spacing: float | None = None,
+    until: float | None = None,
+    set: Mapping[str, Any] | None = None,  # noqa: A002, the option's name
+    steps: int | None = None,
+    backend: str | None = None,
+    adapter: str | int | None = None,
+    threads: int | None = None,
+    max_wall: str | float | None = None,
+    memory_limit: str | int | None = None,
+    picture: bool = False,
+    force: bool = False,
+    resume: bool = False,
+    force_disk: bool = False,
+    progress: bool = False,
+) -> Run:
+    """Runs a case and returns its results; returns when the run has ended.
+
+    case: a TOML file, or a dict with the same keys. Paths in a dict count from the working directory.
+    out: folder of the results; `out/NAME`, or `out/stdin` for a dict, if absent.
+    set: values of the case to change, e.g. `{"fluid.preset": "paper", "body.0.density": 800}`.
+    progress: show the program's progress and remarks on stderr.
+    Everything else is the option of `seixo run` of the same name.
+
+    A run that `max_wall` stopped is returned with the state saved; call again with `resume=True`.
+
+    Raises CaseError, DeviceError, DivergedError or FileError with the program's message. KeyboardInterrupt is passed on
+    after the program has saved its state.
+    """
+    options: dict[str, Any] = {
+        "--backend": backend,
+        "--adapter": adapter,
+        "--threads": threads,
+        "--steps": steps,
+        "--max-wall": max_wall,
+        "--memory-limit": memory_limit,
+    }
+    flags = {"--picture": picture, "--force": force, "--force-disk": force_disk, "--resume": resume}
+    where, text = _case(case)
+    folder = Path(out) if out is not None else Path("out") / ("stdin" if text is not None else Path(where).stem)
+    arguments = ["run", where, f"--out={folder}", *_changes(spacing, until, set)]
+    arguments += [f"{option}={value}" for option, value in options.items() if value is not None]
+    # The case stands before --resume, which could take it for its folder.
+    arguments += [flag for flag, given in flags.items() if given]
+    if not progress:
+        arguments.append("--quiet")
+    code, _, remarks = _start(arguments, text, echo=progress)
+    if code in (0, RESUMABLE):
+        return read(folder)
+    failure = error(remarks, code)
+    if isinstance(failure, DivergedError) and (folder / "result.json").is_file():
+        failure.run = read(folder)
+    raise failure
+
+
+def plan(
+    case: Case,
+    *,
+    spacing: float | None = None,
+    until: float | None = None,
+    set: Mapping[str, Any] | None = None,  # noqa: A002, the option's name
+) -> dict[str, Any]:
+    """What a run would compute, and what it takes: `seixo plan --json`.
+
+    Raises CaseError with the program's message.
+    """
+    where, text = _case(case)
+    code, answer, remarks = _start(["plan", where, "--json", *_changes(spacing, until, set)], text, echo=False)
+    if code != 0:
+        raise error(remarks, code)
+    found: dict[str, Any] = json.loads(answer)
+    return found
+
+
+def _case(case: Case) -> tuple[str, str | None]:
+    """The argument that names the case, and its text if that goes to standard input."""
+    if isinstance(case, Mapping):
+        return "-", tomli_w.dumps(_table(case))
+    return os.fspath(case), None
+
+
+def _changes(spacing: float | None, until: float | None, sets: Mapping[str, Any] | None) -> list[str]:
+    """Options that change the case."""
+    changes = []
+    if spacing is not None:
+        changes.append(f"--spacing={spacing!r}")
+    if until is not None:
+        changes.append(f"--until={until!r}")
+    for key, value in (sets or {}).items():
+        # The value as TOML, in one line.
+        written = tomli_w.dumps({"x": _plain(value)}).removeprefix("x = ") if not isinstance(value, str) else value
+        changes.append(f"--set={key}={' '.join(written.split()) if not isinstance(value, str) else value}")
+    return changes
+
+
+def _table(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {str(key): _plain(value) for key, value in table.items() if value is not None}
+
+
+def _plain(value: Any) -> Any:
+    """A value that TOML has: of arrays, lists; of paths, text; what is None is left out of tables."""
+    if isinstance(value, Mapping):
+        return _table(value)
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return value
+
+
+def _start(arguments: list[str], text: str | None, *, echo: bool) -> tuple[int, str, str]:
+    """Starts the program: its exit code, results and remarks."""
+    process = subprocess.Popen(
+        [str(program()), *arguments],
+        stdin=subprocess.PIPE if text is not None else subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+    )
+    remarks: list[str] = []
+
+    def listen() -> None:
+        assert process.stderr is not None
+        for line in process.stderr:
+            remarks.append(line)
+            if echo:
+                sys.stderr.write(line)
+                sys.stderr.flush()
+
+    listener = threading.Thread(target=listen, daemon=True)
+    listener.start()
+    try:
+        if text is not None and process.stdin is not None:
+            try:
+                process.stdin.write(text)
+                process.stdin.close()
+            except BrokenPipeError:
+                pass  # it says why itself
+        assert process.stdout is not None
+        answer = process.stdout.read()
+        process.wait()
+    except KeyboardInterrupt:
+        # The terminal has told the program, too; it saves its state and ends.
+        process.wait()
+        raise
+    listener.join()
+    return process.returncode, answer, "".join(remarks)

@@ -1,0 +1,176 @@
+"""The package against the program: cases are run, results read. `pytest python/tests`, with the program installed or named
+by SEIXO_PROGRAM, and numpy, tomli-w, meshio; with and without pandas."""
+
+from __future__ import annotations
+
+import builtins
+import runpy
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import seixo
+
+ROOT = Path(__file__).resolve().parents[2]
+
+#: A gate, a floating box and gauges in two dimensions: 0.02 s, three frames.
+CASE: dict[str, Any] = {
+    "run": {"spacing": 0.05, "time_step": 1e-3, "end": 0.02, "dimensions": 2},
+    "tank": {"min": [0, 0, 0], "max": (2.0, 0.1, 1.0), "open": ["z_max"]},
+    "fluid": {"block": [{"min": [0, 0, 0], "max": np.array([0.5, 0.1, 0.5])}]},
+    "moving_wall": [
+        {"name": "gate \"é\"", "min": [0.6, 0, 0], "max": [0.8, 0, 0.8], "motion": [[0, 0, 0, 0], [1, 0, 0, 0.5]]}
+    ],
+    "body": [{"name": "box", "size": [0.2, 0.2, 0.2], "center": [1.4, 0, 0.1], "density": 500, "standing": True}],
+    "contact": {"spring": 1e5, "restitution": None},
+    "gauge": {"level": [{"name": "near gate", "at": [0.3, 0.0]}], "force": [{"name": "on box", "on": "box"}]},
+    "output": {"every": 0.01},
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> seixo.Run:
+    return seixo.run(CASE, tmp_path_factory.mktemp("run") / "out", backend="cpu")
+
+
+def test_the_result_tells_how_it_ended(run: seixo.Run) -> None:
+    assert (run.status, run.verdict) == ("done", run.result["verdict"]["grade"])
+    assert run.result["steps"] == 20
+    assert run.case["run"]["end"] == 0.02
+    assert run.case["fluid"]["block"][0]["max"] == [0.5, 0.1, 0.5]
+    assert "done" in repr(run) and "3 frames" in repr(run)
+
+
+def test_tables_have_columns_by_attribute(run: seixo.Run) -> None:
+    monitors: Any = run.monitors
+    assert np.isclose(monitors.time.iloc[-1], 0.02) and len(monitors) == 21
+    assert monitors.attrs["units"]["time"] == "s"
+    gauges: Any = run.gauges
+    assert 0.4 < gauges.near_gate.iloc[0] < 0.55
+    assert run.units("gauges")["near_gate"] == "m"
+    assert {"on_box_force_x", "on_box_torque_y"} <= set(gauges.columns)
+    box: Any = run.body("box")
+    assert len(box) == 21 and set(box["body"]) == {"box"} and box.index[0] == 0
+    gate: Any = run.body("gate \"é\"")
+    assert np.isclose(gate.z.iloc[-1] - gate.z.iloc[0], 0.01)
+    with pytest.raises(KeyError, match="there are: .*box"):
+        run.body("bax")
+    with pytest.raises(FileNotFoundError, match="bodies, gauges, monitors"):
+        run.table("levels")
+
+
+def test_without_pandas_tables_are_arrays(run: seixo.Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name == "pandas":
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    frame: Any = run.table("bodies")
+    monkeypatch.setattr(builtins, "__import__", without)
+    plain = seixo.read(run.path)
+    array: Any = plain.table("bodies")
+    assert isinstance(array, np.recarray) and array.dtype.names == tuple(frame.columns)
+    assert np.array_equal(array.z, frame.z.to_numpy()) and list(array.body) == list(frame.body)
+    assert len(plain.body("box")) == 21
+
+
+def test_frames_are_read_when_asked_for(run: seixo.Run) -> None:
+    frames = run.frames
+    assert np.allclose(frames.times, [0.0, 0.01, 0.02])
+    assert frames.at(0.012) is frames[1] and len(frames[1:]) == 2
+    water = frames[-1].fluid
+    assert "_fields" not in vars(water)
+    assert len(water) == run.result["particles"]["fluid"] and water.position.shape == (len(water), 3)
+    assert water.velocity.shape == water.position.shape and water.pressure.max() > 500.0
+    assert set(water.kind) == {0} and sorted(water.id) == sorted(frames[0].fluid.id)
+    # Falling: the water has moved down and away from the wall.
+    assert water.velocity[:, 2].mean() < 0.0 < water.velocity[:, 0].max()
+    assert set(frames[0].solids.body) == {1, 2} and len(run.walls) > 50
+    with pytest.raises(KeyError, match="there are: .*Velocity"):
+        water.field("Vorticity")
+
+
+def test_options_change_the_case_and_the_run(tmp_path: Path) -> None:
+    file = tmp_path / "a case.toml"
+    file.write_text((ROOT / "cases/resting_cube.toml").read_text(), encoding="utf-8")
+    sets = {"output.kinds": ["body"], "body.0.density": 700, "body.0.center": (0.4, 0.4, 0.11)}
+    run = seixo.run(file, tmp_path / "out", until=0.01, set=sets, threads=1)
+    assert run.case["run"]["end"] == 0.01 and run.case["body"][0]["density"] == 700
+    assert run.case["output"]["kinds"] == ["body"]
+    with pytest.raises(FileNotFoundError, match="no such table"):
+        _ = run.gauges
+    with pytest.raises(LookupError, match="no water"):
+        _ = run.frames[0].fluid
+    with pytest.raises(seixo.CaseError, match="--force"):
+        seixo.run(file, tmp_path / "out", until=0.01, set=sets)
+    again = seixo.run(file, tmp_path / "out", until=0.01, set=sets, force=True, steps=3)
+    assert again.result["steps"] == 3
+
+
+def test_errors_are_exceptions_with_the_message_of_the_program(tmp_path: Path) -> None:
+    with pytest.raises(seixo.CaseError, match="out of range") as wrong:
+        seixo.run({**CASE, "run": {**CASE["run"], "spacing": -0.03}}, tmp_path / "a")
+    assert wrong.value.code == 2 and "run.spacing" in str(wrong.value)
+    with pytest.raises(seixo.CaseError, match="no case file"):
+        seixo.run(tmp_path / "none.toml")
+    with pytest.raises(seixo.CaseError, match="viscosty"):
+        seixo.plan(CASE, set={"fluid.viscosty": 0})
+    (tmp_path / "file").write_text("")
+    with pytest.raises(seixo.FileError):
+        seixo.run(CASE, tmp_path / "file" / "out")
+    with pytest.raises(FileNotFoundError, match="no results"):
+        seixo.read(tmp_path)
+
+
+def test_a_run_that_means_nothing_says_so_and_keeps_its_results(tmp_path: Path) -> None:
+    fast = {**CASE, "fluid": {"block": [{**CASE["fluid"]["block"][0], "velocity": [0, 0, 3000]}]}}
+    with pytest.raises(seixo.DivergedError) as failed:
+        seixo.run(fast, tmp_path / "out", backend="cpu")
+    assert failed.value.run is not None and failed.value.run.verdict == "failed"
+    assert len(failed.value.run.frames) == 3
+
+
+def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
+    long = {**CASE, "run": {**CASE["run"], "end": 1.0}}
+    first = seixo.run(long, tmp_path / "out", max_wall=0.3, backend="cpu")
+    assert first.status == "interrupted" and 0.0 < first.result["time_s"] < 1.0
+    second = seixo.run(long, tmp_path / "out", max_wall=0.3, backend="cpu", resume=True)
+    assert second.result["time_s"] > first.result["time_s"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+def test_ctrl_c_reaches_python_after_the_state_is_saved(tmp_path: Path) -> None:
+    import subprocess
+
+    script = f"import seixo; seixo.run({str(ROOT / 'cases/dam_break_2d.toml')!r}, 'out', until=50.0, backend='cpu')"
+    process = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True)
+    import os
+    import time
+
+    for _ in range(600):
+        if (tmp_path / "out/monitors.csv").is_file():
+            break
+        time.sleep(0.05)
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    _, remarks = process.communicate(timeout=60)
+    assert b"KeyboardInterrupt" in remarks
+    assert seixo.read(tmp_path / "out").status == "interrupted"
+    assert list((tmp_path / "out/checkpoint").glob("*.seixo"))
+
+
+def test_plan_tells_what_a_run_takes() -> None:
+    plan = seixo.plan(CASE, spacing=0.025)
+    assert plan["spacing_m"] == 0.025 and plan["particles"]["fluid"] == 400
+
+
+def test_the_tutorial_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pandas")
+    monkeypatch.chdir(tmp_path)
+    names = runpy.run_path(str(ROOT / "python/tutorial.py"))
+    assert names["run"].status == "done" and len(names["drafts"]) == 3
