@@ -30,7 +30,7 @@ impl Starter {
         }
     }
 
-    fn text(self) -> &'static str {
+    pub fn text(self) -> &'static str {
         match self {
             Self::DamBreak => include_str!("starters/dam-break.toml"),
             Self::FloatingBody => include_str!("starters/floating-body.toml"),

@@ -5,6 +5,8 @@ mod bench;
 mod compare;
 mod device;
 mod init;
+mod keys;
+mod measure;
 mod plan;
 mod progress;
 mod render;
@@ -49,6 +51,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Tell of a run on one page (HTML) that holds everything: verdict, pictures, curves, times.
     Report(report::ReportArgs),
+    /// Velocity and pressure at points or along lines, from the frames of a run, as CSV.
+    Measure(measure::MeasureArgs),
     /// Show what a run would compute, and what it would leave out and why; compute nothing.
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
@@ -65,8 +69,14 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Print the JSON schema of case files.
-    Schema,
+    /// List the keys of a case file: what each is, what is allowed, what it is if left out, an example.
+    Keys(keys::KeysArgs),
+    /// Print the JSON schema of case files, or of study files.
+    Schema {
+        /// Of which files.
+        #[arg(value_enum, default_value_t = SchemaOf::Case)]
+        of: SchemaOf,
+    },
     /// Print the completions for a shell, e.g. `seixo completions bash > ~/.local/share/bash-completion/completions/seixo`.
     Completions {
         /// The shell.
@@ -134,6 +144,15 @@ enum BackendName {
     Cpu,
 }
 
+/// Files that have a schema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SchemaOf {
+    /// Case files.
+    Case,
+    /// Study and validation files.
+    Study,
+}
+
 /// How a command ended, if it did not fail: its exit code.
 type Exit = Result<u8, Error>;
 
@@ -169,6 +188,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),
+        Command::Measure(args) => measure::measure(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
@@ -177,8 +197,13 @@ fn main() -> ExitCode {
             sweep(args.quiet, |stop| seixo_study::validation::command::command(&args, stop))
         }
         Command::Adapters { json } => device::list(json),
-        Command::Schema => {
-            say(seixo::case::Case::schema().trim_end());
+        Command::Keys(args) => keys::keys(&args),
+        Command::Schema { of } => {
+            let text = match of {
+                SchemaOf::Case => seixo::case::Case::schema(),
+                SchemaOf::Study => seixo_study::definition::Definition::schema(),
+            };
+            say(text.trim_end());
             Ok(0)
         }
         Command::Completions { shell } => shell::completions(shell),

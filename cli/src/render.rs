@@ -112,7 +112,8 @@ fn magnification(text: &str) -> std::result::Result<f64, String> {
     if (0.01..=1000.0).contains(&zoom) { Ok(zoom) } else { Err("write a number from 0.01 to 1000".into()) }
 }
 
-fn numbers<const N: usize>(text: &str, example: &str) -> std::result::Result<[f64; N], String> {
+/// So many numbers with commas between.
+pub fn numbers<const N: usize>(text: &str, example: &str) -> std::result::Result<[f64; N], String> {
     let wrong = || format!("write {N} numbers, e.g. {example}");
     let all: std::result::Result<Vec<f64>, String> = text.split(',').map(super::finite).collect();
     all.map_err(|_| wrong())?.try_into().map_err(|_| wrong())
@@ -234,7 +235,7 @@ pub fn frames_of(root: &Path) -> Result<Vec<Frame>> {
 }
 
 /// The frames nearest to each of `times`, or every `every`th, with their numbers.
-fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
+pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     let nearest = |t: &f64| {
         let distance = |k: &usize| (all[*k].time - t).abs();
         (0..all.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))

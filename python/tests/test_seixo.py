@@ -174,3 +174,14 @@ def test_the_tutorial_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.chdir(tmp_path)
     names = runpy.run_path(str(ROOT / "python/tutorial.py"))
     assert names["run"].status == "done" and len(names["drafts"]) == 3
+
+
+def test_the_python_of_the_guide_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pandas")
+    monkeypatch.chdir(tmp_path)
+    parts = (ROOT / "docs/python.md").read_text(encoding="utf-8").split("```python\n")[1:]
+    assert len(parts) == 3
+    names: dict[str, Any] = {}
+    for part in parts:
+        exec(part.split("```")[0], names)  # noqa: S102, the guide's own
+    assert names["run"].status == "done" and names["unit"] == "N" and names["peak"] >= 0.0

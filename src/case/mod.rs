@@ -2,6 +2,7 @@
 //!
 //! The structs here are the schema (`seixo schema` prints it). `file` reads and overrides, `check` judges what serde cannot.
 
+mod bounds;
 pub mod check;
 mod check_geometry;
 mod check_solids;
@@ -59,25 +60,30 @@ pub struct Case {
 #[serde(deny_unknown_fields)]
 pub struct Run {
     /// Initial distance between particles l0 [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing: f64,
     /// Time step [s]; the largest one when `adaptive = true`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub time_step: f64,
     /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v and
     /// dt <= 0.7 l0 / c_s.
     #[serde(default)]
     pub adaptive: bool,
     /// End of the run [s].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub end: f64,
     /// Gravity [m/s2].
     #[serde(default = "Run::default_gravity")]
     pub gravity: Vector,
     /// 3, or 2 for the plane y = 0 (a slice one spacing wide).
     #[serde(default = "Run::default_dimensions")]
+    #[schemars(extend("enum" = [2, 3]))]
     pub dimensions: u32,
     /// Lower and upper corner of the box that no particle may leave [m]. Derived from the walls if absent.
     pub domain: Option<[Vector; 2]>,
     /// Effective radius over the spacing, re / l0 [-].
     #[serde(default = "Run::default_effective_radius")]
+    #[schemars(range(min = 1.5, max = 4.1))]
     pub effective_radius: f64,
     /// When the state is saved, so that a run that was stopped goes on where it was.
     #[serde(default)]
@@ -92,8 +98,10 @@ pub struct Run {
 #[serde(deny_unknown_fields, default)]
 pub struct Checkpoint {
     /// Simulated time between checkpoints [s]; none by simulated time if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<f64>,
     /// Wall-clock time between checkpoints [s]; 0 for none, nor at the end, unless `every` is given.
+    #[schemars(range(min = 0))]
     pub wall: f64,
 }
 
@@ -145,12 +153,15 @@ pub enum Preconditioner {
 pub struct Fluid {
     /// Density [kg/m3].
     #[serde(default = "Fluid::default_density")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: f64,
     /// Kinematic viscosity [m2/s]; 0 leaves the viscous stage out.
     #[serde(default = "Fluid::default_viscosity")]
+    #[schemars(range(min = 0))]
     pub viscosity: f64,
     /// Friction C_f of walls whose boundary layer is thinner than a spacing, tau = rho C_f |u_t| u_t [-]: half the skin
     /// friction coefficient. 0 leaves the stage out. If absent 0.0025, smooth walls; none with the paper's preset.
+    #[schemars(range(min = 0, max = 1))]
     pub wall_friction: Option<f64>,
     /// Set of scheme switches; the keys below override single ones.
     #[serde(default)]
@@ -162,19 +173,25 @@ pub struct Fluid {
     /// Test for the free surface.
     pub free_surface: Option<FreeSurface>,
     /// Relaxation gamma of Eq. (8) [-]. Give this or `sound_speed`.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 4))]
     pub relaxation: Option<f64>,
     /// Reference speed c_s [m/s], gamma = (c_s dt / l0)^2. Derived from depth and spacing if neither is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub sound_speed: Option<f64>,
     /// Artificial compressibility alpha of Eq. (8) [1/Pa]. Derived if absent.
+    #[schemars(range(min = 1e-14))]
     pub compressibility: Option<f64>,
     /// Free-surface threshold beta [-].
     #[serde(default = "Fluid::default_beta")]
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub free_surface_threshold: f64,
     /// Distance of the collision model over l0, a [-]; Eq. (18).
     #[serde(default = "Fluid::default_collision_distance")]
+    #[schemars(range(min = 0, max = 1))]
     pub collision_distance: f64,
     /// Restitution of the collision model, b [-]; Eq. (18).
     #[serde(default = "Fluid::default_collision_restitution")]
+    #[schemars(range(min = 0, max = 1))]
     pub collision_restitution: f64,
     /// Blocks of water at t = 0.
     #[serde(default)]
@@ -182,6 +199,7 @@ pub struct Fluid {
     /// Largest displacement of a water particle from its lattice at t = 0, along each axis, over the spacing [-];
     /// 0 for none. For ensembles: starts with different `seed` differ in nothing else.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 0.3))]
     pub jitter: f64,
     /// Which of the jittered starts.
     #[serde(default)]
@@ -214,8 +232,10 @@ impl Fluid {
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
     /// Residual over right side at which the iteration stops, ||r|| / ||b|| [-].
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: f64,
     /// Most iterations a step.
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub max_iterations: u32,
     /// Preconditioner.
     pub preconditioner: Preconditioner,
@@ -280,6 +300,7 @@ pub struct Tank {
     pub max: Vector,
     /// Faces without a wall.
     #[serde(default)]
+    #[schemars(length(max = 5), transform = bounds::each_once)]
     pub open: Vec<Face>,
 }
 
@@ -288,6 +309,7 @@ pub struct Tank {
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
     /// Name, for messages and gauges.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Shape. A box from `min` to `max` stands on the lattice of the water; every other one stands where `center` or
     /// `position` puts it.
@@ -299,16 +321,21 @@ pub struct Obstacle {
     pub max: Option<Vector>,
     /// Faces of such a box that need no particles because nothing reaches them.
     #[serde(default)]
+    #[schemars(length(max = 5), transform = bounds::each_once)]
     pub open: Vec<Face>,
     /// Edge lengths of a wedge, or of a box about `center` [m].
+    #[schemars(transform = bounds::each_positive)]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// STL or OBJ file of a mesh or terrain; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
     pub axis: Option<Vector>,
@@ -325,12 +352,14 @@ pub struct Obstacle {
 #[serde(deny_unknown_fields)]
 pub struct Plane {
     /// Name, for messages and gauges.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Centre of the surface [m].
     pub center: Vector,
     /// Normal, into the free space (any length).
     pub normal: Vector,
     /// Edge lengths [m]: along `along`, and across it.
+    #[schemars(transform = bounds::each_positive)]
     pub size: [f64; 2],
     /// Direction of the first edge; made orthogonal to the normal.
     pub along: Vector,
@@ -341,6 +370,7 @@ pub struct Plane {
 #[serde(deny_unknown_fields)]
 pub struct MovingWall {
     /// Name, for messages and gauges.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Shape. A box from `min` to `max` stands on the lattice of the water; every other one stands where `center` or
     /// `position` puts it.
@@ -352,16 +382,21 @@ pub struct MovingWall {
     pub max: Option<Vector>,
     /// Faces of such a box that need no particles because nothing reaches them.
     #[serde(default)]
+    #[schemars(length(max = 5), transform = bounds::each_once)]
     pub open: Vec<Face>,
     /// Edge lengths of a wedge, or of a box about `center` [m].
+    #[schemars(transform = bounds::each_positive)]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// STL or OBJ file of a mesh or terrain; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
     pub axis: Option<Vector>,
@@ -416,19 +451,24 @@ pub enum Freedom {
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Name, for messages and tables.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Shape.
     #[serde(default)]
     pub shape: BodyShape,
     /// Edge lengths of a box or wedge [m].
+    #[schemars(transform = bounds::each_positive)]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In
     /// two dimensions it is [0, 1, 0].
@@ -437,11 +477,14 @@ pub struct Body {
     pub center: Vector,
     /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share of it: l0 over size y
     /// or over the cylinder's height.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub mass: Option<f64>,
     /// Density [kg/m3].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: Option<f64>,
     /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform body if absent.
     /// A cylinder's third axis is its own.
+    #[schemars(transform = bounds::each_positive)]
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.
     pub orientation: Option<Turn>,
@@ -453,6 +496,7 @@ pub struct Body {
     pub angular_velocity: Vector,
     /// Degrees of freedom that are locked.
     #[serde(default)]
+    #[schemars(transform = bounds::each_once)]
     pub locked: Vec<Freedom>,
     /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table, as a moving wall does,
     /// instead of forces.
@@ -505,25 +549,32 @@ pub struct Contact {
     pub law: Law,
     /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 1e18))]
     pub spring: f64,
     /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.
+    #[schemars(range(min = 0))]
     pub damping: Option<f64>,
     /// Damping over the critical one of the lightest body, C / (2 sqrt(K m)) [-], Eq. (15).
+    #[schemars(range(min = 0))]
     pub damping_ratio: Option<f64>,
     /// Normal restitution e of a free impact [-] (law "smooth"): 1 elastic, 0 plastic. 0.5 if none of the three is
     /// given with law "smooth"; law "paper" is then undamped.
+    #[schemars(range(min = 0, max = 1))]
     pub restitution: Option<f64>,
     /// Numerical friction eta of Eq. (12) [kg/s]: over particle pairs (law "paper") or over the true
     /// surfaces, where it adds to `friction` (law "smooth").
     #[serde(default)]
+    #[schemars(range(min = 0))]
     pub viscous_friction: f64,
     /// Coulomb coefficient mu [-], static and kinetic (law "smooth").
     #[serde(default)]
+    #[schemars(range(min = 0))]
     pub friction: f64,
     /// Let contact forces turn bodies (law "paper"; Eq. (14) says nothing of torque).
     #[serde(default = "Contact::default_torque")]
     pub torque: bool,
     /// Force this many contact sub-steps a step instead of as many as stability asks for.
+    #[schemars(range(min = 1, max = 100_000))]
     pub substeps: Option<u32>,
     /// Where pairs are searched and pressed. Sums, friction and motion are the host's, in f64, either way.
     #[serde(default)]
@@ -544,6 +595,7 @@ impl Contact {
 #[serde(deny_unknown_fields, default)]
 pub struct Gauges {
     /// Interval between rows [s]; every step if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<f64>,
     /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
     pub pressure: Vec<PressureGauge>,
@@ -558,6 +610,7 @@ pub struct Gauges {
 #[serde(deny_unknown_fields)]
 pub struct PressureGauge {
     /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Point on a wall [m].
     pub point: Vector,
@@ -568,6 +621,7 @@ pub struct PressureGauge {
 #[serde(deny_unknown_fields)]
 pub struct LevelGauge {
     /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// x, y of the line [m].
     pub at: [f64; 2],
@@ -578,6 +632,7 @@ pub struct LevelGauge {
 #[serde(deny_unknown_fields)]
 pub struct ForceGauge {
     /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
     /// the centre of mass, or the middle of a fixed wall.
@@ -614,12 +669,14 @@ pub enum Encoding {
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// Interval between frames [s]; 0 writes no frames.
+    #[schemars(range(min = 0))]
     pub every: f64,
     /// Which particles to write.
     pub kinds: Vec<OutputKind>,
     /// Encoding of the VTU files.
     pub encoding: Encoding,
     /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub table_every: Option<f64>,
     /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.
     pub ledger: bool,

@@ -36,10 +36,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A study file.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Definition {
     /// Name, for files.
+    #[schemars(regex(pattern = r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$"))]
     pub name: String,
     /// First line of the plots.
     pub title: String,
@@ -88,7 +89,7 @@ fn three() -> u32 {
 }
 
 /// A grid of its own.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Method of its points, instead of the study's.
@@ -101,7 +102,7 @@ pub struct Grid {
 }
 
 /// Something that is varied.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// Name, for tables and plots.
@@ -110,9 +111,11 @@ pub struct Axis {
     pub key: Option<String>,
     /// Values of `key`.
     #[serde(default)]
+    #[schemars(with = "Vec<serde_json::Value>")]
     pub values: Vec<toml::Value>,
     /// Further values, only with `--full`.
     #[serde(default)]
+    #[schemars(with = "Vec<serde_json::Value>")]
     pub full_values: Vec<toml::Value>,
     /// Settings of several keys, instead of `key` and `values`.
     #[serde(default)]
@@ -120,7 +123,7 @@ pub struct Axis {
 }
 
 /// A setting of several keys at once.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Choice {
     /// Name, for tables and plots.
@@ -136,7 +139,7 @@ pub struct Choice {
 }
 
 /// What counts as error.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorMeasure {
     /// A measured value that is an error by itself (against an analytic solution).
@@ -220,6 +223,13 @@ impl Axis {
 }
 
 impl Definition {
+    /// The JSON schema of a study or validation file, for editors (`#:schema` in the first line) and for
+    /// `seixo schema study`.
+    pub fn schema() -> String {
+        let text = serde_json::to_string_pretty(&schemars::schema_for!(Self)).unwrap_or_default();
+        text + "\n"
+    }
+
     /// Read a study; `name` stands for the file in messages.
     ///
     /// # Errors

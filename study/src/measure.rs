@@ -13,7 +13,7 @@ use seixo::simulation::Simulation;
 use serde::Deserialize;
 
 /// A measure of a study file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Pressure of water at rest, P = rho g z below the surface: rms over all inner fluid particles and the window,
@@ -43,7 +43,7 @@ pub enum Measure {
 }
 
 /// What to measure, and when.
-#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Spec {
     /// Measures.

@@ -21,7 +21,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// A check, as in a validation file.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
     /// What is compared, with its unit.
@@ -64,6 +64,7 @@ pub struct Check {
     /// The difference is divided by this; by the reference's size if absent.
     pub per: Option<f64>,
     /// Largest error that is called right [-].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// What others reach.
     #[serde(default)]
@@ -82,7 +83,7 @@ fn time() -> String {
 }
 
 /// What somebody else reaches: a number, or a curve.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Peer {
     /// Who.

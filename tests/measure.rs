@@ -1,0 +1,78 @@
+//! `seixo measure`: what is read from frames between the particles.
+
+use crate::cli::seixo;
+use std::path::Path;
+
+/// Still water 0.5 m deep in two dimensions.
+const STILL: &str = r#"
+[run]
+spacing = 0.025
+time_step = 1e-3
+end = 0.02
+dimensions = 2
+gravity = [0, 0, -10]
+[tank]
+min = [0, 0, 0]
+max = [1, 0, 0.7]
+open = ["z_max"]
+[fluid]
+[[fluid.block]]
+min = [0, 0, 0]
+max = [1, 0, 0.5]
+[output]
+every = 0.01
+"#;
+
+fn measured(folder: &Path, args: &[&str]) -> (i32, String, String) {
+    let output = seixo().current_dir(folder).args(["measure", "out"]).args(args).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+/// The rows of a table, numbers or nothing.
+fn rows(table: &str) -> Vec<Vec<Option<f64>>> {
+    table.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().ok()).collect()).collect()
+}
+
+#[test]
+fn pressures_along_a_line_are_those_of_water_at_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("still.toml"), STILL).unwrap();
+    let run = ["run", "still.toml", "-o", "out", "--backend", "cpu", "-q"];
+    seixo().current_dir(folder.path()).args(run).assert().success();
+
+    let (code, table, err) =
+        measured(folder.path(), &["--line", "0.5,0,0,0.5,0,0.7", "--count", "8", "--times", "0.02"]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    assert!(table.starts_with("time [s],x [m],y [m],z [m],velocity_x [m/s],"), "{table}");
+    let rows = rows(&table);
+    assert_eq!(rows.len(), 8);
+    for row in rows {
+        let z = row[3].unwrap();
+        assert!((row[0].unwrap() - 0.02).abs() < 1e-9);
+        if z < 0.5 {
+            let pressure = row[7].unwrap();
+            assert!((pressure - 1e4 * (0.5 - z)).abs() < 0.05 * 5e3, "z = {z}: {pressure} Pa");
+            assert!(row[4].unwrap().abs() < 0.05);
+        } else if z > 0.55 {
+            assert_eq!(row[4..], [None; 4], "z = {z}: there is no water");
+        }
+    }
+
+    // All frames, points from a file, a table beside the results.
+    std::fs::write(folder.path().join("points.csv"), "x,y,z\n0.2,0,0.1\n# the middle\n0.5,0,0.25\n").unwrap();
+    let (code, said, _) =
+        measured(folder.path(), &["--file", "points.csv", "--point", "0.9,0,0.3", "-o", "out/measure.csv"]);
+    assert_eq!((code, said.trim()), (0, "9 rows in out/measure.csv"));
+    assert_eq!(std::fs::read_to_string(folder.path().join("out/measure.csv")).unwrap().lines().count(), 10);
+
+    let (code, _, err) = measured(folder.path(), &["--point", "0.5,0,0.69"]);
+    assert!(code == 0 && err.contains("no point lies in the water"), "{err}");
+    let (code, _, err) = measured(folder.path(), &[]);
+    assert!(code == 2 && err.contains("--line"), "{err}");
+    let (code, _, err) = measured(folder.path(), &["--point", "0.5,0"]);
+    assert!(code == 2 && err.contains("write 3 numbers"), "{err}");
+    std::fs::write(folder.path().join("points.csv"), "0.2,0,0.1\n0.5,0,x\n").unwrap();
+    let (code, _, err) = measured(folder.path(), &["--file", "points.csv"]);
+    assert!(code == 2 && err.contains("points.csv:2") && err.contains("`0.5,0,x`"), "{err}");
+}
