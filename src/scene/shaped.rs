@@ -156,7 +156,9 @@ impl Builder<'_> {
 
     /// Keeps water out of a shape.
     fn block(&mut self, shape: &Placed) {
-        let margin = margin(shape, self.lattice.spacing);
+        // Only what stands as the lattice does is in register with it.
+        let turned = shape.axes != DMat3::IDENTITY;
+        let margin = if turned { -0.25 * self.lattice.spacing } else { margin(shape, self.lattice.spacing) };
         let reach = shape.bounds() - margin;
         let range = self.lattice.cells(shape.center - reach, shape.center + reach);
         let (lo, hi) = (range.lo.max(self.grid.cells.lo), range.hi.min(self.grid.cells.hi));
