@@ -1,6 +1,6 @@
 // Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer. P is
-// the pressure on the true surface, half a spacing outside of the particles' centres: the hydrostatic parts of the
-// difference are known. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
+// the pressure on the true surface, half a spacing outside of the particles' centres: what the weight and the inertia of
+// the water between would add is known. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
 // Twin: src/kernels/body_force.rs
 
 @group(0) @binding(2) var<storage, read> pressure: array<f32>;
@@ -23,19 +23,17 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     var torque = vec3f(0.0);
     if t < chunk.y {
         let k = chunk.x + t;
-        let orientation = poses[chunk.z].orientation;
+        let pose = poses[chunk.z];
         let wall = wall_layer[k];
         if state[params.fluid + k] == INNER {
-            // Inside the surface by to_surface; see missing_head in src/kernels/body_force.rs.
-            let inside = params.density * dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
-            let surface_pressure = max(pressure[params.fluid + k] + inside + params.surface_head, 0.0);
-            force = -surface_pressure * rotate(orientation, wall.area.xyz);
+            let p = pressure[params.fluid + k];
+            force = -max(p + surface_head(p, pose, wall), 0.0) * rotate(pose.orientation, wall.area.xyz);
         }
 //#if REACTION
         force += reaction[k].xyz;
         reaction[k] = vec4f(0.0);
 //#endif
-        torque = cross(rotate(orientation, wall.arm.xyz), force);
+        torque = cross(rotate(pose.orientation, wall.arm.xyz), force);
     }
     force_of[t] = force;
     torque_of[t] = torque;

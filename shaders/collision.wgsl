@@ -1,7 +1,7 @@
 // Collision of particles that come too close (Lee et al. 2011), Eq. (18): pairs closer than a l0 that still approach each
 // other rebound, dv = -(1 + b) (v_i - v_j).r r / r^2, half of it each for two fluid particles. With SHARED_COLLISIONS a
-// particle takes part in each of its pairs with an equal part of its mass. Written as an acceleration; the reaction on
-// wall layers of moving solids as a force.
+// particle takes part in each of its pairs with an equal part of its mass, one of a free body's wall layer with its part
+// of the body's. Written as an acceleration; the reaction on wall layers of moving solids as a force.
 // Twin: src/kernels/collision.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -10,6 +10,9 @@
 @group(0) @binding(5) var<storage, read> neighbour_count: array<u32>;
 @group(0) @binding(6) var<storage, read_write> acceleration: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> reaction: array<vec4f>;
+//#if REACTION
+@group(0) @binding(8) var<storage, read> wall_layer: array<WallParticle>;
+//#endif
 
 // Velocity that i gains against j if j were immovable.
 fn rebound(x: vec3f, v: vec3f, j: u32) -> vec3f {
@@ -25,23 +28,36 @@ fn rebound(x: vec3f, v: vec3f, j: u32) -> vec3f {
     return -(1.0 + params.restitution) * approach / distance_squared * r;
 }
 
-// Parts into which fluid particle i is split: the number of its colliding pairs, at least one.
+// Inverse of the mass with which particle i takes part in each of its pairs, over that of a particle of water: the number
+// of its colliding pairs, at least one, times its lightness. 0 for what does not give way.
 fn parts(i: u32) -> f32 {
+    let is_fluid = i < params.fluid;
+    var own = f32(is_fluid);
 //#if SHARED_COLLISIONS
+//#if REACTION
+    if !is_fluid && i < params.fluid + params.moving_wall {
+        own = wall_layer[i - params.fluid].area.w;
+    }
+//#endif
+    if own == 0.0 {
+        return 0.0;
+    }
     let x = position[i].xyz;
     let v = velocity[i].xyz;
     let count = neighbour_count[i];
     var pairs = 0u;
     for (var k = 0u; k < near_of(count); k++) {
-        pairs += u32(any(rebound(x, v, neighbour_list[near_place(i, k)]) != vec3f(0.0)));
+        let j = neighbour_list[near_place(i, k)];
+        pairs += u32((is_fluid || j < params.fluid) && any(rebound(x, v, j) != vec3f(0.0)));
     }
-    for (var k = 0u; k < dummies_of(count); k++) {
-        pairs += u32(any(rebound(x, v, neighbour_list[dummy_place(i, k)]) != vec3f(0.0)));
+    if is_fluid {
+        for (var k = 0u; k < dummies_of(count); k++) {
+            pairs += u32(any(rebound(x, v, neighbour_list[dummy_place(i, k)]) != vec3f(0.0)));
+        }
     }
-    return max(f32(pairs), 1.0);
-//#else
-    return 1.0;
+    own *= max(f32(pairs), 1.0);
 //#endif
+    return own;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -56,11 +72,7 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
         let x = position[i].xyz;
         let v = velocity[i].xyz;
         let near = near_of(count);
-        // Solids are immovable here: infinitely many parts of them change nothing.
-        var own = 0.0;
-        if i < params.fluid {
-            own = parts(i);
-        }
+        let own = parts(i);
         for (var k = 0u; k < near; k++) {
             let j = neighbour_list[near_place(i, k)];
             if i >= params.fluid && j >= params.fluid {
@@ -68,11 +80,7 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
             }
             let full = rebound(x, v, j);
             if any(full != vec3f(0.0)) {
-                var other = 0.0;
-                if j < params.fluid {
-                    other = parts(j);
-                }
-                change += full / (own + other);
+                change += full / (own + parts(j));
             }
         }
         if i < params.fluid {

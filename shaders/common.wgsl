@@ -83,12 +83,14 @@ struct Pose {
     orientation: vec4f,
     velocity: vec4f,
     angular_velocity: vec4f,
+    acceleration: vec4f, // over the last step
+    angular_acceleration: vec4f,
 }
 
 // A wall-layer particle of a moving solid, in the solid's frame: outward area, from the centre of mass to the surface, from
 // the particle to the surface.
 struct WallParticle {
-    area: vec4f,
+    area: vec4f, // and its lightness in collisions
     arm: vec4f,
     to_surface: vec4f,
 }
@@ -206,4 +208,19 @@ fn moving_slot_of(k: u32) -> u32 {
 fn rotate(q: vec4f, v: vec3f) -> vec3f {
     let t = 2.0 * cross(q.xyz, v);
     return v + q.w * t + cross(q.xyz, t);
+}
+
+// Pressure on the true surface of a moving solid over `pressure`, that of a particle half a spacing inside: weight and
+// inertia of the water that would lie between. See head in src/kernels/body_force.rs.
+fn surface_head(pressure: f32, pose: Pose, wall: WallParticle) -> f32 {
+    let to_surface = rotate(pose.orientation, wall.to_surface.xyz);
+    var head = params.density * dot(params.gravity, to_surface) + params.surface_head;
+//#if MIXED
+    let arm = rotate(pose.orientation, wall.arm.xyz);
+    let acceleration = pose.acceleration.xyz + cross(pose.angular_acceleration.xyz, arm);
+    // Water does not pull.
+    let most = max(pressure, 0.0);
+    head -= clamp(params.density * dot(acceleration, to_surface), -most, most);
+//#endif
+    return head;
 }

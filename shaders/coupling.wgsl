@@ -13,8 +13,9 @@
 // Of each moving-wall slot force and the place of its y, torque and what it adds to the diagonal; then y of each body.
 @group(0) @binding(7) var<storage, read_write> coupling: array<vec4f>;
 @group(0) @binding(8) var<storage, read> preconditioned: array<vec4f>;
+@group(0) @binding(9) var<storage, read> pressure: array<f32>; // of the last step
 //#if REACTION
-@group(0) @binding(9) var<storage, read> reaction: array<vec4f>;
+@group(0) @binding(10) var<storage, read> reaction: array<vec4f>;
 //#endif
 
 // How a body answers: M^-1 times rho / (c l0^3), with the c by which the device's equation is divided.
@@ -77,20 +78,19 @@ fn product(row: Wrench, y: Wrench) -> f32 {
 @compute @workgroup_size(WORKGROUP)
 fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
     let b = group.x;
-    let orientation = poses[free_body[b].solid].orientation;
+    let pose = poses[free_body[b].solid];
     let place = f32(2u * (params.moving_wall + b));
     let end = free_body[b].first + free_body[b].count;
     var known = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
         let wall = wall_layer[k];
-        let arm = rotate(orientation, wall.arm.xyz);
+        let arm = rotate(pose.orientation, wall.arm.xyz);
         var row = Wrench(vec3f(0.0), vec3f(0.0));
         var force = vec3f(0.0);
         if state[params.fluid + k] == INNER {
-            row.force = -rotate(orientation, wall.area.xyz);
+            row.force = -rotate(pose.orientation, wall.area.xyz);
             row.torque = cross(arm, row.force);
-            let inside = params.density * dot(params.gravity, rotate(orientation, wall.to_surface.xyz));
-            force = (inside + params.surface_head) * row.force;
+            force = surface_head(pressure[params.fluid + k], pose, wall) * row.force;
         }
 //#if REACTION
         force += reaction[k].xyz;

@@ -5,7 +5,7 @@ pub mod wall_force;
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
-use crate::kernels::body_force::surface_pressure;
+use crate::kernels::body_force::{head, surface_pressure};
 use crate::output::table::{Cell, vector_cells, vector_columns};
 use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene, wall_at};
@@ -163,7 +163,8 @@ impl Gauges {
         for gauge in &self.pressure {
             let (own, after) = rest.split_at(gauge.slots.len());
             rest = after;
-            let at_point = |(&p, &way): (&f64, &DVec3)| surface_pressure(p, p > 0.0, way, params);
+            let at_point =
+                |(&p, &way): (&f64, &DVec3)| surface_pressure(p, p > 0.0, head(p, way, DVec3::ZERO, params));
             let sum: f64 = own.iter().zip(&gauge.to_point).map(at_point).sum();
             row.push(Cell::from(if known { sum / own.len() as f64 } else { f64::NAN }));
         }

@@ -64,7 +64,8 @@ fn bodies_of_any_density_carry_the_same_water_and_none_is_thrown_to_and_fro() {
         found.push((s, c, alternation));
     }
     for (s, c, alternation) in found {
-        assert!((0.75..1.0).contains(&c), "s {s}: C {c}");
+        // 0.67 in an endless fluid (Brennen 1982)
+        assert!((0.60..0.75).contains(&c), "s {s}: C {c}");
         assert!(alternation < 0.01, "s {s}: {alternation} g");
     }
 }
@@ -73,7 +74,7 @@ fn bodies_of_any_density_carry_the_same_water_and_none_is_thrown_to_and_fro() {
 fn water_loses_the_momentum_that_a_body_gains() {
     // A cube in the middle of a block of water that touches nothing, without gravity: all of its momentum stays there.
     // Half of what a light body leaves behind is suction, which water without weight does not bear.
-    for (s, most) in [(0.3, 0.12), (1.0, 0.01), (3.0, 0.02)] {
+    for (s, most) in [(0.3, 0.05), (1.0, 0.03), (3.0, 0.02)] {
         let case = case(&format!(
             "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, 0]\n\
              domain = [[-0.2, -0.2, -0.2], [0.6, 0.6, 0.6]]\n\

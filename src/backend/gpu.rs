@@ -30,6 +30,7 @@ use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
 use crate::error::{Error, GpuError, Result};
 use crate::fields::Fields;
+use crate::kernels::collision;
 pub use crate::kernels::device as kernels;
 use crate::kernels::device::Over;
 use crate::kernels::monitor::{speed_most, speed_range};
@@ -239,10 +240,11 @@ impl Gpu {
             let mut chunks: Vec<[u32; 4]> = Vec::new();
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
+                let lightness = collision::lightness(solid, &self.params);
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
                     layer[first + p] = WallParticle {
-                        area: four(solid.wall_area[p], 0.0),
+                        area: four(solid.wall_area[p], lightness as f32),
                         arm: four(solid.wall_offset[p] + to_surface, 0.0),
                         to_surface: four(to_surface, 0.0),
                     };
@@ -424,6 +426,8 @@ impl Backend for Gpu {
             orientation: p.orientation.as_quat().to_array(),
             velocity: four(p.velocity),
             angular_velocity: four(p.angular_velocity),
+            acceleration: four(p.acceleration),
+            angular_acceleration: four(p.angular_acceleration),
         };
         let poses: Vec<_> = poses.iter().map(device).collect();
         self.context.begin(Some(Stage::MoveSolids));

@@ -10,19 +10,27 @@ use crate::error::Result;
 use glam::{DQuat, DVec3};
 
 /// A pose as numbers.
-const POSE: usize = 13;
+const POSE: usize = 19;
 
 fn numbers(pose: &Pose) -> [f64; POSE] {
-    let Pose { position: x, orientation: q, velocity: v, angular_velocity: w } = *pose;
-    [x.x, x.y, x.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z]
+    let Pose { position, orientation, velocity, angular_velocity, acceleration, angular_acceleration } =
+        *pose;
+    let vectors = [position, velocity, angular_velocity, acceleration, angular_acceleration];
+    let mut n = [0.0; POSE];
+    n[..4].copy_from_slice(&orientation.to_array());
+    n[4..].copy_from_slice(vectors.map(|v| v.to_array()).as_flattened());
+    n
 }
 
 fn pose(n: &[f64]) -> Pose {
+    let vector = |k: usize| DVec3::from_slice(&n[4 + 3 * k..]);
     Pose {
-        position: DVec3::new(n[0], n[1], n[2]),
-        orientation: DQuat::from_xyzw(n[3], n[4], n[5], n[6]),
-        velocity: DVec3::new(n[7], n[8], n[9]),
-        angular_velocity: DVec3::new(n[10], n[11], n[12]),
+        position: vector(0),
+        orientation: DQuat::from_slice(n),
+        velocity: vector(1),
+        angular_velocity: vector(2),
+        acceleration: vector(3),
+        angular_acceleration: vector(4),
     }
 }
 

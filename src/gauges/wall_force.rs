@@ -6,7 +6,7 @@
 
 use crate::body::Wrench;
 use crate::fields::Fields;
-use crate::kernels::body_force::surface_pressure;
+use crate::kernels::body_force::{head, surface_pressure};
 use crate::kernels::number_density::pair_weight;
 use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
@@ -71,7 +71,7 @@ impl FixedWall {
     pub fn pressure_force(&self, pressures: &[f64], params: &Params) -> Wrench {
         let mut sum = Wrench::default();
         for (k, &p) in pressures.iter().enumerate() {
-            let p = surface_pressure(p, p > 0.0, self.to_surface[k], params);
+            let p = surface_pressure(p, p > 0.0, head(p, self.to_surface[k], DVec3::ZERO, params));
             let force = -p * self.area[k];
             sum.force += force;
             sum.torque += (self.position[k] + self.to_surface[k] - self.about).cross(force);

@@ -14,6 +14,7 @@ impl Cpu {
             // Follows from the case.
             params,
             settings: _,
+            lightness: _,
             groups,
             solids: _,
             grid: _,

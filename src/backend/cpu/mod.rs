@@ -55,6 +55,8 @@ pub struct Cpu {
     poses: Vec<Pose>,
     /// One a solid where the pressure is to know how they answer, else none.
     free_bodies: Vec<FreeBody>,
+    /// [`collision::lightness`] of each wall-layer slot of the moving solids.
+    lightness: Vec<f64>,
     fields: Fields,
     grid: Grid,
     fluid_start: Vec<u32>,
@@ -81,6 +83,7 @@ impl Cpu {
     pub fn new(scene: &Scene, params: &Params, plan: &Plan, settings: Settings) -> Result<Self> {
         let groups = scene.groups;
         let wet = plan.wet();
+        let lightness = |solid| collision::lightness(solid, params);
         let grid =
             if wet { Grid::new(params)? } else { Grid { origin: DVec3::ZERO, width: 1.0, count: [1; 3] } };
         let mut scratch = Scratch::default();
@@ -98,6 +101,7 @@ impl Cpu {
             solids: scene.solids.clone(),
             poses: Vec::new(),
             free_bodies: Vec::new(),
+            lightness: scene.solids.iter().flat_map(|s| s.wall_slots.clone().map(|_| lightness(s))).collect(),
             fields: if wet { Fields::new(scene, plan.needs(Arrays::Reaction)) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
@@ -259,18 +263,19 @@ impl Cpu {
     }
 
     fn collision(&mut self, step: &Step) {
-        let Self { fields, neighbours, params, groups, .. } = self;
+        let Self { fields, neighbours, params, groups, lightness, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let among = collision::Colliding { on, rows: neighbours, lightness };
         let close = |i: usize| neighbours.chunks[i / CHUNK].close[i % CHUNK];
         fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
-            let change = if close(i) { collision::collision(i, neighbours, on) } else { DVec3::ZERO };
+            let change = if close(i) { collision::collision(i, among) } else { DVec3::ZERO };
             *a = change / step.dt;
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
             if close(i) {
-                *f += collision::reaction(i, neighbours, on, step.dt);
+                *f += collision::reaction(i, among, step.dt);
             }
         });
         if let Some(ledger) = &mut self.ledger {
@@ -309,7 +314,7 @@ impl Cpu {
     fn couple(&mut self) -> Vec<CoupledBody> {
         let (params, fluid) = (&self.params, self.groups.fluid);
         let density_over_volume = params.density / params.spacing.powi(3);
-        let Fields { state, reaction, source, .. } = &mut self.fields;
+        let Fields { state, reaction, source, pressure, .. } = &mut self.fields;
         let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies);
         let mut couple = |((solid, pose), body): ((&Solid, &Pose), &FreeBody)| {
             let mut known = body.load;
@@ -319,7 +324,8 @@ impl Cpu {
                 let unknown = state[i] == State::Inner;
                 let area = if unknown { pose.orientation * solid.wall_area[k] } else { DVec3::ZERO };
                 let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
-                let force = body_force::body_force(body_force::head(to_surface, params), area, reaction);
+                let head = body_force::head(pressure[i], to_surface, pose.acceleration_at(arm), params);
+                let force = body_force::body_force(head, area, reaction);
                 known += Wrench { force, torque: arm.cross(force) };
                 (area, arm)
             };
@@ -493,12 +499,14 @@ impl Backend for Cpu {
             for (k, i) in solid.wall_slots.clone().enumerate() {
                 let area = pose.orientation * solid.wall_area[k];
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
-                let unknown = fields.state[i] == State::Inner;
-                let pressure = body_force::surface_pressure(fields.pressure[i], unknown, to_surface, params);
+                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let (pressure, unknown) = (fields.pressure[i], fields.state[i] == State::Inner);
+                let head = body_force::head(pressure, to_surface, pose.acceleration_at(arm), params);
+                let pressure = body_force::surface_pressure(pressure, unknown, head);
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;
-                total.torque += (pose.orientation * solid.wall_offset[k] + to_surface).cross(force);
+                total.torque += arm.cross(force);
             }
             total
         });

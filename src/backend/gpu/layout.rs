@@ -122,6 +122,8 @@ pub struct Pose {
     pub orientation: [f32; 4],
     pub velocity: [f32; 4],
     pub angular_velocity: [f32; 4],
+    pub acceleration: [f32; 4],
+    pub angular_acceleration: [f32; 4],
 }
 
 /// A wall-layer particle of a moving solid; see `WallParticle` in shaders/body_force.wgsl.
