@@ -169,6 +169,36 @@ fn the_cap_of_sub_steps_holds_whatever_is_asked() {
     }
 }
 
+#[test]
+fn sub_steps_are_cut_further_only_where_a_contact_nears_its_stop() {
+    for spacing in [0.0125, 0.00625] {
+        // two cubes in a tank so high that what could fall through it asks for a hard stop
+        let most = |speed: f64| {
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n[tank]\nmin = [0, 0, 0]\n\
+                 max = [0.5, 0.5, 6]\nopen = [\"z_max\"]\n[contact]\nspring = 1e5\nrestitution = 0.2\nfriction = 0.3\n\
+                 [[body]]\nname = \"still\"\nsize = [0.05, 0.05, 0.05]\ncenter = [0.2, 0.2, 0.025]\ndensity = 800\n\
+                 [[body]]\nname = \"thrown\"\nsize = [0.05, 0.05, 0.05]\ncenter = [0.2, 0.2, 0.09]\ndensity = 800\n\
+                 velocity = [0, 0, -{speed}]\n"
+            ));
+            let planned = dry.solids.advice(dry.dt).substeps.unwrap();
+            let (mut most, mut deepest) = (0, 0.0_f64);
+            while dry.time() < 0.2 {
+                let report = dry.try_step().unwrap();
+                most = most.max(report.substeps);
+                deepest = deepest.max(report.penetration_max_over_l0);
+            }
+            (planned, most, deepest)
+        };
+        let (planned, gentle, deepest) = most(0.0);
+        assert!(deepest > 0.01 && deepest < 0.2, "{deepest}");
+        assert_eq!(gentle, planned);
+        let (planned, hard, deepest) = most(20.0);
+        assert!(deepest > 0.25, "{deepest}");
+        assert!(hard >= 2 * planned && hard <= 64, "{hard} of {planned}");
+    }
+}
+
 fn thin_wall(dt: f64, speed: f64) -> Dry {
     Dry::new(&format!(
         "[run]\nspacing = 0.005\ntime_step = {dt:e}\nend = 1\ngravity = [0, 0, 0]\n\

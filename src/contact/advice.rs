@@ -10,7 +10,7 @@ pub struct ContactAdvice {
     pub omega_dt: f64,
     /// C dt / m_e of the whole step [-].
     pub damping_dt: f64,
-    /// Sub-steps planned; `None` if the case's own number is refused.
+    /// Sub-steps planned, where no contact nears its stop; `None` if the case's own number is refused.
     pub substeps: Option<u32>,
     /// K that the case's heights and masses ask for [N/m]; `None` if the law has no spring.
     pub spring_recommended: Option<f64>,
@@ -42,7 +42,15 @@ impl Solids {
             worst.omega_dt, worst.damping_dt
         );
         match &substeps {
-            Ok(n) => words.push(format!("{numbers}: {n} sub-steps a step")),
+            Ok(n) => {
+                let hardest = self.limits.hardest(&worst, *n);
+                let more = if hardest > *n {
+                    format!(", {hardest} where one nears its stop")
+                } else {
+                    String::new()
+                };
+                words.push(format!("{numbers}: {n} sub-steps a step{more}"));
+            }
             Err(e) => words.extend([e.to_string(), format!("{numbers}: refused, see above")]),
         }
         if let Some((wanted, soft)) = recommended {

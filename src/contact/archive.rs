@@ -73,12 +73,16 @@ impl Solids {
             longest_step,
         } = limits;
         archive.number("solids.longest_step", longest_step)?;
-        let none = Cut { substeps: 1, omega_dt: 0.0 };
-        let (mut dt, Cut { mut substeps, mut omega_dt }) = planned.unwrap_or((-1.0, none));
+        let (mut dt, mut cut) = planned.unwrap_or((-1.0, Cut::new(1, 1, 0.0)));
+        // of what is planned nothing is cut through as yet
+        let Cut { substeps, parts, all: _, hardest, omega_dt } = &mut cut;
         archive.number("solids.planned_step", &mut dt)?;
-        archive.number("solids.planned_omega_dt", &mut omega_dt)?;
-        archive.small("solids.planned_substeps", &mut substeps)?;
-        *planned = Some((dt, Cut { substeps, omega_dt })).filter(|p| p.0 > 0.0);
+        archive.number("solids.planned_omega_dt", omega_dt)?;
+        archive.small("solids.planned_substeps", substeps)?;
+        archive.small("solids.planned_parts", parts)?;
+        archive.small("solids.planned_hardest", hardest)?;
+        let substeps = *substeps;
+        *planned = Some((dt, cut)).filter(|p| p.0 > 0.0);
         archive.number("solids.substep", substep)?;
         let mut now: Vec<[f64; POSE]> = bodies.iter().map(|b| numbers(&b.pose)).collect();
         let mut momenta: Vec<DVec3> = bodies.iter().map(|b| b.momentum).collect();

@@ -4,7 +4,7 @@
 use super::candidates::Candidates;
 use super::device::Link;
 use super::probe::Probe;
-use super::substeps::{Limits, Worst};
+use super::substeps::{Cut, Limits, Worst};
 use crate::body::{Body, Wrench};
 use crate::case;
 use crate::compute::Program;
@@ -77,9 +77,15 @@ pub(crate) trait Law: Send {
         None
     }
 
-    /// Sub-steps of a step of `dt` [s] at which no solid can go through another between two of them.
-    fn hurry(&self, _: Now, _: f64) -> std::result::Result<u32, Fault> {
-        Ok(1)
+    /// How a step of `dt` [s], planned as `cut`, is cut so that no solid can go through another, or far into it, between
+    /// two sub-steps.
+    fn hurry(&self, _: Now, _: f64, cut: Cut) -> std::result::Result<Cut, Fault> {
+        Ok(cut)
+    }
+
+    /// Whether a contact of the last evaluation may reach its stop within the sub-step.
+    fn nears_stop(&self, _: Now) -> bool {
+        false
     }
 
     /// The solids have been put elsewhere, and the lists are no longer theirs.

@@ -199,26 +199,43 @@ impl Solids {
     ) -> Result<ContactReport> {
         let cut = self.prepare(dt)?;
         self.bodies.iter_mut().for_each(|b| b.follow(t, dt));
-        let substeps = self.hurry(cut, t, dt)?;
-        let mut report = ContactReport { substeps, omega_dt: cut.omega_dt, ..ContactReport::default() };
-        let h = dt / f64::from(report.substeps);
-        self.substep = h;
+        let cut = self.hurry(cut, t, dt)?;
+        let mut report = ContactReport { omega_dt: cut.omega_dt, ..ContactReport::default() };
         let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
-        for step in 0..report.substeps {
-            let start = t + h * f64::from(step);
-            self.bodies.iter_mut().filter(|b| b.bends(t, dt)).for_each(|b| b.follow(start, h));
-            // a plain as_deref_mut would keep the borrow for the whole loop
-            let compute = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
-            self.substep(compute, (start, h, dt), fluid, &mut report)?;
-            let last = step + 1 == report.substeps;
-            let now = t + dt * f64::from(step + 1) / f64::from(report.substeps);
-            for (k, body) in self.bodies.iter_mut().enumerate() {
-                if body.is_free() {
-                    body.drift(h);
-                } else {
-                    body.carry(now, h, last);
+        for step in 0..cut.substeps {
+            let (mut part, mut parts) = (0, if cut.all { cut.parts } else { 1 });
+            while part < parts {
+                // a plain as_deref_mut would keep the borrow for the whole loop
+                let compute = compute.as_mut().map(|c| &mut **c as &mut dyn Compute);
+                let at = |part: u32, parts: u32| f64::from(step) + f64::from(part) / f64::from(parts);
+                let whole = dt / f64::from(cut.substeps);
+                let start = t + whole * at(part, parts);
+                let follow = |bodies: &mut [Body], h: f64| {
+                    bodies.iter_mut().filter(|b| b.bends(t, dt)).for_each(|b| b.follow(start, h));
+                };
+                follow(&mut self.bodies, whole / f64::from(parts));
+                self.evaluate(compute, whole, dt)?;
+                if parts < cut.parts && self.nears_stop(whole) {
+                    parts = cut.parts;
+                    follow(&mut self.bodies, whole / f64::from(parts));
                 }
-                self.candidates.travelled(k, body, h);
+                let h = whole / f64::from(parts);
+                // since the evaluation before, the solids have moved for the sub-step before
+                self.check(start, h.max(self.substep))?;
+                self.act(h, fluid, &mut report);
+                part += 1;
+                let last = step + 1 == cut.substeps && part == parts;
+                let now = t + dt * at(part, parts) / f64::from(cut.substeps);
+                for (k, body) in self.bodies.iter_mut().enumerate() {
+                    if body.is_free() {
+                        body.drift(h);
+                    } else {
+                        body.carry(now, h, last);
+                    }
+                    self.candidates.travelled(k, body, h);
+                }
+                report.substeps += 1;
+                self.substep = h;
             }
         }
         report.penetration_max_over_l0 /= self.spacing;
@@ -258,13 +275,18 @@ impl Solids {
         Ok(cut)
     }
 
-    /// Sub-steps of the step: more than planned while a fast solid is close to another.
-    fn hurry(&mut self, cut: Cut, t: f64, dt: f64) -> Result<u32> {
+    /// How the step is cut: into more than planned while a fast solid is close to another.
+    fn hurry(&mut self, cut: Cut, t: f64, dt: f64) -> Result<Cut> {
         self.candidates.refresh(&self.bodies, self.spacing, dt);
-        let Self { law: Some(law), bodies, candidates, limits, .. } = self else { return Ok(cut.substeps) };
-        let hurry = law.hurry(Now { bodies, candidates, limits, substep: dt }, dt);
-        let hurry = hurry.map_err(|fault| self.fault(&fault, t))?;
-        Ok(cut.substeps.max(hurry))
+        let Self { law: Some(law), bodies, candidates, limits, .. } = self else { return Ok(cut) };
+        law.hurry(Now { bodies, candidates, limits, substep: dt }, dt, cut)
+            .map_err(|fault| self.fault(&fault, t))
+    }
+
+    /// Whether a contact of the last evaluation may reach its stop within a sub-step of `h` [s].
+    fn nears_stop(&self, h: f64) -> bool {
+        let Self { law, bodies, candidates, limits, .. } = self;
+        law.as_ref().is_some_and(|law| law.nears_stop(Now { bodies, candidates, limits, substep: h }))
     }
 
     /// An error if the last evaluation has left what the law can be trusted with.
@@ -295,16 +317,8 @@ impl Solids {
         law.evaluate(Now { bodies, candidates, limits, substep: h }, link)
     }
 
-    /// Forces, impulses and friction of the sub-step of `h` [s] from `t` in a step of `dt`; positions stay.
-    fn substep(
-        &mut self,
-        compute: Option<&mut dyn Compute>,
-        (t, h, dt): (f64, f64, f64),
-        fluid: &[Wrench],
-        report: &mut ContactReport,
-    ) -> Result<()> {
-        self.evaluate(compute, h, dt)?;
-        self.check(t, h)?;
+    /// Takes the forces of the last evaluation, impulses and friction of `h` [s] into the velocities; positions stay.
+    fn act(&mut self, h: f64, fluid: &[Wrench], report: &mut ContactReport) {
         self.load.copy_from_slice(fluid);
         if let Some(law) = &self.law {
             law.add_loads(&mut self.load);
@@ -321,6 +335,5 @@ impl Solids {
             report.potential_energy = pressed.energy;
             report.penetration_max_over_l0 = report.penetration_max_over_l0.max(pressed.depth);
         }
-        Ok(())
     }
 }

@@ -51,6 +51,8 @@ pub(crate) struct Worst {
     pub damping_dt: f64,
     /// Sub-steps that the contact as it will be treated asks for; 0 if the law needs none.
     pub wanted: f64,
+    /// The same where a contact reaches its stop.
+    pub hardest: f64,
     /// Stiffness of the softest contact [N/m].
     pub softest: f64,
 }
@@ -58,9 +60,31 @@ pub(crate) struct Worst {
 /// How a step is cut.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cut {
+    /// Sub-steps, each at the laws' constants for its length.
     pub substeps: u32,
+    /// Parts of a sub-step in which a contact may reach its stop.
+    pub parts: u32,
+    /// Whether every sub-step is cut into those.
+    pub all: bool,
+    /// Sub-steps where a contact reaches its stop.
+    pub hardest: u32,
     /// dt sqrt(K / m_e) of the whole step [-].
     pub omega_dt: f64,
+}
+
+impl Cut {
+    /// At least `substeps`, the first at which parts of them make `hardest`, within the most that there may be.
+    pub fn new(substeps: u32, hardest: u32, omega_dt: f64) -> Self {
+        let most = hardest.max(substeps).max(MOST_SUBSTEPS);
+        let fit = |parts: &u32| substeps.max(hardest.div_ceil(*parts)) * parts <= most;
+        let parts = (1..=hardest.div_ceil(substeps.max(1))).rev().find(fit).unwrap_or(1);
+        Self { substeps: substeps.max(hardest.div_ceil(parts)), parts, all: false, hardest, omega_dt }
+    }
+
+    /// With `substeps` at least.
+    pub fn at_least(self, substeps: u32) -> Self {
+        if substeps <= self.substeps { self } else { Self::new(substeps, self.hardest, self.omega_dt) }
+    }
 }
 
 impl Limits {
@@ -166,15 +190,21 @@ impl Limits {
         Ok(wanted as u32)
     }
 
+    /// Sub-steps where a contact reaches its stop, of a step of `substeps`.
+    pub fn hardest(&self, worst: &Worst, substeps: u32) -> u32 {
+        if self.forced.is_some() { substeps } else { substeps.max((worst.hardest - 1e-9).ceil() as u32) }
+    }
+
     /// How the step `dt` [s] is cut.
     ///
     /// # Errors
     /// As [`Limits::substeps`].
     pub fn cut(&mut self, law: Option<&dyn Law>, bodies: &[Body], dt: f64) -> Result<Cut> {
         self.longest_step = self.longest_step.max(dt);
-        let Some(law) = law else { return Ok(Cut { substeps: 1, omega_dt: 0.0 }) };
+        let Some(law) = law else { return Ok(Cut::new(1, 1, 0.0)) };
         let worst = self.worst(law, bodies, dt);
-        Ok(Cut { substeps: self.substeps(&worst)?, omega_dt: worst.omega_dt })
+        let substeps = self.substeps(&worst)?;
+        Ok(Cut::new(substeps, self.hardest(&worst, substeps), worst.omega_dt))
     }
 
     /// dt sqrt(K / m_e) of a sub-step: smaller where the energy of an impact is what the case is about,

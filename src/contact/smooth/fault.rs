@@ -1,13 +1,13 @@
 //! What the smooth law cannot be trusted with, found before it becomes a force: solids that go through each other
 //! between two sub-steps, come out on the wrong side, or are driven into each other.
 
-use super::Smooth;
 use super::pair::{Other, Pair};
 use super::walls::WallBox;
+use super::{STOP_DEPTH, Smooth};
 use crate::body::Body;
 use crate::contact::candidates::reduced_mass;
 use crate::contact::law::{Fault, Now};
-use crate::contact::substeps::{Limits, MOST_SUBSTEPS};
+use crate::contact::substeps::{Cut, Limits, MOST_SUBSTEPS};
 use crate::shape::{Faces, Surface};
 use glam::{DMat3, DVec3};
 
@@ -17,6 +17,10 @@ pub(super) const THROUGH: f64 = 0.8;
 pub(super) const DRIVEN: f64 = 1.0;
 /// Way of a sub-step over half of the thickness of what is hit, at most: one sub-step at least sees it inside.
 const WAY: f64 = 0.5;
+/// Way of a sub-step over the depth of the stop, at most, into what has not been touched yet.
+const UNSEEN: f64 = 0.5;
+/// Ways of a sub-step that are looked ahead for the stop: forces may add to the speed.
+const AHEAD: f64 = 1.5;
 
 /// Depth [m] at which a point in each solid and in each wall reaches the middle between two faces.
 #[derive(Debug)]
@@ -148,27 +152,43 @@ impl Smooth {
         format!("contact.spring = {spring:.1e} or more with run.time_step = {step:.1e} or less")
     }
 
-    /// Sub-steps of a step of `dt` [s] at which no solid can go through another between two of them.
+    /// Whether a contact may reach its stop before the next evaluation.
+    pub(super) fn is_near_stop(&self, now: &Now) -> bool {
+        self.evaluated().iter().filter(|p| p.depth > 0.0).any(|pair| {
+            let most = pair.constants.stop_depth;
+            // most are nowhere near it, and the speed takes longer to find
+            pair.depth >= most || pair.depth + AHEAD * Self::closing(pair, now) * now.substep >= most
+        })
+    }
+
+    /// How a step of `dt` [s] is cut, of `cut` as planned, so that no solid can go through another between two sub-steps, or
+    /// reach its stop unseen.
     ///
     /// Most scenes are slow enough to be passed over at once: only pairs that may meet within the step count.
-    pub(super) fn substeps_of_way(&self, now: &Now, dt: f64) -> Result<u32, Fault> {
+    pub(super) fn cut_of_way(&self, now: &Now, dt: f64, mut cut: Cut) -> Result<Cut, Fault> {
         let speed = |k: usize| {
             let pose = &now.bodies[k].pose;
             pose.velocity.length() + pose.angular_velocity.length() * now.bodies[k].radius()
         };
         let fastest = (0..now.bodies.len()).map(speed).fold(0.0, f64::max);
         // two solids close at twice the speed of the faster one at most; a lattice body is two spacings thick
-        if 2.0 * fastest * dt <= WAY * 0.5 * self.spacing {
-            return Ok(1);
+        let unseen = |reach: f64| UNSEEN * STOP_DEPTH * reach * f64::from(cut.substeps);
+        let thinnest = self.spacing.min(self.middles.least());
+        let stops = cut.parts == 1 || 2.0 * fastest * dt <= unseen(thinnest);
+        if 2.0 * fastest * dt <= WAY * 0.5 * self.spacing && stops {
+            return Ok(cut);
         }
         let mut most = 1.0_f64;
+        let mut all = false;
         for (pair, _) in self.close(now.candidates, now.bodies) {
             let [middle_a, middle_b] = self.middles.of(&pair);
             let way = Self::closing(&pair, now) * dt;
             let wanted = way / (WAY * middle_a.min(middle_b));
-            if wanted <= most || !self.meets(&pair, now, dt) {
+            let stops = cut.parts > 1 && way > unseen(self.spacing.min(middle_a).min(middle_b));
+            if wanted <= most && (all || !stops) || !self.meets(&pair, now, dt) {
                 continue;
             }
+            all |= stops;
             if wanted > f64::from(MOST_SUBSTEPS) {
                 let b = match pair.b {
                     Other::Solid(b) => Ok(b),
@@ -183,9 +203,10 @@ impl Smooth {
                 );
                 return Err(Fault { a: pair.a, b, what });
             }
-            most = wanted;
+            most = most.max(wanted);
         }
-        Ok(most.ceil() as u32)
+        cut.all = all;
+        Ok(cut.at_least(most.ceil() as u32))
     }
 
     /// Whether the first solid, on its way of the step, may come to touch the second.

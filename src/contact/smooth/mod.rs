@@ -32,7 +32,7 @@ use super::candidates::{Candidates, MANY_PAIRS, reduced_mass};
 use super::device::Link;
 use super::law::{Fault, Kind, Law, Now, Summary};
 use super::probe::Probe;
-use super::substeps::{Limits, Worst};
+use super::substeps::{Cut, Limits, Worst};
 use crate::body::{Body, Wrench};
 use crate::error::Result;
 use crate::scene::{Scene, Solid};
@@ -182,7 +182,7 @@ impl Smooth {
             self.set_constants(&mut pairs, now.limits, now.bodies, now.substep);
             (self.pairs, self.constants) = (pairs, wanted);
         }
-        self.press(now.bodies, LEAST);
+        self.press(now.bodies, LEAST, Some(&now.candidates.travel));
     }
 
     /// Constants of `pair` for the longest sub-steps of `limits`.
@@ -204,12 +204,22 @@ impl Smooth {
         }
     }
 
-    fn press(&mut self, bodies: &[Body], least: f64) {
+    /// Forces of all pairs, of those alone that `travel` [m] of each solid since the lists were made does not leave apart.
+    fn press(&mut self, bodies: &[Body], least: f64, travel: Option<&[f64]>) {
         let (surfaces, walls, spacing) = (&self.surfaces, &self.walls, self.spacing);
+        let press = |pair: &mut Pair| {
+            let apart = travel.is_some_and(|travel| {
+                let way = travel[pair.a] + pair.b.solid().map_or(0.0, |b| travel[b]);
+                pair.stays_apart(way, bodies, surfaces, walls)
+            });
+            if !apart {
+                pair.evaluate(bodies, surfaces, walls, spacing, least);
+            }
+        };
         if self.pairs.len() >= MANY_PAIRS {
-            self.pairs.par_iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls, spacing, least));
+            self.pairs.par_iter_mut().for_each(press);
         } else {
-            self.pairs.iter_mut().for_each(|p| p.evaluate(bodies, surfaces, walls, spacing, least));
+            self.pairs.iter_mut().for_each(press);
         }
     }
 }
@@ -261,8 +271,12 @@ impl Law for Smooth {
         self.first_fault(&now)
     }
 
-    fn hurry(&self, now: Now, dt: f64) -> std::result::Result<u32, Fault> {
-        self.substeps_of_way(&now, dt)
+    fn hurry(&self, now: Now, dt: f64, cut: Cut) -> std::result::Result<Cut, Fault> {
+        self.cut_of_way(&now, dt, cut)
+    }
+
+    fn nears_stop(&self, now: Now) -> bool {
+        self.is_near_stop(&now)
     }
 
     fn forget(&mut self) {
@@ -272,7 +286,7 @@ impl Law for Smooth {
 
     fn moved(&mut self) {
         let device = self.device.iter_mut().flat_map(|d| &mut d.pairs);
-        self.pairs.iter_mut().chain(device).for_each(|p| p.depth = f64::INFINITY);
+        self.pairs.iter_mut().chain(device).for_each(Pair::moved);
     }
 
     fn energy(&mut self, now: Now) -> f64 {
@@ -297,7 +311,7 @@ impl Law for Smooth {
     fn probe(&mut self, bodies: &[Body], device: Option<Link>, probe: &mut Probe) -> Result<()> {
         if !self.on_device {
             // at a glance nothing is left out, as on a device, which leaves next to nothing out
-            self.press(bodies, 0.0);
+            self.press(bodies, 0.0, None);
         }
         probe::fill(self, bodies, device, probe)
     }

@@ -105,6 +105,27 @@ impl Frame {
         Self { center: wall.center, axes: wall.axes, shape: wall.shape(), faces: wall.faces }
     }
 
+    /// Largest coordinate of its points along the unit vector `n` of the world [m], from its centre.
+    fn reach(&self, n: DVec3) -> f64 {
+        let own = self.axes.transpose() * n;
+        match self.shape {
+            Shape::Box(cuboid) => own.abs().dot(cuboid.half),
+            shape => shape.reach(own),
+        }
+    }
+
+    /// A lower bound of its distance from `other` [m]: the widest gap across an axis of either, or the line of centres.
+    fn gap(&self, other: &Self) -> f64 {
+        let between = other.center - self.center;
+        let axes =
+            [self.axes, other.axes].into_iter().flat_map(|axes| [axes.x_axis, axes.y_axis, axes.z_axis]);
+        let gap = |n: DVec3| {
+            let n = if n.dot(between) < 0.0 { -n } else { n };
+            n.dot(between) - self.reach(n) - other.reach(-n)
+        };
+        axes.chain(between.try_normalize()).map(gap).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// `x` [m] of the world in its own frame.
     pub fn local(&self, x: DVec3) -> DVec3 {
         self.axes.transpose() * (x - self.center)
@@ -253,6 +274,8 @@ pub(crate) struct Pair {
     pub depth: f64,
     /// The same at the evaluation before; infinite if there was none.
     pub before: f64,
+    /// Way of both solids since the lists were made [m] up to which they stay apart.
+    apart: f64,
     /// Points in contact at the last evaluation, and those with the nodes of edges.
     points: usize,
     count: usize,
@@ -277,9 +300,50 @@ impl Pair {
             energy: 0.0,
             depth: f64::INFINITY,
             before: f64::INFINITY,
+            apart: f64::NEG_INFINITY,
             points: 0,
             count: 0,
         }
+    }
+
+    /// The solids have been put elsewhere: what was before says nothing.
+    pub fn moved(&mut self) {
+        (self.depth, self.apart) = (f64::INFINITY, f64::NEG_INFINITY);
+    }
+
+    /// Whether the two solids, which did not touch at the last evaluation, still do not, when they have gone `way` [m] since the
+    /// lists were made. Most pairs of a heap are such neighbours.
+    pub fn stays_apart(
+        &mut self,
+        way: f64,
+        bodies: &[Body],
+        surfaces: &[Surface],
+        walls: &[WallBox],
+    ) -> bool {
+        if self.depth > 0.0 && self.depth.is_finite() {
+            return false;
+        }
+        if way > self.apart {
+            let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
+            let gap = own.gap(&self.other(bodies, surfaces, walls));
+            if gap <= 0.0 {
+                return false;
+            }
+            // a turn goes a little further than the speed at its start says
+            self.apart = way + 0.9 * gap;
+        }
+        self.clear();
+        true
+    }
+
+    /// Nothing touches.
+    fn clear(&mut self) {
+        self.contacts.clear();
+        self.patches.clear();
+        self.wrench = Default::default();
+        self.before = self.depth;
+        (self.energy, self.depth) = (0.0, 0.0);
+        (self.points, self.count) = (0, 0);
     }
 
     /// Deepest points [m] inside the first and inside the second solid. Of what a device has found only one is
@@ -449,11 +513,7 @@ impl Pair {
         spacing: f64,
         least: f64,
     ) {
-        self.contacts.clear();
-        self.patches.clear();
-        self.wrench = Default::default();
-        self.before = self.depth;
-        (self.energy, self.depth) = (0.0, 0.0);
+        self.clear();
         self.find(bodies, surfaces, walls);
         self.points = self.contacts.len();
         self.find_edges(bodies, surfaces, walls, spacing, least);
@@ -675,5 +735,52 @@ impl Pair {
                 patch.spread += square(c.at - patch.at, share) + square(c.stretch, share);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{ALL_FACES, Cylinder, Sphere};
+    use glam::DQuat;
+
+    #[test]
+    fn the_gap_is_no_more_than_the_distance_and_finds_most_neighbours() {
+        let shapes = [
+            Shape::cuboid(DVec3::new(0.4, 0.2, 0.6)),
+            Shape::Sphere(Sphere { radius: 0.3 }),
+            Shape::Cylinder(Cylinder { radius: 0.2, half_height: 0.25 }),
+        ];
+        let (mut apart, mut found) = (0, 0);
+        for k in 1..600_u32 {
+            let f = |n: f64| (f64::from(k) * n).fract() - 0.5;
+            let frame = |shape: Shape, at: f64, turn: [f64; 3]| Frame {
+                center: at * DVec3::from(turn.map(f)),
+                axes: DMat3::from_quat(
+                    DQuat::from_xyzw(f(turn[0] * 3.1), f(turn[1] * 3.1), f(turn[2] * 3.1), 0.4).normalize(),
+                ),
+                shape,
+                faces: ALL_FACES,
+            };
+            let a = frame(shapes[k as usize % 3], 1.6, [0.618_034, 0.754_877, 0.569_84]);
+            let b = frame(shapes[k as usize / 3 % 3], 0.0, [0.819_17, 0.671_04, 0.549_7]);
+            let gap = a.gap(&b);
+            assert!((gap - b.gap(&a)).abs() < 1e-12);
+            // from places on the one to the other
+            let mut nearest = f64::INFINITY;
+            for n in 0..2000_u32 {
+                let z = 1.0 - (2.0 * f64::from(n) + 1.0) / 2e3;
+                let (sin, cos) = (2.399_963_2 * f64::from(n)).sin_cos();
+                let out = DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
+                // in its frame, from outside onto its surface
+                let (distance, gradient) = a.shape.distance(2.0 * out);
+                let on = a.center + a.axes * (2.0 * out - distance * gradient);
+                nearest = nearest.min(b.shape.distance(b.local(on)).0);
+            }
+            assert!(gap < nearest + 1e-9, "{k}: {gap} {nearest}");
+            apart += u32::from(nearest > 0.05);
+            found += u32::from(gap > 0.0 && nearest > 0.05);
+        }
+        assert!(apart > 300 && f64::from(found) > 0.8 * f64::from(apart), "{found} of {apart}");
     }
 }

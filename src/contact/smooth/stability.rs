@@ -81,7 +81,8 @@ pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> 
         let stopping = c.damping * (c.stop / c.spring).sqrt();
         let for_spring = dt * (c.spring * spring).sqrt() / limits.omega_step();
         let for_stop = dt * (c.stop * spring).sqrt() / limits.omega_step().max(STOP_OMEGA_STEP);
-        worst.wanted = worst.wanted.max(for_spring).max(for_stop).max(dt * stopping * damping / DAMPING_STEP);
+        worst.wanted = worst.wanted.max(for_spring).max(dt * c.damping * damping / DAMPING_STEP);
+        worst.hardest = worst.hardest.max(for_stop).max(dt * stopping * damping / DAMPING_STEP);
         worst.softest = worst.softest.min(c.spring);
     }
     worst
