@@ -1,6 +1,7 @@
 //! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
 
-use crate::case::{Case, Encoding, Face, Obstacle, OutputKind, Vector};
+use crate::case::{Case, Encoding, Face, Form, OutputKind, Place, Vector, Wall};
+use glam::{DMat3, DVec3};
 use serde::Serialize;
 
 /// Bytes on the host, as measured on the transport case from 27,000 to 577,000 particles, states among them: for each particle, for
@@ -84,6 +85,30 @@ fn length(v: &Vector) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// Lower and upper corner of the box around a wall [m], and its open faces. What cannot be read has no size: whoever
+/// builds the scene says so.
+fn edges<'a>(wall: &Wall, spacing: f64, flat: bool, open: &'a [Face]) -> (Vector, Vector, &'a [Face]) {
+    let (form, place) = match wall {
+        Wall::Lattice(min, max) => return (*min, *max, open),
+        Wall::Shaped(form, place) => (form, place),
+    };
+    let (Place::Center(at) | Place::Position(at)) = *place;
+    let Ok((shape, _)) = form.shape(spacing, flat) else { return (at, at, open) };
+    let turn = form.turn(flat);
+    let middle = DVec3::from(at)
+        + if matches!(place, Place::Position(_)) { turn * shape.origin() } else { DVec3::ZERO };
+    let half = shape.extent(DMat3::from_quat(turn * shape.frame()));
+    ((middle - half).to_array(), (middle + half).to_array(), open)
+}
+
+/// Edges of a form that is not turned [m]; none of what cannot be read.
+fn size(form: &Form, spacing: f64, flat: bool) -> Vector {
+    let of = |(shape, _): (crate::shape::Shape, f64)| {
+        (2.0 * shape.extent(DMat3::from_quat(shape.frame()))).to_array()
+    };
+    form.shape(spacing, flat).map_or([0.0; 3], of)
+}
+
 impl Estimate {
     /// Of `case`, which has passed the check.
     pub fn new(case: &Case) -> Self {
@@ -107,32 +132,40 @@ impl Estimate {
             (area * closed.max(0.0) * layers).min(f64::MAX)
         };
         let inside = |size: &dyn Fn(usize) -> f64, open: &[Face]| shell(size, open).min(cells(size));
-        let boxed = |o: &Obstacle| inside(&|k| span(&o.min, &o.max, k), &o.open);
-        let mut solids: f64 = case.obstacle.iter().map(boxed).sum();
-        solids += case.moving_wall.iter().map(|w| inside(&|k| span(&w.min, &w.max, k), &w.open)).sum::<f64>();
+        let tank = case.tank.as_ref();
+        let obstacles = case.obstacle.iter().map(|o| (o.wall(tank), &o.open[..]));
+        let moving = case.moving_wall.iter().map(|w| (w.wall(tank), &w.open[..]));
+        let walls: Vec<(Vector, Vector, &[Face])> =
+            obstacles.chain(moving).map(|(wall, open)| edges(&wall, l0, flat, open)).collect();
+        let mut solids: f64 =
+            walls.iter().map(|(lo, hi, open)| inside(&|k| span(lo, hi, k), open)).sum::<f64>();
         if let Some(tank) = &case.tank {
             solids += shell(&|k| span(&tank.min, &tank.max, k), &tank.open);
         }
         let across = |p: &crate::case::Plane| if flat { 1.0 } else { (p.size[1] / l0).ceil().max(1.0) };
         solids +=
             case.plane.iter().map(|p| (p.size[0] / l0).ceil().max(1.0) * across(p) * layers).sum::<f64>();
-        let extent = |body: &crate::case::Body| {
-            let round = [2.0 * body.radius.unwrap_or_default(); 3];
-            let height = body.height.unwrap_or(round[0]);
-            body.size.unwrap_or([round[0], round[1], height])
-        };
+        let extent = |body: &crate::case::Body| size(&body.form(), l0, flat);
         solids += case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum::<f64>();
 
         let mut lattice = Bounds::NONE;
         case.tank.iter().for_each(|t| lattice.add(t.min, t.max));
         blocks.for_each(|b| lattice.add(b.min, b.max));
-        case.obstacle.iter().for_each(|o| lattice.add(o.min, o.max));
-        case.moving_wall.iter().for_each(|w| lattice.add(w.min, w.max));
-        let mut domain = lattice;
-        for w in &case.moving_wall {
-            let center = [0, 1, 2].map(|k| 0.5 * (w.min[k] + w.max[k]));
+        // What is on the lattice; ground that reaches beyond a tank is cut off there.
+        let on_lattice = |o: Option<(Vector, Vector)>| o.is_some() || tank.is_none();
+        let mut domain = Bounds::NONE;
+        let corners = case.obstacle.iter().map(|o| o.corners());
+        let corners = corners.chain(case.moving_wall.iter().map(|w| w.corners()));
+        for ((lo, hi, _), corners) in walls.iter().zip(corners) {
+            if on_lattice(corners) {
+                lattice.add(*lo, *hi);
+            }
+        }
+        domain.add(lattice.lo, lattice.hi);
+        for (w, (lo, hi, _)) in case.moving_wall.iter().zip(&walls[case.obstacle.len()..]) {
+            let center = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
             let pivot = (!w.rotation.is_empty()).then_some(w.pivot.unwrap_or(center));
-            domain.add_moving(w.min, w.max, &w.motion, pivot);
+            domain.add_moving(*lo, *hi, &w.motion, pivot);
         }
         for body in &case.body {
             let half = 0.5 * length(&extent(body));

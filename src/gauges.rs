@@ -49,8 +49,10 @@ impl Gauges {
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
         let reach = 0.5 * case.run.effective_radius * scene.spacing;
         let mut out = Self::default();
-        let first = scene.groups.static_wall_range().start;
-        let wall = &scene.position[scene.groups.static_wall_range()];
+        // Walls that never move, those of solids of any shape among them.
+        let still = scene.solids.iter().filter(|s| s.is_still()).flat_map(|s| s.wall_slots.clone());
+        let slots: Vec<usize> = scene.groups.static_wall_range().chain(still).collect();
+        let wall: Vec<DVec3> = slots.iter().map(|&slot| scene.position[slot]).collect();
         for (k, gauge) in case.gauge.pressure.iter().enumerate() {
             if scene.groups.fluid == 0 {
                 let message = format!("gauge.pressure {}: there is no fluid", gauge.name);
@@ -60,7 +62,7 @@ impl Gauges {
             if scene.dimensions == 2 {
                 point.y = 0.0;
             }
-            let found = wall_at(wall, point, reach, scene.spacing).map_err(|nearest| {
+            let found = wall_at(&wall, point, reach, scene.spacing).map_err(|nearest| {
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |at| {
                     format!("the nearest wall particle is {:.4} m away at {at:.4}", at.distance(point))
                 });
@@ -69,7 +71,7 @@ impl Gauges {
             })?;
             out.pressure.push(WallPressure {
                 name: gauge.name.clone(),
-                slots: found.iter().map(|k| first + k).collect(),
+                slots: found.iter().map(|&k| slots[k]).collect(),
                 to_point: found.iter().map(|&k| point - wall[k]).collect(),
             });
         }

@@ -238,6 +238,7 @@ pages! {
     how_to_sweep "howto-cluster.md" 1 5;
     how_to_look "howto-look.md" 0 4;
     from_dualsphysics "dualsphysics.md" 1 0;
+    the_shapes "shapes.md" 1 0;
     the_studies "studies.md" 2 6;
     the_validation "validation.md" 0 4;
 }

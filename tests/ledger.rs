@@ -59,12 +59,10 @@ fn the_ledger_closes_with_a_gate_and_a_body_and_shows_what_they_put_in() {
     // A plate that is pushed into the water beside the cube, which starts below its draft and bobs.
     case.moving_wall = vec![MovingWall {
         name: "plate".into(),
-        min: [0.018, 0.018, 0.135],
-        max: [0.036, 0.252, 0.225],
-        open: vec![],
+        min: Some([0.018, 0.018, 0.135]),
+        max: Some([0.036, 0.252, 0.225]),
         motion: vec![[0.0; 4], [0.1, 0.0, 0.0, -0.05]],
-        rotation: vec![],
-        pivot: None,
+        ..MovingWall::default()
     }];
     let (ledger, start) = closes(&mut case, 250, 0);
     for entry in [Entry::Walls, Entry::Exchange, Entry::Contact] {

@@ -35,6 +35,7 @@ mod report;
 mod restart;
 mod scene;
 mod shaders;
+mod shaped;
 mod shapes;
 mod stability;
 mod study;

@@ -8,10 +8,10 @@ use seixo::{Error, Options, Processor, Simulation};
 use std::fmt::Write;
 use tempfile::TempDir;
 
-type Triangles = Vec<[DVec3; 3]>;
+pub type Triangles = Vec<[DVec3; 3]>;
 
 /// A box with its lower corner in the origin, triangles turned outwards.
-fn cuboid(size: DVec3) -> Triangles {
+pub fn cuboid(size: DVec3) -> Triangles {
     let corner = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2 & 1) as f64) * size;
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
         .map(|q| q.map(corner));
@@ -19,7 +19,7 @@ fn cuboid(size: DVec3) -> Triangles {
 }
 
 /// A ball about the origin: an octahedron, each triangle of which is cut in four `times`.
-fn ball(radius: f64, times: u32) -> Triangles {
+pub fn ball(radius: f64, times: u32) -> Triangles {
     let mut out: Triangles = vec![];
     for signs in
         [[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1], [1, 1, -1], [-1, 1, -1], [1, -1, -1], [-1, -1, -1]]
@@ -37,7 +37,7 @@ fn ball(radius: f64, times: u32) -> Triangles {
     out.into_iter().map(|t| t.map(|v| radius * v)).collect()
 }
 
-fn stl(triangles: &Triangles) -> String {
+pub fn stl(triangles: &Triangles) -> String {
     let mut out = String::from("solid it\n");
     for t in triangles {
         out += "facet normal 0 0 0\nouter loop\n";
@@ -56,7 +56,7 @@ fn obj(triangles: &Triangles) -> String {
 }
 
 /// A file in a folder that goes with the test.
-fn file(folder: &TempDir, name: &str, text: &str) -> String {
+pub fn file(folder: &TempDir, name: &str, text: &str) -> String {
     let path = folder.path().join(name);
     std::fs::write(&path, text).expect("written");
     path.display().to_string()

@@ -1,7 +1,7 @@
 //! The part of the check that judges shapes: edges, lengths against the spacing, motion, names.
 
 use super::check::{Checker, face, length};
-use super::{Face, Vector};
+use super::{BodyShape, Face, Form, Vector};
 
 /// More cells than this are a slip of the pen; what a machine can hold is asked before anything is built.
 const MOST_CELLS: f64 = 1e11;
@@ -17,6 +17,14 @@ fn at_start(rows: &[[f64; 4]]) -> Vector {
         (Some(a), None) => a[axis],
         (None, first) => first.map_or(0.0, |r| r[axis]),
     })
+}
+
+/// The keys of a wall beside those of its shape.
+struct WallKeys<'a> {
+    corners: [Option<Vector>; 2],
+    open: &'a [Face],
+    /// `center` and `position`.
+    places: [Option<Vector>; 2],
 }
 
 impl Checker<'_> {
@@ -96,29 +104,110 @@ impl Checker<'_> {
             }
             self.open("tank", &tank.open);
         }
+        let tank = case.tank.as_ref();
         for (k, o) in case.obstacle.iter().enumerate() {
-            let path = format!("obstacle.{k}");
-            if self.box_edges(&path, &format!("{path}.max"), &o.min, &o.max) {
-                self.fits(&path, &format!("obstacle `{}`", o.name), &o.min, &o.max);
-            }
-            self.open(&path, &o.open);
+            let label = format!("obstacle `{}`", o.name);
+            let keys = WallKeys { corners: [o.min, o.max], open: &o.open, places: [o.center, o.position] };
+            self.wall(&format!("obstacle.{k}"), &label, &keys, &o.form(tank));
         }
         for (k, w) in case.moving_wall.iter().enumerate() {
             let path = format!("moving_wall.{k}");
-            if self.box_edges(&path, &format!("{path}.max"), &w.min, &w.max) {
-                self.fits(&path, &format!("moving wall `{}`", w.name), &w.min, &w.max);
+            let label = format!("moving wall `{}`", w.name);
+            let keys = WallKeys { corners: [w.min, w.max], open: &w.open, places: [w.center, w.position] };
+            self.wall(&path, &label, &keys, &w.form(tank));
+            if w.shape == BodyShape::Terrain {
+                let message = format!("{label}: a terrain is ground, which does not move");
+                self.add(
+                    format!("{path}.shape"),
+                    message,
+                    "make it an [[obstacle]], or set shape = \"mesh\"",
+                );
             }
-            self.open(&path, &w.open);
             if !w.motion.is_empty() || w.rotation.is_empty() {
                 self.motion(&format!("{path}.motion"), &w.motion);
             }
-            let size = [0, 1, 2].map(|axis| 0.5 * (w.max[axis] - w.min[axis]));
-            let center = [0, 1, 2].map(|axis| 0.5 * (w.max[axis] + w.min[axis]));
-            self.rotation(&path, &w.rotation, (w.pivot, center), length(&size));
+            let (reach, middle) = w.reach_and_middle();
+            self.rotation(&path, &w.rotation, (w.pivot, middle), reach);
         }
         for (k, plane) in case.plane.iter().enumerate() {
             self.plane(&format!("plane.{k}"), plane);
         }
+    }
+
+    /// A wall is a box with two corners, or any other shape at its place.
+    fn wall(&mut self, path: &str, label: &str, keys: &WallKeys, form: &Form) {
+        let key = |key: &str| format!("{path}.{key}");
+        let [min, max] = keys.corners;
+        if form.shape == BodyShape::Box && form.size.is_none() {
+            match (min, max) {
+                (Some(min), Some(max)) => {
+                    if self.box_edges(path, &key("max"), &min, &max) {
+                        self.fits(path, label, &min, &max);
+                    }
+                }
+                (None, None) => self.add(
+                    path,
+                    format!("{label} has neither corners nor a `size`"),
+                    "add `min` and `max`, or another `shape` with its keys",
+                ),
+                (given, _) => {
+                    let (missing, other) = if given.is_some() { ("max", "min") } else { ("min", "max") };
+                    let message = format!("{label} has `{other}` but no `{missing}`");
+                    self.add(path, message, format!("add `{missing}`, the other corner [m]"));
+                }
+            }
+            self.open(path, keys.open);
+            let foreign = [
+                ("radius", form.radius.is_some(), "cylinder"),
+                ("height", form.height.is_some(), "cylinder"),
+                ("file", form.file.is_some(), "mesh"),
+            ];
+            for (name, _, shape) in foreign.into_iter().filter(|f| f.1) {
+                let message = format!("{label} is a box: `{name}` does not belong to it");
+                self.add(key(name), message, format!("remove `{name}`, or set shape = \"{shape}\""));
+            }
+            let of_shapes = [
+                ("center", keys.places[0].is_some()),
+                ("position", keys.places[1].is_some()),
+                ("axis", form.axis.is_some()),
+                ("scale", form.scale.is_some()),
+                ("orientation", form.orientation.is_some()),
+            ];
+            for (name, _) in of_shapes.into_iter().filter(|f| f.1) {
+                let message = format!("{label} stands where its corners are: `{name}` has no effect");
+                self.add(
+                    key(name),
+                    message,
+                    format!("remove `{name}`, or give `size` and `center`, without corners"),
+                );
+            }
+            return;
+        }
+        let (name, _) = form.shape.keys();
+        for (corner, _) in [("min", min), ("max", max)].into_iter().filter(|c| c.1.is_some()) {
+            let message =
+                format!("{label} is a {name} with a place of its own: `{corner}` does not belong to it");
+            let remedy = format!("remove `{corner}`, or its shape and `size` for a box from `min` to `max`");
+            self.add(key(corner), message, remedy);
+        }
+        if !keys.open.is_empty() {
+            let message = format!("{label}: only a box from `min` to `max` has faces to leave open");
+            self.add(key("open"), message, "remove `open`");
+        }
+        let (own, other) = if form.shape.is_file() { (1, 0) } else { (0, 1) };
+        let names = ["center", "position"];
+        if keys.places[other].is_some() {
+            let message = format!("{label} is a {name}: `{}` does not belong to it", names[other]);
+            self.add(key(names[other]), message, format!("use `{}`", names[own]));
+        }
+        if own == 0 && keys.places[0].is_none() {
+            let message = format!("{label} is a {name} without `center`");
+            self.add(path, message, "add `center`, where its centroid is [m]");
+        }
+        if let Some(at) = keys.places[own] {
+            self.place(&key(names[own]), &at);
+        }
+        self.form(path, label, form);
     }
 
     /// Cells of a plane's surface, one across in two dimensions; infinite if it lies too far off.

@@ -1,7 +1,7 @@
 //! The part of the check that judges bodies and their contact.
 
 use super::check::{Checker, length};
-use super::{Body, BodyShape, ContactDevice, Law};
+use super::{Body, BodyShape, ContactDevice, Form, Law};
 use glam::DMat3;
 
 /// Most sub-steps of a step that a case can ask for.
@@ -13,7 +13,12 @@ const SPRING_MOST: f64 = 1e18;
 impl Checker<'_> {
     pub(super) fn body(&mut self, k: usize, body: &Body) {
         let path = |key: &str| format!("body.{k}.{key}");
-        self.shape(k, body);
+        let label = format!("body `{}`", body.name);
+        self.form(&format!("body.{k}"), &label, &body.form());
+        if body.shape == BodyShape::Terrain {
+            let message = format!("{label}: a terrain is ground, which does not move");
+            self.add(path("shape"), message, "make it an [[obstacle]], or set shape = \"mesh\"");
+        }
         let given = self.one_of(
             &format!("body.{k}"),
             &[("mass", body.mass.is_some()), ("density", body.density.is_some())],
@@ -43,11 +48,6 @@ impl Checker<'_> {
                 );
             }
         }
-        if let Some(turn) = &body.orientation
-            && length(&turn.axis) == 0.0
-        {
-            self.add(path("orientation.axis"), "the axis has no length", "give a direction, e.g. [0, 1, 0]");
-        }
         for (i, freedom) in body.locked.iter().enumerate() {
             if body.locked[..i].contains(freedom) {
                 self.add(path(&format!("locked.{i}")), "listed twice", "remove one of them");
@@ -56,8 +56,7 @@ impl Checker<'_> {
         if let Some(rows) = &body.motion {
             self.motion(&path("motion"), rows);
         }
-        let far = body.size.map_or(0.0, |s| 0.5 * length(&s));
-        let far = far.max(body.radius.unwrap_or(0.0).hypot(0.5 * body.height.unwrap_or(0.0)));
+        let far = body.form().reach();
         self.rotation(&format!("body.{k}"), &body.rotation, (body.pivot, body.center), far);
         if body.is_driven() {
             for (key, given) in [("locked", !body.locked.is_empty()), ("standing", body.standing)] {
@@ -104,12 +103,12 @@ impl Checker<'_> {
         }
         let (spacing, flat) = (run.spacing, self.flat());
         let weight = |body: &Body| {
-            let Ok((shape, share)) = body.shape(spacing, flat) else { return 0.0 };
+            let Ok((shape, share)) = body.form().shape(spacing, flat) else { return 0.0 };
             let mass = body.mass.map(|m| m * share).or(body.density.map(|d| d * shape.volume()));
             mass.unwrap_or(0.0) * length(&run.gravity)
         };
         let smallest = |body: &Body| {
-            let Ok((shape, _)) = body.shape(spacing, flat) else { return f64::INFINITY };
+            let Ok((shape, _)) = body.form().shape(spacing, flat) else { return f64::INFINITY };
             let [x, y, z] = (2.0 * shape.extent(DMat3::IDENTITY)).to_array();
             // what is missing is reported elsewhere
             let lengths = [x, if flat { x } else { y }, z].map(|l| if l > 0.0 { l } else { f64::INFINITY });
@@ -128,22 +127,22 @@ impl Checker<'_> {
         }
     }
 
-    /// The keys that the shape needs, no others, and a particle across at least.
-    fn shape(&mut self, k: usize, body: &Body) {
-        let path = |key: &str| format!("body.{k}.{key}");
-        let (name, needed) = body.shape.keys();
+    /// The keys that the shape of `label` in the table `at` needs, no others, and a particle across at least.
+    pub(super) fn form(&mut self, at: &str, label: &str, form: &Form) {
+        let path = |key: &str| format!("{at}.{key}");
+        let (name, needed) = form.shape.keys();
         let keys = [
-            ("size", body.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
-            ("radius", body.radius.is_some(), "0.1", "[m]"),
-            ("height", body.height.is_some(), "0.2", "the length along the axis [m]"),
-            ("file", body.file.is_some(), "\"hull.stl\"", "an STL or OBJ file"),
+            ("size", form.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
+            ("radius", form.radius.is_some(), "0.1", "[m]"),
+            ("height", form.height.is_some(), "0.2", "the length along the axis [m]"),
+            ("file", form.file.is_some(), "\"hull.stl\"", "an STL or OBJ file"),
         ];
         let mut complete = true;
         for (key, given, example, what) in keys {
             if needed.contains(&key) && !given {
                 complete = false;
-                let message = format!("body `{}` is a {name} without `{key}`", body.name);
-                self.add(format!("body.{k}"), message, format!("add `{key} = {example}`, {what}"));
+                let message = format!("{label} is a {name} without `{key}`");
+                self.add(at, message, format!("add `{key} = {example}`, {what}"));
             } else if given && !needed.contains(&key) {
                 let other = match key {
                     "size" => "box",
@@ -152,32 +151,29 @@ impl Checker<'_> {
                 };
                 self.add(
                     path(key),
-                    format!("body `{}` is a {name}: `{key}` does not belong to it", body.name),
+                    format!("{label} is a {name}: `{key}` does not belong to it"),
                     format!("remove `{key}`, or set shape = \"{other}\""),
                 );
             }
         }
-        for (axis, &length) in body.size.iter().flatten().enumerate() {
+        for (axis, &length) in form.size.iter().flatten().enumerate() {
             self.positive(&path(&format!("size.{axis}")), length, "m");
         }
-        for (key, length) in [("radius", body.radius), ("height", body.height)] {
+        for (key, length) in [("radius", form.radius), ("height", form.height)] {
             if let Some(length) = length {
                 self.positive(&path(key), length, "m");
             }
         }
         let flat = self.flat();
-        if flat && body.shape.needs_space() {
-            let message = format!("body `{}`: there are no {name}s in two dimensions", body.name);
-            self.add(
-                path("shape"),
-                message,
-                "set shape = \"cylinder\" with `radius` and `height`: it lies along y",
-            );
+        if flat && form.shape.needs_space() {
+            let message = format!("{label}: there are no {name}s in two dimensions");
+            let remedy = "set shape = \"cylinder\" with `radius` and `height`: it lies along y";
+            self.add(path("shape"), message, remedy);
         }
-        if let Some(axis) = body.axis {
-            if !body.shape.has_axis() {
-                let message = format!("body `{}` is a {name}: it has no `axis`", body.name);
-                self.add(path("axis"), message, "remove `axis`; `orientation` turns a body");
+        if let Some(axis) = form.axis {
+            if !form.shape.has_axis() {
+                let message = format!("{label} is a {name}: it has no `axis`");
+                self.add(path("axis"), message, "remove `axis`; `orientation` turns a solid");
             } else if length(&axis) == 0.0 {
                 self.add(path("axis"), "the axis has no length", "give a direction, e.g. [0, 1, 0]");
             } else if flat && (axis[0] != 0.0 || axis[2] != 0.0) {
@@ -185,16 +181,21 @@ impl Checker<'_> {
                 self.add(path("axis"), message, "set axis = [0, 1, 0], or leave it out");
             }
         }
-        if let Some(scale) = body.scale {
+        if let Some(turn) = form.orientation
+            && length(&turn.axis) == 0.0
+        {
+            self.add(path("orientation.axis"), "the axis has no length", "give a direction, e.g. [0, 1, 0]");
+        }
+        if let Some(scale) = form.scale {
             self.positive(&path("scale"), scale, "m");
-            if body.shape != BodyShape::Mesh {
-                let message = format!("body `{}` is a {name}: it has no `scale`", body.name);
+            if !form.shape.is_file() {
+                let message = format!("{label} is a {name}: it has no `scale`");
                 self.add(path("scale"), message, "remove `scale`");
             }
         }
-        let (key, size) = body.across(flat);
+        let (key, size) = form.across(flat);
         if complete && size.iter().all(|&l| l > 0.0) {
-            self.fits(&path(key), &format!("body `{}`", body.name), &[0.0; 3], &size);
+            self.fits(&path(key), label, &[0.0; 3], &size);
         }
     }
 

@@ -79,7 +79,12 @@ pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String
     let (mut case, mut text, warnings) = parse(&name, text, &all)?;
     // What a case says of its place holds no more for its copy beside the results.
     let mut places = vec![("run.from".to_owned(), case.run.from.clone())];
-    places.extend(case.body.iter().enumerate().map(|(k, b)| (format!("body.{k}.file"), b.file.clone())));
+    let mut files = |table: &str, all: &mut dyn Iterator<Item = &Option<String>>| {
+        places.extend(all.enumerate().map(|(k, file)| (format!("{table}.{k}.file"), file.clone())));
+    };
+    files("obstacle", &mut case.obstacle.iter().map(|o| &o.file));
+    files("moving_wall", &mut case.moving_wall.iter().map(|w| &w.file));
+    files("body", &mut case.body.iter().map(|b| &b.file));
     let mut absolute = Vec::new();
     for (key, place) in places {
         if let Some(place) = place.map(PathBuf::from).filter(|p| p.is_relative()) {

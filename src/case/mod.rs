@@ -14,6 +14,7 @@ mod shape;
 mod surplus;
 
 pub use shape::BodyShape;
+pub(crate) use shape::{Form, Place, Wall};
 
 use crate::scheme::{FreeSurface, Gradient, Source};
 use schemars::JsonSchema;
@@ -32,7 +33,7 @@ pub struct Case {
     pub fluid: Option<Fluid>,
     /// A rectangular container.
     pub tank: Option<Tank>,
-    /// Fixed boxes.
+    /// Fixed solids.
     #[serde(default)]
     pub obstacle: Vec<Obstacle>,
     /// Fixed flat walls at any angle.
@@ -303,21 +304,47 @@ pub struct Tank {
     pub open: Vec<Face>,
 }
 
-/// A fixed box.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+/// A fixed solid: a box, or any other shape.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
     /// Name, for messages and gauges.
     #[schemars(length(min = 1, max = 80))]
     pub name: String,
-    /// Lower corner [m].
-    pub min: Vector,
-    /// Upper corner [m].
-    pub max: Vector,
-    /// Faces that need no particles because nothing reaches them.
+    /// Shape. A box from `min` to `max` stands on the lattice of the water; every other one stands where `center` or
+    /// `position` puts it.
+    #[serde(default)]
+    pub shape: BodyShape,
+    /// Lower corner of a box [m].
+    pub min: Option<Vector>,
+    /// Upper corner of a box [m].
+    pub max: Option<Vector>,
+    /// Faces of such a box that need no particles because nothing reaches them.
     #[serde(default)]
     #[schemars(length(max = 5), transform = bounds::each_once)]
     pub open: Vec<Face>,
+    /// Edge lengths of a wedge, or of a box about `center` [m].
+    #[schemars(transform = bounds::each_positive)]
+    pub size: Option<Vector>,
+    /// Radius of a sphere, cylinder or cone [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius: Option<f64>,
+    /// Length of a cylinder or cone along its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub height: Option<f64>,
+    /// STL or OBJ file of a mesh or terrain; relative to the case.
+    pub file: Option<String>,
+    /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: Option<f64>,
+    /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
+    pub axis: Option<Vector>,
+    /// Centroid [m], of what is not from a file.
+    pub center: Option<Vector>,
+    /// Where the origin of the file's coordinates goes [m]; [0, 0, 0] if absent.
+    pub position: Option<Vector>,
+    /// Turn about `center` or `position`.
+    pub orientation: Option<Turn>,
 }
 
 /// A fixed rectangular wall at any angle; its layers lie behind the surface.
@@ -338,21 +365,47 @@ pub struct Plane {
     pub along: Vector,
 }
 
-/// A wall that follows a table of motion, e.g. a gate.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+/// A solid that follows a table of motion, e.g. a gate: a box, or any other shape.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MovingWall {
     /// Name, for messages and gauges.
     #[schemars(length(min = 1, max = 80))]
     pub name: String,
-    /// Lower corner at t = 0 [m].
-    pub min: Vector,
-    /// Upper corner at t = 0 [m].
-    pub max: Vector,
-    /// Faces that need no particles because nothing reaches them.
+    /// Shape. A box from `min` to `max` stands on the lattice of the water; every other one stands where `center` or
+    /// `position` puts it.
+    #[serde(default)]
+    pub shape: BodyShape,
+    /// Lower corner of a box at t = 0 [m].
+    pub min: Option<Vector>,
+    /// Upper corner of a box at t = 0 [m].
+    pub max: Option<Vector>,
+    /// Faces of such a box that need no particles because nothing reaches them.
     #[serde(default)]
     #[schemars(length(max = 5), transform = bounds::each_once)]
     pub open: Vec<Face>,
+    /// Edge lengths of a wedge, or of a box about `center` [m].
+    #[schemars(transform = bounds::each_positive)]
+    pub size: Option<Vector>,
+    /// Radius of a sphere, cylinder or cone [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius: Option<f64>,
+    /// Length of a cylinder or cone along its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub height: Option<f64>,
+    /// STL or OBJ file of a mesh or terrain; relative to the case.
+    pub file: Option<String>,
+    /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: Option<f64>,
+    /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
+    pub axis: Option<Vector>,
+    /// Centroid at t = 0 [m], of what is not from a file.
+    pub center: Option<Vector>,
+    /// Where the origin of the file's coordinates goes [m]; [0, 0, 0] if absent.
+    pub position: Option<Vector>,
+    /// Turn about `center` or `position`.
+    pub orientation: Option<Turn>,
     /// Rows of time [s] and displacement x, y, z [m]. Two rows: a constant velocity; more: a smooth curve through them
     /// with a continuous velocity. At rest before the first and after the last. May be left out if there is `rotation`.
     #[serde(default)]
@@ -361,7 +414,7 @@ pub struct MovingWall {
     /// `motion` is, with rows of its own. In two dimensions only the angle about y.
     #[serde(default)]
     pub rotation: Vec<[f64; 4]>,
-    /// What `rotation` turns about, at t = 0 [m]; it moves with `motion`. The middle of the wall if absent.
+    /// What `rotation` turns about, at t = 0 [m]; it moves with `motion`. The centroid of the wall if absent.
     pub pivot: Option<Vector>,
 }
 
@@ -403,13 +456,13 @@ pub struct Body {
     /// Shape.
     #[serde(default)]
     pub shape: BodyShape,
-    /// Edge lengths of a box [m].
+    /// Edge lengths of a box or wedge [m].
     #[schemars(transform = bounds::each_positive)]
     pub size: Option<Vector>,
-    /// Radius of a sphere or cylinder [m].
+    /// Radius of a sphere, cylinder or cone [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Length of a cylinder along its axis [m].
+    /// Length of a cylinder or cone along its axis [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
@@ -417,8 +470,8 @@ pub struct Body {
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<f64>,
-    /// Direction of a cylinder's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In two
-    /// dimensions it is [0, 1, 0].
+    /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In
+    /// two dimensions it is [0, 1, 0].
     pub axis: Option<Vector>,
     /// Centre of mass at t = 0 [m].
     pub center: Vector,

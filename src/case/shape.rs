@@ -1,20 +1,21 @@
-//! Shapes that a body may have: the keys that each needs and what it makes of them. With the shape's own file and its
+//! Shapes that a solid may have: the keys that each needs and what it makes of them. With the shape's own file and its
 //! arm in `src/shape` all that a new one takes.
 
-use super::{Body, Vector};
+use super::{Body, MovingWall, Obstacle, Tank, Turn, Vector};
 use crate::error::Problem;
-#[cfg(feature = "mesh")]
-use crate::shape::Mesh;
 use crate::shape::{Cylinder, Disc, Shape, Sphere};
-use glam::DVec3;
+#[cfg(feature = "mesh")]
+use crate::shape::{Mesh, Unfit};
+use glam::{DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Length of a mesh without a `scale` from which it is asked about [m].
-#[cfg(feature = "mesh")]
 const LARGE: f64 = 50.0;
+/// The same of a wall, over the tank's longest edge [-].
+const LARGE_IN_TANK: f64 = 3.0;
 
-/// Shape of a body.
+/// Shape of a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BodyShape {
@@ -25,29 +26,133 @@ pub enum BodyShape {
     Sphere,
     /// A cylinder of `radius` and `height` with flat ends, along `axis`; in two dimensions a disc.
     Cylinder,
-    /// The watertight surface in the STL or OBJ `file` (three dimensions). `center` is where its centre of mass goes.
+    /// A cone with a base of `radius` and its tip `height` above that along `axis` (three dimensions). Its centroid
+    /// lies a quarter of the height above the base.
+    Cone,
+    /// A wedge: of the box of `size`, what lies below the plane that rises from its lower edge at x min to its upper
+    /// edge at x max (three dimensions). Its centroid lies two thirds of the way along x and one third up.
+    Wedge,
+    /// The watertight surface in the STL or OBJ `file` (three dimensions). A body's `center` is where its centre of mass
+    /// goes.
     Mesh,
+    /// Ground below the open surface in the STL or OBJ `file`, z upwards (three dimensions; not for bodies).
+    Terrain,
 }
 
 impl BodyShape {
-    /// Its name, and the keys of a body that it needs; others of them do not belong to it.
+    /// Its name, and the keys that it needs; others of them do not belong to it.
     pub(super) fn keys(self) -> (&'static str, &'static [&'static str]) {
         match self {
             Self::Box => ("box", &["size"]),
             Self::Sphere => ("sphere", &["radius"]),
             Self::Cylinder => ("cylinder", &["radius", "height"]),
+            Self::Cone => ("cone", &["radius", "height"]),
+            Self::Wedge => ("wedge", &["size"]),
             Self::Mesh => ("mesh", &["file"]),
+            Self::Terrain => ("terrain", &["file"]),
         }
     }
 
-    /// Whether a body of it has an `axis`.
+    /// Whether it has an `axis`.
     pub(super) fn has_axis(self) -> bool {
-        matches!(self, Self::Cylinder)
+        matches!(self, Self::Cylinder | Self::Cone)
+    }
+
+    /// Whether it comes from a file.
+    pub(super) fn is_file(self) -> bool {
+        matches!(self, Self::Mesh | Self::Terrain)
     }
 
     /// Whether there is none of it in two dimensions.
     pub(super) fn needs_space(self) -> bool {
-        matches!(self, Self::Sphere | Self::Mesh)
+        !matches!(self, Self::Box | Self::Cylinder)
+    }
+}
+
+/// The keys of a solid that make its shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Form<'a> {
+    pub shape: BodyShape,
+    pub size: Option<Vector>,
+    pub radius: Option<f64>,
+    pub height: Option<f64>,
+    pub file: Option<&'a str>,
+    pub scale: Option<f64>,
+    pub axis: Option<Vector>,
+    pub orientation: Option<&'a Turn>,
+    /// Length of what comes from a file without a `scale` from which it is asked about [m].
+    large: f64,
+}
+
+/// Where a wall of any shape stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Place {
+    /// Its centroid [m].
+    Center(Vector),
+    /// The origin of its file [m].
+    Position(Vector),
+}
+
+/// What is a box of the water's lattice, or has any shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Wall<'a> {
+    /// From `min` to `max` [m].
+    Lattice(Vector, Vector),
+    /// Any shape, at its place.
+    Shaped(Form<'a>, Place),
+}
+
+/// An obstacle or a moving wall by the keys that make its shape.
+macro_rules! wall {
+    ($kind:ty) => {
+        impl $kind {
+            /// The keys that make its shape; `tank` tells what is large.
+            pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
+                let edge = |t: &Tank| (0..3).map(|k| t.max[k] - t.min[k]).fold(0.0, f64::max);
+                Form {
+                    shape: self.shape,
+                    size: self.size,
+                    radius: self.radius,
+                    height: self.height,
+                    file: self.file.as_deref(),
+                    scale: self.scale,
+                    axis: self.axis,
+                    orientation: self.orientation.as_ref(),
+                    large: LARGE.max(LARGE_IN_TANK * tank.map_or(0.0, edge)),
+                }
+            }
+
+            /// What it is: a box of the lattice, if it has corners.
+            pub(crate) fn wall(&self, tank: Option<&Tank>) -> Wall<'_> {
+                match (self.min, self.max) {
+                    (Some(min), Some(max)) => Wall::Lattice(min, max),
+                    _ if self.shape.is_file() => {
+                        Wall::Shaped(self.form(tank), Place::Position(self.position.unwrap_or_default()))
+                    }
+                    _ => Wall::Shaped(self.form(tank), Place::Center(self.center.unwrap_or_default())),
+                }
+            }
+
+            /// Its corners, if it is a box of the lattice.
+            pub(crate) fn corners(&self) -> Option<(Vector, Vector)> {
+                self.min.zip(self.max)
+            }
+        }
+    };
+}
+
+wall!(Obstacle);
+wall!(MovingWall);
+
+impl MovingWall {
+    /// Half of its diagonal [m] and its middle, as far as they are known without its file.
+    pub(super) fn reach_and_middle(&self) -> (f64, Vector) {
+        if let Some((min, max)) = self.corners() {
+            let half = DVec3::from(max) - DVec3::from(min);
+            return (0.5 * half.length(), [0, 1, 2].map(|k| 0.5 * (min[k] + max[k])));
+        }
+        let middle = self.center.or(self.position).unwrap_or_default();
+        (self.form(None).reach(), middle)
     }
 }
 
@@ -57,37 +162,80 @@ impl Body {
         self.motion.is_some() || !self.rotation.is_empty()
     }
 
-    /// Its shape, and the share of a given mass that it stands for: in two dimensions (`plane`) a body is a slice as
+    /// The keys that make its shape.
+    pub(crate) fn form(&self) -> Form<'_> {
+        Form {
+            shape: self.shape,
+            size: self.size,
+            radius: self.radius,
+            height: self.height,
+            file: self.file.as_deref(),
+            scale: self.scale,
+            axis: self.axis,
+            orientation: self.orientation.as_ref(),
+            large: LARGE,
+        }
+    }
+}
+
+impl Form<'_> {
+    /// Its shape, and the share of a given mass that it stands for: in two dimensions (`plane`) a solid is a slice as
     /// wide as the `spacing` [m].
     ///
     /// # Errors
-    /// A mesh that cannot be read; the key is that of the body's table.
+    /// A file that cannot be read; the key is that of the solid's table.
     pub(crate) fn shape(&self, spacing: f64, plane: bool) -> Result<(Shape, f64), Box<Problem>> {
         let (radius, height) = (self.radius.unwrap_or_default(), self.height.unwrap_or_default());
+        let size: DVec3 = self.size.unwrap_or_default().into();
         let slice = |width: f64| if plane { spacing / width } else { 1.0 };
         Ok(match self.shape {
-            BodyShape::Mesh => (self.mesh()?, 1.0),
             BodyShape::Box => {
-                let mut size: DVec3 = self.size.unwrap_or_default().into();
                 let share = slice(size.y);
-                if plane {
-                    size.y = spacing;
-                }
-                (Shape::cuboid(size), share)
+                let y = if plane { spacing } else { size.y };
+                (Shape::cuboid(DVec3 { y, ..size }), share)
             }
             BodyShape::Sphere => (Shape::Sphere(Sphere { radius }), 1.0),
             BodyShape::Cylinder if plane => (Shape::Disc(Disc { radius, width: spacing }), slice(height)),
             BodyShape::Cylinder => (Shape::Cylinder(Cylinder { radius, half_height: 0.5 * height }), 1.0),
+            BodyShape::Cone | BodyShape::Wedge | BodyShape::Mesh | BodyShape::Terrain => {
+                (self.mesh(spacing)?, 1.0)
+            }
         })
     }
 
+    /// Turn of the shape's frame, [`Shape::frame`] left aside; a cylinder stands along the z axis of its own.
+    pub(crate) fn turn(&self, plane: bool) -> DQuat {
+        let turn = self.orientation.map_or(DQuat::IDENTITY, |turn| {
+            DQuat::from_axis_angle(DVec3::from(turn.axis).normalize(), turn.angle_deg.to_radians())
+        });
+        match self.axis {
+            Some(axis) if !plane => turn * DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
+            _ => turn,
+        }
+    }
+
     #[cfg(feature = "mesh")]
-    fn mesh(&self) -> Result<Shape, Box<Problem>> {
-        let path = self.file.as_deref().unwrap_or_default();
-        let mesh = Mesh::open(path, self.scale.unwrap_or(1.0));
-        let mesh = mesh.map_err(|unfit| Box::new(Problem::new("file", unfit.message, unfit.remedy)))?;
+    fn mesh(&self, spacing: f64) -> Result<Shape, Box<Problem>> {
+        let unfit = |key: &str| {
+            let key = key.to_owned();
+            move |unfit: Unfit| Box::new(Problem::new(key, unfit.message, unfit.remedy))
+        };
+        let path = self.file.unwrap_or_default();
+        let scale = self.scale.unwrap_or(1.0);
+        let mesh = match self.shape {
+            BodyShape::Cone => {
+                let (radius, height) = (self.radius.unwrap_or_default(), self.height.unwrap_or_default());
+                return Ok(Shape::Mesh(Mesh::cone(radius, height).map_err(unfit("shape"))?));
+            }
+            BodyShape::Wedge => {
+                let size = self.size.unwrap_or_default().into();
+                return Ok(Shape::Mesh(Mesh::wedge(size).map_err(unfit("shape"))?));
+            }
+            BodyShape::Terrain => Mesh::terrain(path, scale, spacing).map_err(unfit("file"))?,
+            _ => Mesh::open(path, scale).map_err(unfit("file"))?,
+        };
         let size = mesh.size().max_element();
-        if self.scale.is_none() && size > LARGE {
+        if self.scale.is_none() && size > self.large {
             let message = format!("{path}: it would be {size} m long: are its lengths millimetres?");
             return Err(Box::new(Problem::new(
                 "scale",
@@ -99,23 +247,32 @@ impl Body {
     }
 
     #[cfg(not(feature = "mesh"))]
-    fn mesh(&self) -> Result<Shape, Box<Problem>> {
+    fn mesh(&self, _: f64) -> Result<Shape, Box<Problem>> {
         let message = "this seixo was built without meshes";
         Err(Box::new(Problem::new("shape", message, "build it with its feature `mesh`")))
+    }
+
+    /// Radius of a sphere about its centre that holds it, as far as it is known without its file [m].
+    pub(super) fn reach(&self) -> f64 {
+        let box_ = self.size.map_or(0.0, |s| 0.5 * DVec3::from(s).length());
+        let round = self.radius.unwrap_or(0.0).hypot(0.5 * self.height.unwrap_or(0.0));
+        // the centroid of a cone or wedge is not in the middle
+        let off = if matches!(self.shape, BodyShape::Cone | BodyShape::Wedge) { 2.0 } else { 1.0 };
+        off * box_.max(round)
     }
 
     /// The key that its smallest length comes from, and the edges of the box around it [m].
     pub(super) fn across(&self, plane: bool) -> (&'static str, Vector) {
         let (radius, height) = (self.radius.unwrap_or_default(), self.height.unwrap_or_default());
         match self.shape {
-            BodyShape::Box => ("size", self.size.unwrap_or_default()),
-            BodyShape::Cylinder if !plane => {
+            BodyShape::Box | BodyShape::Wedge => ("size", self.size.unwrap_or_default()),
+            BodyShape::Cylinder | BodyShape::Cone if !plane => {
                 let key = if height < 2.0 * radius { "height" } else { "radius" };
                 (key, [2.0 * radius, 2.0 * radius, height])
             }
-            BodyShape::Sphere | BodyShape::Cylinder => ("radius", [2.0 * radius; 3]),
+            BodyShape::Sphere | BodyShape::Cylinder | BodyShape::Cone => ("radius", [2.0 * radius; 3]),
             // Known when the file is read.
-            BodyShape::Mesh => ("file", [f64::NAN; 3]),
+            BodyShape::Mesh | BodyShape::Terrain => ("file", [f64::NAN; 3]),
         }
     }
 }

@@ -5,7 +5,7 @@ use super::walls::motion;
 use super::{Drive, FreeBody, Shape, Solid};
 use crate::case::{self, Freedom};
 use crate::error::Problem;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 /// A body without slots, at the position that the case asks for.
 ///
@@ -18,7 +18,8 @@ pub(super) fn body(
     layers: i32,
 ) -> Result<Solid, Box<Problem>> {
     let plane = dimensions == 2;
-    let (shape, share) = body.shape(spacing, plane)?;
+    let form = body.form();
+    let (shape, share) = form.shape(spacing, plane)?;
     let mut position: DVec3 = body.center.into();
     if plane {
         position.y = 0.0;
@@ -35,7 +36,7 @@ pub(super) fn body(
         is_body: true,
         shape,
         position,
-        orientation: orientation(body, plane) * shape.frame(),
+        orientation: form.turn(plane) * shape.frame(),
         drive,
         wall_slots: 0..0,
         dummy_slots: 0..0,
@@ -44,17 +45,6 @@ pub(super) fn body(
         wall_area: particles.area,
         wall_to_surface: particles.to_surface,
     })
-}
-
-/// The turn from the shape's frame; a cylinder stands along the z axis of its own.
-fn orientation(body: &case::Body, plane: bool) -> DQuat {
-    let turn = body.orientation.as_ref().map_or(DQuat::IDENTITY, |turn| {
-        DQuat::from_axis_angle(DVec3::from(turn.axis).normalize(), turn.angle_deg.to_radians())
-    });
-    match body.axis {
-        Some(axis) if !plane => turn * DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
-        _ => turn,
-    }
 }
 
 fn free(body: &case::Body, shape: &Shape, share: f64, plane: bool) -> FreeBody {

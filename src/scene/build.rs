@@ -1,10 +1,12 @@
 //! From a case to a scene.
 //!
-//! Order of placement, first come first served: tank, obstacles, moving walls, planes, water, bodies.
+//! Order of placement, first come first served: tank, obstacles and moving walls that are boxes of the lattice, planes,
+//! obstacles and moving walls of any other shape, water, bodies.
 
 use super::bodies;
 use super::lattice::{Cells, Grid, Lattice};
 use super::placement::{Surroundings, point};
+use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::Water;
 use super::{Scene, Solid, wall_at};
@@ -46,9 +48,9 @@ fn listed(problems: &[Problem]) -> String {
 pub(super) struct Builder<'a> {
     pub(super) case: &'a Case,
     pub(super) lattice: Lattice,
-    grid: Grid,
+    pub(super) grid: Grid,
     /// Wall layer and dummies: 1 + the most layers that lie strictly within re of the wall layer.
-    layers: i32,
+    pub(super) layers: i32,
     pub(super) tank: Option<Cells>,
     pub(super) fixed: Fixed,
     pub(super) moving_walls: Vec<Solid>,
@@ -69,9 +71,11 @@ impl<'a> Builder<'a> {
         let tank = case.tank.as_ref().map(|t| lattice.tank_cells(t.min.into(), t.max.into()));
         let outer = case.tank.as_ref().zip(tank);
         let outer = outer.map(|(t, c)| walls::outer(c, walls::closed(&t.open, lattice.plane), layers));
-        let boxes = case.obstacle.iter().map(|o| (o.min, o.max));
-        let boxes = boxes.chain(case.moving_wall.iter().map(|w| (w.min, w.max)));
+        let boxes = case.obstacle.iter().filter_map(|o| o.corners());
+        let boxes = boxes.chain(case.moving_wall.iter().filter_map(|w| w.corners()));
         let boxes = boxes.chain(blocks.iter().map(|b| (b.min, b.max)));
+        // A vessel of any shape holds water without a tank.
+        let boxes = boxes.chain(if case.tank.is_none() { shaped::boxes(case) } else { vec![] });
         let all = boxes.map(|(min, max)| lattice.cells(min.into(), max.into())).chain(outer);
         let all = all.reduce(Cells::union).unwrap_or(Cells { lo: IVec3::ZERO, hi: IVec3::ZERO });
         // One free cell around everything, so that what leaves can be seen to leave.
@@ -117,15 +121,17 @@ impl<'a> Builder<'a> {
             }
         }
         for obstacle in &case.obstacle {
-            let taken = self.fixed.obstacle(obstacle, &lattice, &mut self.grid, layers);
+            let Some(corners) = obstacle.corners() else { continue };
+            let taken = self.fixed.obstacle(obstacle, corners, &lattice, &mut self.grid, layers);
             let label = format!("obstacle `{}`", obstacle.name);
-            self.rounded(&label, obstacle.min.into(), obstacle.max.into());
+            self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
         }
         for wall in &case.moving_wall {
-            let (solid, taken) = walls::moving_wall(wall, &lattice, &mut self.grid, layers);
+            let Some(corners) = wall.corners() else { continue };
+            let (solid, taken) = walls::moving_wall(wall, corners, &lattice, &mut self.grid, layers);
             let label = format!("moving wall `{}`", wall.name);
-            self.rounded(&label, wall.min.into(), wall.max.into());
+            self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
             let half = solid.shape.extent(DMat3::IDENTITY);
             let thin = (0..3).any(|k| 2.0 * half[k] < 1.5 * lattice.spacing && !(lattice.plane && k == 1));
@@ -156,6 +162,7 @@ impl<'a> Builder<'a> {
                 ));
             }
         }
+        self.shaped();
     }
 
     fn water(&mut self) {
@@ -187,7 +194,7 @@ impl<'a> Builder<'a> {
                     continue;
                 }
             };
-            self.thin(k, &solid);
+            self.thin(&format!("body.{k}"), &solid);
             let earlier: Vec<&Solid> = self.moving_walls.iter().chain(&self.bodies).collect();
             let surroundings = Surroundings {
                 fixed: &self.fixed,
@@ -220,39 +227,17 @@ impl<'a> Builder<'a> {
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }
 
-    /// What is thinner than two particles has none inside, and what is thinner than one none at all.
-    #[cfg(feature = "mesh")]
-    fn thin(&mut self, k: usize, solid: &Solid) {
-        let super::Shape::Mesh(mesh) = solid.shape else { return };
-        let (thin, l0) = (mesh.thickness(), self.lattice.spacing);
-        let message = format!(
-            "body `{}` is {:.2e} m thin at {} of its file",
-            solid.name,
-            thin.least,
-            point(thin.place)
-        );
-        if thin.least < l0 * (1.0 - 1e-6) || solid.wall_offset.len() < 4 {
-            let message = format!("{message}, less than one particle of {l0} m");
-            let remedy = format!("use run.spacing = {:.1e} or less, or thicken it", thin.least);
-            self.problems.push(Problem::new(format!("body.{k}.file"), message, remedy));
-        } else if thin.least < 2.0 * l0 * (1.0 - 1e-6) {
-            self.notes
-                .push(format!("{message}: less than two particles of {l0} m, the force on it is rough"));
-        }
-    }
-
-    #[cfg(not(feature = "mesh"))]
-    fn thin(&mut self, _: usize, _: &Solid) {}
-
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     fn gauges(&mut self) {
         let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
+        let still = self.moving_walls.iter().filter(|s| s.is_still()).flat_map(Solid::wall_positions);
+        let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
         for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
             let mut at: DVec3 = gauge.point.into();
             if self.lattice.plane {
                 at.y = 0.0;
             }
-            if let Err(nearest) = wall_at(&self.fixed.wall, at, reach, self.lattice.spacing) {
+            if let Err(nearest) = wall_at(&walls, at, reach, self.lattice.spacing) {
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
                     format!("the nearest stands at {}", point(nearest))
                 });

@@ -17,8 +17,15 @@ impl Builder<'_> {
         }
         for solid in self.moving_walls.iter().chain(&self.bodies) {
             let shape = solid.placed();
+            let label = format!("{} `{}`", solid.what(), solid.name);
+            if solid.is_still() {
+                // as much of it as the tank has left
+                let left =
+                    solid.wall_positions().fold((DVec3::MAX, DVec3::MIN), |(a, b), x| (a.min(x), b.max(x)));
+                bounds.add(&label, left.0 - l0, left.1 + l0);
+                continue;
+            }
             let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
-            let label = format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name);
             bounds.add(&label, lo, hi);
             if let Drive::Prescribed(motion) = &solid.drive {
                 for t in motion.samples() {

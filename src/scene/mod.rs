@@ -21,6 +21,7 @@ mod layout;
 mod motion;
 mod oriented;
 mod placement;
+mod shaped;
 mod support;
 mod walls;
 mod water;
@@ -196,6 +197,20 @@ pub struct Solid {
 }
 
 impl Solid {
+    /// Whether it stands still for ever: an obstacle that is no box of the lattice.
+    pub fn is_still(&self) -> bool {
+        matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
+    }
+
+    /// What it is in a case.
+    pub(crate) fn what(&self) -> &'static str {
+        match (self.is_body, self.is_still()) {
+            (true, _) => "body",
+            (false, true) => "obstacle",
+            (false, false) => "moving wall",
+        }
+    }
+
     /// What of its surface presses into others.
     pub(crate) fn surface(&self, spacing: f64, dimensions: u32) -> Surface {
         let wall = WallLayer { offset: &self.wall_offset, to_surface: &self.wall_to_surface };

@@ -36,6 +36,11 @@ impl Motion {
         Self { rotation: Some(Rotation { angles, arm }), ..self }
     }
 
+    /// Whether nothing ever moves.
+    pub fn is_still(&self) -> bool {
+        self.displacement.is_constant() && !self.turns()
+    }
+
     /// Whether it turns.
     pub fn turns(&self) -> bool {
         self.rotation.as_ref().is_some_and(|r| !r.angles.is_constant())

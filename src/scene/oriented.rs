@@ -42,7 +42,16 @@ impl Placed {
     pub fn holds(&self, p: DVec3, margin: f64) -> bool {
         self.shape.outside(self.axes.transpose() * (p - self.center)) < -margin
     }
+    /// Whether planes tell it apart from what does not touch it.
+    pub fn is_convex(&self) -> bool {
+        match self.shape {
+            #[cfg(feature = "mesh")]
+            Shape::Mesh(_) => false,
+            _ => true,
+        }
+    }
     /// How far the shapes overlap along the direction in which they overlap least [m]; 0 or less: apart.
+    #[cfg(test)]
     pub fn overlap(&self, other: &Self) -> f64 {
         self.way_out(other).0
     }

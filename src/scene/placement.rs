@@ -6,7 +6,7 @@
 
 use super::oriented::Placed;
 use super::walls::Fixed;
-use super::{Drive, Solid};
+use super::{Drive, Shape, Solid, WallShape};
 use crate::case::Law;
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
@@ -70,29 +70,34 @@ impl Surroundings<'_> {
         )))
     }
 
-    /// Shapes of the fixed walls and earlier solids. Prescribed bodies may reach into what does not move under
-    /// forces: a table of motion is the user's word.
-    fn boxes(&self, body: &Solid) -> Vec<(String, Placed)> {
+    /// The fixed walls and earlier solids. Prescribed bodies may reach into what does not move under forces: a table
+    /// of motion is the user's word.
+    fn obstructions(&self, body: &Solid) -> Vec<Obstruction<'_>> {
         let free = |s: &Solid| matches!(s.drive, Drive::Free(_));
-        let mut boxes = Vec::new();
+        let mut all = Vec::new();
         if free(body) {
-            boxes.extend(self.fixed.shapes.iter().map(|w| (format!("wall `{}`", w.name), w.into())));
+            let wall = |w: &WallShape| Obstruction {
+                name: format!("wall `{}`", w.name),
+                placed: w.into(),
+                solid: None,
+            };
+            all.extend(self.fixed.shapes.iter().map(wall));
         }
         let solids = self.earlier.iter().filter(|s| free(body) || free(s));
-        boxes.extend(solids.map(|s| (solid_name(s), s.placed())));
-        boxes
+        all.extend(solids.map(|&s| Obstruction { name: solid_name(s), placed: s.placed(), solid: Some(s) }));
+        all
     }
 
     fn deepest(&self, body: &Solid) -> Option<Contact> {
         let own = body.placed();
         // Lattices need not be in register, so that "paper" lets true surfaces overlap a little.
         let tolerance = if self.law == Law::Paper { 0.5 } else { 1e-6 } * self.spacing;
-        let boxes = self.boxes(body);
-        let solid = boxes
+        let solid = self
+            .obstructions(body)
             .into_iter()
-            .map(|(with, b)| {
-                let (overlap, out) = own.way_out(&b);
-                Contact { with, overlap, out: Some(out) }
+            .map(|b| {
+                let (overlap, out) = b.way_out(&own, body, tolerance);
+                Contact { with: b.name, overlap, out: Some(out) }
             })
             .filter(|c| c.overlap > tolerance)
             .max_by(|a, b| a.overlap.total_cmp(&b.overlap));
@@ -119,15 +124,16 @@ impl Surroundings<'_> {
     }
 
     fn lift_surfaces(&self, body: &Solid, up: DVec3) -> f64 {
-        let boxes = self.boxes(body);
+        let all = self.obstructions(body);
         let start = body.placed();
+        let most = 2.0 * start.reach(up).max(2.0 * self.spacing);
         let mut total = 0.0;
-        // Each round clears at least one box for good: `up` never leads back into one.
-        for _ in 0..=boxes.len() {
+        // Each round clears at least one shape for good, if they are convex: `up` never leads back into one.
+        for _ in 0..MOST_LIFTS.max(all.len() + 1) {
             let own = Placed { center: start.center + total * up, ..start };
-            let overlaps = boxes.iter().filter(|(_, b)| own.overlap(b) > 1e-9 * self.spacing);
-            let lift = overlaps.map(|(_, b)| own.lift(b, up)).fold(0.0, f64::max);
-            if lift == 0.0 {
+            let lifts = all.iter().map(|b| b.lift(&own, body, up, self.spacing));
+            let lift = lifts.fold(0.0, f64::max);
+            if lift == 0.0 || total > most {
                 break;
             }
             total += lift;
@@ -216,6 +222,66 @@ impl Surroundings<'_> {
     }
 }
 
+/// Most rounds of a lift out of shapes that are not convex.
+const MOST_LIFTS: usize = 500;
+
+/// What a body may be in the way of at t = 0.
+struct Obstruction<'a> {
+    name: String,
+    placed: Placed,
+    /// `None` for a wall of the lattice or a plane.
+    solid: Option<&'a Solid>,
+}
+
+impl Obstruction<'_> {
+    /// How deep `body`, placed as `own`, reaches into it [m], and the way out; what is convex is told apart by planes.
+    fn way_out(&self, own: &Placed, body: &Solid, tolerance: f64) -> (f64, DVec3) {
+        let (overlap, out) = own.way_out(&self.placed);
+        if overlap <= tolerance || own.is_convex() && self.placed.is_convex() {
+            return (overlap, out);
+        }
+        let mut deepest = (f64::NEG_INFINITY, out);
+        let mut press = |points: &mut dyn Iterator<Item = DVec3>, into: &Placed, side: f64| {
+            for point in points {
+                let (distance, outward) = into.shape.distance(into.axes.transpose() * (point - into.center));
+                if -distance > deepest.0 {
+                    deepest = (-distance, side * (into.axes * outward));
+                }
+            }
+        };
+        press(&mut surface_points(own, Some(body)), &self.placed, 1.0);
+        press(&mut surface_points(&self.placed, self.solid), own, -1.0);
+        deepest
+    }
+
+    /// Way along `up` that `body`, placed as `own`, has to go to leave it, or a part of that way [m].
+    fn lift(&self, own: &Placed, body: &Solid, up: DVec3, spacing: f64) -> f64 {
+        let (overlap, _) = self.way_out(own, body, 1e-9 * spacing);
+        if overlap <= 1e-9 * spacing {
+            return 0.0;
+        }
+        if own.is_convex() && self.placed.is_convex() {
+            return own.lift(&self.placed, up);
+        }
+        overlap.max(1e-4 * spacing)
+    }
+}
+
+/// Points of the surface of a shape, in the world: those above its wall layer and its corners.
+fn surface_points<'a>(at: &'a Placed, solid: Option<&'a Solid>) -> Box<dyn Iterator<Item = DVec3> + 'a> {
+    let corners: Vec<DVec3> = match (&at.shape, at.shape.as_cuboid()) {
+        #[cfg(feature = "mesh")]
+        (Shape::Mesh(mesh), _) => mesh.vertices().to_vec(),
+        (_, Some(cuboid)) => (0..8)
+            .map(|k| cuboid.half * DVec3::from_array([0, 1, 2].map(|b| f64::from(k >> b & 1) * 2.0 - 1.0)))
+            .collect(),
+        _ => vec![],
+    };
+    let layer = solid.into_iter().flat_map(|s| s.wall_offset.iter().zip(&s.wall_to_surface));
+    let layer = layer.map(|(offset, to_surface)| *offset + *to_surface);
+    Box::new(corners.into_iter().chain(layer).map(|q| at.center + at.axes * q))
+}
+
 /// A pair of wall-layer particles: from the other one to the body's.
 struct Pair {
     from: DVec3,
@@ -229,7 +295,7 @@ enum Partner {
 }
 
 fn solid_name(solid: &Solid) -> String {
-    format!("{} `{}`", if solid.is_body { "body" } else { "moving wall" }, solid.name)
+    format!("{} `{}`", solid.what(), solid.name)
 }
 
 /// A point for messages.

@@ -90,11 +90,12 @@ impl Fixed {
     pub fn obstacle(
         &mut self,
         obstacle: &case::Obstacle,
+        (min, max): (case::Vector, case::Vector),
         lattice: &Lattice,
         grid: &mut Grid,
         layers: i32,
     ) -> usize {
-        let cells = lattice.cells(obstacle.min.into(), obstacle.max.into());
+        let cells = lattice.cells(min.into(), max.into());
         let of = self.add_shape(&obstacle.name, lattice, cells);
         let (shell, taken) = shell(cells, closed(&obstacle.open, lattice.plane), grid, layers);
         for cell in shell {
@@ -216,11 +217,12 @@ fn shell(cells: Cells, closed: [[bool; 2]; 3], grid: &mut Grid, layers: i32) -> 
 /// A wall that follows a table, without slots yet; and how many of its cells were taken before.
 pub(super) fn moving_wall(
     wall: &case::MovingWall,
+    (min, max): (case::Vector, case::Vector),
     lattice: &Lattice,
     grid: &mut Grid,
     layers: i32,
 ) -> (Solid, usize) {
-    let cells = lattice.cells(wall.min.into(), wall.max.into());
+    let cells = lattice.cells(min.into(), max.into());
     let (lo, hi) = (lattice.corner(cells.lo), lattice.corner(cells.hi));
     let position = 0.5 * (lo + hi);
     let l0 = lattice.spacing;
@@ -314,7 +316,7 @@ impl PlaneFrame {
 }
 
 /// Whether a lattice particle of a wall stands closer than l0/2.
-fn near_solid(lattice: &Lattice, grid: &Grid, p: DVec3) -> bool {
+pub(super) fn near_solid(lattice: &Lattice, grid: &Grid, p: DVec3) -> bool {
     let at = lattice.cell(p);
     let near = Cells { lo: at, hi: at + 1 }.grown(lattice.step(1));
     near.iter().any(|c| grid.get(c) == SOLID && lattice.center(c).distance(p) < 0.5 * lattice.spacing)

@@ -123,7 +123,7 @@ impl Water {
 
 /// How far inside a shape water may stand [m]. The lattice of a round body's layers is never the water's: as
 /// with planes, water keeps 3/4 of a spacing from their centres.
-fn margin(body: &Placed, spacing: f64) -> f64 {
+pub(super) fn margin(body: &Placed, spacing: f64) -> f64 {
     if body.shape.as_cuboid().is_some() { -1e-6 * spacing } else { -0.25 * spacing }
 }
 

@@ -105,6 +105,15 @@ impl Shape {
         }
     }
 
+    /// Its centre in the coordinates of its file [m], before [`Shape::frame`] is left.
+    pub(crate) fn origin(&self) -> DVec3 {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => shape.center(),
+            _ => DVec3::ZERO,
+        }
+    }
+
     /// [`Geometry::depth`], for boxes without asking which shape it is at every point.
     #[inline]
     pub fn depth(&self, q: DVec3, faces: Faces) -> Option<Inside> {

@@ -28,10 +28,41 @@ normal = [0, 0, 1]
 along = [1, 0, 0]
 size = [0.5, 0.5]
 
+[[obstacle]]
+name = "obstacle box"
+size = [0.2, 0.2, 0.2]
+center = [1.5, 0.5, 0.5]
+
+[[obstacle]]
+name = "obstacle drum"
+shape = "cylinder"
+radius = 0.2
+height = 0.3
+center = [1.5, 1.5, 0.5]
+
+[[obstacle]]
+name = "obstacle hull"
+shape = "mesh"
+file = "hull.stl"
+
 [[moving_wall]]
-name = "gate"
-min = [1.2, 0, 0]
-max = [1.3, 1, 1]
+name = "moving wall box"
+size = [0.2, 0.2, 0.2]
+center = [1.5, 0.5, 0.5]
+motion = [[0, 0, 0, 0]]
+
+[[moving_wall]]
+name = "moving wall drum"
+shape = "cylinder"
+radius = 0.2
+height = 0.3
+center = [1.5, 1.5, 0.5]
+motion = [[0, 0, 0, 0]]
+
+[[moving_wall]]
+name = "moving wall hull"
+shape = "mesh"
+file = "hull.stl"
 motion = [[0, 0, 0, 0]]
 
 [[body]]

@@ -1,10 +1,12 @@
-//! A closed surface of triangles: a body from an STL or OBJ file.
+//! A closed surface of triangles: a solid from an STL or OBJ file, ground below an open one, a cone or a wedge.
 //!
 //! Volume, moments and distances are those of the triangles (parry). Particles stand on a lattice that fills the body; its
 //! wall layer is brought to half a spacing below the surface. Points of the surface press into others: those above the
 //! wall layer, the vertices and the sharp edges.
 
+mod ground;
 mod particles;
+mod primitives;
 mod read;
 
 use super::surface::Surface;
@@ -38,6 +40,7 @@ pub struct Mesh {
     moments: DVec3,
     /// Turn from this frame to the file's.
     frame: DQuat,
+    is_file: bool,
     /// Centre of mass in the file's coordinates [m].
     center: DVec3,
     /// Corners of its convex hull [m].
@@ -45,6 +48,8 @@ pub struct Mesh {
     radius: f64,
     /// Lower and upper corner of the box around it [m].
     bounds: (DVec3, DVec3),
+    /// The same along the axes of the file, about the centre of mass [m].
+    along_file: (DVec3, DVec3),
     /// Convex edges that are sharper than [`SHARP`]: their ends, and the faces that their triangles belong to.
     sharp: Vec<(DVec3, DVec3, Faces)>,
     thickness: Thickness,
@@ -64,8 +69,12 @@ const SHARP: f64 = 0.5;
 /// Share of the inertia beside the diagonal that is round-off.
 const ROUND_OFF: f64 = 1e-6;
 
-/// A mesh is read once for all bodies, scenes and runs of a program that have it, and kept.
-static READ: Mutex<Vec<(u32, u64, &'static Mesh)>> = Mutex::new(Vec::new());
+/// A mesh is made once for all solids, scenes and runs of a program that have it, and kept: by what it is made from, and
+/// its lengths.
+static MADE: Mutex<Vec<(Key, &'static Mesh)>> = Mutex::new(Vec::new());
+
+/// What a mesh is made from: a name, the file's checksum, and the lengths that it is made with.
+type Key = (String, u32, [u64; 3]);
 
 impl std::fmt::Debug for Mesh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -85,19 +94,46 @@ impl Mesh {
     /// # Errors
     /// A file that cannot be read, or a surface that encloses nothing: open, turned both ways, flat.
     pub fn open(path: &str, scale: f64) -> Result<&'static Self, Unfit> {
+        Self::from_file(path, scale, 0.0, Ok)
+    }
+
+    /// The ground below the open surface in the file `path`, down to a few of `spacing` [m] below its lowest place.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a surface that is closed, overhangs or is turned both ways.
+    pub fn terrain(path: &str, scale: f64, spacing: f64) -> Result<&'static Self, Unfit> {
+        Self::from_file(path, scale, spacing, |(vertices, triangles)| {
+            ground::below(path, vertices, triangles, ground::BASE * spacing)
+        })
+    }
+
+    fn from_file(
+        path: &str,
+        scale: f64,
+        base: f64,
+        close: impl FnOnce(read::Soup) -> Result<read::Soup, Unfit>,
+    ) -> Result<&'static Self, Unfit> {
         let bytes = std::fs::read(path).map_err(|e| {
             Unfit::new(format!("{path}: {e}"), "give an STL or OBJ file, by its path from the case")
         })?;
-        let mut key = crc32fast::hash(&bytes);
-        key ^= crc32fast::hash(path.as_bytes());
-        let mut read = READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(known) = read.iter().find(|k| (k.0, k.1) == (key, scale.to_bits())) {
-            return Ok(known.2);
+        Self::made((path.to_owned(), crc32fast::hash(&bytes), [scale, base, 0.0].map(f64::to_bits)), || {
+            let (vertices, triangles) = read::soup(path, &bytes)?;
+            let vertices = vertices.into_iter().map(|v| scale * v).collect();
+            close((vertices, triangles))
+        })
+    }
+
+    /// The mesh that `key` stands for, of what `make` gives if there is none yet.
+    fn made(key: Key, make: impl FnOnce() -> Result<read::Soup, Unfit>) -> Result<&'static Self, Unfit> {
+        let mut made = MADE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(known) = made.iter().find(|known| known.0 == key) {
+            return Ok(known.1);
         }
-        let (vertices, triangles) = read::soup(path, &bytes)?;
-        let vertices = vertices.into_iter().map(|v| scale * v).collect();
-        let mesh: &'static Self = Box::leak(Box::new(Self::new(path, vertices, triangles)?));
-        read.push((key, scale.to_bits(), mesh));
+        let (vertices, triangles) = make()?;
+        let mut mesh = Self::new(&key.0, vertices, triangles)?;
+        mesh.is_file = key.1 != 0;
+        let mesh: &'static Self = Box::leak(Box::new(mesh));
+        made.push((key, mesh));
         Ok(mesh)
     }
 
@@ -126,8 +162,12 @@ impl Mesh {
         };
         let center = mass.local_com;
         let to_own = frame.inverse();
-        vertices.iter_mut().for_each(|v| *v = to_own * (*v - center));
-        let bounds = vertices.iter().fold((DVec3::MAX, DVec3::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+        let around =
+            |all: &[DVec3]| all.iter().fold((DVec3::MAX, DVec3::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+        vertices.iter_mut().for_each(|v| *v -= center);
+        let along_file = around(&vertices);
+        vertices.iter_mut().for_each(|v| *v = to_own * *v);
+        let bounds = around(&vertices);
         let sharp = sharp(&vertices, &triangles);
         let hull = parry3d_f64::transformation::try_convex_hull(&vertices);
         let hull = hull.map_or_else(|_| vertices.clone(), |(hull, _)| hull);
@@ -138,7 +178,20 @@ impl Mesh {
         let place = frame * thickness.place + center;
         let thickness = Thickness { place, ..thickness };
         let moments = moments / volume;
-        Ok(Self { triangles, volume, moments, frame, center, hull, radius, bounds, sharp, thickness })
+        Ok(Self {
+            triangles,
+            volume,
+            moments,
+            frame,
+            is_file: false,
+            center,
+            hull,
+            radius,
+            bounds,
+            along_file,
+            sharp,
+            thickness,
+        })
     }
 
     /// Turn from the frame of its principal axes to the file's.
@@ -151,14 +204,24 @@ impl Mesh {
         self.center
     }
 
+    /// Whether it comes from a file.
+    pub(crate) fn is_file(&self) -> bool {
+        self.is_file
+    }
+
     /// Where it is thinnest.
     pub fn thickness(&self) -> Thickness {
         self.thickness
     }
 
-    /// Edge lengths of the box around it [m].
+    /// Edge lengths of the box around it, along the axes of the file [m].
     pub fn size(&self) -> DVec3 {
-        self.bounds.1 - self.bounds.0
+        self.along_file.1 - self.along_file.0
+    }
+
+    /// Corners of its triangles [m].
+    pub(crate) fn vertices(&self) -> &[DVec3] {
+        self.triangles.vertices()
     }
 
     /// The nearest point of the surface, and whether `q` is inside.

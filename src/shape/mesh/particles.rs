@@ -50,16 +50,17 @@ impl Cells {
     }
 }
 
-/// A lattice of about `spacing` [m] in the box around `mesh`: what is less than a spacing deep goes into the wall layer,
+/// A lattice of about `spacing` [m] along the axes of the file in the box around `mesh`: what is less than a spacing deep goes into the wall layer,
 /// moved along the normal to half of one; the rest lies below, hollow beyond `layers`.
 pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
-    let (low, high) = mesh.bounds;
+    let (low, high) = mesh.along_file;
+    let to_own = mesh.frame.inverse();
     let count = ((high - low) / spacing).round().max(DVec3::ONE);
     let step = (high - low) / count;
     let [nx, ny, nz] = count.to_array().map(|n| n as usize);
     let place = |k: usize| {
         let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
-        low + (cell + 0.5) * step
+        to_own * (low + (cell + 0.5) * step)
     };
     let found: Vec<(DVec3, f64, DVec3)> = (0..nx * ny * nz)
         .into_par_iter()

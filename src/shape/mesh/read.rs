@@ -90,8 +90,12 @@ fn finite(path: &str, k: usize, corners: [DVec3; 3]) -> Result<[DVec3; 3], Unfit
     Err(Unfit::new(message, "save the file again"))
 }
 
-/// A body's surface has no border, and its triangles turn the same way round.
-pub(super) fn check(path: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Unfit> {
+/// The edges of triangles that turn the same way round, each with the triangle that it is of.
+pub(super) fn directed(
+    path: &str,
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+) -> Result<HashMap<(u32, u32), usize>, Unfit> {
     if triangles.is_empty() {
         let message = format!("{path}: there is no triangle in it");
         return Err(Unfit::new(message, "give a file that holds a solid"));
@@ -113,6 +117,12 @@ pub(super) fn check(path: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> R
             }
         }
     }
+    Ok(edges)
+}
+
+/// A solid's surface has no border, and its triangles turn the same way round.
+pub(super) fn check(path: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Unfit> {
+    let edges = directed(path, vertices, triangles)?;
     let mut open: Vec<_> = edges.iter().filter(|((a, b), _)| !edges.contains_key(&(*b, *a))).collect();
     open.sort_by_key(|(_, k)| **k);
     if let Some(((a, _), k)) = open.first() {
@@ -122,7 +132,10 @@ pub(super) fn check(path: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> R
             *k + 1,
             vertices[*a as usize]
         );
-        return Err(Unfit::new(message, "close the holes: a body needs a watertight surface"));
+        return Err(Unfit::new(
+            message,
+            "close the holes: a solid needs a watertight surface; an open ground is shape = \"terrain\"",
+        ));
     }
     Ok(())
 }

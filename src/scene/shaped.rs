@@ -1,0 +1,206 @@
+//! Obstacles and moving walls of any shape: solids that stand still or follow a table, with water around them.
+
+use super::build::Builder;
+use super::lattice::{BLOCKED, Cells, FREE};
+use super::oriented::Placed;
+use super::placement::point;
+use super::walls::{closed, motion, near_solid};
+use super::water::margin;
+use super::{Drive, Shape, Solid};
+use crate::case::{Case, Form, Place, Vector, Wall};
+use crate::error::Problem;
+use glam::{DMat3, DVec3, IVec3};
+use rayon::prelude::*;
+
+/// Rows of a case's tables of motion and of angles, and what is turned about.
+type Tables<'a> = (&'a [[f64; 4]], &'a [[f64; 4]], Option<Vector>);
+
+/// A wall without particles, where it stands.
+fn wall(name: &str, form: &Form, place: Place, tables: Tables, case: &Case) -> Result<Solid, Box<Problem>> {
+    let plane = case.run.dimensions == 2;
+    let (shape, _) = form.shape(case.run.spacing, plane)?;
+    let turn = form.turn(plane);
+    let mut position: DVec3 = match place {
+        Place::Center(at) => at.into(),
+        Place::Position(at) => DVec3::from(at) + turn * shape.origin(),
+    };
+    if plane {
+        position.y = 0.0;
+    }
+    Ok(Solid {
+        name: name.to_owned(),
+        is_body: false,
+        shape,
+        position,
+        orientation: turn * shape.frame(),
+        drive: Drive::Prescribed(motion(tables, position, plane)),
+        wall_slots: 0..0,
+        dummy_slots: 0..0,
+        wall_offset: vec![],
+        dummy_offset: vec![],
+        wall_area: vec![],
+        wall_to_surface: vec![],
+    })
+}
+
+/// All walls of a case that are no boxes of the lattice: key of the table, whether it is fixed, and the wall.
+fn walls(case: &Case) -> Vec<(String, bool, Result<Solid, Box<Problem>>)> {
+    let tank = case.tank.as_ref();
+    let obstacles = case.obstacle.iter().enumerate().map(|(k, o)| {
+        let tables: Tables = (&[], &[], None);
+        (format!("obstacle.{k}"), true, o.name.as_str(), o.wall(tank), tables)
+    });
+    let moving = case.moving_wall.iter().enumerate().map(|(k, w)| {
+        let tables: Tables = (&w.motion, &w.rotation, w.pivot);
+        (format!("moving_wall.{k}"), false, w.name.as_str(), w.wall(tank), tables)
+    });
+    let shaped = obstacles.chain(moving).filter_map(|(key, fixed, name, keys, tables)| match keys {
+        Wall::Lattice(..) => None,
+        Wall::Shaped(form, place) => Some((key, fixed, wall(name, &form, place, tables, case))),
+    });
+    shaped.collect()
+}
+
+/// Corners of the boxes around all of them [m]; what cannot be read is reported where it is built.
+pub(super) fn boxes(case: &Case) -> Vec<(Vector, Vector)> {
+    let around = |solid: Solid| {
+        let shape = solid.placed();
+        let half = shape.bounds();
+        ((shape.center - half).to_array(), (shape.center + half).to_array())
+    };
+    walls(case).into_iter().filter_map(|(_, _, solid)| solid.ok().map(around)).collect()
+}
+
+impl Builder<'_> {
+    /// Obstacles and moving walls of any shape: their particles, and no water where they stand.
+    pub(super) fn shaped(&mut self) {
+        let run = &self.case.run;
+        for (key, fixed, solid) in walls(self.case) {
+            let mut solid = match solid {
+                Ok(solid) => solid,
+                Err(problem) => {
+                    let key = format!("{key}.{}", problem.key);
+                    self.problems.push(Problem { key, ..*problem });
+                    continue;
+                }
+            };
+            let particles = solid.shape.particles(run.spacing, run.dimensions, self.layers);
+            solid.wall_offset = particles.wall;
+            solid.dummy_offset = particles.dummy;
+            solid.wall_area = particles.area;
+            solid.wall_to_surface = particles.to_surface;
+            self.thin(&key, &solid);
+            if fixed {
+                self.bury(&key, &mut solid);
+            }
+            if !solid.wall_offset.is_empty() {
+                self.block(&solid.placed());
+                self.moving_walls.push(solid);
+            }
+        }
+    }
+
+    /// Takes away what of a fixed solid lies inside other walls or beyond the tank's, and the areas that face them.
+    fn bury(&mut self, key: &str, solid: &mut Solid) {
+        let l0 = self.lattice.spacing;
+        let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
+        let kept: Vec<bool> = solid.wall_offset.iter().map(|o| !self.buried(at(o), true)).collect();
+        let dummies: Vec<DVec3> =
+            solid.dummy_offset.iter().filter(|o| !self.buried(at(o), true)).copied().collect();
+        let count = solid.wall_offset.len() + solid.dummy_offset.len();
+        let mut areas = solid.wall_area.clone();
+        for (area, offset) in areas.iter_mut().zip(&solid.wall_offset) {
+            for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
+                let own = solid.orientation.inverse() * e;
+                let faces = area.dot(own);
+                if faces > 0.0 && self.buried(at(offset) + l0 * e, false) {
+                    *area -= faces * own;
+                }
+            }
+        }
+        fn left<T: Copy>(all: &[T], kept: &[bool]) -> Vec<T> {
+            all.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()
+        }
+        solid.wall_offset = left(&solid.wall_offset, &kept);
+        solid.wall_to_surface = left(&solid.wall_to_surface, &kept);
+        solid.wall_area = left(&areas, &kept);
+        solid.dummy_offset = dummies;
+        let gone = count - solid.wall_offset.len() - solid.dummy_offset.len();
+        let label = format!("obstacle `{}`", solid.name);
+        if solid.wall_offset.is_empty() {
+            let message =
+                format!("{label}: nothing of it stands free, its middle is at {}", point(solid.position));
+            let remedy = "it lies beyond the tank's walls or inside others: move it, or check `scale`";
+            self.problems.push(Problem::new(key, message, remedy));
+        } else if gone > 0 {
+            self.notes
+                .push(format!("{label}: {gone} particles left out inside other walls and beyond the tank's"));
+        }
+    }
+
+    /// Whether a place lies inside a wall or beyond the tank's; `near`: or closer to a particle of the lattice's walls
+    /// than half a spacing.
+    fn buried(&self, at: DVec3, near: bool) -> bool {
+        let (lattice, slack) = (&self.lattice, 1e-6 * self.lattice.spacing);
+        let beyond = self.tank.zip(self.case.tank.as_ref()).is_some_and(|(cells, tank)| {
+            let (lo, hi) = (lattice.corner(cells.lo), lattice.corner(cells.hi));
+            let closed = closed(&tank.open, lattice.plane);
+            (0..3).any(|k| closed[k][0] && at[k] < lo[k] - slack || closed[k][1] && at[k] > hi[k] + slack)
+        });
+        let earlier = || self.moving_walls.iter().filter(|s| s.is_still()).map(Solid::placed);
+        beyond
+            || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
+            || earlier().any(|b| b.holds(at, slack))
+            || near && near_solid(lattice, &self.grid, at)
+    }
+
+    /// Keeps water out of a shape.
+    fn block(&mut self, shape: &Placed) {
+        // Only what stands as the lattice does is in register with it.
+        let turned = shape.axes != DMat3::IDENTITY;
+        let margin = if turned { -0.25 * self.lattice.spacing } else { margin(shape, self.lattice.spacing) };
+        let reach = shape.bounds() - margin;
+        let range = self.lattice.cells(shape.center - reach, shape.center + reach);
+        let (lo, hi) = (range.lo.max(self.grid.cells.lo), range.hi.min(self.grid.cells.hi));
+        for x in lo.x..hi.x {
+            let slice = Cells { lo: IVec3 { x, ..lo }, hi: IVec3 { x: x + 1, ..hi } };
+            let free: Vec<IVec3> = slice.iter().filter(|c| self.grid.get(*c) == FREE).collect();
+            let lattice = self.lattice;
+            let held: Vec<IVec3> =
+                free.into_par_iter().filter(|c| shape.holds(lattice.center(*c), margin)).collect();
+            held.into_iter().for_each(|c| self.grid.set(c, BLOCKED));
+        }
+    }
+
+    /// What is thinner than two particles has none inside, and what is thinner than one none at all. `key` is that of
+    /// its table.
+    pub(super) fn thin(&mut self, key: &str, solid: &Solid) {
+        let l0 = self.lattice.spacing;
+        let (least, place, of) = match solid.shape {
+            #[cfg(feature = "mesh")]
+            Shape::Mesh(mesh) => {
+                let thin = mesh.thickness();
+                (thin.least, thin.place, if mesh.is_file() { "file" } else { "shape" })
+            }
+            _ if solid.is_body => return,
+            shape => {
+                let mut lengths = 2.0 * shape.extent(DMat3::IDENTITY);
+                if self.lattice.plane {
+                    lengths.y = lengths.x;
+                }
+                (lengths.min_element(), DVec3::ZERO, "shape")
+            }
+        };
+        let whose = if of == "file" { "of its file" } else { "of its own frame" };
+        let message =
+            format!("{} `{}` is {least:.2e} m thin at {} {whose}", solid.what(), solid.name, point(place));
+        if least < l0 * (1.0 - 1e-6) || solid.wall_offset.len() < 4 {
+            let message = format!("{message}, less than one particle of {l0} m");
+            let remedy = format!("use run.spacing = {least:.1e} or less, or thicken it");
+            self.problems.push(Problem::new(format!("{key}.{of}"), message, remedy));
+        } else if least < 2.0 * l0 * (1.0 - 1e-6) {
+            self.notes
+                .push(format!("{message}: less than two particles of {l0} m, the force on it is rough"));
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Cones and wedges, as triangles.
+
+use super::read::Soup;
+use super::{Mesh, Unfit};
+use glam::DVec3;
+use std::f64::consts::TAU;
+
+/// Sides of a cone: its surface is off by 0.1 % of its radius at most.
+const SIDES: u32 = 64;
+
+impl Mesh {
+    /// A cone with a base of `radius` [m], `height` [m] high along z; of as much volume as the round one.
+    ///
+    /// # Errors
+    /// A cone without a volume.
+    pub fn cone(radius: f64, height: f64) -> Result<&'static Self, Unfit> {
+        let key = ("cone".to_owned(), 0, [radius, height, 0.0].map(f64::to_bits));
+        Self::made(key, || Ok(cone(radius, height)))
+    }
+
+    /// What of a box of `size` [m] lies below the plane from its lower edge at x min to its upper edge at x max.
+    ///
+    /// # Errors
+    /// A wedge without a volume.
+    pub fn wedge(size: DVec3) -> Result<&'static Self, Unfit> {
+        let key = ("wedge".to_owned(), 0, size.to_array().map(f64::to_bits));
+        Self::made(key, || Ok(wedge(size)))
+    }
+}
+
+fn cone(radius: f64, height: f64) -> Soup {
+    let turn = TAU / f64::from(SIDES);
+    // a polygon as large as the circle
+    let corner = radius * (turn / turn.sin()).sqrt();
+    let mut vertices = vec![DVec3::ZERO, height * DVec3::Z];
+    vertices.extend((0..SIDES).map(|k| {
+        let (sin, cos) = (turn * f64::from(k)).sin_cos();
+        corner * DVec3::new(cos, sin, 0.0)
+    }));
+    let sides = (0..SIDES).flat_map(|k| {
+        let (a, b) = (2 + k, 2 + (k + 1) % SIDES);
+        [[0, b, a], [1, a, b]]
+    });
+    (vertices, sides.collect())
+}
+
+fn wedge(size: DVec3) -> Soup {
+    // toe, heel, top, at y = 0; the same at the other end
+    let section = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Z];
+    let vertices = section.into_iter().chain(section.map(|v| v + DVec3::Y)).map(|v| v * size).collect();
+    let triangles =
+        vec![[0, 1, 2], [3, 5, 4], [0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [0, 2, 5], [0, 5, 3]];
+    (vertices, triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::Geometry;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn volume_and_moments_are_those_of_the_round_cone_and_of_the_wedge() {
+        let (r, h) = (0.3, 0.8);
+        let cone = Mesh::cone(r, h).expect("a cone");
+        assert!((cone.volume() / (PI * r * r * h / 3.0) - 1.0).abs() < 1e-12, "{}", cone.volume());
+        assert!((cone.center() - 0.25 * h * DVec3::Z).length() < 1e-12, "{}", cone.center());
+        let across = 0.6 * (0.25 * r * r + h * h / 16.0);
+        let exact = DVec3::new(across, across, 0.3 * r * r);
+        let mut moments = cone.inertia(1.0).to_array();
+        moments.sort_by(f64::total_cmp);
+        let mut wanted = exact.to_array();
+        wanted.sort_by(f64::total_cmp);
+        for (have, want) in moments.iter().zip(wanted) {
+            assert!((have / want - 1.0).abs() < 2e-3, "{moments:?} {exact}");
+        }
+        let size = DVec3::new(0.6, 0.4, 0.3);
+        let wedge = Mesh::wedge(size).expect("a wedge");
+        assert!((wedge.volume() - 0.036).abs() < 1e-12, "{}", wedge.volume());
+        assert!((wedge.center() - DVec3::new(0.4, 0.2, 0.1)).length() < 1e-12, "{}", wedge.center());
+    }
+}
