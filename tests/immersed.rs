@@ -168,7 +168,7 @@ fn a_floating_cube_is_carried_by_its_displacement() {
     let case = tank_with_cube(s, 0.4, "sound_speed = 4");
     let mut sim = simulation(&case);
     let (mut force, mut height, mut level, mut count) = (0.0, 0.0, 0.0, 0.0);
-    while sim.time < 1.6 {
+    while sim.time < 1.2 {
         sim.step().expect("the cube floats");
         if sim.time > 0.6 {
             force += sim.fluid_force[0].force.z;
@@ -226,7 +226,7 @@ fn still_water_does_not_rock_itself() {
 fn a_small_cube_does_not_swing_itself_out_of_the_water() {
     let mut sim = simulation(&shallow(true, ""));
     let mut heights = Vec::new();
-    while sim.time < 1.75 {
+    while sim.time < 1.25 {
         sim.step().expect("the cube floats");
         if sim.time > 0.25 {
             heights.push(sim.solids.poses()[0].position.z);
