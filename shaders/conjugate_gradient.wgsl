@@ -38,6 +38,10 @@ const DAMPING: f32 = 0.9;
 const DAMPING: f32 = 1.0;
 //#endif
 
+//#if CONSISTENT
+@group(0) @binding(16) var<storage, read> surface_pressure: array<f32>; // 0 where the pressure is unknown
+//#endif
+
 //#if COUPLED
 // Rows of free bodies and what the bodies answer; see shaders/coupling.wgsl.
 @group(0) @binding(15) var<storage, read> coupling: array<vec4f>;
@@ -424,7 +428,10 @@ fn end(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index
     }
     var cut = vec4f(0.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
-        let p = pressure[i];
+        var p = pressure[i];
+//#if CONSISTENT
+        p += surface_pressure[i];
+//#endif
         cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
         pressure[i] = clamp(p, 0.0, now.pressure_max);
     }

@@ -1,7 +1,7 @@
 // Pressure gradient against the smallest pressure in the neighbourhood, Eq. (9), as an acceleration:
 // a_i = -1 / rho d / n0 sum w_ij (P_j - P_min) r_ij / r_ij^2 over neighbours that carry pressure.
 // Consistent below the surface: against max(P_min, min (P_j - rho g . r_ij)), with dummies at P_i + rho g . r_ij, times the
-// inverse of the moment matrix.
+// inverse of the moment matrix; on the surface against -P_i.
 // Twin: src/kernels/pressure_gradient.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -52,6 +52,8 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     let inner = state[i] == INNER;
     if inner {
         reference = max(reference, level);
+    } else {
+        reference = -own;
     }
     var one_side = vec3f(0.0);
     var moment = Moment(vec3f(0.0), vec3f(0.0));

@@ -9,6 +9,9 @@
 @group(0) @binding(6) var<storage, read> number_density: array<f32>;
 @group(0) @binding(7) var<storage, read> state: array<u32>;
 @group(0) @binding(8) var<storage, read_write> source_diagonal: array<vec2f>;
+//#if CONSISTENT
+@group(0) @binding(9) var<storage, read> surface_pressure: array<f32>;
+//#endif
 
 //#if MIXED
 // What a row sums over all its neighbours.
@@ -69,6 +72,9 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let count = neighbour_count[i];
     let near = near_of(count);
     var links = 0.0;
+//#if CONSISTENT
+    var known = 0.0;
+//#endif
 //#if MIXED
     let v = velocity[i].xyz;
     var first_moment = vec3f(0.0);
@@ -80,6 +86,9 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         let r = position[j].xyz - x;
         let w = weight(dot(r, r));
         links += w;
+//#if CONSISTENT
+        known += w * surface_pressure[j];
+//#endif
 //#if MIXED
         first_moment += w * r;
         sums = add_neighbour(sums, w, r, velocity[j].xyz - v, i < params.fluid && j >= params.fluid);
@@ -96,11 +105,14 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         let r = position[j].xyz - x;
         sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);
     }
-    let b = now.source_density * (sums.density - params.smooth_density) / params.smooth_density
+    var b = now.source_density * (sums.density - params.smooth_density) / params.smooth_density
         - now.source_divergence * divergence(sums)
         - params.density * dot(params.gravity, first_moment);
 //#else
-    let b = now.source_density * (number_density[i] - params.number_density) / params.number_density;
+    var b = now.source_density * (number_density[i] - params.number_density) / params.number_density;
+//#endif
+//#if CONSISTENT
+    b += known;
 //#endif
     source_diagonal[i] = vec2f(b, links + now.compressibility);
 }

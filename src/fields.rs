@@ -3,6 +3,7 @@
 //! Slots follow [`crate::scene::Groups`]. Fluid slots are kept in cell order and so change from step to
 //! step (`id` tells who is who); all other slots stay.
 
+use crate::plan::{Arrays, Plan};
 use crate::scene::{Kind, Scene};
 use glam::DVec3;
 
@@ -13,7 +14,7 @@ pub enum State {
     /// Takes no part: a dry wall, a ghost.
     #[default]
     Inactive = 0,
-    /// On the free surface: P = 0.
+    /// On the free surface: P is known.
     Surface = 1,
     /// An unknown.
     Inner = 2,
@@ -41,6 +42,8 @@ pub struct Fields {
     pub pressure: Vec<f64>,
     /// Number density n, Eq. (4) [-], P.
     pub number_density: Vec<f64>,
+    /// Pressure on the free surface, 0 elsewhere [Pa], P; empty where the plan leaves it out.
+    pub surface_pressure: Vec<f64>,
     /// Part in the PPE, P.
     pub state: Vec<State>,
     /// Right side of the PPE, Eq. (8), times -1 [Pa/m2], P.
@@ -55,10 +58,11 @@ pub struct Fields {
 }
 
 impl Fields {
-    /// The state at t = 0, with a `reaction` or without.
-    pub fn new(scene: &Scene, reaction: bool) -> Self {
+    /// The state at t = 0, with the arrays of `plan`.
+    pub fn new(scene: &Scene, plan: &Plan) -> Self {
         let g = scene.groups;
         let p = g.pressure();
+        let planned = |arrays, length| if plan.needs(arrays) { length } else { 0 };
         Self {
             position: scene.position.clone(),
             velocity: scene.velocity.clone(),
@@ -66,11 +70,12 @@ impl Fields {
             id: (0..g.fluid as u32).collect(),
             pressure: vec![0.0; p],
             number_density: vec![0.0; p],
+            surface_pressure: vec![0.0; planned(Arrays::SurfacePressure, p)],
             state: vec![State::Inactive; p],
             source: vec![0.0; p],
             diagonal: vec![1.0; p],
             acceleration: vec![DVec3::ZERO; g.fluid],
-            reaction: vec![DVec3::ZERO; if reaction { g.moving_wall } else { 0 }],
+            reaction: vec![DVec3::ZERO; planned(Arrays::Reaction, g.moving_wall)],
         }
     }
 }

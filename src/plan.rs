@@ -71,6 +71,8 @@ stages! {
     Collision = "collision" [Collision];
     /// Number density, Eq. (4), and free surface.
     NumberDensity = "number_density" [NumberDensity];
+    /// Pressure of the free surface's particles, whose centres lie half a spacing below it.
+    SurfacePressure = "surface_pressure" [SurfacePressure];
     /// Right side and diagonal of the pressure Poisson equation (PPE), Eq. (8).
     PressureSource = "pressure_source" [PressureSource];
     /// Solution of the PPE.
@@ -98,6 +100,8 @@ pub enum Arrays {
     FixedWalls,
     /// How unevenly neighbours lie, for the shift.
     Imbalance,
+    /// Pressure of the free surface's particles.
+    SurfacePressure,
     /// Of the fluid's force on solids.
     Force,
     /// Force of viscosity, friction and collisions on the wall layer of moving solids, which the fluid's force takes in.
@@ -202,6 +206,10 @@ impl Plan {
                     Err("the repulsion of the minimum-pressure gradient spaces the particles")
                 }
                 Stage::Shift => wet("the consistent gradient leaves it to the shift to space the particles"),
+                Stage::SurfacePressure if params.gradient == Gradient::Minimum => {
+                    Err("the minimum-pressure gradient takes P = 0 at the centres of the surface's particles")
+                }
+                Stage::SurfacePressure => wet("P = 0 lies half a spacing outside the surface's particles"),
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
                 Stage::BodyForce if !free && !gauged && !case.output.ledger => {
                     Err("no body is free and no gauge asks for the force on one that moves")
@@ -241,6 +249,7 @@ impl Plan {
             Arrays::Solids => self.has(Stage::MoveSolids),
             Arrays::FixedWalls => self.fixed_walls,
             Arrays::Imbalance => self.has(Stage::Shift),
+            Arrays::SurfacePressure => self.has(Stage::SurfacePressure),
             Arrays::Force => self.has(Stage::BodyForce),
             Arrays::Reaction => {
                 let acts = |stage| self.has(stage);

@@ -9,6 +9,7 @@ use seixo::output::pvd::Pvd;
 use seixo::output::table::{Cell, Table};
 use seixo::output::vtu::{BLOCK, Values, vtu};
 use seixo::params::Params;
+use seixo::plan::Plan;
 use seixo::scene::Scene;
 use std::io::Read;
 
@@ -331,8 +332,16 @@ fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
     let turned = |(scene, case): &(Scene, Case), turn: DQuat| {
         let solids = seixo::contact::Solids::new(scene, Some(&contact())).unwrap();
         let poses: Vec<_> = placed(solids.poses()).into_iter().map(|(x, q)| (x, turn * q)).collect();
-        let painter = Painter::new(scene, &Style::of(3), &Params::new(case, scene).unwrap());
-        painter.paint(scene, 0.0, &poses, drops(scene, Some(&Fields::new(scene, true)))).png()
+        let params = Params::new(case, scene).unwrap();
+        let painter = Painter::new(scene, &Style::of(3), &params);
+        painter
+            .paint(
+                scene,
+                0.0,
+                &poses,
+                drops(scene, Some(&Fields::new(scene, &Plan::new(case, scene, &params)))),
+            )
+            .png()
     };
     let draw = |seen: &(Scene, Case)| turned(seen, DQuat::IDENTITY);
     let open = scene("");

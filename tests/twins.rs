@@ -127,6 +127,15 @@ impl Pair {
         stages.iter().for_each(|&s| self.run(s));
     }
 
+    /// What follows the lists, up to the right side of the PPE.
+    fn run_to_source(&mut self) {
+        for stage in [Stage::NumberDensity, Stage::SurfacePressure, Stage::PressureSource] {
+            if self.plan.has(stage) {
+                self.run(stage);
+            }
+        }
+    }
+
     fn move_solids(&mut self) {
         self.cpu.move_solids(&self.poses).expect("the CPU moves solids");
         self.gpu.move_solids(&self.poses).expect("the device moves solids");
@@ -335,10 +344,31 @@ fn number_density() {
 }
 
 #[test]
+fn surface_pressure() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run(Stage::NumberDensity);
+        if !pair.plan.has(Stage::SurfacePressure) {
+            return;
+        }
+        pair.run(Stage::SurfacePressure);
+        let (gpu, _) = pair.fields();
+        let fluid = pair.scene.groups.fluid;
+        let (water, walls) = gpu.surface_pressure.split_at(fluid);
+        for part in [water, walls] {
+            assert!(part.iter().filter(|&&p| p > 10.0).count() > 10, "{part:?}");
+        }
+        let off = gpu.state.iter().zip(&gpu.surface_pressure).filter(|(s, _)| **s != State::Surface);
+        assert!(off.into_iter().all(|(_, p)| *p == 0.0));
+        pair.check(Stage::SurfacePressure);
+    });
+}
+
+#[test]
 fn pressure_source() {
     each(|pair| {
         pair.run_all(&LISTS);
-        pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+        pair.run_to_source();
         let (gpu, _) = pair.fields();
         assert!(gpu.source.iter().any(|&b| b > 0.0) && gpu.source.iter().any(|&b| b < 0.0));
         pair.check(Stage::PressureSource);
@@ -349,7 +379,7 @@ fn pressure_source() {
 fn conjugate_gradient() {
     each(|pair| {
         pair.run_all(&LISTS);
-        pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+        pair.run_to_source();
         let (before, _) = pair.fields();
         let negative = pair.cpu.counters().expect("readable").negative_pressures;
         let g = pair.gpu.solve_pressure(&pair.step).expect("the device solves");
@@ -375,7 +405,7 @@ fn conjugate_gradient() {
 fn conjugate_gradient_from_zero_and_from_a_bad_start() {
     let Some(mut pair) = Pair::new(3, "preset = \"accurate\"") else { return };
     pair.run_all(&LISTS);
-    pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+    pair.run_to_source();
     pair.gpu.solve_pressure(&pair.step).expect("solves");
     let (good, _) = pair.fields();
     // A start whose residual exceeds the right side is thrown away.
@@ -384,6 +414,7 @@ fn conjugate_gradient_from_zero_and_from_a_bad_start() {
     pair.gpu.write(&bad).expect("writable");
     pair.sync();
     pair.run_all(&LISTS);
+    // What is known of the surface stays as it was.
     pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
     let g = pair.gpu.solve_pressure(&pair.step).expect("solves");
     let c = pair.cpu.solve_pressure(&pair.step).expect("solves");
@@ -410,6 +441,7 @@ fn conjugate_gradient_from_zero_and_from_a_bad_start() {
     // No source: no pressure, no iteration.
     let mut nothing = gpu.read().expect("readable");
     nothing.source.fill(0.0);
+    nothing.surface_pressure.fill(0.0);
     gpu.write(&nothing).expect("writable");
     let report = gpu.solve_pressure(&pair.step).expect("solves");
     assert_eq!((report.outcome, report.iterations), (Outcome::ZeroSource, 0));
@@ -427,7 +459,7 @@ fn each_multigrid(test: impl Fn(&mut Pair)) {
         if let Some(mut pair) = Pair::of_size(dimensions, fluid, scale, Preconditioner::Multigrid) {
             println!("{dimensions}D, {fluid}");
             pair.run_all(&LISTS);
-            pair.run_all(&[Stage::NumberDensity, Stage::PressureSource]);
+            pair.run_to_source();
             test(&mut pair);
         }
     }
@@ -493,7 +525,7 @@ fn multigrid() {
         };
         let [plus, minus] = [1.0, -1.0].map(|sign| solved(pair, 0, sign));
         let scale = plus.1.iter().chain(&minus.1).fold(0.0_f64, |s, p| s.max(*p));
-        for ((gpu, cpu), least) in [(&plus, 300), (&minus, 0)] {
+        for ((gpu, cpu), least) in [(&plus, 200), (&minus, 0)] {
             let positive = cpu.iter().filter(|&&p| p > 1e-3 * scale).count();
             let worst = gpu.iter().zip(cpu).fold(0.0_f64, |s, (a, b)| s.max((a - b).abs()));
             println!("{positive} positive of {}, worst {:.1e}", cpu.len(), worst / scale);
@@ -585,7 +617,8 @@ fn coupling() {
         let made = Pair::of_size(dimensions, "preset = \"accurate\"", scale, preconditioner);
         let Some(mut pair) = made else { return };
         pair.run_all(&LISTS);
-        pair.run_all(&[Stage::Viscosity, Stage::Collision, Stage::NumberDensity, Stage::PressureSource]);
+        pair.run_all(&[Stage::Viscosity, Stage::Collision]);
+        pair.run_to_source();
         pair.gpu.solve_pressure(&pair.step).expect("the device solves");
         pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
         let alone = pair.cpu.fields().clone();
@@ -593,7 +626,7 @@ fn coupling() {
         let turns = DMat3::from_diagonal(DVec3::new(3.0, 2.0, 4.0));
         // A body brings outliers into the spectrum, the lighter the farther out; conjugate gradients in f32 find those
         // again and again, one iteration each time.
-        for (ratio, apart, least) in [(1.0, 2, 0.01), (0.05, 4, 0.1)] {
+        for (ratio, apart, least) in [(1.0, 2, 0.01), (0.05, 4, 0.05)] {
             // Pressed and turned by something else as well.
             let mass = ratio * pair.params.density * volume;
             let load = Wrench { force: DVec3::new(0.2, 0.0, -3.0), torque: DVec3::new(0.0, 0.01, 0.0) };

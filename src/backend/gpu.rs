@@ -200,7 +200,7 @@ impl Gpu {
             if let Some(levels) = &gpu.levels {
                 gpu.context.upload(buffers::hierarchy, &[levels.hierarchy()])?;
             }
-            gpu.write_fields(&Fields::new(scene, plan.needs(Arrays::Reaction)))?;
+            gpu.write_fields(&Fields::new(scene, plan))?;
             gpu.write_solids(scene)?;
         }
         Ok(gpu)

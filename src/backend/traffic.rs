@@ -111,6 +111,7 @@ impl Sizes {
             (Stage::WallFriction, fluid * (4 + vector) + update),
             (Stage::Collision, rows + update),
             (Stage::NumberDensity, pairs * (4 + weight) + rows * (vector + number + 1)),
+            (Stage::SurfacePressure, rows * (number + 1)),
             (Stage::PressureSource, pairs * (4 + weight) + rows * (2 * vector + 3 * number)),
             (Stage::PressureGradient, pairs * (4 + weight) + rows * (vector + number) + fluid * vector),
             (Stage::Correct, update),

@@ -18,6 +18,7 @@ pub mod predict;
 pub mod pressure_gradient;
 pub mod pressure_source;
 pub mod shift;
+pub mod surface_pressure;
 pub mod viscosity;
 pub mod wall_friction;
 
@@ -96,6 +97,7 @@ pub mod device {
         pressure_gradient[super::WORKGROUP] Stage(PressureGradient), Fluid: pressure_gradient;
         pressure_source[super::WORKGROUP] Stage(PressureSource), Rows: pressure_source;
         shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
+        surface_pressure[super::WORKGROUP] Stage(SurfacePressure), Rows: surface_pressure_main;
         viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
         wall_friction[super::WORKGROUP] Stage(WallFriction), FluidAndReaction: wall_friction;
     }

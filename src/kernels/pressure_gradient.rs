@@ -7,7 +7,8 @@
 //! The consistent gradient is, below the surface,
 //! M^-1 (d / n0) [sum (P_j - P_i + R) e + sum_dummies (rho g . r + R) e],  e = w r / r^2,
 //! exact for a linear pressure but for the repulsion R, which is that of Eq. (9), P_i - P_min, or what is left of it when
-//! the weight of the water is taken off, whichever is smaller: none in still water on any arrangement.
+//! the weight of the water is taken off, whichever is smaller: none in still water on any arrangement. On the surface it is
+//! (d / n0) sum (P_j + P_i) e: with P = 0 half a spacing outside, half a neighbourhood then carries the whole weight.
 
 use super::Particles;
 use crate::fields::State;
@@ -52,6 +53,9 @@ pub fn pressure_gradient(
     let head = |j: usize| hydrostatic(on.position[j] - on.position[i], on.params);
     let mut reference = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j]));
     let consistent = is_consistent(state, on.params);
+    if on.params.gradient == Gradient::Consistent && !consistent {
+        reference = -pressure[i];
+    }
     if consistent {
         let level = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j] - head(j)));
         reference = reference.max(level);

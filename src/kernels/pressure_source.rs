@@ -2,7 +2,8 @@
 //!
 //! A P = b,  A_ij = -c w_ij,  A_ii = c sum w_ij + alpha rho / dt^2,  c = 2 d / (lambda n0),
 //!
-//! over neighbours that carry pressure (dummies: no flux; surface particles: P = 0).
+//! over neighbours that carry pressure (dummies: no flux). The pressure of surface particles is known: 0, or
+//! [`super::surface_pressure`], which b_i takes in as c sum w_ij P_s.
 //! GPU twin: shaders/pressure_source.wgsl
 //!
 //! The paper's source is the deviation of the number density alone. The mixed one takes the divergence of the velocity,
@@ -24,12 +25,13 @@ pub fn laplacian_coefficient(params: &Params) -> f64 {
 }
 
 /// Right side b [Pa/m2] and diagonal [1/m2] of slot `i` with number density `n`. `all` holds every
-/// neighbour, of which the first `carry` carry pressure.
+/// neighbour, of which the first `carry` carry pressure; `surface_pressure` is empty where it is 0.
 pub fn pressure_source(
     i: usize,
     n: f64,
     (all, carry): (Row, usize),
     on: Particles,
+    surface_pressure: &[f64],
     step: &Step,
 ) -> (f64, f64) {
     let (params, c) = (on.params, laplacian_coefficient(on.params));
@@ -48,7 +50,12 @@ pub fn pressure_source(
                 - c * params.density * params.gravity.dot(first_moment)
         }
     };
-    (b, c * links + step.compressibility * per_time / step.dt)
+    let known: f64 = if surface_pressure.is_empty() {
+        0.0
+    } else {
+        all.iter().take(carry).map(|(j, w)| w * surface_pressure[j]).sum()
+    };
+    (b + c * known, c * links + step.compressibility * per_time / step.dt)
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).

@@ -61,7 +61,7 @@ pub fn by_number(fields: &Fields) -> Fields {
     }
     fn sort<T: Copy>(values: &[T], slot: &[usize]) -> Vec<T> {
         let rest = values.get(slot.len()..).unwrap_or(&[]);
-        slot.iter().map(|&i| values[i]).chain(rest.iter().copied()).collect()
+        slot.iter().filter_map(|&i| values.get(i)).chain(rest).copied().collect()
     }
     Fields {
         position: sort(&fields.position, &slot),
@@ -70,6 +70,7 @@ pub fn by_number(fields: &Fields) -> Fields {
         id: sort(&fields.id, &slot),
         pressure: sort(&fields.pressure, &slot),
         number_density: sort(&fields.number_density, &slot),
+        surface_pressure: sort(&fields.surface_pressure, &slot),
         state: sort(&fields.state, &slot),
         source: sort(&fields.source, &slot),
         diagonal: sort(&fields.diagonal, &slot),
@@ -136,6 +137,9 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
             scalar("number_density", &of_parts(&gpu.number_density), &of_parts(&cpu.number_density)),
             share(stage, "state", &gpu.state, &cpu.state),
         ],
+        Stage::SurfacePressure => {
+            vec![scalar("surface_pressure", &gpu.surface_pressure, &cpu.surface_pressure)]
+        }
         Stage::PressureSource => {
             vec![scalar("source", &gpu.source, &cpu.source), scalar("diagonal", &gpu.diagonal, &cpu.diagonal)]
         }

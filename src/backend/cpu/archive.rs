@@ -48,6 +48,7 @@ impl Cpu {
             number_density,
             state,
             // Made anew in every step before they are used.
+            surface_pressure: _,
             source: _,
             diagonal: _,
             acceleration,

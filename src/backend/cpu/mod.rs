@@ -28,7 +28,8 @@ use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
-    Particles, body_force, collision, correct, monitor, move_solids, predict, shift, wall_friction,
+    Particles, body_force, collision, correct, monitor, move_solids, predict, shift, surface_pressure,
+    wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -102,7 +103,7 @@ impl Cpu {
             poses: Vec::new(),
             free_bodies: Vec::new(),
             lightness: scene.solids.iter().flat_map(|s| s.wall_slots.clone().map(|_| lightness(s))).collect(),
-            fields: if wet { Fields::new(scene, plan.needs(Arrays::Reaction)) } else { Fields::default() },
+            fields: if wet { Fields::new(scene, plan) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
             coordinates: Coordinates::default(),
@@ -296,9 +297,19 @@ impl Cpu {
             });
     }
 
+    fn surface_pressure(&mut self) {
+        let Self { fields, neighbours, params, groups, .. } = self;
+        let Fields { position, velocity, state, pressure, surface_pressure, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        surface_pressure.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(i, p)| {
+            *p = surface_pressure::surface_pressure(i, neighbours.pressure(i), state, on, pressure);
+        });
+    }
+
     fn pressure_source(&mut self, step: &Step) {
         let Self { fields, neighbours, params, groups, .. } = self;
-        let Fields { position, velocity, number_density, state, source, diagonal, .. } = fields;
+        let Fields { position, velocity, number_density, state, source, diagonal, surface_pressure, .. } =
+            fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         (
             &neighbours.chunks,
@@ -307,7 +318,9 @@ impl Cpu {
         )
             .into_par_iter()
             .enumerate()
-            .for_each(|(c, (chunk, given, out))| source_rows(c * CHUNK, chunk, given, out, on, step));
+            .for_each(|(c, (chunk, given, out))| {
+                source_rows(c * CHUNK, chunk, given, surface_pressure, out, on, step);
+            });
     }
 
     /// The free bodies in the pressure equation; takes the forces that are known off its right side.
@@ -419,6 +432,7 @@ impl Backend for Cpu {
             ParticleStage::WallFriction => self.wall_friction(step),
             ParticleStage::Collision => self.collision(step),
             ParticleStage::NumberDensity => self.number_density(),
+            ParticleStage::SurfacePressure => self.surface_pressure(),
             ParticleStage::PressureSource => self.pressure_source(step),
             ParticleStage::PressureGradient => self.pressure_gradient(),
             ParticleStage::Shift => self.shift(step.dt),
@@ -459,6 +473,8 @@ impl Backend for Cpu {
         };
         let report =
             solve_or_fall_back(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
+        // The solve leaves zero where the pressure is no unknown.
+        fields.pressure.iter_mut().zip(&fields.surface_pressure).for_each(|(p, known)| *p += known);
         if let Some(ledger) = &mut self.ledger {
             ledger.solution.clone_from(&fields.pressure);
         }

@@ -9,6 +9,7 @@ use crate::kernels::pressure_gradient::{acceleration, is_consistent};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use crate::params::Params;
+use crate::scheme::Gradient;
 use glam::DVec3;
 
 wide! {
@@ -63,6 +64,9 @@ fn pressure_gradient(
     }
     p[carry..].fill(own);
     let mut reference = least(p).min(own);
+    if on.params.gradient == Gradient::Consistent && !consistent {
+        reference = -own;
+    }
     if consistent {
         heads(r, h, on.params);
         // Those of dummies stand at the particle's own level.

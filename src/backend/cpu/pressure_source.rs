@@ -19,6 +19,7 @@ wide! {
         first: usize,
         chunk: &Chunk,
         given: (&[f64], &[State]),
+        surface_pressure: &[f64],
         out: (&mut [f64], &mut [f64]),
         on: Particles,
         step: &Step,
@@ -41,8 +42,17 @@ wide! {
                 Source::NumberDensity => number_density_source(density[k], on.params, step),
                 Source::Mixed => mixed_source(first + k, chunk.parts(k), on, step, &mut arrays),
             };
+            if !surface_pressure.is_empty() {
+                source[k] += c * known(chunk.pressure(k), surface_pressure);
+            }
         }
     }
+}
+
+/// sum w P_s [Pa].
+#[inline(always)]
+fn known(carriers: Row, surface_pressure: &[f64]) -> f64 {
+    carriers.iter().map(|(j, w)| w * surface_pressure[j]).sum()
 }
 
 /// Right side of slot `i`, corrected, smooth and balanced.

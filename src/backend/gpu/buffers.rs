@@ -46,6 +46,7 @@ table! {
         velocity: [f32; 4], Both, Fluid, |s, _| s.total;
         pressure: f32, Both, Fluid, |s, _| s.pressure;
         number_density: f32, Both, Fluid, |s, _| s.pressure;
+        surface_pressure: f32, Both, SurfacePressure, |s, _| s.pressure;
         state: u32, Both, Fluid, |s, _| s.pressure;
         acceleration: [f32; 4], Both, Fluid, |s, _| s.fluid;
         imbalance: [f32; 4], None, Imbalance, |s, _| s.fluid;

@@ -61,6 +61,7 @@ impl Gpu {
             (Stage::WallFriction, (f + followed) * k + f * v + update),
             (Stage::Collision, p.min(f + followed) * k + f * 4 * v),
             (Stage::NumberDensity, p * (v + n + 2 * k) + lists + walls),
+            (Stage::SurfacePressure, p * (k + n)),
             (Stage::PressureSource, p * (k + equation) + rows.used * (2 * v + n + k) + lists + 2 * walls),
             (Stage::PressureGradient, f * (gradient + n + 2 * k) + lists * f / rows.used.max(1) + walls),
             (Stage::Correct, update),

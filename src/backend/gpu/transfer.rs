@@ -95,6 +95,9 @@ impl Gpu {
         context.upload(buffers::state, &state)?;
         context.upload(buffers::source_diagonal, &equations)?;
         context.upload(buffers::acceleration, &packed(&fields.acceleration, DVec3::ZERO, |_| 0.0))?;
+        if self.plan.needs(Arrays::SurfacePressure) {
+            context.upload(buffers::surface_pressure, &scalar(&fields.surface_pressure))?;
+        }
         if self.plan.needs(Arrays::Reaction) {
             context.upload(buffers::reaction, &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
         }
@@ -136,6 +139,9 @@ impl Gpu {
         let pressure = wide(context.download(buffers::pressure, g.pressure())?);
         let number_density = wide(context.download(buffers::number_density, g.pressure())?);
         let acceleration = context.download(buffers::acceleration, g.fluid)?;
+        let known = if self.plan.needs(Arrays::SurfacePressure) { g.pressure() } else { 0 };
+        let surface_pressure =
+            wide(if known > 0 { context.download(buffers::surface_pressure, known)? } else { Vec::new() });
         let felt = if self.plan.needs(Arrays::Reaction) { g.moving_wall } else { 0 };
         let reaction = if felt > 0 { context.download(buffers::reaction, felt)? } else { Vec::new() };
         let c = laplacian_coefficient(&self.params);
@@ -147,6 +153,7 @@ impl Gpu {
             velocity: velocity.iter().map(vector).collect(),
             pressure,
             number_density,
+            surface_pressure,
             state,
             source: equations.iter().map(|e| f64::from(e[0]) * c).collect(),
             diagonal: equations.iter().map(diagonal).collect(),
