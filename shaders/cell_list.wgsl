@@ -41,16 +41,6 @@ fn slot_of(k: u32) -> u32 {
     return k;
 }
 
-fn inside(x: vec3f, v: vec3f) -> bool {
-//#if TWO_DIMENSIONS
-    let y = true;
-//#else
-    let y = x.y >= params.lower.y && x.y < params.upper.y;
-//#endif
-    return finite_vector(x) && finite_vector(v) && y && x.x >= params.lower.x && x.x < params.upper.x
-        && x.z >= params.lower.z && x.z < params.upper.z;
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn count(@builtin(global_invocation_id) id: vec3u) {
     let k = id.x;
@@ -62,7 +52,7 @@ fn count(@builtin(global_invocation_id) id: vec3u) {
     if k >= params.fluid {
         key = moving_key() + cell_index(cell_coordinates(x.xyz));
     } else if x.w == FLUID {
-        if inside(x.xyz, velocity[k].xyz) {
+        if in_domain(x.xyz, velocity[k].xyz) {
             key = cell_index(cell_coordinates(x.xyz));
         } else {
             atomicAdd(&counters[LOST], 1u);

@@ -107,6 +107,23 @@ fn finite_vector(v: vec3f) -> bool {
     return finite(v.x) && finite(v.y) && finite(v.z);
 }
 
+// v, no longer than `longest`.
+fn shortened(v: vec3f, longest: f32) -> vec3f {
+    let squared = dot(v, v);
+    return select(v, v * (longest * inverseSqrt(squared)), squared > longest * longest);
+}
+
+// Whether a particle stays: it is in the domain, and its numbers are numbers.
+fn in_domain(x: vec3f, v: vec3f) -> bool {
+//#if TWO_DIMENSIONS
+    let y = true;
+//#else
+    let y = x.y >= params.lower.y && x.y < params.upper.y;
+//#endif
+    return finite_vector(x) && finite_vector(v) && y && x.x >= params.lower.x && x.x < params.upper.x
+        && x.z >= params.lower.z && x.z < params.upper.z;
+}
+
 // Eq. (3) for a squared distance: no infinities for coincident particles, 0 beyond the effective radius.
 fn weight(distance_squared: f32) -> f32 {
     let closest = CLOSEST * params.spacing;
@@ -128,6 +145,15 @@ fn add_moment(sum: Moment, e: vec3f, r: vec3f) -> Moment {
 fn pair_vector(w: f32, r: vec3f) -> vec3f {
     let inverse = (1.0 + w) / params.effective_radius;
     return w * inverse * inverse * r;
+}
+
+const SHIFT: f32 = 0.3;
+const SHIFT_MAX: f32 = 0.05;
+
+// The way of a shift, as crate::kernels::shift.
+fn shift_way(imbalance: vec3f, v: vec3f) -> vec3f {
+    let speed = sqrt(length(params.gravity) * params.spacing) + length(v);
+    return shortened(-SHIFT * now.dt * speed * params.spacing * imbalance, SHIFT_MAX * params.spacing);
 }
 
 // Inverse of M = d / n0 times the sum, or 1 where a lower bound of its smallest eigenvalue is too small. M is symmetric:

@@ -7,9 +7,6 @@
 @group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
 @group(0) @binding(4) var<storage, read> imbalance: array<vec4f>;
 
-const SHIFT: f32 = 0.3;
-const SHIFT_MAX: f32 = 0.05;
-
 @compute @workgroup_size(WORKGROUP)
 fn shift(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;
@@ -21,12 +18,5 @@ fn shift(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    let speed = sqrt(length(params.gravity) * params.spacing) + length(velocity[i].xyz);
-    var way = -SHIFT * now.dt * speed * params.spacing * sum;
-    let longest = SHIFT_MAX * params.spacing;
-    let squared = dot(way, way);
-    if squared > longest * longest {
-        way *= longest * inverseSqrt(squared);
-    }
-    position[i] = vec4f(x.xyz + way, x.w);
+    position[i] = vec4f(x.xyz + shift_way(sum, velocity[i].xyz), x.w);
 }

@@ -3,7 +3,6 @@
 //! Slots follow [`crate::scene::Groups`]. Fluid slots are kept in cell order and so change from step to
 //! step (`id` tells who is who); all other slots stay.
 
-use crate::plan::{Arrays, Plan};
 use crate::scene::{Kind, Scene};
 use glam::DVec3;
 
@@ -58,11 +57,10 @@ pub struct Fields {
 }
 
 impl Fields {
-    /// The state at t = 0, with the arrays of `plan`.
-    pub fn new(scene: &Scene, plan: &Plan) -> Self {
+    /// The state at t = 0, without the arrays that a plan may leave out.
+    pub fn new(scene: &Scene) -> Self {
         let g = scene.groups;
         let p = g.pressure();
-        let planned = |arrays, length| if plan.needs(arrays) { length } else { 0 };
         Self {
             position: scene.position.clone(),
             velocity: scene.velocity.clone(),
@@ -70,12 +68,12 @@ impl Fields {
             id: (0..g.fluid as u32).collect(),
             pressure: vec![0.0; p],
             number_density: vec![0.0; p],
-            surface_pressure: vec![0.0; planned(Arrays::SurfacePressure, p)],
+            surface_pressure: Vec::new(),
             state: vec![State::Inactive; p],
             source: vec![0.0; p],
             diagonal: vec![1.0; p],
             acceleration: vec![DVec3::ZERO; g.fluid],
-            reaction: vec![DVec3::ZERO; planned(Arrays::Reaction, g.moving_wall)],
+            reaction: Vec::new(),
         }
     }
 }

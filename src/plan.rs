@@ -110,6 +110,8 @@ pub enum Arrays {
     Multigrid,
     /// Of free bodies in the pressure equation.
     Coupling,
+    /// Of the energy ledger.
+    Ledger,
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
@@ -257,6 +259,7 @@ impl Plan {
                     && [Stage::Viscosity, Stage::WallFriction, Stage::Collision].into_iter().any(acts)
             }
             Arrays::Coupling => self.coupled,
+            Arrays::Ledger => self.wet() && self.ledger,
             Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,
         }
     }

@@ -114,10 +114,6 @@ impl Simulation {
                 "use --backend gpu (`seixo adapters` lists what there is) or leave contact.device out";
             return Err(Error::key("contact.device", message, remedy));
         }
-        if plan.ledger && plan.wet() && backend.ledger()?.is_none() {
-            let message = "output.ledger = true: this backend keeps no ledger";
-            return Err(Error::key("output.ledger", message, "use --backend cpu or leave it out"));
-        }
         Ok(Self {
             backend,
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),

@@ -2,10 +2,13 @@
 
 use crate::common;
 use common::*;
+use seixo::backend::{Processor, gpu};
 use seixo::case::{Case, MovingWall};
 use seixo::ledger::{Entry, Ledger};
 use seixo::plan::Stage;
+use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::sync::Arc;
 
 /// Energy of water and free bodies [J].
 fn energy(sim: &mut Simulation) -> f64 {
@@ -13,34 +16,53 @@ fn energy(sim: &mut Simulation) -> f64 {
     water.kinetic + water.potential + sim.solids.energy().total()
 }
 
-/// Runs `case` for `steps` steps; the ledger closes to 1e-10 of the energy at the start all the way. The last `shot`
-/// particles are shot up, so fast that their displacements are shortened, and out of the domain.
-fn closes(case: &mut Case, steps: usize, shot: usize) -> (Ledger, f64) {
+/// Of a run, step by step: its ledger, the energy less that at the start less the ledger, and the energy at the start.
+struct Booked {
+    ledger: Vec<Ledger>,
+    open: Vec<f64>,
+    start: f64,
+}
+
+/// Runs `case` for `steps` steps. The last `shot` particles are shot up, so fast that their displacements are shortened,
+/// and out of the domain.
+fn booked(case: &Case, processor: &Processor, steps: usize, shot: usize) -> Booked {
+    let mut case = case.clone();
     case.output.ledger = true;
-    let mut sim = simulation(case);
+    let scene = Arc::new(Scene::build(&case).expect("a valid scene"));
+    let mut sim = Simulation::on(&case, scene, processor).expect("it starts");
     let mut fields = sim.backend.read().expect("readable");
     let fluid = sim.groups.fluid;
     fields.velocity[fluid - shot..fluid].fill(12.0 * glam::DVec3::Z);
     sim.backend.write(&fields).expect("writable");
     let start = energy(&mut sim);
+    let mut out = Booked { ledger: Vec::new(), open: Vec::new(), start };
     for _ in 0..steps {
         sim.step().expect("a step");
         let ledger = sim.ledger().expect("kept").expect("asked for");
-        let open = energy(&mut sim) - start - ledger.total();
-        assert!(open.abs() < 1e-10 * start, "step {}: {open:e} of {start} J, {ledger:?}", sim.steps);
+        out.open.push(energy(&mut sim) - start - ledger.total());
+        out.ledger.push(ledger);
     }
-    let ledger = sim.ledger().expect("kept").expect("asked for");
+    let ledger = out.ledger.last().expect("a step");
     for entry in Entry::ALL {
         println!("{:10} {:+.3e}", entry.name(), ledger.get(entry) / start);
     }
-    (ledger, start)
+    out
+}
+
+/// The ledger of a run on the CPU closes to 1e-10 of the energy at the start all the way.
+fn closes(case: &Case, steps: usize, shot: usize) -> (Ledger, f64) {
+    let Booked { ledger, open, start } = booked(case, &Processor::Cpu, steps, shot);
+    for (step, open) in open.iter().enumerate() {
+        assert!(open.abs() < 1e-10 * start, "step {step}: {open:e} of {start} J, {:?}", ledger[step]);
+    }
+    (ledger[steps - 1], start)
 }
 
 #[test]
 fn the_ledger_of_a_collapse_closes_with_either_scheme() {
     for preset in ["accurate", "paper"] {
-        let mut case = dam_break(0.04, 2e-3, &format!("preset = \"{preset}\"\nviscosity = 1e-4"));
-        let (ledger, start) = closes(&mut case, 150, 5);
+        let case = dam_break(0.04, 2e-3, &format!("preset = \"{preset}\"\nviscosity = 1e-4"));
+        let (ledger, start) = closes(&case, 150, 5);
         let of_water =
             [Entry::Gravity, Entry::Viscosity, Entry::Collision, Entry::Pressure, Entry::Clip, Entry::Clamps];
         for entry in of_water {
@@ -64,11 +86,38 @@ fn the_ledger_closes_with_a_gate_and_a_body_and_shows_what_they_put_in() {
         motion: vec![[0.0; 4], [0.1, 0.0, 0.0, -0.05]],
         ..MovingWall::default()
     }];
-    let (ledger, start) = closes(&mut case, 250, 0);
+    let (ledger, start) = closes(&case, 250, 0);
     for entry in [Entry::Walls, Entry::Exchange, Entry::Contact] {
         assert!(ledger.get(entry).abs() > 1e-9 * start, "{}", entry.name());
     }
     assert!(ledger.get(Entry::Walls) > 0.0, "the plate lifts the water");
+}
+
+#[test]
+fn a_device_books_the_same_in_single_precision() {
+    if gpu::adapters().is_empty() {
+        let text = "NO GPU ADAPTER: the ledger of the device is not compared";
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        eprintln!("SKIPPED, {text}");
+        return;
+    }
+    for preset in ["accurate", "paper"] {
+        let case = dam_break(0.04, 2e-3, &format!("preset = \"{preset}\"\nviscosity = 1e-4"));
+        let device = booked(&case, &Processor::Gpu { adapter: None }, 150, 5);
+        let cpu = booked(&case, &Processor::Cpu, 20, 5);
+        // Before the two drift apart.
+        let (a, b) = (&device.ledger[19], &cpu.ledger[19]);
+        let most = Entry::ALL.map(|e| b.get(e).abs()).into_iter().fold(0.0, f64::max);
+        for entry in Entry::ALL {
+            let (a, b) = (a.get(entry), b.get(entry));
+            println!("{:10} {a:+.6e} {b:+.6e}", entry.name());
+            assert!((a - b).abs() < 1e-4 * most, "{preset}, {}: {a} for {b} J", entry.name());
+        }
+        let open = device.open.iter().fold(0.0_f64, |m, o| m.max(o.abs())) / device.start;
+        println!("{preset}: open by {open:e}");
+        assert!(open < 1e-5, "{open:e}");
+        assert!(device.ledger[149].get(Entry::Lost) != 0.0 && device.ledger[149].get(Entry::Clamps) != 0.0);
+    }
 }
 
 #[test]

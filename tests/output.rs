@@ -9,7 +9,6 @@ use seixo::output::pvd::Pvd;
 use seixo::output::table::{Cell, Table};
 use seixo::output::vtu::{BLOCK, Values, vtu};
 use seixo::params::Params;
-use seixo::plan::Plan;
 use seixo::scene::Scene;
 use std::io::Read;
 
@@ -334,14 +333,7 @@ fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
         let poses: Vec<_> = placed(solids.poses()).into_iter().map(|(x, q)| (x, turn * q)).collect();
         let params = Params::new(case, scene).unwrap();
         let painter = Painter::new(scene, &Style::of(3), &params);
-        painter
-            .paint(
-                scene,
-                0.0,
-                &poses,
-                drops(scene, Some(&Fields::new(scene, &Plan::new(case, scene, &params)))),
-            )
-            .png()
+        painter.paint(scene, 0.0, &poses, drops(scene, Some(&Fields::new(scene)))).png()
     };
     let draw = |seen: &(Scene, Case)| turned(seen, DQuat::IDENTITY);
     let open = scene("");

@@ -374,6 +374,22 @@ fn constants_are_the_same_on_both_sides() {
     }
     assert_eq!(constant(text("monitor"), "WIDTH"), MONITOR_WIDTH as f64);
     assert_eq!(constant(text("monitor"), "SPEED_BINS"), seixo::monitor::SPEED_BINS as f64);
+    use seixo::backend::gpu::layout::LEDGER_WIDTH;
+    use seixo::ledger::Entry;
+    assert_eq!(constant(text("ledger"), "LEDGER_WIDTH"), LEDGER_WIDTH as f64);
+    for (name, entry) in [
+        ("GRAVITY", Entry::Gravity),
+        ("VISCOSITY", Entry::Viscosity),
+        ("FRICTION", Entry::Friction),
+        ("COLLISION", Entry::Collision),
+        ("PRESSURE", Entry::Pressure),
+        ("CLIP", Entry::Clip),
+        ("CLAMPS", Entry::Clamps),
+        ("SHIFTED", Entry::Shift),
+        ("TAKEN_OUT", Entry::Lost),
+    ] {
+        assert_eq!(constant(text("ledger"), name), f64::from(entry as u8), "{name}");
+    }
     let on_wall = format!("const ON_WALL: u32 = {:#x}u;", seixo::contact::device::paper::ON_WALL);
     assert!(text("contact_paper").contains(&on_wall));
     use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};
@@ -392,7 +408,7 @@ fn constants_are_the_same_on_both_sides() {
         assert_eq!(constant(text("multigrid"), name), f64::from(operation as u32), "{name}");
     }
     for (name, value) in [("SHIFT", SHIFT), ("SHIFT_MAX", SHIFT_MAX)] {
-        assert_eq!(constant(text("shift"), name), value, "{name}");
+        assert_eq!(common(name), value, "{name}");
     }
     for (name, outcome) in [
         ("CONVERGED", Outcome::Converged),

@@ -15,6 +15,7 @@ mod exchange;
 pub mod forecast;
 pub mod hierarchy;
 pub mod layout;
+mod ledger;
 pub mod shader;
 mod solve;
 mod traffic;
@@ -34,6 +35,7 @@ use crate::kernels::collision;
 pub use crate::kernels::device as kernels;
 use crate::kernels::device::Over;
 use crate::kernels::monitor::{speed_most, speed_range};
+use crate::ledger::Ledger;
 use crate::monitor::{FluidMonitor, SPEED_BINS};
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
@@ -200,7 +202,7 @@ impl Gpu {
             if let Some(levels) = &gpu.levels {
                 gpu.context.upload(buffers::hierarchy, &[levels.hierarchy()])?;
             }
-            gpu.write_fields(&Fields::new(scene, plan))?;
+            gpu.write_fields(&super::start(scene, plan))?;
             gpu.write_solids(scene)?;
         }
         Ok(gpu)
@@ -365,8 +367,9 @@ impl Backend for Gpu {
     fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
         self.context.begin(Some(stage.into()));
         self.set_step(step)?;
+        self.book(stage)?;
         let Some((kernel, over)) = kernels::of(stage) else { return self.cell_list() };
-        let s = &self.sizes;
+        let s = self.sizes;
         let threads = match over {
             Over::Fluid | Over::Own => s.fluid,
             Over::FluidAndReaction => s.fluid + self.felt(),
@@ -374,6 +377,7 @@ impl Backend for Gpu {
         };
         self.context.pass([(kernel, groups(threads))])?;
         if matches!(stage, ParticleStage::WallFriction | ParticleStage::Collision) {
+            self.book_kick(stage)?;
             // What they found is applied as any acceleration is.
             self.context.pass([(kernels::correct::correct, groups(s.fluid))])?;
         }
@@ -450,6 +454,10 @@ impl Backend for Gpu {
             total[solid].torque += vector(&part[1]);
         }
         Ok(total)
+    }
+
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        self.read_ledger()
     }
 
     fn counters(&mut self) -> Result<Counters> {

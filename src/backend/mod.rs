@@ -14,11 +14,25 @@ use crate::fields::Fields;
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
-use crate::plan::{ParticleStage, Stage};
+use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::PressureReport;
+use crate::scene::Scene;
 use crate::stop::Stop;
+use glam::DVec3;
 pub use processor::Processor;
 use std::collections::BTreeMap;
+
+/// The fields of `scene` at t = 0, with the arrays that `plan` asks for.
+fn start(scene: &Scene, plan: &Plan) -> Fields {
+    let mut fields = Fields::new(scene);
+    if plan.needs(Arrays::Reaction) {
+        fields.reaction = vec![DVec3::ZERO; scene.groups.moving_wall];
+    }
+    if plan.needs(Arrays::SurfacePressure) {
+        fields.surface_pressure = vec![0.0; scene.groups.pressure()];
+    }
+    fields
+}
 
 /// What the guards have seen since the start of the run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -134,10 +148,8 @@ pub trait Backend: Send {
     fn body_force(&mut self) -> Result<Vec<Wrench>>;
     /// What the guards have seen.
     fn counters(&mut self) -> Result<Counters>;
-    /// Work of the stages on the water since the start, if the plan asks for the ledger and the backend keeps one.
-    fn ledger(&mut self) -> Result<Option<Ledger>> {
-        Ok(None)
-    }
+    /// Work of the stages on the water since the start, if the plan asks for the ledger.
+    fn ledger(&mut self) -> Result<Option<Ledger>>;
     /// Sums over the fluid.
     fn monitor(&mut self) -> Result<FluidMonitor>;
     /// Both of these, with one wait on a device; [`Self::stage_seconds`] is up to date then.

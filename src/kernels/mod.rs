@@ -8,6 +8,7 @@ pub mod collision;
 pub mod conjugate_gradient;
 pub mod correct;
 pub mod coupling;
+pub mod ledger;
 pub mod monitor;
 pub mod move_solids;
 pub mod multigrid;
@@ -85,6 +86,8 @@ pub mod device {
             pack start_residual start descend ascend multiply advance end_pack end_residual end;
         correct[super::WORKGROUP] Stage(Correct), Fluid: correct;
         coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare respond;
+        ledger[super::WORKGROUP] Arrays(Ledger), Own:
+            predict_work lost_work friction_work collision_work pressure_work shift_work as_solved as_clipped;
         monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
         move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids;
         multigrid[super::WORKGROUP] Arrays(Multigrid), Own:

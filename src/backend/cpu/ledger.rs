@@ -1,8 +1,8 @@
-//! The water's part of the energy ledger: [`crate::ledger::particle`] over all particles.
+//! The water's part of the energy ledger: [`crate::kernels::ledger`] over all particles.
 
 use crate::kernels::Particles;
 use crate::kernels::cell_list::inside;
-use crate::ledger::particle::{correct_clamp, correct_work, predict_work};
+use crate::kernels::ledger::{correct_clamp, correct_work, predict_work};
 use crate::ledger::{Entry, Ledger};
 use crate::neighbours::CHUNK;
 use crate::params::Params;

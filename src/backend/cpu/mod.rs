@@ -103,7 +103,7 @@ impl Cpu {
             poses: Vec::new(),
             free_bodies: Vec::new(),
             lightness: scene.solids.iter().flat_map(|s| s.wall_slots.clone().map(|_| lightness(s))).collect(),
-            fields: if wet { Fields::new(scene, plan) } else { Fields::default() },
+            fields: if wet { super::start(scene, plan) } else { Fields::default() },
             grid,
             fluid_start: Vec::new(),
             coordinates: Coordinates::default(),

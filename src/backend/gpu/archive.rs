@@ -9,7 +9,8 @@ use bytemuck::Pod;
 
 /// Buffers that hold the state between two steps.
 #[cfg(test)]
-const SAVED: [&str; 9] = [
+const SAVED: [&str; 10] = [
+    "ledger_sum",
     "position",
     "velocity",
     "pressure",
@@ -23,7 +24,9 @@ const SAVED: [&str; 9] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 40] = [
+const MADE_ANEW: [&str; 42] = [
+    "unclipped",
+    "clipped",
     "surface_pressure",
     "imbalance",
     "source_diagonal",
@@ -83,6 +86,9 @@ impl Gpu {
             // The lists of the last step serve viscosity, at the start of the next one.
             if self.params.viscosity > 0.0 {
                 self.lists(archive)?;
+            }
+            if self.plan.needs(Arrays::Ledger) {
+                self.buffer(archive, buffers::ledger_sum, self.ledger_length())?;
             }
             if archive.is_saving() {
                 let seen = self.context.download(buffers::counters, super::layout::counter::WORDS)?;

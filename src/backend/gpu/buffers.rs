@@ -3,7 +3,8 @@
 
 use super::hierarchy::{Hierarchy, Levels};
 use super::layout::{
-    Coefficients, Constants, FreeBody, MonitorSum, Pose, SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
+    Coefficients, Constants, FreeBody, LEDGER_WIDTH, MonitorSum, Pose, SCAN_BLOCK, Sizes, Solve,
+    WallParticle, counter,
 };
 use crate::compute::{Buffer, Host, Spec, shader_structs};
 use crate::monitor::SPEED_BINS;
@@ -75,6 +76,12 @@ table! {
         coarse: f32, None, Multigrid, |_, l| 3 * l.capacity;
         smoothed: f32, None, Multigrid, |s, _| s.pressure;
         corrected: [f32; 4], None, Multigrid, |s, _| s.pressure;
+    }
+    "ledger" {
+        /// Sums of each workgroup, and what they lack.
+        ledger_sum: [f32; 2], Both, Ledger, |s, _| LEDGER_WIDTH * s.monitor_groups();
+        unclipped: [f32; 4], Writes, Ledger, |s, _| s.fluid;
+        clipped: f32, None, Ledger, |s, _| s.pressure;
     }
     "search" {
         cell_of: [u32; 2], None, Fluid, |s, _| s.sorted();

@@ -153,6 +153,9 @@ pub struct FreeBody {
     pub pad: u32,
 }
 
+/// Sums of one workgroup in the ledger: the first entries of [`crate::ledger::Entry`], then the number of lost particles.
+pub const LEDGER_WIDTH: u64 = 10;
+
 /// Sums of one workgroup of the monitor; see `MonitorSum` in shaders/monitor.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]

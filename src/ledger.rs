@@ -1,10 +1,8 @@
 //! The energy ledger: what each part of a step did to the energy of the water and of the bodies that move freely.
 //!
 //! The entries add up to the change of that energy since the start to round-off. Those of the water are summed from
-//! single particles, stage by stage ([`crate::ledger::particle`]), apart from the energy that the monitors measure: that
+//! single particles, stage by stage ([`crate::kernels::ledger`]), apart from the energy that the monitors measure: that
 //! the two agree is what closes the ledger.
-
-pub mod particle;
 
 use crate::body::{Pose, Wrench};
 use crate::checkpoint::Archive;

@@ -1,4 +1,5 @@
 //! What a stage does to the energy v^2 / 2 - g . x of a particle, per mass [m2/s2], from the state before the stage.
+//! GPU twin: shaders/ledger.wgsl
 
 use crate::kernels::correct::correct;
 use crate::kernels::predict::predict;
