@@ -40,3 +40,5 @@ mod shapes;
 mod stability;
 mod study;
 mod twins;
+mod water;
+mod waves;

@@ -23,7 +23,8 @@ const SAVED: [&str; 9] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 39] = [
+const MADE_ANEW: [&str; 40] = [
+    "absorber_zone",
     "imbalance",
     "source_diagonal",
     "preconditioned",
