@@ -21,6 +21,7 @@ mod fluid;
 mod fuzz;
 mod gauges;
 mod guide;
+mod hulls;
 mod immersed;
 mod kernels;
 mod layers;
