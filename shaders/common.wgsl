@@ -95,6 +95,14 @@ struct WallParticle {
     to_surface: vec4f,
 }
 
+// A box in which the water comes to rest. Corners relative to the middle of the domain; s = ramp.xyz . (r - start.xyz).
+struct AbsorberZone {
+    low: vec4f,
+    high: vec4f,
+    start: vec4f,
+    ramp: vec4f, // and the rate
+}
+
 @group(0) @binding(0) var<uniform> params: Constants;
 @group(0) @binding(1) var<uniform> now: Coefficients;
 
@@ -111,6 +119,13 @@ fn finite_vector(v: vec3f) -> bool {
 fn shortened(v: vec3f, longest: f32) -> vec3f {
     let squared = dot(v, v);
     return select(v, v * (longest * inverseSqrt(squared)), squared > longest * longest);
+}
+
+// sigma of crate::kernels::absorber in one zone.
+fn absorber_rate(zone: AbsorberZone, x: vec3f) -> f32 {
+    let s = clamp(dot(zone.ramp.xyz, x - zone.start.xyz), 0.0, 1.0);
+    let holds = all(x >= zone.low.xyz) && all(x <= zone.high.xyz);
+    return select(0.0, zone.ramp.w * s * s, holds);
 }
 
 // Whether a particle stays: it is in the domain, and its numbers are numbers.

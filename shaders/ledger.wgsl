@@ -15,22 +15,28 @@
 @group(0) @binding(10) var<storage, read> imbalance: array<vec4f>;
 @group(0) @binding(11) var<storage, read> surface_pressure: array<f32>;
 //#endif
+//#if ABSORBER
+@group(0) @binding(12) var<storage, read> absorber_zone: array<AbsorberZone>;
+//#endif
 
 // Places in the sums of a workgroup: the first entries of crate::ledger::Entry, then the number of lost particles.
-const GRAVITY: u32 = 0u;
-const VISCOSITY: u32 = 1u;
-const FRICTION: u32 = 2u;
-const COLLISION: u32 = 3u;
-const PRESSURE: u32 = 4u;
-const CLIP: u32 = 5u;
-const CLAMPS: u32 = 6u;
-//#if CONSISTENT
-const SHIFTED: u32 = 7u;
+//#if ABSORBER
+const ABSORBED: u32 = 0u;
 //#endif
-const TAKEN_OUT: u32 = 8u;
-const NUMBER: u32 = 9u;
+const GRAVITY: u32 = 1u;
+const VISCOSITY: u32 = 2u;
+const FRICTION: u32 = 3u;
+const COLLISION: u32 = 4u;
+const PRESSURE: u32 = 5u;
+const CLIP: u32 = 6u;
+const CLAMPS: u32 = 7u;
+//#if CONSISTENT
+const SHIFTED: u32 = 8u;
+//#endif
+const TAKEN_OUT: u32 = 9u;
+const NUMBER: u32 = 10u;
 // As crate::backend::gpu::layout::LEDGER_WIDTH.
-const LEDGER_WIDTH: u32 = 10u;
+const LEDGER_WIDTH: u32 = 11u;
 
 var<workgroup> lane: array<vec4f, 256>;
 
@@ -80,6 +86,28 @@ fn correct_clamp(v: vec3f, total: vec3f) -> f32 {
     return gain(v, change, now.dt * change) - correct_work(v, total, total);
 }
 
+//#if ABSORBER
+@compute @workgroup_size(WORKGROUP)
+fn absorber_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
+                 @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    var sum = vec4f(0.0);
+    for (var i = id.x; i < params.fluid; i += stride(groups.x)) {
+        let x = position[i];
+        if x.w == FLUID {
+            var rate = 0.0;
+            for (var k = 0u; k < arrayLength(&absorber_zone); k++) {
+                rate += absorber_rate(absorber_zone[k], x.xyz);
+            }
+            // v^2 (b^2 - 1) / 2 with b = 1 / (1 + dt sigma), without the difference of two numbers near 1.
+            let v = velocity[i].xyz;
+            let s = now.dt * rate;
+            sum.x -= 0.5 * dot(v, v) * s * (2.0 + s) / ((1.0 + s) * (1.0 + s));
+        }
+    }
+    book(vec4u(ABSORBED, CLAMPS, CLAMPS, CLAMPS), sum, t, group.x);
+}
+
+//#endif
 @compute @workgroup_size(WORKGROUP)
 fn predict_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) t: u32,
                 @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {

@@ -121,6 +121,18 @@ impl Estimate {
         let span = |lo: &Vector, hi: &Vector, k: usize| hi[k] - lo[k];
         let blocks = case.fluid.iter().flat_map(|f| &f.block);
         let water: f64 = blocks.clone().map(|b| cells(&|k| span(&b.min, &b.max, k))).sum();
+        let tank = case.tank.as_ref();
+        let shapes = case.fluid.iter().flat_map(|f| &f.shape).map(|w| Wall::Shaped(w.form(tank), w.place()));
+        let shapes: Vec<(Vector, Vector, &[Face])> = shapes.map(|w| edges(&w, l0, flat, &[])).collect();
+        let water = water + shapes.iter().map(|(lo, hi, _)| cells(&|k| span(lo, hi, k))).sum::<f64>();
+        // At most all of the tank below the highest level.
+        let level = case.fluid.iter().flat_map(|f| &f.fill).map(|f| f.level).reduce(f64::max);
+        let filled = |(t, level): (&crate::case::Tank, f64)| {
+            cells(&|k| {
+                if k == 2 { (level - t.min[2]).clamp(0.0, t.max[2] - t.min[2]) } else { t.max[k] - t.min[k] }
+            })
+        };
+        let water = water + tank.zip(level).map_or(0.0, filled);
         // A shell of `layers` around or inside of a box.
         let shell = |size: &dyn Fn(usize) -> f64, open: &[Face]| {
             let closed = 1.0 - open.len() as f64 / if flat { 4.0 } else { 6.0 };
@@ -132,7 +144,6 @@ impl Estimate {
             (area * closed.max(0.0) * layers).min(f64::MAX)
         };
         let inside = |size: &dyn Fn(usize) -> f64, open: &[Face]| shell(size, open).min(cells(size));
-        let tank = case.tank.as_ref();
         let obstacles = case.obstacle.iter().map(|o| (o.wall(tank), &o.open[..]));
         let moving = case.moving_wall.iter().map(|w| (w.wall(tank), &w.open[..]));
         let walls: Vec<(Vector, Vector, &[Face])> =
@@ -151,6 +162,7 @@ impl Estimate {
         let mut lattice = Bounds::NONE;
         case.tank.iter().for_each(|t| lattice.add(t.min, t.max));
         blocks.for_each(|b| lattice.add(b.min, b.max));
+        shapes.iter().for_each(|(lo, hi, _)| lattice.add(*lo, *hi));
         // What is on the lattice; ground that reaches beyond a tank is cut off there.
         let on_lattice = |o: Option<(Vector, Vector)>| o.is_some() || tank.is_none();
         let mut domain = Bounds::NONE;
@@ -164,8 +176,17 @@ impl Estimate {
         domain.add(lattice.lo, lattice.hi);
         for (w, (lo, hi, _)) in case.moving_wall.iter().zip(&walls[case.obstacle.len()..]) {
             let center = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
-            let pivot = (!w.rotation.is_empty()).then_some(w.pivot.unwrap_or(center));
+            let turns = !w.rotation.is_empty() || w.swing.is_some();
+            let pivot = turns.then_some(w.pivot.unwrap_or(center));
             domain.add_moving(*lo, *hi, &w.motion, pivot);
+            let sine = w.sine.as_ref().map(|s| (s.axis, s.formula().reach()));
+            let wave =
+                w.wave.as_ref().zip(w.wave(case)).map(|(k, wave)| (k.direction(), wave.formula.reach()));
+            for (axis, reach) in sine.into_iter().chain(wave) {
+                let unit = length(&axis).recip();
+                let row = |way: f64| [0.0, way * unit * axis[0], way * unit * axis[1], way * unit * axis[2]];
+                domain.add_moving(*lo, *hi, &reach.map(row), pivot);
+            }
         }
         for body in &case.body {
             let half = 0.5 * length(&extent(body));

@@ -11,6 +11,8 @@ use crate::error::Result;
 /// A part of the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
+    /// What absorbers take from the water.
+    Absorber,
     /// Kicks by gravity less what the water falls: what the time integration makes or loses.
     Gravity,
     /// Explicit viscosity, friction on solids included.
@@ -40,7 +42,8 @@ pub enum Entry {
 
 impl Entry {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
+        Self::Absorber,
         Self::Gravity,
         Self::Viscosity,
         Self::Friction,
@@ -58,6 +61,7 @@ impl Entry {
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Absorber => "absorber",
             Self::Gravity => "gravity",
             Self::Viscosity => "viscosity",
             Self::Friction => "friction",

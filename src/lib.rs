@@ -46,6 +46,7 @@
 //! | equation | kernel and shader | checked by itself in |
 //! |---|---|---|
 //! | weight (3), n0 (4), lambda (7) | [`lattice`] | `fluid` |
+//! | absorption of waves | [`kernels::absorber`] | `twins`, `waves` |
 //! | viscosity (2), (6) | [`kernels::viscosity`] | `twins`, study `stability` |
 //! | explicit step (2) | [`kernels::predict`] | `twins`, `fluid` |
 //! | solids take their pose | [`kernels::move_solids`] | `twins`, `immersed` |
@@ -68,6 +69,7 @@ pub mod backend;
 pub mod body;
 pub mod case;
 pub mod cells;
+mod chance;
 pub mod checkpoint;
 pub mod compute;
 pub mod console;
@@ -98,6 +100,7 @@ mod step;
 pub mod stop;
 pub mod threads;
 pub mod time_step;
+pub mod waves;
 mod whole;
 
 pub use backend::Processor;

@@ -1,6 +1,6 @@
 //! Constants of a run: the scheme's switches, what follows from the initial lattice, the step's coefficients.
 
-use crate::case::{Case, Preset};
+use crate::case::{self, Case, Preset};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 use crate::scene::Scene;
@@ -29,6 +29,41 @@ const WALL_FRICTION: f64 = 0.0025;
 /// Largest gamma that [`Relaxation::Speed`] gives. The density error oscillates with
 /// omega dt = sqrt(gamma), unstable from 2 on; noise grows well before.
 pub const RELAXATION_MAX: f64 = 0.5;
+
+/// Height that a wave has left of itself beyond the absorber and back, over its height, is exp(-THROUGH / 3): a rate
+/// sigma takes sigma / (2 c_g) of it a metre, the mean of s^2 is a third and c_g is sqrt(g d) at most.
+const THROUGH: f64 = 12.0;
+
+/// A box in which the water comes to rest, see [`crate::kernels::absorber`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Zone {
+    /// Lower corner [m].
+    pub low: DVec3,
+    /// Upper corner [m].
+    pub high: DVec3,
+    /// A place where the damping begins [m].
+    pub start: DVec3,
+    /// Gradient of the way s from there to the far end [1/m].
+    pub ramp: DVec3,
+    /// Largest rate of damping [1/s].
+    pub rate: f64,
+}
+
+impl Zone {
+    /// That of a case; `head` is gravity times depth [m2/s2].
+    fn new(absorber: &case::Absorber, dimensions: u32, head: f64) -> Self {
+        let (mut low, mut high): (DVec3, DVec3) = (absorber.min.into(), absorber.max.into());
+        if dimensions == 2 {
+            (low.y, high.y) = (-1.0, 1.0);
+        }
+        let ((axis, up), length) = (absorber.way(), absorber.length());
+        let start = if up { low } else { high };
+        let mut ramp = DVec3::ZERO;
+        ramp[axis] = if up { 1.0 / length } else { -1.0 / length };
+        let rate = absorber.rate.unwrap_or(THROUGH * head.sqrt() / length);
+        Self { low, high, start, ramp, rate }
+    }
+}
 
 /// Constants of a run.
 #[derive(Clone, Debug)]
@@ -76,6 +111,8 @@ pub struct Params {
     pub collision_distance: f64,
     /// Restitution b of the collision, Eq. (18) [-].
     pub collision_restitution: f64,
+    /// Where the water comes to rest.
+    pub absorbers: Vec<Zone>,
     /// Depth of the water at the start [m].
     pub depth: f64,
     /// Lower corner of the domain [m].
@@ -148,6 +185,7 @@ impl Params {
             collision: if paper { Collision::Single } else { Collision::Shared },
             collision_distance: fluid.map_or(0.8, |f| f.collision_distance) * l0,
             collision_restitution: fluid.map_or(0.2, |f| f.collision_restitution),
+            absorbers: case.absorber.iter().map(|a| Zone::new(a, run.dimensions, g * scene.depth)).collect(),
             depth: scene.depth,
             domain_min: scene.domain.0,
             domain_max: scene.domain.1,

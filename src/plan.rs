@@ -55,6 +55,8 @@ macro_rules! stages {
 
 // A step plays them in this order. In brackets: once more if the stage sweeps over the particles.
 stages! {
+    /// The water comes to rest in absorbers.
+    Absorber = "absorber" [Absorber];
     /// Explicit viscosity, Eq. (2): acceleration at the positions and neighbours of the last step.
     Viscosity = "viscosity" [Viscosity];
     /// Explicit part of Eq. (2): viscosity and gravity move particles to r*.
@@ -112,6 +114,8 @@ pub enum Arrays {
     Coupling,
     /// Of the energy ledger.
     Ledger,
+    /// Of boxes in which the water comes to rest.
+    Absorber,
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
@@ -195,6 +199,8 @@ impl Plan {
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
+                Stage::Absorber if params.absorbers.is_empty() => Err("no absorber"),
+                Stage::Absorber => wet("waves run into absorbers"),
                 Stage::Viscosity if params.viscosity == 0.0 => Err("viscosity is zero"),
                 Stage::Viscosity => wet("viscosity is given"),
                 Stage::MoveSolids if !moving => Err("nothing solid moves"),
@@ -260,6 +266,7 @@ impl Plan {
             }
             Arrays::Coupling => self.coupled,
             Arrays::Ledger => self.wet() && self.ledger,
+            Arrays::Absorber => self.has(Stage::Absorber),
             Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,
         }
     }

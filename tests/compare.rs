@@ -1,8 +1,8 @@
 //! The library's own comparison of device and CPU, as `seixo compare` runs it.
 
 use seixo::backend::gpu;
-use seixo::case::Case;
 use seixo::case::file::load;
+use seixo::case::{Absorber, Case, Face};
 use seixo::plan::Stage;
 use seixo::scene::Scene;
 use seixo_study::device_compare as compare;
@@ -31,7 +31,9 @@ fn one_step_agrees_stage_by_stage() {
     if !device() {
         return;
     }
-    let (case, scene) = transport();
+    let (mut case, scene) = transport();
+    // The experiment has none; every stage is to be there.
+    case.absorber = vec![Absorber { min: [0.0; 3], max: [8.0; 3], towards: Face::XMax, rate: Some(5.0) }];
     let errors = compare::compare_stages(&case, &scene, None, 5).expect("both run");
     for e in &errors {
         println!("{:20} {:16} max {:.1e}  l2 {:.1e}", e.stage, e.field, e.max_relative, e.l2_relative);

@@ -3,7 +3,7 @@
 use crate::common;
 use common::*;
 use seixo::backend::{Processor, gpu};
-use seixo::case::{Case, MovingWall};
+use seixo::case::{Absorber, Case, Face, MovingWall};
 use seixo::ledger::{Entry, Ledger};
 use seixo::plan::Stage;
 use seixo::scene::Scene;
@@ -61,7 +61,8 @@ fn closes(case: &Case, steps: usize, shot: usize) -> (Ledger, f64) {
 #[test]
 fn the_ledger_of_a_collapse_closes_with_either_scheme() {
     for preset in ["accurate", "paper"] {
-        let case = dam_break(0.04, 2e-3, &format!("preset = \"{preset}\"\nviscosity = 1e-4"));
+        let mut case = dam_break(0.04, 2e-3, &format!("preset = \"{preset}\"\nviscosity = 1e-4"));
+        case.absorber = vec![Absorber { min: [0.0; 3], max: [2.0; 3], towards: Face::XMax, rate: Some(2.0) }];
         let (ledger, start) = closes(&case, 150, 5);
         let of_water =
             [Entry::Gravity, Entry::Viscosity, Entry::Collision, Entry::Pressure, Entry::Clip, Entry::Clamps];
@@ -69,6 +70,7 @@ fn the_ledger_of_a_collapse_closes_with_either_scheme() {
             assert!(ledger.get(entry).abs() > 1e-6 * start, "{preset}: {}", entry.name());
         }
         assert!(ledger.get(Entry::Viscosity) < 0.0 && ledger.get(Entry::Collision) < 0.0);
+        assert!(ledger.get(Entry::Absorber) < -1e-4 * start, "{preset}");
         assert!(ledger.get(Entry::Lost) != 0.0, "{preset}: nothing is lost");
         assert_eq!(ledger.get(Entry::Contact), 0.0);
     }

@@ -4,7 +4,7 @@ use crate::common::moving as common;
 
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
 use seixo::backend::gpu::layout::{
-    Coefficients, Constants, FreeBody, MonitorSum, Pose, Solve, WallParticle, counter,
+    AbsorberZone, Coefficients, Constants, FreeBody, MonitorSum, Pose, Solve, WallParticle, counter,
 };
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
 use seixo::compute::{Host, Program};
@@ -260,6 +260,7 @@ fn structs_lie_the_same_on_both_sides() {
         Pose { position, orientation, velocity, angular_velocity, acceleration, angular_acceleration }
     );
     same_layout!("body_force", WallParticle { area, arm, to_surface });
+    same_layout!("absorber", AbsorberZone { low, high, start, ramp });
     same_layout!(
         "coupling",
         FreeBody { inverse_mass, inertia_x, inertia_y, inertia_z, force, torque, first, count, solid, pad }
@@ -378,6 +379,7 @@ fn constants_are_the_same_on_both_sides() {
     use seixo::ledger::Entry;
     assert_eq!(constant(text("ledger"), "LEDGER_WIDTH"), LEDGER_WIDTH as f64);
     for (name, entry) in [
+        ("ABSORBED", Entry::Absorber),
         ("GRAVITY", Entry::Gravity),
         ("VISCOSITY", Entry::Viscosity),
         ("FRICTION", Entry::Friction),

@@ -701,6 +701,26 @@ fn correct() {
 }
 
 #[test]
+fn absorber() {
+    let zones = "\n[[absorber]]\nmin = [0.05, -1, 0.0]\nmax = [0.15, 1, 0.1]\ntowards = \"x_max\"\nrate = 300\n\
+                 [[absorber]]\nmin = [0.0, -1, 0.03]\nmax = [0.12, 1, 0.2]\ntowards = \"z_min\"\n";
+    for (dimensions, fluid) in SCHEMES {
+        let Some(mut pair) = Pair::new(dimensions, &format!("{fluid}{zones}")) else { return };
+        let (before, _) = pair.fields();
+        pair.run(Stage::Absorber);
+        let (after, _) = pair.fields();
+        let slower = |(a, b): (&DVec3, &DVec3)| b.length() < 0.95 * a.length();
+        let count = before.velocity.iter().zip(&after.velocity).filter(|&pair| slower(pair)).count();
+        let same = before.velocity.iter().zip(&after.velocity).filter(|(a, b)| a == b).count();
+        assert!(count > 20 && same > 20, "{count} slower, {same} as they were");
+        pair.check(Stage::Absorber);
+    }
+    // What has none plans none.
+    let Some(pair) = Pair::new(2, "preset = \"accurate\"") else { return };
+    assert!(!pair.plan.has(Stage::Absorber));
+}
+
+#[test]
 fn shift() {
     each(|pair| {
         if pair.params.gradient == Gradient::Minimum {
@@ -802,6 +822,7 @@ fn bytes(scheme: &str, preconditioner: Preconditioner) -> Vec<u64> {
         for stage in Stage::ALL {
             let (gpu, step) = (&mut pair.gpu, &pair.step);
             let done = match (stage, stage.over_particles()) {
+                _ if !pair.plan.has(stage) => Ok(()),
                 (_, Some(stage)) => gpu.run(stage, step),
                 (Stage::MoveSolids, _) => gpu.move_solids(&pair.poses),
                 (Stage::ConjugateGradient, _) => gpu.solve_pressure(step).map(|_| ()),

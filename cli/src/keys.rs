@@ -87,6 +87,9 @@ ledger = true
 table_every = 0.01
 [[moving_wall]]
 motion = "paddle.csv"
+sine = { axis = [1, 0, 0], amplitude = 0.05, period = 1.2, phase_deg = 90, ramp = 2.4 }
+wave = { kind = "regular", height = 0.06, period = 1.2, depth = 0.3, direction = [1, 0, 0], ramp = 2.4, seed = 1, peak_enhancement = 3.3, profile = "rayleigh" }
+swing = { axis = [0, 1, 0], amplitude_deg = 10, period = 1.2, phase_deg = 90, ramp = 2.4 }
 rotation = [[0, 0, 0, 0], [1, 0, 30, 0]]
 pivot = [0.1, 0.0, 0.0]
 [[body]]
@@ -105,6 +108,27 @@ angular_velocity = [0.0, 0.0, 3.0]
 locked = ["y", "rotation_x"]
 [[fluid.block]]
 velocity = [1.0, 0.0, 0.0]
+[[fluid.shape]]
+shape = "cylinder"
+size = [0.2, 0.1, 0.3]
+radius = 0.1
+height = 0.4
+file = "pool.stl"
+scale = 0.001
+axis = [0.0, 0.0, 1.0]
+center = [0.5, 0.2, 0.2]
+position = [0.0, 0.0, 0.0]
+orientation = { axis = [0, 1, 0], angle_deg = 15 }
+velocity = [0.0, 0.0, -1.0]
+[[fluid.fill]]
+seed = [0.5, 0.2, 0.05]
+level = 0.3
+velocity = [0.0, 0.0, 0.0]
+[[absorber]]
+min = [7.0, 0.0, 0.0]
+max = [10.0, 0.5, 0.6]
+towards = "x_max"
+rate = 4.0
 "#;
 
 /// Cases to take examples from.
@@ -117,8 +141,19 @@ fn examples() -> Vec<toml::Table> {
 }
 
 /// The tables in the order in which one writes them; others follow.
-const ORDER: [&str; 10] =
-    ["run", "tank", "obstacle", "plane", "moving_wall", "fluid", "body", "contact", "gauge", "output"];
+const ORDER: [&str; 11] = [
+    "run",
+    "tank",
+    "obstacle",
+    "plane",
+    "moving_wall",
+    "fluid",
+    "absorber",
+    "body",
+    "contact",
+    "gauge",
+    "output",
+];
 
 /// Longest example.
 const LONGEST: usize = 60;

@@ -20,8 +20,9 @@ use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
 use seixo::run::summary::particles;
-use seixo::scene::Drive;
+use seixo::scene::{Drive, Solid};
 use seixo::time_step::{Bounds, collapse_speed, time_step};
+use seixo::waves::WaveKind;
 use serde::Serialize;
 
 #[derive(Debug, clap::Args)]
@@ -46,6 +47,60 @@ struct StageLine {
 struct ContactLine {
     device: bool,
     reason: String,
+}
+
+/// A wave that a piston makes, by theory.
+#[derive(Serialize)]
+struct WaveLine {
+    piston: String,
+    kind: WaveKind,
+    height_m: f64,
+    /// Nothing for a solitary wave.
+    period_s: Option<f64>,
+    depth_m: f64,
+    length_m: f64,
+    celerity_m_s: f64,
+    stroke_m: f64,
+    /// Height and length over the spacing.
+    height_over_spacing: f64,
+    length_over_spacing: f64,
+}
+
+impl WaveLine {
+    fn new(solid: &Solid, spacing: f64) -> Option<Self> {
+        let Drive::Prescribed(motion) = &solid.drive else { return None };
+        let wave = motion.wave()?;
+        let wanted = &wave.wanted;
+        Some(Self {
+            piston: solid.name.clone(),
+            kind: wanted.kind,
+            height_m: wanted.height,
+            period_s: (wanted.kind != WaveKind::Solitary).then_some(wanted.period),
+            depth_m: wanted.depth,
+            length_m: wave.length,
+            celerity_m_s: wave.celerity,
+            stroke_m: wave.stroke,
+            height_over_spacing: wanted.height / spacing,
+            length_over_spacing: wave.length / spacing,
+        })
+    }
+
+    fn words(&self) -> String {
+        let period = self.period_s.map_or(String::new(), |t| format!(", period {t} s"));
+        format!(
+            "  `{}` makes a {} wave: height {} m{period}, in {:.4} m of water\n  length {:.3} m, celerity {:.3} m/s, stroke \
+             {:.4} m; {:.1} particles high, {:.0} long",
+            self.piston,
+            self.kind.name(),
+            self.height_m,
+            self.depth_m,
+            self.length_m,
+            self.celerity_m_s,
+            self.stroke_m,
+            self.height_over_spacing,
+            self.length_over_spacing
+        )
+    }
 }
 
 /// Constants of the fluid's scheme.
@@ -82,6 +137,7 @@ struct Report {
     end_s: f64,
     particles: seixo::output::result::Particles,
     solids: Vec<String>,
+    waves: Vec<WaveLine>,
     stages: Vec<StageLine>,
     contact: ContactLine,
     scheme: Option<Scheme>,
@@ -113,10 +169,7 @@ impl Seen {
         let mut loaded = setup::read(args)?;
         let case = loaded.case.clone();
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
-        let blocks = case.fluid.iter().flat_map(|f| &f.block);
-        let extent = |b: &seixo::case::Block, k: usize| (b.max[k] - b.min[k]).abs();
-        let fluid = |b| extent(b, 0) * extent(b, 2) * if d == 3.0 { extent(b, 1) } else { 1.0 } / l0.powf(d);
-        let fluid: f64 = blocks.map(fluid).sum();
+        let fluid = Estimate::new(&case).water;
         let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
         if coarser > 1.0 {
             // From its text: standard input is read once.
@@ -193,6 +246,7 @@ fn report(seen: &Seen) -> Result<Report> {
         end_s: case.run.end,
         particles: count,
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
+        waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
         estimate,
@@ -297,6 +351,10 @@ fn words(report: &Report) -> String {
     }
     if !report.solids.is_empty() {
         lines.push(format!("  moving solids: {}", report.solids.join(", ")));
+    }
+    if !report.waves.is_empty() {
+        lines.extend([String::new(), "waves".to_string()]);
+        lines.extend(report.waves.iter().map(WaveLine::words));
     }
     for (title, planned) in [("stages", true), ("left out", false)] {
         let of = |s: &&StageLine| s.planned == planned;

@@ -33,7 +33,7 @@ impl Setup {
     /// # Errors
     /// What is wrong with it.
     pub fn build(loaded: Loaded, name: String, quiet: bool) -> Result<Self> {
-        let scene = Arc::new(Scene::build(&loaded.case)?);
+        let scene = Arc::new(Scene::build(&loaded.case).map_err(|e| loaded.placed(e))?);
         if !quiet {
             loaded.warnings.iter().for_each(|w| remark(w));
             scene.notes.iter().for_each(|n| remark(&format!("note: {n}")));

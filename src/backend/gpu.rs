@@ -204,6 +204,11 @@ impl Gpu {
             }
             gpu.write_fields(&super::start(scene, plan))?;
             gpu.write_solids(scene)?;
+            if plan.needs(Arrays::Absorber) {
+                let zone = |z: &crate::params::Zone| layout::AbsorberZone::new(z, gpu.middle);
+                let zones: Vec<_> = params.absorbers.iter().map(zone).collect();
+                gpu.context.upload(buffers::absorber_zone, &zones)?;
+            }
         }
         Ok(gpu)
     }

@@ -105,6 +105,7 @@ impl Sizes {
         let update = fluid * 5 * vector; // position and velocity in and out, acceleration in
         let stages = [
             (Stage::Viscosity, pressure_pairs * 4 + rows * 2 * vector + fluid * vector),
+            (Stage::Absorber, fluid * 3 * vector),
             (Stage::Predict, update),
             (Stage::CellList, fluid * 2 * (2 * vector + number + 5) + cells * 8),
             (Stage::NeighbourList, rows * vector + pairs * 4),

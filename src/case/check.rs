@@ -16,6 +16,7 @@ pub fn check(case: &Case) -> Vec<Problem> {
     c.run();
     c.fluid();
     c.walls();
+    c.absorbers();
     c.names();
     for (k, body) in case.body.iter().enumerate() {
         c.body(k, body);
@@ -50,7 +51,7 @@ impl Checker<'_> {
     ) {
         self.problems.push(Problem::new(path, message, remedy));
     }
-    fn warn(&mut self, path: &str, message: String, remedy: &str) {
+    pub(super) fn warn(&mut self, path: &str, message: String, remedy: &str) {
         self.add(path, message, remedy);
         if let Some(last) = self.problems.last_mut() {
             last.warning = true;
@@ -184,11 +185,12 @@ impl Checker<'_> {
         }
         let jitter = fluid.jitter;
         self.range("fluid.jitter", jitter, (0.0..=0.3).contains(&jitter), "0 to 0.3 of the spacing");
-        if fluid.block.is_empty() {
+        self.water(&fluid.shape, &fluid.fill);
+        if fluid.block.is_empty() && fluid.shape.is_empty() && fluid.fill.is_empty() {
             self.add(
                 "fluid",
                 "no water at t = 0",
-                "add a [[fluid.block]], or leave [fluid] out for a dry scene",
+                "add a [[fluid.block]], [[fluid.shape]] or [[fluid.fill]], or leave [fluid] out for a dry scene",
             );
         }
         for (k, block) in fluid.block.iter().enumerate() {

@@ -9,22 +9,12 @@ const MOST_CELLS: f64 = 1e11;
 const FARTHEST: f64 = 1e9;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What a table of rows is at t = 0, on straight lines between them.
-fn at_start(rows: &[[f64; 4]]) -> Vector {
-    let after = rows.iter().position(|r| r[0] > 0.0).unwrap_or(rows.len());
-    [1, 2, 3].map(|axis| match (after.checked_sub(1).map(|k| rows[k]), rows.get(after)) {
-        (Some(a), Some(b)) => a[axis] - (b[axis] - a[axis]) * a[0] / (b[0] - a[0]),
-        (Some(a), None) => a[axis],
-        (None, first) => first.map_or(0.0, |r| r[axis]),
-    })
-}
-
 /// The keys of a wall beside those of its shape.
-struct WallKeys<'a> {
-    corners: [Option<Vector>; 2],
-    open: &'a [Face],
+pub(super) struct WallKeys<'a> {
+    pub corners: [Option<Vector>; 2],
+    pub open: &'a [Face],
     /// `center` and `position`.
-    places: [Option<Vector>; 2],
+    pub places: [Option<Vector>; 2],
 }
 
 impl Checker<'_> {
@@ -123,11 +113,7 @@ impl Checker<'_> {
                     "make it an [[obstacle]], or set shape = \"mesh\"",
                 );
             }
-            if !w.motion.is_empty() || w.rotation.is_empty() {
-                self.motion(&format!("{path}.motion"), &w.motion);
-            }
-            let (reach, middle) = w.reach_and_middle();
-            self.rotation(&path, &w.rotation, (w.pivot, middle), reach);
+            self.guided(&path, w);
         }
         for (k, plane) in case.plane.iter().enumerate() {
             self.plane(&format!("plane.{k}"), plane);
@@ -135,7 +121,7 @@ impl Checker<'_> {
     }
 
     /// A wall is a box with two corners, or any other shape at its place.
-    fn wall(&mut self, path: &str, label: &str, keys: &WallKeys, form: &Form) {
+    pub(super) fn wall(&mut self, path: &str, label: &str, keys: &WallKeys, form: &Form) {
         let key = |key: &str| format!("{path}.{key}");
         let [min, max] = keys.corners;
         if form.shape == BodyShape::Box && form.size.is_none() {
@@ -257,124 +243,6 @@ impl Checker<'_> {
                 let message =
                     format!("plane `{}` is {size:.4} m across, less than one particle of {l0} m", plane.name);
                 self.add(path, message, format!("use run.spacing = {} or less", round_down(size)));
-            }
-        }
-    }
-
-    /// A table of motion: at least one row, times increasing, at rest where the case puts it at t = 0, no jumps.
-    pub(super) fn motion(&mut self, path: &str, rows: &[[f64; 4]]) {
-        if rows.is_empty() {
-            self.add(
-                path,
-                "the table of motion has no rows",
-                "write rows of time, x, y, z, e.g. [[0, 0, 0, 0], [3, 0, 0, 0.33]]",
-            );
-        }
-        if !self.increases(path, rows) {
-            return;
-        }
-        if !rows.is_empty() && rows.iter().flatten().all(|x| x.is_finite()) {
-            rows.iter().enumerate().for_each(|(k, row)| self.place(&format!("{path}.{k}"), &row[1..]));
-            self.motion_start(path, rows);
-            let flat = self.flat();
-            let way = |a: &[f64; 4], b: &[f64; 4]| {
-                length(&[b[1] - a[1], if flat { 0.0 } else { b[2] - a[2] }, b[3] - a[3]])
-            };
-            self.jumps(path, rows, &way);
-        }
-    }
-
-    /// Times that increase from row to row.
-    fn increases(&mut self, path: &str, rows: &[[f64; 4]]) -> bool {
-        let wrong = rows.windows(2).position(|pair| pair[1][0] <= pair[0][0]);
-        if let Some(k) = wrong {
-            let message = format!("time {} does not come after {}", rows[k + 1][0], rows[k][0]);
-            self.add(format!("{path}.{}.0", k + 1), message, "times must increase from row to row");
-        }
-        wrong.is_none()
-    }
-
-    /// A table of angles of a solid at `path`: times increasing, no angle at t = 0, no jumps of a point `far` [m] from
-    /// the centre, about y alone in two dimensions.
-    pub(super) fn rotation(
-        &mut self,
-        path: &str,
-        rows: &[[f64; 4]],
-        (pivot, center): (Option<Vector>, Vector),
-        far: f64,
-    ) {
-        let rotation = format!("{path}.rotation");
-        if rows.is_empty() {
-            if pivot.is_some() {
-                let message = "nothing turns about it: there is no `rotation`";
-                self.add(format!("{path}.pivot"), message, "add `rotation` or remove `pivot`");
-            }
-            return;
-        }
-        if let Some(pivot) = &pivot {
-            self.place(&format!("{path}.pivot"), pivot);
-        }
-        if !self.increases(&rotation, rows) || !rows.iter().flatten().all(|x| x.is_finite()) {
-            return;
-        }
-        let across = |r: &[f64; 4]| r[1] != 0.0 || r[3] != 0.0;
-        if let Some(k) = rows.iter().position(across).filter(|_| self.flat()) {
-            let message = "in two dimensions a solid turns about y alone";
-            self.add(format!("{rotation}.{k}"), message, "set the angles about x and z to 0");
-        }
-        let start = at_start(rows);
-        if length(&start) > 1e-6 {
-            let message = format!(
-                "the table is at ({}, {}, {}) degrees at t = 0, so that the solid would turn there in the first step",
-                start[0], start[1], start[2]
-            );
-            let remedy = "angles count from the orientation given by the case: begin with [0, 0, 0, 0]";
-            self.add(format!("{rotation}.0"), message, remedy);
-        }
-        let arm = pivot.map_or(0.0, |p| length(&[0, 1, 2].map(|axis| p[axis] - center[axis])));
-        let reach = (arm + far).to_radians();
-        let way = |a: &[f64; 4], b: &[f64; 4]| reach * length(&[b[1] - a[1], b[2] - a[2], b[3] - a[3]]);
-        self.jumps(&rotation, rows, &way);
-    }
-
-    /// Displacements count from where the case puts the solid: at t = 0 there is none.
-    fn motion_start(&mut self, path: &str, rows: &[[f64; 4]]) {
-        let [x, y, z] = at_start(rows);
-        let start = [x, if self.flat() { 0.0 } else { y }, z];
-        let l0 = self.spacing().unwrap_or(0.0);
-        if length(&start) > 1e-6 * l0 {
-            let message = format!(
-                "the table is at ({}, {}, {}) m at t = 0, so that the solid would jump there in the first step",
-                start[0], start[1], start[2]
-            );
-            let remedy = "displacements count from the place given by the case: begin with [0, 0, 0, 0]";
-            self.add(format!("{path}.0"), message, remedy);
-        }
-    }
-
-    /// A solid that crosses whole particles within a step passes through the water instead of pushing it.
-    fn jumps(&mut self, path: &str, rows: &[[f64; 4]], way: &dyn Fn(&[f64; 4], &[f64; 4]) -> f64) {
-        let run = &self.case.run;
-        let Some(l0) = self.spacing().filter(|_| run.time_step > 0.0) else { return };
-        // An adaptive step follows a fast wall; nothing follows one that is there at once.
-        let adapts = run.adaptive && self.case.fluid.is_some();
-        let most = if adapts { 100.0 } else { 1.0 };
-        for (k, pair) in rows.windows(2).enumerate() {
-            let way = way(&pair[0], &pair[1]);
-            let speed = way / (pair[1][0] - pair[0][0]);
-            let spacings = speed * run.time_step / l0;
-            if way > l0 && spacings > most {
-                let message = format!(
-                    "{way} m in {:.3e} s is {speed:.3e} m/s, {spacings:.1} particles in a time step: the solid would \
-                     jump through what is in its way",
-                    pair[1][0] - pair[0][0]
-                );
-                let adaptive = if adapts { "" } else { ", or run.adaptive = true" };
-                let remedy = format!(
-                    "give the motion more time, or use run.time_step = {:.1e} or less{adaptive}",
-                    l0 / speed
-                );
-                self.add(format!("{path}.{}", k + 1), message, remedy);
             }
         }
     }

@@ -23,7 +23,40 @@ pub struct Loaded {
     pub path: PathBuf,
     /// Warnings, ready to print; the case runs all the same.
     pub warnings: Vec<String>,
+    /// Whether overrides were applied, so that lines are those of the text and not of the file.
+    overridden: bool,
 }
+
+impl Loaded {
+    /// An error about the case that knows no place, as the scene's do, with file and line of its keys.
+    pub fn placed(&self, error: Error) -> Error {
+        let Error::Case(found) = &error else { return error };
+        let Ok(table) = DeTable::parse(&self.text) else { return error };
+        let of = |p: &Problem| {
+            let span = span_of(&table, &p.key);
+            let known = p.file.is_none() && !span.is_empty();
+            known.then(|| Message {
+                span,
+                key: p.key.clone(),
+                title: p.message.clone(),
+                label: p.key.clone(),
+                remedy: Some(p.remedy.clone()).filter(|r| !r.is_empty()),
+                warning: false,
+            })
+        };
+        let Some(messages) = found.problems.iter().map(of).collect::<Option<Vec<_>>>() else { return error };
+        let name = self.path.display().to_string();
+        let mut report = render(&name, &self.text, &messages);
+        if self.overridden {
+            report.push_str(OVERRIDDEN);
+        }
+        let problems = messages.iter().map(|m| m.problem(&name, &self.text)).collect();
+        CaseError::new(problems, report).into()
+    }
+}
+
+/// Said where lines are not those of the file.
+const OVERRIDDEN: &str = "\n\nnote: lines are counted with --spacing and --set applied";
 
 /// Reads a case: `spacing` overrides `run.spacing` [m], `sets` are `key=value` pairs such as
 /// `body.0.density=780`.
@@ -84,6 +117,8 @@ pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String
     };
     files("obstacle", &mut case.obstacle.iter().map(|o| &o.file));
     files("moving_wall", &mut case.moving_wall.iter().map(|w| &w.file));
+    let water = case.fluid.iter().flat_map(|f| &f.shape);
+    files("fluid.shape", &mut water.map(|w| &w.file));
     files("body", &mut case.body.iter().map(|b| &b.file));
     let mut absolute = Vec::new();
     for (key, place) in places {
@@ -95,7 +130,7 @@ pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String
     if !absolute.is_empty() {
         (case, text, _) = parse(&name, text, &absolute)?;
     }
-    Ok(Loaded { case, text, path: path.to_owned(), warnings })
+    Ok(Loaded { case, text, path: path.to_owned(), warnings, overridden: !all.is_empty() })
 }
 
 /// Parses and checks the text of a case; `name` stands for the file in messages. Returns the case, the text
@@ -115,7 +150,7 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
     let wrong = |messages: &[Message]| {
         let mut report = render(name, &text, messages);
         if !sets.is_empty() {
-            report.push_str("\n\nnote: lines are counted with --spacing and --set applied");
+            report.push_str(OVERRIDDEN);
         }
         report
     };

@@ -2,9 +2,11 @@
 //!
 //! The structs here are the schema (`seixo schema` prints it). `file` reads and overrides, `check` judges what serde cannot.
 
+mod absorber;
 mod bounds;
 pub mod check;
 mod check_geometry;
+mod check_motion;
 mod check_solids;
 pub mod file;
 mod motion_file;
@@ -12,9 +14,14 @@ mod overrides;
 mod report;
 mod shape;
 mod surplus;
+mod water;
+mod wave;
 
+pub use absorber::Absorber;
 pub use shape::BodyShape;
 pub(crate) use shape::{Form, Place, Wall};
+pub use water::{Fill, WaterShape};
+pub use wave::{Sine, Swing, WaveMaker};
 
 use crate::scheme::{FreeSurface, Gradient, Source};
 use schemars::JsonSchema;
@@ -39,9 +46,12 @@ pub struct Case {
     /// Fixed flat walls at any angle.
     #[serde(default)]
     pub plane: Vec<Plane>,
-    /// Walls that follow a table of motion.
+    /// Walls that follow a table or a formula of motion.
     #[serde(default)]
     pub moving_wall: Vec<MovingWall>,
+    /// Boxes in which the water comes to rest, for waves that must not come back.
+    #[serde(default)]
+    pub absorber: Vec<Absorber>,
     /// Rigid bodies.
     #[serde(default)]
     pub body: Vec<Body>,
@@ -196,6 +206,12 @@ pub struct Fluid {
     /// Blocks of water at t = 0.
     #[serde(default)]
     pub block: Vec<Block>,
+    /// Water of other shapes at t = 0.
+    #[serde(default)]
+    pub shape: Vec<WaterShape>,
+    /// Water that fills what a seed can reach, up to a level, at t = 0.
+    #[serde(default)]
+    pub fill: Vec<Fill>,
     /// Largest displacement of a water particle from its lattice at t = 0, along each axis, over the spacing [-];
     /// 0 for none. For ensembles: starts with different `seed` differ in nothing else.
     #[serde(default)]
@@ -365,7 +381,7 @@ pub struct Plane {
     pub along: Vector,
 }
 
-/// A solid that follows a table of motion, e.g. a gate: a box, or any other shape.
+/// A solid that follows a table or a formula of motion, e.g. a gate or a piston: a box, or any other shape.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MovingWall {
@@ -407,14 +423,21 @@ pub struct MovingWall {
     /// Turn about `center` or `position`.
     pub orientation: Option<Turn>,
     /// Rows of time [s] and displacement x, y, z [m]. Two rows: a constant velocity; more: a smooth curve through them
-    /// with a continuous velocity. At rest before the first and after the last. May be left out if there is `rotation`.
+    /// with a continuous velocity. At rest before the first and after the last. May be left out if something else moves it.
     #[serde(default)]
     pub motion: Vec<[f64; 4]>,
+    /// A sine along an axis, instead of `motion`.
+    pub sine: Option<Sine>,
+    /// A wave that the wall makes as a piston, instead of `motion`.
+    pub wave: Option<WaveMaker>,
     /// Rows of time [s] and angles [degrees] about the axes x, y and z of the world, turned in this order; smooth as
     /// `motion` is, with rows of its own. In two dimensions only the angle about y.
     #[serde(default)]
     pub rotation: Vec<[f64; 4]>,
-    /// What `rotation` turns about, at t = 0 [m]; it moves with `motion`. The centroid of the wall if absent.
+    /// A turn by a sine, instead of `rotation`.
+    pub swing: Option<Swing>,
+    /// What `rotation` or `swing` turns about, at t = 0 [m]; it moves with `motion`, `sine` or `wave`. The centroid of the
+    /// wall if absent.
     pub pivot: Option<Vector>,
 }
 

@@ -81,7 +81,7 @@ pub(crate) struct Form<'a> {
     pub axis: Option<Vector>,
     pub orientation: Option<&'a Turn>,
     /// Length of what comes from a file without a `scale` from which it is asked about [m].
-    large: f64,
+    pub(super) large: f64,
 }
 
 /// Where a wall of any shape stands.
@@ -102,13 +102,18 @@ pub(crate) enum Wall<'a> {
     Shaped(Form<'a>, Place),
 }
 
+/// Length of what comes from a file without a `scale` from which it is asked about [m].
+pub(super) fn large(tank: Option<&Tank>) -> f64 {
+    let edge = |t: &Tank| (0..3).map(|k| t.max[k] - t.min[k]).fold(0.0, f64::max);
+    LARGE.max(LARGE_IN_TANK * tank.map_or(0.0, edge))
+}
+
 /// An obstacle or a moving wall by the keys that make its shape.
 macro_rules! wall {
     ($kind:ty) => {
         impl $kind {
             /// The keys that make its shape; `tank` tells what is large.
             pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
-                let edge = |t: &Tank| (0..3).map(|k| t.max[k] - t.min[k]).fold(0.0, f64::max);
                 Form {
                     shape: self.shape,
                     size: self.size,
@@ -118,7 +123,7 @@ macro_rules! wall {
                     scale: self.scale,
                     axis: self.axis,
                     orientation: self.orientation.as_ref(),
-                    large: LARGE.max(LARGE_IN_TANK * tank.map_or(0.0, edge)),
+                    large: large(tank),
                 }
             }
 

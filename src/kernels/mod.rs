@@ -2,6 +2,7 @@
 //! plain function in f64 that says what the shader must do. [`crate::backend::cpu`] has faster versions of some,
 //! which are tested against the twins, and runs them over all particles; device results are measured against it.
 
+pub mod absorber;
 pub mod body_force;
 pub mod cell_list;
 pub mod collision;
@@ -79,6 +80,7 @@ pub mod device {
 
     // File [threads of a workgroup], what needs it, what the threads run over: its kernels.
     files! {
+        absorber[super::WORKGROUP] Stage(Absorber), Fluid: absorber;
         body_force[super::WORKGROUP] Stage(BodyForce), Own: body_force;
         cell_list[super::WORKGROUP] Stage(CellList), Own: count scan_blocks scan_sums scan_add scatter place;
         collision[super::WORKGROUP] Stage(Collision), FluidAndReaction: collision;
@@ -87,7 +89,7 @@ pub mod device {
         correct[super::WORKGROUP] Stage(Correct), Fluid: correct;
         coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare respond;
         ledger[super::WORKGROUP] Arrays(Ledger), Own:
-            predict_work lost_work friction_work collision_work pressure_work shift_work as_solved as_clipped;
+            absorber_work predict_work lost_work friction_work collision_work pressure_work shift_work as_solved as_clipped;
         monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
         move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids;
         multigrid[super::WORKGROUP] Arrays(Multigrid), Own:

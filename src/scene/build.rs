@@ -65,7 +65,13 @@ impl<'a> Builder<'a> {
     fn new(case: &'a Case) -> Result<Self> {
         let run = &case.run;
         let blocks = case.fluid.as_ref().map_or(&[][..], |f| &f.block);
+        let shapes = shaped::of_water(case)
+            .into_iter()
+            .flatten()
+            .map(|s| ((s.center - s.bounds()).to_array(), (s.center + s.bounds()).to_array()));
+        let shapes: Vec<_> = shapes.collect();
         let anchor = case.tank.as_ref().map(|t| t.min).or_else(|| blocks.first().map(|b| b.min));
+        let anchor = anchor.or_else(|| shapes.first().map(|s| s.0));
         let lattice = Lattice::new(anchor.unwrap_or_default().into(), run.spacing, run.dimensions);
         let layers = run.effective_radius.ceil() as i32;
         let tank = case.tank.as_ref().map(|t| lattice.tank_cells(t.min.into(), t.max.into()));
@@ -74,6 +80,7 @@ impl<'a> Builder<'a> {
         let boxes = case.obstacle.iter().filter_map(|o| o.corners());
         let boxes = boxes.chain(case.moving_wall.iter().filter_map(|w| w.corners()));
         let boxes = boxes.chain(blocks.iter().map(|b| (b.min, b.max)));
+        let boxes = boxes.chain(shapes);
         // A vessel of any shape holds water without a tank.
         let boxes = boxes.chain(if case.tank.is_none() { shaped::boxes(case) } else { vec![] });
         let all = boxes.map(|(min, max)| lattice.cells(min.into(), max.into())).chain(outer);
@@ -129,7 +136,7 @@ impl<'a> Builder<'a> {
         }
         for wall in &case.moving_wall {
             let Some(corners) = wall.corners() else { continue };
-            let (solid, taken) = walls::moving_wall(wall, corners, &lattice, &mut self.grid, layers);
+            let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             let label = format!("moving wall `{}`", wall.name);
             self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
@@ -176,6 +183,35 @@ impl<'a> Builder<'a> {
                 self.problems.push(Problem::new(key, message, remedy));
             }
             self.rounded(&format!("fluid.block.{k}"), block.min.into(), block.max.into());
+        }
+        for (k, (shape, water)) in shaped::of_water(self.case).into_iter().zip(&fluid.shape).enumerate() {
+            let key = format!("fluid.shape.{k}");
+            let placed = match shape {
+                Ok(placed) => placed,
+                Err(problem) => {
+                    self.problems.push(Problem { key: format!("{key}.{}", problem.key), ..*problem });
+                    continue;
+                }
+            };
+            let mut velocity: DVec3 = water.velocity.into();
+            if self.lattice.plane {
+                velocity.y = 0.0;
+            }
+            if self.water.shape(&placed, velocity, &self.lattice, &mut self.grid) == 0 {
+                let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
+                let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
+                self.problems.push(Problem::new(key, message, remedy));
+            }
+        }
+        for (k, fill) in fluid.fill.iter().enumerate() {
+            match self.water.flood(fill, &self.lattice, &mut self.grid, self.tank) {
+                Ok(count) => self.notes.push(format!("fluid.fill.{k}: {count} particles of water")),
+                Err(problem) => {
+                    let key = format!("fluid.fill.{k}.{}", problem.key);
+                    let message = format!("fluid.fill.{k}: {}", problem.message);
+                    self.problems.push(Problem { key, message, ..*problem });
+                }
+            }
         }
         self.depth = self.water.depth(self.gravity(), &self.lattice);
     }

@@ -29,6 +29,25 @@ impl Curve {
         &self.time
     }
 
+    /// Corners of a box that holds all of it.
+    pub fn corners(&self) -> Vec<DVec3> {
+        let mut corners = (DVec3::MAX, DVec3::MIN);
+        for (k, &value) in self.value.iter().enumerate() {
+            // A cubic stays this close to the ends of its interval.
+            let before = k.checked_sub(1).map_or(0.0, |j| self.time[k] - self.time[j]);
+            let after = self.time.get(k + 1).map_or(0.0, |next| next - self.time[k]);
+            let room =
+                if self.time.len() > 2 { self.slope[k].abs() * before.max(after) / 3.0 } else { DVec3::ZERO };
+            corners = (corners.0.min(value - room), corners.1.max(value + room));
+        }
+        let of = |k: u32| {
+            DVec3::from_array(
+                [0, 1, 2].map(|axis| if k & (1 << axis) == 0 { corners.0[axis] } else { corners.1[axis] }),
+            )
+        };
+        (0..8).map(of).collect()
+    }
+
     /// Whether it never changes.
     pub fn is_constant(&self) -> bool {
         self.value.windows(2).all(|w| w[0] == w[1])

@@ -28,9 +28,9 @@ impl Builder<'_> {
             let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
             bounds.add(&label, lo, hi);
             if let Drive::Prescribed(motion) = &solid.drive {
-                for t in motion.samples() {
-                    let center = shape.center + motion.displacement(t);
-                    let axes = DMat3::from_quat(motion.turn(t)) * shape.axes;
+                for (way, turn) in motion.poses() {
+                    let center = shape.center + way;
+                    let axes = DMat3::from_quat(turn) * shape.axes;
                     let reach = Placed { center, axes, ..shape }.bounds();
                     bounds.add(&label, center - reach, center + reach);
                 }

@@ -1,15 +1,8 @@
 //! Water particles off their lattice at t = 0: starts that differ in nothing but chance, for means and spreads of
 //! flows that are chaotic.
 
+use crate::chance::mixed;
 use glam::{DVec3, IVec3};
-
-/// A step of SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every machine.
-fn mixed(x: u64) -> u64 {
-    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
 
 /// Displacement of the particle of cell `c`: each coordinate uniform in -`most`..`most`. It depends on the cell and
 /// the seed alone, not on how many particles there are.

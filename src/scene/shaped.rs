@@ -4,19 +4,22 @@ use super::build::Builder;
 use super::lattice::{BLOCKED, Cells, FREE};
 use super::oriented::Placed;
 use super::placement::point;
-use super::walls::{closed, motion, near_solid};
+use super::walls::{closed, near_solid, wall_motion};
 use super::water::margin;
-use super::{Drive, Shape, Solid};
-use crate::case::{Case, Form, Place, Vector, Wall};
+use super::{Drive, Motion, Shape, Solid};
+use crate::case::{Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
 use glam::{DMat3, DVec3, IVec3};
 use rayon::prelude::*;
 
-/// Rows of a case's tables of motion and of angles, and what is turned about.
-type Tables<'a> = (&'a [[f64; 4]], &'a [[f64; 4]], Option<Vector>);
-
-/// A wall without particles, where it stands.
-fn wall(name: &str, form: &Form, place: Place, tables: Tables, case: &Case) -> Result<Solid, Box<Problem>> {
+/// A wall without particles, where it stands; `moved` if it moves.
+fn wall(
+    name: &str,
+    form: &Form,
+    place: Place,
+    moved: Option<&MovingWall>,
+    case: &Case,
+) -> Result<Solid, Box<Problem>> {
     let plane = case.run.dimensions == 2;
     let (shape, _) = form.shape(case.run.spacing, plane)?;
     let turn = form.turn(plane);
@@ -33,7 +36,7 @@ fn wall(name: &str, form: &Form, place: Place, tables: Tables, case: &Case) -> R
         shape,
         position,
         orientation: turn * shape.frame(),
-        drive: Drive::Prescribed(motion(tables, position, plane)),
+        drive: Drive::Prescribed(moved.map_or_else(Motion::still, |w| wall_motion(w, case, position))),
         wall_slots: 0..0,
         dummy_slots: 0..0,
         wall_offset: vec![],
@@ -46,17 +49,19 @@ fn wall(name: &str, form: &Form, place: Place, tables: Tables, case: &Case) -> R
 /// All walls of a case that are no boxes of the lattice: key of the table, whether it is fixed, and the wall.
 fn walls(case: &Case) -> Vec<(String, bool, Result<Solid, Box<Problem>>)> {
     let tank = case.tank.as_ref();
-    let obstacles = case.obstacle.iter().enumerate().map(|(k, o)| {
-        let tables: Tables = (&[], &[], None);
-        (format!("obstacle.{k}"), true, o.name.as_str(), o.wall(tank), tables)
-    });
-    let moving = case.moving_wall.iter().enumerate().map(|(k, w)| {
-        let tables: Tables = (&w.motion, &w.rotation, w.pivot);
-        (format!("moving_wall.{k}"), false, w.name.as_str(), w.wall(tank), tables)
-    });
-    let shaped = obstacles.chain(moving).filter_map(|(key, fixed, name, keys, tables)| match keys {
+    let obstacles = case
+        .obstacle
+        .iter()
+        .enumerate()
+        .map(|(k, o)| (format!("obstacle.{k}"), None, o.name.as_str(), o.wall(tank)));
+    let moving = case
+        .moving_wall
+        .iter()
+        .enumerate()
+        .map(|(k, w)| (format!("moving_wall.{k}"), Some(w), w.name.as_str(), w.wall(tank)));
+    let shaped = obstacles.chain(moving).filter_map(|(key, moved, name, keys)| match keys {
         Wall::Lattice(..) => None,
-        Wall::Shaped(form, place) => Some((key, fixed, wall(name, &form, place, tables, case))),
+        Wall::Shaped(form, place) => Some((key, moved.is_none(), wall(name, &form, place, moved, case))),
     });
     shaped.collect()
 }
@@ -69,6 +74,13 @@ pub(super) fn boxes(case: &Case) -> Vec<(Vector, Vector)> {
         ((shape.center - half).to_array(), (shape.center + half).to_array())
     };
     walls(case).into_iter().filter_map(|(_, _, solid)| solid.ok().map(around)).collect()
+}
+
+/// The shapes of a case's water, where they are, or what is wrong with them.
+pub(super) fn of_water(case: &Case) -> Vec<Result<Placed, Box<Problem>>> {
+    let shapes = case.fluid.iter().flat_map(|f| &f.shape);
+    let tank = case.tank.as_ref();
+    shapes.map(|w| Ok(wall("water", &w.form(tank), w.place(), None, case)?.placed())).collect()
 }
 
 impl Builder<'_> {

@@ -218,6 +218,7 @@ fn shell(cells: Cells, closed: [[bool; 2]; 3], grid: &mut Grid, layers: i32) -> 
 pub(super) fn moving_wall(
     wall: &case::MovingWall,
     (min, max): (case::Vector, case::Vector),
+    case: &case::Case,
     lattice: &Lattice,
     grid: &mut Grid,
     layers: i32,
@@ -232,7 +233,7 @@ pub(super) fn moving_wall(
         shape: Shape::cuboid(hi - lo),
         position,
         orientation: DQuat::IDENTITY,
-        drive: Drive::Prescribed(motion((&wall.motion, &wall.rotation, wall.pivot), position, lattice.plane)),
+        drive: Drive::Prescribed(wall_motion(wall, case, position)),
         wall_slots: 0..0,
         dummy_slots: 0..0,
         wall_offset: Vec::new(),
@@ -254,27 +255,54 @@ pub(super) fn moving_wall(
     (solid, taken)
 }
 
+/// The motion of a wall whose centre is `center` at the start.
+pub(super) fn wall_motion(wall: &case::MovingWall, case: &case::Case, center: DVec3) -> Motion {
+    let plane = case.run.dimensions == 2;
+    let flat = |v: case::Vector| DVec3::new(v[0], if plane { 0.0 } else { v[1] }, v[2]);
+    let tables = motion((&wall.motion, &wall.rotation, wall.pivot), center, plane);
+    let made = wall.wave(case).zip(wall.wave.as_ref());
+    let mut moved = match (&wall.sine, made) {
+        (Some(sine), _) => Motion::along(flat(sine.axis), sine.formula()),
+        (None, Some((wave, keys))) => Motion::making(wave, flat(keys.direction())),
+        (None, None) => tables,
+    };
+    let arm = flat((center - wall.pivot.map_or(center, DVec3::from)).to_array());
+    // The tables know of their turn already.
+    let by_formula = wall.sine.is_some() || wall.wave.is_some();
+    if let Some(angles) = angles(&wall.rotation).filter(|_| by_formula) {
+        moved = moved.turned(angles, arm);
+    }
+    match &wall.swing {
+        Some(swing) => moved.swinging(swing.axis.into(), swing.formula(), arm),
+        None => moved,
+    }
+}
+
+/// Angles [rad] by rows of them [degrees].
+fn angles(rows: &[[f64; 4]]) -> Option<Curve> {
+    let angle = |r: &[f64; 4]| DVec3::new(r[1], r[2], r[3]) * (std::f64::consts::PI / 180.0);
+    (!rows.is_empty())
+        .then(|| Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(angle).collect()))
+}
+
 /// The motion of a solid whose centre is `center` at the start, from a case's rows of displacement and of angles and the
 /// place that it turns about.
 pub(super) fn motion(
-    (rows, angles, pivot): (&[[f64; 4]], &[[f64; 4]], Option<case::Vector>),
+    (rows, turns, pivot): (&[[f64; 4]], &[[f64; 4]], Option<case::Vector>),
     center: DVec3,
     plane: bool,
 ) -> Motion {
-    let curve = |rows: &[[f64; 4]], of: &dyn Fn(&[f64; 4]) -> DVec3| {
-        Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(of).collect())
-    };
     let still = [[0.0; 4]];
     let rows = if rows.is_empty() { &still } else { rows };
-    let motion = Motion::shift(curve(rows, &|r| DVec3::new(r[1], if plane { 0.0 } else { r[2] }, r[3])));
-    if angles.is_empty() {
-        return motion;
-    }
+    let place = |r: &[f64; 4]| DVec3::new(r[1], if plane { 0.0 } else { r[2] }, r[3]);
+    let curve = Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(place).collect());
+    let motion = Motion::shift(curve);
+    let Some(turns) = angles(turns) else { return motion };
     let mut arm = center - pivot.map_or(center, DVec3::from);
     if plane {
         arm.y = 0.0;
     }
-    motion.turned(curve(angles, &|r| DVec3::new(r[1], r[2], r[3]) * (std::f64::consts::PI / 180.0)), arm)
+    motion.turned(turns, arm)
 }
 
 /// Frame and size in particles of a plane.

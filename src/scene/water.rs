@@ -7,6 +7,7 @@ use super::walls::face_name;
 use crate::case;
 use crate::error::Problem;
 use glam::{DVec3, IVec3};
+use rayon::prelude::*;
 
 /// The cells that hold water, with the velocity at t = 0.
 #[derive(Default, Debug)]
@@ -31,6 +32,106 @@ impl Water {
             }
         }
         self.cell.len() - before
+    }
+
+    /// Fills the free cells whose centres lie in a shape; returns how many.
+    pub fn shape(&mut self, shape: &Placed, velocity: DVec3, lattice: &Lattice, grid: &mut Grid) -> usize {
+        let before = self.cell.len();
+        let reach = shape.bounds();
+        let range = lattice.cells(shape.center - reach, shape.center + reach);
+        let free: Vec<IVec3> = range.iter().filter(|&c| grid.get(c) == FREE).collect();
+        let slack = -1e-6 * lattice.spacing;
+        let held: Vec<IVec3> =
+            free.into_par_iter().filter(|&c| shape.holds(lattice.center(c), slack)).collect();
+        for c in held {
+            grid.set(c, FLUID);
+            self.cell.push(c);
+            self.velocity.push(velocity);
+        }
+        self.cell.len() - before
+    }
+
+    /// Fills the free cells below a level that can be reached from a seed; returns how many.
+    ///
+    /// # Errors
+    /// A seed that is not free, or a way out of everything there is; the key is that of the fill's table.
+    pub fn flood(
+        &mut self,
+        fill: &case::Fill,
+        lattice: &Lattice,
+        grid: &mut Grid,
+        tank: Option<Cells>,
+    ) -> Result<usize, Box<Problem>> {
+        let before = self.cell.len();
+        let (seed, l0) = (DVec3::from(fill.seed), lattice.spacing);
+        let mut velocity: DVec3 = fill.velocity.into();
+        let mut start = lattice.cell(seed);
+        if lattice.plane {
+            (start.y, velocity.y) = (0, 0.0);
+        }
+        let wrong = |message: String, remedy: &str| Err(Box::new(Problem::new("seed", message, remedy)));
+        if !grid.cells.contains(start) {
+            let message = format!("the seed at {} lies outside of tank and obstacles", point(seed));
+            return wrong(message, "put it where the water is to be");
+        }
+        match grid.get(start) {
+            FREE => {}
+            FLUID => {
+                let message = format!("there is water at the seed, {}, already", point(seed));
+                return wrong(message, "put it into a basin that is still empty, or remove the other water");
+            }
+            _ => {
+                let message = format!("the seed at {} lies in a wall", point(seed));
+                return wrong(message, "put it where the water is to be");
+            }
+        }
+        let within = |c: IVec3| lattice.center(c).z <= fill.level + 1e-6 * l0;
+        if !within(start) {
+            let message = format!("the level lies less than half a particle of {l0} m above the seed");
+            return wrong(message, "put the seed deeper, or use a smaller run.spacing");
+        }
+        // Where each cell was reached from, to tell the way of a leak.
+        let mut queue: Vec<(IVec3, usize)> = vec![(start, usize::MAX)];
+        let mut next = 0;
+        grid.set(start, REACHED);
+        while next < queue.len() {
+            let (c, _) = queue[next];
+            for way in 0..6 {
+                if lattice.plane && way / 2 == 1 {
+                    continue;
+                }
+                let mut to = c;
+                to[way / 2] += 2 * (way as i32 % 2) - 1;
+                if !within(to) {
+                    continue;
+                }
+                if !grid.cells.contains(to) {
+                    queue.iter().for_each(|&(c, _)| grid.set(c, FREE));
+                    let out = leaves(&queue, next, tank);
+                    let message = format!(
+                        "water filled from {} up to z = {} leaks out at {}",
+                        point(seed),
+                        fill.level,
+                        point(lattice.center(out))
+                    );
+                    let key = "level";
+                    let remedy =
+                        "lower the level, or close the gap there with a wall of two particles or more";
+                    return Err(Box::new(Problem::new(key, message, remedy)));
+                }
+                if grid.get(to) == FREE {
+                    grid.set(to, REACHED);
+                    queue.push((to, next));
+                }
+            }
+            next += 1;
+        }
+        for (c, _) in queue {
+            grid.set(c, FLUID);
+            self.cell.push(c);
+            self.velocity.push(velocity);
+        }
+        Ok(self.cell.len() - before)
     }
 
     /// Number of particles whose centres lie inside a shape or on its faces.
@@ -119,6 +220,19 @@ impl Water {
         }
         None
     }
+}
+
+/// Where the way to the end of a leak first leaves the tank, or where it ends.
+fn leaves(queue: &[(IVec3, usize)], end: usize, tank: Option<Cells>) -> IVec3 {
+    let mut path = vec![queue[end].0];
+    let mut at = end;
+    while queue[at].1 != usize::MAX {
+        at = queue[at].1;
+        path.push(queue[at].0);
+    }
+    let outside = |c: &&IVec3| tank.is_some_and(|tank| !tank.contains(**c));
+    // It runs from its end back to the seed.
+    path.iter().rev().find(outside).copied().unwrap_or(queue[end].0)
 }
 
 /// How far inside a shape water may stand [m]. The lattice of a round body's layers is never the water's: as

@@ -21,6 +21,29 @@ max = [2, 2, 1]
 min = [0, 0, 0]
 max = [1, 1, 0.3]
 
+[[fluid.shape]]
+size = [0.2, 0.2, 0.2]
+center = [1.5, 0.5, 0.5]
+
+[[fluid.shape]]
+shape = "cylinder"
+radius = 0.2
+height = 0.3
+center = [1.5, 1.5, 0.5]
+
+[[fluid.shape]]
+shape = "mesh"
+file = "pool.stl"
+
+[[fluid.fill]]
+seed = [0.5, 0.5, 0.1]
+level = 0.3
+
+[[absorber]]
+min = [0, 0, 0]
+max = [1, 1, 1]
+towards = "x_min"
+
 [[plane]]
 name = "plane"
 center = [1, 1, 0.9]
@@ -49,7 +72,7 @@ file = "hull.stl"
 name = "moving wall box"
 size = [0.2, 0.2, 0.2]
 center = [1.5, 0.5, 0.5]
-motion = [[0, 0, 0, 0]]
+wave = { kind = "jonswap", height = 0.02, period = 1, depth = 0.3 }
 
 [[moving_wall]]
 name = "moving wall drum"
@@ -57,7 +80,8 @@ shape = "cylinder"
 radius = 0.2
 height = 0.3
 center = [1.5, 1.5, 0.5]
-motion = [[0, 0, 0, 0]]
+sine = { axis = [1, 0, 0], amplitude = 0.01, period = 1 }
+swing = { axis = [1, 0, 0], amplitude_deg = 1, period = 1 }
 
 [[moving_wall]]
 name = "moving wall hull"

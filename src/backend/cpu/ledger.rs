@@ -42,6 +42,18 @@ impl WaterLedger {
         self.add([Entry::Gravity, Entry::Viscosity, Entry::Clamps], on.params, sums(live, of));
     }
 
+    /// Books `absorber`, which is about to slow particle i down to `slowed(i)`.
+    pub fn absorber(
+        &mut self,
+        live: usize,
+        params: &Params,
+        velocity: &[DVec3],
+        slowed: impl Fn(usize) -> DVec3 + Sync,
+    ) {
+        let of = |i: usize| [0.5 * (slowed(i).length_squared() - velocity[i].length_squared())];
+        self.add([Entry::Absorber], params, sums(live, of));
+    }
+
     /// Books `shift`, which is about to move particle i by `way(i)`.
     pub fn shift(&mut self, live: usize, params: &Params, way: impl Fn(usize) -> DVec3 + Sync) {
         self.add([Entry::Shift], params, sums(live, |i| [-params.gravity.dot(way(i))]));

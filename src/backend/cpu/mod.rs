@@ -28,8 +28,8 @@ use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
-    Particles, body_force, collision, correct, monitor, move_solids, predict, shift, surface_pressure,
-    wall_friction,
+    Particles, absorber, body_force, collision, correct, monitor, move_solids, predict, shift,
+    surface_pressure, wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -161,6 +161,18 @@ impl Cpu {
             *f = viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays);
         };
         fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::default, reaction);
+    }
+
+    fn absorber(&mut self, dt: f64) {
+        let (zones, n) = (&self.params.absorbers, self.live);
+        let Fields { position, velocity, .. } = &mut self.fields;
+        if let Some(ledger) = &mut self.ledger {
+            let slowed = |i: usize| absorber::absorber(position[i], velocity[i], zones, dt);
+            ledger.absorber(n, &self.params, velocity, slowed);
+        }
+        (&position[..n], &mut velocity[..n])
+            .into_par_iter()
+            .for_each(|(&x, v)| *v = absorber::absorber(x, *v, zones, dt));
     }
 
     fn predict(&mut self, dt: f64) {
@@ -425,6 +437,7 @@ impl Backend for Cpu {
     fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
         self.dt = step.dt;
         match stage {
+            ParticleStage::Absorber => self.absorber(step.dt),
             ParticleStage::Viscosity => self.viscosity(),
             ParticleStage::Predict => self.predict(step.dt),
             ParticleStage::CellList => self.cell_list(),

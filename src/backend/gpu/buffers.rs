@@ -3,14 +3,24 @@
 
 use super::hierarchy::{Hierarchy, Levels};
 use super::layout::{
-    Coefficients, Constants, FreeBody, LEDGER_WIDTH, MonitorSum, Pose, SCAN_BLOCK, Sizes, Solve,
-    WallParticle, counter,
+    AbsorberZone, Coefficients, Constants, FreeBody, LEDGER_WIDTH, MonitorSum, Pose, SCAN_BLOCK, Sizes,
+    Solve, WallParticle, counter,
 };
 use crate::compute::{Buffer, Host, Spec, shader_structs};
 use crate::monitor::SPEED_BINS;
 use crate::plan::Arrays;
 
-shader_structs!(Constants, Coefficients, FreeBody, Hierarchy, MonitorSum, Pose, Solve, WallParticle);
+shader_structs!(
+    AbsorberZone,
+    Constants,
+    Coefficients,
+    FreeBody,
+    Hierarchy,
+    MonitorSum,
+    Pose,
+    Solve,
+    WallParticle
+);
 
 /// A line of the table.
 pub struct Row {
@@ -108,6 +118,7 @@ table! {
         free_body: FreeBody, Writes, Coupling, |s, _| s.solids;
         /// Rows of the moving-wall slots, then what each body answers.
         coupling: [f32; 4], None, Coupling, |s, _| 2 * (s.moving_wall + s.solids);
+        absorber_zone: AbsorberZone, Writes, Absorber, |s, _| s.absorbers;
         monitor_sum: MonitorSum, Reads, Fluid, |s, _| s.monitor_groups();
         speed_bin: u32, Both, Fluid, |_, _| SPEED_BINS as u64;
     }

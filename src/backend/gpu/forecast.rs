@@ -155,6 +155,7 @@ mod tests {
             cells: 500_000,
             grid: [225, 36, 62],
             solids: 2,
+            absorbers: 1,
             capacity: 64,
             rows_per_thread: 1,
         }

@@ -8,7 +8,7 @@ pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
 use crate::kernels::body_force::missing_head;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
-use crate::params::{Params, Step};
+use crate::params::{Params, Step, Zone};
 use crate::plan::Plan;
 use crate::pressure::Settings;
 use crate::scene::{Groups, Scene};
@@ -136,6 +136,30 @@ pub struct WallParticle {
     pub to_surface: [f32; 4],
 }
 
+/// A box in which the water comes to rest; see `AbsorberZone` in shaders/absorber.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct AbsorberZone {
+    pub low: [f32; 4],
+    pub high: [f32; 4],
+    pub start: [f32; 4],
+    pub ramp: [f32; 4],
+}
+
+impl AbsorberZone {
+    /// `zone` with its places relative to the `middle` of the domain.
+    pub fn new(zone: &Zone, middle: DVec3) -> Self {
+        let place = |x: DVec3| (x - middle).as_vec3().extend(0.0).to_array();
+        Self {
+            low: place(zone.low),
+            high: place(zone.high),
+            start: place(zone.start),
+            ramp: zone.ramp.as_vec3().extend(zone.rate as f32).to_array(),
+        }
+    }
+}
+
 /// A free body in the pressure equation; see `FreeBody` in shaders/coupling.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -154,7 +178,7 @@ pub struct FreeBody {
 }
 
 /// Sums of one workgroup in the ledger: the first entries of [`crate::ledger::Entry`], then the number of lost particles.
-pub const LEDGER_WIDTH: u64 = 10;
+pub const LEDGER_WIDTH: u64 = 11;
 
 /// Sums of one workgroup of the monitor; see `MonitorSum` in shaders/monitor.wgsl.
 #[repr(C)]
@@ -263,6 +287,8 @@ pub struct Sizes {
     pub grid: [u32; 3],
     /// Moving solids.
     pub solids: u64,
+    /// Boxes in which the water comes to rest.
+    pub absorbers: u64,
     /// Neighbours of a row at most.
     pub capacity: u64,
     /// Rows of the PPE that a thread takes at least. One fills a GPU best; software pays for every workgroup and
@@ -284,6 +310,7 @@ impl Sizes {
             cells: grid.total() as u64,
             grid: grid.count,
             solids: scene.solids.len() as u64,
+            absorbers: params.absorbers.len() as u64,
             capacity: capacity(params.neighbours) as u64,
             rows_per_thread: 1,
         }
@@ -420,6 +447,7 @@ mod tests {
             cells: 500_000 * k,
             grid: [250, 20 * k as u32, 100],
             solids: 2,
+            absorbers: 1,
             capacity: 64,
             rows_per_thread: 1,
         };

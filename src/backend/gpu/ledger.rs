@@ -19,6 +19,7 @@ impl Gpu {
             return Ok(());
         }
         let kernel = match stage {
+            ParticleStage::Absorber => kernel::absorber_work,
             ParticleStage::Predict => kernel::predict_work,
             ParticleStage::CellList => kernel::lost_work,
             ParticleStage::Correct => kernel::pressure_work,

@@ -9,7 +9,8 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 11] = [
+pub const SWITCHES: [&str; 12] = [
+    "ABSORBER",
     "CONSISTENT",
     "COUPLED",
     "MIXED",
@@ -26,6 +27,7 @@ pub const SWITCHES: [&str; 11] = [
 /// The switches that are on for a scene.
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
+        plan.needs(Arrays::Absorber),
         params.gradient != Gradient::Minimum,
         plan.needs(Arrays::Coupling),
         params.source == Source::Mixed,

@@ -13,7 +13,7 @@
 //! peers = [{ name = "MPS of the paper's group, l0 = 15 mm", value = 18505 }]
 //! ```
 
-use super::reduce::{Curve, Take, cut, distance, reduce, since_moved, smooth};
+use super::reduce::{Curve, Take, cut, distance, lag, reduce, since_moved, smooth};
 use crate::definition::Files;
 use crate::row::{Class, Measured};
 use seixo::error::{Error, Result};
@@ -33,6 +33,8 @@ pub struct Check {
     /// What is taken from the curve.
     #[serde(default)]
     pub take: Take,
+    /// The curve that comes first, of `lag`.
+    pub behind: Option<String>,
     /// Only for points with these values on these axes.
     #[serde(default)]
     pub only: BTreeMap<String, String>,
@@ -158,6 +160,12 @@ impl Check {
         if self.reference.is_some() == self.against.is_some() {
             return wrong("give `reference` or `against`, one of them");
         }
+        if (self.take == Take::Lag) != self.behind.is_some() {
+            return wrong("`take = \"lag\"` and `behind` go together: the curve that comes first");
+        }
+        if self.take == Take::Lag && self.reference.is_none() {
+            return wrong("a lag needs a `reference`");
+        }
         if self.value.is_some() && self.against.is_some() {
             return wrong("`against` needs a `curve`");
         }
@@ -240,6 +248,11 @@ impl Check {
             return self.of_numbers(measured.value(value)?, self.reference?);
         }
         let (curve, origin) = self.prepared(measured)?;
+        if let Some(first) = &self.behind {
+            let first = smooth(measured.curves.get(first)?, self.smooth);
+            let late = lag(&cut(&curve, self.window), &cut(&first, self.window))?;
+            return self.of_numbers(late, self.reference?);
+        }
         Some(Verdict { origin, ..self.of_curve(&curve, reference)? })
     }
 

@@ -35,6 +35,8 @@ pub enum Take {
     Acceleration,
     /// Mean period of the oscillation about the mean.
     Period,
+    /// Time by which it lags `behind` another curve: the shift at which the two go together best.
+    Lag,
     /// Last amplitude over the first, to the power of one over the periods between: what a period leaves of the
     /// amplitude.
     Decay,
@@ -187,7 +189,7 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
     }
     let values = || curve.iter().map(|p| p[1]);
     match take {
-        Take::Distance => None,
+        Take::Distance | Take::Lag => None,
         Take::Mean => Some(mean(curve)),
         Take::Largest => values().reduce(f64::max),
         Take::Smallest => values().reduce(f64::min),
@@ -219,6 +221,35 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
             Some((swings[halves] / swings[0]).powf(2.0 / halves as f64))
         }
     }
+}
+
+/// Time by which `curve` lags `behind` another one of about the same samples: the shift from 0 to half of the window's
+/// length at which they are best correlated over what they then share; `None` where they do not go together at all.
+pub fn lag(curve: &[[f64; 2]], behind: &[[f64; 2]]) -> Option<f64> {
+    let (first, last) = (curve.first()?[0], curve.last()?[0]);
+    let step = (last - first) / (curve.len().checked_sub(1).filter(|n| *n > 7)?) as f64;
+    let correlation = |shift: f64| {
+        let pairs = curve.iter().filter_map(|p| at(behind, p[0] - shift).map(|y| [y, p[1]]));
+        let pairs: Curve = pairs.collect();
+        let n = pairs.len() as f64;
+        let [a, b] = [0, 1].map(|k| pairs.iter().map(|p| p[k]).sum::<f64>() / n);
+        let product = |i: usize, j: usize| -> f64 {
+            pairs.iter().map(|p| (p[i] - [a, b][i]) * (p[j] - [a, b][j])).sum()
+        };
+        product(0, 1) / (product(0, 0) * product(1, 1)).sqrt()
+    };
+    let seen: Vec<f64> = (0..=curve.len() / 2).map(|k| correlation(step * k as f64)).collect();
+    let best =
+        (0..seen.len()).filter(|&k| seen[k].is_finite()).max_by(|&a, &b| seen[a].total_cmp(&seen[b]))?;
+    // Waves go together again a period later: the first shift that is nearly as good.
+    let best = (1..best)
+        .find(|&k| seen[k] > 0.97 * seen[best] && seen[k] >= seen[k - 1] && seen[k] >= seen[k + 1])
+        .unwrap_or(best);
+    let top = match (best.checked_sub(1).map(|k| seen[k]), seen.get(best + 1)) {
+        (Some(a), Some(b)) => 0.5 * (a - b) / (a - 2.0 * seen[best] + b),
+        _ => 0.0,
+    };
+    (seen[best] > 0.5).then_some(step * (best as f64 + if top.is_finite() { top } else { 0.0 }))
 }
 
 /// Rms distance of `curve` from the points of `reference` that it covers, and how many these are; `None` for fewer
@@ -254,6 +285,24 @@ mod tests {
             assert!((found - decay).abs() < 0.03, "{decay}: {found}");
         }
         assert_eq!(reduce(Take::Period, &[[0.0, 1.0], [1.0, 2.0]], [0.0; 2]), None);
+    }
+
+    #[test]
+    fn a_curve_lags_behind_another_by_the_time_that_a_wave_takes() {
+        let sine = |late: f64| -> Curve {
+            (0..600).map(|k| f64::from(k) / 100.0).map(|t| [t, (4.0 * (t - late)).sin() + 0.3]).collect()
+        };
+        let crest = |late: f64| -> Curve {
+            let t = (0..600).map(|k| f64::from(k) / 100.0);
+            t.map(|t| [t, 0.2 / (3.0 * (t - 2.0 - late)).cosh().powi(2)]).collect()
+        };
+        for late in [0.123, 0.987, 1.4] {
+            let found = lag(&sine(late), &sine(0.0)).unwrap();
+            assert!((found - late).abs() < 1e-3, "{late}: {found}");
+            let found = lag(&crest(late), &crest(0.0)).unwrap();
+            assert!((found - late).abs() < 1e-3, "{late}: {found}");
+        }
+        assert_eq!(lag(&sine(0.0)[..5], &sine(0.0)), None);
     }
 
     #[test]

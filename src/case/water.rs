@@ -1,0 +1,121 @@
+//! Water at t = 0 that is no block: other shapes, and what a seed fills up to a level.
+
+use super::check::Checker;
+use super::check_geometry::WallKeys;
+use super::{BodyShape, Face, Form, Place, Tank, Turn, Vector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Water of any shape at t = 0: where the shape and no wall is.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WaterShape {
+    /// Shape; a box has `size`.
+    #[serde(default)]
+    pub shape: BodyShape,
+    /// Edge lengths of a box or wedge [m].
+    #[schemars(transform = super::bounds::each_positive)]
+    pub size: Option<Vector>,
+    /// Radius of a sphere, cylinder or cone [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius: Option<f64>,
+    /// Length of a cylinder or cone along its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub height: Option<f64>,
+    /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
+    pub file: Option<String>,
+    /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: Option<f64>,
+    /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
+    pub axis: Option<Vector>,
+    /// Centroid [m], of what is not from a file.
+    pub center: Option<Vector>,
+    /// Where the origin of the file's coordinates goes [m]; [0, 0, 0] if absent.
+    pub position: Option<Vector>,
+    /// Turn about `center` or `position`.
+    pub orientation: Option<Turn>,
+    /// Velocity at t = 0 [m/s].
+    #[serde(default)]
+    pub velocity: Vector,
+}
+
+/// Water that fills what can be reached from a place below a level, through what is free of walls.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fill {
+    /// A place in the water [m].
+    pub seed: Vector,
+    /// Height of its surface along z [m].
+    pub level: f64,
+    /// Velocity at t = 0 [m/s].
+    #[serde(default)]
+    pub velocity: Vector,
+}
+
+impl WaterShape {
+    /// The keys that make its shape; `tank` tells what is large.
+    pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
+        Form {
+            shape: self.shape,
+            size: self.size,
+            radius: self.radius,
+            height: self.height,
+            file: self.file.as_deref(),
+            scale: self.scale,
+            axis: self.axis,
+            orientation: self.orientation.as_ref(),
+            large: super::shape::large(tank),
+        }
+    }
+
+    /// Where it stands.
+    pub(crate) fn place(&self) -> Place {
+        if self.shape.is_file() {
+            Place::Position(self.position.unwrap_or_default())
+        } else {
+            Place::Center(self.center.unwrap_or_default())
+        }
+    }
+}
+
+impl Checker<'_> {
+    /// Shapes of water and fills.
+    pub(super) fn water(&mut self, shapes: &[WaterShape], fills: &[Fill]) {
+        let case = self.case;
+        for (k, water) in shapes.iter().enumerate() {
+            let path = format!("fluid.shape.{k}");
+            if water.shape == BodyShape::Terrain {
+                let message = "a terrain is ground and has no end";
+                self.add(format!("{path}.shape"), message, "use a [[fluid.fill]], or set shape = \"mesh\"");
+                continue;
+            }
+            if water.shape == BodyShape::Box && water.size.is_none() {
+                let message = "a box of water without `size`";
+                self.add(
+                    path,
+                    message,
+                    "add `size` and `center`, or use a [[fluid.block]] from `min` to `max`",
+                );
+                continue;
+            }
+            let places = [water.center, water.position];
+            let keys = WallKeys { corners: [None, None], open: &[] as &[Face], places };
+            self.wall(&path, &format!("water {path}"), &keys, &water.form(case.tank.as_ref()));
+        }
+        for (k, fill) in fills.iter().enumerate() {
+            let path = format!("fluid.fill.{k}");
+            self.place(&format!("{path}.seed"), &fill.seed);
+            self.place(&format!("{path}.level"), &[fill.level]);
+            if fill.seed[2] >= fill.level {
+                let message =
+                    format!("the seed at z = {} lies above the level of {}", fill.seed[2], fill.level);
+                self.add(format!("{path}.seed"), message, "put it into the water, below `level`");
+            }
+            if case.tank.is_none() && case.obstacle.is_empty() {
+                let message = "there is nothing that holds the water";
+                self.add(path, message, "give a [tank] or an [[obstacle]], or use a [[fluid.block]]");
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Bodies from files as they are used: a hull rights itself as its metacentric height has it, armour units come to rest.
+
+use crate::common::dry::{Dry, G};
+use crate::common::{case, cpu_simulation};
+use crate::meshes::{Triangles, ball, file, stl};
+use glam::{DVec2, DVec3};
+use seixo::scene::Scene;
+
+const LENGTH: f64 = 0.2;
+/// Keel and the two edges of the deck of a hull with a V for its section, y and z [m].
+const SECTION: [DVec2; 3] = [DVec2::new(0.0, 0.0), DVec2::new(0.2, 0.2), DVec2::new(-0.2, 0.2)];
+
+fn hull() -> Triangles {
+    let [[a, c, b], [d, f, e]] = [0.0, LENGTH].map(|x| SECTION.map(|p| DVec3::new(x, p.x, p.y)));
+    vec![[a, b, c], [d, f, e], [b, e, f], [b, f, c], [a, d, e], [a, e, b], [a, f, d], [a, c, f]]
+}
+
+/// Area below `level` of the section heeled by `angle` [rad] with its keel at height `keel`, and the lever of its centroid
+/// from the whole section's, along y.
+fn wetted(angle: f64, keel: f64, level: f64) -> (f64, f64) {
+    let corners = SECTION.map(|p| DVec2::from_angle(angle).rotate(p) + DVec2::new(0.0, keel));
+    let mut wet: Vec<DVec2> = vec![];
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        if a.y <= level {
+            wet.push(a);
+        }
+        if (a.y <= level) != (b.y <= level) {
+            wet.push(a.lerp(b, (level - a.y) / (b.y - a.y)));
+        }
+    }
+    let (mut area, mut moment) = (0.0, 0.0);
+    for k in 0..wet.len() {
+        let (a, b) = (wet[k], wet[(k + 1) % wet.len()]);
+        let twice = a.perp_dot(b);
+        area += 0.5 * twice;
+        moment += twice * (a.x + b.x) / 6.0;
+    }
+    (area, moment / area - corners.iter().sum::<DVec2>().x / 3.0)
+}
+
+/// Held at a heel of 12 degrees: lift and torque against what the level of the water around it makes them.
+#[test]
+#[ignore = "a minute"]
+fn a_heeled_hull_is_righted_by_its_metacentric_height() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "hull.stl", &stl(&hull()));
+    // Half as heavy as water it would draw this much.
+    let draft = 0.2 * 0.5_f64.sqrt();
+    let (l0, keel, angle) = (0.02, 0.24 - draft, 12_f64.to_radians());
+    let text = format!(
+        "[run]\nspacing = {l0}\ntime_step = 2e-3\nadaptive = true\nend = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.28, 0.8, 0.4]\nopen = [\"z_max\"]\n\
+         [fluid]\nsound_speed = 5\n[[fluid.fill]]\nseed = [0.02, 0.02, 0.1]\nlevel = 0.24\n\
+         [[obstacle]]\nname = \"hull\"\nshape = \"mesh\"\nfile = \"{path}\"\nposition = [0.04, 0.4, {keel}]\n\
+         orientation = {{ axis = [1, 0, 0], angle_deg = 12 }}\n[gauge]\nevery = 0.02\n[[gauge.force]]\nname = \"f\"\non = \"hull\"\n\
+         [[gauge.level]]\nname = \"l\"\nat = [0.14, 0.06]\n"
+    );
+    let case = case(&text);
+    let mut sim = cpu_simulation(&case, Scene::build(&case).expect("builds"));
+    let (mut mean, mut count) = ([0.0; 3], 0.0);
+    // The water takes a second to settle where the hull has kept it away.
+    sim.run_until(2.0, |sim, _| {
+        if sim.time > 1.2 && sim.steps % 8 == 0 {
+            let gauges = sim.gauges().expect("they read");
+            let value = |name: &str| gauges.iter().find(|g| g.0.starts_with(name)).expect(name).1;
+            let now = [value("l "), value("f_force_z"), value("f_torque_x")];
+            mean.iter_mut().zip(now).for_each(|(m, x)| *m += x);
+            count += 1.0;
+        }
+        std::ops::ControlFlow::Continue(())
+    })
+    .expect("still water is no trouble");
+    let [level, lift, torque] = mean.map(|m| m / count);
+    let (area, lever) = wetted(angle, keel, level);
+    let exact = 1000.0 * G * LENGTH * area;
+    let (height, expected) = (-torque / (lift * angle.sin()), -lever / angle.sin());
+    println!(
+        "level {level:.4} m, lift {lift:.2} N for {exact:.2}, torque {torque:.3} N m for {:.3}; metacentric height {height:.4} m \
+         for {expected:.4}",
+        exact * lever
+    );
+    assert!((lift / exact - 1.0).abs() < 0.06, "{lift} N for {exact} N");
+    assert!((height / expected - 1.0).abs() < 0.12, "{height} m for {expected} m");
+}
+
+#[test]
+fn the_section_of_the_hull_has_its_metacentre_where_theory_has_it() {
+    // GM = KB + BM - KG = 2 T / 3 + b^2 / (6 T) - 2 D / 3 with b = 2 T
+    let draft = 0.2 * 0.5_f64.sqrt();
+    let metacentric = 2.0 / 3.0 * draft + 4.0 * draft / 6.0 - 2.0 / 3.0 * 0.2;
+    let (area, lever) = wetted(1e-4, 0.0, draft);
+    assert!((area / (draft * draft) - 1.0).abs() < 1e-3);
+    assert!((-lever / 1e-4 / metacentric - 1.0).abs() < 1e-3, "{} {metacentric}", -lever / 1e-4);
+}
+
+/// A body with four round legs.
+fn tetrapod() -> Triangles {
+    let legs =
+        [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]].map(|d| DVec3::from(d.map(f64::from)).normalize());
+    let reach = |n: DVec3| 0.035 + 0.065 * legs.iter().map(|d| (12.0 * (n.dot(*d) - 1.0)).exp()).sum::<f64>();
+    ball(1.0, 4).into_iter().map(|t| t.map(|n| reach(n) * n)).collect()
+}
+
+/// Eight of them fall into a pit.
+#[test]
+fn a_heap_of_tetrapods_comes_to_rest() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "tetrapod.stl", &stl(&tetrapod()));
+    let mut text = String::from(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 4\ngravity = [0, 0, -9.80665]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 1.2]\nopen = [\"z_max\"]\n\
+         [contact]\nspring = 2e5\nfriction = 0.5\nrestitution = 0.2\n",
+    );
+    for k in 0..8 {
+        let (x, y) = (0.12 + 0.16 * f64::from(k % 2), 0.12 + 0.16 * f64::from(k / 2 % 2));
+        let z = 0.13 + 0.25 * f64::from(k / 4);
+        text += &format!(
+            "[[body]]\nname = \"unit {k}\"\nshape = \"mesh\"\nfile = \"{path}\"\ncenter = [{x}, {y}, {z}]\ndensity = 2300\n\
+             orientation = {{ axis = [1, {k}, 2], angle_deg = {} }}\n",
+            37 * k
+        );
+    }
+    let mut dry = Dry::new(&text);
+    let start: Vec<DVec3> = dry.solids.poses().iter().map(|p| p.position).collect();
+    dry.run(2.0);
+    let before: Vec<DVec3> = dry.solids.poses().iter().map(|p| p.position).collect();
+    let poses = dry.run(2.5);
+    let fastest =
+        poses.iter().map(|p| p.velocity.length() + 0.1 * p.angular_velocity.length()).fold(0.0, f64::max);
+    let crept = poses.iter().zip(&before).map(|(p, b)| p.position.distance(*b)).fold(0.0, f64::max);
+    let highest = poses.iter().map(|p| p.position.z).fold(0.0, f64::max);
+    let lowest = poses.iter().map(|p| p.position.z).fold(1.0, f64::min);
+    println!("fastest {fastest:.2e} m/s, crept {crept:.2e} m in 0.5 s, {lowest:.3} to {highest:.3} m high");
+    assert!(fastest < 0.02 && crept < 2e-3, "{fastest} m/s, {crept} m");
+    // They fell, the upper ones lie on the lower ones, and none went through a wall.
+    assert!(poses.iter().zip(&start).all(|(p, s)| p.position.z < s.z));
+    assert!(lowest > 0.03 && highest > lowest + 0.05);
+    assert!(poses.iter().all(|p| (p.position.x - 0.2).abs() < 0.18 && (p.position.y - 0.2).abs() < 0.18));
+}
