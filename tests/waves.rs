@@ -185,13 +185,13 @@ fn gauges(folder: &Path, name: &str, text: &str) -> Vec<Vec<f64>> {
 
 const GAUGES: &str = "[gauge]\nevery = 0.02\n[[gauge.level]]\nname = \"a\"\nat = [1.0, 0]\n[[gauge.level]]\nname = \"b\"\nat = [2.0, 0]\n";
 
-/// Crest above still water, and the middle of the time that the level is above half of the theory's.
+/// When a wave passes, the centroid of what stands more than 1 cm above still water, and its crest.
 fn crest(rows: &[Vec<f64>], gauge: usize, [from, to]: [f64; 2]) -> (f64, f64) {
-    let within: Vec<&Vec<f64>> = rows.iter().filter(|r| r[0] >= from && r[0] <= to).collect();
-    let top = within.iter().map(|r| r[gauge] - 0.2).fold(0.0, f64::max);
-    let high: Vec<f64> = within.iter().filter(|r| r[gauge] > 0.23).map(|r| r[0]).collect();
-    let middle = high.iter().sum::<f64>() / high.len() as f64;
-    (middle, top)
+    let within = || rows.iter().filter(|r| r[0] >= from && r[0] <= to).map(|r| (r[0], r[gauge] - 0.2));
+    let top = within().map(|(_, h)| h).fold(0.0, f64::max);
+    let (area, first) =
+        within().filter(|(_, h)| *h > 0.01).fold((0.0, 0.0), |(a, m), (t, h)| (a + h, m + t * h));
+    (first / area, top)
 }
 
 /// A solitary wave runs past two gauges at sqrt(g (d + H)) and nearly as high as asked; a wall sends it back, an

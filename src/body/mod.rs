@@ -313,8 +313,13 @@ impl Body {
     pub fn fastest(&self, t: f64, dt: f64) -> f64 {
         match &self.motion {
             Some((.., motion)) => motion.fastest(t, t + dt, self.radius()),
-            None => self.pose.velocity.length() + self.pose.angular_velocity.length() * self.radius(),
+            None => self.speed(),
         }
+    }
+
+    /// What no point of it is faster than now [m/s].
+    pub fn speed(&self) -> f64 {
+        self.pose.velocity.length() + self.pose.angular_velocity.length() * self.radius()
     }
 
     /// Continues from a pose and an angular momentum [kg m2/s].

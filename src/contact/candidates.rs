@@ -58,10 +58,16 @@ impl Candidates {
 
     /// Notes that `body` moved for `h` [s].
     pub fn travelled(&mut self, k: usize, body: &Body, h: f64) {
-        let speed = body.pose.velocity.length() + body.pose.angular_velocity.length() * body.radius();
-        self.travel[k] += h * speed;
+        self.travel[k] += h * body.speed();
         // a state that is no number must not keep the lists alive
         self.valid &= self.travel[k] <= self.skin[k];
+    }
+
+    /// Drops the lists unless they hold for `h` [s] more at the speeds as they are: bodies may have been hit, or steps have become
+    /// longer, since they were made.
+    pub fn reach_ahead(&mut self, bodies: &[Body], h: f64) {
+        let holds = |(k, body): (usize, &Body)| self.travel[k] + h * body.speed() <= self.skin[k];
+        self.valid &= bodies.iter().enumerate().all(holds);
     }
 
     /// Makes the pairs of solids anew if the old ones no longer hold.
@@ -72,8 +78,7 @@ impl Candidates {
         self.made_dt = dt;
         for (k, body) in bodies.iter().enumerate() {
             self.made[k] = body.pose;
-            let speed = body.pose.velocity.length() + body.pose.angular_velocity.length() * body.radius();
-            self.skin[k] = 0.25 * spacing + STEPS_AHEAD * dt * speed;
+            self.skin[k] = 0.25 * spacing + STEPS_AHEAD * dt * body.speed();
             self.travel[k] = 0.0;
         }
         let bounds: Vec<Bounds> = bodies

@@ -277,6 +277,7 @@ impl Solids {
 
     /// How the step is cut: into more than planned while a fast solid is close to another.
     fn hurry(&mut self, cut: Cut, t: f64, dt: f64) -> Result<Cut> {
+        self.candidates.reach_ahead(&self.bodies, dt);
         self.candidates.refresh(&self.bodies, self.spacing, dt);
         let Self { law: Some(law), bodies, candidates, limits, .. } = self else { return Ok(cut) };
         law.hurry(Now { bodies, candidates, limits, substep: dt }, dt, cut)

@@ -166,11 +166,7 @@ impl Smooth {
     ///
     /// Most scenes are slow enough to be passed over at once: only pairs that may meet within the step count.
     pub(super) fn cut_of_way(&self, now: &Now, dt: f64, mut cut: Cut) -> Result<Cut, Fault> {
-        let speed = |k: usize| {
-            let pose = &now.bodies[k].pose;
-            pose.velocity.length() + pose.angular_velocity.length() * now.bodies[k].radius()
-        };
-        let fastest = (0..now.bodies.len()).map(speed).fold(0.0, f64::max);
+        let fastest = now.bodies.iter().map(Body::speed).fold(0.0, f64::max);
         // two solids close at twice the speed of the faster one at most; a lattice body is two spacings thick
         let unseen = |reach: f64| UNSEEN * STOP_DEPTH * reach * f64::from(cut.substeps);
         let thinnest = self.spacing.min(self.middles.least());
