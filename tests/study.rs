@@ -277,7 +277,7 @@ fn a_point_that_is_stopped_goes_on_from_its_state() {
     let mut parts = 0;
     let ended = loop {
         // Longer and longer, so that a slow machine comes to the end too.
-        match attempt("parts", Duration::from_millis(10 + 5 * parts)) {
+        match attempt("parts", Duration::from_millis(2 + parts)) {
             Err(Error::Interrupted) => parts += 1,
             ended => break ended.expect("it runs"),
         }
