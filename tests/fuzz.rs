@@ -304,7 +304,7 @@ fn the_readers_of_the_fuzz_targets_take_any_bytes() {
 
 /// By hand: see the head of this file.
 #[test]
-#[ignore = "a campaign takes minutes to hours"]
+#[ignore = "a campaign takes minutes to hours: cargo test --release --test seixo -- --ignored fuzz"]
 fn campaign() {
     let number =
         |name: &str, default: u64| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(default);

@@ -41,7 +41,7 @@ fn wetted(angle: f64, keel: f64, level: f64) -> (f64, f64) {
 
 /// Held at a heel of 12 degrees: lift and torque against what the level of the water around it makes them.
 #[test]
-#[ignore = "a minute"]
+#[ignore = "a minute: cargo test --release --test seixo -- --ignored hulls"]
 fn a_heeled_hull_is_righted_by_its_metacentric_height() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = file(&folder, "hull.stl", &stl(&hull()));

@@ -108,33 +108,47 @@ pub(super) fn large(tank: Option<&Tank>) -> f64 {
     LARGE.max(LARGE_IN_TANK * tank.map_or(0.0, edge))
 }
 
+/// The keys of a table that make a shape, with the length of a file's solid that is `large`.
+macro_rules! form {
+    ($keys:expr, $large:expr) => {
+        Form {
+            shape: $keys.shape,
+            size: $keys.size,
+            radius: $keys.radius,
+            height: $keys.height,
+            file: $keys.file.as_deref(),
+            scale: $keys.scale,
+            axis: $keys.axis,
+            orientation: $keys.orientation.as_ref(),
+            large: $large,
+        }
+    };
+}
+pub(super) use form;
+
+/// Where a shape of these keys stands.
+pub(super) fn place(shape: BodyShape, center: Option<Vector>, position: Option<Vector>) -> Place {
+    if shape.is_file() {
+        Place::Position(position.unwrap_or_default())
+    } else {
+        Place::Center(center.unwrap_or_default())
+    }
+}
+
 /// An obstacle or a moving wall by the keys that make its shape.
 macro_rules! wall {
     ($kind:ty) => {
         impl $kind {
             /// The keys that make its shape; `tank` tells what is large.
             pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
-                Form {
-                    shape: self.shape,
-                    size: self.size,
-                    radius: self.radius,
-                    height: self.height,
-                    file: self.file.as_deref(),
-                    scale: self.scale,
-                    axis: self.axis,
-                    orientation: self.orientation.as_ref(),
-                    large: large(tank),
-                }
+                form!(self, large(tank))
             }
 
             /// What it is: a box of the lattice, if it has corners.
             pub(crate) fn wall(&self, tank: Option<&Tank>) -> Wall<'_> {
                 match (self.min, self.max) {
                     (Some(min), Some(max)) => Wall::Lattice(min, max),
-                    _ if self.shape.is_file() => {
-                        Wall::Shaped(self.form(tank), Place::Position(self.position.unwrap_or_default()))
-                    }
-                    _ => Wall::Shaped(self.form(tank), Place::Center(self.center.unwrap_or_default())),
+                    _ => Wall::Shaped(self.form(tank), place(self.shape, self.center, self.position)),
                 }
             }
 
@@ -169,17 +183,7 @@ impl Body {
 
     /// The keys that make its shape.
     pub(crate) fn form(&self) -> Form<'_> {
-        Form {
-            shape: self.shape,
-            size: self.size,
-            radius: self.radius,
-            height: self.height,
-            file: self.file.as_deref(),
-            scale: self.scale,
-            axis: self.axis,
-            orientation: self.orientation.as_ref(),
-            large: LARGE,
-        }
+        form!(self, LARGE)
     }
 }
 

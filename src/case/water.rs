@@ -2,6 +2,7 @@
 
 use super::check::Checker;
 use super::check_geometry::WallKeys;
+use super::shape::{form, large, place};
 use super::{BodyShape, Face, Form, Place, Tank, Turn, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,26 +57,12 @@ pub struct Fill {
 impl WaterShape {
     /// The keys that make its shape; `tank` tells what is large.
     pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
-        Form {
-            shape: self.shape,
-            size: self.size,
-            radius: self.radius,
-            height: self.height,
-            file: self.file.as_deref(),
-            scale: self.scale,
-            axis: self.axis,
-            orientation: self.orientation.as_ref(),
-            large: super::shape::large(tank),
-        }
+        form!(self, large(tank))
     }
 
     /// Where it stands.
     pub(crate) fn place(&self) -> Place {
-        if self.shape.is_file() {
-            Place::Position(self.position.unwrap_or_default())
-        } else {
-            Place::Center(self.center.unwrap_or_default())
-        }
+        place(self.shape, self.center, self.position)
     }
 }
 

@@ -53,12 +53,11 @@ pub fn pressure_gradient(
     let head = |j: usize| hydrostatic(on.position[j] - on.position[i], on.params);
     let mut reference = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j]));
     let consistent = is_consistent(state, on.params);
-    if on.params.gradient == Gradient::Consistent && !consistent {
-        reference = -pressure[i];
-    }
     if consistent {
         let level = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j] - head(j)));
         reference = reference.max(level);
+    } else if on.params.gradient == Gradient::Consistent {
+        reference = -pressure[i];
     }
     let mut gradient: DVec3 =
         carriers().map(|(j, w)| (pressure[j] - reference) * pair_vector(i, j, w, on)).sum();

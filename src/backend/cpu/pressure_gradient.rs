@@ -64,15 +64,14 @@ fn pressure_gradient(
     }
     p[carry..].fill(own);
     let mut reference = least(p).min(own);
-    if on.params.gradient == Gradient::Consistent && !consistent {
-        reference = -own;
-    }
     if consistent {
         heads(r, h, on.params);
         // Those of dummies stand at the particle's own level.
         p[carry..n].iter_mut().zip(&h[carry..n]).for_each(|(p, h)| *p += h);
         w.iter_mut().zip(&*p).zip(&*h).for_each(|((level, p), h)| *level = p - h);
         reference = reference.max(least(w).min(own));
+    } else if on.params.gradient == Gradient::Consistent {
+        reference = -own;
     }
     p.iter_mut().for_each(|p| *p -= reference);
     w[..n].copy_from_slice(&all.weight[..n]);
