@@ -1,7 +1,7 @@
 // Neighbour list: all particles within the effective radius.
 // Twin: src/kernels/neighbour_list.rs
 //
-// A thread finds the row of one pressure-carrying particle. Rows of ghosts, and of walls with no fluid within one cell,
+// A thread finds the row of one pressure-carrying particle. With the balanced source no wall carries pressure to a wall. Rows of ghosts, and of walls with no fluid within one cell,
 // stay empty. A row that is full counts on and reports itself; nothing is dropped unseen.
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -18,6 +18,7 @@ var<private> near: u32;
 var<private> dummies: u32;
 var<private> smallest: f32;
 var<private> wall: bool;
+var<private> carriers: u32;
 
 fn see(i: u32, j: u32, r: vec3f) {
     let distance_squared = dot(r, r);
@@ -26,7 +27,7 @@ fn see(i: u32, j: u32, r: vec3f) {
     }
     smallest = min(smallest, distance_squared);
     let room = near + dummies < params.capacity;
-    if j < params.pressure_slots {
+    if j < carriers {
         if room {
             neighbour_list[near_place(i, near)] = j;
         }
@@ -72,6 +73,10 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     near = 0u;
     dummies = 0u;
     wall = false;
+    carriers = params.pressure_slots;
+//#if MIXED
+    carriers = select(params.fluid, params.pressure_slots, i < params.fluid);
+//#endif
     smallest = params.effective_radius * params.effective_radius;
     for (var x = low.x; x <= high.x; x++) {
         for (var y = low.y; y <= high.y; y++) {

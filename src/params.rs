@@ -202,6 +202,15 @@ impl Params {
         }
     }
 
+    /// Slots below this carry pressure to a wall, of `fluid` slots of water and `pressure` with the walls: in the paper's
+    /// scheme walls too, though no water flows along their layer.
+    pub fn wall_carriers(&self, fluid: usize, pressure: usize) -> usize {
+        match self.source {
+            Source::NumberDensity => pressure,
+            Source::Mixed => fluid,
+        }
+    }
+
     /// Gravity of the explicit stage [m/s2]: none where it acts together with the pressure that balances it.
     pub fn explicit_gravity(&self) -> DVec3 {
         match self.source {

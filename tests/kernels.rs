@@ -102,6 +102,7 @@ fn the_fast_search_finds_the_plain_rows() {
             moving: Some(&moving),
             fixed: Some(&fixed),
             pressure_slots: g.pressure() as u32,
+            wall_carriers: s.params.wall_carriers(g.fluid, g.pressure()) as u32,
         };
         let mut pairs = 0;
         for i in 0..g.pressure() {

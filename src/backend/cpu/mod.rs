@@ -229,6 +229,7 @@ impl Cpu {
             moving: self.moving.as_ref().map(|(list, x)| (list, x)),
             fixed: self.fixed.as_ref().map(|(list, x)| (list, x)),
             pressure_slots: groups.pressure() as u32,
+            wall_carriers: params.wall_carriers(groups.fluid, groups.pressure()) as u32,
         };
         let (largest, slot) = self
             .neighbours

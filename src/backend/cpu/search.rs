@@ -155,8 +155,10 @@ pub struct Candidates<'a> {
     pub moving: Indexed<'a>,
     /// Fixed walls, if the scene has any.
     pub fixed: Indexed<'a>,
-    /// Slots below this carry pressure.
+    /// Slots below this carry pressure to water.
     pub pressure_slots: u32,
+    /// Slots below this carry pressure to walls.
+    pub wall_carriers: u32,
 }
 
 /// Columns of cells around a cell.
@@ -205,6 +207,8 @@ impl Search {
             self.approach(cell, from);
         }
         let Self { fluid, fluid_runs, solid, solid_runs, near, dummy, hits, .. } = self;
+        let is_water = from.fluid_start.last().is_some_and(|&end| i < end as usize);
+        let carriers = if is_water { from.pressure_slots } else { from.wall_carriers };
         near.clear();
         dummy.clear();
         for &run in &fluid[..*fluid_runs] {
@@ -216,13 +220,17 @@ impl Search {
             coordinates.within(run, x, reach, below, hits);
             for &k in hits.kept() {
                 let j = list.slot[k as usize];
-                if j < from.pressure_slots { near.push(j) } else { dummy.push(j) }
+                if j < carriers { near.push(j) } else { dummy.push(j) }
             }
             // What had no place counts, so that the guard sees it.
             near.count += hits.count - hits.kept().len();
             near.close += hits.close;
         }
-        near.remove(i as u32);
+        if i < carriers as usize {
+            near.remove(i as u32)
+        } else {
+            dummy.remove(i as u32)
+        }
         near.count + dummy.count
     }
 
