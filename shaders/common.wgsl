@@ -62,7 +62,10 @@ struct Constants {
     smooth_density: f32,   // W0
     surface_head: f32,     // of the missing half spacing, Pa
     wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
-    wall_friction: f32,    // C_f / l0 / sum w of a wall particle with the water above it
+    wall_friction: f32,    // C_f / l0 / wall_contact
+    wall_contact: f32,     // sum w of a particle of a flat wall's layer with the water above it
+    pad: f32,
+    pad_pair: vec2f,
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the

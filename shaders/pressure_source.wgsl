@@ -105,8 +105,10 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         let r = position[j].xyz - x;
         sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);
     }
-    var b = now.source_density * (sums.density - params.smooth_density) / params.smooth_density
-        - now.source_divergence * divergence(sums)
+    // A wall's row undoes as much as there is water before it.
+    let wet = select(min(links / params.wall_contact, 1.0), 1.0, i < params.fluid);
+    var b = wet * now.source_density * (sums.density - params.smooth_density) / params.smooth_density
+        - wet * now.source_divergence * divergence(sums)
         - params.density * dot(params.gravity, first_moment);
 //#else
     var b = now.source_density * (number_density[i] - params.number_density) / params.number_density;

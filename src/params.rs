@@ -91,6 +91,8 @@ pub struct Params {
     /// Weight of a pair of fluid and wall in the viscous sum [-]: 1 in the paper's scheme, else that of
     /// [`Lattice::wall_shear`].
     pub wall_shear: f64,
+    /// [`Lattice::wall_contact`].
+    pub wall_contact: f64,
     /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
     pub wall_friction: f64,
     /// Free-surface threshold beta [-].
@@ -175,6 +177,7 @@ impl Params {
             density: fluid.map_or(1000.0, |f| f.density),
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
             wall_shear: if paper { 1.0 } else { lattice.wall_shear },
+            wall_contact: lattice.wall_contact,
             wall_friction: friction / (l0 * lattice.wall_contact),
             free_surface_threshold: fluid.map_or(0.97, |f| f.free_surface_threshold),
             source: fluid.and_then(|f| f.source).unwrap_or(source),

@@ -239,6 +239,9 @@ fn structs_lie_the_same_on_both_sides() {
             surface_head,
             wall_shear,
             wall_friction,
+            wall_contact,
+            pad,
+            pad_pair,
         }
     );
     same_layout!(

@@ -8,7 +8,8 @@
 //!
 //! The paper's source is the deviation of the number density alone. The mixed one takes the divergence of the velocity,
 //! corrected by the moment matrix so that a stretch at constant volume has none, the deviation of a smooth density sum,
-//! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles.
+//! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles. Walls carry
+//! pressure to water alone: their layer holds none that could flow along it.
 
 use super::Particles;
 use crate::lattice::{reach, smooth_weight};
@@ -45,8 +46,9 @@ pub fn pressure_source(
         Source::Mixed => {
             let first_moment: DVec3 =
                 all.iter().take(carry).map(|(j, w)| w * (on.position[j] - on.position[i])).sum();
-            step.relaxation * per_time / step.dt * deviation(all, params)
-                - (1.0 - step.relaxation) * per_time * divergence(i, all, on)
+            let wet = if i < on.fluid { 1.0 } else { wet_share(links, params) };
+            wet * step.relaxation * per_time / step.dt * deviation(all, params)
+                - wet * (1.0 - step.relaxation) * per_time * divergence(i, all, on)
                 - c * params.density * params.gravity.dot(first_moment)
         }
     };
@@ -56,6 +58,14 @@ pub fn pressure_source(
         all.iter().take(carry).map(|(j, w)| w * surface_pressure[j]).sum()
     };
     (b + c * known, c * links + step.compressibility * per_time / step.dt)
+}
+
+/// Part of divergence and deviation that a wall's row undoes, whose weights with water sum to `links` [-]: all of them on a flat wall
+/// under water. A row in a slot between solids meets hardly any water, of which a little that is left to be undone, as of solids that touch,
+/// would ask a large pressure.
+#[inline(always)]
+pub fn wet_share(links: f64, params: &Params) -> f64 {
+    (links / params.wall_contact).min(1.0)
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).

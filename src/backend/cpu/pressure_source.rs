@@ -5,7 +5,7 @@ use super::row_arrays::{Columns, RowArrays, sum};
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source};
+use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source, wet_share};
 use crate::lattice::{reach, smooth_weight};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
@@ -82,12 +82,13 @@ fn mixed_source(
     }
     s.copy_from_slice(w);
     s[carry..].fill(0.0);
+    let wet = if i < on.fluid { 1.0 } else { wet_share(sum(s), params) };
     let first_moment = r.weighted_sum(s);
     corrected_products(inverse, e, v, s);
     let divergence = scale(on) * sum(s);
     let per_time = params.density / step.dt;
-    step.relaxation * per_time / step.dt * deviation
-        - (1.0 - step.relaxation) * per_time * divergence
+    wet * step.relaxation * per_time / step.dt * deviation
+        - wet * (1.0 - step.relaxation) * per_time * divergence
         - laplacian_coefficient(params) * params.density * params.gravity.dot(first_moment)
 }
 

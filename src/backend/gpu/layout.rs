@@ -81,6 +81,9 @@ pub struct Constants {
     pub surface_head: f32,
     pub wall_shear: f32,
     pub wall_friction: f32,
+    pub wall_contact: f32,
+    pub pad: f32,
+    pub pad_pair: [f32; 2],
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -243,6 +246,9 @@ impl Constants {
             surface_head: missing_head(params) as f32,
             wall_shear: params.wall_shear as f32,
             wall_friction: params.wall_friction as f32,
+            wall_contact: params.wall_contact as f32,
+            pad: 0.0,
+            pad_pair: [0.0; 2],
         }
     }
 }
