@@ -231,13 +231,13 @@ macro_rules! pages {
 }
 
 pages! {
-    the_tutorial "tutorial.md" 1 11;
+    the_tutorial "tutorial.md" 1 12;
     how_to_measure "howto-gauges.md" 1 4;
     how_to_put_in_bodies "howto-bodies.md" 3 3;
     how_to_make_waves "howto-waves.md" 4 0;
     how_to_restart "howto-restart.md" 1 5;
     how_to_sweep "howto-cluster.md" 1 5;
-    how_to_look "howto-look.md" 0 4;
+    how_to_look "howto-look.md" 1 6;
     from_dualsphysics "dualsphysics.md" 1 0;
     the_shapes "shapes.md" 1 0;
     the_studies "studies.md" 2 6;

@@ -3,6 +3,7 @@
 
 mod bench;
 mod compare;
+mod compare_runs;
 mod device;
 mod init;
 mod keys;
@@ -57,6 +58,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
     Compare(compare::CompareArgs),
+    /// Lay two or more runs over each other: curves on one page (HTML), differences as a table and as CSV.
+    CompareRuns(compare_runs::CompareRunsArgs),
     /// Run a study: error against run time, limits of stability, what a scene does not need.
     Study(seixo_study::command::StudyArgs),
     /// Hold runs against experiments and analytic solutions: one page with tables and charts.
@@ -192,6 +195,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::CompareRuns(args) => compare_runs::compare_runs(&args),
         Command::Study(args) => sweep(args.quiet, |stop| seixo_study::command::command(&args, stop)),
         Command::Validate(args) => {
             sweep(args.quiet, |stop| seixo_study::validation::command::command(&args, stop))

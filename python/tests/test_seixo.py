@@ -30,6 +30,8 @@ CASE: dict[str, Any] = {
     "output": {"every": 0.01},
 }
 
+REGION = {"min": [0.0, 0.0, 0.0], "max": [0.25, 0.1, 0.5]}
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> seixo.Run:
@@ -185,3 +187,13 @@ def test_the_python_of_the_guide_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     for part in parts:
         exec(part.split("```")[0], names)  # noqa: S102, the guide's own
     assert names["run"].status == "done" and names["unit"] == "N" and names["peak"] >= 0.0
+
+
+def test_fields_that_were_not_written_are_named(tmp_path: Path) -> None:
+    few = seixo.run(CASE, tmp_path / "few", set={"output.fields": ["velocity"], "output.region": REGION}, backend="cpu")
+    water = few.frames[-1].fluid
+    assert len(water.velocity) == len(water) > 0
+    assert (water.position[:, 0] <= 0.25).all()
+    with pytest.raises(KeyError, match="no field 'Pressure' .`output.fields`.*Velocity"):
+        _ = water.pressure
+    assert set(few.frames[-1].solids.body) == {1, 2}
