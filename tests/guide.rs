@@ -259,10 +259,24 @@ fn pages_of_the_book_are_there_and_links_lead_somewhere() {
     for page in &listed {
         for link in read(page).split("](").skip(1).filter_map(|rest| rest.split([')', ' ']).next()) {
             let file = link.split('#').next().unwrap_or_default();
-            let elsewhere = link.contains("://") || file.is_empty();
-            assert!(elsewhere || docs().join(file).exists(), "{page}: nothing at {link}");
+            let outside = link.contains("://");
+            assert!(outside || file.is_empty() || docs().join(file).exists(), "{page}: nothing at {link}");
+            let (within, place) = (if file.is_empty() { page } else { file }, link.split('#').nth(1));
+            if let Some(place) = place.filter(|_| !outside && within.ends_with(".md")) {
+                let marked = read(within).contains(&format!("id=\"{place}\""));
+                assert!(marked || headings(within).contains(place), "{page}: no heading for {link}");
+            }
         }
     }
+}
+
+/// Names of the headings of a page, as links call them.
+fn headings(page: &str) -> BTreeSet<String> {
+    let text = read(page);
+    let titles =
+        text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let kept = |c: &char| c.is_alphanumeric() || [' ', '-', '_'].contains(c);
+    titles.map(|t| t.chars().filter(kept).collect::<String>().to_lowercase().replace(' ', "-")).collect()
 }
 
 #[test]
