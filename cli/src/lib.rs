@@ -1,5 +1,5 @@
 //! What can be typed, and what the program answers with: results on stdout, progress and remarks on stderr,
-//! and an exit code. The program `seixo` is [`main`] and nothing else.
+//! and an exit code. The program `seixo` is [`main`] and nothing else; the Python package starts it, too.
 
 mod bench;
 mod compare;
