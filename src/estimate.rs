@@ -1,6 +1,6 @@
 //! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
 
-use crate::case::{Case, Encoding, Face, Form, OutputKind, Place, Vector, Wall};
+use crate::case::{Case, Encoding, Face, Form, OutputField, OutputKind, Place, Vector, Wall};
 use glam::{DMat3, DVec3};
 use serde::Serialize;
 
@@ -13,9 +13,11 @@ const SEARCH_CELL: f64 = 13.0;
 const LATTICE_CELL: f64 = 1.0;
 /// The program itself.
 const PROGRAM: f64 = 16e6;
-/// Bytes of a particle in a frame, by encoding, and in a checkpoint.
+/// Bytes of a particle in a frame with all fields, by encoding, and in a checkpoint.
 const FRAME_BASE64: f64 = 45.0;
 const FRAME_RAW: f64 = 50.0;
+/// Bytes of the position and the cell of a particle in a frame, before it is packed.
+const POINT: f64 = 21.0;
 const CHECKPOINT: f64 = 120.0;
 /// Bytes of a row of the tables, and more for each solid.
 const ROW: f64 = 700.0;
@@ -217,6 +219,8 @@ impl Estimate {
         let shown = |kind| if output.kinds.contains(&kind) { 1.0 } else { 0.0 };
         let bodies: f64 = case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum();
         let each = if output.encoding == Encoding::Raw { FRAME_RAW } else { FRAME_BASE64 };
+        let told = |fields: &[OutputField]| POINT + fields.iter().map(|f| f.bytes()).sum::<usize>() as f64;
+        let each = each * told(&output.fields) / told(&OutputField::ALL);
         let moving = (case.body.len() + case.moving_wall.len()) as f64;
         let rows = run.end / output.table_every.unwrap_or(run.time_step).max(run.time_step);
         let saves = run.checkpoint.wall > 0.0 || run.checkpoint.every.is_some();

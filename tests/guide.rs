@@ -231,13 +231,13 @@ macro_rules! pages {
 }
 
 pages! {
-    the_tutorial "tutorial.md" 1 11;
+    the_tutorial "tutorial.md" 1 12;
     how_to_measure "howto-gauges.md" 1 4;
     how_to_put_in_bodies "howto-bodies.md" 3 3;
     how_to_make_waves "howto-waves.md" 4 0;
     how_to_restart "howto-restart.md" 1 5;
     how_to_sweep "howto-cluster.md" 1 5;
-    how_to_look "howto-look.md" 0 4;
+    how_to_look "howto-look.md" 1 6;
     from_dualsphysics "dualsphysics.md" 1 0;
     the_shapes "shapes.md" 1 0;
     the_studies "studies.md" 2 6;
@@ -259,10 +259,24 @@ fn pages_of_the_book_are_there_and_links_lead_somewhere() {
     for page in &listed {
         for link in read(page).split("](").skip(1).filter_map(|rest| rest.split([')', ' ']).next()) {
             let file = link.split('#').next().unwrap_or_default();
-            let elsewhere = link.contains("://") || file.is_empty();
-            assert!(elsewhere || docs().join(file).exists(), "{page}: nothing at {link}");
+            let outside = link.contains("://");
+            assert!(outside || file.is_empty() || docs().join(file).exists(), "{page}: nothing at {link}");
+            let (within, place) = (if file.is_empty() { page } else { file }, link.split('#').nth(1));
+            if let Some(place) = place.filter(|_| !outside && within.ends_with(".md")) {
+                let marked = read(within).contains(&format!("id=\"{place}\""));
+                assert!(marked || headings(within).contains(place), "{page}: no heading for {link}");
+            }
         }
     }
+}
+
+/// Names of the headings of a page, as links call them.
+fn headings(page: &str) -> BTreeSet<String> {
+    let text = read(page);
+    let titles =
+        text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let kept = |c: &char| c.is_alphanumeric() || [' ', '-', '_'].contains(c);
+    titles.map(|t| t.chars().filter(kept).collect::<String>().to_lowercase().replace(' ', "-")).collect()
 }
 
 #[test]

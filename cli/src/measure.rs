@@ -4,6 +4,7 @@ use super::render::{chosen, frames_of, numbers};
 use super::{Exit, finite};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use seixo::case::OutputField;
 use seixo::case::file::{load, read_text};
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
@@ -67,7 +68,16 @@ pub fn measure(args: &MeasureArgs) -> Exit {
     let points = points(args)?;
     let case = load(&args.dir.join("case.toml"), None, &[]);
     let frames = frames_of(&args.dir)?;
-    let run = case?.case.run;
+    let case = case?.case;
+    let held = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
+    if held == [false; 2] {
+        let text = format!(
+            "the frames of {} hold neither velocity nor pressure: output.fields of its case leaves them out",
+            args.dir.display()
+        );
+        return Err(Error::usage("DIR", text));
+    }
+    let run = case.run;
     let probe =
         Probe { spacing: run.spacing, radius: run.effective_radius * run.spacing, flat: run.dimensions == 2 };
     let chosen = chosen(&frames, &args.times, args.every);
@@ -86,13 +96,19 @@ pub fn measure(args: &MeasureArgs) -> Exit {
         let values: Vec<Option<Value>> = points.par_iter().map(|&x| probe.at(&water, x)).collect();
         for (x, value) in points.iter().zip(values) {
             let place = [frame.time, x.x, x.y, x.z].map(|v| v.to_string());
-            let found =
-                value.map(|v| [v.velocity.x, v.velocity.y, v.velocity.z, v.pressure].map(|v| v.to_string()));
+            let number = |x: f64, held: bool| if held { x.to_string() } else { String::new() };
+            let found = value.map(|v| {
+                let [x, y, z] = v.velocity.to_array().map(|x| number(x, held[0]));
+                [x, y, z, number(v.pressure, held[1])]
+            });
             dry += usize::from(found.is_none());
             table.write_record(place.into_iter().chain(found.unwrap_or_default())).map_err(unwritten)?;
         }
     }
     let bytes = table.into_inner().map_err(|e| Error::io("table")(e.into_error()))?;
+    for (what, _) in [("velocity", held[0]), ("pressure", held[1])].iter().filter(|(_, held)| !held) {
+        remark(&format!("note: no {what}: output.fields of the case leaves it out"));
+    }
     if dry == points.len() * chosen.len() {
         remark("note: no point lies in the water at any of these times");
     }
@@ -178,7 +194,11 @@ impl Probe {
         if nearest.sqrt() * self.radius > reach {
             return None;
         }
-        let value = |k: usize| (DVec3::from(water.velocity[k].map(f64::from)), f64::from(water.pressure[k]));
+        // A file holds what was asked for.
+        let value = |k: usize| {
+            let velocity = water.velocity.get(k).map_or(DVec3::ZERO, |v| DVec3::from(v.map(f64::from)));
+            (velocity, water.pressure.get(k).map_or(0.0, |&p| f64::from(p)))
+        };
         let total: f64 = near.iter().map(|n| n.0).sum();
         let middle = near.iter().map(|n| n.0 * n.1).sum::<DVec3>() / total;
         let mut mean = Value::default();

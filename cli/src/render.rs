@@ -4,12 +4,13 @@ use super::Exit;
 use clap::ValueEnum;
 use glam::DVec3;
 use rayon::prelude::*;
+use seixo::case::Case;
 use seixo::case::file::load;
 use seixo::console::{remark, say};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
 use seixo::output::label::{Picture, animation, sheet};
-use seixo::output::particles::Particles;
+use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
 use seixo::output::replay::{Frame, frames, particles};
 use seixo::output::write_whole;
@@ -64,9 +65,9 @@ pub struct LookArgs {
     /// Width and height [pixels].
     #[arg(long, value_name = "WxH", default_value = "960x480", value_parser = size)]
     size: [usize; 2],
-    /// What the water is coloured by.
-    #[arg(long, value_enum, default_value_t = Shown::Speed)]
-    field: Shown,
+    /// What the water is coloured by [default: the first of speed, pressure and density that the frames hold].
+    #[arg(long, value_enum)]
+    field: Option<Shown>,
     /// Values of the first and the last colour, e.g. 0,2.5 [default: those of the frames].
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
@@ -100,6 +101,23 @@ enum Shown {
     Vx,
     Vy,
     Vz,
+}
+
+/// What is said where nothing colours the water.
+const NO_COLOUR: &str = "the frames of this run hold no field to colour the water by: output.fields of its case leaves out velocity, pressure \
+                         and number_density";
+
+impl Shown {
+    fn field(self) -> Field {
+        match self {
+            Self::Speed => Field::Speed,
+            Self::Pressure => Field::Pressure,
+            Self::Density => Field::Density,
+            Self::Vx => Field::Velocity(0),
+            Self::Vy => Field::Velocity(1),
+            Self::Vz => Field::Velocity(2),
+        }
+    }
 }
 
 fn angle(text: &str) -> std::result::Result<f64, String> {
@@ -147,9 +165,12 @@ fn slice(text: &str) -> std::result::Result<(usize, f64), String> {
 }
 
 impl LookArgs {
-    /// The style for a scene of so many dimensions.
-    fn style(&self, dimensions: u32) -> Style {
-        let mut style = Style::of(dimensions);
+    /// The style for a run of `case`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a field that its frames do not hold.
+    fn style(&self, case: &Case) -> Result<Style> {
+        let mut style = Style::of(case.run.dimensions);
         let view = &mut style.view;
         let preset = match self.view {
             None => None,
@@ -162,16 +183,26 @@ impl LookArgs {
         view.azimuth = self.azimuth.map_or(view.azimuth, f64::to_radians);
         view.elevation = self.elevation.map_or(view.elevation, f64::to_radians);
         (view.zoom, view.target, view.size) = (self.zoom, self.target, self.size);
-        style.field = match self.field {
-            Shown::Speed => Field::Speed,
-            Shown::Pressure => Field::Pressure,
-            Shown::Density => Field::Density,
-            Shown::Vx => Field::Velocity(0),
-            Shown::Vy => Field::Velocity(1),
-            Shown::Vz => Field::Velocity(2),
+        let held = |shown: &Shown| case.output.fields.contains(&shown.field().source());
+        let known: Vec<Shown> = Shown::value_variants().iter().copied().filter(held).collect();
+        style.field = match (self.field, known.first()) {
+            (Some(asked), _) if !held(&asked) => {
+                let names: Vec<String> =
+                    known.iter().filter_map(|s| s.to_possible_value()).map(|v| v.get_name().into()).collect();
+                let there = if names.is_empty() { "none".into() } else { names.join(", ") };
+                let text = format!(
+                    "the frames of this run hold no `{}`: output.fields of its case leaves it out; --field can be: {there}",
+                    name(asked.field().source())
+                );
+                return Err(Error::usage("--field", text));
+            }
+            (Some(asked), _) => asked.field(),
+            (None, Some(first)) => first.field(),
+            (None, None) if case.fluid.is_none() => Field::Speed,
+            (None, None) => return Err(Error::usage("--field", NO_COLOUR)),
         };
         (style.range, style.slice, style.labels) = (self.range, self.slice, !self.no_labels);
-        style
+        Ok(style)
     }
 }
 
@@ -190,7 +221,7 @@ impl Show {
         let case = load(&root.join("case.toml"), None, &[])?.case;
         let scene = Scene::build(&case)?;
         let params = Params::new(&case, &scene)?;
-        let mut style = look.style(scene.dimensions);
+        let mut style = look.style(&case)?;
         if style.range.is_none() {
             style.range = range_of(frames, &style, &params)?;
         }

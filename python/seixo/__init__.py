@@ -7,14 +7,15 @@
     run.body("box").z                # a column of bodies.csv
     run.frames[-1].fluid.velocity    # an array, read when it is asked for
 
-`seixo.run` starts the program `seixo` and returns when it has ended; there is no stepping from Python and no view of a
-computation that is under way. `seixo.read` opens what any run has written.
+`seixo.run` starts the program `seixo` and returns when it has ended; `seixo.read` opens what any run has written.
+`seixo.open` advances a case step by step in this process, writes nothing and lets Python look at all of it.
 """
 
 from ._errors import CaseError, DeviceError, DivergedError, FileError, SeixoError
 from ._program import program
 from ._results import Frame, Frames, Particles, Run, Table, read
 from ._run import plan, run
+from ._simulation import Simulation, Solid, Step, Water, open
 
 __all__ = [
     "CaseError",
@@ -26,7 +27,12 @@ __all__ = [
     "Particles",
     "Run",
     "SeixoError",
+    "Simulation",
+    "Solid",
+    "Step",
     "Table",
+    "Water",
+    "open",
     "plan",
     "program",
     "read",

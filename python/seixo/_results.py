@@ -160,7 +160,8 @@ class Particles:
     def field(self, name: str) -> Array:
         """The field `name` as it is called in the file, e.g. `Velocity`."""
         if name not in self._fields:
-            raise KeyError(f"no field is called {name!r}; there are: {', '.join(self._fields)}")
+            there = ", ".join(self._fields)
+            raise KeyError(f"{self.path.name} holds no field {name!r} (`output.fields` of the case says which are written); there are: {there}")
         return self._fields[name]
 
     @property

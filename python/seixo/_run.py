@@ -65,9 +65,9 @@ def run(
         "--memory-limit": memory_limit,
     }
     flags = {"--picture": picture, "--force": force, "--force-disk": force_disk, "--resume": resume}
-    where, text = _case(case)
-    folder = Path(out) if out is not None else Path("out") / ("stdin" if text is not None else Path(where).stem)
-    arguments = ["run", where, f"--out={folder}", *_changes(spacing, until, set)]
+    where, text = case_text(case)
+    folder = Path(out) if out is not None else Path("out") / (Path(where).stem if where is not None else "stdin")
+    arguments = ["run", where or "-", f"--out={folder}", *_changes(spacing, until, set)]
     arguments += [f"{option}={value}" for option, value in options.items() if value is not None]
     # The case stands before --resume, which could take it for its folder.
     arguments += [flag for flag, given in flags.items() if given]
@@ -93,18 +93,18 @@ def plan(
 
     Raises CaseError with the program's message.
     """
-    where, text = _case(case)
-    code, answer, remarks = _start(["plan", where, "--json", *_changes(spacing, until, set)], text, echo=False)
+    where, text = case_text(case)
+    code, answer, remarks = _start(["plan", where or "-", "--json", *_changes(spacing, until, set)], text, echo=False)
     if code != 0:
         raise error(remarks, code)
     found: dict[str, Any] = json.loads(answer)
     return found
 
 
-def _case(case: Case) -> tuple[str, str | None]:
-    """The argument that names the case, and its text if that goes to standard input."""
+def case_text(case: Case) -> tuple[str | None, str | None]:
+    """The file of the case, or its text: one of them."""
     if isinstance(case, Mapping):
-        return "-", tomli_w.dumps(_table(case))
+        return None, tomli_w.dumps(_table(case))
     return os.fspath(case), None
 
 
@@ -115,11 +115,22 @@ def _changes(spacing: float | None, until: float | None, sets: Mapping[str, Any]
         changes.append(f"--spacing={spacing!r}")
     if until is not None:
         changes.append(f"--until={until!r}")
-    for key, value in (sets or {}).items():
-        # The value as TOML, in one line.
-        written = tomli_w.dumps({"x": _plain(value)}).removeprefix("x = ") if not isinstance(value, str) else value
-        changes.append(f"--set={key}={' '.join(written.split()) if not isinstance(value, str) else value}")
+    changes += [f"--set={change}" for change in value_sets(sets)]
     return changes
+
+
+def value_sets(sets: Mapping[str, Any] | None) -> list[str]:
+    """Changes of single values, `key=value` with the value as TOML in one line; text stands as it is."""
+    return [f"{key}={value if isinstance(value, str) else _inline(_plain(value))}" for key, value in (sets or {}).items()]
+
+
+def _inline(value: Any) -> str:
+    """A value as TOML in one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_inline(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_inline(item) for item in value) + "]"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").strip()
 
 
 def _table(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,11 +4,12 @@ by SEIXO_PROGRAM, and numpy, tomli-w, meshio; with and without pandas."""
 from __future__ import annotations
 
 import builtins
+import importlib.util
 import runpy
 import signal
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -29,6 +30,8 @@ CASE: dict[str, Any] = {
     "gauge": {"level": [{"name": "near gate", "at": [0.3, 0.0]}], "force": [{"name": "on box", "on": "box"}]},
     "output": {"every": 0.01},
 }
+
+REGION = {"min": [0.0, 0.0, 0.0], "max": [0.25, 0.1, 0.5]}
 
 
 @pytest.fixture(scope="module")
@@ -174,14 +177,119 @@ def test_the_tutorial_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.chdir(tmp_path)
     names = runpy.run_path(str(ROOT / "python/tutorial.py"))
     assert names["run"].status == "done" and len(names["drafts"]) == 3
+    assert len(names["heights"]) == names["sim"].steps > 10
 
 
 def test_the_python_of_the_guide_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pandas")
     monkeypatch.chdir(tmp_path)
     parts = (ROOT / "docs/python.md").read_text(encoding="utf-8").split("```python\n")[1:]
-    assert len(parts) == 3
+    assert len(parts) == 4
     names: dict[str, Any] = {}
     for part in parts:
         exec(part.split("```")[0], names)  # noqa: S102, the guide's own
     assert names["run"].status == "done" and names["unit"] == "N" and names["peak"] >= 0.0
+    assert np.isclose(names["sim"].time, 0.1, atol=2e-3) and len(names["front"]) > 20
+
+
+def test_fields_that_were_not_written_are_named(tmp_path: Path) -> None:
+    few = seixo.run(CASE, tmp_path / "few", set={"output.fields": ["velocity"], "output.region": REGION}, backend="cpu")
+    water = few.frames[-1].fluid
+    assert len(water.velocity) == len(water) > 0
+    assert (water.position[:, 0] <= 0.25).all()
+    with pytest.raises(KeyError, match="no field 'Pressure' .`output.fields`.*Velocity"):
+        _ = water.pressure
+    assert set(few.frames[-1].solids.body) == {1, 2}
+
+
+stepped = pytest.mark.skipif(not importlib.util.find_spec("seixo._native"), reason="the compiled part is not installed")
+
+
+@stepped
+def test_stepping_is_the_run_of_the_program(run: seixo.Run) -> None:
+    sim = seixo.open(CASE, backend="cpu", threads=1)
+    assert sim.time == 0.0 and sim.steps == 0 and sim.end == 0.02 and "f64" in sim.processor
+    still = sim.water
+    assert len(still) == 100 and still.position.shape == (100, 3) and not still.pressure.any()
+    steps = list(sim)
+    assert len(steps) == sim.steps == 20 and np.isclose(sim.time, 0.02)
+    assert steps[-1].dt == 1e-3 and steps[-1].solved and steps[-1].iterations > 0
+    # To the last bit: tables hold as many digits as a number has.
+    monitors: Any = run.monitors
+    for name in ["energy", "kinetic", "speed_max"]:
+        assert sim.monitor[name] == monitors[name].iloc[-1], name
+    assert [s.iterations for s in steps] == list(monitors.iterations[1:])
+    gauges: Any = run.gauges
+    assert sim.gauges["near gate"] == gauges.near_gate.iloc[-1]
+    box, table = sim.bodies["box"], cast(Any, run.body("box"))
+    assert list(sim.bodies) == list(dict.fromkeys(run.bodies["body"])) and box.is_body and not sim.bodies["gate \"é\""].is_body
+    assert box.position[2] == table.z.iloc[-1] and box.fluid_force[2] == table.fluid_force_z.iloc[-1]
+    # Frames hold single precision.
+    last = run.frames[-1].fluid
+    ours, theirs = np.argsort(sim.water.id), np.argsort(last.id)
+    assert np.array_equal(sim.positions[ours].astype(np.float32), last.position[theirs])
+    assert np.array_equal(sim.velocity[ours].astype(np.float32), last.velocity[theirs])
+    assert np.array_equal(sim.pressure[ours].astype(np.float32), last.pressure[theirs])
+    # What was taken is a copy.
+    assert not still.pressure.any() and sim.water is sim.water
+    with pytest.raises(ValueError, match="read-only"):
+        sim.positions[0] = 0.0
+
+
+@stepped
+def test_observers_look_on_and_end_a_run() -> None:
+    sim = seixo.open(CASE, set={"run.end": 1.0}, backend="cpu", threads=1)
+    seen: list[float] = []
+
+    def watch(sim: seixo.Simulation, step: seixo.Step) -> bool:
+        seen.append(step.time)
+        return len(seen) < 7
+
+    sim.run_until(0.5, watch)
+    assert sim.steps == 7 and seen[-1] == sim.time
+    sim.run_until(0.01)
+    assert sim.steps == 10
+
+    def fails(sim: seixo.Simulation, step: seixo.Step) -> None:
+        raise RuntimeError("seen enough")
+
+    with pytest.raises(RuntimeError, match="seen enough"):
+        sim.run_until(0.5, fails)
+    assert sim.steps == 11
+
+
+@stepped
+def test_what_is_wrong_is_an_exception_of_stepping_too(tmp_path: Path) -> None:
+    with pytest.raises(seixo.CaseError, match="viscosty") as wrong:
+        seixo.open(CASE, set={"fluid.viscosty": 0})
+    assert wrong.value.code == 2
+    with pytest.raises(seixo.CaseError, match="no case file"):
+        seixo.open(tmp_path / "none.toml")
+    with pytest.raises(seixo.CaseError, match="it is \"auto\""):
+        seixo.open(CASE, backend="quantum")
+    with pytest.raises(seixo.CaseError, match="chooses a GPU"):
+        seixo.open(CASE, backend="cpu", adapter=0)
+    with pytest.raises(seixo.CaseError, match="starts at t = 0"):
+        seixo.open(CASE, set={"run.from": str(tmp_path)})
+    fast = {**CASE, "fluid": {"block": [{**CASE["fluid"]["block"][0], "velocity": [0, 0, 3000]}]}}
+    with pytest.raises(seixo.DivergedError, match="stage"):
+        seixo.open(fast, backend="cpu").run_until(1.0)
+
+
+def test_without_the_compiled_part_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "seixo._native", None)
+    monkeypatch.delattr(seixo, "_native", raising=False)
+    with pytest.raises(ImportError, match="pip install"):
+        seixo.open(CASE)
+
+
+@stepped
+def test_the_command_is_there_as_a_module() -> None:
+    import subprocess
+
+    told = subprocess.run([sys.executable, "-m", "seixo", "--version"], capture_output=True, text=True, check=True)
+    assert told.stdout.startswith("seixo 0.")
+    wrong = subprocess.run([sys.executable, "-m", "seixo", "plan", "none.toml"], capture_output=True, text=True)
+    assert wrong.returncode == 2 and "no case file" in wrong.stderr
+    typo = subprocess.run([sys.executable, "-m", "seixo", "rum"], capture_output=True, text=True)
+    assert typo.returncode == 2 and "unrecognized subcommand" in typo.stderr

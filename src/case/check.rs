@@ -320,6 +320,24 @@ impl Checker<'_> {
         if let Some(every) = output.table_every {
             self.positive("output.table_every", every, "s");
         }
+        let fields = &output.fields;
+        if let Some(k) = (1..fields.len()).find(|&k| fields[..k].contains(&fields[k])) {
+            self.add(format!("output.fields.{k}"), "a field is named twice", "name each field once");
+        }
+        let Some(region) = output.region else { return };
+        if !self.box_edges("output.region", "output.region.max", &region.min, &region.max) {
+            return;
+        }
+        let Some(tank) = &self.case.tank else { return };
+        let apart = |k: &usize| region.max[*k] <= tank.min[*k] || region.min[*k] >= tank.max[*k];
+        if let Some(k) = self.axes().find(apart) {
+            let axis = ["x", "y", "z"][k];
+            self.add(
+                "output.region",
+                format!("output.region lies outside of the tank along {axis}: its frames would hold nothing"),
+                format!("let it reach into {} to {} m", tank.min[k], tank.max[k]),
+            );
+        }
     }
 }
 

@@ -19,7 +19,7 @@ pub(super) struct WallKeys<'a> {
 
 impl Checker<'_> {
     /// Axes that exist: no y in two dimensions.
-    fn axes(&self) -> impl Iterator<Item = usize> + use<> {
+    pub(super) fn axes(&self) -> impl Iterator<Item = usize> + use<> {
         let flat = self.flat();
         (0..3).filter(move |&k| !(flat && k == 1))
     }

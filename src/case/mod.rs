@@ -676,6 +676,49 @@ pub enum OutputKind {
     Dummy,
 }
 
+/// A field of particles in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OutputField {
+    /// `Velocity` [m/s].
+    Velocity,
+    /// `Pressure` [Pa].
+    Pressure,
+    /// `ParticleNumberDensity` [-].
+    NumberDensity,
+    /// `Kind`: 0 fluid, 1 wall, 2 dummy, 3 body wall, 4 body dummy.
+    Kind,
+    /// `Body`: 0 none, then the solids in the order of bodies.csv.
+    Body,
+    /// `Id`, which stays with a particle.
+    Id,
+}
+
+impl OutputField {
+    /// All fields, in the order of a file.
+    pub const ALL: [Self; 6] =
+        [Self::Velocity, Self::Pressure, Self::NumberDensity, Self::Kind, Self::Body, Self::Id];
+
+    /// Bytes of a particle.
+    pub(crate) fn bytes(self) -> usize {
+        match self {
+            Self::Velocity => 12,
+            Self::Kind => 1,
+            Self::Pressure | Self::NumberDensity | Self::Body | Self::Id => 4,
+        }
+    }
+}
+
+/// A box of which frames are written.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutputRegion {
+    /// Its lower corner [m].
+    pub min: Vector,
+    /// Its upper corner [m].
+    pub max: Vector,
+}
+
 /// Encoding of VTU arrays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -696,6 +739,13 @@ pub struct Output {
     pub every: f64,
     /// Which particles to write.
     pub kinds: Vec<OutputKind>,
+    /// Fields of the particles to write beside their positions; all of them if absent. Files of bodies and moving walls hold `body` and
+    /// `id` in any case: their places are read from them.
+    #[schemars(transform = bounds::each_once)]
+    pub fields: Vec<OutputField>,
+    /// Write only the water and the fixed walls within this box; everywhere if absent. Bodies and moving walls are written whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region: Option<OutputRegion>,
     /// Encoding of the VTU files.
     pub encoding: Encoding,
     /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
@@ -710,6 +760,8 @@ impl Default for Output {
         Self {
             every: 0.05,
             kinds: vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall],
+            fields: OutputField::ALL.to_vec(),
+            region: None,
             encoding: Encoding::Base64,
             table_every: None,
             ledger: false,

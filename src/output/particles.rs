@@ -2,12 +2,12 @@
 
 use super::vtu::{Values, vtu};
 use crate::body::Pose;
-use crate::case::Encoding;
+use crate::case::{Encoding, OutputField, OutputRegion};
 use crate::fields::Fields;
 use crate::scene::{Kind, Scene};
 use glam::DVec3;
 
-/// Particles of a file or of a picture, one entry a particle in each array.
+/// Particles of a file or of a picture, one entry a particle in each array; an array that a file does not hold is empty.
 #[derive(Clone, Default, Debug)]
 pub struct Particles {
     /// Position [m].
@@ -90,17 +90,47 @@ impl Particles {
         out
     }
 
-    /// The VTU file of these particles at `time` [s].
-    pub fn vtu(&self, time: f64, encoding: Encoding) -> Vec<u8> {
-        let fields = [
-            ("Velocity", Values::Vector(&self.velocity)),
-            ("Pressure", Values::Scalar(&self.pressure)),
-            ("ParticleNumberDensity", Values::Scalar(&self.number_density)),
-            ("Kind", Values::Byte(&self.kind)),
-            ("Body", Values::Number(&self.body)),
-            ("Id", Values::Number(&self.id)),
-        ];
-        vtu(&self.position, &fields, time, encoding)
+    /// Those of them within `region`, of which y does not count in a `flat` scene.
+    pub fn within(self, region: &OutputRegion, flat: bool) -> Self {
+        let axis =
+            |x: f32, k: usize| flat && k == 1 || (region.min[k]..=region.max[k]).contains(&f64::from(x));
+        let inside = |x: &[f32; 3]| (0..3).all(|k| axis(x[k], k));
+        let kept: Vec<bool> = self.position.iter().map(inside).collect();
+        fn pick<T: Copy>(values: &[T], kept: &[bool]) -> Vec<T> {
+            values.iter().zip(kept).filter(|(_, kept)| **kept).map(|(value, _)| *value).collect()
+        }
+        Self {
+            position: pick(&self.position, &kept),
+            velocity: pick(&self.velocity, &kept),
+            pressure: pick(&self.pressure, &kept),
+            number_density: pick(&self.number_density, &kept),
+            kind: pick(&self.kind, &kept),
+            body: pick(&self.body, &kept),
+            id: pick(&self.id, &kept),
+        }
+    }
+
+    /// The VTU file of these particles at `time` [s], with `fields` beside their positions.
+    pub fn vtu(&self, time: f64, encoding: Encoding, fields: &[OutputField]) -> Vec<u8> {
+        let asked = OutputField::ALL.into_iter().filter(|field| fields.contains(field));
+        let arrays: Vec<(&str, Values)> = asked.map(|field| (name(field), self.values(field))).collect();
+        vtu(&self.position, &arrays, time, encoding)
+    }
+
+    fn values(&self, field: OutputField) -> Values<'_> {
+        match field {
+            OutputField::Velocity => Values::Vector(&self.velocity),
+            OutputField::Pressure => Values::Scalar(&self.pressure),
+            OutputField::NumberDensity => Values::Scalar(&self.number_density),
+            OutputField::Kind => Values::Byte(&self.kind),
+            OutputField::Body => Values::Number(&self.body),
+            OutputField::Id => Values::Number(&self.id),
+        }
+    }
+
+    /// Whether `field` is known of them: a file need not hold it.
+    pub fn has(&self, field: OutputField) -> bool {
+        self.is_empty() || self.values(field).len() == self.len()
     }
 
     /// Number of particles.
@@ -111,6 +141,18 @@ impl Particles {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
+    }
+}
+
+/// What a field is called in a file.
+pub fn name(field: OutputField) -> &'static str {
+    match field {
+        OutputField::Velocity => "Velocity",
+        OutputField::Pressure => "Pressure",
+        OutputField::NumberDensity => "ParticleNumberDensity",
+        OutputField::Kind => "Kind",
+        OutputField::Body => "Body",
+        OutputField::Id => "Id",
     }
 }
 

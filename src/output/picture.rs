@@ -5,6 +5,7 @@ use super::label::Picture;
 use super::particles::Particles;
 use super::render::{Camera, Canvas, Layers, View, water};
 use crate::body::Pose;
+use crate::case::OutputField;
 use crate::fields::Fields;
 use crate::params::Params;
 use crate::scene::{Kind, Scene, Shape, Solid};
@@ -40,6 +41,15 @@ impl Field {
             Self::Velocity(_) => "vz [m/s]",
             Self::Pressure => "pressure [Pa]",
             Self::Density => "n / n0 [-]",
+        }
+    }
+
+    /// The field of a file that it is made of.
+    pub fn source(self) -> OutputField {
+        match self {
+            Self::Speed | Self::Velocity(_) => OutputField::Velocity,
+            Self::Pressure => OutputField::Pressure,
+            Self::Density => OutputField::NumberDensity,
         }
     }
 
@@ -227,14 +237,15 @@ pub fn drops(scene: &Scene, fields: Option<&Fields>) -> impl Iterator<Item = Dro
     })
 }
 
-/// The water of a frame.
+/// The water of a frame; what the file does not hold is not a number.
 pub fn drops_of(particles: &Particles) -> impl Iterator<Item = Drop> {
     let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+    let number = |values: &[f32], i: usize| values.get(i).map_or(f64::NAN, |&x| f64::from(x));
     (0..particles.len()).map(move |i| Drop {
         position: vector(particles.position[i]),
-        velocity: vector(particles.velocity[i]),
-        pressure: f64::from(particles.pressure[i]),
-        number_density: f64::from(particles.number_density[i]),
+        velocity: particles.velocity.get(i).map_or(DVec3::NAN, |&v| vector(v)),
+        pressure: number(&particles.pressure, i),
+        number_density: number(&particles.number_density, i),
     })
 }
 

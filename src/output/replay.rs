@@ -1,7 +1,8 @@
 //! Reads the frames of a run back, from the VTU files that [`super::vtu`] wrote.
 
-use super::particles::Particles;
+use super::particles::{Particles, name};
 use super::vtu::BLOCK;
+use crate::case::OutputField;
 use crate::error::{Error, Result};
 use bytemuck::Pod;
 use flate2::read::ZlibDecoder;
@@ -90,28 +91,39 @@ fn parse(bytes: &[u8]) -> std::result::Result<Particles, String> {
         compressed: head.contains(" compressor=\"vtkZLibDataCompressor\""),
     };
     let position: Vec<[f32; 3]> = file.array("Points")?;
-    let n = position.len();
     let out = Particles {
-        velocity: file.array("Velocity")?,
-        pressure: file.array("Pressure")?,
-        number_density: file.array("ParticleNumberDensity")?,
-        kind: file.array("Kind")?,
-        body: file.array("Body")?,
-        id: file.array("Id")?,
+        velocity: file.field(OutputField::Velocity)?,
+        pressure: file.field(OutputField::Pressure)?,
+        number_density: file.field(OutputField::NumberDensity)?,
+        kind: file.field(OutputField::Kind)?,
+        body: file.field(OutputField::Body)?,
+        id: file.field(OutputField::Id)?,
         position,
     };
-    let lengths = [out.velocity.len(), out.pressure.len(), out.number_density.len(), out.kind.len()];
-    if lengths.iter().chain(&[out.body.len(), out.id.len()]).any(|&m| m != n) {
+    if OutputField::ALL.into_iter().any(|field| file.holds(name(field)) && !out.has(field)) {
         return Err("its arrays differ in length".into());
     }
     Ok(out)
 }
 
 impl Appended<'_> {
-    fn array<T: Pod>(&self, name: &str) -> std::result::Result<Vec<T>, String> {
+    fn line(&self, name: &str) -> Option<&str> {
         let of = format!("Name=\"{name}\"");
-        let line = self.head.lines().find(|l| l.contains("<DataArray") && l.contains(&of));
-        let offset = line.and_then(|l| attribute(l, "offset")).and_then(|o| o.parse::<usize>().ok());
+        self.head.lines().find(|l| l.contains("<DataArray") && l.contains(&of))
+    }
+
+    fn holds(&self, name: &str) -> bool {
+        self.line(name).is_some()
+    }
+
+    /// A field; nothing if it was not asked for (`output.fields`).
+    fn field<T: Pod>(&self, field: OutputField) -> std::result::Result<Vec<T>, String> {
+        if self.holds(name(field)) { self.array(name(field)) } else { Ok(Vec::new()) }
+    }
+
+    fn array<T: Pod>(&self, name: &str) -> std::result::Result<Vec<T>, String> {
+        let offset =
+            self.line(name).and_then(|l| attribute(l, "offset")).and_then(|o| o.parse::<usize>().ok());
         let offset = offset.ok_or_else(|| format!("it holds no `{name}`"))?;
         let from = self.data.get(offset..).ok_or("it is cut off")?;
         let bytes = if self.compressed { self.inflate(from) } else { self.plain(from) }?;
@@ -217,16 +229,32 @@ mod tests {
         for n in [0, 1, 7, 6000, BLOCK / 12, BLOCK / 4, BLOCK] {
             for encoding in [Encoding::Base64, Encoding::Raw] {
                 let written = some(n);
-                let read = parse(&written.vtu(0.5, encoding)).unwrap_or_else(|e| panic!("{n}: {e}"));
+                let read = parse(&written.vtu(0.5, encoding, &OutputField::ALL))
+                    .unwrap_or_else(|e| panic!("{n}: {e}"));
                 assert_eq!(format!("{read:?}"), format!("{written:?}"));
             }
         }
     }
 
     #[test]
+    fn fields_that_were_not_asked_for_are_empty() {
+        for encoding in [Encoding::Base64, Encoding::Raw] {
+            let bytes = some(9).vtu(0.5, encoding, &[OutputField::Id, OutputField::Pressure]);
+            let read = parse(&bytes).expect("sound");
+            let whole = some(9);
+            assert_eq!(
+                (&read.position, &read.pressure, &read.id),
+                (&whole.position, &whole.pressure, &whole.id)
+            );
+            assert!(read.velocity.is_empty() && read.kind.is_empty() && !read.has(OutputField::Velocity));
+            assert!(read.has(OutputField::Pressure) && Particles::default().has(OutputField::Velocity));
+        }
+    }
+
+    #[test]
     fn damage_is_an_error() {
         for encoding in [Encoding::Base64, Encoding::Raw] {
-            let bytes = some(40).vtu(0.5, encoding);
+            let bytes = some(40).vtu(0.5, encoding, &OutputField::ALL);
             // The last third holds cells, which are not read.
             for cut in (0..bytes.len() / 2).step_by(7) {
                 assert!(parse(&bytes[..cut]).is_err(), "cut at {cut} of {}", bytes.len());

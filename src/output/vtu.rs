@@ -39,6 +39,17 @@ impl Values<'_> {
         }
     }
 
+    /// Number of values.
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Self::Vector(v) => v.len(),
+            Self::Scalar(v) => v.len(),
+            Self::Byte(v) => v.len(),
+            Self::Number(v) => v.len(),
+            Self::Index(v) => v.len(),
+        }
+    }
+
     fn type_name(&self) -> &'static str {
         match self {
             Self::Vector(_) | Self::Scalar(_) => "Float32",

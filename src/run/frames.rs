@@ -1,6 +1,6 @@
 //! Frames: the particles of one moment, in VTU files and pictures.
 
-use crate::case::{Encoding, Output, OutputKind};
+use crate::case::{Encoding, Output, OutputField, OutputKind, OutputRegion};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
@@ -20,6 +20,8 @@ pub struct Frames {
     folder: Folder,
     pvd: Pvd,
     encoding: Encoding,
+    fields: Vec<OutputField>,
+    region: Option<OutputRegion>,
     fluid: bool,
     solids: bool,
     walls: (bool, bool),
@@ -53,6 +55,8 @@ impl Frames {
             folder: folder.clone(),
             pvd: Pvd::new(folder.pvd()),
             encoding: output.encoding,
+            fields: output.fields.clone(),
+            region: output.region,
             fluid: asked(OutputKind::Fluid) && groups.fluid > 0,
             solids: asked(OutputKind::Body) && !scene.solids.is_empty(),
             walls: (
@@ -74,6 +78,8 @@ impl Frames {
         let Self {
             folder: _,
             encoding: _,
+            fields: _,
+            region: _,
             fluid: _,
             solids: _,
             walls: _,
@@ -115,7 +121,7 @@ impl Frames {
             let file = "vtu/walls.vtu".to_string();
             if number == 0 {
                 let walls = Particles::walls(scene, fields.as_ref(), self.walls.0, self.walls.1);
-                self.put(&file, &walls, time)?;
+                self.put(&file, &self.cut(walls, scene), time)?;
             }
             parts.push(("walls", file));
         }
@@ -165,7 +171,7 @@ impl Frames {
     ) -> Vec<(&'static str, Particles)> {
         let mut parts = Vec::new();
         if let Some(fields) = fields.filter(|_| self.fluid) {
-            parts.push(("fluid", Particles::fluid(scene, fields)));
+            parts.push(("fluid", self.cut(Particles::fluid(scene, fields), scene)));
         }
         if self.solids {
             parts.push(("solids", Particles::solids(scene, simulation.solids.poses(), fields, true)));
@@ -173,9 +179,22 @@ impl Frames {
         parts
     }
 
+    /// What lies in the region of the output.
+    fn cut(&self, particles: Particles, scene: &Scene) -> Particles {
+        match &self.region {
+            Some(region) => particles.within(region, scene.dimensions == 2),
+            None => particles,
+        }
+    }
+
     fn put(&self, file: &str, particles: &Particles, time: f64) -> Result<()> {
         let path: PathBuf = self.folder.root().join(file);
-        write_whole(&path, &particles.vtu(time, self.encoding))
+        let mut fields = self.fields.clone();
+        if particles.body.iter().any(|&body| body > 0) {
+            // Places of solids are read from these.
+            fields.extend([OutputField::Body, OutputField::Id]);
+        }
+        write_whole(&path, &particles.vtu(time, self.encoding, &fields))
     }
 }
 

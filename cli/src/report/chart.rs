@@ -1,6 +1,6 @@
 //! Curves over time and bars as SVG that takes the colours of the page.
 
-use super::escape;
+use super::page::escape;
 use std::fmt::Write;
 
 /// Size of a chart and what is left free around it [pixels].
@@ -30,7 +30,12 @@ pub struct Chart {
     pub title: String,
     /// The curves.
     pub curves: Vec<Curve>,
+    /// Whether they are told apart by their dashes too, where one may cover another.
+    pub dashed: bool,
 }
+
+/// Dashes of curves that may cover each other: the first shows between those of the others.
+const DASHES: [&str; COLORS] = ["none", "9 5", "3 4", "12 4 3 4", "6 8", "1 5"];
 
 /// Places of round numbers in a range, about `count` of them.
 fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
@@ -124,10 +129,15 @@ impl Chart {
         let mut key = String::new();
         for (k, curve, points) in &curves {
             let color = format!("var(--c{})", k % COLORS);
+            let dash = if self.dashed && *k > 0 {
+                format!(";stroke-dasharray:{}", DASHES[k % COLORS])
+            } else {
+                String::new()
+            };
             let line: Vec<String> = points.iter().map(|p| format!("{:.1},{:.1}", x(p[0]), y(p[1]))).collect();
             let _ = write!(
                 svg,
-                "<polyline class=\"curve\" style=\"stroke:{color}\" points=\"{}\"/>",
+                "<polyline class=\"curve\" style=\"stroke:{color}{dash}\" points=\"{}\"/>",
                 line.join(" ")
             );
             if curves.len() > 1 {
@@ -225,7 +235,7 @@ mod tests {
     fn a_chart_of_nothing_is_none_and_a_constant_is_a_line() {
         assert_eq!(Chart::default().figure(), "");
         let curve = Curve { name: "a<b".into(), points: vec![[0.0, 2.0], [1.0, 2.0], [2.0, f64::NAN]] };
-        let figure = Chart { title: "x [m]".into(), curves: vec![curve] }.figure();
+        let figure = Chart { title: "x [m]".into(), curves: vec![curve], dashed: false }.figure();
         assert!(
             figure.contains("<polyline") && !figure.contains("NaN") && figure.contains("a&lt;b"),
             "{figure}"

@@ -1,7 +1,8 @@
 //! `seixo report`: one page that tells of a run, with everything in it and nothing fetched.
 
-mod chart;
-mod table;
+pub mod chart;
+pub mod page;
+pub mod table;
 
 use super::Exit;
 use super::progress::clock;
@@ -9,9 +10,10 @@ use super::render::{LookArgs, Show, frames_of};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
+use page::{charts, escape, html, section};
 use rayon::prelude::*;
-use seixo::case::Case;
 use seixo::case::file::load;
+use seixo::case::{Case, OutputField};
 use seixo::console::say;
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
@@ -40,23 +42,6 @@ pub struct ReportArgs {
     /// Say nothing.
     #[arg(short, long)]
     quiet: bool,
-}
-
-/// Text as HTML.
-fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c if c.is_control() && c != '\n' && c != '\t' => out.push(char::REPLACEMENT_CHARACTER),
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 /// What a run left.
@@ -110,7 +95,10 @@ pub fn report(args: &ReportArgs) -> Exit {
 fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
     let (all, most) = (run.frames.len(), usize::from(args.pictures));
     let count = all.min(most);
-    if count == 0 {
+    // Without a field there is nothing to colour the water by.
+    let colours = [OutputField::Velocity, OutputField::Pressure, OutputField::NumberDensity];
+    let bare = run.case.fluid.is_some() && !colours.iter().any(|f| run.case.output.fields.contains(f));
+    if count == 0 || bare {
         return Ok(Vec::new());
     }
     let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
@@ -124,14 +112,13 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
 }
 
 fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
-    let title = escape(&run.name);
     let sections = [
         section("what", "What was run", &what(run)),
         section("seen", "Pictures", &film(pictures)),
-        section("bodies", "Bodies and moving walls", &charts(bodies(run))),
-        section("gauges", "Gauges", &charts(gauges(run))),
-        section("energy", "Energies", &charts(energies(run))),
-        section("steps", "Steps", &(charts(steps(run)) + &limits(run)?)),
+        section("bodies", "Bodies and moving walls", &charts(&bodies(run))),
+        section("gauges", "Gauges", &charts(&gauges(run))),
+        section("energy", "Energies", &charts(&energies(run))),
+        section("steps", "Steps", &(charts(&steps(run)) + &limits(run)?)),
         section("time", "Where the time went", &times(run)),
         section(
             "case",
@@ -142,33 +129,7 @@ fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
             ),
         ),
     ];
-    Ok(format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
-         style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
-         <title>{title} - seixo</title>\n<style>\n{}</style>\n</head>\n<body>\n\
-         <header><h1>{title}</h1>{}</header>\n<main>\n{}</main>\n\
-         <footer><p class=\"faint\">Made by seixo {}. The page holds everything and fetches nothing.</p></footer>\n\
-         <script>\n{}</script>\n</body>\n</html>\n",
-        include_str!("page.css"),
-        verdict(&run.result),
-        sections.concat(),
-        env!("CARGO_PKG_VERSION"),
-        include_str!("page.js"),
-    ))
-}
-
-fn section(id: &str, title: &str, inside: &str) -> String {
-    if inside.is_empty() {
-        return String::new();
-    }
-    format!("<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{title}</h2>\n{inside}</section>\n")
-}
-
-fn charts(charts: Vec<Chart>) -> String {
-    let figures: String = charts.iter().map(Chart::figure).collect();
-    if figures.is_empty() { figures } else { format!("<div class=\"charts\">\n{figures}</div>\n") }
+    Ok(html(&run.name, &verdict(&run.result), &sections, include_str!("page.js")))
 }
 
 /// The verdict in plain words.
@@ -252,7 +213,7 @@ fn chart(title: impl Into<String>, table: &Table, columns: &[(&str, &str)]) -> C
     let curves = columns.iter().filter_map(|(column, name)| {
         table.curve(column).map(|points| Curve { name: (*name).to_owned(), points })
     });
-    Chart { title: title.into(), curves: curves.collect() }
+    Chart { title: title.into(), curves: curves.collect(), dashed: false }
 }
 
 /// Bodies whose way is drawn; more would be no page.

@@ -51,7 +51,7 @@ pub(super) const KIND: Kind = Kind {
     program: |scene| {
         // the kernel presses the points of boxes into boxes
         if scene.solids.iter().any(|s| s.shape.as_cuboid().is_none()) {
-            return Err("the device has no kernel of law \"smooth\" for round bodies");
+            return Err("the device has no kernel of law \"smooth\" for bodies that are no boxes");
         }
         Ok(&device::PROGRAM)
     },

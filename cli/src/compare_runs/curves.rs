@@ -1,0 +1,118 @@
+//! The curves of a run: what its tables hold, under names that other runs share.
+
+use crate::report::table::Table;
+use glam::DQuat;
+use seixo::case::file::load;
+use seixo::error::{FolderError, Result};
+use seixo::output::folder::case_name;
+use serde_json::Value;
+use std::path::Path;
+
+/// A quantity of a run over time.
+#[derive(Clone, Debug)]
+pub struct Quantity {
+    /// The table that it is from.
+    pub table: &'static str,
+    /// The column with its unit, after the name of the solid if it is of one.
+    pub name: String,
+    /// Time [s] and value.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A run.
+#[derive(Debug)]
+pub struct Run {
+    /// What it is called beside the others.
+    pub name: String,
+    /// What it did; nothing while it goes on.
+    pub result: Value,
+    /// Its case, keys as dotted paths.
+    pub keys: Vec<(String, String)>,
+    /// Its curves, in the order gauges, solids, monitors.
+    pub curves: Vec<Quantity>,
+    /// Seconds that each step took.
+    pub pace: Vec<[f64; 2]>,
+}
+
+impl Run {
+    /// The run in `root`, to be called `name`.
+    ///
+    /// # Errors
+    /// A folder without a run, or a table that cannot be read.
+    pub fn read(root: &Path, name: String) -> Result<Self> {
+        case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(|| FolderError::NoRun(root.to_path_buf()))?;
+        let text = load(&root.join("case.toml"), None, &[])?.text;
+        let mut keys = Vec::new();
+        if let Ok(case) = text.parse::<toml::Table>() {
+            flatten("", &toml::Value::Table(case), &mut keys);
+        }
+        let result = std::fs::read_to_string(root.join("result.json")).ok();
+        let monitors = Table::read(&root.join("monitors.csv"))?;
+        let mut curves = columns("gauges", "", &Table::read(&root.join("gauges.csv"))?);
+        for (solid, table) in Table::read_by(&root.join("bodies.csv"), "body")? {
+            let before = format!("{solid}: ");
+            let mut of_solid = columns("bodies", &before, &table);
+            let place = of_solid.iter().take_while(|q| q.name.ends_with("[m]")).count();
+            of_solid.splice(place..place, turn(&before, &table));
+            curves.append(&mut of_solid);
+        }
+        curves.append(&mut columns("monitors", "", &monitors));
+        let result = result.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
+        Ok(Self { name, result, keys, curves, pace: pace(&monitors) })
+    }
+
+    /// The curve `name` of `table`.
+    pub fn curve(&self, of: &Quantity) -> Option<&Quantity> {
+        self.curves.iter().find(|q| q.table == of.table && q.name == of.name)
+    }
+}
+
+/// The columns of a table that tell what the water and the solids do, those alone.
+fn columns(from: &'static str, before: &str, table: &Table) -> Vec<Quantity> {
+    let told = |c: &&String| {
+        let (clock, count) = (c.starts_with("wall_"), ["time [s]", "step [-]"].contains(&c.as_str()));
+        // Components of a quaternion say little one by one: `turn` stands for them.
+        let text = ["body", "outcome"].contains(&c.as_str()) || (from == "bodies" && c.starts_with('q'));
+        !(from == "monitors" && clock || count || text)
+    };
+    let curve = |c: &String| {
+        let points = table.curve(c)?;
+        Some(Quantity { table: from, name: format!("{before}{c}"), points })
+    };
+    table.columns().iter().filter(told).filter_map(curve).collect()
+}
+
+/// The angle by which a solid has turned since its first row.
+fn turn(before: &str, table: &Table) -> Option<Quantity> {
+    let [w, x, y, z] = ["qw [-]", "qx [-]", "qy [-]", "qz [-]"].map(|c| table.curve(c));
+    let (w, x, y, z) = (w?, x?, y?, z?);
+    let q = |k: usize| DQuat::from_xyzw(x[k][1], y[k][1], z[k][1], w[k][1]).normalize();
+    let first = (!w.is_empty()).then(|| q(0))?;
+    let points = (0..w.len()).map(|k| [w[k][0], first.angle_between(q(k)).to_degrees()]).collect();
+    Some(Quantity { table: "bodies", name: format!("{before}turn from the start [degrees]"), points })
+}
+
+/// Seconds a step, from the sum over all stages and the steps between two rows.
+fn pace(monitors: &Table) -> Vec<[f64; 2]> {
+    let stages = monitors.columns().iter().filter(|c| c.starts_with("wall_"));
+    let stages: Vec<Vec<[f64; 2]>> = stages.filter_map(|c| monitors.curve(c)).collect();
+    let Some(steps) = monitors.curve("step [-]").filter(|_| !stages.is_empty()) else { return Vec::new() };
+    let each = (1..steps.len()).filter_map(|k| {
+        let told: Vec<f64> = stages.iter().map(|s| s[k][1]).filter(|s| s.is_finite()).collect();
+        let count = steps[k][1] - steps[k - 1][1];
+        (count > 0.0 && !told.is_empty()).then(|| [steps[k][0], told.iter().sum::<f64>() / count])
+    });
+    each.collect()
+}
+
+/// Keys and values of a case.
+fn flatten(at: &str, value: &toml::Value, out: &mut Vec<(String, String)>) {
+    let below = |key: &str| if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") };
+    match value {
+        toml::Value::Table(table) => table.iter().for_each(|(k, v)| flatten(&below(k), v, out)),
+        toml::Value::Array(all) if all.iter().any(toml::Value::is_table) => {
+            all.iter().enumerate().for_each(|(k, v)| flatten(&below(&k.to_string()), v, out));
+        }
+        other => out.push((at.to_owned(), other.to_string())),
+    }
+}
