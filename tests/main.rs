@@ -31,6 +31,7 @@ mod meshes;
 mod motion_file;
 mod output;
 mod packages;
+mod periodic;
 mod render;
 mod report;
 mod restart;

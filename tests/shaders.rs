@@ -239,6 +239,14 @@ fn structs_lie_the_same_on_both_sides() {
             surface_head,
             wall_shear,
             wall_friction,
+            period,
+            pad_period,
+            inverse_period,
+            pad_inverse,
+            cell_width,
+            pad_width,
+            drive,
+            pad_drive,
         }
     );
     same_layout!(

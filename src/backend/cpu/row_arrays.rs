@@ -3,6 +3,7 @@
 //! Arrays are filled up with zeros to whole [`LANES`]; sums run over that many partial sums side by side, on every
 //! machine, so that results do not depend on its vectors.
 
+use crate::neighbourhood::Particles;
 use crate::neighbours::CAPACITY;
 use glam::DVec3;
 
@@ -39,6 +40,19 @@ impl Columns {
         }
         for v in [x, y, z] {
             v[n..].fill(0.0);
+        }
+        filled
+    }
+
+    /// r_j - r_i of each neighbour j, to its nearest image where sides are periodic; returns the length with the filling.
+    #[inline(always)]
+    pub fn offsets(&mut self, i: usize, neighbour: &[u32], on: Particles) -> usize {
+        let filled = self.differences(i, neighbour, on.position);
+        if on.params.periodic.is_any() {
+            for k in 0..neighbour.len() {
+                let r = on.params.periodic.nearest(DVec3::new(self.x[k], self.y[k], self.z[k]));
+                (self.x[k], self.y[k], self.z[k]) = (r.x, r.y, r.z);
+            }
         }
         filled
     }
