@@ -99,22 +99,47 @@ impl Grid {
     /// The columns of cells around `c`: up to nine, and as many more where z is periodic.
     #[inline(always)]
     pub fn columns(&self, c: [u32; 3]) -> impl Iterator<Item = Column> + use<> {
-        let (grid, [x, y, z]) = (*self, [0, 1, 2].map(|axis| self.around(axis, c[axis])));
-        // Cells above each other are one run, unless a seam lies between.
-        let runs = move |x: (u32, f64), y: (u32, f64)| {
-            let middle = z.into_iter().flatten().filter(|z| z.1 == 0.0);
-            let (low, high) = middle.fold((u32::MAX, 0), |(a, b), (k, _)| (a.min(k), b.max(k)));
-            let beyond = z.into_iter().flatten().filter(|z| z.1 != 0.0);
-            std::iter::once((low, high, 0.0)).chain(beyond.map(|(k, s)| (k, k, s))).map(move |(a, b, s)| {
-                let (first, last) = (grid.index([x.0, y.0, a]), grid.index([x.0, y.0, b]));
-                Column { first, last, shift: DVec3::new(x.1, y.1, s) }
-            })
+        let plain = (!self.periodic.is_any()).then(|| self.columns_within(c));
+        let round = self.periodic.is_any().then(|| self.columns_round(c));
+        plain.into_iter().flatten().chain(round.into_iter().flatten())
+    }
+
+    /// Those of a grid that ends at its sides.
+    #[inline(always)]
+    fn columns_within(&self, c: [u32; 3]) -> impl Iterator<Item = Column> + use<> {
+        let grid = *self;
+        let z = (c[2].saturating_sub(1), (c[2] + 1).min(grid.count[2] - 1));
+        let y = (c[1].saturating_sub(1), (c[1] + 1).min(grid.count[1] - 1));
+        let x = c[0].saturating_sub(1)..=(c[0] + 1).min(grid.count[0] - 1);
+        let column = move |x, y| Column {
+            first: grid.index([x, y, z.0]),
+            last: grid.index([x, y, z.1]),
+            shift: DVec3::ZERO,
         };
-        x.into_iter().flatten().flat_map(move |x| y.into_iter().flatten().flat_map(move |y| runs(x, y)))
+        x.flat_map(move |x| (y.0..=y.1).map(move |y| column(x, y)))
+    }
+
+    /// Those of a grid that goes on across its sides; a list, which only scenes with such sides make.
+    #[cold]
+    fn columns_round(&self, c: [u32; 3]) -> Vec<Column> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.around(axis, c[axis]));
+        let mut out = Vec::with_capacity(27);
+        for x in x.into_iter().flatten() {
+            for y in y.into_iter().flatten() {
+                // Cells above each other are one run, but for those beyond a seam.
+                let within = z.into_iter().flatten().filter(|z| z.1 == 0.0).map(|z| z.0);
+                let (low, high) = within.fold((u32::MAX, 0), |(a, b), k| (a.min(k), b.max(k)));
+                let beyond = z.into_iter().flatten().filter(|z| z.1 != 0.0).map(|(k, s)| (k, k, s));
+                for (a, b, shift) in std::iter::once((low, high, 0.0)).chain(beyond) {
+                    let (first, last) = (self.index([x.0, y.0, a]), self.index([x.0, y.0, b]));
+                    out.push(Column { first, last, shift: DVec3::new(x.1, y.1, shift) });
+                }
+            }
+        }
+        out
     }
 
     /// Cell `c` of an axis and its neighbours there, each with what is to be added to its particles' positions [m].
-    #[inline(always)]
     fn around(&self, axis: usize, c: u32) -> [Option<(u32, f64)>; 3] {
         let (n, length) = (self.count[axis], self.periodic.length()[axis]);
         let around = self.periodic.is_along(axis);

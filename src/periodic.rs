@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(p.images(DVec3::new(-0.9, 7.0, 2.1), 0.2).count(), 4);
         assert_eq!(p.across(DVec3::ONE), DVec3::Y);
         let at = |x| p.crossed(DVec3::new(x, 7.0, 2.25), DVec3::splat(0.1), 0.05);
-        assert_eq!([-0.84, 0.0, 1.86].map(at), [Some(0), None, Some(0)]);
+        assert_eq!([-0.86, 0.0, 1.86].map(at), [Some(0), None, Some(0)]);
         assert_eq!(p.crossed(DVec3::new(0.0, 7.0, 2.25), DVec3::new(0.1, 0.1, 0.24), 0.05), None);
     }
 }

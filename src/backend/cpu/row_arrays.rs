@@ -5,6 +5,7 @@
 
 use crate::neighbourhood::Particles;
 use crate::neighbours::CAPACITY;
+use crate::periodic::Periodic;
 use glam::DVec3;
 
 /// Partial sums of a sum.
@@ -49,12 +50,18 @@ impl Columns {
     pub fn offsets(&mut self, i: usize, neighbour: &[u32], on: Particles) -> usize {
         let filled = self.differences(i, neighbour, on.position);
         if on.params.periodic.is_any() {
-            for k in 0..neighbour.len() {
-                let r = on.params.periodic.nearest(DVec3::new(self.x[k], self.y[k], self.z[k]));
-                (self.x[k], self.y[k], self.z[k]) = (r.x, r.y, r.z);
-            }
+            self.bring_near(neighbour.len(), &on.params.periodic);
         }
         filled
+    }
+
+    /// The first `n` ways become those to the nearest images. Out of line: rows of other scenes do without its code.
+    #[inline(never)]
+    fn bring_near(&mut self, n: usize, periodic: &Periodic) {
+        for k in 0..n {
+            let r = periodic.nearest(DVec3::new(self.x[k], self.y[k], self.z[k]));
+            (self.x[k], self.y[k], self.z[k]) = (r.x, r.y, r.z);
+        }
     }
 
     /// out_k <- f(|v_k|^2).
