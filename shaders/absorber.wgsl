@@ -18,7 +18,7 @@ fn absorber(@builtin(global_invocation_id) id: vec3u) {
     }
     var rate = 0.0;
     for (var k = 0u; k < arrayLength(&absorber_zone); k += 1u) {
-        rate += absorber_rate(absorber_zone[k], x.xyz);
+        rate += absorber_rate(absorber_zone[k], wrapped(x.xyz));
     }
     if rate > 0.0 {
         let v = velocity[i];

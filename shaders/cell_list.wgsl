@@ -4,7 +4,7 @@
 // One counting sort serves both. Its keys are the cell of a fluid particle, then ghosts by their slots, GHOST_BLOCK slots a
 // key, then the cells once more for the particles of moving solids. Atomic arrival order decides where a particle of a key
 // lands in `unsorted`; `place` then ranks each within its key by slot, so the final order is the twin's and the same in
-// every run. Ranking compares all of a key with each other, which is why the ghosts, however many, do not share one.
+// every run. Fluid that has left through a periodic side is brought back on the way. Ranking compares all of a key with each other, which is why the ghosts, however many, do not share one.
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
 @group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
@@ -52,7 +52,7 @@ fn count(@builtin(global_invocation_id) id: vec3u) {
     if k >= params.fluid {
         key = moving_key() + cell_index(cell_coordinates(x.xyz));
     } else if x.w == FLUID {
-        if in_domain(x.xyz, velocity[k].xyz) {
+        if in_domain(wrapped(x.xyz), velocity[k].xyz) {
             key = cell_index(cell_coordinates(x.xyz));
         } else {
             atomicAdd(&counters[LOST], 1u);
@@ -192,7 +192,8 @@ fn place(@builtin(global_invocation_id) id: vec3u) {
     let velocities = 4u * params.fluid;
     let pressures = 2u * velocities;
     if key < params.cell_total {
-        store(4u * to, position[me]);
+        let x = position[me];
+        store(4u * to, vec4f(wrapped(x.xyz), x.w));
         store(velocities + 4u * to, velocity[me]);
         sorted[pressures + to] = pressure[me];
     } else {

@@ -16,7 +16,7 @@
 
 // Velocity that i gains against j if j were immovable.
 fn rebound(x: vec3f, v: vec3f, j: u32) -> vec3f {
-    let r = position[j].xyz - x;
+    let r = offset(x, position[j].xyz);
     let distance_squared = dot(r, r);
     if distance_squared >= params.collision_distance * params.collision_distance || distance_squared == 0.0 {
         return vec3f(0.0);

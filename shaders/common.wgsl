@@ -63,9 +63,14 @@ struct Constants {
     surface_head: f32,     // of the missing half spacing, Pa
     wall_shear: f32,       // weight of a pair of fluid and wall in the viscous sum
     wall_friction: f32,    // C_f / l0 / wall_contact
+    period: vec3f,         // from a periodic side to the opposite one, 0 along other axes
     wall_contact: f32,     // sum w of a particle of a flat wall's layer with the water above it
-    pad: f32,
-    pad_pair: vec2f,
+    inverse_period: vec3f, // 1 / period, 0 along other axes
+    pad_inverse: f32,
+    cell_width: vec3f,
+    pad_width: f32,
+    drive: vec3f,          // what of gravity lies along periodic axes; `gravity` is the rest
+    pad_drive: f32,
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
@@ -122,6 +127,28 @@ fn finite_vector(v: vec3f) -> bool {
 fn shortened(v: vec3f, longest: f32) -> vec3f {
     let squared = dot(v, v);
     return select(v, v * (longest * inverseSqrt(squared)), squared > longest * longest);
+}
+
+// r_j - r_i, to the nearest image of j where sides are periodic; as crate::periodic::Periodic::nearest.
+fn offset(here: vec3f, there: vec3f) -> vec3f {
+    let r = there - here;
+//#if PERIODIC
+    return r - params.period * round(r * params.inverse_period);
+//#else
+    return r;
+//#endif
+}
+
+// x, or its image between the sides where these are periodic; as crate::periodic::Periodic::wrap.
+fn wrapped(x: vec3f) -> vec3f {
+//#if PERIODIC
+    let inside = x - params.period * floor((x - params.lower) * params.inverse_period);
+    // What lies less than a rounding from a side comes to lie on the lower one.
+    let off = (params.period > vec3f(0.0)) & ((inside >= params.upper) | (inside < params.lower));
+    return select(inside, params.lower, off);
+//#else
+    return x;
+//#endif
 }
 
 // sigma of crate::kernels::absorber in one zone.
@@ -231,8 +258,38 @@ fn dummy_place(i: u32, k: u32) -> u32 {
 }
 
 fn cell_coordinates(x: vec3f) -> vec3u {
-    return min(vec3u(max((x - params.lower) / params.effective_radius, vec3f(0.0))), params.cells - 1u);
+//#if PERIODIC
+    let width = params.cell_width;
+//#else
+    let width = vec3f(params.effective_radius);
+//#endif
+    return min(vec3u(max((wrapped(x) - params.lower) / width, vec3f(0.0))), params.cells - 1u);
 }
+
+// The cells around a cell run from the first of these to the second one. Where sides are periodic they are counted on from
+// one grid to the next: `beyond` finds them in the first.
+fn lowest_around(c: vec3u) -> vec3u {
+//#if PERIODIC
+    return select(max(c, vec3u(1u)) - 1u, c + params.cells - 1u, params.period > vec3f(0.0));
+//#else
+    return max(c, vec3u(1u)) - 1u;
+//#endif
+}
+
+fn highest_around(c: vec3u) -> vec3u {
+//#if PERIODIC
+    return select(min(c + 1u, params.cells - 1u), c + params.cells + 1u, params.period > vec3f(0.0));
+//#else
+    return min(c + 1u, params.cells - 1u);
+//#endif
+}
+
+//#if PERIODIC
+fn beyond(c: vec3u) -> vec3u {
+    return c % params.cells;
+}
+
+//#endif
 
 // z runs fastest, so that three cells above each other are one range.
 fn cell_index(c: vec3u) -> u32 {

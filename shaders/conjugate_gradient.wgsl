@@ -137,7 +137,7 @@ fn neighbours(i: u32, x: vec3f) -> f32 {
     var sum = 0.0;
     for (var k = 0u; k < near; k++) {
         let other = preconditioned[neighbour_list[near_place(i, k)]];
-        let r = other.xyz - x;
+        let r = offset(x, other.xyz);
         sum += weight(dot(r, r)) * other.w;
     }
     return sum;
@@ -291,7 +291,7 @@ fn ascend(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
             var others = 0.0;
             for (var k = 0u; k < near; k++) {
                 let other = corrected[neighbour_list[near_place(i, k)]];
-                let r = other.xyz - me.xyz;
+                let r = offset(me.xyz, other.xyz);
                 others += weight(dot(r, r)) * other.w;
             }
             let r = residual[i];

@@ -96,7 +96,7 @@ fn absorber_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
         if x.w == FLUID {
             var rate = 0.0;
             for (var k = 0u; k < arrayLength(&absorber_zone); k++) {
-                rate += absorber_rate(absorber_zone[k], x.xyz);
+                rate += absorber_rate(absorber_zone[k], wrapped(x.xyz));
             }
             // v^2 (b^2 - 1) / 2 with b = 1 / (1 + dt sigma), without the difference of two numbers near 1.
             let v = velocity[i].xyz;
@@ -120,6 +120,9 @@ fn predict_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocat
 //#else
             var total = params.gravity;
 //#endif
+//#if PERIODIC
+            total += params.drive;
+//#endif
             var viscosity = 0.0;
 //#if VISCOSITY
             let viscous = acceleration[i].xyz;
@@ -142,10 +145,11 @@ fn lost_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation
              @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
     var sum = vec4f(0.0);
     for (var i = id.x; i < params.fluid; i += stride(groups.x)) {
-        let x = position[i];
+        let kind = position[i].w;
+        let x = wrapped(position[i].xyz);
         let v = velocity[i].xyz;
-        if x.w == FLUID && !in_domain(x.xyz, v) && finite_vector(x.xyz + v) {
-            sum += vec4f(dot(params.gravity, x.xyz) - 0.5 * dot(v, v), 1.0, 0.0, 0.0);
+        if kind == FLUID && !in_domain(x, v) && finite_vector(x + v) {
+            sum += vec4f(dot(params.gravity, x) - 0.5 * dot(v, v), 1.0, 0.0, 0.0);
         }
     }
     book(vec4u(TAKEN_OUT, NUMBER, CLAMPS, CLAMPS), sum, t, group.x);

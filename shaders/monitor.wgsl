@@ -62,8 +62,9 @@ fn monitor(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_i
             let squared = dot(v, v);
             sum.momentum += v;
             sum.kinetic += 0.5 * squared;
-            sum.position += x.xyz;
-            sum.extent_max = max(sum.extent_max, x.xyz);
+            let place = wrapped(x.xyz);
+            sum.position += place;
+            sum.extent_max = max(sum.extent_max, place);
             sum.particles += 1u;
             sum.speed_squared_max = max(sum.speed_squared_max, squared);
             atomicAdd(&bins[min(u32(sqrt(squared) / now.speed_per_bin), SPEED_BINS - 1u)], 1u);

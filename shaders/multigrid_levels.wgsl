@@ -23,7 +23,7 @@
 // the number of rows, then the first row of each level.
 @group(0) @binding(14) var<storage, read_write> row_cell: array<vec4u>;
 @group(0) @binding(15) var<storage, read_write> member: array<vec2u>; // slot, bits of the diagonal; in cell order
-@group(0) @binding(16) var<storage, read_write> aggregate: array<vec2u>; // of a slot: row + 1 or 0, place_of its cell
+@group(0) @binding(16) var<storage, read_write> aggregate: array<vec2u>; // of a slot: row + 1 or 0, place_of its cell or, where sides are periodic, the cell
 @group(0) @binding(17) var<storage, read_write> entry: array<vec2u>; // column, bits of the value; entry after entry
 
 // As crate::backend::gpu::hierarchy::Hierarchy; the cycle is in shaders/multigrid.wgsl.
@@ -53,6 +53,16 @@ fn place_of(c: vec3i) -> i32 {
     return 9 * c.x + 3 * c.y + c.z;
 }
 
+//#if PERIODIC
+// The step from a cell of a level to its neighbour. Along a periodic axis the last cell is the neighbour of the first.
+fn step_to(level: u32, here: vec3u, there: vec3u) -> vec3i {
+    let d = vec3i(there) - vec3i(here);
+    let goes_round = (params.period > vec3f(0.0)) & (abs(d) > vec3i(1));
+    return select(d, d - sign(d) * vec3i(hierarchy.level[level].xyz), goes_round);
+}
+
+//#endif
+
 fn first_row(level: u32) -> u32 {
     return row_cell[hierarchy.capacity + 1u + level].x;
 }
@@ -71,13 +81,22 @@ struct Listed {
 // Whether there is fluid within one cell: walls elsewhere have no row, and so no unknown.
 fn near_fluid(cell: u32) -> bool {
     let c = coordinates_of(0u, cell);
-    let low = max(c, vec3u(1u)) - 1u;
-    let high = min(c + 1u, params.cells - 1u);
+    let low = lowest_around(c);
+    let high = highest_around(c);
     for (var x = low.x; x <= high.x; x++) {
         for (var y = low.y; y <= high.y; y++) {
+//#if PERIODIC
+            for (var z = low.z; z <= high.z; z++) {
+                let around = cell_index(beyond(vec3u(x, y, z)));
+                if cell_start[around] < cell_start[around + 1u] {
+                    return true;
+                }
+            }
+//#else
             if cell_start[cell_index(vec3u(x, y, low.z))] < cell_start[cell_index(vec3u(x, y, high.z)) + 1u] {
                 return true;
             }
+//#endif
         }
     }
     return false;
@@ -273,7 +292,11 @@ fn members(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gr
     for (var cell = id.x; cell < params.cell_total; cell += groups.x * WORKGROUP) {
         let row = cell_row[hierarchy.level[0].w + cell];
         if row.x > 0u {
+//#if PERIODIC
+            let place = cell;
+//#else
             let place = bitcast<u32>(place_of(vec3i(coordinates_of(0u, cell))));
+//#endif
             let l = listed(cell);
             let all = l.count.x + l.count.y + l.count.z;
             var to = row.y;
@@ -317,7 +340,10 @@ fn galerkin(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) g
     for (var row = first_row(0u) + id.x; row < end; row += groups.x * WORKGROUP) {
         let cell = row_cell[row];
         let c = coordinates_of(0u, cell.x);
+//#if PERIODIC
+//#else
         let own = place_of(vec3i(c)) - 13;
+//#endif
         empty_stencil(row);
         for (var m = cell.z; m < cell.w; m++) {
             let i = member[m].x;
@@ -328,9 +354,13 @@ fn galerkin(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) g
                 let j = neighbour_list[near_place(i, k)];
                 let other = aggregate[j];
                 if other.x > 0u {
-                    let r = position[j].xyz - x;
+                    let r = offset(x, position[j].xyz);
                     // Listed pairs lay in neighbouring cells when both were sorted: always within the stencil.
+//#if PERIODIC
+                    let to = u32(place_of(step_to(0u, c, coordinates_of(0u, other.y))) + 13);
+//#else
                     let to = u32(bitcast<i32>(other.y) - own);
+//#endif
                     value[to] -= weight(dot(r, r));
                     column[to] = other.x - 1u;
                 }
@@ -355,7 +385,12 @@ fn coarsen(level: u32, row: u32) {
                     let v = bitcast<f32>(e.y);
                     if v != 0.0 {
                         let d = vec3i(vec3u(k / 9u, k / 3u % 3u, k % 3u)) - 1;
+//#if PERIODIC
+                        let neighbour = vec3u(vec3i(c + size) + d) % size;
+                        let to = u32(place_of(step_to(level, p, neighbour >> vec3u(1u))) + 13);
+//#else
                         let to = u32(place_of(((vec3i(c) + d) >> vec3u(1u)) - vec3i(p)) + 13);
+//#endif
                         value[to] += v;
                         column[to] = row_cell[e.x].y - 1u;
                     }

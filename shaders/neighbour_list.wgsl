@@ -1,8 +1,9 @@
 // Neighbour list: all particles within the effective radius.
 // Twin: src/kernels/neighbour_list.rs
 //
-// A thread finds the row of one pressure-carrying particle. With the balanced source no wall carries pressure to a wall. Rows of ghosts, and of walls with no fluid within one cell,
-// stay empty. A row that is full counts on and reports itself; nothing is dropped unseen.
+// A thread finds the row of one pressure-carrying particle. With the balanced source no wall carries pressure to a wall.
+// Rows of ghosts, and of walls with no fluid within one cell, stay empty. A row that is full counts on and reports itself;
+// nothing is dropped unseen. Where sides are periodic the cells around go on at the other side.
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
 @group(0) @binding(3) var<storage, read> cell_start: array<u32>;
@@ -41,15 +42,52 @@ fn see(i: u32, j: u32, r: vec3f) {
     }
 }
 
+// Whether there is fluid in a column of cells, the last one included.
+fn holds_fluid(first: u32, last: u32) -> bool {
+    return cell_start[first] < cell_start[last + 1u];
+}
+
 fn near_fluid(low: vec3u, high: vec3u) -> bool {
     for (var x = low.x; x <= high.x; x++) {
         for (var y = low.y; y <= high.y; y++) {
-            if cell_start[cell_index(vec3u(x, y, low.z))] < cell_start[cell_index(vec3u(x, y, high.z)) + 1u] {
+//#if PERIODIC
+            for (var z = low.z; z <= high.z; z++) {
+                let cell = cell_index(beyond(vec3u(x, y, z)));
+                if holds_fluid(cell, cell) {
+                    return true;
+                }
+            }
+//#else
+            if holds_fluid(cell_index(vec3u(x, y, low.z)), cell_index(vec3u(x, y, high.z))) {
                 return true;
             }
+//#endif
         }
     }
     return false;
+}
+
+// The particles of a column of cells, the last one not included.
+fn see_cells(i: u32, me: vec3f, first: u32, last: u32) {
+    let fluid_end = cell_start[last];
+    for (var j = cell_start[first]; j < fluid_end; j++) {
+        see(i, j, offset(me, position[j].xyz));
+    }
+//#if MOVING
+    let moving = moving_key();
+    let moving_end = cell_start[moving + last] - params.fluid;
+    for (var k = cell_start[moving + first] - params.fluid; k < moving_end; k++) {
+        let j = moving_slot[k];
+        see(i, j, offset(me, position[j].xyz));
+    }
+//#endif
+//#if STATIC
+    let static_end = static_start[last];
+    for (var k = static_start[first]; k < static_end; k++) {
+        let other = static_particle[k];
+        see(i, other.w, offset(me, bitcast<vec3f>(other.xyz)));
+    }
+//#endif
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -60,8 +98,8 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     }
     let me = position[i];
     let cell = cell_coordinates(me.xyz);
-    let low = max(cell, vec3u(1u)) - 1u;
-    let high = min(cell + 1u, params.cells - 1u);
+    let low = lowest_around(cell);
+    let high = highest_around(cell);
     var searched = me.w == FLUID;
     if i >= params.fluid {
         searched = near_fluid(low, high);
@@ -80,26 +118,13 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     smallest = params.effective_radius * params.effective_radius;
     for (var x = low.x; x <= high.x; x++) {
         for (var y = low.y; y <= high.y; y++) {
-            let first = cell_index(vec3u(x, y, low.z));
-            let last = cell_index(vec3u(x, y, high.z)) + 1u;
-            let fluid_end = cell_start[last];
-            for (var j = cell_start[first]; j < fluid_end; j++) {
-                see(i, j, position[j].xyz - me.xyz);
+//#if PERIODIC
+            for (var z = low.z; z <= high.z; z++) {
+                let cell = cell_index(beyond(vec3u(x, y, z)));
+                see_cells(i, me.xyz, cell, cell + 1u);
             }
-//#if MOVING
-            let moving = moving_key();
-            let moving_end = cell_start[moving + last] - params.fluid;
-            for (var k = cell_start[moving + first] - params.fluid; k < moving_end; k++) {
-                let j = moving_slot[k];
-                see(i, j, position[j].xyz - me.xyz);
-            }
-//#endif
-//#if STATIC
-            let static_end = static_start[last];
-            for (var k = static_start[first]; k < static_end; k++) {
-                let other = static_particle[k];
-                see(i, other.w, bitcast<vec3f>(other.xyz) - me.xyz);
-            }
+//#else
+            see_cells(i, me.xyz, cell_index(vec3u(x, y, low.z)), cell_index(vec3u(x, y, high.z)) + 1u);
 //#endif
         }
     }

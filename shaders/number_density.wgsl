@@ -25,14 +25,14 @@ fn number_density_main(@builtin(global_invocation_id) id: vec3u) {
     var wet = i < params.fluid && me.w == FLUID;
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
-        let r = position[j].xyz - me.xyz;
+        let r = offset(me.xyz, position[j].xyz);
         let w = weight(dot(r, r));
         n += w;
         centroid += w * r;
         wet = wet || (j < params.fluid && w > 0.0);
     }
     for (var k = 0u; k < dummies; k++) {
-        let r = position[neighbour_list[dummy_place(i, k)]].xyz - me.xyz;
+        let r = offset(me.xyz, position[neighbour_list[dummy_place(i, k)]].xyz);
         let w = weight(dot(r, r));
         n += w;
         centroid += w * r;

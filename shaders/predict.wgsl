@@ -1,4 +1,5 @@
 // Explicit part of the step: v* = v + dt (g + nu lap v), r* = r + dt v*; Eq. (2) without pressure.
+// Gravity along periodic axes, which no pressure balances, acts here in any scheme.
 // Twin: src/kernels/predict.rs
 
 @group(0) @binding(2) var<storage, read_write> position: array<vec4f>;
@@ -21,6 +22,9 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     var a = vec3f(0.0);
 //#else
     var a = params.gravity;
+//#endif
+//#if PERIODIC
+    a += params.drive;
 //#endif
 //#if VISCOSITY
     a += acceleration[i].xyz;

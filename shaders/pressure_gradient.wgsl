@@ -44,7 +44,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
         let j = neighbour_list[near_place(i, k)];
         reference = min(reference, pressure[j]);
 //#if CONSISTENT
-        level = min(level, pressure[j] - hydrostatic(position[j].xyz - x.xyz));
+        level = min(level, pressure[j] - hydrostatic(offset(x.xyz, position[j].xyz)));
 //#endif
     }
     var sum = vec3f(0.0);
@@ -60,7 +60,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
 //#endif
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
-        let r = position[j].xyz - x.xyz;
+        let r = offset(x.xyz, position[j].xyz);
         let e = pair_vector(weight(dot(r, r)), r);
         sum += (pressure[j] - reference) * e;
 //#if CONSISTENT
@@ -72,7 +72,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     if inner {
         let dummies = dummies_of(count);
         for (var k = 0u; k < dummies; k++) {
-            let r = position[neighbour_list[dummy_place(i, k)]].xyz - x.xyz;
+            let r = offset(x.xyz, position[neighbour_list[dummy_place(i, k)]].xyz);
             let e = pair_vector(weight(dot(r, r)), r);
             sum += (own + hydrostatic(r) - reference) * e;
             one_side += e;

@@ -83,7 +83,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
 //#endif
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
-        let r = position[j].xyz - x;
+        let r = offset(x, position[j].xyz);
         let w = weight(dot(r, r));
         links += w;
 //#if CONSISTENT
@@ -102,7 +102,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let dummies = dummies_of(count);
     for (var k = 0u; k < dummies; k++) {
         let j = neighbour_list[dummy_place(i, k)];
-        let r = position[j].xyz - x;
+        let r = offset(x, position[j].xyz);
         sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);
     }
     // A wall's row undoes as much as there is water before it.

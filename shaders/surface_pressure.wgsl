@@ -15,7 +15,7 @@ fn of_water(i: u32, x: vec3f, near: u32) -> f32 {
     var sum = vec3f(0.0);
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
-        let r = position[j].xyz - x;
+        let r = offset(x, position[j].xyz);
         sum += (pressure[j] + own) * pair_vector(weight(dot(r, r)), r);
     }
     return 0.5 * params.spacing * params.gradient_scale * length(sum);
@@ -28,7 +28,7 @@ fn of_wall(i: u32, x: vec3f, near: u32) -> f32 {
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list[near_place(i, k)];
         if j < params.fluid && state[j] == SURFACE {
-            let r = position[j].xyz - x;
+            let r = offset(x, position[j].xyz);
             let w = weight(dot(r, r));
             total += w;
             sum += w * pressure[j];

@@ -16,7 +16,7 @@ fn shear(i: u32, below: u32) -> vec3f {
     var sum = vec3f(0.0);
     for (var k = 0u; k < neighbours; k++) {
         let j = neighbour_list[near_place(i, k)];
-        let r = position[j].xyz - x;
+        let r = offset(x, position[j].xyz);
         let distance_squared = dot(r, r);
         // The particles have moved since the list was made.
         if j < below && distance_squared > 0.0

@@ -24,7 +24,7 @@ fn friction(i: u32) -> vec4f {
     for (var k = 0u; k < neighbours; k++) {
         let j = neighbour_list[near_place(i, k)];
         if j >= params.fluid {
-            let r = position[j].xyz - x;
+            let r = offset(x, position[j].xyz);
             let w = weight(dot(r, r));
             sum += w;
             wall += w * velocity[j].xyz;
@@ -60,7 +60,7 @@ fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
             if j < params.fluid {
                 let other = friction(j);
                 if other.w > 0.0 {
-                    let r = position[j].xyz - x;
+                    let r = offset(x, position[j].xyz);
                     taken += weight(dot(r, r)) / other.w * other.xyz;
                 }
             }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::params::Params;
+use crate::periodic::Periodic;
 use glam::DVec3;
 
 /// Geometry of the grid. Cells are numbered with z running fastest and x slowest, so that the three
@@ -10,20 +11,46 @@ use glam::DVec3;
 pub struct Grid {
     /// Lower corner [m].
     pub origin: DVec3,
-    /// Width of a cell [m].
-    pub width: f64,
+    /// Widths of a cell [m]: the effective radius, or as much more as a periodic axis takes to hold a whole number.
+    pub width: DVec3,
     /// Cells along x, y, z.
     pub count: [u32; 3],
+    /// Across which sides the search goes on.
+    pub periodic: Periodic,
+}
+
+/// Cells that lie above each other, and what is to be added to their particles' positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Column {
+    /// First cell.
+    pub first: usize,
+    /// Last cell, included.
+    pub last: usize,
+    /// From the particles to their images [m]; 0 within the sides.
+    pub shift: DVec3,
 }
 
 impl Grid {
+    /// A single cell, of a dry scene.
+    pub(crate) fn nothing() -> Self {
+        Self { origin: DVec3::ZERO, width: DVec3::ONE, count: [1; 3], periodic: Periodic::default() }
+    }
+
     /// Grid over the domain of `params`.
     pub fn new(params: &Params) -> Result<Self> {
-        let width = params.effective_radius;
+        let (radius, periodic) = (params.effective_radius, params.periodic);
         let extent = params.domain_max - params.domain_min;
-        let cells = |length: f64| (length / width).floor() + 1.0;
-        let along_y = if params.dimensions == 2 { 1.0 } else { cells(extent.y) };
-        let total = cells(extent.x) * along_y * cells(extent.z);
+        let cells = |k: usize| match periodic.is_along(k) {
+            // No more than there is room for: none may be narrower than the radius.
+            true => (extent[k] / radius * (1.0 + 1e-12)).floor().max(1.0),
+            false => (extent[k] / radius).floor() + 1.0,
+        };
+        let along_y = if params.dimensions == 2 { 1.0 } else { cells(1) };
+        let total = cells(0) * along_y * cells(2);
+        let mut width = DVec3::splat(radius);
+        for k in (0..3).filter(|&k| periodic.is_along(k)) {
+            width[k] = extent[k] / cells(k);
+        }
         if total.is_nan() || total >= 2e9 {
             let message = format!(
                 "the domain of {:.3} x {:.3} x {:.3} m holds {total:.2e} cells of the neighbour search, more than \
@@ -35,7 +62,8 @@ impl Grid {
         Ok(Self {
             origin: params.domain_min,
             width,
-            count: [cells(extent.x) as u32, along_y as u32, cells(extent.z) as u32],
+            count: [cells(0) as u32, along_y as u32, cells(2) as u32],
+            periodic,
         })
     }
 
@@ -47,7 +75,7 @@ impl Grid {
     /// Cell coordinates of a position inside the domain.
     #[inline(always)]
     pub(crate) fn coordinates(&self, x: DVec3) -> [u32; 3] {
-        let c = (x - self.origin) / self.width;
+        let c = (self.periodic.wrap(x) - self.origin) / self.width;
         [
             (c.x.max(0.0) as u32).min(self.count[0] - 1),
             (c.y.max(0.0) as u32).min(self.count[1] - 1),
@@ -68,13 +96,57 @@ impl Grid {
         [(cell / (y * z)) as u32, (cell / z % y) as u32, (cell % z) as u32]
     }
 
-    /// First and last cell (inclusive) of each of the up to nine columns of cells around `c`.
+    /// The columns of cells around `c`: up to nine, and as many more where z is periodic.
     #[inline(always)]
-    pub fn columns(&self, c: [u32; 3]) -> impl Iterator<Item = (usize, usize)> + use<> {
+    pub fn columns(&self, c: [u32; 3]) -> impl Iterator<Item = Column> + use<> {
+        let plain = (!self.periodic.is_any()).then(|| self.columns_within(c));
+        let round = self.periodic.is_any().then(|| self.columns_round(c));
+        plain.into_iter().flatten().chain(round.into_iter().flatten())
+    }
+
+    /// Those of a grid that ends at its sides.
+    #[inline(always)]
+    fn columns_within(&self, c: [u32; 3]) -> impl Iterator<Item = Column> + use<> {
         let grid = *self;
         let z = (c[2].saturating_sub(1), (c[2] + 1).min(grid.count[2] - 1));
         let y = (c[1].saturating_sub(1), (c[1] + 1).min(grid.count[1] - 1));
-        (c[0].saturating_sub(1)..=(c[0] + 1).min(grid.count[0] - 1))
-            .flat_map(move |x| (y.0..=y.1).map(move |y| (grid.index([x, y, z.0]), grid.index([x, y, z.1]))))
+        let x = c[0].saturating_sub(1)..=(c[0] + 1).min(grid.count[0] - 1);
+        let column = move |x, y| Column {
+            first: grid.index([x, y, z.0]),
+            last: grid.index([x, y, z.1]),
+            shift: DVec3::ZERO,
+        };
+        x.flat_map(move |x| (y.0..=y.1).map(move |y| column(x, y)))
+    }
+
+    /// Those of a grid that goes on across its sides; a list, which only scenes with such sides make.
+    #[cold]
+    fn columns_round(&self, c: [u32; 3]) -> Vec<Column> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.around(axis, c[axis]));
+        let mut out = Vec::with_capacity(27);
+        for x in x.into_iter().flatten() {
+            for y in y.into_iter().flatten() {
+                // Cells above each other are one run, but for those beyond a seam.
+                let within = z.into_iter().flatten().filter(|z| z.1 == 0.0).map(|z| z.0);
+                let (low, high) = within.fold((u32::MAX, 0), |(a, b), k| (a.min(k), b.max(k)));
+                let beyond = z.into_iter().flatten().filter(|z| z.1 != 0.0).map(|(k, s)| (k, k, s));
+                for (a, b, shift) in std::iter::once((low, high, 0.0)).chain(beyond) {
+                    let (first, last) = (self.index([x.0, y.0, a]), self.index([x.0, y.0, b]));
+                    out.push(Column { first, last, shift: DVec3::new(x.1, y.1, shift) });
+                }
+            }
+        }
+        out
+    }
+
+    /// Cell `c` of an axis and its neighbours there, each with what is to be added to its particles' positions [m].
+    fn around(&self, axis: usize, c: u32) -> [Option<(u32, f64)>; 3] {
+        let (n, length) = (self.count[axis], self.periodic.length()[axis]);
+        let around = self.periodic.is_along(axis);
+        [
+            if c > 0 { Some((c - 1, 0.0)) } else { around.then_some((n - 1, -length)) },
+            Some((c, 0.0)),
+            if c + 1 < n { Some((c + 1, 0.0)) } else { around.then_some((0, length)) },
+        ]
     }
 }

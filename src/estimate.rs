@@ -153,7 +153,7 @@ impl Estimate {
         let mut solids: f64 =
             walls.iter().map(|(lo, hi, open)| inside(&|k| span(lo, hi, k), open)).sum::<f64>();
         if let Some(tank) = &case.tank {
-            solids += shell(&|k| span(&tank.min, &tank.max, k), &tank.open);
+            solids += shell(&|k| span(&tank.min, &tank.max, k), &tank.without_wall());
         }
         let across = |p: &crate::case::Plane| if flat { 1.0 } else { (p.size[1] / l0).ceil().max(1.0) };
         solids +=

@@ -3,7 +3,8 @@
 //! Slots follow [`crate::scene::Groups`]. Fluid slots are kept in cell order and so change from step to
 //! step (`id` tells who is who); all other slots stay.
 
-use crate::scene::{Kind, Scene};
+use crate::periodic::Periodic;
+use crate::scene::{Groups, Kind, Scene};
 use glam::DVec3;
 
 /// Part of a particle in the pressure Poisson equation.
@@ -74,6 +75,13 @@ impl Fields {
             diagonal: vec![1.0; p],
             acceleration: vec![DVec3::ZERO; g.fluid],
             reaction: Vec::new(),
+        }
+    }
+
+    /// Bring the fluid back between the sides where these are periodic: since the last search it may have left them.
+    pub(crate) fn wrap(&mut self, groups: &Groups, periodic: &Periodic) {
+        if periodic.is_any() {
+            self.position[..groups.fluid].iter_mut().for_each(|x| *x = periodic.wrap(*x));
         }
     }
 }

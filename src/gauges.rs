@@ -8,6 +8,7 @@ use crate::fields::Fields;
 use crate::kernels::body_force::{head, surface_pressure};
 use crate::output::table::{Cell, vector_cells, vector_columns};
 use crate::params::Params;
+use crate::periodic::Periodic;
 use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
@@ -128,7 +129,7 @@ impl Gauges {
         for &(_, line) in &self.level {
             let level = fields.as_ref().and_then(|f| {
                 let (reach, l0) = (params.effective_radius, params.spacing);
-                level(f, &simulation.groups, line, params.dimensions, reach, l0)
+                level(f, &simulation.groups, line, params.dimensions, reach, l0, &params.periodic)
             });
             row.push(Cell::from(level.unwrap_or(f64::NAN)));
         }
@@ -192,12 +193,14 @@ pub fn level(
     dimensions: u32,
     reach: f64,
     l0: f64,
+    periodic: &Periodic,
 ) -> Option<f64> {
     let plane = dimensions == 2;
     let near: Vec<(f64, f64)> = (0..groups.fluid)
         .filter(|&i| fields.kind[i] == Kind::Fluid)
         .map(|i| fields.position[i])
-        .map(|x| ((x.x - line[0]).powi(2) + if plane { 0.0 } else { (x.y - line[1]).powi(2) }, x.z))
+        .map(|x| (periodic.nearest(DVec3::new(x.x - line[0], x.y - line[1], 0.0)), x.z))
+        .map(|(way, z)| (way.x.powi(2) + if plane { 0.0 } else { way.y.powi(2) }, z))
         .filter(|&(d2, _)| d2 < reach * reach)
         .collect();
     let sum = |z: f64| -> f64 {
@@ -261,7 +264,7 @@ mod tests {
 
     fn level_of(fields: &Fields, line: [f64; 2], l0: f64) -> Option<f64> {
         let groups = Groups { fluid: fields.kind.len(), ..Groups::default() };
-        level(fields, &groups, line, 3, 2.1 * l0, l0)
+        level(fields, &groups, line, 3, 2.1 * l0, l0, &Default::default())
     }
 
     #[test]

@@ -47,6 +47,7 @@
 //! |---|---|---|
 //! | weight (3), n0 (4), lambda (7) | [`lattice`] | `fluid` |
 //! | absorption of waves | [`kernels::absorber`] | `twins`, `waves` |
+//! | periodic sides | [`periodic`], `offset` in `shaders/common.wgsl` | `periodic`, by brute force over images |
 //! | viscosity (2), (6) | [`kernels::viscosity`] | `twins`, study `stability` |
 //! | explicit step (2) | [`kernels::predict`] | `twins`, `fluid` |
 //! | solids take their pose | [`kernels::move_solids`] | `twins`, `immersed` |
@@ -88,6 +89,7 @@ pub mod neighbours;
 mod open;
 pub mod output;
 pub mod params;
+pub mod periodic;
 pub mod plan;
 pub mod pressure;
 pub mod run;

@@ -19,6 +19,14 @@ pub struct Particles<'a> {
     pub fluid: usize,
 }
 
+impl Particles<'_> {
+    /// r_j - r_i of slots `i` and `j` [m], to the nearest image of j where sides are periodic.
+    #[inline(always)]
+    pub fn offset(&self, i: usize, j: usize) -> DVec3 {
+        self.params.periodic.nearest(self.position[j] - self.position[i])
+    }
+}
+
 /// Smallest eigenvalue, by a lower bound of it, at which the inverse is used: below, the neighbourhood is too
 /// one-sided or too flat for a linear fit.
 pub const EIGENVALUE_MIN: f64 = 0.1;
@@ -38,14 +46,14 @@ pub(crate) fn weight_over_square(w: f64, re: f64) -> f64 {
 
 /// (d / n0) w r / r^2 of slot `i` and neighbour `j` of weight `w` [1/m].
 pub(crate) fn pair_vector(i: usize, j: usize, w: f64, on: Particles) -> DVec3 {
-    scale(on) * weight_over_square(w, on.params.effective_radius) * (on.position[j] - on.position[i])
+    scale(on) * weight_over_square(w, on.params.effective_radius) * on.offset(i, j)
 }
 
 /// M of slot `i` over `all` its neighbours [-].
 pub fn moment(i: usize, all: Row, on: Particles) -> DMat3 {
     let mut m = DMat3::ZERO;
     for (j, w) in all.iter() {
-        let (e, r) = (pair_vector(i, j, w, on), on.position[j] - on.position[i]);
+        let (e, r) = (pair_vector(i, j, w, on), on.offset(i, j));
         m += DMat3::from_cols(e * r.x, e * r.y, e * r.z);
     }
     if on.params.dimensions == 2 {

@@ -3,6 +3,7 @@
 use crate::case::{self, Case, Preset};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
+use crate::periodic::Periodic;
 use crate::scene::Scene;
 use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 use glam::DVec3;
@@ -82,8 +83,10 @@ pub struct Params {
     pub smooth_density: f64,
     /// Neighbours of a particle on the full lattice.
     pub neighbours: u32,
-    /// Gravity [m/s2].
+    /// Gravity, without what of it lies along periodic axes [m/s2]: what a pressure at rest balances.
     pub gravity: DVec3,
+    /// What of gravity lies along periodic axes [m/s2]: no pressure balances it, it drives the flow.
+    pub drive: DVec3,
     /// Density of the fluid [kg/m3].
     pub density: f64,
     /// Kinematic viscosity [m2/s].
@@ -121,6 +124,8 @@ pub struct Params {
     pub domain_min: DVec3,
     /// Upper corner of the domain [m].
     pub domain_max: DVec3,
+    /// Sides that the water leaves through to come in at the opposite one.
+    pub periodic: Periodic,
 }
 
 /// Coefficients of one step.
@@ -156,7 +161,8 @@ impl Params {
         } else {
             (Source::Mixed, Gradient::Consistent, FreeSurface::ThresholdOffset)
         };
-        let g = scene.gravity.length();
+        let (gravity, periodic) = (scene.periodic.across(scene.gravity), scene.periodic);
+        let g = gravity.length();
         // 1 % compression of the wall layer in hydrostatics, and well above the speed of the collapse.
         let derived_speed = (100.0 * g * l0).sqrt().max(2.5 * (g * scene.depth).sqrt()).max(1e-6);
         let relaxation = match fluid.map(|f| (f.relaxation, f.sound_speed)) {
@@ -173,7 +179,8 @@ impl Params {
             laplacian: lattice.laplacian * l0 * l0,
             smooth_density: lattice.smooth_density,
             neighbours: lattice.neighbours,
-            gravity: scene.gravity,
+            gravity,
+            drive: scene.gravity - gravity,
             density: fluid.map_or(1000.0, |f| f.density),
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
             wall_shear: if paper { 1.0 } else { lattice.wall_shear },
@@ -192,6 +199,7 @@ impl Params {
             depth: scene.depth,
             domain_min: scene.domain.0,
             domain_max: scene.domain.1,
+            periodic,
         })
     }
 
@@ -217,8 +225,16 @@ impl Params {
     /// Gravity of the explicit stage [m/s2]: none where it acts together with the pressure that balances it.
     pub fn explicit_gravity(&self) -> DVec3 {
         match self.source {
-            Source::NumberDensity => self.gravity,
-            Source::Mixed => DVec3::ZERO,
+            Source::NumberDensity => self.gravity + self.drive,
+            Source::Mixed => self.drive,
+        }
+    }
+
+    /// Gravity that acts together with the pressure that balances it [m/s2].
+    pub fn balanced_gravity(&self) -> DVec3 {
+        match self.source {
+            Source::NumberDensity => DVec3::ZERO,
+            Source::Mixed => self.gravity,
         }
     }
 

@@ -33,6 +33,7 @@ mod motion_file;
 mod output;
 mod output_fields;
 mod packages;
+mod periodic;
 mod render;
 mod report;
 mod restart;

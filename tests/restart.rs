@@ -129,6 +129,7 @@ fn a_run_in_parts_is_the_run_to_the_last_bit() {
             ]),
         ),
         ("multigrid", more(&["fluid.solver.preconditioner=multigrid"])),
+        ("periodic sides", vec!["tank.periodic=[\"x\"]", "run.gravity=[2, 0, -9.81]", "output.ledger=true"]),
         ("tables now and then", more(&["output.table_every=0.007", "gauge.every=0.011"])),
     ] {
         let sets: Vec<&str> = match what {

@@ -239,9 +239,14 @@ fn structs_lie_the_same_on_both_sides() {
             surface_head,
             wall_shear,
             wall_friction,
+            period,
             wall_contact,
-            pad,
-            pad_pair,
+            inverse_period,
+            pad_inverse,
+            cell_width,
+            pad_width,
+            drive,
+            pad_drive,
         }
     );
     same_layout!(

@@ -97,7 +97,7 @@ fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
     if plan.wet() {
         return Grid::new(params);
     }
-    Ok(Grid { origin: DVec3::ZERO, width: 1.0, count: [1; 3] })
+    Ok(Grid::nothing())
 }
 
 impl Gpu {

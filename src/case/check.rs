@@ -298,7 +298,8 @@ impl Checker<'_> {
             .chain(case.plane.iter().map(|p| p.name.as_str()))
             .collect();
         if let Some(tank) = &case.tank {
-            let walls = super::TANK_FACES.iter().filter(|(face, _)| !tank.open.contains(face));
+            let bare = tank.without_wall();
+            let walls = super::TANK_FACES.iter().filter(|(face, _)| !bare.contains(face));
             solid.extend(walls.map(|(_, name)| *name));
         }
         for (k, gauge) in gauges.force.iter().enumerate() {

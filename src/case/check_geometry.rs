@@ -1,7 +1,8 @@
 //! The part of the check that judges shapes: edges, lengths against the spacing, motion, names.
 
 use super::check::{Checker, face, length};
-use super::{BodyShape, Face, Form, Vector};
+use super::{BodyShape, Face, Form, Tank, Vector};
+use crate::periodic::CELLS_MIN;
 
 /// More cells than this are a slip of the pen; what a machine can hold is asked before anything is built.
 const MOST_CELLS: f64 = 1e11;
@@ -86,6 +87,65 @@ impl Checker<'_> {
         }
     }
 
+    /// Sides that the water goes on across: each once, no walls' business, and of a length that the search can go round.
+    fn periodic(&mut self, tank: &Tank) {
+        let case = self.case;
+        for (i, &axis) in tank.periodic.iter().enumerate() {
+            let (k, path) = (axis as usize, format!("tank.periodic.{i}"));
+            let name = ["x", "y", "z"][k];
+            if tank.periodic[..i].contains(&axis) {
+                self.add(path, format!("\"{name}\" is listed twice"), "remove one of them");
+                continue;
+            }
+            if self.flat() && k == 1 {
+                let message = "in two dimensions there is nothing along y";
+                self.add(path, message, "remove \"y\", or set run.dimensions = 3");
+                continue;
+            }
+            let of_axis =
+                |f: &&Face| super::TANK_FACES.iter().position(|t| t.0 == **f).is_some_and(|n| n / 2 == k);
+            if let Some(&open) = tank.open.iter().find(of_axis) {
+                let message = format!("the tank is periodic along {name} and open at `{}`", face(open));
+                self.add("tank.open", message, format!("remove `{}`: the side has no wall", face(open)));
+            }
+            let (Some(l0), length) = (self.spacing(), tank.max[k] - tank.min[k]) else { continue };
+            let cells = length / l0;
+            if !(cells.is_finite() && cells > 0.0 && cells < 1e9) {
+                continue;
+            }
+            let least = (f64::from(CELLS_MIN) * case.run.effective_radius - 1e-6).ceil();
+            let end = |n: f64| tank.min[k] + n * l0;
+            if (cells - cells.round()).abs() > 1e-6 * cells.clamp(1.0, 1e3) {
+                let (short, long) = (cells.floor().max(least), cells.ceil().max(least));
+                let message = format!(
+                    "the tank is {length} m long along {name}, {cells:.3} spacings of {l0} m: round a periodic axis the \
+                     lattice must close"
+                );
+                let remedy = format!(
+                    "use {} m or {} m (tank.max.{k} = {} or {})",
+                    digits(short * l0),
+                    digits(long * l0),
+                    digits(end(short)),
+                    digits(end(long))
+                );
+                self.add(format!("tank.max.{k}"), message, remedy);
+            } else if cells.round() < least {
+                let message = format!(
+                    "the tank is {length} m long along {name}, less than {CELLS_MIN} effective radii of {} m: a particle \
+                     would meet another one and its image at once",
+                    digits(case.run.effective_radius * l0)
+                );
+                let remedy = format!(
+                    "use {} m or more (tank.max.{k} = {}), or run.spacing = {} or less",
+                    digits(least * l0),
+                    digits(end(least)),
+                    round_down(length / least)
+                );
+                self.add(format!("tank.max.{k}"), message, remedy);
+            }
+        }
+    }
+
     pub(super) fn walls(&mut self) {
         let case = self.case;
         if let Some(tank) = &case.tank {
@@ -93,6 +153,7 @@ impl Checker<'_> {
                 self.fits("tank", "the tank", &tank.min, &tank.max);
             }
             self.open("tank", &tank.open);
+            self.periodic(tank);
         }
         let tank = case.tank.as_ref();
         for (k, o) in case.obstacle.iter().enumerate() {
@@ -300,6 +361,11 @@ fn unfit(name: &str) -> Option<String> {
     }
     // Spreadsheets take such a cell for a formula.
     name.trim_start().starts_with(['=', '+', '-', '@']).then(|| "begins like a formula".into())
+}
+
+/// A length as somebody would write it.
+fn digits(x: f64) -> String {
+    format!("{:.9}", x).trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// A length rounded down to three digits, for a remedy that works when it is copied.

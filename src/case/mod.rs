@@ -296,6 +296,18 @@ pub enum Face {
     ZMax,
 }
 
+/// An axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
+    /// Along z.
+    Z,
+}
+
 /// Faces of the tank and the names of their walls, in the order of [`Face`].
 pub(crate) const TANK_FACES: [(Face, &str); 6] = [
     (Face::XMin, "tank.x_min"),
@@ -318,6 +330,24 @@ pub struct Tank {
     #[serde(default)]
     #[schemars(length(max = 5), transform = bounds::each_once)]
     pub open: Vec<Face>,
+    /// Axes across whose two faces the water goes on: what leaves through one comes in through the other. There are no walls
+    /// there; the length is a whole number of spacings and three effective radii or more.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 3), transform = bounds::each_once)]
+    pub periodic: Vec<Axis>,
+}
+
+impl Tank {
+    /// Whether it is periodic along x, y, z.
+    pub(crate) fn periodic(&self) -> [bool; 3] {
+        [Axis::X, Axis::Y, Axis::Z].map(|axis| self.periodic.contains(&axis))
+    }
+
+    /// Faces without a wall: those that are open, and those across which the water goes on.
+    pub(crate) fn without_wall(&self) -> Vec<Face> {
+        let seam = TANK_FACES.iter().enumerate().filter(|(k, _)| self.periodic()[k / 2]);
+        self.open.iter().copied().chain(seam.map(|(_, (face, _))| *face)).collect()
+    }
 }
 
 /// A fixed solid: a box, or any other shape.

@@ -38,7 +38,7 @@ impl FixedWall {
         let l0 = scene.spacing;
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
         let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
-        let cell = |x: DVec3| ((x - origin) / l0).round().as_ivec3();
+        let cell = |x: DVec3| ((scene.periodic.wrap(x) - origin) / l0).round().as_ivec3();
         let solid: HashSet<IVec3> =
             scene.position[scene.groups.static_range()].iter().map(|x| cell(*x)).collect();
         for (k, slot) in scene.groups.static_wall_range().enumerate() {
@@ -85,7 +85,9 @@ impl FixedWall {
         let re = params.effective_radius;
         let cell = |x: DVec3| (x / re).floor().as_ivec3();
         let mut cells: HashMap<IVec3, Vec<usize>> = HashMap::new();
-        for (k, x) in self.position.iter().enumerate() {
+        let images = |(k, &x)| params.periodic.images(x, re).map(move |image| (image, k));
+        let images: Vec<(DVec3, usize)> = self.position.iter().enumerate().flat_map(images).collect();
+        for (k, (x, _)) in images.iter().enumerate() {
             cells.entry(cell(*x)).or_default().push(k);
         }
         let (mut viscous, mut friction) = (DVec3::ZERO, DVec3::ZERO);
@@ -94,7 +96,7 @@ impl FixedWall {
             let (mut weights, mut normal) = (0.0, DVec3::ZERO);
             let around = (0..27).map(|k| at + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
             for &k in around.filter_map(|c| cells.get(&c)).flatten() {
-                let r = self.position[k] - x;
+                let r = images[k].0 - x;
                 let w = pair_weight(r.length_squared(), params);
                 weights += w;
                 normal += weight_over_square(w, re) * r;

@@ -1,5 +1,6 @@
 //! Cell list: count, scan, stable scatter. Fluid particles are reordered by cell each step; moving solids
-//! are indexed by cell each step; what never moves is indexed once.
+//! are indexed by cell each step; what never moves is indexed once. Fluid that has left through a periodic side is brought
+//! back here.
 
 use crate::cells::Grid;
 use crate::fields::Fields;
@@ -86,6 +87,9 @@ pub fn reorder_fluid(
     scratch: &mut Scratch,
 ) -> u64 {
     let n = fields.id.len();
+    if grid.periodic.is_any() {
+        fields.position[..n].par_iter_mut().for_each(|x| *x = grid.periodic.wrap(*x));
+    }
     let ghosts_before = fields.kind[..n].iter().filter(|&&k| k == Kind::Ghost).count();
     let (position, velocity) = (&fields.position[..n], &fields.velocity[..n]);
     scratch.cell.resize(n, 0);
@@ -136,8 +140,8 @@ pub fn mark_near_fluid(grid: &Grid, start: &[u32], near: &mut Vec<bool>) {
             for z in 0..nz {
                 let c = column + z as usize;
                 if start[c] < start[c + 1] {
-                    for (a, b) in grid.columns([x, y, z]) {
-                        near[a..=b].fill(true);
+                    for column in grid.columns([x, y, z]) {
+                        near[column.first..=column.last].fill(true);
                     }
                 }
             }

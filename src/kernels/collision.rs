@@ -78,7 +78,7 @@ fn parts(i: usize, among: Colliding) -> f64 {
 /// Velocity that i gains against j if j were immovable: -(1 + b) times the approach along the line.
 #[inline(always)]
 fn rebound(i: usize, j: usize, on: Particles) -> DVec3 {
-    let r = on.position[j] - on.position[i];
+    let r = on.offset(i, j);
     let r2 = r.length_squared();
     let closest = on.params.collision_distance;
     if r2 >= closest * closest || r2 == 0.0 {

@@ -48,7 +48,7 @@ pub fn monitor(fields: &Fields, live: usize, params: &Params, dt: f64) -> FluidM
                 bins: vec![0; SPEED_BINS],
             };
             for i in c * 8 * CHUNK..((c + 1) * 8 * CHUNK).min(live) {
-                let (x, v) = (fields.position[i], fields.velocity[i]);
+                let (x, v) = (params.periodic.wrap(fields.position[i]), fields.velocity[i]);
                 let v2 = v.length_squared();
                 s.kinetic += 0.5 * v2;
                 s.potential -= params.gravity.dot(x);

@@ -47,6 +47,16 @@ pub fn place_of([x, y, z]: [i32; 3]) -> i32 {
     9 * x + 3 * y + z
 }
 
+/// The step from the cell at `from` to its neighbour at `to`. Along a periodic axis of `around` cells, 0 where it is none,
+/// the last is the neighbour of the first.
+#[inline(always)]
+pub fn step(from: [i32; 3], to: [i32; 3], around: [i32; 3]) -> [i32; 3] {
+    std::array::from_fn(|k| {
+        let step = to[k] - from[k];
+        if around[k] > 0 && step.abs() > 1 { step - step.signum() * around[k] } else { step }
+    })
+}
+
 /// Offset in x, y, z of the `k`-th entry of a stencil.
 #[inline(always)]
 pub fn offset_of(k: usize) -> [i32; 3] {
@@ -61,6 +71,13 @@ mod tests {
     fn entries_and_offsets_belong_together() {
         assert!((0..27).all(|k| place_of(offset_of(k)) + 13 == k as i32));
         assert_eq!(offset_of(13), [0; 3]);
+    }
+
+    #[test]
+    fn the_last_cell_is_next_to_the_first_along_a_periodic_axis_alone() {
+        assert_eq!(step([0, 0, 4], [4, 4, 0], [5, 0, 5]), [-1, 4, 1]);
+        // Of two cells, one is the neighbour of the other at both sides.
+        assert_eq!(step([0, 2, 1], [1, 0, 0], [2, 3, 2]), [1, 1, -1]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! GPU twin: shaders/neighbour_list.wgsl
 
 use super::cell_list::CellList;
-use crate::cells::Grid;
+use crate::cells::{Column, Grid};
 use glam::DVec3;
 
 /// The particles by cell, as a search walks them.
@@ -27,9 +27,10 @@ pub struct Candidates<'a> {
 /// Neighbours of slot `i` within `radius` [m], and how many of them carry pressure.
 pub fn neighbour_list(i: u32, radius: f64, from: &Candidates, position: &[DVec3]) -> (Vec<u32>, usize) {
     let x = position[i as usize];
-    let near = |&j: &u32| j != i && position[j as usize].distance_squared(x) < radius * radius;
+    let offset = |j: u32| from.grid.periodic.nearest(position[j as usize] - x);
+    let near = |&j: &u32| j != i && offset(j).length_squared() < radius * radius;
     let columns = || from.grid.columns(from.grid.coordinates(x));
-    let range = |start: &[u32], (first, last): (usize, usize)| start[first]..start[last + 1];
+    let range = |start: &[u32], column: Column| start[column.first]..start[column.last + 1];
     let is_water = from.fluid_start.last().is_some_and(|&end| i < end);
     let carry = if is_water { from.pressure_slots } else { from.wall_carriers };
     let mut carriers = Vec::new();

@@ -23,7 +23,7 @@ pub fn pair_weight(r2: f64, params: &Params) -> f64 {
 
 /// Number density of slot `i`, Eq. (4) [-], and its part in the PPE.
 pub fn number_density(i: usize, neighbour: &[u32], on: Particles) -> (f64, State) {
-    let offset = |j: u32| on.position[j as usize] - on.position[i];
+    let offset = |j: u32| on.offset(i, j as usize);
     let w = |j: u32| pair_weight(offset(j).length_squared(), on.params);
     let n: f64 = neighbour.iter().map(|&j| w(j)).sum();
     // A wall particle without fluid in reach is dry.

@@ -50,7 +50,7 @@ pub fn pressure_gradient(
     pressure: &[f64],
 ) -> DVec3 {
     let carriers = || all.iter().take(carry);
-    let head = |j: usize| hydrostatic(on.position[j] - on.position[i], on.params);
+    let head = |j: usize| hydrostatic(on.offset(i, j), on.params);
     let mut reference = carriers().fold(pressure[i], |m, (j, _)| m.min(pressure[j]));
     let consistent = is_consistent(state, on.params);
     if consistent {

@@ -44,8 +44,7 @@ pub fn pressure_source(
     let b = match params.source {
         Source::NumberDensity => number_density_source(n, params, step),
         Source::Mixed => {
-            let first_moment: DVec3 =
-                all.iter().take(carry).map(|(j, w)| w * (on.position[j] - on.position[i])).sum();
+            let first_moment: DVec3 = all.iter().take(carry).map(|(j, w)| w * on.offset(i, j)).sum();
             let wet = if i < on.fluid { 1.0 } else { wet_share(links, params) };
             wet * step.relaxation * per_time / step.dt * deviation(all, params)
                 - wet * (1.0 - step.relaxation) * per_time * divergence(i, all, on)

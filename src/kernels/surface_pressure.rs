@@ -25,7 +25,7 @@ pub fn surface_pressure(i: usize, carriers: Row, state: &[State], on: Particles,
     for (j, w) in carriers.iter().filter(|&(j, _)| j < on.fluid && state[j] == State::Surface) {
         weight += w;
         sum += w * pressure[j];
-        height += w * hydrostatic(on.position[i] - on.position[j], on.params);
+        height += w * hydrostatic(on.offset(j, i), on.params);
     }
     if weight > 0.0 { ((sum + height.min(0.0)) / weight).max(0.0) } else { 0.0 }
 }

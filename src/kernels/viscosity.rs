@@ -35,7 +35,7 @@ pub fn share(i: usize, j: usize, on: Particles) -> f64 {
 
 /// w_ij (v_j - v_i), with its share [m/s].
 fn exchange(i: usize, j: usize, on: Particles) -> DVec3 {
-    let (r, re) = (on.position[j].distance(on.position[i]), on.params.effective_radius);
+    let (r, re) = (on.offset(i, j).length(), on.params.effective_radius);
     let w = if r > 0.0 && r < re { weight(r, re) } else { 0.0 };
     share(i, j, on) * w * (on.velocity[j] - on.velocity[i])
 }

@@ -22,7 +22,7 @@ use glam::DVec3;
 pub fn wall_friction(i: usize, carriers: &[u32], on: Particles, dt: f64) -> (DVec3, f64) {
     let (mut sum, mut velocity, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
     for j in carriers.iter().map(|&j| j as usize).filter(|&j| j >= on.fluid) {
-        let r = on.position[j] - on.position[i];
+        let r = on.offset(i, j);
         let w = pair_weight(r.length_squared(), on.params);
         sum += w;
         velocity += w * on.velocity[j];
@@ -49,7 +49,7 @@ pub fn reaction<'a>(
     let wet = carriers.iter().map(|&i| i as usize).filter(|&i| i < on.fluid);
     let taken = wet.map(|i| {
         let (acceleration, sum) = wall_friction(i, row(i), on, dt);
-        let w = pair_weight(on.position[j].distance_squared(on.position[i]), on.params);
+        let w = pair_weight(on.offset(i, j).length_squared(), on.params);
         if sum > 0.0 { -w / sum * acceleration } else { DVec3::ZERO }
     });
     on.params.particle_mass() * taken.sum::<DVec3>()

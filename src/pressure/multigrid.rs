@@ -6,7 +6,7 @@ use super::cg::{Precondition, System};
 use crate::cells::Grid;
 use crate::fields::State;
 use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
-use crate::kernels::multigrid_levels::{LevelSums, level_cells, offset_of, place_of};
+use crate::kernels::multigrid_levels::{LevelSums, level_cells, offset_of, place_of, step};
 use crate::neighbours::{CHUNK, Chunk};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -18,6 +18,8 @@ const PARALLEL: usize = 4096;
 #[derive(Default, Debug)]
 struct Level {
     coordinates: Vec<[i32; 3]>,
+    /// Cells along periodic axes, 0 along the others.
+    around: [i32; 3],
     start: Vec<u32>,
     column: Vec<u32>,
     value: Vec<f32>,
@@ -108,13 +110,15 @@ const NOWHERE: i32 = i32::MIN;
 impl Multigrid {
     /// Rebuild for `system` with particles at `position`.
     pub fn build(&mut self, system: &System, grid: &Grid, position: &[DVec3]) {
-        if self.levels.is_empty() {
-            self.levels.push(Level::default());
+        let counts = level_cells(grid.count);
+        self.used = counts.len();
+        self.levels.resize_with(self.used.max(self.levels.len()), Level::default);
+        for (level, count) in self.levels.iter_mut().zip(&counts) {
+            let along = |k| if grid.periodic.is_along(k) { count[k] as i32 } else { 0 };
+            level.around = [0, 1, 2].map(along);
         }
         self.aggregate_cells(system, grid, position);
         self.first_level(system);
-        self.used = level_cells(grid.count).len();
-        self.levels.resize_with(self.used.max(self.levels.len()), Level::default);
         for l in 1..self.used {
             let (fine, coarse) = self.levels.split_at_mut(l);
             coarsen(&mut fine[l - 1], &mut coarse[0], &mut self.scratch);
@@ -227,10 +231,11 @@ impl Multigrid {
             w32.resize(chunk.weight.len(), 0.0);
             w32.iter_mut().zip(&chunk.weight).for_each(|(w32, &w)| *w32 = (c * w) as f32);
         });
-        let codes = &self.code;
+        let (codes, aggregate) = (&self.code, &self.aggregate);
         let (members, start) = (&self.members, &self.member_start);
         let level = &mut self.levels[0];
-        let rows = level.coordinates.len();
+        let (rows, cells, around) = (level.coordinates.len(), &level.coordinates, level.around);
+        let seams = around != [0; 3];
         self.scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
             // Two stencils in turn: neighbours that follow each other mostly fall into the same entry, and would wait
             // for each other's sum.
@@ -242,7 +247,12 @@ impl Multigrid {
                 for (k, (j, w)) in chunks[i / CHUNK].pressure(i % CHUNK).iter().enumerate() {
                     // A pair without weight may lie further apart than neighbouring cells.
                     if codes[j] != NOWHERE && w > 0.0 {
-                        turns[k % 2][(codes[j] - own) as usize] -= c * w;
+                        let entry = if seams {
+                            place_of(step(cells[a], cells[aggregate[j] as usize], around)) + 13
+                        } else {
+                            codes[j] - own
+                        };
+                        turns[k % 2][entry as usize] -= c * w;
                     }
                 }
             }
@@ -343,8 +353,8 @@ fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) {
         s[13] += f64::from(fine.diagonal[i]);
         for k in fine.start[i] as usize..fine.start[i + 1] as usize {
             let q = fine.parent[fine.column[k] as usize] as usize;
-            s[(place_of(coarse.coordinates[q]) - place_of(coarse.coordinates[p]) + 13) as usize] +=
-                f64::from(fine.value[k]);
+            let way = step(coarse.coordinates[p], coarse.coordinates[q], coarse.around);
+            s[(place_of(way) + 13) as usize] += f64::from(fine.value[k]);
         }
     }
     compress(coarse, scratch);
@@ -377,7 +387,7 @@ fn compress(level: &mut Level, scratch: &mut Scratch) {
     level.value.clear();
     level.diagonal.clear();
     level.start.push(0);
-    let step: [isize; 27] = std::array::from_fn(|k| {
+    let way: [isize; 27] = std::array::from_fn(|k| {
         let d = offset_of(k).map(|d| d as isize);
         (d[0] * size[1] as isize + d[1]) * size[2] as isize + d[2]
     });
@@ -385,7 +395,15 @@ fn compress(level: &mut Level, scratch: &mut Scratch) {
         let own = place(c);
         for (k, &v) in s.iter().enumerate() {
             if k != 13 && v != 0.0 {
-                level.column.push(map[own.wrapping_add_signed(step[k])]);
+                let mut at = own.wrapping_add_signed(way[k]);
+                if level.around != [0; 3] {
+                    let (d, around) = (offset_of(k), level.around);
+                    let beyond = |k: usize| {
+                        if around[k] > 0 { (c[k] + d[k]).rem_euclid(around[k]) } else { c[k] + d[k] }
+                    };
+                    at = place([0, 1, 2].map(beyond));
+                }
+                level.column.push(map[at]);
                 level.value.push(v as f32);
             }
         }

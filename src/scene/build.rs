@@ -5,13 +5,15 @@
 
 use super::bodies;
 use super::lattice::{Cells, Grid, Lattice};
+use super::oriented::Placed;
 use super::placement::{Surroundings, point};
 use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::Water;
 use super::{Scene, Solid, wall_at};
-use crate::case::{Case, Law};
+use crate::case::{self, Case, Law};
 use crate::error::{CaseError, Problem, Result};
+use crate::periodic::Periodic;
 use glam::{DMat3, DVec3, IVec3};
 
 impl Scene {
@@ -52,6 +54,7 @@ pub(super) struct Builder<'a> {
     /// Wall layer and dummies: 1 + the most layers that lie strictly within re of the wall layer.
     pub(super) layers: i32,
     pub(super) tank: Option<Cells>,
+    pub(super) periodic: Periodic,
     pub(super) fixed: Fixed,
     pub(super) moving_walls: Vec<Solid>,
     pub(super) bodies: Vec<Solid>,
@@ -76,7 +79,8 @@ impl<'a> Builder<'a> {
         let layers = run.effective_radius.ceil() as i32;
         let tank = case.tank.as_ref().map(|t| lattice.tank_cells(t.min.into(), t.max.into()));
         let outer = case.tank.as_ref().zip(tank);
-        let outer = outer.map(|(t, c)| walls::outer(c, walls::closed(&t.open, lattice.plane), layers));
+        let outer =
+            outer.map(|(t, c)| walls::outer(c, walls::closed(&t.without_wall(), lattice.plane), layers));
         let boxes = case.obstacle.iter().filter_map(|o| o.corners());
         let boxes = boxes.chain(case.moving_wall.iter().filter_map(|w| w.corners()));
         let boxes = boxes.chain(blocks.iter().map(|b| (b.min, b.max)));
@@ -86,13 +90,18 @@ impl<'a> Builder<'a> {
         let all = boxes.map(|(min, max)| lattice.cells(min.into(), max.into())).chain(outer);
         let all = all.reduce(Cells::union).unwrap_or(Cells { lo: IVec3::ZERO, hi: IVec3::ZERO });
         // One free cell around everything, so that what leaves can be seen to leave.
-        let grid = Grid::new(all.grown(lattice.step(1)), run.spacing)?;
+        let mut grid = Grid::new(all.grown(lattice.step(1)), run.spacing)?;
+        let along = case.tank.as_ref().map_or([false; 3], |t| t.periodic());
+        let sides = tank.map_or((DVec3::ZERO, DVec3::ZERO), |t| (lattice.corner(t.lo), lattice.corner(t.hi)));
+        let periodic = Periodic::new(along, sides.0, sides.1);
+        tank.into_iter().for_each(|tank| grid.close(tank, along));
         Ok(Self {
             case,
             lattice,
             grid,
             layers,
             tank,
+            periodic,
             fixed: Fixed::default(),
             moving_walls: Vec::new(),
             bodies: Vec::new(),
@@ -114,6 +123,11 @@ impl<'a> Builder<'a> {
 
     fn walls(&mut self) {
         let (case, lattice, layers) = (self.case, self.lattice, self.layers);
+        for (k, axis) in AXES.iter().enumerate() {
+            if let Some((low, high)) = self.periodic.sides(k) {
+                self.notes.push(format!("tank: periodic along {axis}, from {low:.4} to {high:.4} m"));
+            }
+        }
         if let Some(tank) = &case.tank {
             self.fixed.tank(tank, &lattice, &mut self.grid, layers);
             let (min, max): (DVec3, DVec3) = (tank.min.into(), tank.max.into());
@@ -127,17 +141,23 @@ impl<'a> Builder<'a> {
                 self.notes.push(format!("tank: {line} at spacing {}", lattice.spacing));
             }
         }
-        for obstacle in &case.obstacle {
+        for (k, obstacle) in case.obstacle.iter().enumerate() {
             let Some(corners) = obstacle.corners() else { continue };
-            let taken = self.fixed.obstacle(obstacle, corners, &lattice, &mut self.grid, layers);
             let label = format!("obstacle `{}`", obstacle.name);
+            if !self.on_lattice(&format!("obstacle.{k}"), &label, corners) {
+                continue;
+            }
+            let taken = self.fixed.obstacle(obstacle, corners, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
         }
-        for wall in &case.moving_wall {
+        for (k, wall) in case.moving_wall.iter().enumerate() {
             let Some(corners) = wall.corners() else { continue };
-            let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             let label = format!("moving wall `{}`", wall.name);
+            if !self.on_lattice(&format!("moving_wall.{k}"), &label, corners) {
+                continue;
+            }
+            let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
             let half = solid.shape.extent(DMat3::IDENTITY);
@@ -175,9 +195,12 @@ impl<'a> Builder<'a> {
     fn water(&mut self) {
         let Some(fluid) = &self.case.fluid else { return };
         for (k, block) in fluid.block.iter().enumerate() {
+            let key = format!("fluid.block.{k}");
+            if !self.on_lattice(&key, &key, (block.min, block.max)) {
+                continue;
+            }
             let filled = self.water.fill(block, &self.lattice, &mut self.grid);
             if filled == 0 {
-                let key = format!("fluid.block.{k}");
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
                 self.problems.push(Problem::new(key, message, remedy));
@@ -213,7 +236,8 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        self.depth = self.water.depth(self.gravity(), &self.lattice);
+        // What of gravity lies along a periodic axis presses on nothing.
+        self.depth = self.water.depth(self.periodic.across(self.gravity()), &self.lattice);
     }
 
     fn bodies(&mut self) {
@@ -245,6 +269,8 @@ impl<'a> Builder<'a> {
                     self.problems.push(Problem::new(format!("body.{k}"), message, remedy));
                 }
             }
+            let what = solid.what();
+            self.seams(&format!("body.{k}"), what, &solid.name, &solid.placed(), false);
             let shape = solid.placed();
             let wet = self.water.inside(&shape, &self.lattice);
             if wet > 0 && body.displaces_fluid {
@@ -281,6 +307,49 @@ impl<'a> Builder<'a> {
                 let message = format!("gauge.pressure `{name}` at {at}: no fixed wall there, {hint}");
                 let remedy = "move the point onto a wall";
                 self.problems.push(Problem::new(format!("gauge.pressure.{k}.point"), message, remedy));
+            }
+        }
+    }
+
+    /// Whether a box of the lattice ends at the periodic sides; a problem if not.
+    fn on_lattice(&mut self, key: &str, label: &str, (min, max): (case::Vector, case::Vector)) -> bool {
+        let cells = self.lattice.cells(min.into(), max.into());
+        let Some(tank) = self.tank else { return true };
+        let over =
+            |k: usize| self.periodic.is_along(k) && (cells.lo[k] < tank.lo[k] || cells.hi[k] > tank.hi[k]);
+        let Some((k, (low, high))) =
+            (0..3).filter(|&k| over(k)).find_map(|k| Some((k, self.periodic.sides(k)?)))
+        else {
+            return true;
+        };
+        let (axis, from, to) = (AXES[k], min[k], max[k]);
+        let message =
+            format!("{label} spans {axis} = {from} to {to} m, over the periodic sides at {low} and {high} m");
+        let remedy = "end it at the side, and put the rest, if there is any, at the opposite one";
+        self.problems.push(Problem::new(
+            format!("{key}.{}", if from < low { "min" } else { "max" }),
+            message,
+            remedy,
+        ));
+        false
+    }
+
+    /// Complains of a solid of any shape that reaches over a periodic side: half of it would be missing at the other one. A
+    /// fixed one that spans the whole axis goes on there.
+    pub(super) fn seams(&mut self, key: &str, what: &str, name: &str, shape: &Placed, fixed: bool) {
+        let (reach, slack) = (shape.bounds(), 1e-6 * self.lattice.spacing);
+        for k in 0..3 {
+            let Some((low, high)) = self.periodic.sides(k) else { continue };
+            let (from, to) = (shape.center[k] - reach[k], shape.center[k] + reach[k]);
+            let over = from < low - slack || to > high + slack;
+            if over && !(fixed && from <= low + slack && to >= high - slack) {
+                let axis = AXES[k];
+                let message = format!(
+                    "{what} `{name}` reaches from {axis} = {from:.4} to {to:.4} m, over a periodic side at {low} or {high} m"
+                );
+                let remedy = format!("keep it between them, or take \"{axis}\" out of tank.periodic");
+                self.problems.push(Problem::new(key, message, remedy));
+                return;
             }
         }
     }

@@ -46,7 +46,8 @@ impl Builder<'_> {
             let slack = 1e-9 * l0;
             for (label, a, b) in &bounds.items {
                 let outside = |k: usize| a[k] < lo[k] - slack || b[k] > hi[k] + slack;
-                if let Some(k) = (0..3).find(|&k| !(self.lattice.plane && k == 1) && outside(k)) {
+                let held = |k: usize| !(self.periodic.is_along(k) || self.lattice.plane && k == 1);
+                if let Some(k) = (0..3).find(|&k| held(k) && outside(k)) {
                     let message = format!(
                         "run.domain: {label} reaches from {} = {:.4} to {:.4} m, outside of {:.4} to {:.4} m",
                         AXES[k], a[k], b[k], lo[k], hi[k]
@@ -78,11 +79,16 @@ impl Builder<'_> {
         self.in_plane(lo, hi)
     }
 
-    /// In two dimensions a domain is one cell wide.
+    /// In two dimensions a domain is one cell wide; along a periodic axis it is the tank.
     fn in_plane(&self, mut lo: DVec3, mut hi: DVec3) -> (DVec3, DVec3) {
         if self.lattice.plane {
             let half = 0.5 * self.lattice.spacing;
             (lo.y, hi.y) = (-half, half);
+        }
+        for k in 0..3 {
+            if let Some(sides) = self.periodic.sides(k) {
+                (lo[k], hi[k]) = sides;
+            }
         }
         (lo, hi)
     }

@@ -103,6 +103,8 @@ pub(super) struct Grid {
     pub cells: Cells,
     n: [usize; 3],
     state: Vec<u8>,
+    /// Cells between the sides of the tank, and the axes along which these are periodic.
+    seam: Option<(Cells, [bool; 3])>,
 }
 
 impl Grid {
@@ -122,7 +124,38 @@ impl Grid {
             return Err(CaseError::new(vec![Problem::new("run.spacing", message, remedy)], text).into());
         }
         let n = [n.x as usize, n.y as usize, n.z as usize];
-        Ok(Self { cells, n, state: vec![FREE; n[0] * n[1] * n[2]] })
+        Ok(Self { cells, n, state: vec![FREE; n[0] * n[1] * n[2]], seam: None })
+    }
+    /// Makes the sides of the `tank` periodic along the given axes. Nothing may stand beyond them.
+    pub fn close(&mut self, tank: Cells, along: [bool; 3]) {
+        if along == [false; 3] {
+            return;
+        }
+        self.seam = Some((tank, along));
+        let beyond: Vec<IVec3> = self.cells.iter().filter(|&c| self.is_beyond(c)).collect();
+        beyond.into_iter().for_each(|c| self.set(c, BLOCKED));
+    }
+    /// The cell itself, or its image between periodic sides.
+    pub fn wrap(&self, mut c: IVec3) -> IVec3 {
+        if let Some((tank, along)) = self.seam {
+            for k in (0..3).filter(|&k| along[k]) {
+                c[k] = tank.lo[k] + (c[k] - tank.lo[k]).rem_euclid(tank.hi[k] - tank.lo[k]);
+            }
+        }
+        c
+    }
+    /// Whether a cell lies beyond a periodic side.
+    pub fn is_beyond(&self, c: IVec3) -> bool {
+        self.wrap(c) != c
+    }
+    /// `closed` without the faces of a box of `cells` that spans a periodic axis: it goes on there.
+    pub(crate) fn closed(&self, cells: Cells, mut closed: [[bool; 2]; 3]) -> [[bool; 2]; 3] {
+        if let Some((tank, along)) = self.seam {
+            for k in (0..3).filter(|&k| along[k] && cells.lo[k] <= tank.lo[k] && cells.hi[k] >= tank.hi[k]) {
+                closed[k] = [false; 2];
+            }
+        }
+        closed
     }
     fn index(&self, c: IVec3) -> usize {
         let d = c - self.cells.lo;

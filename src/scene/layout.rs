@@ -62,6 +62,7 @@ impl Builder<'_> {
             static_wall_normal: self.fixed.normal,
             static_wall_shape: self.fixed.shape_of,
             domain,
+            periodic: self.periodic,
             depth: self.depth,
             notes: self.notes,
         }

@@ -31,6 +31,7 @@ pub use curve::Curve;
 pub use motion::Motion;
 pub(crate) use placement::CONTACT_DISTANCE;
 
+use crate::periodic::Periodic;
 use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::Range;
@@ -248,6 +249,8 @@ pub struct Scene {
     pub static_wall_shape: Vec<u32>,
     /// Box that no particle may leave [m].
     pub domain: (DVec3, DVec3),
+    /// Sides that the water goes on across.
+    pub periodic: Periodic,
     /// Largest depth of water at the start, along gravity [m].
     pub depth: f64,
     /// What a user should know that is no error (rounded lengths, removed particles ...).

@@ -102,6 +102,7 @@ impl Builder<'_> {
             solid.wall_area = particles.area;
             solid.wall_to_surface = particles.to_surface;
             self.thin(&key, &solid);
+            self.seams(&key, solid.what(), &solid.name, &solid.placed(), fixed);
             if fixed {
                 self.bury(&key, &mut solid);
             }
@@ -156,8 +157,9 @@ impl Builder<'_> {
         let (lattice, slack) = (&self.lattice, 1e-6 * self.lattice.spacing);
         let beyond = self.tank.zip(self.case.tank.as_ref()).is_some_and(|(cells, tank)| {
             let (lo, hi) = (lattice.corner(cells.lo), lattice.corner(cells.hi));
-            let closed = closed(&tank.open, lattice.plane);
-            (0..3).any(|k| closed[k][0] && at[k] < lo[k] - slack || closed[k][1] && at[k] > hi[k] + slack)
+            let (closed, seam) = (closed(&tank.open, lattice.plane), tank.periodic());
+            let ends = |k: usize, side: usize| closed[k][side] || seam[k];
+            (0..3).any(|k| ends(k, 0) && at[k] < lo[k] - slack || ends(k, 1) && at[k] > hi[k] + slack)
         });
         let earlier = || self.moving_walls.iter().filter(|s| s.is_still()).map(Solid::placed);
         beyond

@@ -41,7 +41,7 @@ impl Fixed {
     /// axis, so corners are filled).
     pub fn tank(&mut self, tank: &case::Tank, lattice: &Lattice, grid: &mut Grid, layers: i32) {
         let interior = lattice.tank_cells(tank.min.into(), tank.max.into());
-        let closed = closed(&tank.open, lattice.plane);
+        let closed = closed(&tank.without_wall(), lattice.plane);
         let outer = outer(interior, closed, layers);
         let mut shape = [[u32::MAX; 2]; 3];
         for axis in 0..3 {
@@ -97,7 +97,8 @@ impl Fixed {
     ) -> usize {
         let cells = lattice.cells(min.into(), max.into());
         let of = self.add_shape(&obstacle.name, lattice, cells);
-        let (shell, taken) = shell(cells, closed(&obstacle.open, lattice.plane), grid, layers);
+        let closed = grid.closed(cells, closed(&obstacle.open, lattice.plane));
+        let (shell, taken) = shell(cells, closed, grid, layers);
         for cell in shell {
             let p = lattice.center(cell.at);
             if cell.depth > 0 {
@@ -137,7 +138,7 @@ impl Fixed {
                     }
                     let in_plane =
                         earlier.iter().zip(&on_lattice).any(|(b, &on)| !on && b.holds(p, 1e-6 * l0));
-                    if in_plane || near_solid(lattice, grid, p) {
+                    if in_plane || grid.is_beyond(lattice.cell(p)) || near_solid(lattice, grid, p) {
                         left_out += 1;
                     } else if depth > 0 {
                         self.dummy.push(p);
@@ -241,7 +242,8 @@ pub(super) fn moving_wall(
         wall_area: Vec::new(),
         wall_to_surface: Vec::new(),
     };
-    let (shell, taken) = shell(cells, closed(&wall.open, lattice.plane), grid, layers);
+    let closed = grid.closed(cells, closed(&wall.open, lattice.plane));
+    let (shell, taken) = shell(cells, closed, grid, layers);
     for cell in shell {
         let offset = lattice.center(cell.at) - position;
         if cell.depth > 0 {
@@ -347,5 +349,6 @@ impl PlaneFrame {
 pub(super) fn near_solid(lattice: &Lattice, grid: &Grid, p: DVec3) -> bool {
     let at = lattice.cell(p);
     let near = Cells { lo: at, hi: at + 1 }.grown(lattice.step(1));
-    near.iter().any(|c| grid.get(c) == SOLID && lattice.center(c).distance(p) < 0.5 * lattice.spacing)
+    near.iter()
+        .any(|c| grid.get(grid.wrap(c)) == SOLID && lattice.center(c).distance(p) < 0.5 * lattice.spacing)
 }

@@ -102,6 +102,7 @@ impl Water {
                 }
                 let mut to = c;
                 to[way / 2] += 2 * (way as i32 % 2) - 1;
+                to = grid.wrap(to);
                 if !within(to) {
                     continue;
                 }
@@ -207,7 +208,7 @@ impl Water {
         while next < queue.len() {
             let (c, _) = queue[next];
             for &way in &ways {
-                let to = c + way;
+                let to = grid.wrap(c + way);
                 if !grid.cells.contains(to) {
                     return Some(describe(&queue, next, lattice, tank));
                 }

@@ -59,6 +59,7 @@ impl DryScene {
             static_wall_normal: vec![],
             static_wall_shape: vec![],
             domain: (low, high),
+            periodic: Default::default(),
             depth: 0.0,
             notes: vec![],
         };

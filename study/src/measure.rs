@@ -271,7 +271,7 @@ impl Sampler {
             .as_ref()
             .map_or([0.0, 0.0], |t| [0, 1].map(|k| t.min[k] + 0.125 * (t.max[k] - t.min[k])));
         let (reach, l0) = (params.effective_radius, params.spacing);
-        let level = level(fields, &simulation.groups, at, params.dimensions, reach, l0);
+        let level = level(fields, &simulation.groups, at, params.dimensions, reach, l0, &params.periodic);
         self.draft.push([level.unwrap_or(f64::NAN), pose.position.z]);
         let up = pose.orientation * DVec3::Z;
         self.tilt = self.tilt.max(up.z.clamp(-1.0, 1.0).acos().to_degrees());

@@ -186,6 +186,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         solids,
         walls: Vec::new(),
         domain: (low, high),
+        periodic: Default::default(),
         depth: f64::from(7 * scale) * SPACING,
         notes: Vec::new(),
     }

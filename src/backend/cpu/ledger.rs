@@ -63,7 +63,7 @@ impl WaterLedger {
     pub fn lost(&mut self, live: usize, on: Particles) {
         let (params, domain) = (on.params, (on.params.domain_min, on.params.domain_max));
         let of = |i: usize| {
-            let (x, v) = (on.position[i], on.velocity[i]);
+            let (x, v) = (params.periodic.wrap(on.position[i]), on.velocity[i]);
             let kept = inside(x, v, domain.0, domain.1, params.dimensions) || !(x + v).is_finite();
             [if kept { 0.0 } else { params.gravity.dot(x) - 0.5 * v.length_squared() }]
         };
@@ -82,7 +82,7 @@ impl WaterLedger {
 
     /// Books `correct`, which is about to run with the accelerations `total` of pressure and gravity.
     pub fn pressure(&mut self, live: usize, on: Particles, total: &[DVec3], dt: f64) {
-        let gravity = on.params.gravity - on.params.explicit_gravity();
+        let gravity = on.params.balanced_gravity();
         let of = |i: usize| {
             let (v, a) = (on.velocity[i], total[i]);
             let work = |part| correct_work(v, part, a, on.params.gravity, dt);

@@ -85,14 +85,14 @@ impl Cpu {
         let groups = scene.groups;
         let wet = plan.wet();
         let lightness = |solid| collision::lightness(solid, params);
-        let grid =
-            if wet { Grid::new(params)? } else { Grid { origin: DVec3::ZERO, width: 1.0, count: [1; 3] } };
+        let grid = if wet { Grid::new(params)? } else { Grid::nothing() };
         let mut scratch = Scratch::default();
         let fixed = (wet && !groups.static_range().is_empty()).then(|| {
             let mut list = CellList::default();
             list.index(&grid, groups.static_range(), &scene.position, &mut scratch);
             let mut coordinates = Coordinates::default();
-            coordinates.set(list.slot.par_iter().map(|&s| &scene.position[s as usize]));
+            let place = |&s: &u32| grid.periodic.wrap(scene.position[s as usize]);
+            coordinates.set(list.slot.par_iter().map(place));
             (list, coordinates)
         });
         Ok(Self {
@@ -164,15 +164,15 @@ impl Cpu {
     }
 
     fn absorber(&mut self, dt: f64) {
-        let (zones, n) = (&self.params.absorbers, self.live);
+        let (zones, n, sides) = (&self.params.absorbers, self.live, self.params.periodic);
         let Fields { position, velocity, .. } = &mut self.fields;
         if let Some(ledger) = &mut self.ledger {
-            let slowed = |i: usize| absorber::absorber(position[i], velocity[i], zones, dt);
+            let slowed = |i: usize| absorber::absorber(sides.wrap(position[i]), velocity[i], zones, dt);
             ledger.absorber(n, &self.params, velocity, slowed);
         }
         (&position[..n], &mut velocity[..n])
             .into_par_iter()
-            .for_each(|(&x, v)| *v = absorber::absorber(x, *v, zones, dt));
+            .for_each(|(&x, v)| *v = absorber::absorber(sides.wrap(x), *v, zones, dt));
     }
 
     fn predict(&mut self, dt: f64) {
@@ -208,7 +208,8 @@ impl Cpu {
         if let Some((list, coordinates)) = &mut self.moving {
             let slots = groups.moving_wall_range().chain(groups.moving_dummy_range());
             list.index(grid, slots, &fields.position, scratch);
-            coordinates.set(list.slot.par_iter().map(|&s| &fields.position[s as usize]));
+            let place = |&s: &u32| grid.periodic.wrap(fields.position[s as usize]);
+            coordinates.set(list.slot.par_iter().map(place));
         }
         if self.active_set {
             cell_list::mark_near_fluid(grid, fluid_start, &mut self.near_fluid);
@@ -221,7 +222,7 @@ impl Cpu {
     fn neighbour_list(&mut self) {
         let Self { fields, grid, params, groups, near_fluid, live, .. } = self;
         let (fluid, position, live) = (groups.fluid, &fields.position, *live);
-        self.coordinates.set(position[..live].par_iter());
+        self.coordinates.set(position[..live].par_iter().copied());
         let from = Candidates {
             grid,
             fluid_start: &self.fluid_start,
@@ -239,7 +240,7 @@ impl Cpu {
             .map_init(Search::default, |search, (c, chunk)| {
                 let active = |k: usize| {
                     let i = c * CHUNK + k;
-                    let x = position[i];
+                    let x = grid.periodic.wrap(position[i]);
                     let near = if i < fluid { i < live } else { near_fluid[grid.index(grid.coordinates(x))] };
                     near.then_some((i, x))
                 };
@@ -562,7 +563,9 @@ impl Backend for Cpu {
     }
 
     fn read(&mut self) -> Result<Fields> {
-        Ok(self.fields.clone())
+        let mut fields = self.fields.clone();
+        fields.wrap(&self.groups, &self.params.periodic);
+        Ok(fields)
     }
 
     fn write(&mut self, fields: &Fields) -> Result<()> {

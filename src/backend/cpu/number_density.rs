@@ -35,7 +35,7 @@ wide! {
 #[inline(always)]
 fn number_density(i: usize, neighbour: &[u32], on: Particles, arrays: &mut RowArrays) -> (f64, State) {
     let RowArrays { r, w, .. } = arrays;
-    let (n, filled) = (neighbour.len(), r.differences(i, neighbour, on.position));
+    let (n, filled) = (neighbour.len(), r.offsets(i, neighbour, on));
     let w = &mut w[..filled];
     r.map_squares(w, |r2| pair_weight(r2, on.params));
     w[n..].fill(0.0);

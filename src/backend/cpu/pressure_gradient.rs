@@ -56,7 +56,7 @@ fn pressure_gradient(
     let consistent = is_consistent(state, on.params);
     let n = if consistent { all.neighbour.len() } else { carry };
     let RowArrays { r, e, w: p, s: w, h, .. } = arrays;
-    let filled = r.differences(i, &all.neighbour[..n], on.position);
+    let filled = r.offsets(i, &all.neighbour[..n], on);
     let (p, w, h) = (&mut p[..filled], &mut w[..filled], &mut h[..filled]);
     let own = pressure[i];
     for (p, &j) in p.iter_mut().zip(&all.neighbour[..carry]) {

@@ -66,7 +66,7 @@ fn mixed_source(
 ) -> f64 {
     let (params, n) = (on.params, all.neighbour.len());
     let RowArrays { r, v, w, s, e, .. } = arrays;
-    let filled = r.differences(i, all.neighbour, on.position);
+    let filled = r.offsets(i, all.neighbour, on);
     let (w, s) = (&mut w[..filled], &mut s[..filled]);
     w[..n].copy_from_slice(all.weight);
     w[n..].fill(0.0);

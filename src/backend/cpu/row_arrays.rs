@@ -3,7 +3,9 @@
 //! Arrays are filled up with zeros to whole [`LANES`]; sums run over that many partial sums side by side, on every
 //! machine, so that results do not depend on its vectors.
 
+use crate::neighbourhood::Particles;
 use crate::neighbours::CAPACITY;
+use crate::periodic::Periodic;
 use glam::DVec3;
 
 /// Partial sums of a sum.
@@ -41,6 +43,25 @@ impl Columns {
             v[n..].fill(0.0);
         }
         filled
+    }
+
+    /// r_j - r_i of each neighbour j, to its nearest image where sides are periodic; returns the length with the filling.
+    #[inline(always)]
+    pub fn offsets(&mut self, i: usize, neighbour: &[u32], on: Particles) -> usize {
+        let filled = self.differences(i, neighbour, on.position);
+        if on.params.periodic.is_any() {
+            self.bring_near(neighbour.len(), &on.params.periodic);
+        }
+        filled
+    }
+
+    /// The first `n` ways become those to the nearest images. Out of line: rows of other scenes do without its code.
+    #[inline(never)]
+    fn bring_near(&mut self, n: usize, periodic: &Periodic) {
+        for k in 0..n {
+            let r = periodic.nearest(DVec3::new(self.x[k], self.y[k], self.z[k]));
+            (self.x[k], self.y[k], self.z[k]) = (r.x, r.y, r.z);
+        }
     }
 
     /// out_k <- f(|v_k|^2).

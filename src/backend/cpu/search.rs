@@ -1,6 +1,6 @@
 //! [`crate::kernels::neighbour_list`], several candidates at a time.
 
-use crate::cells::Grid;
+use crate::cells::{Column, Grid};
 use crate::kernels::cell_list::CellList;
 use crate::neighbours::{CAPACITY, CHUNK, Chunk};
 use crate::params::Params;
@@ -19,8 +19,8 @@ pub struct Coordinates {
 }
 
 impl Coordinates {
-    /// Take over `position`, one for each place of the order.
-    pub fn set<'a>(&mut self, position: impl IndexedParallelIterator<Item = &'a DVec3>) {
+    /// Take over `position`, one for each place of the order, between the sides where these are periodic.
+    pub fn set(&mut self, position: impl IndexedParallelIterator<Item = DVec3>) {
         let (n, Self { x, y, z }) = (position.len(), self);
         // A block of padding, so that blocks may be read past the end.
         for v in [&mut *x, &mut *y, &mut *z] {
@@ -45,6 +45,7 @@ impl Coordinates {
     /// Append those of `run` that are closer than `reach` to `found`, in rising order.
     #[inline(always)]
     fn within(&self, run: Run, c: DVec3, reach: Reach, below: impl Below, found: &mut Found) {
+        let c = c - run.shift;
         for first in (run.first..run.end).step_by(BLOCK) {
             let square = self.squares(first as usize, c);
             let inside = u32::MAX >> (32 - (run.end - first).min(BLOCK as u32));
@@ -94,6 +95,8 @@ struct Reach {
 struct Run {
     first: u32,
     end: u32,
+    /// From its particles to their images [m].
+    shift: DVec3,
 }
 
 /// The particle itself is found as well, before it is taken out.
@@ -161,18 +164,13 @@ pub struct Candidates<'a> {
     pub wall_carriers: u32,
 }
 
-/// Columns of cells around a cell.
-const COLUMNS: usize = 9;
-
 /// One row under construction.
 #[derive(Default)]
 pub struct Search {
     /// Cell that the runs lie around: rows that follow each other often share it.
     cell: Option<[u32; 3]>,
-    fluid: [Run; COLUMNS],
-    fluid_runs: usize,
-    solid: [(Run, bool); 2 * COLUMNS],
-    solid_runs: usize,
+    fluid: Vec<Run>,
+    solid: Vec<(Run, bool)>,
     near: Found,
     dummy: Found,
     hits: Found,
@@ -181,19 +179,19 @@ pub struct Search {
 impl Search {
     /// Look up the columns of cells around `cell`.
     fn approach(&mut self, cell: [u32; 3], from: &Candidates) {
-        (self.cell, self.fluid_runs, self.solid_runs) = (Some(cell), 0, 0);
-        for (first, last) in from.grid.columns(cell) {
-            let run = |start: &[u32]| Run { first: start[first], end: start[last + 1] };
+        self.cell = Some(cell);
+        self.fluid.clear();
+        self.solid.clear();
+        for Column { first, last, shift } in from.grid.columns(cell) {
+            let run = |start: &[u32]| Run { first: start[first], end: start[last + 1], shift };
             let fluid = run(from.fluid_start);
             if fluid.first < fluid.end {
-                self.fluid[self.fluid_runs] = fluid;
-                self.fluid_runs += 1;
+                self.fluid.push(fluid);
             }
             for (list, moves) in [(from.moving, true), (from.fixed, false)] {
                 let run = list.map_or(Run::default(), |(list, _)| run(&list.start));
                 if run.first < run.end {
-                    self.solid[self.solid_runs] = (run, moves);
-                    self.solid_runs += 1;
+                    self.solid.push((run, moves));
                 }
             }
         }
@@ -206,15 +204,15 @@ impl Search {
         if self.cell != Some(cell) {
             self.approach(cell, from);
         }
-        let Self { fluid, fluid_runs, solid, solid_runs, near, dummy, hits, .. } = self;
+        let Self { fluid, solid, near, dummy, hits, .. } = self;
         let is_water = from.fluid_start.last().is_some_and(|&end| i < end as usize);
         let carriers = if is_water { from.pressure_slots } else { from.wall_carriers };
         near.clear();
         dummy.clear();
-        for &run in &fluid[..*fluid_runs] {
+        for &run in &*fluid {
             from.fluid.within(run, x, reach, below, near);
         }
-        for &(run, moves) in &solid[..*solid_runs] {
+        for &(run, moves) in &*solid {
             let Some((list, coordinates)) = (if moves { from.moving } else { from.fixed }) else { continue };
             hits.clear();
             coordinates.within(run, x, reach, below, hits);

@@ -38,7 +38,7 @@ fn laplacian_sum(
 ) -> DVec3 {
     let re = on.params.effective_radius;
     let RowArrays { r, w, .. } = arrays;
-    r.differences(i, neighbour, on.position);
+    r.offsets(i, neighbour, on);
     let w = &mut w[..neighbour.len()];
     r.map_squares(w, |r2| {
         let r = r2.sqrt();

@@ -81,9 +81,14 @@ pub struct Constants {
     pub surface_head: f32,
     pub wall_shear: f32,
     pub wall_friction: f32,
+    pub period: [f32; 3],
     pub wall_contact: f32,
-    pub pad: f32,
-    pub pad_pair: [f32; 2],
+    pub inverse_period: [f32; 3],
+    pub pad_inverse: f32,
+    pub cell_width: [f32; 3],
+    pub pad_width: f32,
+    pub drive: [f32; 3],
+    pub pad_drive: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -217,6 +222,8 @@ impl Constants {
     pub fn new(params: &Params, groups: &Groups, grid: &Grid, settings: &Settings, sizes: &Sizes) -> Self {
         let middle = middle(params);
         let laplacian = laplacian_coefficient(params);
+        let period = params.periodic.length();
+        let inverse = DVec3::from_array(period.to_array().map(|l| if l > 0.0 { 1.0 / l } else { 0.0 }));
         Self {
             gravity: params.gravity.as_vec3().to_array(),
             spacing: params.spacing as f32,
@@ -246,9 +253,14 @@ impl Constants {
             surface_head: missing_head(params) as f32,
             wall_shear: params.wall_shear as f32,
             wall_friction: params.wall_friction as f32,
+            period: period.as_vec3().to_array(),
+            inverse_period: inverse.as_vec3().to_array(),
+            cell_width: grid.width.as_vec3().to_array(),
+            drive: params.drive.as_vec3().to_array(),
             wall_contact: params.wall_contact as f32,
-            pad: 0.0,
-            pad_pair: [0.0; 2],
+            pad_inverse: 0.0,
+            pad_width: 0.0,
+            pad_drive: 0.0,
         }
     }
 }

@@ -9,13 +9,14 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 12] = [
+pub const SWITCHES: [&str; 13] = [
     "ABSORBER",
     "CONSISTENT",
     "COUPLED",
     "MIXED",
     "MOVING",
     "MULTIGRID",
+    "PERIODIC",
     "REACTION",
     "SHARED_COLLISIONS",
     "STATIC",
@@ -33,6 +34,7 @@ pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
+        params.periodic.is_any(),
         plan.needs(Arrays::Reaction),
         params.collision == Collision::Shared,
         plan.needs(Arrays::FixedWalls),

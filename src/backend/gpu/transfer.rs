@@ -38,11 +38,11 @@ fn kind(code: f32) -> Kind {
 }
 
 /// Start of each cell and particles in cell order, as bits of x, y, z and the slot. Cells are found in f32
-/// as the shaders find them.
+/// as the shaders find them; what never moves stands between the sides where these are periodic.
 fn index(
     grid: &Grid,
     lower: Vec3,
-    width: f32,
+    width: Vec3,
     first: usize,
     position: &[[f32; 4]],
 ) -> (Vec<u32>, Vec<[u32; 4]>) {
@@ -83,7 +83,7 @@ impl Gpu {
         let context = &mut self.context;
         if !fixed.is_empty() {
             let lower = (self.params.domain_min - self.middle).as_vec3();
-            let width = self.params.effective_radius as f32;
+            let width = self.grid.width.as_vec3();
             let (start, particle) = index(&self.grid, lower, width, fixed.start, &position[fixed.clone()]);
             context.upload(buffers::static_start, &start)?;
             context.upload(buffers::static_particle, &particle)?;
@@ -146,7 +146,7 @@ impl Gpu {
         let reaction = if felt > 0 { context.download(buffers::reaction, felt)? } else { Vec::new() };
         let c = laplacian_coefficient(&self.params);
         let diagonal = |e: &[f32; 2]| if e[1] > 0.0 { f64::from(e[1]) * c } else { 1.0 };
-        Ok(Fields {
+        let mut fields = Fields {
             kind: position.iter().map(|x| kind(x[3])).collect(),
             position: position.iter().map(|x| vector(x) + self.middle).collect(),
             id: velocity[..g.fluid].iter().map(|v| v[3] as u32).collect(),
@@ -159,6 +159,8 @@ impl Gpu {
             diagonal: equations.iter().map(diagonal).collect(),
             acceleration: acceleration.iter().map(vector).collect(),
             reaction: reaction.iter().map(vector).collect(),
-        })
+        };
+        fields.wrap(&g, &self.params.periodic);
+        Ok(fields)
     }
 }

@@ -1,0 +1,155 @@
+//! Periodic sides: what leaves the tank through one of them comes in through the opposite one, and particles at the two
+//! sides are neighbours.
+//!
+//! No particle is kept twice. Every way from one particle to another is that to its nearest image ([`Periodic::nearest`];
+//! `offset` in shaders/common.wgsl), which is the only one within reach where a side is three effective radii long or more; the
+//! search looks past a seam into the cells at the other side, and `cell_list` brings back the water that has left.
+
+use glam::DVec3;
+
+/// Cells of the search along a periodic axis at least: a cell and its two neighbours are then three.
+pub const CELLS_MIN: u32 = 3;
+
+/// The axes along which a scene is periodic. The default is periodic along none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Periodic {
+    /// Lower sides [m].
+    low: DVec3,
+    /// From a side to the opposite one [m]; 0 along an axis that is not periodic.
+    length: DVec3,
+    /// 1 / length [1/m]; 0 along an axis that is not periodic.
+    inverse: DVec3,
+    any: bool,
+}
+
+impl Periodic {
+    /// Periodic along the `axes` that are `true`, from `low` to `high` [m].
+    pub fn new(axes: [bool; 3], low: DVec3, high: DVec3) -> Self {
+        let mut out = Self { any: axes.contains(&true), ..Self::default() };
+        for k in (0..3).filter(|&k| axes[k]) {
+            out.low[k] = low[k];
+            out.length[k] = high[k] - low[k];
+            out.inverse[k] = 1.0 / out.length[k];
+        }
+        out
+    }
+
+    /// Whether an axis is periodic.
+    pub fn is_any(&self) -> bool {
+        self.any
+    }
+
+    /// Whether axis `k` is periodic.
+    pub fn is_along(&self, k: usize) -> bool {
+        self.length[k] > 0.0
+    }
+
+    /// From a side to the opposite one [m]; 0 along an axis that is not periodic.
+    pub fn length(&self) -> DVec3 {
+        self.length
+    }
+
+    /// Lower and upper side along `axis`, where that is periodic [m].
+    pub fn sides(&self, axis: usize) -> Option<(f64, f64)> {
+        self.is_along(axis).then(|| (self.low[axis], self.low[axis] + self.length[axis]))
+    }
+
+    /// `v` without its components along periodic axes.
+    pub fn across(&self, mut v: DVec3) -> DVec3 {
+        (0..3).filter(|&k| self.is_along(k)).for_each(|k| v[k] = 0.0);
+        v
+    }
+
+    /// The way `r` to a particle, or to the nearest of its images [m].
+    #[inline(always)]
+    pub fn nearest(&self, r: DVec3) -> DVec3 {
+        if self.any { r - self.length * (r * self.inverse).round() } else { r }
+    }
+
+    /// The image of `x` between the sides [m], the lower one included.
+    #[inline(always)]
+    pub fn wrap(&self, x: DVec3) -> DVec3 {
+        if !self.any {
+            return x;
+        }
+        let mut x = x - self.length * ((x - self.low) * self.inverse).floor();
+        for (k, x) in x.as_mut().iter_mut().enumerate() {
+            // What lies less than a rounding below the lower side comes to lie on the upper one.
+            if self.is_along(k) && *x >= self.low[k] + self.length[k] {
+                *x = self.low[k];
+            }
+        }
+        x
+    }
+
+    /// The axis across whose seam a solid of `half` lengths about `center` reaches, or to which it is closer than `reach`
+    /// [m]; none where it spans the whole length.
+    pub fn crossed(&self, center: DVec3, half: DVec3, reach: f64) -> Option<usize> {
+        (0..3).find(|&k| {
+            let spans = 2.0 * half[k] > self.length[k] - reach;
+            let near = |(low, high)| center[k] - half[k] < low + reach || center[k] + half[k] > high - reach;
+            !spans && self.sides(k).is_some_and(near)
+        })
+    }
+
+    /// `x`, which lies between the sides, and its images that lie no further than `reach` beyond them [m].
+    pub fn images(&self, x: DVec3, reach: f64) -> impl Iterator<Item = DVec3> + use<> {
+        let periodic = *self;
+        let shifts = move |k: usize| {
+            let inside = move |s: &f64| match periodic.sides(k) {
+                None => *s == 0.0,
+                Some((low, high)) => {
+                    let at = x[k] + s * periodic.length[k];
+                    *s == 0.0 || (at >= low - reach && at <= high + reach)
+                }
+            };
+            [0.0, -1.0, 1.0].into_iter().filter(inside)
+        };
+        shifts(0).flat_map(move |a| {
+            shifts(1).flat_map(move |b| shifts(2).map(move |c| x + periodic.length * DVec3::new(a, b, c)))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_axes() -> Periodic {
+        Periodic::new([true, false, true], DVec3::new(-1.0, 7.0, 2.0), DVec3::new(2.0, 8.0, 2.5))
+    }
+
+    #[test]
+    fn the_image_between_the_sides_is_one_and_differs_by_whole_lengths() {
+        let p = two_axes();
+        for x in [-1.0, -1.0 - 1e-17, 2.0, 2.0 - 1e-17, 17.3, -23.4, 0.5] {
+            let x = DVec3::new(x, x, 2.0 + x);
+            let w = p.wrap(x);
+            assert!(w.x >= -1.0 && w.x < 2.0 && w.z >= 2.0 && w.z < 2.5, "{x} {w}");
+            assert_eq!(w.y, x.y);
+            let turns = (x - w) / DVec3::new(3.0, 1.0, 0.5);
+            assert!((turns - turns.round()).abs().max_element() < 1e-12, "{x} {w}");
+            assert_eq!(p.wrap(w), w);
+        }
+        let x = DVec3::new(1e9, -3.0, 0.1);
+        assert_eq!((Periodic::default().wrap(x), Periodic::default().nearest(x)), (x, x));
+        assert!(!Periodic::default().is_any() && p.is_any());
+    }
+
+    #[test]
+    fn the_nearest_image_is_the_nearest_one() {
+        let p = two_axes();
+        let (a, b) = (DVec3::new(-0.9, 7.0, 2.1), DVec3::new(1.9, 7.5, 2.45));
+        let r = p.nearest(b - a);
+        assert!((r - DVec3::new(-0.2, 0.5, -0.15)).length() < 1e-12, "{r}");
+        let among = p.images(b, 3.0).map(|b| (b - a).length()).fold(f64::INFINITY, f64::min);
+        assert!((r.length() - among).abs() < 1e-12);
+        // Only what is near a side has images near the other one.
+        assert_eq!(p.images(DVec3::new(0.5, 7.0, 2.25), 0.2).count(), 1);
+        assert_eq!(p.images(DVec3::new(-0.9, 7.0, 2.1), 0.2).count(), 4);
+        assert_eq!(p.across(DVec3::ONE), DVec3::Y);
+        let at = |x| p.crossed(DVec3::new(x, 7.0, 2.25), DVec3::splat(0.1), 0.05);
+        assert_eq!([-0.86, 0.0, 1.86].map(at), [Some(0), None, Some(0)]);
+        assert_eq!(p.crossed(DVec3::new(0.0, 7.0, 2.25), DVec3::new(0.1, 0.1, 0.24), 0.05), None);
+    }
+}
