@@ -2,7 +2,7 @@
 
 use super::candidates::reduced_mass;
 use super::law::Law;
-use super::stiffness::{Damping, Lambda};
+use super::stiffness::{Damping, Lambda, restitution};
 use crate::body::Body;
 use crate::case;
 use crate::error::{CaseError, Problem, Result};
@@ -13,6 +13,10 @@ use glam::DMat3;
 pub(crate) const OMEGA_STEP: f64 = 0.5;
 /// The same where energy must come back: the law `smooth` undamped, or with a restitution.
 pub(crate) const ELASTIC_OMEGA_STEP: f64 = 0.2;
+/// The same with a restitution e, times e; and the most. Where contact begins and ends within a sub-step costs or gives
+/// 0.105 (dt sqrt(K / m))^2 of the energy that comes back, rms over both phases. Of an impact that is e^2: 0.18 % of it for any e.
+pub(crate) const RETURNED_OMEGA_STEP: f64 = 0.13;
+pub(crate) const DAMPED_OMEGA_STEP: f64 = 0.32;
 /// The same of the second spring, the stop, which hardly any contact reaches.
 pub(crate) const STOP_OMEGA_STEP: f64 = 0.3;
 /// Largest C dt / m_e of a sub-step.
@@ -210,11 +214,19 @@ impl Limits {
     /// dt sqrt(K / m_e) of a sub-step: smaller where the energy of an impact is what the case is about,
     /// because it gives a restitution or has next to no damping to take an error away.
     pub fn omega_step(&self) -> f64 {
-        let elastic = match self.damping {
-            Damping::Ratio(_) => true,
-            Damping::Coefficient(c) => c < 0.02 * (self.spring * self.lightest).sqrt(),
-        };
-        if elastic { ELASTIC_OMEGA_STEP } else { OMEGA_STEP }
+        match self.damping {
+            Damping::Ratio(ratio) => {
+                (RETURNED_OMEGA_STEP / restitution(ratio)).clamp(ELASTIC_OMEGA_STEP, DAMPED_OMEGA_STEP)
+            }
+            Damping::Coefficient(c) if c < 0.02 * (self.spring * self.lightest).sqrt() => ELASTIC_OMEGA_STEP,
+            Damping::Coefficient(_) => OMEGA_STEP,
+        }
+    }
+
+    /// dt sqrt(K / m_e) of the most sub-steps that a stop is softened to. With a restitution it is the least that there is, so that the
+    /// parts of longer sub-steps make what the stop asks for.
+    pub fn stop_carried_at(&self) -> f64 {
+        if self.damping.is_ratio() { ELASTIC_OMEGA_STEP } else { self.omega_step() }
     }
 }
 

@@ -103,14 +103,18 @@ impl Limits {
         let mass = reduced_mass(bodies, a, b);
         let both = |of: fn(&Lambda) -> f64| of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]));
         let shortest = self.longest_step / f64::from(self.forced.unwrap_or(MOST_SUBSTEPS));
-        let carried = (self.omega_step() / shortest).powi(2) / both(|l| l.spring);
+        let carried = |omega_step: f64| (omega_step / shortest).powi(2) / both(|l| l.spring);
         let carried_damping = DAMPING_STEP / shortest / both(|l| l.damping);
         // a dashpot that does not fit would be a weaker one, and the restitution another
         let fits = match self.damping {
             Damping::Ratio(ratio) => (0.5 * carried_damping / ratio).powi(2) / mass,
             Damping::Coefficient(_) => f64::INFINITY,
         };
-        let spring = if self.forced.is_some() { self.spring } else { self.spring.min(carried).min(fits) };
+        let spring = if self.forced.is_some() {
+            self.spring
+        } else {
+            self.spring.min(carried(self.omega_step())).min(fits)
+        };
         let closing = if b.is_some() { 2.0 } else { 1.0 } * self.fastest;
         let corner = weight.powf(2.0 / EXPONENT);
         let stop = mass * (2.0 * closing / reach).powi(2) / corner;
@@ -120,7 +124,7 @@ impl Limits {
         let stop_fits = spring * (carried_damping / damping).powi(2);
         Constants {
             spring,
-            stop: stop.min(carried).min(stop_fits).max(spring),
+            stop: stop.min(carried(self.stop_carried_at())).min(stop_fits).max(spring),
             stop_depth: STOP_DEPTH * reach,
             step: shortest,
             damping,

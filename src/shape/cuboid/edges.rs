@@ -136,25 +136,21 @@ pub(crate) fn nodes(
 /// place t in 0..1, deviation from it and depth d with w d^8, w d^7, w t d^7 and w (t^2 + deviation^2) d^7 equal to the
 /// integrals.
 fn whole(a: f64, b: f64) -> (f64, f64, f64, f64) {
-    let largest = a.max(b);
+    let (largest, smallest) = if a > b { (a, b) } else { (b, a) };
     if largest <= 0.0 {
         return (0.0, 0.5, 0.0, 0.0);
     }
-    let (x, y) = (a / largest, b / largest);
-    let (mut seventh, mut moment, mut second) = (0.0, 0.0, 0.0);
-    // sums of x^(n - k) y^k by Horner's rule; n = 7 has the moments' factors k + 1 and (k + 1) (k + 2)
-    let mut power = 1.0;
-    for k in 0..8_u32 {
-        seventh = seventh * x + power;
-        moment = moment * x + f64::from(k + 1) * power;
-        second = second * x + f64::from((k + 1) * (k + 2)) * power;
-        power *= y;
-    }
-    let eighth = seventh * x + power;
-    let (eighth, seventh, moment) = (eighth / 9.0, seventh / 8.0, moment / 72.0);
-    let depth = eighth / seventh;
-    let place = moment / seventh;
-    let deviation = (second / 720.0 / seventh - place * place).max(0.0).sqrt();
+    let r = smallest / largest;
+    let (r2, r4, r8) = (r.powi(2), r.powi(4), r.powi(8));
+    // sums of r^k, (k + 1) r^k and (k + 1) (k + 2) r^k for k from 0 to 7, taken from the deeper end
+    let sum = (1.0 + r) * (1.0 + r2) * (1.0 + r4);
+    let first = (1.0 + 2.0 * r) + r2 * (3.0 + 4.0 * r) + r4 * ((5.0 + 6.0 * r) + r2 * (7.0 + 8.0 * r));
+    let second = (2.0 + 6.0 * r) + r2 * (12.0 + 20.0 * r) + r4 * ((30.0 + 42.0 * r) + r2 * (56.0 + 72.0 * r));
+    let (eighth, per_seventh) = ((sum + r8) / 9.0, 8.0 / sum);
+    let depth = eighth * per_seventh;
+    let place = first * per_seventh / 72.0;
+    let deviation = (second * per_seventh / 720.0 - place * place).max(0.0).sqrt();
+    let place = if a > b { place } else { 1.0 - place };
     (eighth / depth.powi(8), place, deviation, largest * depth)
 }
 
