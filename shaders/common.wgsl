@@ -82,7 +82,8 @@ struct Coefficients {
     compressibility: f32,   // alpha rho / dt^2 / c
     pressure_max: f32,
     speed_per_bin: f32,     // of the monitor's histogram
-    pad: vec2f,
+    shift_speed: f32,       // of particles at rest
+    pad: f32,
 }
 
 // Of a moving solid; its position relative to the middle of the domain.
@@ -197,7 +198,7 @@ const SHIFT_MAX: f32 = 0.05;
 
 // The way of a shift, as crate::kernels::shift.
 fn shift_way(imbalance: vec3f, v: vec3f) -> vec3f {
-    let speed = sqrt(length(params.gravity) * params.spacing) + length(v);
+    let speed = now.shift_speed + length(v);
     return shortened(-SHIFT * now.dt * speed * params.spacing * imbalance, SHIFT_MAX * params.spacing);
 }
 

@@ -38,7 +38,7 @@ const DAMPING: f32 = 0.9;
 const DAMPING: f32 = 1.0;
 //#endif
 
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
 @group(0) @binding(16) var<storage, read> surface_pressure: array<f32>; // 0 where the pressure is unknown
 //#endif
 
@@ -429,11 +429,16 @@ fn end(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index
     var cut = vec4f(0.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
         var p = pressure[i];
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
         p += surface_pressure[i];
 //#endif
+//#if FILLED
+        // shaders/pressure_level.wgsl bounds it when it has its level.
+        pressure[i] = p;
+//#else
         cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
         pressure[i] = clamp(p, 0.0, now.pressure_max);
+//#endif
     }
     cut = workgroup_sum(cut, t);
     if t == 0u && cut.x + cut.y > 0.0 {

@@ -13,6 +13,8 @@
 @group(0) @binding(9) var<storage, read> preconditioned: array<vec4f>; // position, pressure as solved
 //#if CONSISTENT
 @group(0) @binding(10) var<storage, read> imbalance: array<vec4f>;
+//#endif
+//#if SURFACE_PRESSURE
 @group(0) @binding(11) var<storage, read> surface_pressure: array<f32>;
 //#endif
 //#if ABSORBER
@@ -221,7 +223,7 @@ fn as_solved(@builtin(global_invocation_id) id: vec3u) {
     if i < params.pressure_slots {
         clipped[i] = pressure[i];
         var p = preconditioned[i].w;
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
         p += surface_pressure[i];
 //#endif
         pressure[i] = p;

@@ -9,7 +9,7 @@
 @group(0) @binding(6) var<storage, read> number_density: array<f32>;
 @group(0) @binding(7) var<storage, read> state: array<u32>;
 @group(0) @binding(8) var<storage, read_write> source_diagonal: array<vec2f>;
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
 @group(0) @binding(9) var<storage, read> surface_pressure: array<f32>;
 //#endif
 
@@ -72,7 +72,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let count = neighbour_count[i];
     let near = near_of(count);
     var links = 0.0;
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
     var known = 0.0;
 //#endif
 //#if MIXED
@@ -86,7 +86,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         let r = offset(x, position[j].xyz);
         let w = weight(dot(r, r));
         links += w;
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
         known += w * surface_pressure[j];
 //#endif
 //#if MIXED
@@ -113,7 +113,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
 //#else
     var b = now.source_density * (number_density[i] - params.number_density) / params.number_density;
 //#endif
-//#if CONSISTENT
+//#if SURFACE_PRESSURE
     b += known;
 //#endif
     source_diagonal[i] = vec2f(b, links + now.compressibility);

@@ -55,6 +55,7 @@
 //! | friction of walls | [`kernels::wall_friction`] | `kernels`, `twins` |
 //! | collision (18) | [`kernels::collision`] | `twins`, `fluid` |
 //! | number density (4), free surface | [`kernels::number_density`] | `fluid` |
+//! | level of the pressure without a free surface | [`kernels::pressure_level`] | `filled`, `twins` |
 //! | pressure of the free surface | [`kernels::surface_pressure`] | `fluid`, `kernels`, `twins` |
 //! | source and diagonal of the PPE (8) | [`kernels::pressure_source`] | `fluid`, `twins` |
 //! | PPE (8) by conjugate gradients | [`kernels::conjugate_gradient`], [`pressure::cg`] | `fluid`, study `pressure-solve` |

@@ -98,8 +98,10 @@ pub struct Params {
     pub wall_contact: f64,
     /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
     pub wall_friction: f64,
-    /// Free-surface threshold beta [-].
+    /// Free-surface threshold beta [-]; 0, which no density is below, where the water fills all its room.
     pub free_surface_threshold: f64,
+    /// Whether the water fills all its room and stays so: there is no free surface, and the pressure has no level.
+    pub filled: bool,
     /// Source term of the PPE.
     pub source: Source,
     /// Pressure gradient.
@@ -141,6 +143,8 @@ pub struct Step {
     pub compressibility: f64,
     /// Pressure at which the clamp acts [Pa].
     pub pressure_max: f64,
+    /// Speed by which particles at rest shift, over the imbalance [m/s].
+    pub shift_speed: f64,
 }
 
 impl Params {
@@ -170,6 +174,9 @@ impl Params {
             Some((None, Some(c))) => Relaxation::Speed(c),
             _ => Relaxation::Speed(derived_speed),
         };
+        let source = fluid.and_then(|f| f.source).unwrap_or(source);
+        // The paper's source takes the density's deviation for the pressure: its mean is the level.
+        let filled = scene.filled && source == Source::Mixed;
         let friction = fluid.and_then(|f| f.wall_friction).unwrap_or(if paper { 0.0 } else { WALL_FRICTION });
         Ok(Self {
             dimensions: run.dimensions,
@@ -186,8 +193,11 @@ impl Params {
             wall_shear: if paper { 1.0 } else { lattice.wall_shear },
             wall_contact: lattice.wall_contact,
             wall_friction: friction / (l0 * lattice.wall_contact),
-            free_surface_threshold: fluid.map_or(0.97, |f| f.free_surface_threshold),
-            source: fluid.and_then(|f| f.source).unwrap_or(source),
+            free_surface_threshold: fluid
+                .filter(|_| !filled)
+                .map_or(if filled { 0.0 } else { 0.97 }, |f| f.free_surface_threshold),
+            filled,
+            source,
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),
             free_surface: fluid.and_then(|f| f.free_surface).unwrap_or(free_surface),
             relaxation,
@@ -280,6 +290,8 @@ impl Params {
             self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));
         let c = self.sound_speed(dt);
         let pressure_max = 5.0 * self.density * (c * c).max(speed * speed).max(head);
-        Step { time, dt, relaxation, compressibility, pressure_max }
+        let fastest = if self.filled { speed } else { 0.0 };
+        let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
+        Step { time, dt, relaxation, compressibility, pressure_max, shift_speed }
     }
 }

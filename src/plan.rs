@@ -104,6 +104,8 @@ pub enum Arrays {
     Imbalance,
     /// Pressure of the free surface's particles.
     SurfacePressure,
+    /// Of the pressure's level where there is no free surface: none of its own.
+    Level,
     /// Of the fluid's force on solids.
     Force,
     /// Force of viscosity, friction and collisions on the wall layer of moving solids, which the fluid's force takes in.
@@ -183,6 +185,8 @@ pub struct Plan {
     pub coupled: bool,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
+    /// Whether the water fills all its room, so that the pressure needs a level.
+    pub filled: bool,
     /// Whether the energy ledger is kept.
     pub ledger: bool,
     /// Whether walls that never move line the fluid.
@@ -217,6 +221,7 @@ impl Plan {
                 Stage::SurfacePressure if params.gradient == Gradient::Minimum => {
                     Err("the minimum-pressure gradient takes P = 0 at the centres of the surface's particles")
                 }
+                Stage::SurfacePressure if params.filled => Err("the water fills all its room"),
                 Stage::SurfacePressure => wet("P = 0 lies half a spacing outside the surface's particles"),
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
                 Stage::BodyForce if !free && !gauged && !case.output.ledger => {
@@ -242,7 +247,8 @@ impl Plan {
         let coupled = fluid && free && params.source == Source::Mixed;
         let fixed_walls = fluid && !scene.groups.static_range().is_empty();
         let ledger = case.output.ledger;
-        Self { reasons: reasons.to_vec(), preconditioner, coupled, contact, ledger, fixed_walls }
+        let filled = params.filled;
+        Self { reasons: reasons.to_vec(), preconditioner, coupled, contact, filled, ledger, fixed_walls }
     }
 
     /// Whether `stage` runs.
@@ -258,6 +264,7 @@ impl Plan {
             Arrays::FixedWalls => self.fixed_walls,
             Arrays::Imbalance => self.has(Stage::Shift),
             Arrays::SurfacePressure => self.has(Stage::SurfacePressure),
+            Arrays::Level => self.filled,
             Arrays::Force => self.has(Stage::BodyForce),
             Arrays::Reaction => {
                 let acts = |stage| self.has(stage);

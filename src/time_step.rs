@@ -45,8 +45,11 @@ impl Bounds {
     }
 }
 
-/// Speed of a collapse of the water from rest, 2 sqrt(g H) [m/s].
+/// Speed of a collapse of the water from rest, 2 sqrt(g H) [m/s]; 0 where it fills all its room.
 pub fn collapse_speed(params: &Params) -> f64 {
+    if params.filled {
+        return 0.0;
+    }
     2.0 * (params.gravity.length() * params.depth).sqrt()
 }
 

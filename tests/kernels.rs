@@ -305,7 +305,7 @@ fn the_fast_pressure_gradient_is_the_plain_one() {
             let inner = f.state[i] == State::Inner;
             let one_side = shift::imbalance(i, s.cpu.neighbours().all(i), s.particles());
             if inner {
-                shift::shift(one_side, f.velocity[i], s.step.dt, s.particles().params)
+                shift::shift(one_side, f.velocity[i], &s.step, s.particles().params)
             } else {
                 DVec3::ZERO
             }

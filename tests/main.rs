@@ -17,6 +17,7 @@ mod device;
 mod errors;
 mod examples;
 mod faults;
+mod filled;
 mod first_minute;
 mod fluid;
 mod fuzz;

@@ -9,6 +9,7 @@ use seixo::case::Case;
 use seixo::cells::Grid;
 use seixo::fields::{Fields, State};
 use seixo::gauges::Gauges;
+use seixo::kernels::pressure_level::subtract_mean;
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::params::Params;
 use seixo::plan::{ParticleStage, Plan};
@@ -125,12 +126,16 @@ fn multigrid_goes_round() {
         assert!(entries.iter().all(|e| (e - entries[0]).abs() < 1e-6), "{entries:?}");
         let (n, settings) = (a.state.len(), Settings { tolerance: 1e-6, ..TIGHT });
         let (mut p, mut q) = (vec![0.0; n], vec![0.0; n]);
-        let b = &cpu.fields().source;
+        // The constant that a box without a surface does not know is no part of a solve.
+        let mut b = cpu.fields().source.clone();
+        subtract_mean(a.state, &mut b);
+        let b = &b;
         let jacobi = solve(&a, b, &mut p, &mut Jacobi, &settings, &mut Workspace::default());
         let bucket = solve(&a, b, &mut q, &mut multigrid, &settings, &mut Workspace::default());
         println!("{size:?}: Jacobi {} iterations, multigrid {}", jacobi.iterations, bucket.iterations);
         assert_eq!((jacobi.outcome, bucket.outcome), (Outcome::Converged, Outcome::Converged));
-        assert!(bucket.iterations <= 12 && bucket.iterations < jacobi.iterations, "{bucket:?} {jacobi:?}");
+        // No particle of the surface is a fixed point here.
+        assert!(bucket.iterations <= 15 && 2 * bucket.iterations < jacobi.iterations, "{bucket:?} {jacobi:?}");
         let scale = p.iter().fold(0.0_f64, |s, p| s.max(p.abs()));
         let worst = p.iter().zip(&q).fold(0.0_f64, |s, (a, b)| s.max((a - b).abs()));
         assert!(worst < 1e-4 * scale, "{worst} of {scale}");

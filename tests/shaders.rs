@@ -258,6 +258,7 @@ fn structs_lie_the_same_on_both_sides() {
             compressibility,
             pressure_max,
             speed_per_bin,
+            shift_speed,
             pad,
         }
     );

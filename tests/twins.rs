@@ -738,6 +738,51 @@ fn shift() {
 }
 
 #[test]
+fn pressure_level() {
+    if !device() {
+        return;
+    }
+    let case = crate::common::case(
+        "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\nsound_speed = 3\njitter = 0.1\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1.6, 1.5, 1.4]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1.6, 1.5, 1.4]\nopen = []\nperiodic = [\"x\"]\n",
+    );
+    let scene = Scene::build(&case).expect("it builds");
+    let params = Params::new(&case, &scene).expect("valid");
+    let plan = Plan::new(&case, &scene, &params);
+    assert!(plan.filled);
+    let settings = Settings { tolerance: 1e-5, max_iterations: 1000, warm_start: true };
+    let cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+    let gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+    let step = params.step(0.0, 1e-3, 2.0);
+    let mut pair = Pair { scene, params, plan, settings, step, poses: vec![], cpu, gpu };
+    let mut fields = pair.gpu.read().expect("readable");
+    for (i, v) in fields.velocity.iter_mut().take(pair.scene.groups.fluid).enumerate() {
+        *v = 0.2 * common::noise_vector(i, 3);
+    }
+    pair.gpu.write(&fields).expect("writable");
+    pair.sync();
+    pair.run_all(&LISTS);
+    pair.run_to_source();
+    pair.gpu.solve_pressure(&step).expect("the device solves");
+    pair.cpu.solve_pressure(&step).expect("the CPU solves");
+    let (gpu, cpu) = pair.fields();
+    let unknown = |f: &Fields| -> Vec<f64> {
+        f.state.iter().zip(&f.pressure).filter(|(s, _)| **s == State::Inner).map(|(_, &p)| p).collect()
+    };
+    let (there, here) = (unknown(&gpu), unknown(&cpu));
+    assert!(there.len() == here.len() && there.len() > 3000, "{} {}", there.len(), here.len());
+    let largest = here.iter().fold(0.0_f64, |a, &p| a.max(p));
+    let least = |of: &[f64]| of.iter().fold(f64::INFINITY, |a, &p| a.min(p));
+    assert_eq!((least(&there), least(&here)), (0.0, 0.0));
+    let square: f64 = there.iter().zip(&here).map(|(a, b)| (a - b).powi(2)).sum();
+    let rms = (square / here.len() as f64).sqrt() / largest;
+    println!("rms {rms:.1e} of {largest:.0} Pa");
+    assert!(largest > 5e3 && rms < SOLVE, "{rms}");
+    assert_eq!(pair.gpu.counters().expect("counted").negative_pressures, 0);
+}
+
+#[test]
 fn body_force() {
     each(|pair| {
         pair.run_all(&LISTS);

@@ -18,6 +18,7 @@ pub mod neighbour_list;
 pub mod number_density;
 pub mod predict;
 pub mod pressure_gradient;
+pub mod pressure_level;
 pub mod pressure_source;
 pub mod shift;
 pub mod surface_pressure;
@@ -100,6 +101,7 @@ pub mod device {
         number_density[super::WORKGROUP] Stage(NumberDensity), Rows: number_density_main;
         predict[super::WORKGROUP] Stage(Predict), Fluid: predict;
         pressure_gradient[super::WORKGROUP] Stage(PressureGradient), Fluid: pressure_gradient;
+        pressure_level[super::WORKGROUP] Arrays(Level), Own: sum_source subtract_mean find_lowest raise;
         pressure_source[super::WORKGROUP] Stage(PressureSource), Rows: pressure_source;
         shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
         surface_pressure[super::WORKGROUP] Stage(SurfacePressure), Rows: surface_pressure_main;

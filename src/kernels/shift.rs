@@ -3,13 +3,14 @@
 //!
 //! The consistent gradient carries water exactly and does not care how the particles lie; Eq. (9)'s repulsion, which
 //! spaced them, was noise of a tenth of gravity. Displacement (0.3 dt (sqrt(g l0) + |v|) l0) times the imbalance, after
-//! the particle shifting of Lind et al. (2012); particles on the free surface stay.
+//! the particle shifting of Lind et al. (2012); particles on the free surface stay. Where there is no free surface the
+//! fastest speed of the flow is added: particles are drawn out into lines where water parts, and v is zero there.
 
 use super::Particles;
 use super::predict::clamp_length;
 use crate::neighbourhood::pair_vector;
 use crate::neighbours::Row;
-use crate::params::Params;
+use crate::params::{Params, Step};
 use glam::DVec3;
 
 /// Displacement over dt times speed, l0 and imbalance [-].
@@ -22,10 +23,10 @@ pub fn imbalance(i: usize, all: Row, on: Particles) -> DVec3 {
     all.iter().map(|(j, w)| pair_vector(i, j, w, on)).sum()
 }
 
-/// Displacement of a particle of velocity `v` in a step of `dt` [m].
+/// Displacement of a particle of velocity `v` in `step` [m].
 #[inline(always)]
-pub fn shift(imbalance: DVec3, v: DVec3, dt: f64, params: &Params) -> DVec3 {
+pub fn shift(imbalance: DVec3, v: DVec3, step: &Step, params: &Params) -> DVec3 {
     let l0 = params.spacing;
-    let speed = (params.gravity.length() * l0).sqrt() + v.length();
-    clamp_length(-SHIFT * dt * speed * l0 * imbalance, SHIFT_MAX * l0).0
+    let speed = step.shift_speed + v.length();
+    clamp_length(-SHIFT * step.dt * speed * l0 * imbalance, SHIFT_MAX * l0).0
 }

@@ -60,6 +60,7 @@ pub(super) struct Builder<'a> {
     pub(super) bodies: Vec<Solid>,
     pub(super) water: Water,
     pub(super) depth: f64,
+    pub(super) filled: bool,
     pub(super) notes: Vec<String>,
     pub(super) problems: Vec<Problem>,
 }
@@ -107,6 +108,7 @@ impl<'a> Builder<'a> {
             bodies: Vec::new(),
             water: Water::default(),
             depth: 0.0,
+            filled: false,
             notes: Vec::new(),
             problems: Vec::new(),
         })
@@ -235,6 +237,11 @@ impl<'a> Builder<'a> {
                     self.problems.push(Problem { key, message, ..*problem });
                 }
             }
+        }
+        // A wall that moves may make room; a body among the water only changes places with it.
+        self.filled = self.case.moving_wall.is_empty() && self.water.fills(&self.lattice, &self.grid);
+        if self.filled {
+            self.notes.push("the water fills all its room: the smallest pressure is 0".into());
         }
         // What of gravity lies along a periodic axis presses on nothing.
         self.depth = self.water.depth(self.periodic.across(self.gravity()), &self.lattice);

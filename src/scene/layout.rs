@@ -64,6 +64,7 @@ impl Builder<'_> {
             domain,
             periodic: self.periodic,
             depth: self.depth,
+            filled: self.filled,
             notes: self.notes,
         }
     }

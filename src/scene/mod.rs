@@ -253,6 +253,8 @@ pub struct Scene {
     pub periodic: Periodic,
     /// Largest depth of water at the start, along gravity [m].
     pub depth: f64,
+    /// Whether the water leaves no room free at the start, nor any wall that moves could: it has no free surface.
+    pub filled: bool,
     /// What a user should know that is no error (rounded lengths, removed particles ...).
     pub notes: Vec<String>,
 }

@@ -178,6 +178,14 @@ impl Water {
         high - low + lattice.spacing
     }
 
+    /// Whether there is water and no cell beside it is free.
+    pub fn fills(&self, lattice: &Lattice, grid: &Grid) -> bool {
+        let ways = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().filter(|way| !(lattice.plane && way.y == 1));
+        let ways: Vec<IVec3> = ways.flat_map(|way| [way, -way]).collect();
+        let enclosed = |&c: &IVec3| ways.iter().all(|&way| grid.get(grid.wrap(c + way)) != FREE);
+        !self.cell.is_empty() && self.cell.iter().all(enclosed)
+    }
+
     /// Whether water at rest would run away: spreads it sideways and down through free cells (gates and
     /// moving walls are closed) and complains when it gets out of everything there is.
     ///

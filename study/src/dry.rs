@@ -61,6 +61,7 @@ impl DryScene {
             domain: (low, high),
             periodic: Default::default(),
             depth: 0.0,
+            filled: false,
             notes: vec![],
         };
         Self { scene }

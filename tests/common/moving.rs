@@ -188,6 +188,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         domain: (low, high),
         periodic: Default::default(),
         depth: f64::from(7 * scale) * SPACING,
+        filled: false,
         notes: Vec::new(),
     }
 }

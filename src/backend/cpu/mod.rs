@@ -28,8 +28,8 @@ use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
-    Particles, absorber, body_force, collision, correct, monitor, move_solids, predict, shift,
-    surface_pressure, wall_friction,
+    Particles, absorber, body_force, collision, correct, monitor, move_solids, predict, pressure_level,
+    shift, surface_pressure, wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -391,17 +391,17 @@ impl Cpu {
         }
     }
 
-    fn shift(&mut self, dt: f64) {
+    fn shift(&mut self, step: &Step) {
         let Self { params, fields, imbalance, ledger, live, .. } = self;
         let Fields { position, velocity, .. } = fields;
         let n = *live;
         if let Some(ledger) = ledger {
-            let way = |i: usize| shift::shift(imbalance[i], velocity[i], dt, params);
+            let way = |i: usize| shift::shift(imbalance[i], velocity[i], step, params);
             ledger.shift(n, params, way);
         }
         (&mut position[..n], &velocity[..n], &imbalance[..n])
             .into_par_iter()
-            .for_each(|(x, &v, &imbalance)| *x += shift::shift(imbalance, v, dt, params));
+            .for_each(|(x, &v, &imbalance)| *x += shift::shift(imbalance, v, step, params));
     }
 
     fn correct(&mut self, dt: f64) {
@@ -450,7 +450,7 @@ impl Backend for Cpu {
             ParticleStage::SurfacePressure => self.surface_pressure(),
             ParticleStage::PressureSource => self.pressure_source(step),
             ParticleStage::PressureGradient => self.pressure_gradient(),
-            ParticleStage::Shift => self.shift(step.dt),
+            ParticleStage::Shift => self.shift(step),
             ParticleStage::Correct => {
                 if let Some(ledger) = &mut self.ledger {
                     let Fields { position, velocity, acceleration, .. } = &self.fields;
@@ -472,6 +472,9 @@ impl Backend for Cpu {
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let bodies = self.couple();
         let Self { fields, neighbours, params, settings, work, multigrid, grid, .. } = self;
+        if params.filled {
+            pressure_level::subtract_mean(&fields.state, &mut fields.source);
+        }
         let system = System {
             neighbours,
             state: &fields.state,
@@ -490,6 +493,9 @@ impl Backend for Cpu {
             solve_or_fall_back(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
         // The solve leaves zero where the pressure is no unknown.
         fields.pressure.iter_mut().zip(&fields.surface_pressure).for_each(|(p, known)| *p += known);
+        if params.filled {
+            pressure_level::raise(&fields.state, &mut fields.pressure);
+        }
         if let Some(ledger) = &mut self.ledger {
             ledger.solution.clone_from(&fields.pressure);
         }

@@ -102,7 +102,8 @@ pub struct Coefficients {
     pub compressibility: f32,
     pub pressure_max: f32,
     pub speed_per_bin: f32,
-    pub pad: [f32; 2],
+    pub shift_speed: f32,
+    pub pad: f32,
 }
 
 /// State of the conjugate gradients; see `Solve` in shaders/conjugate_gradient.wgsl.
@@ -279,7 +280,8 @@ impl Coefficients {
             compressibility: (step.compressibility * per_time / step.dt / c) as f32,
             pressure_max: step.pressure_max as f32,
             speed_per_bin: (range / SPEED_BINS as f64) as f32,
-            pad: [0.0; 2],
+            shift_speed: step.shift_speed as f32,
+            pad: 0.0,
         }
     }
 }

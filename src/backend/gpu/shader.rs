@@ -9,10 +9,11 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 13] = [
+pub const SWITCHES: [&str; 15] = [
     "ABSORBER",
     "CONSISTENT",
     "COUPLED",
+    "FILLED",
     "MIXED",
     "MOVING",
     "MULTIGRID",
@@ -20,6 +21,7 @@ pub const SWITCHES: [&str; 13] = [
     "REACTION",
     "SHARED_COLLISIONS",
     "STATIC",
+    "SURFACE_PRESSURE",
     "THRESHOLD_OFFSET",
     "TWO_DIMENSIONS",
     "VISCOSITY",
@@ -31,6 +33,7 @@ pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
         plan.needs(Arrays::Absorber),
         params.gradient != Gradient::Minimum,
         plan.needs(Arrays::Coupling),
+        plan.needs(Arrays::Level),
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
@@ -38,6 +41,7 @@ pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
         plan.needs(Arrays::Reaction),
         params.collision == Collision::Shared,
         plan.needs(Arrays::FixedWalls),
+        plan.needs(Arrays::SurfacePressure),
         params.free_surface == FreeSurface::ThresholdOffset,
         params.dimensions == 2,
         plan.has(Stage::Viscosity),

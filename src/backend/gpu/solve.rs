@@ -1,6 +1,6 @@
 //! The PPE on the device: the host queues iterations and looks at the verdict now and then.
 
-use super::kernels::{conjugate_gradient as kernel, coupling};
+use super::kernels::{conjugate_gradient as kernel, coupling, pressure_level as level};
 use super::layout::Solve;
 use super::{Gpu, buffers};
 use crate::compute::Kernel;
@@ -24,6 +24,19 @@ impl Gpu {
         if self.coupled > 0 {
             self.context.pass([(coupling::prepare, self.coupled)])?;
         }
+        let groups = self.sizes.reduction_groups();
+        if self.params.filled {
+            self.context.pass([level::sum_source, level::subtract_mean].map(|kernel| (kernel, groups)))?;
+        }
+        let report = self.preconditioned()?;
+        if self.params.filled {
+            self.context.pass([level::find_lowest, level::raise].map(|kernel| (kernel, groups)))?;
+        }
+        Ok(report)
+    }
+
+    /// The iteration with the planned preconditioner.
+    fn preconditioned(&mut self) -> Result<PressureReport> {
         self.build_levels()?;
         let multigrid = self.levels.is_some();
         let expected = self.expected_iterations.ceil() as u32;

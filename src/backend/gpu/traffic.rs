@@ -107,6 +107,12 @@ impl Gpu {
         let coupled = respond * self.sizes.moving_wall * (4 * buffers::coupling.size() + z);
         let multiply = equation + lists + u * (z + 2 * search);
         let advance = equation + u * (search + 2 * p + 2 * r + 2 * z);
+        let mut ends = ends;
+        if self.params.filled {
+            // The right side is read and read and written, so is the pressure, each time beside the state.
+            ends.bytes += slots * (4 * buffers::state.size() + 3 * buffers::source_diagonal.size() + 3 * p);
+            ends.dispatches += 4;
+        }
         let mut out =
             Solve { ends, iteration: work(multiply + advance + coupled, 2 + respond), ..Solve::default() };
         if let Some(levels) = self.levels.clone() {
