@@ -169,6 +169,7 @@ mod tests {
             coupled: true,
             contact: Default::default(),
             fixed_walls: true,
+            filled: false,
             ledger: false,
         }
     }

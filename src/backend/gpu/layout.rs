@@ -478,6 +478,7 @@ mod tests {
             coupled: true,
             contact: Default::default(),
             fixed_walls: true,
+            filled: false,
             ledger: false,
         };
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
@@ -498,6 +499,7 @@ mod tests {
             coupled: false,
             contact: Default::default(),
             fixed_walls: false,
+            filled: false,
             ledger: false,
         };
         assert_eq!(Memory::new(&Sizes::default(), &plan).total(), 0);
