@@ -30,6 +30,7 @@ mod ledger;
 mod measure;
 mod meshes;
 mod motion_file;
+mod openings;
 mod output;
 mod output_fields;
 mod packages;
