@@ -44,6 +44,7 @@ mod shaped;
 mod shapes;
 mod stability;
 mod study;
+mod surface;
 mod twins;
 mod water;
 mod waves;

@@ -267,6 +267,21 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
     }
 }
 
+/// A log that drifts down the channel stays there: to bodies an opening is a wall.
+#[test]
+fn a_body_does_not_leave_through_an_opening() {
+    for outflow in ["velocity = 0.25", ""] {
+        let log = "[contact]\nlaw = \"smooth\"\nspring = 1e4\n[[body]]\nname = \"log\"\nsize = [0.08, 0.1, 0.05]\n\
+                   center = [0.7, 0, 0.1]\ndensity = 500\nvelocity = [0.25, 0, 0]\ndisplaces_fluid = true\n";
+        let mut simulation = opened(&format!("{}{log}", channel(outflow)), &Processor::Cpu);
+        until(&mut simulation, 1.0);
+        let (_, out, lost, _) = counted(&mut simulation);
+        let x = simulation.solid("log").expect("it is there").pose.position.x;
+        println!("{outflow}: log at {x:.4} m, {out} out");
+        assert!(lost == 0 && out > 200 && (0.74..0.77).contains(&x), "{x} {out} {lost}");
+    }
+}
+
 #[test]
 fn a_scene_without_openings_has_no_such_stage() {
     let case: Case = tank(0.1, "").parse().expect("valid");

@@ -2,21 +2,41 @@
 
 use super::check::{Checker, face};
 use super::{Case, Face, TANK_FACES, Tank, Vector};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Outflows of a case at most: a device counts what each swallows.
 pub const OUTFLOWS_MAX: usize = 8;
 
 /// A quantity over time: a number, or rows of time [s] and value with straight lines between them; before the first row the
 /// first value holds, after the last one the last.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number, or rows of time [s] and value")]
 pub enum Rate {
     /// The same at all times.
     Constant(f64),
     /// Rows of time [s] and value.
     Table(Vec<[f64; 2]>),
+}
+
+impl JsonSchema for Rate {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Rate".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        schemars::json_schema!({
+            "type": ["number", "array"],
+            "minimum": 0,
+            "minItems": 1,
+            "items": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
+        })
+    }
 }
 
 impl Rate {
