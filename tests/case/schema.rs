@@ -49,10 +49,20 @@ name = "in"
 face = "x_min"
 velocity = 1
 
+[[inflow]]
+name = "in by discharge"
+face = "y_min"
+discharge = 1
+
 [[outflow]]
 name = "out"
 face = "x_max"
 discharge = 1
+
+[[outflow]]
+name = "out by velocity"
+face = "y_max"
+velocity = 1
 
 [[plane]]
 name = "plane"
