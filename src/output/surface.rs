@@ -166,8 +166,7 @@ fn filled(bins: &Bins, nodes: &Nodes, reach: f32) -> Vec<f32> {
         let from = bins.start[bins.index(IVec3::new(first, 0, 0))] as usize;
         let to = bins.start[bins.index(IVec3::new(last, bins.count.y - 1, bins.count.z - 1)) + 1] as usize;
         // The nodes of this plane that each particle reaches.
-        for k in from..to {
-            let p = bins.position[k];
+        for (p, part) in bins.position[from..to].iter().zip(&share[from..to]) {
             let left = reach - (p.x - x).powi(2);
             if left <= 0.0 {
                 continue;
@@ -182,9 +181,9 @@ fn filled(bins: &Bins, nodes: &Nodes, reach: f32) -> Vec<f32> {
                 if left <= 0.0 {
                     continue;
                 }
-                for k_z in span(p.z, nodes.low.z, left) {
-                    let z = nodes.low.z + nodes.cell * k_z as f32 - p.z;
-                    plane[j * row + k_z] += share[k] * weight(reach - left + z * z, reach);
+                for k in span(p.z, nodes.low.z, left) {
+                    let z = nodes.low.z + nodes.cell * k as f32 - p.z;
+                    plane[j * row + k] += part * weight(reach - left + z * z, reach);
                 }
             }
         }
