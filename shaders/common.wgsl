@@ -33,6 +33,8 @@ const NEGATIVE_PRESSURES: u32 = 3u;
 const NEIGHBOURS_MAX: u32 = 4u;
 const NON_FINITE: u32 = 5u;
 const OVERFLOW: u32 = 6u;
+// The first of as many as there are outflows.
+const SWALLOWED: u32 = 8u;
 
 struct Constants {
     gravity: vec3f,
@@ -110,6 +112,23 @@ struct AbsorberZone {
     high: vec4f,
     start: vec4f,
     ramp: vec4f, // and the rate
+}
+
+// A wall layer that becomes water: its first slot, its particles, the first slot of the water; from the layer to the water, and the
+// water's velocity.
+struct Emission {
+    wall: u32,
+    count: u32,
+    to: u32,
+    pad: u32,
+    shift: vec4f,
+    velocity: vec4f,
+}
+
+// A box in which water is swallowed. Corners relative to the middle of the domain.
+struct Outlet {
+    low: vec4f,
+    high: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> params: Constants;

@@ -135,6 +135,21 @@ impl Estimate {
             })
         };
         let water = water + tank.zip(level).map_or(0.0, filled);
+        // What comes in, but no more than the tank holds, or than the case says.
+        let comes = |o: crate::case::OpeningKeys| {
+            let volume = match (o.velocity, o.discharge, tank) {
+                (Some(velocity), _, Some(tank)) => velocity.total(run.end) * o.area(tank, flat),
+                (None, Some(discharge), _) => discharge.total(run.end),
+                _ => 0.0,
+            };
+            volume / if flat { l0 * l0 } else { l0.powi(3) }
+        };
+        let comes: f64 = case.openings().filter(|o| o.is_inflow()).map(comes).sum();
+        let most = case.fluid.as_ref().and_then(|f| f.max_volume);
+        let most = most.map(|v| v / if flat { l0 * l0 } else { l0.powi(3) });
+        let most = most.or_else(|| tank.map(|t| 2.0 * cells(&|k| span(&t.min, &t.max, k))));
+        let water =
+            if comes > 0.0 { (water + comes).min(most.unwrap_or(f64::INFINITY)).max(water) } else { water };
         // A shell of `layers` around or inside of a box.
         let shell = |size: &dyn Fn(usize) -> f64, open: &[Face]| {
             let closed = 1.0 - open.len() as f64 / if flat { 4.0 } else { 6.0 };

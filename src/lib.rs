@@ -46,6 +46,7 @@
 //! | equation | kernel and shader | checked by itself in |
 //! |---|---|---|
 //! | weight (3), n0 (4), lambda (7) | [`lattice`] | `fluid` |
+//! | inflow and outflow | [`kernels::openings`], [`openings`] | `openings`, `twins` |
 //! | absorption of waves | [`kernels::absorber`] | `twins`, `waves` |
 //! | periodic sides | [`periodic`], `offset` in `shaders/common.wgsl` | `periodic`, by brute force over images |
 //! | viscosity (2), (6) | [`kernels::viscosity`] | `twins`, study `stability` |
@@ -88,6 +89,7 @@ pub mod monitor;
 pub mod neighbourhood;
 pub mod neighbours;
 mod open;
+pub mod openings;
 pub mod output;
 pub mod params;
 pub mod periodic;

@@ -61,6 +61,8 @@ stages! {
     Viscosity = "viscosity" [Viscosity];
     /// Explicit part of Eq. (2): viscosity and gravity move particles to r*.
     Predict = "predict" [Predict];
+    /// Water comes in and goes out through the tank's walls.
+    Openings = "openings" [];
     /// Solids go where they would go without the fluid.
     MoveSolids = "move_solids" [];
     /// Sort by cell at r*.
@@ -118,6 +120,8 @@ pub enum Arrays {
     Ledger,
     /// Of boxes in which the water comes to rest.
     Absorber,
+    /// Of openings through which water comes in and goes out.
+    Openings,
 }
 
 /// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
@@ -205,6 +209,8 @@ impl Plan {
             let reason = match stage {
                 Stage::Absorber if params.absorbers.is_empty() => Err("no absorber"),
                 Stage::Absorber => wet("waves run into absorbers"),
+                Stage::Openings if scene.openings.is_empty() => Err("no inflow and no outflow"),
+                Stage::Openings => wet("water comes in or goes out"),
                 Stage::Viscosity if params.viscosity == 0.0 => Err("viscosity is zero"),
                 Stage::Viscosity => wet("viscosity is given"),
                 Stage::MoveSolids if !moving => Err("nothing solid moves"),
@@ -273,6 +279,7 @@ impl Plan {
             }
             Arrays::Coupling => self.coupled,
             Arrays::Ledger => self.wet() && self.ledger,
+            Arrays::Openings => self.has(Stage::Openings),
             Arrays::Absorber => self.has(Stage::Absorber),
             Arrays::Multigrid => self.wet() && self.preconditioner == Preconditioner::Multigrid,
         }

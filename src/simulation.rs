@@ -9,6 +9,7 @@ use crate::contact::{ContactReport, Solids};
 use crate::error::{Error, Result};
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
+use crate::openings::Openings;
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
@@ -67,6 +68,10 @@ pub struct Simulation {
     pub groups: Groups,
     /// Work of and on the solids, and the energy of the free ones [J], if the ledger is kept.
     solids_ledger: Option<(Ledger, f64)>,
+    /// Where water comes in and goes out.
+    pub openings: Openings,
+    /// Particles that were gone when last looked.
+    gone: u64,
     speed: f64,
     pub(crate) stop: Stop,
     pub(crate) threads: Option<ThreadPool>,
@@ -121,6 +126,8 @@ impl Simulation {
             fluid_force: vec![Wrench::default(); scene.solids.len()],
             case: case.clone(),
             groups: scene.groups,
+            openings: Openings::new(&scene),
+            gone: 0,
             scene,
             params,
             plan,
@@ -149,6 +156,8 @@ impl Simulation {
             wait_for_stages: _,
             threads: _,
             stop: _,
+            // Looked up when it matters.
+            gone: _,
             // Times by the clock are those of each process.
             stages: _,
             backend,
@@ -158,6 +167,7 @@ impl Simulation {
             steps,
             speed,
             solids_ledger,
+            openings,
         } = self;
         let Groups { fluid, moving_wall, static_wall, static_dummy, moving_dummy } = *groups;
         archive.same("particles of water", fluid as u64)?;
@@ -179,6 +189,7 @@ impl Simulation {
             ledger.exchange(archive, "ledger.solids")?;
             archive.number("ledger.energy", energy)?;
         }
+        openings.exchange(archive)?;
         backend.exchange(archive)?;
         solids.exchange(archive, backend.compute())
     }
@@ -204,7 +215,11 @@ impl Simulation {
     pub fn next_step(&self) -> Step {
         let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
         let typed = self.case.run.time_step;
-        let fastest = if adaptive { self.solids.fastest(self.time, typed) } else { 0.0 };
+        let fastest = if adaptive {
+            self.solids.fastest(self.time, typed).max(self.openings.fastest(self.time, self.time + typed))
+        } else {
+            0.0
+        };
         let dt = time_step(&self.params, typed, adaptive, flow.max(fastest));
         self.params.step(self.time, dt, flow)
     }
@@ -252,6 +267,37 @@ impl Simulation {
         self.timed(stage.into(), |s| s.backend.run(stage, step))
     }
 
+    /// Water comes in and goes out.
+    pub(crate) fn pass_openings(&mut self, step: &Step) -> Result<()> {
+        if !self.plan.has(Stage::Openings) {
+            return Ok(());
+        }
+        self.timed(Stage::Openings, |s| {
+            let there = s.scene.water() as u64 + s.openings.total_emitted();
+            let slots = s.groups.fluid;
+            let passage = s.openings.advance(step.time, step.dt, slots);
+            let comes: usize = passage.emissions.iter().map(|e| e.wall.len()).sum();
+            let fits = |gone: u64| there - gone + comes as u64 <= slots as u64;
+            if comes > 0 && !fits(s.gone) {
+                s.gone = s.backend.counters()?.gone();
+                if !fits(s.gone) {
+                    let what = format!(
+                        "there is room for {slots} particles of water, {} are there and {comes} more come in; give a larger \
+                         fluid.max_volume, or a larger run.domain if water is to be higher than that",
+                        there - s.gone
+                    );
+                    return Err(s.diverged(step, Stage::Openings, what));
+                }
+            }
+            s.backend.pass_openings(&passage.emissions, &passage.outlets)?;
+            if passage.counts {
+                let counters = s.backend.counters()?;
+                s.openings.count(step.time + step.dt, &passage, &counters.swallowed);
+            }
+            Ok(())
+        })
+    }
+
     /// Solids move as they would without the fluid's force in this step.
     pub(crate) fn move_solids(&mut self, t: f64, dt: f64) -> Result<()> {
         if !self.plan.has(Stage::MoveSolids) {
@@ -259,7 +305,7 @@ impl Simulation {
         }
         self.timed(Stage::MoveSolids, |s| {
             let poses = s.solids.predict(t, dt, s.params.explicit_gravity(), !s.plan.needs(Arrays::Coupling));
-            s.backend.move_solids(poses)
+            s.backend.move_solids(&s.openings.place(poses))
         })
     }
 
@@ -302,7 +348,7 @@ impl Simulation {
             self.book_solids(&before, step.dt);
         }
         if self.plan.has(Stage::MoveSolids) {
-            self.timed(Stage::MoveSolids, |s| s.backend.move_solids(s.solids.poses()))?;
+            self.timed(Stage::MoveSolids, |s| s.backend.move_solids(&s.openings.place(s.solids.poses())))?;
         }
         Ok(report)
     }
@@ -409,11 +455,11 @@ impl Simulation {
             let what = format!("the velocity of particle {particle} is not a number");
             return Err(self.diverged(step, Stage::Correct, what));
         }
-        let fluid = self.groups.fluid as f64;
-        if counters.lost as f64 > (LOST_MAX * fluid).max(10.0) {
+        let fluid = self.scene.water() as u64 + self.openings.total_emitted();
+        if counters.lost as f64 > (LOST_MAX * fluid as f64).max(10.0) {
             let what = format!(
                 "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began",
-                counters.lost, self.groups.fluid
+                counters.lost, fluid
             );
             return Err(self.diverged(step, Stage::CellList, what));
         }

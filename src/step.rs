@@ -32,6 +32,7 @@ impl Simulation {
                 Stage::BodyForce => {}
                 Stage::Contact => report.contact = self.advance_solids(&step)?,
                 _ if !self.plan.wet() => {}
+                Stage::Openings => self.pass_openings(&step)?,
                 Stage::MoveSolids => self.move_solids(t, dt)?,
                 Stage::ConjugateGradient => report.pressure = self.solve_pressure(&step)?,
                 particles => {

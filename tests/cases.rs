@@ -29,7 +29,9 @@ fn steps_of(name: &str, spacing: Option<f64>, steps: u64) {
     assert_eq!((counters.lost, counters.non_finite, counters.overflow), (0, None, None), "{name}");
     // A gate does work on the water, little in a few steps.
     let end = energy(&mut sim);
-    assert!(end < start + 1e-3 * start.abs() + 1e-9, "{name}: {start} J became {end} J");
+    // Water that comes in brings its own.
+    let closed = sim.openings.is_empty();
+    assert!(!closed || end < start + 1e-3 * start.abs() + 1e-9, "{name}: {start} J became {end} J");
     let moved = wet || sim.solids.poses().iter().zip(&before).any(|(a, b)| a.position != b.position);
     assert!(moved && sim.time > 0.0, "{name}: nothing moved");
 }
@@ -53,6 +55,7 @@ macro_rules! cases {
 }
 
 cases! {
+    channel Some(0.04), 60;
     dam_break Some(0.04), 60;
     dam_break_2d None, 60;
     dam_break_transport Some(0.03), 100;

@@ -135,7 +135,10 @@ fn multigrid_goes_round() {
         println!("{size:?}: Jacobi {} iterations, multigrid {}", jacobi.iterations, bucket.iterations);
         assert_eq!((jacobi.outcome, bucket.outcome), (Outcome::Converged, Outcome::Converged));
         // No particle of the surface is a fixed point here.
-        assert!(bucket.iterations <= 15 && 2 * bucket.iterations < jacobi.iterations, "{bucket:?} {jacobi:?}");
+        assert!(
+            bucket.iterations <= 15 && 2 * bucket.iterations < jacobi.iterations,
+            "{bucket:?} {jacobi:?}"
+        );
         let scale = p.iter().fold(0.0_f64, |s, p| s.max(p.abs()));
         let worst = p.iter().zip(&q).fold(0.0_f64, |s, (a, b)| s.max((a - b).abs()));
         assert!(worst < 1e-4 * scale, "{worst} of {scale}");

@@ -16,7 +16,7 @@ const BODIES: [&str; 4] = [
 ];
 
 /// Everything that a run wrote and that does not tell times by the clock.
-fn results(root: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn results(root: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for folder in [root.to_path_buf(), root.join("vtu")] {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -41,7 +41,7 @@ fn results(root: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-fn assert_same(a: &Path, b: &Path, what: &str) {
+pub(crate) fn assert_same(a: &Path, b: &Path, what: &str) {
     let (a, b) = (results(a), results(b));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "{what}");
     for (name, bytes) in &a {

@@ -4,7 +4,8 @@ use crate::common::moving as common;
 
 use seixo::backend::gpu::hierarchy::{Hierarchy, Operation};
 use seixo::backend::gpu::layout::{
-    AbsorberZone, Coefficients, Constants, FreeBody, MonitorSum, Pose, Solve, WallParticle, counter,
+    AbsorberZone, Coefficients, Constants, Emission, FreeBody, MonitorSum, Outlet, Pose, Solve, WallParticle,
+    counter,
 };
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
 use seixo::compute::{Host, Program};
@@ -269,6 +270,8 @@ fn structs_lie_the_same_on_both_sides() {
         Pose { position, orientation, velocity, angular_velocity, acceleration, angular_acceleration }
     );
     same_layout!("body_force", WallParticle { area, arm, to_surface });
+    same_layout!("openings", Emission { wall, count, to, pad, shift, velocity });
+    same_layout!("openings", Outlet { low, high });
     same_layout!("absorber", AbsorberZone { low, high, start, ramp });
     same_layout!(
         "coupling",
@@ -379,6 +382,7 @@ fn constants_are_the_same_on_both_sides() {
         ("NEIGHBOURS_MAX", counter::NEIGHBOURS_MAX),
         ("NON_FINITE", counter::NON_FINITE),
         ("OVERFLOW", counter::OVERFLOW),
+        ("SWALLOWED", counter::SWALLOWED),
     ] {
         assert_eq!(common(name), place as f64, "{name}");
     }

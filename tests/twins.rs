@@ -721,6 +721,63 @@ fn absorber() {
 }
 
 #[test]
+fn openings() {
+    use seixo::case::Case;
+    use seixo::kernels::openings::{Emission, Outlet};
+    if !device() {
+        return;
+    }
+    let text = "[run]\nspacing = 0.01\ntime_step = 1e-3\nend = 1.0\n[tank]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.2]\n\
+                [fluid]\nmax_volume = 0.0021\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.1]\n\
+                [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0.02, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 1\n\
+                [[inflow]]\nname = \"above\"\nface = \"x_min\"\nmin = [0, 0, 0.1]\nmax = [0, 0.1, 0.14]\nvelocity = 1\n\
+                [[outflow]]\nname = \"out\"\nface = \"x_max\"\nvelocity = 1\n[[outflow]]\nname = \"hole\"\nface = \"z_min\"\n\
+                min = [0.1, 0, 0]\nmax = [0.14, 0.1, 0]\n";
+    let case: Case = text.parse().expect("valid");
+    let scene = Scene::build(&case).expect("valid");
+    let params = Params::new(&case, &scene).expect("valid");
+    let plan = Plan::new(&case, &scene, &params);
+    let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
+    let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+    let mut gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+    let mut fields = cpu.read().expect("readable");
+    fields.pressure.iter_mut().enumerate().for_each(|(i, p)| *p = i as f64);
+    for backend in [&mut cpu as &mut dyn Backend, &mut gpu] {
+        backend.write(&fields).expect("writable");
+        let mut to = scene.groups.fluid;
+        let layers = [0, 1].map(|k| {
+            let wall = scene.solids[scene.openings[k].solid.expect("a wall")].wall_slots.clone();
+            to -= wall.len();
+            let shift = DVec3::new(0.0103, 1e-3 * k as f64, 0.0);
+            Emission { wall, to, shift, velocity: DVec3::new(1.0, 0.5, -0.25 * k as f64) }
+        });
+        let outlets = [
+            Outlet { low: DVec3::new(0.153, -1.0, -1.0), high: DVec3::new(1.0, 1.0, 0.052) },
+            Outlet { low: DVec3::new(0.1, 0.0, -0.1), high: DVec3::new(0.14, 0.1, 0.031) },
+        ];
+        backend.pass_openings(&layers, &outlets).expect("it runs");
+        backend.pass_openings(&[], &[Outlet::CLOSED; 2]).expect("it runs");
+    }
+    let (a, b) = (cpu.read().expect("readable"), gpu.read().expect("readable"));
+    assert!(a.kind == b.kind && a.id == b.id);
+    let n = scene.groups.fluid;
+    for i in 0..n {
+        assert!(a.position[i].distance(b.position[i]) < 1e-7, "slot {i}");
+        assert!(a.velocity[i].distance(b.velocity[i]) < 1e-7 && (a.pressure[i] - b.pressure[i]).abs() < 1e-3);
+    }
+    // Layers of 8 x 10 and 10 x 4, at the end of the parked slots; 5 and 4 columns of water are swallowed, 5 and 3 deep.
+    let count = |kind: Kind| a.kind[..n].iter().filter(|&&k| k == kind).count();
+    let swallowed = [5 * 10 * 5, 4 * 10 * 3];
+    assert_eq!(count(Kind::Fluid), scene.water() + 120 - swallowed.iter().sum::<usize>());
+    assert!(a.kind[n - 120..n].iter().all(|&k| k == Kind::Fluid) && a.kind[n - 121] == Kind::Ghost);
+    assert!((a.velocity[n - 1].x - 1.0).abs() < 1e-12 && a.pressure[n - 1] >= n as f64);
+    for backend in [&mut cpu as &mut dyn Backend, &mut gpu] {
+        let counters = backend.counters().expect("readable");
+        assert_eq!((counters.swallowed.clone(), counters.lost), (swallowed.map(|n| n as u64).to_vec(), 0));
+    }
+}
+
+#[test]
 fn shift() {
     each(|pair| {
         if pair.params.gradient == Gradient::Minimum {

@@ -72,6 +72,7 @@ wall_friction = 0.004
 gradient = "minimum"
 free_surface = "threshold"
 source = "number_density"
+max_volume = 2.5
 jitter = 0.02
 seed = 3
 solver = { tolerance = 1e-4, max_iterations = 500, preconditioner = "multigrid", warm_start = false }
@@ -129,6 +130,11 @@ min = [7.0, 0.0, 0.0]
 max = [10.0, 0.5, 0.6]
 towards = "x_max"
 rate = 4.0
+[[inflow]]
+discharge = [[0.0, 0.0], [1.0, 0.02]]
+[[outflow]]
+discharge = 0.02
+velocity = 0.25
 "#;
 
 /// Cases to take examples from.
@@ -141,7 +147,7 @@ fn examples() -> Vec<toml::Table> {
 }
 
 /// The tables in the order in which one writes them; others follow.
-const ORDER: [&str; 11] = [
+const ORDER: [&str; 13] = [
     "run",
     "tank",
     "obstacle",
@@ -149,6 +155,8 @@ const ORDER: [&str; 11] = [
     "moving_wall",
     "fluid",
     "absorber",
+    "inflow",
+    "outflow",
     "body",
     "contact",
     "gauge",

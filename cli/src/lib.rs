@@ -16,6 +16,7 @@ mod run;
 mod setup;
 mod shell;
 mod signals;
+mod surface;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use seixo::console::{lost, remark, say};
@@ -54,6 +55,8 @@ enum Command {
     Report(report::ReportArgs),
     /// Velocity and pressure at points or along lines, from the frames of a run, as CSV.
     Measure(measure::MeasureArgs),
+    /// The surface of the water as a mesh (PLY, OBJ) of each frame of a run.
+    Surface(surface::SurfaceArgs),
     /// Show what a run would compute, and what it would leave out and why; compute nothing.
     Plan(plan::PlanArgs),
     /// Compare the GPU with the CPU: every stage of one step, then the drift over many.
@@ -201,6 +204,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),
         Command::Measure(args) => measure::measure(&args),
+        Command::Surface(args) => surface::write(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Compare(args) => compare::compare(&args),

@@ -237,8 +237,8 @@ pub fn run(args: &RunArgs) -> Exit {
         remark(&format!(
             "{}: {} particles, {} of water, on {device}",
             setup.name,
-            groups.total(),
-            groups.fluid
+            groups.total() - setup.scene.reserve,
+            setup.scene.water()
         ));
         if simulation.plan.wet() {
             let run = &simulation.case.run;

@@ -35,6 +35,7 @@ use crate::kernels::collision;
 pub use crate::kernels::device as kernels;
 use crate::kernels::device::Over;
 use crate::kernels::monitor::{speed_most, speed_range};
+use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::{FluidMonitor, SPEED_BINS};
 use crate::params::{Params, Step};
@@ -70,6 +71,8 @@ pub struct Gpu {
     coupled: u64,
     counters: Counters,
     coefficients: Coefficients,
+    /// What swallows on the device.
+    outlets: Vec<layout::Outlet>,
     dt: f64,
     expected_iterations: f64,
     /// Levels of the multigrid preconditioner, if that is planned.
@@ -189,8 +192,9 @@ impl Gpu {
             solids: scene.solids.len(),
             wall_layers: wall_layers.collect(),
             coupled: 0,
-            counters: Counters::default(),
+            counters: Counters::new(super::outflows(scene)),
             coefficients: Coefficients::default(),
+            outlets: Vec::new(),
             dt: 0.0,
             expected_iterations: if levels.is_some() { 5.0 } else { 30.0 },
             levels,
@@ -311,12 +315,16 @@ impl Gpu {
         c.negative_pressures += u64::from(seen[counter::NEGATIVE_PRESSURES]);
         c.neighbours_max = c.neighbours_max.max(seen[counter::NEIGHBOURS_MAX]);
         let first = |k: usize| Some(seen[k]).filter(|&n| n != u32::MAX);
+        for (total, &count) in c.swallowed.iter_mut().zip(&seen[counter::SWALLOWED..]) {
+            *total += u64::from(count);
+        }
         c.non_finite = c.non_finite.or(first(counter::NON_FINITE));
         c.overflow = c.overflow.or(first(counter::OVERFLOW).map(|slot| (slot, c.neighbours_max)));
         let out = c.clone();
-        if seen[..counter::NEIGHBOURS_MAX].iter().any(|&n| n > 0) {
+        let sums = [0..counter::NEIGHBOURS_MAX, counter::SWALLOWED..counter::WORDS];
+        if sums.iter().flat_map(|s| &seen[s.clone()]).any(|&n| n > 0) {
             let mut reset = seen.to_vec();
-            reset[..counter::NEIGHBOURS_MAX].fill(0);
+            sums.into_iter().for_each(|s| reset[s].fill(0));
             self.context.upload(buffers::counters, &reset)?;
         }
         Ok(out)
@@ -387,6 +395,37 @@ impl Backend for Gpu {
             self.context.pass([(kernels::correct::correct, groups(s.fluid))])?;
         }
         Ok(())
+    }
+
+    fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()> {
+        self.context.begin(Some(Stage::Openings));
+        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        if !emissions.is_empty() {
+            let device = |e: &Emission| layout::Emission {
+                wall: e.wall.start as u32,
+                count: e.wall.len() as u32,
+                to: e.to as u32,
+                pad: 0,
+                shift: four(e.shift),
+                velocity: four(e.velocity),
+            };
+            let mut layers = vec![layout::Emission::default(); self.sizes.openings as usize];
+            layers.iter_mut().zip(emissions).for_each(|(layer, e)| *layer = device(e));
+            let count: u64 = emissions.iter().map(|e| e.wall.len() as u64).sum();
+            self.context.upload(buffers::emission, &layers)?;
+            self.context.pass([(kernels::openings::emit, groups(count))])?;
+        }
+        if outlets.iter().all(Outlet::is_closed) {
+            return Ok(());
+        }
+        let mut boxes = vec![layout::Outlet::CLOSED; self.sizes.openings as usize];
+        let device = |outlet: &Outlet| layout::Outlet::new(outlet, self.middle);
+        boxes.iter_mut().zip(outlets).for_each(|(to, outlet)| *to = device(outlet));
+        if boxes != self.outlets {
+            self.context.upload(buffers::outlet, &boxes)?;
+            self.outlets = boxes;
+        }
+        self.context.pass([(kernels::openings::swallow, groups(self.sizes.fluid))])
     }
 
     fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {

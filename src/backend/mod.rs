@@ -11,6 +11,7 @@ use crate::checkpoint::Archive;
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
@@ -34,6 +35,11 @@ fn start(scene: &Scene, plan: &Plan) -> Fields {
     fields
 }
 
+/// Outflows of `scene`.
+fn outflows(scene: &Scene) -> usize {
+    scene.openings.iter().filter(|o| !o.is_inflow()).count()
+}
+
 /// What the guards have seen since the start of the run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counters {
@@ -51,9 +57,21 @@ pub struct Counters {
     pub non_finite: Option<u32>,
     /// A row with more neighbours than the lists hold: slot and neighbours.
     pub overflow: Option<(u32, u32)>,
+    /// Fluid particles that each outflow has swallowed.
+    pub swallowed: Vec<u64>,
 }
 
 impl Counters {
+    /// At the start of a run with as many outflows.
+    fn new(outflows: usize) -> Self {
+        Self { swallowed: vec![0; outflows], ..Self::default() }
+    }
+
+    /// Fluid particles that are in the scene no more.
+    pub fn gone(&self) -> u64 {
+        self.lost + self.swallowed.iter().sum::<u64>()
+    }
+
     /// Save the counters, or take them over.
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self {
@@ -64,7 +82,11 @@ impl Counters {
             neighbours_max,
             non_finite,
             overflow,
+            swallowed,
         } = self;
+        for (k, count) in swallowed.iter_mut().enumerate() {
+            archive.count(&format!("counters.swallowed.{k}"), count)?;
+        }
         archive.count("counters.lost", lost)?;
         archive.count("counters.displacement_clamps", displacement_clamps)?;
         archive.count("counters.pressure_clamps", pressure_clamps)?;
@@ -137,6 +159,9 @@ pub trait Backend: Send {
     fn precision(&self) -> &'static str;
     /// Run one stage.
     fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()>;
+    /// Water that comes in and goes out: layers that become water in slots that no particle has, and boxes that swallow, one
+    /// an outflow; needed where the plan has [`Stage::Openings`].
+    fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()>;
     /// How the moving solids answer forces in the next solve, in the pose given last; needed where the plan has
     /// [`crate::plan::Arrays::Coupling`].
     fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()>;

@@ -106,6 +106,7 @@ impl Sizes {
         let stages = [
             (Stage::Viscosity, pressure_pairs * 4 + rows * 2 * vector + fluid * vector),
             (Stage::Absorber, fluid * 3 * vector),
+            (Stage::Openings, fluid * vector),
             (Stage::Predict, update),
             (Stage::CellList, fluid * 2 * (2 * vector + number + 5) + cells * 8),
             (Stage::NeighbourList, rows * vector + pairs * 4),

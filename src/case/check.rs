@@ -17,6 +17,7 @@ pub fn check(case: &Case) -> Vec<Problem> {
     c.fluid();
     c.walls();
     c.absorbers();
+    c.openings();
     c.names();
     for (k, body) in case.body.iter().enumerate() {
         c.body(k, body);
@@ -186,12 +187,20 @@ impl Checker<'_> {
         let jitter = fluid.jitter;
         self.range("fluid.jitter", jitter, (0.0..=0.3).contains(&jitter), "0 to 0.3 of the spacing");
         self.water(&fluid.shape, &fluid.fill);
-        if fluid.block.is_empty() && fluid.shape.is_empty() && fluid.fill.is_empty() {
+        let none = fluid.block.is_empty() && fluid.shape.is_empty() && fluid.fill.is_empty();
+        if none && self.case.inflow.is_empty() {
             self.add(
                 "fluid",
                 "no water at t = 0",
-                "add a [[fluid.block]], [[fluid.shape]] or [[fluid.fill]], or leave [fluid] out for a dry scene",
+                "add a [[fluid.block]], [[fluid.shape]], [[fluid.fill]] or [[inflow]], or leave [fluid] out for a dry scene",
             );
+        }
+        if let Some(most) = fluid.max_volume {
+            self.positive("fluid.max_volume", most, "m3");
+            if self.case.inflow.is_empty() {
+                let message = "without an inflow there is never more water than at t = 0";
+                self.add("fluid.max_volume", message, "remove it, or add an [[inflow]]");
+            }
         }
         for (k, block) in fluid.block.iter().enumerate() {
             let path = format!("fluid.block.{k}");
@@ -296,6 +305,7 @@ impl Checker<'_> {
             .chain(case.moving_wall.iter().map(|w| w.name.as_str()))
             .chain(case.obstacle.iter().map(|o| o.name.as_str()))
             .chain(case.plane.iter().map(|p| p.name.as_str()))
+            .chain(case.openings().filter(|o| !o.is_hole()).map(|o| o.name))
             .collect();
         if let Some(tank) = &case.tank {
             let bare = tank.without_wall();

@@ -321,6 +321,7 @@ impl Checker<'_> {
                     .map(|(k, w)| (format!("moving_wall.{k}.name"), w.name.clone())),
             )
             .chain(case.body.iter().enumerate().map(|(k, b)| (format!("body.{k}.name"), b.name.clone())))
+            .chain(case.openings().map(|o| (format!("{}.name", o.path()), o.name.to_owned())))
             .collect();
         self.unique(&names, "solid");
     }

@@ -10,6 +10,7 @@ mod check_motion;
 mod check_solids;
 pub mod file;
 mod motion_file;
+mod opening;
 mod overrides;
 mod report;
 mod shape;
@@ -18,6 +19,8 @@ mod water;
 mod wave;
 
 pub use absorber::Absorber;
+pub(crate) use opening::{HURRY, OpeningKeys};
+pub use opening::{Inflow, OUTFLOWS_MAX, Outflow, Rate};
 pub use shape::BodyShape;
 pub(crate) use shape::{Form, Place, Wall};
 pub use water::{Fill, WaterShape};
@@ -52,6 +55,12 @@ pub struct Case {
     /// Boxes in which the water comes to rest, for waves that must not come back.
     #[serde(default)]
     pub absorber: Vec<Absorber>,
+    /// Walls of the tank that emit water.
+    #[serde(default)]
+    pub inflow: Vec<Inflow>,
+    /// Walls of the tank that swallow water, and holes that it falls through.
+    #[serde(default)]
+    pub outflow: Vec<Outflow>,
     /// Rigid bodies.
     #[serde(default)]
     pub body: Vec<Body>,
@@ -220,6 +229,10 @@ pub struct Fluid {
     /// Which of the jittered starts.
     #[serde(default)]
     pub seed: u32,
+    /// Most water at any time where an inflow brings more [m3]; in two dimensions for each metre across [m2]. If absent, all that
+    /// comes in by `run.end`, or what the domain holds if that is less.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub max_volume: Option<f64>,
     /// The pressure Poisson equation's solver.
     #[serde(default)]
     pub solver: Solver,

@@ -1,14 +1,30 @@
-//! Tables of motion from files: `motion = "file.csv"` is the rows of that file.
+//! Tables over time from files: `motion = "file.csv"` is the rows of that file, `discharge = "file.csv"` too.
 
 use super::file::read_text;
 use crate::error::{Error, Result};
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Value};
 
-/// Tables of a case whose solids may follow a file.
-const TABLES: [&str; 2] = ["moving_wall", "body"];
+/// Tables of a case, those of their keys that may be the name of a file, and its rows.
+const TABLES: [(&str, &[&str], &Form); 4] = [
+    ("moving_wall", &["motion"], &MOTION),
+    ("body", &["motion"], &MOTION),
+    ("inflow", &["velocity", "discharge"], &RATE),
+    ("outflow", &["velocity", "discharge"], &RATE),
+];
 
-/// The text of the case at `path` with the rows of each file that a `motion` names in the file's place. Text that cannot be
+/// What the rows of a file are.
+struct Form {
+    columns: usize,
+    what: &'static str,
+    short: &'static str,
+}
+
+const MOTION: Form =
+    Form { columns: 4, what: "time [s] and displacement x, y, z [m], four numbers", short: "time, x, y, z" };
+const RATE: Form = Form { columns: 2, what: "time [s] and value, two numbers", short: "time, value" };
+
+/// The text of the case at `path` with the rows of each file that a key names in the file's place. Text that cannot be
 /// read is left as it is, to be explained by whoever reads it.
 ///
 /// # Errors
@@ -16,20 +32,20 @@ const TABLES: [&str; 2] = ["moving_wall", "body"];
 pub(super) fn inline(path: &Path, text: String) -> Result<String> {
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text) };
     let mut found = false;
-    for table in TABLES {
-        let solids = match document.get_mut(table) {
-            Some(Item::ArrayOfTables(solids)) => solids,
+    for (table, keys, form) in TABLES {
+        let tables = match document.get_mut(table) {
+            Some(Item::ArrayOfTables(tables)) => tables,
             _ => continue,
         };
-        for solid in solids.iter_mut() {
-            let named = solid.get("motion").and_then(Item::as_str).map(str::to_owned);
-            if let Some(file) = named {
-                let mut rows = Value::Array(rows(path, &file)?);
+        for one in tables.iter_mut() {
+            for &key in keys {
+                let Some(file) = one.get(key).and_then(Item::as_str).map(str::to_owned) else { continue };
+                let mut rows = Value::Array(rows(path, &file, key, form)?);
                 // What stands around the name, a comment say, stays around the rows.
-                if let Some(old) = solid.get("motion").and_then(Item::as_value) {
+                if let Some(old) = one.get(key).and_then(Item::as_value) {
                     *rows.decor_mut() = old.decor().clone();
                 }
-                solid["motion"] = Item::Value(rows);
+                one[key] = Item::Value(rows);
                 found = true;
             }
         }
@@ -37,49 +53,62 @@ pub(super) fn inline(path: &Path, text: String) -> Result<String> {
     Ok(if found { document.to_string() } else { text })
 }
 
-/// `set` as it is, or with the rows of the file that it names for a motion.
+/// `set` as it is, or with the rows of the file that it names.
 ///
 /// # Errors
 /// As [`inline`].
 pub(super) fn inline_set(path: &Path, set: &str) -> Result<String> {
-    let Some((key, value)) = set.split_once('=').filter(|(key, _)| key.trim().ends_with(".motion")) else {
+    let Some((path_of, value)) = set.split_once('=') else { return Ok(set.to_owned()) };
+    let (table, key) = match (path_of.trim().split('.').next(), path_of.trim().rsplit('.').next()) {
+        (Some(table), Some(key)) if table != key => (table, key),
+        _ => return Ok(set.to_owned()),
+    };
+    let Some((.., form)) = TABLES.iter().find(|(name, keys, _)| *name == table && keys.contains(&key)) else {
         return Ok(set.to_owned());
     };
     let file = value.trim().trim_matches(|c| c == '"' || c == '\'');
-    if file.starts_with('[') {
+    if file.starts_with('[') || file.parse::<f64>().is_ok() {
         return Ok(set.to_owned());
     }
-    Ok(format!("{key}={}", rows(path, file)?))
+    Ok(format!("{path_of}={}", rows(path, file, key, form)?))
 }
 
-/// Lets a schema of cases have the name of a file where the rows of a motion stand.
+/// Lets a schema of cases have the name of a file where such rows stand.
 pub(super) fn allow_files(schema: &mut serde_json::Value) {
     use serde_json::Value::{Array, String};
-    for solid in ["Body", "MovingWall"] {
-        let Some(motion) = schema.pointer_mut(&format!("/$defs/{solid}/properties/motion")) else { continue };
-        let mut types = match motion["type"].take() {
+    let of = [
+        ("Body", "motion"),
+        ("MovingWall", "motion"),
+        ("Inflow", "velocity"),
+        ("Inflow", "discharge"),
+        ("Outflow", "velocity"),
+        ("Outflow", "discharge"),
+    ];
+    for (table, key) in of {
+        let Some(rows) = schema.pointer_mut(&format!("/$defs/{table}/properties/{key}")) else { continue };
+        let mut types = match rows["type"].take() {
             Array(types) => types,
             one => vec![one],
         };
         types.push("string".into());
-        motion["type"] = Array(types);
-        if let String(words) = &mut motion["description"] {
+        rows["type"] = Array(types);
+        if let String(words) = &mut rows["description"] {
             words.push_str(" Or the name of a CSV file with these rows, relative to the case.");
         }
     }
 }
 
 /// The rows of `file`, a name relative to the case at `path`.
-fn rows(path: &Path, file: &str) -> Result<Array> {
+fn rows(path: &Path, file: &str, key: &str, form: &Form) -> Result<Array> {
     let place = path.with_file_name("").join(file);
     let name = place.display().to_string();
     let wrong = |line: usize, why: String| {
         let at = if line > 0 { format!("{name}:{line}") } else { name.clone() };
-        Error::file(name.clone(), "motion", format!("{at}: {why}"))
+        Error::file(name.clone(), key, format!("{at}: {why}"))
     };
     let text = std::fs::File::open(&place).and_then(read_text).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => {
-            wrong(0, "no such file; a table of motion is named relative to its case".into())
+            wrong(0, format!("no such file; a table of `{key}` is named relative to its case"))
         }
         std::io::ErrorKind::InvalidData => wrong(0, "not a text file in UTF-8".into()),
         _ => Error::io(&place)(e),
@@ -97,8 +126,8 @@ fn rows(path: &Path, file: &str) -> Result<Array> {
         }
         let numbers: Option<Vec<f64>> = cells.iter().copied().collect();
         let numbers = numbers.filter(|row| row.iter().all(|x| x.is_finite()));
-        let Some(row) = numbers.filter(|row| row.len() == 4) else {
-            let why = "expected time [s] and displacement x, y, z [m], four numbers with commas between";
+        let Some(row) = numbers.filter(|row| row.len() == form.columns) else {
+            let why = format!("expected {} with commas between", form.what);
             return Err(wrong(n, format!("{why}: `{}`", line.chars().take(60).collect::<String>())));
         };
         if row[0] <= last {
@@ -108,7 +137,7 @@ fn rows(path: &Path, file: &str) -> Result<Array> {
         rows.push(row.into_iter().collect::<Array>());
     }
     if rows.is_empty() {
-        return Err(wrong(0, "it holds no rows of time, x, y, z".into()));
+        return Err(wrong(0, format!("it holds no rows of {}", form.short)));
     }
     Ok(rows)
 }

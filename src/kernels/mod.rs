@@ -16,6 +16,7 @@ pub mod multigrid;
 pub mod multigrid_levels;
 pub mod neighbour_list;
 pub mod number_density;
+pub mod openings;
 pub mod predict;
 pub mod pressure_gradient;
 pub mod pressure_level;
@@ -99,6 +100,7 @@ pub mod device {
             mark scan_blocks scan_sums number_rows members galerkin coarsen_second coarsen_rest;
         neighbour_list[super::WORKGROUP] Stage(NeighbourList), Rows: neighbour_list_main;
         number_density[super::WORKGROUP] Stage(NumberDensity), Rows: number_density_main;
+        openings[super::WORKGROUP] Stage(Openings), Own: emit swallow;
         predict[super::WORKGROUP] Stage(Predict), Fluid: predict;
         pressure_gradient[super::WORKGROUP] Stage(PressureGradient), Fluid: pressure_gradient;
         pressure_level[super::WORKGROUP] Arrays(Level), Own: sum_source subtract_mean find_lowest raise;

@@ -138,6 +138,37 @@ pub struct Body {
     pub fluid_force_n: [f64; 3],
 }
 
+/// Water that an opening has let through.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Passed {
+    /// Name of the opening.
+    pub name: String,
+    /// Particles.
+    pub particles: u64,
+    /// Their volume [m3]; in two dimensions of a slice one spacing wide.
+    pub volume_m3: f64,
+}
+
+/// Water of a scene with openings: what was there at the start and came in is what is there at the end, went out or was lost,
+/// to the particle.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Water {
+    /// Particles at t = 0.
+    pub particles_start: u64,
+    /// Particles at the end.
+    pub particles_end: u64,
+    /// Particles that left the domain.
+    pub particles_lost: u64,
+    /// Volume at t = 0 [m3]; in two dimensions of a slice one spacing wide.
+    pub volume_start_m3: f64,
+    /// Volume at the end [m3].
+    pub volume_end_m3: f64,
+    /// What came in.
+    pub inflow: Vec<Passed>,
+    /// What went out.
+    pub outflow: Vec<Passed>,
+}
+
 /// The summary of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Summary {
@@ -183,6 +214,9 @@ pub struct Summary {
     pub ledger: Option<BTreeMap<&'static str, f64>>,
     /// Bodies and moving walls.
     pub bodies: Vec<Body>,
+    /// The water, of a scene with inflows or outflows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub water: Option<Water>,
 }
 
 /// Most memory that this process has held [bytes].

@@ -6,7 +6,7 @@ use crate::checkpoint::Archive;
 use crate::error::Result;
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
-use crate::output::result::{Body, Monitors, Particles, Pressure, Summary};
+use crate::output::result::{Body, Monitors, Particles, Passed, Pressure, Summary, Water};
 use crate::scene::{Kind, Scene};
 use crate::simulation::{Simulation, StepReport};
 use std::collections::BTreeMap;
@@ -24,6 +24,8 @@ pub struct Totals {
     density_error: f64,
     /// Work of each part of the step, if it is kept.
     pub ledger: Option<Ledger>,
+    /// Particles of water, and those that each outflow had swallowed, when last looked at.
+    water: (u64, Vec<u64>),
     /// Largest speed of the fluid when last looked at [m/s].
     pub speed: f64,
     /// Wall-clock time spent on files.
@@ -47,6 +49,7 @@ impl Totals {
             speed,
             // Read from the simulation at the next row.
             ledger: _,
+            water: _,
             // By the clock of each process.
             output: _,
         } = self;
@@ -125,6 +128,7 @@ impl Totals {
     /// Count in what a table row shows: the fluid, the guards and the bodies' energy [J].
     pub fn look(&mut self, fluid: &FluidMonitor, counters: &Counters, bodies: f64, dt: f64, l0: f64) {
         self.speed = fluid.speed_max;
+        self.water = (fluid.particles, counters.swallowed.clone());
         self.looks += 1;
         self.density_error += fluid.density_error_mean;
         let monitors = &mut self.monitors;
@@ -172,17 +176,43 @@ impl Totals {
             monitors,
             ledger: self.ledger.map(|ledger| works(&ledger, monitors.energy_end - monitors.energy_start)),
             bodies: bodies(simulation),
+            water: self.water(simulation),
             ..Summary::default()
         }
     }
 }
 
+impl Totals {
+    /// What came in and went out, of a scene with openings.
+    fn water(&self, simulation: &Simulation) -> Option<Water> {
+        let openings = &simulation.openings;
+        let volume = simulation.params.spacing.powi(3);
+        let passed = |name: &str, particles: u64| Passed {
+            name: name.to_owned(),
+            particles,
+            volume_m3: particles as f64 * volume,
+        };
+        let outflows = openings.outflows().zip(&self.water.1);
+        (!openings.is_empty()).then(|| Water {
+            particles_start: simulation.scene.water() as u64,
+            particles_end: self.water.0,
+            particles_lost: self.monitors.lost_particles,
+            volume_start_m3: simulation.scene.water() as f64 * volume,
+            volume_end_m3: self.water.0 as f64 * volume,
+            inflow: openings.emitted().map(|(name, n)| passed(name, n)).collect(),
+            outflow: outflows.map(|(name, &n)| passed(name, n)).collect(),
+        })
+    }
+}
+
 /// Numbers of particles by kind.
 pub fn particles(scene: &Scene) -> Particles {
-    let mut out = Particles { total: scene.kind.len(), ..Particles::default() };
+    // Slots for water that is to come in hold no particle.
+    let mut out = Particles { total: scene.kind.len() - scene.reserve, ..Particles::default() };
     for kind in &scene.kind {
         match kind {
-            Kind::Fluid | Kind::Ghost => out.fluid += 1,
+            Kind::Fluid => out.fluid += 1,
+            Kind::Ghost => {}
             Kind::Wall => out.wall += 1,
             Kind::Dummy => out.dummy += 1,
             Kind::BodyWall | Kind::BodyDummy => out.body += 1,
@@ -199,6 +229,7 @@ fn works(ledger: &Ledger, change: f64) -> BTreeMap<&'static str, f64> {
 
 fn bodies(simulation: &Simulation) -> Vec<Body> {
     let poses = simulation.solids.poses().iter().zip(&simulation.fluid_force).enumerate();
+    let poses = poses.take(simulation.scene.followed());
     poses
         .map(|(k, (pose, wrench))| {
             let q = pose.orientation;

@@ -105,9 +105,11 @@ impl Tables {
             let table = table("gauges.csv", &gauges.header())?;
             Some((gauges, table))
         };
-        let bodies = if scene.solids.is_empty() { None } else { Some(table("bodies.csv", &body_header())?) };
+        // The walls in openings are no solids that anyone follows.
+        let followed = scene.followed();
+        let bodies = if followed == 0 { None } else { Some(table("bodies.csv", &body_header())?) };
         Ok(Self {
-            monitors: table("monitors.csv", &monitor_header(&stages, simulation.plan.ledger))?,
+            monitors: table("monitors.csv", &monitor_header(&stages, simulation))?,
             bodies,
             gauges,
             due: Due::new(every),
@@ -211,13 +213,15 @@ impl Tables {
         let since = std::mem::take(&mut self.since);
         let mut row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
         let ledger = simulation.ledger()?;
+        row.extend(water_cells(simulation, &fluid, &counters));
         row.extend(ledger.iter().flat_map(|l| Entry::ALL.map(|entry| Cell::from(l.get(entry)))));
         totals.ledger = ledger;
         self.since.stages = simulation.stages.clone();
         self.monitors.row(&row)?;
         self.monitors.flush()?;
         if let Some(table) = &mut self.bodies {
-            for (k, pose) in simulation.solids.poses().iter().enumerate() {
+            let followed = simulation.scene.followed();
+            for (k, pose) in simulation.solids.poses().iter().enumerate().take(followed) {
                 let q = pose.orientation;
                 let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
                 let mut row = vec![Cell::from(simulation.time), Cell::from(simulation.solids.name(k))];
@@ -295,7 +299,18 @@ impl Tables {
     }
 }
 
-fn monitor_header(stages: &[Stage], ledger: bool) -> Vec<String> {
+/// Volume of the water, and what each opening has let in or out since the start [m3], where there are any.
+fn water_cells(simulation: &Simulation, fluid: &FluidMonitor, counters: &Counters) -> Vec<Cell> {
+    let openings = &simulation.openings;
+    if openings.is_empty() {
+        return Vec::new();
+    }
+    let passed = openings.emitted().map(|(_, n)| n).chain(counters.swallowed.iter().copied());
+    let volume = simulation.params.spacing.powi(3);
+    [fluid.particles].into_iter().chain(passed).map(|n| Cell::from(n as f64 * volume)).collect()
+}
+
+fn monitor_header(stages: &[Stage], simulation: &Simulation) -> Vec<String> {
     let fixed = "step [-],time [s],dt [s],courant [-],speed_max [m/s],density_error_mean [-],density_error_max [-],\
                  kinetic [J],potential [J],body_kinetic [J],body_potential [J],body_contact [J],energy [J]";
     let mut header: Vec<String> = fixed.split(',').map(String::from).collect();
@@ -307,7 +322,13 @@ fn monitor_header(stages: &[Stage], ledger: bool) -> Vec<String> {
                 negative_pressures [-],neighbours_max [-]";
     header.extend(rest.split(',').map(String::from));
     header.extend(stages.iter().map(|s| format!("wall_{} [s]", s.name())));
-    if ledger {
+    let openings = &simulation.openings;
+    if !openings.is_empty() {
+        header.push("water_volume [m3]".into());
+        header.extend(openings.emitted().map(|(name, _)| format!("inflow_{name} [m3]")));
+        header.extend(openings.outflows().map(|name| format!("outflow_{name} [m3]")));
+    }
+    if simulation.plan.ledger {
         header.extend(Entry::ALL.map(|entry| format!("work_{} [J]", entry.name())));
     }
     header

@@ -45,7 +45,8 @@ impl Scale {
             Drive::Prescribed(motion) => Some(motion.fastest(0.0, simulation.case.run.end, s.shape.radius())),
             Drive::Free(_) => None,
         });
-        let driven = driven.fold(0.0, f64::max);
+        let end = simulation.case.run.end;
+        let driven = driven.fold(simulation.openings.fastest(0.0, end), f64::max);
         let (mut bodies, mut turning) = (0.0, 0.0);
         for solid in &scene.solids {
             if let Drive::Free(body) = &solid.drive {
@@ -90,9 +91,10 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     let (p, m) = (&summary.pressure, &summary.monitors);
     let mut judge = Judge(Vec::new());
     let solves = summary.steps.max(1) as f64;
-    let wet = summary.particles.fluid > 0 && summary.steps > 0;
+    let wet = (summary.particles.fluid > 0 || summary.water.is_some()) && summary.steps > 0;
     if wet {
-        let fluid = summary.particles.fluid as f64;
+        let came = summary.water.iter().flat_map(|w| &w.inflow).map(|i| i.particles).sum::<u64>();
+        let fluid = summary.particles.fluid as f64 + came as f64;
         judge.bound(p.failures as f64 / solves, FAILURES, || {
             format!(
                 "{} of {} pressure solves missed fluid.solver.tolerance (largest residual {:.1e})",
@@ -122,6 +124,8 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
         format!("solids sank {:.1} particles deep into each other", m.penetration_max_over_l0)
     });
     let gain = m.energy_max - m.energy_start;
+    // Water that comes in brings its energy along.
+    let gain = if summary.water.is_some() { 0.0 } else { gain };
     judge.bound(gain, (GAIN.0 * scale.energy, GAIN.1 * scale.energy), || {
         format!("the energy rose by {gain:.2e} J, where {:.2e} J is at hand", scale.energy)
     });

@@ -5,6 +5,7 @@
 
 use super::bodies;
 use super::lattice::{Cells, Grid, Lattice};
+use super::opening::Planned;
 use super::oriented::Placed;
 use super::placement::{Surroundings, point};
 use super::shaped;
@@ -30,10 +31,11 @@ impl Scene {
         builder.bodies();
         builder.gauges();
         let domain = builder.domain();
+        let reserve = builder.reserve(domain);
         if !builder.problems.is_empty() {
             return Err(CaseError::new(builder.problems.clone(), listed(&builder.problems)).into());
         }
-        Ok(builder.assemble(domain))
+        Ok(builder.assemble(domain, reserve))
     }
 }
 
@@ -57,6 +59,7 @@ pub(super) struct Builder<'a> {
     pub(super) periodic: Periodic,
     pub(super) fixed: Fixed,
     pub(super) moving_walls: Vec<Solid>,
+    pub(super) openings: Vec<Planned>,
     pub(super) bodies: Vec<Solid>,
     pub(super) water: Water,
     pub(super) depth: f64,
@@ -105,6 +108,7 @@ impl<'a> Builder<'a> {
             periodic,
             fixed: Fixed::default(),
             moving_walls: Vec::new(),
+            openings: Vec::new(),
             bodies: Vec::new(),
             water: Water::default(),
             depth: 0.0,
@@ -130,6 +134,7 @@ impl<'a> Builder<'a> {
                 self.notes.push(format!("tank: periodic along {axis}, from {low:.4} to {high:.4} m"));
             }
         }
+        self.carve();
         if let Some(tank) = &case.tank {
             self.fixed.tank(tank, &lattice, &mut self.grid, layers);
             let (min, max): (DVec3, DVec3) = (tank.min.into(), tank.max.into());
@@ -192,6 +197,7 @@ impl<'a> Builder<'a> {
             }
         }
         self.shaped();
+        self.opening_walls();
     }
 
     fn water(&mut self) {
@@ -238,13 +244,17 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        // A wall that moves may make room; a body among the water only changes places with it.
-        self.filled = self.case.moving_wall.is_empty() && self.water.fills(&self.lattice, &self.grid);
+        // A wall that moves or an opening may make room; a body among the water only changes places with it.
+        let shut =
+            self.case.moving_wall.is_empty() && self.case.inflow.is_empty() && self.case.outflow.is_empty();
+        self.filled = shut && self.water.fills(&self.lattice, &self.grid);
         if self.filled {
             self.notes.push("the water fills all its room: the smallest pressure is 0".into());
         }
         // What of gravity lies along a periodic axis presses on nothing.
-        self.depth = self.water.depth(self.periodic.across(self.gravity()), &self.lattice);
+        let gravity = self.periodic.across(self.gravity());
+        self.depth = self.water.depth(gravity, &self.lattice);
+        self.depth = self.depth_with_inflows(gravity);
     }
 
     fn bodies(&mut self) {

@@ -6,13 +6,14 @@ use super::{Drive, Groups, Kind, Scene, Solid};
 use glam::DVec3;
 
 impl Builder<'_> {
-    /// Lays the particles out in their groups.
-    pub(super) fn assemble(self, domain: (DVec3, DVec3)) -> Scene {
+    /// Lays the particles out in their groups, with slots for `reserve` more of water.
+    pub(super) fn assemble(self, domain: (DVec3, DVec3), reserve: usize) -> Scene {
         let gravity = self.gravity();
+        let openings = self.number_openings();
         let mut solids: Vec<Solid> = self.bodies.into_iter().chain(self.moving_walls).collect();
         let count = |f: fn(&Solid) -> usize| solids.iter().map(f).sum();
         let groups = Groups {
-            fluid: self.water.cell.len(),
+            fluid: self.water.cell.len() + reserve,
             moving_wall: count(|s| s.wall_offset.len()),
             static_wall: self.fixed.wall.len(),
             static_dummy: self.fixed.dummy.len(),
@@ -34,6 +35,7 @@ impl Builder<'_> {
             }
             layout.push(at, v, Kind::Fluid, 0);
         }
+        (0..reserve).for_each(|_| layout.push(domain.0, DVec3::ZERO, Kind::Ghost, 0));
         for (k, solid) in solids.iter_mut().enumerate() {
             let kind = if solid.is_body { Kind::BodyWall } else { Kind::Wall };
             solid.wall_slots = layout.push_offsets(solid, &solid.wall_offset, kind, k);
@@ -57,6 +59,8 @@ impl Builder<'_> {
             kind: layout.kind,
             solid: layout.solid,
             groups,
+            reserve,
+            openings,
             solids,
             walls: self.fixed.shapes,
             static_wall_normal: self.fixed.normal,

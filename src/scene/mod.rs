@@ -19,6 +19,7 @@ mod jitter;
 mod lattice;
 mod layout;
 mod motion;
+mod opening;
 mod oriented;
 mod placement;
 mod shaped;
@@ -29,6 +30,7 @@ mod water;
 pub use crate::shape::Shape;
 pub use curve::Curve;
 pub use motion::Motion;
+pub use opening::{Course, Opening, Passes};
 pub(crate) use placement::CONTACT_DISTANCE;
 
 use crate::periodic::Periodic;
@@ -71,7 +73,7 @@ pub enum Kind {
     BodyWall = 3,
     /// Inside of a body.
     BodyDummy = 4,
-    /// A fluid particle that left the domain or became non-finite; takes part in nothing.
+    /// A fluid particle that left the domain, was swallowed, became non-finite or has not come in yet; takes part in nothing.
     Ghost = 5,
 }
 
@@ -86,7 +88,7 @@ impl Kind {
 /// How many particles each group holds; the groups lie in this order.
 #[derive(Clone, Copy, Default, Debug, PartialEq, Eq)]
 pub struct Groups {
-    /// Fluid particles.
+    /// Fluid particles, and slots for those that are to come in.
     pub fluid: usize,
     /// Wall-layer particles of moving solids.
     pub moving_wall: usize,
@@ -219,6 +221,18 @@ impl Solid {
     }
 }
 
+impl Scene {
+    /// Particles of water at t = 0.
+    pub fn water(&self) -> usize {
+        self.groups.fluid - self.reserve
+    }
+
+    /// Solids that tables follow: all but the walls in openings, which come last.
+    pub fn followed(&self) -> usize {
+        self.solids.len() - self.openings.iter().filter(|o| o.solid.is_some()).count()
+    }
+}
+
 /// The scene.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -238,7 +252,11 @@ pub struct Scene {
     pub solid: Vec<u32>,
     /// Sizes of the groups.
     pub groups: Groups,
-    /// Moving solids: the bodies in the case's order, then the moving walls.
+    /// Slots for water that comes in, at the end of those of the fluid.
+    pub reserve: usize,
+    /// Where water comes in and goes out: the inflows, then the outflows.
+    pub openings: Vec<Opening>,
+    /// Moving solids: the bodies in the case's order, then the moving walls, last those in openings.
     pub solids: Vec<Solid>,
     /// Geometry of the fixed walls.
     pub walls: Vec<WallShape>,

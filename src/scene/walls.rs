@@ -38,7 +38,7 @@ pub(super) fn outer(interior: Cells, closed: [[bool; 2]; 3], layers: i32) -> Cel
 
 impl Fixed {
     /// Walls of the tank: everything outside of the interior, `layers` deep (largest distance along an
-    /// axis, so corners are filled).
+    /// axis, so corners are filled), but for cells that are taken: openings.
     pub fn tank(&mut self, tank: &case::Tank, lattice: &Lattice, grid: &mut Grid, layers: i32) {
         let interior = lattice.tank_cells(tank.min.into(), tank.max.into());
         let closed = closed(&tank.without_wall(), lattice.plane);
@@ -61,7 +61,7 @@ impl Fixed {
             let below = interior.lo - c;
             let above = c - interior.hi + 1;
             let depth = below.max(above).max_element();
-            if depth <= 0 {
+            if depth <= 0 || grid.get(c) != FREE {
                 continue;
             }
             grid.set(c, SOLID);

@@ -136,7 +136,9 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
     let of_parts = |n: &[f64]| -> Vec<f64> { (0..n.len()).filter(part).map(|i| n[i]).collect() };
     match stage {
         Stage::Viscosity => vec![acceleration(), reaction()],
-        Stage::CellList => vec![position(), velocity(), share(stage, "kind", &gpu.kind, &cpu.kind)],
+        Stage::Openings | Stage::CellList => {
+            vec![position(), velocity(), share(stage, "kind", &gpu.kind, &cpu.kind)]
+        }
         Stage::WallFriction | Stage::Collision => vec![position(), velocity(), reaction()],
         Stage::NumberDensity => vec![
             scalar("number_density", &of_parts(&gpu.number_density), &of_parts(&cpu.number_density)),
@@ -275,7 +277,13 @@ pub fn compare_stages(
         }
         match stage {
             Stage::Contact => continue,
+            Stage::Openings => {
+                let passage = simulation.openings.advance(step.time, step.dt, simulation.groups.fluid);
+                pair.cpu.pass_openings(&passage.emissions, &passage.outlets)?;
+                pair.gpu.pass_openings(&passage.emissions, &passage.outlets)?;
+            }
             Stage::MoveSolids => {
+                let poses = simulation.openings.place(&poses);
                 pair.cpu.move_solids(&poses)?;
                 pair.gpu.move_solids(&poses)?;
             }

@@ -54,6 +54,8 @@ impl DryScene {
             kind: vec![],
             solid: vec![],
             groups: Groups::default(),
+            reserve: 0,
+            openings: vec![],
             solids: vec![],
             walls: vec![],
             static_wall_normal: vec![],

@@ -44,6 +44,26 @@ min = [0, 0, 0]
 max = [1, 1, 1]
 towards = "x_min"
 
+[[inflow]]
+name = "in"
+face = "x_min"
+velocity = 1
+
+[[inflow]]
+name = "in by discharge"
+face = "y_min"
+discharge = 1
+
+[[outflow]]
+name = "out"
+face = "x_max"
+discharge = 1
+
+[[outflow]]
+name = "out by velocity"
+face = "y_max"
+velocity = 1
+
 [[plane]]
 name = "plane"
 center = [1, 1, 0.9]

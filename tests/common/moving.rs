@@ -183,6 +183,8 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         static_wall_normal: vec![normal; groups.static_wall],
         static_wall_shape: vec![0; groups.static_wall],
         groups,
+        reserve: 0,
+        openings: Vec::new(),
         solids,
         walls: Vec::new(),
         domain: (low, high),

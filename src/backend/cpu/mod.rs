@@ -26,10 +26,11 @@ use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::{self, CellList, Scratch};
+use crate::kernels::openings::{Emission, Outlet};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
-    Particles, absorber, body_force, collision, correct, monitor, move_solids, predict, pressure_level,
-    shift, surface_pressure, wall_friction,
+    Particles, absorber, body_force, collision, correct, monitor, move_solids, openings, predict,
+    pressure_level, shift, surface_pressure, wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -115,8 +116,8 @@ impl Cpu {
             scratch,
             work: Workspace::default(),
             multigrid: (wet && plan.preconditioner == Preconditioner::Multigrid).then(Multigrid::default),
-            live: groups.fluid,
-            counters: Counters::default(),
+            live: scene.water(),
+            counters: Counters::new(super::outflows(scene)),
             ledger: (wet && plan.ledger).then(Box::default),
             imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
             dt: 0.0,
@@ -460,6 +461,30 @@ impl Backend for Cpu {
                 self.correct(step.dt);
             }
         }
+        Ok(())
+    }
+
+    fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()> {
+        for emission in emissions {
+            (0..emission.wall.len()).for_each(|k| openings::emit(emission, k, &mut self.fields));
+        }
+        if outlets.iter().all(Outlet::is_closed) {
+            return Ok(());
+        }
+        let (sides, n) = (self.params.periodic, self.groups.fluid);
+        let Fields { position, kind, .. } = &mut self.fields;
+        let count = |mut counts: Vec<u64>, (&x, kind): (&DVec3, &mut Kind)| {
+            if let Some(k) = openings::swallow(sides.wrap(x), outlets).filter(|_| *kind == Kind::Fluid) {
+                *kind = Kind::Ghost;
+                counts[k] += 1;
+            }
+            counts
+        };
+        let add = |a: Vec<u64>, b: Vec<u64>| a.iter().zip(b).map(|(a, b)| a + b).collect();
+        let none = || vec![0; outlets.len()];
+        let particles = (&position[..n], &mut kind[..n]).into_par_iter().with_min_len(CHUNK);
+        let counts: Vec<u64> = particles.fold(none, count).reduce(none, add);
+        self.counters.swallowed.iter_mut().zip(counts).for_each(|(total, count)| *total += count);
         Ok(())
     }
 

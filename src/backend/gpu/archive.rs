@@ -24,11 +24,13 @@ const SAVED: [&str; 10] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 43] = [
+const MADE_ANEW: [&str; 45] = [
     "unclipped",
     "clipped",
     "surface_pressure",
     "absorber_zone",
+    "emission",
+    "outlet",
     "imbalance",
     "source_diagonal",
     "preconditioned",

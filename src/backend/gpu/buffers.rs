@@ -3,8 +3,8 @@
 
 use super::hierarchy::{Hierarchy, Levels};
 use super::layout::{
-    AbsorberZone, Coefficients, Constants, FreeBody, LEDGER_WIDTH, MonitorSum, Pose, SCAN_BLOCK, Sizes,
-    Solve, WallParticle, counter,
+    AbsorberZone, Coefficients, Constants, Emission, FreeBody, LEDGER_WIDTH, MonitorSum, Outlet, Pose,
+    SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
 };
 use crate::compute::{Buffer, Host, Spec, shader_structs};
 use crate::monitor::SPEED_BINS;
@@ -14,9 +14,11 @@ shader_structs!(
     AbsorberZone,
     Constants,
     Coefficients,
+    Emission,
     FreeBody,
     Hierarchy,
     MonitorSum,
+    Outlet,
     Pose,
     Solve,
     WallParticle
@@ -119,6 +121,8 @@ table! {
         /// Rows of the moving-wall slots, then what each body answers.
         coupling: [f32; 4], None, Coupling, |s, _| 2 * (s.moving_wall + s.solids);
         absorber_zone: AbsorberZone, Writes, Absorber, |s, _| s.absorbers;
+        emission: Emission, Writes, Openings, |s, _| s.openings;
+        outlet: Outlet, Writes, Openings, |s, _| s.openings;
         monitor_sum: MonitorSum, Reads, Fluid, |s, _| s.monitor_groups();
         speed_bin: u32, Both, Fluid, |_, _| SPEED_BINS as u64;
     }

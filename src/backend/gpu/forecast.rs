@@ -156,6 +156,7 @@ mod tests {
             grid: [225, 36, 62],
             solids: 2,
             absorbers: 1,
+            openings: 1,
             capacity: 64,
             rows_per_thread: 1,
         }

@@ -6,6 +6,7 @@ use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
 pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
 use crate::kernels::body_force::missing_head;
+use crate::kernels::openings;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
 use crate::params::{Params, Step, Zone};
@@ -42,10 +43,16 @@ pub mod counter {
     pub const NON_FINITE: usize = 5;
     /// Smallest slot with more neighbours than a row holds, or `u32::MAX`.
     pub const OVERFLOW: usize = 6;
+    /// First of the particles that each outflow has swallowed since the last look.
+    pub const SWALLOWED: usize = 8;
     /// Words in the buffer.
-    pub const WORDS: usize = 8;
+    pub const WORDS: usize = SWALLOWED + crate::case::OUTFLOWS_MAX;
     /// Their start values.
-    pub const START: [u32; WORDS] = [0, 0, 0, 0, 0, u32::MAX, u32::MAX, 0];
+    pub const START: [u32; WORDS] = {
+        let mut start = [0; WORDS];
+        (start[NON_FINITE], start[OVERFLOW]) = (u32::MAX, u32::MAX);
+        start
+    };
 }
 
 /// Constants of a run; see `Constants` in shaders/common.wgsl for the units.
@@ -143,6 +150,42 @@ pub struct WallParticle {
     pub area: [f32; 4],
     pub arm: [f32; 4],
     pub to_surface: [f32; 4],
+}
+
+/// A wall layer that becomes water; see `Emission` in shaders/common.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Emission {
+    pub wall: u32,
+    pub count: u32,
+    pub to: u32,
+    pub pad: u32,
+    pub shift: [f32; 4],
+    pub velocity: [f32; 4],
+}
+
+/// A box in which water is swallowed; see `Outlet` in shaders/common.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Outlet {
+    pub low: [f32; 4],
+    pub high: [f32; 4],
+}
+
+impl Outlet {
+    /// One that swallows nothing.
+    pub const CLOSED: Self = Self { low: [1.0; 4], high: [-1.0; 4] };
+
+    /// That of the host, relative to the `middle` of the domain.
+    pub fn new(outlet: &openings::Outlet, middle: DVec3) -> Self {
+        if outlet.is_closed() {
+            return Self::CLOSED;
+        }
+        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        Self { low: four(outlet.low - middle), high: four(outlet.high - middle) }
+    }
 }
 
 /// A box in which the water comes to rest; see `AbsorberZone` in shaders/absorber.wgsl.
@@ -309,6 +352,8 @@ pub struct Sizes {
     pub solids: u64,
     /// Boxes in which the water comes to rest.
     pub absorbers: u64,
+    /// Openings through which water comes in and goes out.
+    pub openings: u64,
     /// Neighbours of a row at most.
     pub capacity: u64,
     /// Rows of the PPE that a thread takes at least. One fills a GPU best; software pays for every workgroup and
@@ -331,6 +376,7 @@ impl Sizes {
             grid: grid.count,
             solids: scene.solids.len() as u64,
             absorbers: params.absorbers.len() as u64,
+            openings: scene.openings.len() as u64,
             capacity: capacity(params.neighbours) as u64,
             rows_per_thread: 1,
         }
@@ -468,6 +514,7 @@ mod tests {
             grid: [250, 20 * k as u32, 100],
             solids: 2,
             absorbers: 1,
+            openings: 1,
             capacity: 64,
             rows_per_thread: 1,
         };

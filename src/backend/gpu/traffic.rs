@@ -50,6 +50,7 @@ impl Gpu {
         let stages = [
             (Stage::Viscosity, f * (3 * v + k) + followed * (4 * v + k) + k * rows.fluid_near),
             (Stage::Absorber, f * 3 * v),
+            (Stage::Openings, f * v),
             (Stage::Predict, if viscous { update } else { f * 4 * v }),
             (Stage::MoveSolids, 2 * s.moving * 4 * v),
             // Keys: counted, scanned in three kernels, searched. Particles: key, arrival and order; then moved and

@@ -1,0 +1,91 @@
+//! `seixo surface`: the surface of the water as meshes, from the frames that a run has written.
+
+use super::render::{chosen, frames_of};
+use super::{Exit, finite};
+use clap::ValueEnum;
+use rayon::prelude::*;
+use seixo::case::file::load;
+use seixo::console::{remark, say};
+use seixo::error::{Error, Result};
+use seixo::output::replay::{Frame, particles};
+use seixo::output::surface::surface;
+use seixo::output::write_whole;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct SurfaceArgs {
+    /// Folder of a run.
+    dir: PathBuf,
+    /// Folder for the meshes [default: DIR/surface].
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Every so many frames one.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Only the frames nearest to these times [s], e.g. 0.5,1,1.5.
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',', value_parser = finite, conflicts_with = "every")]
+    times: Vec<f64>,
+    /// Edge of a cell of the grid that the surface is found on, over the particle spacing.
+    #[arg(long, value_name = "X", default_value_t = 0.5, value_parser = edge)]
+    cell: f64,
+    /// Format of the files.
+    #[arg(long, value_enum, default_value_t = Format::Ply)]
+    format: Format,
+    /// Say nothing.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// A format of meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Binary PLY with the water's velocity: ParaView, Blender, MeshLab.
+    Ply,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+fn edge(text: &str) -> std::result::Result<f64, String> {
+    let edge = finite(text)?;
+    if (0.1..=2.0).contains(&edge) { Ok(edge) } else { Err("write a number from 0.1 to 2".into()) }
+}
+
+pub fn write(args: &SurfaceArgs) -> Exit {
+    seixo::threads::start(None)?;
+    let frames = frames_of(&args.dir)?;
+    let run = load(&args.dir.join("case.toml"), None, &[])?.case.run;
+    if run.dimensions == 2 {
+        let text = "the water of a case in two dimensions has no surface to make a mesh of; draw it with `seixo render`";
+        return Err(Error::usage("DIR", text));
+    }
+    let chosen = chosen(&frames, &args.times, args.every);
+    if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
+        let text =
+            format!("{} holds no frames with water: `output.every`, `output.kinds`", args.dir.display());
+        return Err(Error::usage("DIR", text));
+    }
+    let out = args.out.clone().unwrap_or_else(|| args.dir.join("surface"));
+    std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
+    let one = |(number, frame): &(usize, Frame)| -> Result<usize> {
+        let Some(path) = &frame.fluid else { return Ok(0) };
+        let water = particles(path)?;
+        let mesh = surface(&water.position, &water.velocity, run.spacing, args.cell * run.spacing)
+            .map_err(|why| Error::usage("--cell", format!("frame {number}: {why}; use larger cells")))?;
+        let (extension, bytes) = match args.format {
+            Format::Ply => ("ply", mesh.ply()),
+            Format::Obj => ("obj", mesh.obj().into_bytes()),
+        };
+        write_whole(&out.join(format!("surface_{number:04}.{extension}")), &bytes)?;
+        if !args.quiet {
+            let (time, count, volume) = (frame.time, mesh.triangle.len(), mesh.volume());
+            remark(&format!("frame {number}, t = {time:.3} s: {count} triangles around {volume:.4e} m3"));
+        }
+        Ok(1)
+    };
+    let written: Result<Vec<usize>> = chosen.par_iter().map(one).collect();
+    let count: usize = written?.into_iter().sum();
+    if !args.quiet {
+        say(&format!("{count} surfaces in {}", out.display()));
+    }
+    Ok(0)
+}

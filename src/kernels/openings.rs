@@ -1,0 +1,55 @@
+//! Openings: a layer of wall particles becomes water where it has gone a spacing into the tank, and water behind an outflow is
+//! swallowed.
+//! GPU twin: shaders/openings.wgsl
+
+use crate::fields::Fields;
+use crate::scene::Kind;
+use glam::DVec3;
+use std::ops::Range;
+
+/// A wall layer that becomes water.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emission {
+    /// Its slots.
+    pub wall: Range<usize>,
+    /// First of the fluid slots that the water takes; parked ones.
+    pub to: usize,
+    /// From where the layer stands to where the water begins [m].
+    pub shift: DVec3,
+    /// Velocity of the water [m/s].
+    pub velocity: DVec3,
+}
+
+/// A box in which water is swallowed; one that is empty swallows none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outlet {
+    /// Lower corner [m].
+    pub low: DVec3,
+    /// Upper corner [m].
+    pub high: DVec3,
+}
+
+impl Outlet {
+    /// One that swallows nothing.
+    pub const CLOSED: Self = Self { low: DVec3::ONE, high: DVec3::NEG_ONE };
+
+    /// Whether it swallows nothing.
+    pub fn is_closed(&self) -> bool {
+        self.low.cmpgt(self.high).any()
+    }
+}
+
+/// The k-th particle of the water of `emission`: it has the pressure of the wall particle that it was.
+pub fn emit(emission: &Emission, k: usize, fields: &mut Fields) {
+    let (wall, i) = (emission.wall.start + k, emission.to + k);
+    fields.position[i] = fields.position[wall] + emission.shift;
+    fields.velocity[i] = emission.velocity;
+    fields.kind[i] = Kind::Fluid;
+    fields.pressure[i] = fields.pressure[wall];
+}
+
+/// The first of `outlets` that holds `x`.
+#[inline(always)]
+pub fn swallow(x: DVec3, outlets: &[Outlet]) -> Option<usize> {
+    outlets.iter().position(|o| x.cmpge(o.low).all() && x.cmple(o.high).all())
+}

@@ -1,0 +1,209 @@
+//! Openings over time: how far the walls in them have gone, and which water comes in and goes out in a step.
+//!
+//! The wall layer of an inflow moves in with the water's velocity. When it has gone one spacing it becomes water where it is, and
+//! the wall goes on from where it began: what is in front of it feels no difference, as the particles stay where they are. The wall
+//! of an outflow draws back; when it has gone one spacing, the water that has followed it out of the tank is swallowed and the
+//! wall stands in the face again. A hole swallows what is a spacing outside of the face.
+
+use crate::body::Pose;
+use crate::checkpoint::Archive;
+use crate::error::Result;
+use crate::kernels::openings::{Emission, Outlet};
+use crate::scene::{Opening, Passes, Scene};
+use glam::DVec3;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Part of the volume that an outflow of given discharge is behind its table which it makes up for while its wall goes the next
+/// spacing [-].
+const MADE_UP: f64 = 0.5;
+
+/// An opening and where its wall is.
+#[derive(Clone, Debug)]
+struct Gate {
+    opening: Opening,
+    /// Slots of its wall layer.
+    wall: Range<usize>,
+    /// How far the wall has gone [m], less than a spacing.
+    travel: f64,
+    /// Speed of the wall [m/s].
+    speed: f64,
+    /// Layers that have become water.
+    layers: u64,
+    /// Discharge over this area is the speed of a wall that follows a discharge [m2].
+    area: f64,
+    /// Particles that it had swallowed when they were last counted.
+    taken: u64,
+}
+
+/// The openings of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Openings {
+    gates: Vec<Gate>,
+    spacing: f64,
+}
+
+/// What passes the openings in a step.
+#[derive(Clone, Debug, Default)]
+pub struct Passage {
+    /// Layers that become water.
+    pub emissions: Vec<Emission>,
+    /// Where water is swallowed, one an outflow.
+    pub outlets: Vec<Outlet>,
+    /// Whether an outflow must know what it has swallowed.
+    pub counts: bool,
+}
+
+impl Openings {
+    /// Those of `scene` at t = 0.
+    pub fn new(scene: &Scene) -> Self {
+        let gate = |opening: &Opening| Gate {
+            wall: opening.solid.map_or(0..0, |k| scene.solids[k].wall_slots.clone()),
+            travel: 0.0,
+            speed: 0.0,
+            layers: 0,
+            area: opening.area * (opening.wet.max(1) as f64 / opening.layer as f64).max(0.25),
+            taken: 0,
+            opening: opening.clone(),
+        };
+        Self { gates: scene.openings.iter().map(gate).collect(), spacing: scene.spacing }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.gates.is_empty()
+    }
+
+    /// Largest speed of a wall between the times `from` and `to` [m/s].
+    pub fn fastest(&self, from: f64, to: f64) -> f64 {
+        self.gates.iter().map(|g| g.opening.fastest(from, to)).fold(0.0, f64::max)
+    }
+
+    /// Moves the walls on from `t` to `t + dt` [s]; water that comes in takes the last of `slots` fluid slots.
+    pub fn advance(&mut self, t: f64, dt: f64, slots: usize) -> Passage {
+        let l0 = self.spacing;
+        let mut out = Passage::default();
+        for gate in &mut self.gates {
+            let way = match &gate.opening.passes {
+                Passes::In(speed) | Passes::Out(speed) => {
+                    gate.speed = speed.value(t + dt);
+                    speed.integral(t, t + dt)
+                }
+                Passes::Drawn(discharge) => {
+                    gate.speed = discharge.value(t + dt) / gate.area;
+                    discharge.integral(t, t + dt) / gate.area
+                }
+                Passes::Free => 0.0,
+            };
+            gate.travel += way;
+            // A time step is far too short for two.
+            let crosses = gate.travel >= l0;
+            if crosses {
+                gate.travel -= l0;
+            }
+            let outward = gate.opening.outward;
+            if gate.opening.is_inflow() {
+                if crosses {
+                    gate.layers += 1;
+                    out.emissions.push(Emission {
+                        wall: gate.wall.clone(),
+                        to: 0,
+                        shift: -outward * way,
+                        velocity: -outward * gate.speed,
+                    });
+                }
+                continue;
+            }
+            let free = gate.opening.passes == Passes::Free;
+            out.counts |= crosses && matches!(gate.opening.passes, Passes::Drawn(_));
+            out.outlets.push(if free || crosses {
+                gate.opening.outlet(if free { l0 } else { gate.travel })
+            } else {
+                Outlet::CLOSED
+            });
+        }
+        let mut to = slots;
+        for emission in out.emissions.iter_mut().rev() {
+            to -= emission.wall.len();
+            emission.to = to;
+        }
+        out
+    }
+
+    /// Takes in what the outflows have swallowed since the start, at time `t` [s]: walls that follow a discharge hurry or wait.
+    pub fn count(&mut self, t: f64, passage: &Passage, swallowed: &[u64]) {
+        let l0 = self.spacing;
+        let outflows = self.gates.iter_mut().filter(|g| !g.opening.is_inflow());
+        for ((gate, outlet), &total) in outflows.zip(&passage.outlets).zip(swallowed) {
+            let Passes::Drawn(discharge) = &gate.opening.passes else { continue };
+            if outlet.is_closed() {
+                continue;
+            }
+            let full = gate.opening.area;
+            let wet = (total - gate.taken) as f64 * l0 * l0;
+            gate.taken = total;
+            let behind = discharge.integral(0.0, t) - total as f64 * l0.powi(3);
+            // A wall that has met no water goes on as if there were.
+            let wet = if wet > 0.0 { wet } else { full };
+            gate.area =
+                (wet - MADE_UP * behind / l0).clamp(full / crate::case::HURRY, full * crate::case::HURRY);
+        }
+    }
+
+    /// The `poses` of the solids with the walls in the openings where they are.
+    pub fn place<'a>(&self, poses: &'a [Pose]) -> Cow<'a, [Pose]> {
+        let mut poses = Cow::Borrowed(poses);
+        for gate in &self.gates {
+            if let Some(k) = gate.opening.solid {
+                let way = if gate.opening.is_inflow() { -gate.opening.outward } else { gate.opening.outward };
+                let pose = &mut poses.to_mut()[k];
+                pose.position += gate.travel * way;
+                pose.velocity = gate.speed * way;
+            }
+        }
+        poses
+    }
+
+    /// Particles that have come in, one an inflow.
+    pub fn emitted(&self) -> impl Iterator<Item = (&str, u64)> {
+        let inflows = self.gates.iter().filter(|g| g.opening.is_inflow());
+        inflows.map(|g| (g.opening.name.as_str(), g.layers * g.wall.len() as u64))
+    }
+
+    /// All particles that have come in.
+    pub fn total_emitted(&self) -> u64 {
+        self.emitted().map(|(_, n)| n).sum()
+    }
+
+    /// Names of the outflows.
+    pub fn outflows(&self) -> impl Iterator<Item = &str> {
+        self.gates.iter().filter(|g| !g.opening.is_inflow()).map(|g| g.opening.name.as_str())
+    }
+
+    /// Save where the walls are, or take it over.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Checkpoint`] if the state has none.
+    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        for (k, gate) in self.gates.iter_mut().enumerate() {
+            let Gate { opening: _, wall: _, travel, speed, layers, area, taken } = gate;
+            archive.number(&format!("openings.{k}.travel"), travel)?;
+            archive.number(&format!("openings.{k}.speed"), speed)?;
+            archive.number(&format!("openings.{k}.area"), area)?;
+            archive.count(&format!("openings.{k}.layers"), layers)?;
+            archive.count(&format!("openings.{k}.taken"), taken)?;
+        }
+        Ok(())
+    }
+}
+
+impl Opening {
+    /// The box behind the face, from `behind` the face on [m].
+    fn outlet(&self, behind: f64) -> Outlet {
+        let (mut low, mut high) = self.behind;
+        let shift = behind * self.outward;
+        low += shift.max(DVec3::ZERO);
+        high += shift.min(DVec3::ZERO);
+        Outlet { low, high }
+    }
+}

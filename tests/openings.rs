@@ -1,0 +1,375 @@
+//! Inflow and outflow: what comes in and goes out is counted to the particle, levels are those of the volume, both backends do
+//! the same, and a run that was stopped goes on as it would have.
+
+use crate::cli::{json, ran};
+use crate::restart::assert_same;
+use seixo::backend::gpu;
+use seixo::case::Case;
+use seixo::plan::{Plan, Stage};
+use seixo::scene::{Kind, Passes, Scene};
+use seixo::{Options, Processor, Simulation};
+use std::path::Path;
+
+/// A tank 0.4 m wide with water `depth` deep, in two dimensions.
+fn tank(depth: f64, more: &str) -> String {
+    format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nadaptive = true\nend = 2.0\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, 0.4]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, {depth}]\n{more}"
+    )
+}
+
+/// A channel 0.8 m long with water 0.1 m deep that flows at 0.25 m/s, in two dimensions.
+fn channel(outflow: &str) -> String {
+    format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nadaptive = true\nend = 6.0\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.1, 0.2]\nopen = [\"z_max\"]\n\
+         [fluid]\nsound_speed = 3\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.1, 0.1]\nvelocity = [0.25, 0, 0]\n\
+         [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.25\n\
+         [[outflow]]\nname = \"out\"\nface = \"x_max\"\n{outflow}\n"
+    )
+}
+
+fn opened(text: &str, processor: &Processor) -> Simulation {
+    let case: Case = text.parse().unwrap_or_else(|e| panic!("{e}"));
+    let options = Options { processor: processor.clone(), ..Options::default() };
+    Simulation::open(&case, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Particles in, out, lost and there; they close at any time.
+fn counted(simulation: &mut Simulation) -> (u64, u64, u64, u64) {
+    let (water, counters) = simulation.observe().expect("it can be looked at");
+    let came = simulation.openings.total_emitted();
+    let out = counters.swallowed.iter().sum::<u64>();
+    let there = simulation.scene.water() as u64 + came - out - counters.lost;
+    assert_eq!(water.particles, there, "at {} s", simulation.time);
+    (came, out, counters.lost, there)
+}
+
+fn until(simulation: &mut Simulation, time: f64) {
+    while simulation.time < time {
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+#[test]
+fn a_tank_fills_at_the_given_discharge() {
+    // 0.02 m2/s for two seconds after a second of growing: 0.05 m2 by 3 s, 0.125 m of level.
+    let inflow = "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\n\
+                  discharge = [[0, 0], [1, 0.02]]\n";
+    let mut simulation = opened(&tank(0.1, inflow).replace("end = 2.0", "end = 3.5"), &Processor::Cpu);
+    assert_eq!(simulation.scene.water(), 400);
+    let layer = simulation.scene.openings[0].layer as u64;
+    assert_eq!(layer, 10);
+    let mut last = 0.0;
+    for time in [0.5, 1.0, 2.0, 3.0] {
+        until(&mut simulation, time);
+        let t = simulation.time;
+        let volume = if t < 1.0 { 0.01 * t * t } else { 0.01 + 0.02 * (t - 1.0) };
+        let (came, _, lost, there) = counted(&mut simulation);
+        // Whole layers, each when its water has come in.
+        assert_eq!(came, layer * (volume / (layer as f64 * 1e-4) + 1e-9).floor() as u64, "at {t} s");
+        assert_eq!(lost, 0);
+        // Twice the height of the centroid is the level of water that is nearly at rest.
+        let level = 2.0 * simulation.observe().expect("readable").0.centroid[2];
+        let expected = there as f64 * 1e-4 / 0.4;
+        println!(
+            "at {t:.3} s: level {level:.4} m, by volume {expected:.4} m, by discharge {:.4} m",
+            0.1 + volume / 0.4
+        );
+        if time == 3.0 {
+            assert!((level / expected - 1.0).abs() < 0.01, "{level} m for {expected} m");
+            assert!((expected - 0.1 - volume / 0.4).abs() < 0.0026, "less than a layer is under way");
+        }
+        assert!(level > last);
+        last = level;
+    }
+}
+
+/// Mean depth over the middle half of the channel [m], by count.
+fn depth(simulation: &mut Simulation) -> f64 {
+    let fields = simulation.fields().expect("readable");
+    let middle = |i: &usize| fields.kind[*i] == Kind::Fluid && (0.2..0.6).contains(&fields.position[*i].x);
+    (0..simulation.groups.fluid).filter(middle).count() as f64 * 1e-4 / 0.4
+}
+
+#[test]
+fn a_channel_keeps_its_level() {
+    for outflow in ["velocity = 0.25", "discharge = 0.025"] {
+        let mut simulation = opened(&channel(outflow), &Processor::Cpu);
+        let (mut sum, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
+        for k in 1..=32 {
+            until(&mut simulation, 0.125 * f64::from(k));
+            let (came, out, lost, there) = counted(&mut simulation);
+            assert_eq!(lost, 0);
+            let depth = depth(&mut simulation);
+            worst = worst.max((depth / 0.1 - 1.0).abs());
+            if k > 16 {
+                (sum, count) = (sum + depth, count + 1.0);
+            }
+            if k % 8 == 0 {
+                println!(
+                    "{outflow}, {:.2} s: {came} in, {out} out, {there} there, depth {depth:.4} m",
+                    simulation.time
+                );
+            }
+        }
+        let (came, out, _, there) = counted(&mut simulation);
+        let mean = sum / count;
+        println!("{outflow}: mean depth {mean:.4} m, worst off by {:.1} %", 100.0 * worst);
+        // 4 s at 0.25 m/s: 100 layers, more than the channel holds.
+        assert_eq!(came, 1000);
+        assert!(worst < 0.025 && (mean / 0.1 - 1.0).abs() < 0.01, "{outflow}: {mean} m");
+        assert!((there as f64 / 800.0 - 1.0).abs() < 0.025, "{outflow}: {there} particles");
+        assert!(out.abs_diff(came) < 40, "{outflow}: {came} in, {out} out");
+    }
+}
+
+#[test]
+fn a_tank_runs_empty_through_a_hole() {
+    // A slot 0.04 m high at the foot; Torricelli gives v = sqrt(2 g h) at its middle.
+    let hole = "[[outflow]]\nname = \"slot\"\nface = \"x_max\"\nmin = [0.4, 0, 0]\nmax = [0.4, 0.1, 0.04]\n";
+    let mut simulation = opened(&tank(0.2, hole), &Processor::Cpu);
+    assert!(simulation.scene.openings[0].passes == Passes::Free && simulation.scene.solids.is_empty());
+    until(&mut simulation, 0.1);
+    let start = counted(&mut simulation).3 as f64 * 1e-4 / 0.4;
+    let from = simulation.time;
+    until(&mut simulation, 0.4);
+    let (_, out, _, there) = counted(&mut simulation);
+    let end = there as f64 * 1e-4 / 0.4;
+    // d sqrt(h) / dt = -C a sqrt(2 g) / (2 A), with h above the middle of the slot.
+    let roots = (start - 0.02_f64).sqrt() - (end - 0.02_f64).sqrt();
+    let full = 0.04 * (2.0 * 9.80665_f64).sqrt() * (simulation.time - from) / (2.0 * 0.4);
+    let coefficient = roots / full;
+    println!("{out} swallowed, level {start:.3} to {end:.3} m, coefficient of discharge {coefficient:.3}");
+    // 0.61 for a sharp edge all around; the floor suppresses the contraction below.
+    assert!((0.5..1.0).contains(&coefficient), "{coefficient}");
+}
+
+#[test]
+fn an_empty_tank_may_be_filled_and_slots_are_used_again() {
+    // Room for less than comes in over the run; what goes out makes room again.
+    let more = "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0.1]\nmax = [0, 0.1, 0.2]\nvelocity = 1.0\n\
+                [[outflow]]\nname = \"drain\"\nface = \"x_max\"\nmin = [0.4, 0, 0]\nmax = [0.4, 0.1, 0.2]\n";
+    let text = tank(0.1, more)
+        .replace("[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, 0.1]\n", "max_volume = 0.06\n");
+    let mut simulation = opened(&text, &Processor::Cpu);
+    assert_eq!((simulation.scene.water(), simulation.groups.fluid), (0, 610));
+    until(&mut simulation, 1.0);
+    let (came, out, _, there) = counted(&mut simulation);
+    println!("{came} in, {out} out, {there} there");
+    assert!(came > 900 && out > 300 && there > 50);
+    // Without the drain there is no room for it all, and the run says so.
+    let closed = text.split("[[outflow]]").next().expect("the text before").to_owned();
+    let mut simulation = opened(&closed, &Processor::Cpu);
+    let error = loop {
+        if let Err(error) = simulation.step() {
+            break error.to_string();
+        }
+    };
+    assert!(error.contains("fluid.max_volume") && error.contains("room for 610"), "{error}");
+    assert!((0.55..0.66).contains(&simulation.time), "{}", simulation.time);
+}
+
+#[test]
+fn both_backends_do_the_same() {
+    if gpu::adapters().is_empty() {
+        assert!(std::env::var_os("CI").is_none(), "no adapter");
+        eprintln!("SKIPPED: no GPU adapter");
+        return;
+    }
+    for (outflow, periodic) in [("velocity = 0.25", false), ("", false), ("discharge = 0.025", true)] {
+        let mut text = channel(outflow).replace("velocity = 0.25\n[[outflow", "velocity = 0.5\n[[outflow");
+        if periodic {
+            // Three dimensions, periodic across the channel.
+            text = text
+                .replace("dimensions = 2", "dimensions = 3")
+                .replace("max = [0.8, 0.1, 0.2]", "max = [0.3, 0.1, 0.2]\nperiodic = [\"y\"]")
+                .replace("max = [0.8, 0.1, 0.1]", "max = [0.3, 0.1, 0.1]")
+                .replace("discharge = 0.025", "discharge = 0.0025");
+        }
+        let mut cpu = opened(&text, &Processor::Cpu);
+        let mut gpu = opened(&text, &Processor::Gpu { adapter: None });
+        for k in 0..60 {
+            let (a, b) = (cpu.step().expect("the CPU steps"), gpu.step().expect("the device steps"));
+            assert_eq!(a.dt, b.dt, "step {k}");
+        }
+        let (a, b) = (counted(&mut cpu), counted(&mut gpu));
+        println!("{outflow}: CPU {a:?}, device {b:?}");
+        assert!(a.0 == b.0 && a.0 >= 20, "{a:?} {b:?}");
+        // One that is at the edge of an outflow's box may be swallowed a little later.
+        assert!(a.1.abs_diff(b.1) <= 2 && a.1 > 0, "{a:?} {b:?}");
+        let (x, y) = (cpu.fields().expect("readable"), gpu.fields().expect("readable"));
+        let by_id = |f: &seixo::fields::Fields| {
+            let mut of = vec![None; f.id.len()];
+            (0..f.id.len())
+                .filter(|&i| f.kind[i] == Kind::Fluid)
+                .for_each(|i| of[f.id[i] as usize] = Some(f.position[i]));
+            of
+        };
+        let (x, y) = (by_id(&x), by_id(&y));
+        let both: Vec<f64> =
+            x.iter().zip(&y).filter_map(|(a, b)| Some(a.as_ref()?.distance(*b.as_ref()?))).collect();
+        let apart = both.iter().copied().fold(0.0, f64::max) / 0.01;
+        let mean = both.iter().sum::<f64>() / both.len() as f64 / 0.01;
+        println!("{} particles, {apart:.2e} spacings apart at most, {mean:.2e} in the mean", both.len());
+        assert!(mean < 5e-3, "{mean}");
+    }
+}
+
+#[test]
+fn a_run_that_was_stopped_goes_on_to_the_bit() {
+    for backend in ["cpu", "gpu"] {
+        if backend == "gpu" && gpu::adapters().is_empty() {
+            eprintln!("SKIPPED: no GPU adapter");
+            continue;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("channel.toml");
+        let text = channel("discharge = 0.025").replace("end = 6.0", "end = 0.4");
+        std::fs::write(&path, text.replace("velocity = 0.25\n[[outflow", "velocity = 0.5\n[[outflow"))
+            .unwrap();
+        let path = path.display().to_string();
+        let root = |name: &str| folder.path().join(name).display().to_string();
+        let (whole, parts) = (root("whole"), root("parts"));
+        let run = |more: &[&str]| {
+            let base = ["run", &path, "--backend", backend, "--quiet", "--set", "output.every=0.1"];
+            let args: Vec<&str> = base.into_iter().chain(more.iter().copied()).collect();
+            let ran = ran(&args);
+            assert_eq!(ran.code, 0, "{}", ran.err);
+        };
+        run(&["-o", &whole]);
+        run(&["-o", &parts, "--steps", "53"]);
+        run(&["-o", &parts, "--resume"]);
+        assert_same(Path::new(&whole), Path::new(&parts), backend);
+        let result = json(&std::fs::read_to_string(format!("{parts}/result.json")).unwrap());
+        let water = &result["water"];
+        let number = |v: &serde_json::Value| v.as_u64().unwrap_or_else(|| panic!("{water}"));
+        let (came, out) =
+            (number(&water["inflow"][0]["particles"]), number(&water["outflow"][0]["particles"]));
+        assert_eq!(number(&water["particles_start"]), 800);
+        assert_eq!(
+            number(&water["particles_end"]),
+            800 + came - out - number(&water["particles_lost"]),
+            "{water}"
+        );
+        assert_eq!(came, 200);
+        // The table says the same, and knows no solid.
+        let table = std::fs::read_to_string(format!("{parts}/monitors.csv")).unwrap();
+        let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+        let last: Vec<&str> = table.lines().last().unwrap().split(',').collect();
+        let of = |name: &str| last[head.iter().position(|h| *h == name).unwrap()].parse::<f64>().unwrap();
+        assert!((of("inflow_in [m3]") / (came as f64 * 1e-6) - 1.0).abs() < 1e-6);
+        assert!((of("outflow_out [m3]") / (out as f64 * 1e-6) - 1.0).abs() < 1e-6);
+        let there = number(&water["particles_end"]) as f64;
+        assert!((of("water_volume [m3]") / (there * 1e-6) - 1.0).abs() < 1e-6);
+        assert!(!Path::new(&parts).join("bodies.csv").exists());
+    }
+}
+
+/// A log that drifts down the channel stays there: to bodies an opening is a wall.
+#[test]
+fn a_body_does_not_leave_through_an_opening() {
+    for outflow in ["velocity = 0.25", ""] {
+        let log = "[contact]\nlaw = \"smooth\"\nspring = 1e4\n[[body]]\nname = \"log\"\nsize = [0.08, 0.1, 0.05]\n\
+                   center = [0.7, 0, 0.1]\ndensity = 500\nvelocity = [0.25, 0, 0]\ndisplaces_fluid = true\n";
+        let mut simulation = opened(&format!("{}{log}", channel(outflow)), &Processor::Cpu);
+        until(&mut simulation, 1.0);
+        let (_, out, lost, _) = counted(&mut simulation);
+        let x = simulation.solid("log").expect("it is there").pose.position.x;
+        println!("{outflow}: log at {x:.4} m, {out} out");
+        assert!(lost == 0 && out > 150 && (0.74..0.77).contains(&x), "{x} {out} {lost}");
+    }
+}
+
+#[test]
+fn a_hydrograph_comes_from_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.toml");
+    let inflow = "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\n";
+    std::fs::write(&path, tank(0.1, &format!("{inflow}discharge = \"flood.csv\"  # measured\n"))).unwrap();
+    let flood = |text: &str| std::fs::write(folder.path().join("flood.csv"), text).unwrap();
+    flood("# gauge 7\ntime [s], discharge [m2/s]\n0, 0\n1.5, 0.03\n");
+    let rates = |sets: &[String]| {
+        let loaded = seixo::case::file::load(&path, None, sets).unwrap_or_else(|e| panic!("{e}"));
+        assert!(sets.len() == 1 || loaded.text.contains("# measured"), "{}", loaded.text);
+        loaded.case.inflow[0].discharge.clone()
+    };
+    use seixo::case::Rate;
+    assert_eq!(rates(&[]), Some(Rate::Table(vec![[0.0, 0.0], [1.5, 0.03]])));
+    assert_eq!(rates(&["inflow.0.discharge=0.02".into()]), Some(Rate::Constant(0.02)));
+    flood("0, 0\n1.5, 0.03, 0.1\n");
+    let told = seixo::case::file::load(&path, None, &[]).expect_err("three numbers").to_string();
+    assert!(told.contains("flood.csv:2: expected time [s] and value"), "{told}");
+}
+
+#[test]
+fn a_scene_without_openings_has_no_such_stage() {
+    let case: Case = tank(0.1, "").parse().expect("valid");
+    let scene = Scene::build(&case).expect("valid");
+    let params = seixo::params::Params::new(&case, &scene).expect("valid");
+    let plan = Plan::new(&case, &scene, &params);
+    assert!(!plan.has(Stage::Openings) && scene.reserve == 0 && scene.water() == scene.groups.fluid);
+}
+
+#[test]
+fn what_is_wrong_with_an_opening_is_told() {
+    let inflow = |keys: &str| format!("[[inflow]]\nname = \"in\"\n{keys}\n");
+    let face = "face = \"x_min\"\n";
+    let box_low = "min = [0, 0, 0]\nmax = [0, 0.1, 0.1]\n";
+    for (text, words) in [
+        (tank(0.1, &inflow(face)), "brings no water"),
+        (tank(0.1, &inflow(&format!("{face}velocity = 1\ndischarge = 1"))), "exclude each other"),
+        (tank(0.1, &inflow(&format!("{face}velocity = -1"))), "out of range"),
+        (
+            tank(0.1, &inflow(&format!("{face}velocity = \"fast\""))),
+            "a number, or rows of time [s] and value",
+        ),
+        (tank(0.1, &inflow(&format!("{face}velocity = [[0, 1], [0, 2]]"))), "does not come after"),
+        (tank(0.1, &inflow(&format!("{face}velocity = []"))), "no rows"),
+        (tank(0.1, &inflow("face = \"z_max\"\nvelocity = 1")), "tank.open"),
+        (tank(0.1, &inflow("face = \"y_min\"\nvelocity = 1")), "in two dimensions"),
+        (tank(0.1, &inflow(&format!("{face}velocity = 1\nmin = [0, 0, 0]"))), "add `max`"),
+        (
+            tank(0.1, &inflow(&format!("{face}velocity = 1\nmin = [0.2, 0, 0]\nmax = [0.3, 0.1, 0.1]"))),
+            "does not meet `x_min`",
+        ),
+        (
+            tank(0.1, &inflow(&format!("{face}velocity = 1\nmin = [0, 0, 0.5]\nmax = [0, 0.1, 0.6]"))),
+            "less than one particle",
+        ),
+        (
+            tank(0.1, &inflow(&format!("{face}velocity = 9\n{box_low}")))
+                .replace("adaptive = true", "adaptive = false"),
+            "use run.time_step",
+        ),
+        (
+            tank(0.1, "[output]\nledger = true\n[[outflow]]\nname = \"out\"\nface = \"x_min\"\n"),
+            "output.ledger",
+        ),
+        (
+            tank(
+                0.1,
+                &format!(
+                    "{}{}",
+                    inflow(&format!("{face}velocity = 1")),
+                    "[[outflow]]\nname = \"in\"\nface = \"x_max\"\n"
+                ),
+            ),
+            "is taken",
+        ),
+        (tank(0.1, "").replace("[fluid]\n", "[fluid]\nmax_volume = 1\n"), "without an inflow"),
+    ] {
+        let error = text.parse::<Case>().expect_err(words).to_string();
+        assert!(error.contains(words), "{words}: {error}");
+    }
+    // What only the scene shows.
+    let two =
+        format!("{}[[outflow]]\nname = \"out\"\n{face}", inflow(&format!("{face}velocity = 1\n{box_low}")));
+    let error =
+        |text: String| Scene::build(&text.parse().expect("the check passes")).expect_err("wrong").to_string();
+    assert!(error(tank(0.1, &two)).contains("overlaps `in`"));
+    let little = tank(0.1, &inflow(&format!("{face}velocity = 1")))
+        .replace("[fluid]\n", "[fluid]\nmax_volume = 0.01\n");
+    assert!(error(little).contains("fluid.max_volume"));
+}
