@@ -205,15 +205,43 @@ fn crosses(from: DVec3, to: DVec3, half: DVec3) -> bool {
     low < high
 }
 
-/// Runs the scene of `text` for `time` [s], with steps of `time_step` [s] if that is given.
+/// What an error says a scene would run with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Remedy {
+    /// Time step, if not the scene's own [s].
+    pub time_step: Option<f64>,
+    /// Spring, if not the scene's own [N/m].
+    pub spring: Option<f64>,
+}
+
+impl Remedy {
+    /// What the text of an error names.
+    pub fn of(error: &str) -> Self {
+        let number = |key: &str| {
+            let rest = error.split(&format!("{key} = ")).nth(1)?;
+            rest.split_whitespace().next()?.parse().ok()
+        };
+        Self { time_step: number("run.time_step"), spring: number("contact.spring") }
+    }
+
+    /// This one, and where it says nothing what `earlier` said.
+    pub fn or(self, earlier: Self) -> Self {
+        Self { time_step: self.time_step.or(earlier.time_step), spring: self.spring.or(earlier.spring) }
+    }
+}
+
+/// Runs the scene of `text` for `time` [s] with a `remedy`.
 ///
 /// # Errors
 /// Those of [`Scene::build`]: the scene does not exist.
-pub fn run(text: &str, time: f64, time_step: Option<f64>) -> Result<Outcome> {
-    let case: Case = text.parse()?;
+pub fn run(text: &str, time: f64, remedy: Remedy) -> Result<Outcome> {
+    let mut case: Case = text.parse()?;
+    if let (Some(contact), Some(spring)) = (&mut case.contact, remedy.spring) {
+        contact.spring = spring;
+    }
     let scene = Scene::build(&case)?;
     let mut solids = Solids::new(&scene, case.contact.as_ref())?;
-    let dt = time_step.unwrap_or(case.run.time_step);
+    let dt = remedy.time_step.unwrap_or(case.run.time_step);
     let none = none(solids.poses().len());
     let start = solids.energy();
     let mass: f64 = case.body.iter().filter_map(|b| b.mass).sum();
