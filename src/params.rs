@@ -193,9 +193,11 @@ impl Params {
             wall_shear: if paper { 1.0 } else { lattice.wall_shear },
             wall_contact: lattice.wall_contact,
             wall_friction: friction / (l0 * lattice.wall_contact),
-            free_surface_threshold: fluid
-                .filter(|_| !filled)
-                .map_or(if filled { 0.0 } else { 0.97 }, |f| f.free_surface_threshold),
+            free_surface_threshold: if filled {
+                0.0
+            } else {
+                fluid.map_or(0.97, |f| f.free_surface_threshold)
+            },
             filled,
             source,
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),

@@ -18,30 +18,11 @@ fn device() -> Option<Processor> {
 /// A Taylor-Green vortex in a square of L = 1 m with `cells` spacings a side, U = 1 m/s, Re = U L / nu = 100, at t = 0.5 s: rate at which its
 /// energy decayed over the exact one, 16 pi^2 nu / L^2, and the rms of the velocity's error over its own.
 fn taylor_green(cells: usize, processor: &Processor) -> (f64, f64) {
-    let (l0, nu, k) = (1.0 / cells as f64, 0.01, 2.0 * PI);
-    let case = case(&format!(
-        "[run]\nspacing = {l0}\ntime_step = {}\nend = 1.0\ngravity = [0, 0, 0]\ndimensions = 2\n\
-         [fluid]\nviscosity = {nu}\nsound_speed = 5\n\
-         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\n\
-         [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\nperiodic = [\"x\", \"z\"]\n",
-        0.1 * l0
-    ));
-    let scene = Scene::build(&case).expect("it builds");
-    let mut sim = Simulation::on(&case, scene, processor).expect("it starts");
-    let mut fields = sim.backend.read().expect("the fields");
+    let (nu, k) = (0.01, 2.0 * PI);
     let exact =
         |x: DVec3| DVec3::new((k * x.x).sin() * (k * x.z).cos(), 0.0, -(k * x.x).cos() * (k * x.z).sin());
-    for (v, x) in fields.velocity.iter_mut().zip(&fields.position) {
-        *v = exact(*x);
-    }
-    sim.backend.write(&fields).expect("written");
-    let mut energy = Vec::new();
-    while sim.time < 0.5 {
-        sim.step().expect("a step");
-        energy.push((sim.time, sim.backend.monitor().expect("measured").kinetic));
-    }
-    let (first, last) = (energy[2], energy[energy.len() - 1]);
-    let rate = (first.1 / last.1).ln() / (last.0 - first.0) / (4.0 * nu * k * k);
+    let (mut sim, decay) = stirred_square(cells, processor, exact);
+    let rate = decay / (4.0 * nu * k * k);
     let fields = sim.backend.read().expect("the fields");
     let left = (-2.0 * nu * k * k * sim.time).exp();
     let (mut wrong, mut all) = (0.0, 0.0);

@@ -359,31 +359,12 @@ fn couette_flow_without_ends_is_the_line_between_the_surfaces() {
 /// periodic, Re = U L / nu = 100, to t = 0.5 s: kinematic viscosity by which its energy decays over nu, and the momentum
 /// that it gained over m U.
 fn shear_wave(cells: usize, processor: &Processor) -> (f64, f64) {
-    let (l0, nu, k) = (1.0 / cells as f64, 0.01, 2.0 * PI);
-    let case = case(&format!(
-        "[run]\nspacing = {l0}\ntime_step = {}\nend = 1.0\ngravity = [0, 0, 0]\ndimensions = 2\n\
-         [fluid]\nviscosity = {nu}\nsound_speed = 5\n\
-         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\n\
-         [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\nperiodic = [\"x\", \"z\"]\n",
-        0.1 * l0
-    ));
-    let scene = Scene::build(&case).expect("it builds");
-    let mut sim = Simulation::on(&case, scene, processor).expect("it starts");
-    let mut fields = sim.backend.read().expect("the fields");
-    for (v, x) in fields.velocity.iter_mut().zip(&fields.position) {
-        *v = DVec3::new((k * x.z).sin(), 0.0, 0.0);
-    }
-    sim.backend.write(&fields).expect("written");
-    let mut energy = Vec::new();
-    while sim.time < 0.5 {
-        sim.step().expect("a step");
-        energy.push((sim.time, sim.backend.monitor().expect("measured")));
-    }
-    let (first, last) = (&energy[2], &energy[energy.len() - 1]);
-    let rate = (first.1.kinetic / last.1.kinetic).ln() / (last.0 - first.0);
-    let mass = last.1.particles as f64 * sim.params.particle_mass();
+    let (nu, k) = (0.01, 2.0 * PI);
+    let (mut sim, rate) = stirred_square(cells, processor, |x| DVec3::new((k * x.z).sin(), 0.0, 0.0));
+    let last = sim.backend.monitor().expect("measured");
+    let mass = last.particles as f64 * sim.params.particle_mass();
     assert_eq!(sim.backend.counters().expect("counted").lost, 0);
-    (rate / (2.0 * nu * k * k), DVec3::from(last.1.momentum).length() / mass)
+    (rate / (2.0 * nu * k * k), DVec3::from(last.momentum).length() / mass)
 }
 
 #[test]
