@@ -430,7 +430,8 @@ impl Cpu {
 
 impl Backend for Cpu {
     fn description(&self) -> String {
-        format!("CPU, {} threads", rayon::current_num_threads())
+        let threads = rayon::current_num_threads();
+        format!("CPU, {threads} thread{}", if threads == 1 { "" } else { "s" })
     }
 
     fn precision(&self) -> &'static str {
