@@ -1,6 +1,9 @@
 //! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
 
-use crate::case::{Case, Encoding, Face, Form, OutputField, OutputKind, Place, Vector, Wall};
+use crate::case::{
+    Case, Choice, Encoding, Face, Form, Guide, OutputField, OutputKind, OutputRegion, Place, Series, Vector,
+    Wall,
+};
 use glam::{DMat3, DVec3};
 use serde::Serialize;
 
@@ -23,8 +26,19 @@ const CHECKPOINT: f64 = 120.0;
 const ROW: f64 = 700.0;
 const ROW_OF_SOLID: f64 = 400.0;
 
+/// What a series of frames will take on disk.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct SeriesEstimate {
+    /// Name.
+    pub name: String,
+    /// Frames.
+    pub frames: f64,
+    /// Bytes of a frame.
+    pub frame_bytes: f64,
+}
+
 /// What a case will take.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Estimate {
     /// Particles of water.
     pub water: f64,
@@ -40,6 +54,9 @@ pub struct Estimate {
     pub frames: f64,
     /// Bytes of a frame.
     pub frame_bytes: f64,
+    /// Those of each `[[output.series]]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub series: Vec<SeriesEstimate>,
     /// Bytes of a row of all tables.
     pub row_bytes: f64,
     /// Bytes of the tables.
@@ -76,6 +93,23 @@ impl Bounds {
         for row in if rows.is_empty() { &still } else { rows } {
             let at = |x: Vector| [x[0] + row[1], x[1] + row[2], x[2] + row[3]];
             self.add(at(lo), at(hi));
+        }
+    }
+    /// A solid about `center`, wherever tables and formulas take it, or a wave that it makes by strokes along a direction.
+    fn add_guided(
+        &mut self,
+        (lo, hi): (Vector, Vector),
+        guide: &Guide,
+        wave: Option<(Vector, [f64; 2])>,
+        center: Vector,
+    ) {
+        let pivot = guide.turns().then_some(guide.pivot.unwrap_or(center));
+        self.add_moving(lo, hi, guide.motion.unwrap_or_default(), pivot);
+        let sine = guide.sine.map(|s| (s.axis, s.formula().reach()));
+        for (axis, reach) in sine.into_iter().chain(wave) {
+            let unit = length(&axis).recip();
+            let row = |way: f64| [0.0, way * unit * axis[0], way * unit * axis[1], way * unit * axis[2]];
+            self.add_moving(lo, hi, &reach.map(row), pivot);
         }
     }
     fn size(&self, k: usize) -> f64 {
@@ -193,23 +227,14 @@ impl Estimate {
         domain.add(lattice.lo, lattice.hi);
         for (w, (lo, hi, _)) in case.moving_wall.iter().zip(&walls[case.obstacle.len()..]) {
             let center = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
-            let turns = !w.rotation.is_empty() || w.swing.is_some();
-            let pivot = turns.then_some(w.pivot.unwrap_or(center));
-            domain.add_moving(*lo, *hi, &w.motion, pivot);
-            let sine = w.sine.as_ref().map(|s| (s.axis, s.formula().reach()));
             let wave =
                 w.wave.as_ref().zip(w.wave(case)).map(|(k, wave)| (k.direction(), wave.formula.reach()));
-            for (axis, reach) in sine.into_iter().chain(wave) {
-                let unit = length(&axis).recip();
-                let row = |way: f64| [0.0, way * unit * axis[0], way * unit * axis[1], way * unit * axis[2]];
-                domain.add_moving(*lo, *hi, &reach.map(row), pivot);
-            }
+            domain.add_guided((*lo, *hi), &w.guide(), wave, center);
         }
         for body in &case.body {
             let half = 0.5 * length(&extent(body));
-            let (lo, hi) = (body.center.map(|x| x - half), body.center.map(|x| x + half));
-            let pivot = (!body.rotation.is_empty()).then_some(body.pivot.unwrap_or(body.center));
-            domain.add_moving(lo, hi, body.motion.as_deref().unwrap_or_default(), pivot);
+            let edges = (body.center.map(|x| x - half), body.center.map(|x| x + half));
+            domain.add_guided(edges, &body.guide(), None, body.center);
         }
         for plane in &case.plane {
             let half = 0.5 * plane.size[0].hypot(if flat { 0.0 } else { plane.size[1] });
@@ -230,12 +255,23 @@ impl Estimate {
         let base = PROGRAM + particles * PARTICLE + searched * SEARCH_CELL + ground;
 
         let output = &case.output;
-        let frames = if output.every > 0.0 { (run.end / output.every).floor() + 2.0 } else { 0.0 };
-        let shown = |kind| if output.kinds.contains(&kind) { 1.0 } else { 0.0 };
+        let frames = |every: f64| if every > 0.0 { (run.end / every).floor() + 2.0 } else { 0.0 };
         let bodies: f64 = case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum();
         let each = if output.encoding == Encoding::Raw { FRAME_RAW } else { FRAME_BASE64 };
         let told = |fields: &[OutputField]| POINT + fields.iter().map(|f| f.bytes()).sum::<usize>() as f64;
-        let each = each * told(&output.fields) / told(&OutputField::ALL);
+        // No region holds more water than fits into it.
+        let room = |region: &OutputRegion| cells(&|k| span(&region.min, &region.max, k));
+        let frame = |choice: Choice<'_>| {
+            let shown = |kind| if choice.has(kind) { 1.0 } else { 0.0 };
+            let water = choice.region.as_ref().map_or(water, |region| water.min(room(region)));
+            let told = each * told(choice.fields) / told(&OutputField::ALL);
+            told * (water * shown(OutputKind::Fluid) + bodies * shown(OutputKind::Body))
+        };
+        let series = |named: &Series| SeriesEstimate {
+            name: named.name.clone(),
+            frames: frames(named.every),
+            frame_bytes: frame(named.choice()),
+        };
         let moving = (case.body.len() + case.moving_wall.len()) as f64;
         let rows = run.end / output.table_every.unwrap_or(run.time_step).max(run.time_step);
         let saves = run.checkpoint.wall > 0.0 || run.checkpoint.every.is_some();
@@ -245,8 +281,9 @@ impl Estimate {
             cells: searched,
             memory_cpu: base + water * WATER,
             memory_beside_device: base + water * WATER_ON_DEVICE,
-            frames,
-            frame_bytes: each * (water * shown(OutputKind::Fluid) + bodies * shown(OutputKind::Body)),
+            frames: frames(output.every),
+            frame_bytes: frame(output.choice()),
+            series: output.series.iter().map(series).collect(),
             row_bytes: ROW + moving * ROW_OF_SOLID,
             table_bytes: rows * (ROW + moving * ROW_OF_SOLID),
             checkpoint_bytes: if saves { 3.0 * CHECKPOINT * particles } else { 0.0 },
@@ -257,13 +294,19 @@ impl Estimate {
     pub fn at_most(self, steps: Option<u64>) -> Self {
         let Some(steps) = steps.map(|n| n as f64) else { return self };
         let frames = self.frames.min(steps + 2.0);
+        let fewer = |named: &SeriesEstimate| SeriesEstimate {
+            frames: named.frames.min(steps + 2.0),
+            ..named.clone()
+        };
+        let series = self.series.iter().map(fewer).collect();
         let table_bytes = self.table_bytes.min(steps * self.row_bytes);
-        Self { frames, table_bytes, ..self }
+        Self { frames, series, table_bytes, ..self }
     }
 
     /// All bytes that will be written and kept.
     pub fn disk(&self) -> f64 {
-        self.frames * self.frame_bytes + self.table_bytes + self.checkpoint_bytes
+        let series: f64 = self.series.iter().map(|s| s.frames * s.frame_bytes).sum();
+        self.frames * self.frame_bytes + series + self.table_bytes + self.checkpoint_bytes
     }
 }
 

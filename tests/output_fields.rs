@@ -121,3 +121,111 @@ fn what_is_wrong_with_the_choice_names_what_is_allowed() {
     assert!(err.contains("outside of the tank along x") && err.contains("0 to 2 m"), "{err}");
     assert!(wrong("output.region={min=[0,0,0]}").contains("missing field `max`"));
 }
+
+const SERIES: &str = "output.series=[{name=\"corner\",every=0.005,kinds=[\"fluid\"],fields=[\"velocity\"],region={min=[0,0,0],\
+                      max=[0.2,0,0.2]}},{name=\"gate\",every=0.01,kinds=[\"body\"],fields=[\"velocity\"]}]";
+
+#[test]
+fn series_are_frames_of_their_own_choice_and_interval() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = run(folder.path(), "plain", &[]);
+    let root = run(folder.path(), "series", &["--set", SERIES]);
+    assert!(!plain.join("series").exists());
+    // Those of the case itself are what they are without.
+    for (a, b) in frames(&plain, "small").unwrap().iter().zip(frames(&root, "small").unwrap()) {
+        let bytes = |path: &Option<PathBuf>| std::fs::read(path.as_ref().unwrap()).unwrap();
+        assert!(bytes(&a.fluid) == bytes(&b.fluid) && bytes(&a.solids) == bytes(&b.solids));
+    }
+    let list = |name: &str| frames(&root.join("series").join(name), name).unwrap();
+    let (corner, gate) = (list("corner"), list("gate"));
+    // 0, then every 5 or 10 ms to 50 ms.
+    let near = |times: Vec<f64>, every: f64| {
+        times.iter().enumerate().all(|(k, t)| (t - every * k as f64).abs() < 1.1e-3)
+    };
+    assert_eq!((corner.len(), gate.len()), (11, 6));
+    assert!(near(corner.iter().map(|f| f.time).collect(), 0.005));
+    assert!(near(gate.iter().map(|f| f.time).collect(), 0.01));
+    let result: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(root.join("result.json")).unwrap()).unwrap();
+    let counts = [&result["frames"], &result["series"]["corner"], &result["series"]["gate"]];
+    assert_eq!(counts.map(|n| n.as_u64()), [Some(4), Some(11), Some(6)]);
+    let shown = particles(corner[10].fluid.as_ref().unwrap()).unwrap();
+    let whole = particles(&last(&root).0).unwrap();
+    let inside = |x: &&[f32; 3]| x[0] >= 0.0 && x[0] <= 0.2 && (0.0..=0.2).contains(&x[2]);
+    let expected: Vec<[f32; 3]> = whole.position.iter().filter(inside).copied().collect();
+    assert!(shown.position == expected && expected.len() > 10, "{} {}", shown.len(), expected.len());
+    assert!(corner[10].solids.is_none() && shown.pressure.is_empty() && !shown.velocity.is_empty());
+    let (there, here) = (gate[5].solids.as_ref().unwrap(), last(&root).1);
+    assert_eq!(particles(there).unwrap().position, particles(&here).unwrap().position);
+    assert!(gate[5].fluid.is_none() && !root.join("series/gate/vtu/walls.vtu").exists());
+
+    // What reads frames takes a name.
+    let dir = root.display().to_string();
+    let drawn = ran(&["render", &dir, "--series", "corner", "--times", "0.05", "-q", "--size", "160x80"]);
+    assert_eq!((drawn.code, drawn.err.as_str()), (0, ""));
+    assert!(root.join("series/corner/pictures/frame_0010.png").exists());
+    let rows = ran(&["measure", &dir, "--series", "corner", "--point", "0.1,0,0.1"]);
+    assert_eq!((rows.code, rows.out.lines().count()), (0, 12));
+    assert!(rows.err.contains("note: no pressure"), "{}", rows.err);
+    let wrong = ran(&["measure", &dir, "--series", "gat", "--point", "0.1,0,0.1"]);
+    assert!(wrong.code == 2 && wrong.err.contains("no output.series called `gat`; there are: corner, gate"));
+    let wrong = ran(&["surface", &plain.display().to_string(), "--series", "x"]);
+    assert!(wrong.code == 2 && wrong.err.contains("there are: none"), "{}", wrong.err);
+
+    // Results that take their place leave none of them, and of a stranger's file its folder.
+    std::fs::write(root.join("series/gate/notes.txt"), "mine").unwrap();
+    run(folder.path(), "series", &["--force"]);
+    assert!(!root.join("series/corner/vtu").exists() && !root.join("series/gate/gate.pvd").exists());
+    assert!(root.join("series/gate/notes.txt").exists());
+}
+
+#[test]
+fn series_count_on_the_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let plan = |set: &str| {
+        let told = ran(&["plan", &case, "--json", "--set", set]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        serde_json::from_str::<serde_json::Value>(&told.out).unwrap()["estimate"].clone()
+    };
+    let (few, many) = (plan("output.every=0"), plan(SERIES));
+    assert!(few["series"].is_null());
+    // 16 of 100 particles, 33 of 50 bytes, by what all of them take.
+    let all = many["frame_bytes"].as_f64().unwrap();
+    let corner = &many["series"][0];
+    assert_eq!((&corner["name"], &corner["frames"]), (&"corner".into(), &12.0.into()));
+    assert!((corner["frame_bytes"].as_f64().unwrap() / all - 0.16 * 33.0 / 50.0).abs() < 1e-9, "{many}");
+    let told = ran(&["plan", &case, "--set", SERIES]);
+    assert!(told.out.contains("series `corner`: 12 frames of"), "{}", told.out);
+    let far = SERIES.replace("every=0.01", "every=1e-14").replace("\"body\"", "\"fluid\"");
+    let out = folder.path().join("far").display().to_string();
+    let refused = ran(&["run", &case, "-o", &out, "--backend", "cpu", "-q", "--set", &far]);
+    assert!(
+        refused.code == 2 && refused.err.contains("raise output.every (or that of a series)"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_series_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let text = std::fs::read_to_string(&case).unwrap();
+    for (rows, what) in [
+        ("name = \"../up\"\nevery = 0.1", "`../up` is the name of a folder"),
+        ("name = \"a\"\nevery = 0.0", "0 is out of range"),
+        ("name = \"a\"", "missing field `every`"),
+        ("name = \"a\"\nevery = 0.1\nkinds = []", "would hold nothing"),
+        ("name = \"a\"\nevery = 0.1\nfields = [\"id\", \"id\"]", "named twice"),
+        ("name = \"a\"\nevery = 0.1\n[[output.series]]\nname = \"A\"\nevery = 1.0", "two series are called"),
+        ("name = \"a\"\nevery = 0.1\nregion = {min=[3,0,0],max=[4,0,1]}", "outside of the tank along x"),
+        ("name = \"a\"\nevery = 0.1\nencoding = \"raw\"", "encoding"),
+    ] {
+        std::fs::write(&case, format!("{text}\n[[output.series]]\n{rows}\n")).unwrap();
+        let told = ran(&["plan", &case]);
+        assert!(told.code == 2 && told.err.contains(what), "{rows}: {}{}", told.out, told.err);
+        // The line in question.
+        assert!(told.err.contains("small.toml:"), "{}", told.err);
+    }
+}

@@ -18,8 +18,13 @@ const BODIES: [&str; 4] = [
 /// Everything that a run wrote and that does not tell times by the clock.
 pub(crate) fn results(root: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
-    for folder in [root.to_path_buf(), root.join("vtu")] {
-        for entry in std::fs::read_dir(folder).unwrap() {
+    let mut folders = vec![root.to_path_buf(), root.join("vtu")];
+    for series in std::fs::read_dir(root.join("series")).into_iter().flatten() {
+        let series = series.unwrap().path();
+        folders.extend([series.join("vtu"), series]);
+    }
+    for folder in folders {
+        for entry in std::fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             if !path.is_file() || name.starts_with('.') || name == "result.json" {
@@ -35,7 +40,7 @@ pub(crate) fn results(root: &Path) -> BTreeMap<String, Vec<u8>> {
                 };
                 bytes = text.lines().map(kept).collect::<Vec<_>>().join("\n").into_bytes();
             }
-            found.insert(name, bytes);
+            found.insert(folder.strip_prefix(root).unwrap().join(name).display().to_string(), bytes);
         }
     }
     found
@@ -130,6 +135,12 @@ fn a_run_in_parts_is_the_run_to_the_last_bit() {
         ),
         ("multigrid", more(&["fluid.solver.preconditioner=multigrid"])),
         ("periodic sides", vec!["tank.periodic=[\"x\"]", "run.gravity=[2, 0, -9.81]", "output.ledger=true"]),
+        (
+            "series of frames",
+            more(&[
+                "output.series=[{name=\"a\",every=0.003,fields=[]},{name=\"b\",every=1e-9,kinds=[\"body\"]}]",
+            ]),
+        ),
         ("tables now and then", more(&["output.table_every=0.007", "gauge.every=0.011"])),
     ] {
         let sets: Vec<&str> = match what {

@@ -215,3 +215,71 @@ fn a_solitary_wave_has_its_speed_and_does_not_come_back_from_an_absorber() {
     println!("come back: {:.4} m from the wall, {:.4} m from the absorber", back[0], back[1]);
     assert!(back[0] > 0.025 && back[1] < 0.009, "{back:?}");
 }
+
+/// The same keys, the same way: a body and a wall of one shape at one place. A body that follows a sine in a run is where it says.
+#[test]
+fn a_body_follows_formulas_as_a_wall_does() {
+    let keys = "sine = { axis = [1, 0, 2], amplitude = 0.02, period = 0.3, phase_deg = 30, ramp = 0.2 }\n\
+                swing = { axis = [0, 1, 0], amplitude_deg = 20, period = 0.25 }\npivot = [0.4, 0.0, 0.5]\n";
+    let case = |table: &str, keys: &str| {
+        format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.2\ndimensions = 2\n[tank]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\n\
+             open = [\"z_max\"]\n[{table}]\nname = \"vane\"\nsize = [0.2, 0.1, 0.06]\ncenter = [0.5, 0, 0.5]\n{keys}[output]\nevery = 0\n"
+        )
+    };
+    let of = |table: &str, keys: &str| -> Motion {
+        let scene = Scene::build(&toml::from_str(&case(table, keys)).expect("a case")).expect("a scene");
+        match &scene.solids[0].drive {
+            Drive::Prescribed(motion) => motion.clone(),
+            Drive::Free(_) => panic!("{table} follows a formula"),
+        }
+    };
+    let (wall, body) = (of("[moving_wall]", keys), of("[body]", keys));
+    assert_eq!(wall, body);
+    assert!(body.turns() && body.displacement(0.11).length() > 5e-3);
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("vane.toml");
+    std::fs::write(&path, case("[body]", keys)).unwrap();
+    let (path, out) = (path.display().to_string(), folder.path().join("out").display().to_string());
+    let done = ran(&["run", &path, "-o", &out, "--backend", "cpu", "--threads", "1", "-q"]);
+    assert_eq!(done.code, 0, "{}", done.err);
+    let table = std::fs::read_to_string(folder.path().join("out/bodies.csv")).unwrap();
+    let mut way: f64 = 0.0;
+    for line in table.lines().skip(1) {
+        let cells: Vec<f64> = line.split(',').map(|c| c.parse().unwrap_or(f64::NAN)).collect();
+        let place = DVec3::new(cells[2], cells[3], cells[4]) - DVec3::new(0.5, 0.0, 0.5);
+        let expected = body.displacement(cells[0]);
+        assert!((place - expected).length() < 1e-9, "{line}: {expected}");
+        assert!((body.turn(cells[0]).w - cells[5]).abs() < 1e-9, "{line}");
+        way = way.max(place.length());
+    }
+    assert!(way > 0.02 && table.lines().count() > 190, "{way}");
+
+    for (keys, what) in [
+        (
+            "sine = { axis = [0, 0, 0], amplitude = 0.1, period = 1 }",
+            "body.0.sine.axis: the axis has no length",
+        ),
+        ("sine = { axis = [1, 0, 0], amplitude = 900, period = 1 }", "particles in a time step"),
+        ("swing = { axis = [1, 0, 0], amplitude_deg = 5, period = 1 }", "about y alone"),
+        (
+            "motion = [[0, 0, 0, 0]]\nsine = { axis = [1, 0, 0], amplitude = 0.1, period = 1 }",
+            "exclude each other",
+        ),
+        (
+            "pivot = [0, 0, 0]\nsine = { axis = [1, 0, 0], amplitude = 0.1, period = 1 }",
+            "nothing turns about it",
+        ),
+        (
+            "sine = { axis = [1, 0, 0], amplitude = 0.1, period = 1 }\nvelocity = [1, 0, 0]",
+            "follows a given motion",
+        ),
+        ("wave = { kind = \"regular\", height = 0.08, period = 1.5 }", "unknown field `wave`"),
+    ] {
+        std::fs::write(&path, case("[body]", &format!("{keys}\n"))).unwrap();
+        let told = ran(&["plan", &path]);
+        assert!(told.code == 2 && told.err.contains(what), "{keys}: {}{}", told.out, told.err);
+        assert!(told.err.contains("vane.toml:"), "{}", told.err);
+    }
+}

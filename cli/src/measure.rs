@@ -1,11 +1,11 @@
 //! `seixo measure`: velocity and pressure at points of one's choice, from the frames that a run has written.
 
-use super::render::{chosen, frames_of, numbers};
+use super::render::{chosen, numbers, series_of, unseen};
 use super::{Exit, finite};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use seixo::case::OutputField;
-use seixo::case::file::{load, read_text};
+use seixo::case::file::read_text;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
 use seixo::output::particles::Particles;
@@ -29,6 +29,9 @@ pub struct MeasureArgs {
     /// A CSV file of points: x, y, z [m], a line each.
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
+    /// Frames of this `[[output.series]]` of the case.
+    #[arg(long, value_name = "NAME")]
+    series: Option<String>,
     /// Every so many frames one.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -66,9 +69,7 @@ const HEADER: [&str; 8] = [
 pub fn measure(args: &MeasureArgs) -> Exit {
     seixo::threads::start(None)?;
     let points = points(args)?;
-    let case = load(&args.dir.join("case.toml"), None, &[]);
-    let frames = frames_of(&args.dir)?;
-    let case = case?.case;
+    let (case, frames) = series_of(&args.dir, args.series.as_deref())?;
     let held = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
     if held == [false; 2] {
         let text = format!(
@@ -77,13 +78,16 @@ pub fn measure(args: &MeasureArgs) -> Exit {
         );
         return Err(Error::usage("DIR", text));
     }
-    let run = case.run;
+    let run = &case.run;
     let probe =
         Probe { spacing: run.spacing, radius: run.effective_radius * run.spacing, flat: run.dimensions == 2 };
     let chosen = chosen(&frames, &args.times, args.every);
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
-        let text =
-            format!("{} holds no frames with water: `output.every`, `output.kinds`", args.dir.display());
+        let text = format!(
+            "{} holds no frames with water: {}",
+            args.dir.display(),
+            unseen(&case, args.series.as_deref())
+        );
         return Err(Error::usage("DIR", text));
     }
     let mut table = csv::Writer::from_writer(Vec::new());

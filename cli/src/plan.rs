@@ -425,6 +425,9 @@ fn words(report: &Report) -> String {
             bytes(e.disk())
         ),
     ]);
+    lines.extend(e.series.iter().map(|s| {
+        format!("    of them series `{}`: {:.0} frames of {}", s.name, s.frames, bytes(s.frame_bytes))
+    }));
     if !report.advice.is_empty() {
         lines.extend([String::new(), "advice".to_string()]);
         lines.extend(report.advice.iter().map(|a| format!("  {a}")));

@@ -8,7 +8,7 @@ use seixo::case::Case;
 use seixo::case::file::load;
 use seixo::console::{remark, say};
 use seixo::error::{Error, FolderError, Result};
-use seixo::output::folder::case_name;
+use seixo::output::folder::{case_name, series_in};
 use seixo::output::label::{Picture, animation, sheet};
 use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
@@ -25,6 +25,9 @@ pub struct RenderArgs {
     /// Folder of the pictures [default: DIR/pictures].
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Frames of this `[[output.series]]` of the case.
+    #[arg(long, value_name = "NAME")]
+    series: Option<String>,
     #[command(flatten)]
     look: LookArgs,
     /// Every so many frames one.
@@ -213,15 +216,14 @@ pub struct Show {
 }
 
 impl Show {
-    /// The run in `root`, of which `frames` are shown, seen as `look` says.
+    /// The run of `case`, of which `frames` are shown, seen as `look` says.
     ///
     /// # Errors
     /// A folder without a run, a case or a frame that cannot be read any more.
-    pub fn open(root: &Path, look: &LookArgs, frames: &[&Frame]) -> Result<Self> {
-        let case = load(&root.join("case.toml"), None, &[])?.case;
-        let scene = Scene::build(&case)?;
-        let params = Params::new(&case, &scene)?;
-        let mut style = look.style(&case)?;
+    pub fn open(case: &Case, look: &LookArgs, frames: &[&Frame]) -> Result<Self> {
+        let scene = Scene::build(case)?;
+        let params = Params::new(case, &scene)?;
+        let mut style = look.style(case)?;
         if style.range.is_none() {
             style.range = range_of(frames, &style, &params)?;
         }
@@ -265,6 +267,50 @@ pub fn frames_of(root: &Path) -> Result<Vec<Frame>> {
     frames(root, &name)
 }
 
+/// Where the frames of `[output]`, or of a series, of the run in `root` lie.
+pub fn place(root: &Path, series: Option<&str>) -> PathBuf {
+    series.map_or_else(|| root.to_path_buf(), |name| series_in(root, name))
+}
+
+/// The case of the run in `root`, and the frames of its `[output]`; with `series` those of that one, and what it chose stands in the case as
+/// the choice of `[output]`.
+///
+/// # Errors
+/// As [`frames_of`]; [`Error::Usage`] if the case has no such series.
+pub fn series_of(root: &Path, series: Option<&str>) -> Result<(Case, Vec<Frame>)> {
+    let Some(name) = series else {
+        let frames = frames_of(root)?;
+        return Ok((load(&root.join("case.toml"), None, &[])?.case, frames));
+    };
+    if case_name(root)?.is_none() {
+        return Err(FolderError::NoRun(root.to_path_buf()).into());
+    }
+    let mut case = load(&root.join("case.toml"), None, &[])?.case;
+    let Some(named) = case.output.series.iter().find(|s| s.name == name).cloned() else {
+        let names: Vec<&str> = case.output.series.iter().map(|s| s.name.as_str()).collect();
+        let there = if names.is_empty() { "none".into() } else { names.join(", ") };
+        let text = format!(
+            "the case of {} has no output.series called `{name}`; there are: {there}",
+            root.display()
+        );
+        return Err(Error::usage("--series", text));
+    };
+    let output = &mut case.output;
+    (output.every, output.kinds, output.fields, output.region) =
+        (named.every, named.kinds, named.fields, named.region);
+    let frames = frames(&series_in(root, name), name)?;
+    Ok((case, frames))
+}
+
+/// Why there are no frames of the water, or none at all.
+pub fn unseen(case: &Case, series: Option<&str>) -> String {
+    let others = case.output.series.first().filter(|_| series.is_none());
+    let others = others.map_or(String::new(), |s| format!("; its series has its own: --series {}", s.name));
+    let why =
+        if case.output.every > 0.0 { "output.kinds leaves it out" } else { "the case has output.every = 0" };
+    format!("{why}{others}")
+}
+
 /// The frames nearest to each of `times`, or every `every`th, with their numbers.
 pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     let nearest = |t: &f64| {
@@ -281,14 +327,16 @@ pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
 
 pub fn render(args: &RenderArgs) -> Exit {
     seixo::threads::start(None)?;
-    let chosen = chosen(&frames_of(&args.dir)?, &args.times, args.every);
+    let series = args.series.as_deref();
+    let (case, frames) = series_of(&args.dir, series)?;
+    let chosen = chosen(&frames, &args.times, args.every);
     if chosen.is_empty() {
-        let text = format!("{} holds no frames: the case has output.every = 0", args.dir.display());
+        let text = format!("{} holds no frames: {}", args.dir.display(), unseen(&case, series));
         return Err(Error::usage("DIR", text));
     }
     let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
-    let show = Show::open(&args.dir, &args.look, &seen)?;
-    let out = args.out.clone().unwrap_or_else(|| args.dir.join("pictures"));
+    let show = Show::open(&case, &args.look, &seen)?;
+    let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("pictures"));
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let joined = args.sheet.is_some() || args.animation.is_some();
     let one = |(number, frame): &(usize, Frame)| -> Result<Option<Picture>> {

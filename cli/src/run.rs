@@ -129,12 +129,13 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool) -> Result<()>
     let free = machine::disk(&asked.out).map_or(f64::INFINITY, |n| n as f64);
     if estimate.disk() > free && !args.force_disk && !resumes {
         let text = format!(
-            "{}: the results take about {}, {} are free on the disk of {}: raise output.every, output.table_every or \
+            "{}: the results take about {}, {} are free on the disk of {}: raise output.every{}, output.table_every or \
              run.spacing, or run all the same with --force-disk",
             asked.name,
             bytes(estimate.disk()),
             bytes(free),
-            asked.out.display()
+            asked.out.display(),
+            if estimate.series.is_empty() { "" } else { " (or that of a series)" }
         );
         return Err(Error::usage("--force-disk", text));
     }

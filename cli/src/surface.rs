@@ -1,10 +1,9 @@
 //! `seixo surface`: the surface of the water as meshes, from the frames that a run has written.
 
-use super::render::{chosen, frames_of};
+use super::render::{chosen, place, series_of, unseen};
 use super::{Exit, finite};
 use clap::ValueEnum;
 use rayon::prelude::*;
-use seixo::case::file::load;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
 use seixo::output::replay::{Frame, particles};
@@ -19,6 +18,9 @@ pub struct SurfaceArgs {
     /// Folder for the meshes [default: DIR/surface].
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Frames of this `[[output.series]]` of the case.
+    #[arg(long, value_name = "NAME")]
+    series: Option<String>,
     /// Every so many frames one.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -52,19 +54,19 @@ fn edge(text: &str) -> std::result::Result<f64, String> {
 
 pub fn write(args: &SurfaceArgs) -> Exit {
     seixo::threads::start(None)?;
-    let frames = frames_of(&args.dir)?;
-    let run = load(&args.dir.join("case.toml"), None, &[])?.case.run;
+    let series = args.series.as_deref();
+    let (case, frames) = series_of(&args.dir, series)?;
+    let run = &case.run;
     if run.dimensions == 2 {
         let text = "the water of a case in two dimensions has no surface to make a mesh of; draw it with `seixo render`";
         return Err(Error::usage("DIR", text));
     }
     let chosen = chosen(&frames, &args.times, args.every);
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
-        let text =
-            format!("{} holds no frames with water: `output.every`, `output.kinds`", args.dir.display());
+        let text = format!("{} holds no frames with water: {}", args.dir.display(), unseen(&case, series));
         return Err(Error::usage("DIR", text));
     }
-    let out = args.out.clone().unwrap_or_else(|| args.dir.join("surface"));
+    let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("surface"));
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let one = |(number, frame): &(usize, Frame)| -> Result<usize> {
         let Some(path) = &frame.fluid else { return Ok(0) };

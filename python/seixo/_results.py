@@ -144,6 +144,12 @@ class Particles:
     def __init__(self, path: Path) -> None:
         #: The file.
         self.path = path
+    @functools.cached_property
+    def series(self) -> dict[str, Frames]:
+        """The frames of each `[[output.series]]` of the case, by its name."""
+        names = [named["name"] for named in self.case.get("output", {}).get("series", [])]
+        return {name: Frames(_frames(self.path / "series" / name)) for name in names}
+
 
     def __len__(self) -> int:
         return len(self.position)

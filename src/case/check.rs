@@ -2,7 +2,7 @@
 //!
 //! Everything is listed at once; `file` adds line and column from the dotted path of each problem.
 
-use super::{Case, Face, Gauges, Vector};
+use super::{Case, Choice, Face, Gauges, Vector};
 use crate::error::{CaseError, Problem, Result};
 use crate::lattice::Lattice;
 
@@ -331,12 +331,38 @@ impl Checker<'_> {
         if let Some(every) = output.table_every {
             self.positive("output.table_every", every, "s");
         }
-        let fields = &output.fields;
-        if let Some(k) = (1..fields.len()).find(|&k| fields[..k].contains(&fields[k])) {
-            self.add(format!("output.fields.{k}"), "a field is named twice", "name each field once");
+        self.frames("output", output.choice());
+        for (k, series) in output.series.iter().enumerate() {
+            let path = format!("output.series.{k}");
+            let allowed = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
+            if series.name.is_empty() || series.name.chars().count() > 80 || !series.name.chars().all(allowed)
+            {
+                let message = format!("`{}` is the name of a folder", series.name);
+                self.add(format!("{path}.name"), message, "write 1 to 80 letters, digits, `-` or `_`");
+            }
+            // There are systems to which a and A are the same.
+            let lower = series.name.to_lowercase();
+            if output.series[..k].iter().any(|other| other.name.to_lowercase() == lower) {
+                let message = format!("two series are called `{}`", series.name);
+                self.add(format!("{path}.name"), message, "give each a name of its own");
+            }
+            self.positive(&format!("{path}.every"), series.every, "s");
+            if series.kinds.is_empty() {
+                let message = "no kind of particle is asked for: the series would hold nothing";
+                self.add(format!("{path}.kinds"), message, "name some, or leave out the series");
+            }
+            self.frames(&path, series.choice());
         }
-        let Some(region) = output.region else { return };
-        if !self.box_edges("output.region", "output.region.max", &region.min, &region.max) {
+    }
+
+    /// Fields and region of a series of frames, whose keys begin with `path`.
+    fn frames(&mut self, path: &str, Choice { fields, region, .. }: Choice<'_>) {
+        if let Some(k) = (1..fields.len()).find(|&k| fields[..k].contains(&fields[k])) {
+            self.add(format!("{path}.fields.{k}"), "a field is named twice", "name each field once");
+        }
+        let Some(region) = region else { return };
+        let key = format!("{path}.region");
+        if !self.box_edges(&key, &format!("{key}.max"), &region.min, &region.max) {
             return;
         }
         let Some(tank) = &self.case.tank else { return };
@@ -344,8 +370,8 @@ impl Checker<'_> {
         if let Some(k) = self.axes().find(apart) {
             let axis = ["x", "y", "z"][k];
             self.add(
-                "output.region",
-                format!("output.region lies outside of the tank along {axis}: its frames would hold nothing"),
+                key,
+                format!("{path}.region lies outside of the tank along {axis}: its frames would hold nothing"),
                 format!("let it reach into {} to {} m", tank.min[k], tank.max[k]),
             );
         }

@@ -174,7 +174,7 @@ impl Checker<'_> {
                     "make it an [[obstacle]], or set shape = \"mesh\"",
                 );
             }
-            self.guided(&path, w);
+            self.wall_guided(&path, w);
         }
         for (k, plane) in case.plane.iter().enumerate() {
             self.plane(&format!("plane.{k}"), plane);

@@ -1,7 +1,7 @@
 //! The part of the check that judges motion: tables, formulas, and waves against what theory and resolution allow.
 
 use super::check::{Checker, length};
-use super::{MovingWall, Vector};
+use super::{Guide, MovingWall, Vector};
 use crate::waves::{MCCOWAN, SECOND_ORDER, WaveKind, miche};
 
 /// Shortest wave over the spacing that a piston is asked for [-].
@@ -21,40 +21,48 @@ fn at_start(rows: &[[f64; 4]]) -> Vector {
 
 impl Checker<'_> {
     /// What moves a wall: at most one thing that shifts it and one that turns it, at least one of both.
-    pub(super) fn guided(&mut self, path: &str, w: &MovingWall) {
-        let key = |key: &str| format!("{path}.{key}");
-        let shifts =
-            [("motion", !w.motion.is_empty()), ("sine", w.sine.is_some()), ("wave", w.wave.is_some())];
-        let turns = [("rotation", !w.rotation.is_empty()), ("swing", w.swing.is_some())];
-        let shifted = self.one_of(path, &shifts) > 0;
-        let turned = self.one_of(path, &turns) > 0;
-        if !w.motion.is_empty() || !shifted && !turned {
-            self.motion(&key("motion"), &w.motion);
+    pub(super) fn wall_guided(&mut self, path: &str, w: &MovingWall) {
+        let guide = w.guide();
+        if guide.motion.is_none() && guide.sine.is_none() && w.wave.is_none() && !guide.turns() {
+            self.motion(&format!("{path}.motion"), &[]);
         }
-        let (reach, middle) = w.reach_and_middle();
-        let pivot = w.pivot.filter(|_| w.swing.is_none());
-        self.rotation(path, &w.rotation, (pivot, middle), reach);
-        if let Some(sine) = &w.sine {
+        self.guided(path, &guide, w.wave.is_some(), w.reach_and_middle());
+        self.wave(&format!("{path}.wave"), w);
+    }
+
+    /// What moves a solid that reaches so far [m] from its middle: at most one thing that shifts it, a `wave` or another, and one that
+    /// turns it.
+    pub(super) fn guided(&mut self, path: &str, guide: &Guide, wave: bool, (reach, middle): (f64, Vector)) {
+        let key = |key: &str| format!("{path}.{key}");
+        let shifts = [("motion", guide.motion.is_some()), ("sine", guide.sine.is_some()), ("wave", wave)];
+        let turns = [("rotation", !guide.rotation.is_empty()), ("swing", guide.swing.is_some())];
+        self.one_of(path, &shifts);
+        self.one_of(path, &turns);
+        if let Some(rows) = guide.motion {
+            self.motion(&key("motion"), rows);
+        }
+        let pivot = guide.pivot.filter(|_| guide.swing.is_none());
+        self.rotation(path, guide.rotation, (pivot, middle), reach);
+        if let Some(sine) = guide.sine {
             let times = [sine.period, sine.phase_deg, sine.ramp];
             if self.sine(&key("sine"), &sine.axis, times) && sine.amplitude.is_finite() {
                 self.steady(&key("sine"), sine.formula().fastest(0.0, f64::INFINITY));
             }
         }
-        if let Some(swing) = &w.swing {
+        if let Some(swing) = guide.swing {
             let times = [swing.period, swing.phase_deg, swing.ramp];
             if self.flat() && (swing.axis[0] != 0.0 || swing.axis[2] != 0.0) {
                 let message = "in two dimensions a solid turns about y alone";
                 self.add(key("swing.axis"), message, "set it to [0, 1, 0]");
             }
-            if let Some(pivot) = &w.pivot {
+            if let Some(pivot) = &guide.pivot {
                 self.place(&key("pivot"), pivot);
             }
             if self.sine(&key("swing"), &swing.axis, times) && swing.amplitude_deg.is_finite() {
-                let arm = w.pivot.map_or(0.0, |p| length(&[0, 1, 2].map(|k| p[k] - middle[k])));
+                let arm = guide.pivot.map_or(0.0, |p| length(&[0, 1, 2].map(|k| p[k] - middle[k])));
                 self.steady(&key("swing"), (arm + reach) * swing.formula().fastest(0.0, f64::INFINITY));
             }
         }
-        self.wave(&key("wave"), w);
     }
 
     /// Axis, period, phase and ramp of a sine; whether they make one.

@@ -53,18 +53,15 @@ impl Checker<'_> {
                 self.add(path(&format!("locked.{i}")), "listed twice", "remove one of them");
             }
         }
-        if let Some(rows) = &body.motion {
-            self.motion(&path("motion"), rows);
-        }
         let far = body.form().reach();
-        self.rotation(&format!("body.{k}"), &body.rotation, (body.pivot, body.center), far);
+        self.guided(&format!("body.{k}"), &body.guide(), false, (far, body.center));
         if body.is_driven() {
             for (key, given) in [("locked", !body.locked.is_empty()), ("standing", body.standing)] {
                 if given {
                     self.add(
                         path(key),
-                        format!("body `{}` follows a table: `{key}` has no effect", body.name),
-                        format!("remove `{key}`, or `motion` and `rotation`"),
+                        format!("body `{}` follows a given motion: `{key}` has no effect", body.name),
+                        format!("remove `{key}`, or what moves the body"),
                     );
                 }
             }
@@ -72,8 +69,8 @@ impl Checker<'_> {
                 if length(v) > 0.0 {
                     self.add(
                         path(key),
-                        format!("body `{}` follows a table: `{key}` has no effect", body.name),
-                        format!("remove `{key}`, or `motion` and `rotation`"),
+                        format!("body `{}` follows a given motion: `{key}` has no effect", body.name),
+                        format!("remove `{key}`, or what moves the body"),
                     );
                 }
             }

@@ -11,6 +11,7 @@ mod check_solids;
 pub mod file;
 mod motion_file;
 mod opening;
+mod output;
 mod overrides;
 mod report;
 mod shape;
@@ -21,9 +22,12 @@ mod wave;
 pub use absorber::Absorber;
 pub(crate) use opening::{HURRY, OpeningKeys};
 pub use opening::{Inflow, OUTFLOWS_MAX, Outflow, Rate};
+pub(crate) use output::Choice;
+pub use output::{Encoding, Output, OutputField, OutputKind, OutputRegion, Series};
 pub use shape::BodyShape;
 pub(crate) use shape::{Form, Place, Wall};
 pub use water::{Fill, WaterShape};
+pub(crate) use wave::Guide;
 pub use wave::{Sine, Swing, WaveMaker};
 
 use crate::scheme::{FreeSurface, Gradient, Source};
@@ -567,11 +571,15 @@ pub struct Body {
     /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table, as a moving wall does,
     /// instead of forces.
     pub motion: Option<Vec<[f64; 4]>>,
+    /// A sine along an axis, instead of `motion`: the body then follows it, as a moving wall does.
+    pub sine: Option<Sine>,
     /// Rows of time [s] and angles [degrees] about the axes x, y and z of the world, from the orientation at t = 0: the
     /// body then follows the table, as a moving wall does.
     #[serde(default)]
     pub rotation: Vec<[f64; 4]>,
-    /// What `rotation` turns about, at t = 0 [m]; it moves with `motion`. `center` if absent.
+    /// A turn by a sine, instead of `rotation`.
+    pub swing: Option<Swing>,
+    /// What `rotation` or `swing` turns about, at t = 0 [m]; it moves with `motion` or `sine`. `center` if absent.
     pub pivot: Option<Vector>,
     /// Remove the water that the body displaces at t = 0 (otherwise an overlap is an error).
     #[serde(default)]
@@ -703,111 +711,4 @@ pub struct ForceGauge {
     /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
     /// the centre of mass, or the middle of a fixed wall.
     pub on: String,
-}
-
-/// Which particles an output holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum OutputKind {
-    /// Fluid particles, every frame.
-    Fluid,
-    /// Particles of bodies and moving walls, every frame.
-    Body,
-    /// Fixed walls, once.
-    Wall,
-    /// Dummies of fixed walls, once.
-    Dummy,
-}
-
-/// A field of particles in a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum OutputField {
-    /// `Velocity` [m/s].
-    Velocity,
-    /// `Pressure` [Pa].
-    Pressure,
-    /// `ParticleNumberDensity` [-].
-    NumberDensity,
-    /// `Kind`: 0 fluid, 1 wall, 2 dummy, 3 body wall, 4 body dummy.
-    Kind,
-    /// `Body`: 0 none, then the solids in the order of bodies.csv.
-    Body,
-    /// `Id`, which stays with a particle.
-    Id,
-}
-
-impl OutputField {
-    /// All fields, in the order of a file.
-    pub const ALL: [Self; 6] =
-        [Self::Velocity, Self::Pressure, Self::NumberDensity, Self::Kind, Self::Body, Self::Id];
-
-    /// Bytes of a particle.
-    pub(crate) fn bytes(self) -> usize {
-        match self {
-            Self::Velocity => 12,
-            Self::Kind => 1,
-            Self::Pressure | Self::NumberDensity | Self::Body | Self::Id => 4,
-        }
-    }
-}
-
-/// A box of which frames are written.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct OutputRegion {
-    /// Its lower corner [m].
-    pub min: Vector,
-    /// Its upper corner [m].
-    pub max: Vector,
-}
-
-/// Encoding of VTU arrays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Encoding {
-    /// Appended base64, zlib: read by ParaView, meshio and splashsurf.
-    #[default]
-    Base64,
-    /// Appended raw: smallest and fastest, read by ParaView.
-    Raw,
-}
-
-/// Files to write.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Output {
-    /// Interval between frames [s]; 0 writes no frames.
-    #[schemars(range(min = 0))]
-    pub every: f64,
-    /// Which particles to write.
-    pub kinds: Vec<OutputKind>,
-    /// Fields of the particles to write beside their positions; all of them if absent. Files of bodies and moving walls hold `body` and
-    /// `id` in any case: their places are read from them.
-    #[schemars(transform = bounds::each_once)]
-    pub fields: Vec<OutputField>,
-    /// Write only the water and the fixed walls within this box; everywhere if absent. Bodies and moving walls are written whole.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub region: Option<OutputRegion>,
-    /// Encoding of the VTU files.
-    pub encoding: Encoding,
-    /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub table_every: Option<f64>,
-    /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.
-    pub ledger: bool,
-}
-
-impl Default for Output {
-    fn default() -> Self {
-        Self {
-            every: 0.05,
-            kinds: vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall],
-            fields: OutputField::ALL.to_vec(),
-            region: None,
-            encoding: Encoding::Base64,
-            table_every: None,
-            ledger: false,
-        }
-    }
 }

@@ -176,9 +176,10 @@ impl MovingWall {
 }
 
 impl Body {
-    /// Whether it follows a table instead of forces.
+    /// Whether it follows a table or a formula instead of forces.
     pub(crate) fn is_driven(&self) -> bool {
-        self.motion.is_some() || !self.rotation.is_empty()
+        let guide = self.guide();
+        guide.motion.is_some() || guide.sine.is_some() || guide.turns()
     }
 
     /// The keys that make its shape.

@@ -1,6 +1,6 @@
-//! Motion of a wall by formulas: sines, and the wave that a piston is to make.
+//! Motion of walls and bodies by formulas: sines, and the wave that a piston is to make.
 
-use super::{Case, Face, MovingWall, Vector};
+use super::{Body, Case, Face, MovingWall, Vector};
 use crate::waves::{Component, Formula, Profile, Wanted, Wave, WaveKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -73,6 +73,51 @@ pub struct WaveMaker {
     pub peak_enhancement: Option<f64>,
     /// Shape of a solitary wave; "boussinesq" if absent.
     pub profile: Option<Profile>,
+}
+
+/// What moves a solid on a given way, a wall or a body; a wall may make a wave besides.
+#[derive(Clone, Copy)]
+pub(crate) struct Guide<'a> {
+    /// Rows of time [s] and displacement [m].
+    pub motion: Option<&'a [[f64; 4]]>,
+    pub sine: Option<&'a Sine>,
+    /// Rows of time [s] and angles [degrees].
+    pub rotation: &'a [[f64; 4]],
+    pub swing: Option<&'a Swing>,
+    pub pivot: Option<Vector>,
+}
+
+impl Guide<'_> {
+    /// Whether it turns the solid.
+    pub fn turns(&self) -> bool {
+        !self.rotation.is_empty() || self.swing.is_some()
+    }
+}
+
+impl MovingWall {
+    /// What moves it, a wave left aside.
+    pub(crate) fn guide(&self) -> Guide<'_> {
+        Guide {
+            motion: Some(&self.motion[..]).filter(|rows| !rows.is_empty()),
+            sine: self.sine.as_ref(),
+            rotation: &self.rotation,
+            swing: self.swing.as_ref(),
+            pivot: self.pivot,
+        }
+    }
+}
+
+impl Body {
+    /// What moves it instead of forces.
+    pub(crate) fn guide(&self) -> Guide<'_> {
+        Guide {
+            motion: self.motion.as_deref(),
+            sine: self.sine.as_ref(),
+            rotation: &self.rotation,
+            swing: self.swing.as_ref(),
+            pivot: self.pivot,
+        }
+    }
 }
 
 fn sine(amplitude: f64, period: f64, phase_deg: f64, ramp: f64) -> Formula {

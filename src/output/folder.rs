@@ -35,6 +35,11 @@ pub fn checkpoints(root: &Path) -> PathBuf {
     root.join("checkpoint")
 }
 
+/// The folder of the frames of the series `name` (`[[output.series]]`) of a run in `root`: the list `name.pvd`, and `vtu/`.
+pub fn series_in(root: &Path, name: &str) -> PathBuf {
+    root.join("series").join(name)
+}
+
 /// Name of the case whose run `root` holds; nothing if it is no folder of seixo's.
 ///
 /// # Errors
@@ -181,11 +186,19 @@ impl Folder {
                 || file.starts_with(UNFINISHED)
         };
         self.remove(&self.vtu(), frame)?;
+        for (series, list) in self.series()? {
+            let vtu = series.join("vtu");
+            self.remove(&vtu, frame)?;
+            self.remove(&series, |file| file == list || file.starts_with(UNFINISHED))?;
+            for folder in [&vtu, &series] {
+                let _ = std::fs::remove_dir(folder);
+            }
+        }
         self.remove(&self.pictures(), |file| {
             numbered(file, "frame_", ".png") || file.starts_with(UNFINISHED)
         })?;
         self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(UNFINISHED))?;
-        for folder in [self.vtu(), self.pictures(), self.checkpoints()] {
+        for folder in [self.vtu(), self.pictures(), self.checkpoints(), self.root.join("series")] {
             // Somebody else's files keep their folder.
             let _ = std::fs::remove_dir(folder);
         }
@@ -195,8 +208,32 @@ impl Folder {
     /// Removes what a run that was killed had not written to the end. The lock says that nobody writes there; pictures
     /// may be drawn beside a run and are left alone.
     fn clear_unfinished(&self) -> Result<()> {
-        let folders = [self.root.clone(), self.vtu(), self.checkpoints()];
+        let mut folders = vec![self.root.clone(), self.vtu(), self.checkpoints()];
+        folders.extend(self.series()?.into_iter().flat_map(|(series, _)| [series.join("vtu"), series]));
         folders.iter().try_for_each(|folder| self.remove(folder, |file| file.starts_with(UNFINISHED)))
+    }
+
+    /// Folders of series, and the list of frames of each.
+    fn series(&self) -> Result<Vec<(PathBuf, String)>> {
+        let parent = self.root.join("series");
+        if parent.is_symlink() {
+            return Ok(Vec::new());
+        }
+        let entries = match std::fs::read_dir(&parent) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(e) => return Err(Error::io(&parent)(e)),
+        };
+        let mut found = Vec::new();
+        for entry in entries {
+            let entry = entry.map_err(Error::io(&parent))?;
+            if let (true, Ok(name)) =
+                (entry.file_type().is_ok_and(|t| t.is_dir()), entry.file_name().into_string())
+            {
+                found.push((entry.path(), format!("{name}.pvd")));
+            }
+        }
+        Ok(found)
     }
 
     /// Removes the plain files of `folder` that are `ours`; links and folders are left alone.

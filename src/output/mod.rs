@@ -7,6 +7,7 @@
 //! | `vtu/fluid_0000.vtu`, `vtu/solids_0000.vtu` | every frame | particles |
 //! | `vtu/walls.vtu` | once | particles that never move, at t = 0 |
 //! | `vtu/last_fluid.vtu`, `vtu/last_solids.vtu` | when a run diverges | the state in which it was found |
+//! | `series/NAME/NAME.pvd`, `series/NAME/vtu/` | every frame of it | the same of each `[[output.series]]` |
 //! | `monitors.csv`, `bodies.csv`, `gauges.csv` | row by row | tables over time, units in the header |
 //! | `pictures/frame_0000.png`, `final.png` | if asked for | pictures of the particles |
 //! | `result.json` | at the end, also of a failed run | the summary |

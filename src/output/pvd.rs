@@ -27,13 +27,13 @@ impl Pvd {
         Self { path, file: None, entries: HEAD.len() as u64 }
     }
 
-    /// Save how long the list is, or cut the file back to what it was. Returns nothing to read otherwise.
+    /// Save how long the list is, or cut the file back to what it was. `prefix` tells lists of one run apart.
     ///
     /// # Errors
     /// [`Error::Folder`] if the file is shorter than that, [`Error::Io`].
-    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+    pub(crate) fn exchange(&mut self, prefix: &str, archive: &mut Archive) -> Result<()> {
         let Self { path, file, entries } = self;
-        archive.count("pvd.bytes", entries)?;
+        archive.count(&format!("{prefix}pvd.bytes"), entries)?;
         if archive.is_saving() || *entries <= HEAD.len() as u64 {
             return Ok(());
         }

@@ -198,6 +198,9 @@ pub struct Summary {
     pub parts: u64,
     /// Frames written.
     pub frames: u64,
+    /// Frames written of each `[[output.series]]`, by its name.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub series: BTreeMap<String, u64>,
     /// Most memory that the process has held so far [bytes], where the system tells it (Linux).
     pub memory_peak_bytes: Option<u64>,
     /// Numbers of particles.

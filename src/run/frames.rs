@@ -1,10 +1,11 @@
 //! Frames: the particles of one moment, in VTU files and pictures.
 
-use crate::case::{Encoding, Output, OutputField, OutputKind, OutputRegion};
+use super::due::Due;
+use crate::case::{Choice, Encoding, Output, OutputField, OutputKind, OutputRegion};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
-use crate::output::folder::Folder;
+use crate::output::folder::{Folder, series_in};
 use crate::output::particles::Particles;
 use crate::output::picture::{Painter, Style, drops, placed};
 use crate::output::pvd::Pvd;
@@ -12,12 +13,24 @@ use crate::output::write_whole;
 use crate::params::Params;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Writes frames.
+/// Writes frames: those of `[output]`, and those of each `[[output.series]]`.
 #[derive(Debug)]
 pub struct Frames {
     folder: Folder,
+    picture: Option<Painter>,
+    main: Series,
+    others: Vec<Series>,
+}
+
+/// Frames of one choice, in a folder of their own.
+#[derive(Debug)]
+struct Series {
+    /// Before the names of its numbers in a state.
+    prefix: String,
+    root: PathBuf,
     pvd: Pvd,
     encoding: Encoding,
     fields: Vec<OutputField>,
@@ -26,7 +39,7 @@ pub struct Frames {
     solids: bool,
     walls: (bool, bool),
     every: f64,
-    picture: Option<Painter>,
+    due: Due,
     written: u64,
     /// The last frame is that of the present step.
     fresh: Option<u64>,
@@ -34,10 +47,10 @@ pub struct Frames {
 
 impl Frames {
     /// Frames of `scene` in `folder`, with the kinds of particles that `output` asks for. `pictures` adds
-    /// a picture of every frame.
+    /// a picture of every frame of `[output]`.
     ///
     /// # Errors
-    /// [`Error::Io`] if the folder of the pictures cannot be made.
+    /// [`Error::Io`] if the folder of the pictures or of a series cannot be made.
     pub fn new(
         folder: &Folder,
         output: &Output,
@@ -45,29 +58,44 @@ impl Frames {
         params: &Params,
         pictures: bool,
     ) -> Result<Self> {
-        let asked = |kind| output.kinds.contains(&kind);
-        let groups = &scene.groups;
         let picture = pictures.then(|| Painter::new(scene, &Style::of(scene.dimensions), params));
         if pictures {
             std::fs::create_dir_all(folder.pictures()).map_err(Error::io(folder.pictures()))?;
         }
-        Ok(Self {
-            folder: folder.clone(),
-            pvd: Pvd::new(folder.pvd()),
+        let series = |choice: Choice<'_>, prefix: String, root: PathBuf, pvd: PathBuf| Series {
+            prefix,
+            root,
+            pvd: Pvd::new(pvd),
             encoding: output.encoding,
-            fields: output.fields.clone(),
-            region: output.region,
-            fluid: asked(OutputKind::Fluid) && groups.fluid > 0,
-            solids: asked(OutputKind::Body) && !scene.solids.is_empty(),
+            fields: choice.fields.to_vec(),
+            region: choice.region,
+            fluid: choice.has(OutputKind::Fluid) && scene.groups.fluid > 0,
+            solids: choice.has(OutputKind::Body) && !scene.solids.is_empty(),
             walls: (
-                asked(OutputKind::Wall) && groups.static_wall > 0,
-                asked(OutputKind::Dummy) && groups.static_dummy > 0,
+                choice.has(OutputKind::Wall) && scene.groups.static_wall > 0,
+                choice.has(OutputKind::Dummy) && scene.groups.static_dummy > 0,
             ),
-            every: output.every,
-            picture,
+            every: choice.every,
+            due: Due::new(Some(choice.every)),
             written: 0,
             fresh: None,
+        };
+        let other = |named: &crate::case::Series| {
+            let root = series_in(folder.root(), &named.name);
+            std::fs::create_dir_all(root.join("vtu")).map_err(Error::io(&root))?;
+            let pvd = root.join(format!("{}.pvd", named.name));
+            Ok(series(named.choice(), format!("series.{}.", named.name), root, pvd))
+        };
+        Ok(Self {
+            folder: folder.clone(),
+            picture,
+            main: series(output.choice(), String::new(), folder.root().to_path_buf(), folder.pvd()),
+            others: output.series.iter().map(other).collect::<Result<_>>()?,
         })
+    }
+
+    fn each(&mut self) -> impl Iterator<Item = &mut Series> {
+        std::iter::once(&mut self.main).chain(&mut self.others)
     }
 
     /// Save which frames there are, or go back to them.
@@ -75,69 +103,80 @@ impl Frames {
     /// # Errors
     /// [`Error::Case`], [`Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self {
-            folder: _,
-            encoding: _,
-            fields: _,
-            region: _,
-            fluid: _,
-            solids: _,
-            walls: _,
-            every: _,
-            picture: _,
-            fresh,
-            pvd,
-            written,
-        } = self;
-        let mut step = fresh.unwrap_or(u64::MAX);
-        archive.count("frames.step", &mut step)?;
-        *fresh = Some(step).filter(|&s| s != u64::MAX);
-        archive.count("frames", written)?;
-        pvd.exchange(archive)
+        self.each().try_for_each(|series| series.exchange(archive))
     }
 
-    /// Whether there is a frame of step `steps`.
+    /// A run that begins late: moments before `time` [s] are over.
+    pub(crate) fn skip(&mut self, time: f64) {
+        self.each().for_each(|series| {
+            series.due.reached(time);
+        });
+    }
+
+    /// Whether there is a frame of `[output]` of step `steps`.
     pub(crate) fn is_fresh(&self, steps: u64) -> bool {
-        self.fresh == Some(steps)
+        self.main.fresh == Some(steps)
     }
 
-    /// Frames written so far.
+    /// Frames of `[output]` written so far.
     pub fn written(&self) -> u64 {
-        self.written
+        self.main.written
     }
 
-    /// Write the present state as the next frame, unless the case wants none (`output.every = 0`).
+    /// Frames of each series written so far.
+    pub fn written_by_name(&self) -> BTreeMap<String, u64> {
+        let name =
+            |series: &Series| series.root.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        self.others.iter().map(|series| (name(series), series.written)).collect()
+    }
+
+    /// Write the present state as the next frame of all series.
     ///
     /// # Errors
     /// [`Error::Io`], or what the backend says when it is read.
     pub fn write(&mut self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
-        if self.every <= 0.0 {
-            return Ok(());
+        self.write_where(simulation, scene, |_| true).map(drop)
+    }
+
+    /// Write it for those whose moment the run has reached; says whether `[output]` is one of them.
+    ///
+    /// # Errors
+    /// As [`Frames::write`].
+    pub(crate) fn write_due(&mut self, simulation: &mut Simulation, scene: &Scene) -> Result<bool> {
+        let time = simulation.time;
+        self.write_where(simulation, scene, |series| series.due.reached(time))
+    }
+
+    /// Write it for those that have no frame of it.
+    ///
+    /// # Errors
+    /// As [`Frames::write`].
+    pub(crate) fn write_end(&mut self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
+        let steps = simulation.steps;
+        self.write_where(simulation, scene, |series| series.fresh != Some(steps)).map(drop)
+    }
+
+    /// Write it for those of which `now` says so, unless the case wants none (`output.every = 0`).
+    fn write_where(
+        &mut self,
+        simulation: &mut Simulation,
+        scene: &Scene,
+        now: impl Fn(&mut Series) -> bool,
+    ) -> Result<bool> {
+        let named: Vec<bool> = self.each().map(|series| now(series) && series.every > 0.0).collect();
+        let pictures = self.picture.is_some() && named[0];
+        let asked = self.each().zip(&named).any(|(series, now)| *now && series.reads());
+        // Once for all of them; where nothing of it is shown a device is not waited for.
+        let fields = if asked || pictures { read(simulation)? } else { None };
+        let number = self.main.written;
+        for (series, _) in self.each().zip(&named).filter(|(_, now)| **now) {
+            series.write(simulation, scene, fields.as_ref())?;
         }
-        let (number, time) = (self.written, simulation.time);
-        let fields = read(simulation)?;
-        let mut parts = Vec::new();
-        if self.walls != (false, false) {
-            let file = "vtu/walls.vtu".to_string();
-            if number == 0 {
-                let walls = Particles::walls(scene, fields.as_ref(), self.walls.0, self.walls.1);
-                self.put(&file, &self.cut(walls, scene), time)?;
-            }
-            parts.push(("walls", file));
-        }
-        for (name, particles) in self.moving(simulation, scene, fields.as_ref()) {
-            let file = format!("vtu/{name}_{number:04}.vtu");
-            self.put(&file, &particles, time)?;
-            parts.push((name, file));
-        }
-        self.pvd.push(time, &parts)?;
-        if let Some(picture) = &self.picture {
+        if let Some(picture) = self.picture.as_ref().filter(|_| pictures) {
             let png = paint(picture, simulation, scene, fields.as_ref());
             write_whole(&self.folder.pictures().join(format!("frame_{number:04}.png")), &png)?;
         }
-        self.written += 1;
-        self.fresh = Some(simulation.steps);
-        Ok(())
+        Ok(named[0])
     }
 
     /// Write `vtu/last_*.vtu`: the state in which a run was given up. It is no part of the series.
@@ -146,8 +185,8 @@ impl Frames {
     /// [`Error::Io`], or what the backend says when it is read.
     pub(crate) fn write_last(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
         let fields = read(simulation)?;
-        for (name, particles) in self.moving(simulation, scene, fields.as_ref()) {
-            self.put(&format!("vtu/last_{name}.vtu"), &particles, simulation.time)?;
+        for (name, particles) in self.main.moving(simulation, scene, fields.as_ref()) {
+            self.main.put(&format!("vtu/last_{name}.vtu"), &particles, simulation.time)?;
         }
         Ok(())
     }
@@ -161,6 +200,61 @@ impl Frames {
         let fields = read(simulation)?;
         let png = paint(picture, simulation, scene, fields.as_ref());
         write_whole(&self.folder.file("final.png"), &png)
+    }
+}
+
+impl Series {
+    fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        let Self {
+            prefix,
+            root: _,
+            pvd,
+            encoding: _,
+            fields: _,
+            region: _,
+            fluid: _,
+            solids: _,
+            walls: _,
+            every: _,
+            due,
+            written,
+            fresh,
+        } = self;
+        let mut step = fresh.unwrap_or(u64::MAX);
+        archive.count(&format!("{prefix}frames.step"), &mut step)?;
+        *fresh = Some(step).filter(|&s| s != u64::MAX);
+        archive.count(&format!("{prefix}frames"), written)?;
+        due.exchange(&format!("{prefix}frames"), archive)?;
+        pvd.exchange(prefix, archive)
+    }
+
+    /// Whether its frames hold anything that a scene and the poses of its solids do not tell.
+    fn reads(&self) -> bool {
+        let carried = [OutputField::Pressure, OutputField::NumberDensity];
+        self.fluid || carried.iter().any(|field| self.fields.contains(field))
+    }
+
+    /// Write the next frame.
+    fn write(&mut self, simulation: &Simulation, scene: &Scene, fields: Option<&Fields>) -> Result<()> {
+        let (number, time) = (self.written, simulation.time);
+        let mut parts = Vec::new();
+        if self.walls != (false, false) {
+            let file = "vtu/walls.vtu".to_string();
+            if number == 0 {
+                let walls = Particles::walls(scene, fields, self.walls.0, self.walls.1);
+                self.put(&file, &self.cut(walls, scene), time)?;
+            }
+            parts.push(("walls", file));
+        }
+        for (name, particles) in self.moving(simulation, scene, fields) {
+            let file = format!("vtu/{name}_{number:04}.vtu");
+            self.put(&file, &particles, time)?;
+            parts.push((name, file));
+        }
+        self.pvd.push(time, &parts)?;
+        self.written += 1;
+        self.fresh = Some(simulation.steps);
+        Ok(())
     }
 
     fn moving(
@@ -188,7 +282,7 @@ impl Frames {
     }
 
     fn put(&self, file: &str, particles: &Particles, time: f64) -> Result<()> {
-        let path: PathBuf = self.folder.root().join(file);
+        let path: PathBuf = self.root.join(file);
         let mut fields = self.fields.clone();
         if particles.body.iter().any(|&body| body > 0) {
             // Places of solids are read from these.

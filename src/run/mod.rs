@@ -1,6 +1,6 @@
 //! A run: the clock, and what is written when.
 //!
-//! Frames come at t = 0, at the first step that reaches each multiple of `output.every`, and at the end;
+//! Frames come at t = 0, at the first step that reaches each multiple of `output.every` (or `every` of a series), and at the end;
 //! the time step is never cut to hit them. A run that diverges or is interrupted keeps everything that it
 //! wrote, and says in `result.json` how it ended. Its state is saved now and then, and when it is stopped:
 //! gone on with, it writes what it would have written undisturbed.
@@ -136,7 +136,6 @@ pub fn run(
         tables: Tables::create(&folder, simulation, scene, gauges, resumes)?,
         totals: Totals::default(),
         steps_max: options.steps.unwrap_or(u64::MAX),
-        due: Due::new(Some(simulation.case.output.every)),
         saving: Saving::new(simulation, &options.name, text, folder.checkpoints()),
         pace: Pace::default(),
         walls: 0.0,
@@ -175,7 +174,6 @@ struct Run {
     tables: Tables,
     totals: Totals,
     steps_max: u64,
-    due: Due,
     saving: Saving,
     pace: Pace,
     /// Wall-clock time of the processes before this one [s].
@@ -189,12 +187,10 @@ struct Run {
 impl Run {
     /// Save how far files and sums are, or go back to that.
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self { start, frames, tables, totals, steps_max: _, due, saving, pace: _, walls, parts, dt } =
-            self;
+        let Self { start, frames, tables, totals, steps_max: _, saving, pace: _, walls, parts, dt } = self;
         frames.exchange(archive)?;
         tables.exchange(archive)?;
         totals.exchange(archive)?;
-        due.exchange("frames", archive)?;
         saving.every.exchange("checkpoint", archive)?;
         let mut wall = *walls + start.elapsed().as_secs_f64();
         archive.number("run.wall", &mut wall)?;
@@ -208,7 +204,7 @@ impl Run {
     /// A run that begins late: moments before `time` [s] are over.
     fn skip(&mut self, time: f64) {
         if time > 0.0 {
-            self.due.reached(time);
+            self.frames.skip(time);
             self.saving.every.reached(time);
             self.tables.skip(time);
         }
@@ -318,6 +314,7 @@ impl Run {
         summary.wall_s = self.walls + self.start.elapsed().as_secs_f64();
         summary.parts = self.parts;
         summary.frames = self.frames.written();
+        summary.series = self.frames.written_by_name();
         summary.memory_peak_bytes = memory_peak();
         summary.stages.insert("output", self.totals.output.as_secs_f64());
         // Where the disk is full this makes room for the last word.
@@ -385,10 +382,7 @@ impl Run {
             let writing = Instant::now();
             self.totals.add(&report, simulation);
             self.tables.step(&report, simulation, &mut self.totals)?;
-            progress.frame = self.due.reached(simulation.time);
-            if progress.frame {
-                self.frames.write(simulation, scene)?;
-            }
+            progress.frame = self.frames.write_due(simulation, scene)?;
             // After the files of this step, so that a state knows all of them.
             self.save_if_due(simulation)?;
             self.totals.output += writing.elapsed();
@@ -405,9 +399,7 @@ impl Run {
         if (stopped || self.saving.planned) && self.saving.step != Some(simulation.steps) {
             self.save(simulation)?;
         }
-        if !self.frames.is_fresh(simulation.steps) {
-            self.frames.write(simulation, scene)?;
-        }
+        self.frames.write_end(simulation, scene)?;
         self.tables.finish(&progress.report, simulation, &mut self.totals)?;
         self.frames.write_final_picture(simulation, scene)?;
         self.totals.output += writing.elapsed();

@@ -25,8 +25,7 @@ pub(super) fn body(
         position.y = 0.0;
     }
     let drive = if body.is_driven() {
-        let rows = body.motion.as_deref().unwrap_or_default();
-        Drive::Prescribed(motion((rows, &body.rotation, body.pivot), position, plane))
+        Drive::Prescribed(motion(&body.guide(), None, position, plane))
     } else {
         Drive::Free(free(body, &shape, share, plane))
     };

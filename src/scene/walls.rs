@@ -4,6 +4,7 @@ use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
 use super::oriented::Placed;
 use super::{Curve, Drive, Motion, Shape, Solid, WallShape};
 use crate::case::{self, Face, TANK_FACES};
+use crate::waves::Wave;
 use glam::{DMat3, DQuat, DVec3, IVec3};
 
 /// Particles of the walls that never move.
@@ -259,25 +260,8 @@ pub(super) fn moving_wall(
 
 /// The motion of a wall whose centre is `center` at the start.
 pub(super) fn wall_motion(wall: &case::MovingWall, case: &case::Case, center: DVec3) -> Motion {
-    let plane = case.run.dimensions == 2;
-    let flat = |v: case::Vector| DVec3::new(v[0], if plane { 0.0 } else { v[1] }, v[2]);
-    let tables = motion((&wall.motion, &wall.rotation, wall.pivot), center, plane);
-    let made = wall.wave(case).zip(wall.wave.as_ref());
-    let mut moved = match (&wall.sine, made) {
-        (Some(sine), _) => Motion::along(flat(sine.axis), sine.formula()),
-        (None, Some((wave, keys))) => Motion::making(wave, flat(keys.direction())),
-        (None, None) => tables,
-    };
-    let arm = flat((center - wall.pivot.map_or(center, DVec3::from)).to_array());
-    // The tables know of their turn already.
-    let by_formula = wall.sine.is_some() || wall.wave.is_some();
-    if let Some(angles) = angles(&wall.rotation).filter(|_| by_formula) {
-        moved = moved.turned(angles, arm);
-    }
-    match &wall.swing {
-        Some(swing) => moved.swinging(swing.axis.into(), swing.formula(), arm),
-        None => moved,
-    }
+    let wave = wall.wave(case).zip(wall.wave.as_ref().map(case::WaveMaker::direction));
+    motion(&wall.guide(), wave, center, case.run.dimensions == 2)
 }
 
 /// Angles [rad] by rows of them [degrees].
@@ -287,24 +271,32 @@ fn angles(rows: &[[f64; 4]]) -> Option<Curve> {
         .then(|| Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(angle).collect()))
 }
 
-/// The motion of a solid whose centre is `center` at the start, from a case's rows of displacement and of angles and the
-/// place that it turns about.
+/// The motion of a solid whose centre is `center` at the start, by tables and formulas, or by the wave that it makes along a direction.
 pub(super) fn motion(
-    (rows, turns, pivot): (&[[f64; 4]], &[[f64; 4]], Option<case::Vector>),
+    guide: &case::Guide,
+    wave: Option<(Wave, case::Vector)>,
     center: DVec3,
     plane: bool,
 ) -> Motion {
-    let still = [[0.0; 4]];
-    let rows = if rows.is_empty() { &still } else { rows };
-    let place = |r: &[f64; 4]| DVec3::new(r[1], if plane { 0.0 } else { r[2] }, r[3]);
-    let curve = Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(place).collect());
-    let motion = Motion::shift(curve);
-    let Some(turns) = angles(turns) else { return motion };
-    let mut arm = center - pivot.map_or(center, DVec3::from);
-    if plane {
-        arm.y = 0.0;
+    let flat = |v: case::Vector| DVec3::new(v[0], if plane { 0.0 } else { v[1] }, v[2]);
+    let table = || {
+        let rows = guide.motion.filter(|rows| !rows.is_empty()).unwrap_or(&[[0.0; 4]]);
+        let place = |r: &[f64; 4]| flat([r[1], r[2], r[3]]);
+        Motion::shift(Curve::new(rows.iter().map(|r| r[0]).collect(), rows.iter().map(place).collect()))
+    };
+    let mut moved = match (guide.sine, wave) {
+        (Some(sine), _) => Motion::along(flat(sine.axis), sine.formula()),
+        (None, Some((wave, direction))) => Motion::making(wave, flat(direction)),
+        (None, None) => table(),
+    };
+    let arm = flat((center - guide.pivot.map_or(center, DVec3::from)).to_array());
+    if let Some(angles) = angles(guide.rotation) {
+        moved = moved.turned(angles, arm);
     }
-    motion.turned(turns, arm)
+    match guide.swing {
+        Some(swing) => moved.swinging(swing.axis.into(), swing.formula(), arm),
+        None => moved,
+    }
 }
 
 /// Frame and size in particles of a plane.

@@ -130,6 +130,8 @@ shape = "mesh"
 file = "hull.stl"
 center = [1.5, 1.5, 0.5]
 density = 500
+sine = { axis = [1, 0, 0], amplitude = 0.01, period = 1 }
+swing = { axis = [1, 0, 0], amplitude_deg = 1, period = 1 }
 
 [contact]
 spring = 1e6
@@ -138,7 +140,9 @@ spring = 1e6
 name = "force"
 on = "box"
 
-[output]
+[[output.series]]
+name = "near"
+every = 0.1
 "#;
 
 /// Bounds of a number, and the keys it is under: a path with `*` for the number of a table or an element.

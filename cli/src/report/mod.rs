@@ -103,7 +103,7 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
     }
     let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
     let seen: Vec<&Frame> = (0..count).map(|k| &run.frames[pick(k)]).collect();
-    let show = Show::open(&args.dir, &args.look, &seen)?;
+    let show = Show::open(&run.case, &args.look, &seen)?;
     let draw = |k: usize| {
         let frame = seen[k];
         Ok((frame.time, STANDARD.encode(show.picture(frame)?.png())))
