@@ -164,6 +164,16 @@ impl Openings {
         poses
     }
 
+    /// Columns of what is told of the water's volumes, without units; none without openings.
+    pub(crate) fn columns(&self) -> Vec<String> {
+        if self.is_empty() {
+            return Vec::new();
+        }
+        let emitted = self.emitted().map(|(name, _)| format!("inflow_{name}"));
+        let swallowed = self.outflows().map(|name| format!("outflow_{name}"));
+        std::iter::once("water_volume".to_owned()).chain(emitted).chain(swallowed).collect()
+    }
+
     /// Particles that have come in, one an inflow.
     pub fn emitted(&self) -> impl Iterator<Item = (&str, u64)> {
         let inflows = self.gates.iter().filter(|g| g.opening.is_inflow());

@@ -247,6 +247,17 @@ impl Simulation {
         out
     }
 
+    /// Volume of the water, and what each inflow and outflow has let through since the start [m3], by the columns of monitors.csv
+    /// without their units, as far as `fluid` and `counters` say, see [`Self::observe`]; in two dimensions of a slice one spacing wide. Nothing
+    /// without openings.
+    pub fn volumes(&self, fluid: &FluidMonitor, counters: &Counters) -> Vec<(String, f64)> {
+        let emitted = self.openings.emitted().map(|(_, n)| n);
+        let counts =
+            std::iter::once(fluid.particles).chain(emitted).chain(counters.swallowed.iter().copied());
+        let volume = self.params.spacing.powi(3);
+        self.openings.columns().into_iter().zip(counts.map(|n| n as f64 * volume)).collect()
+    }
+
     /// Look at the fluid, the guards and the device's clock.
     ///
     /// # Errors

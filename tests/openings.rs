@@ -264,6 +264,15 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
         let there = number(&water["particles_end"]) as f64;
         assert!((of("water_volume [m3]") / (there * 1e-6) - 1.0).abs() < 1e-6);
         assert!(!Path::new(&parts).join("bodies.csv").exists());
+        // So does the page.
+        assert_eq!(ran(&["report", &parts, "-q", "--size", "160x80", "--pictures", "1"]).code, 0);
+        let page = std::fs::read_to_string(format!("{parts}/report.html")).unwrap();
+        assert!(
+            page.contains("<h2 id=\"water\">Water in and out</h2>") && page.contains("since the start [m3]")
+        );
+        for (name, n) in [("in through in", came), ("out through out", out), ("at the start", 800)] {
+            assert!(page.contains(&format!("<td>{name}</td><td>{n}</td>")), "{name} {n}");
+        }
     }
 }
 

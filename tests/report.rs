@@ -56,6 +56,7 @@ fn a_report_holds_everything_and_fetches_nothing() {
     );
     // Every picture and chart has words; the pictures are the frames, the last one shown without a script.
     assert_eq!(text.matches("<img ").count(), text.matches("<img id=\"picture\" alt=\"The scene at").count());
+    assert!(!words.contains("Water in and out"));
     assert_eq!(text.matches("<svg ").count(), text.matches("role=\"img\" aria-label=\"").count());
     let frames = text.split("id=\"frames\">").nth(1).unwrap().split("</script>").next().unwrap();
     let frames = json(frames);

@@ -66,6 +66,18 @@ class Run:
         grade: str | None = self.result.get("verdict", {}).get("grade")
         return grade
 
+    @property
+    def water(self) -> dict[str, float]:
+        """Volumes of water [m3] of a case with inflow or outflow, at the end: `water_volume`, `inflow_NAME` and `outflow_NAME` as the columns
+        of `monitors` are called, and `start` and `lost`. Their sums agree to the particle. Empty without openings, and while the
+        run is under way."""
+        told: dict[str, Any] = self.result.get("water") or {}
+        if not told:
+            return {}
+        each = told["volume_start_m3"] / max(told["particles_start"], 1) or told["volume_end_m3"] / max(told["particles_end"], 1)
+        volumes = {"water_volume": told["volume_end_m3"], "start": told["volume_start_m3"], "lost": told["particles_lost"] * each}
+        return volumes | {f"{way}_{one['name']}": one["volume_m3"] for way in ("inflow", "outflow") for one in told[way]}
+
     @functools.cached_property
     def case(self) -> dict[str, Any]:
         """The case as it was run."""
@@ -133,6 +145,12 @@ class Run:
         return Frames(_frames(self.path))
 
     @functools.cached_property
+    def series(self) -> dict[str, Frames]:
+        """The frames of each `[[output.series]]` of the case, by its name."""
+        names = [named["name"] for named in self.case.get("output", {}).get("series", [])]
+        return {name: Frames(_frames(self.path / "series" / name)) for name in names}
+
+    @functools.cached_property
     def walls(self) -> Particles:
         """The particles of fixed walls."""
         return Particles(self.path / "vtu" / "walls.vtu")
@@ -144,12 +162,6 @@ class Particles:
     def __init__(self, path: Path) -> None:
         #: The file.
         self.path = path
-    @functools.cached_property
-    def series(self) -> dict[str, Frames]:
-        """The frames of each `[[output.series]]` of the case, by its name."""
-        names = [named["name"] for named in self.case.get("output", {}).get("series", [])]
-        return {name: Frames(_frames(self.path / "series" / name)) for name in names}
-
 
     def __len__(self) -> int:
         return len(self.position)

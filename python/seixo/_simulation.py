@@ -218,5 +218,6 @@ class Simulation:
 
     @property
     def monitor(self) -> dict[str, float]:
-        """Energies [J], largest speed [m/s], error of the number density [-] and lost particles now, called as in monitors.csv."""
+        """Energies [J], largest speed [m/s], error of the number density [-] and lost particles now; with inflow or outflow the volume of the
+        water and what each has let through [m3]. Called as in monitors.csv."""
         return dict(self._native.monitor())

@@ -197,11 +197,11 @@ impl Simulation {
     }
 
     /// Energies and guards now, by the columns of monitors.csv.
-    fn monitor(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, f64)>> {
+    fn monitor(&self, py: Python<'_>) -> PyResult<Vec<(String, f64)>> {
         self.with(py, |s| {
             let (fluid, counters) = s.observe()?;
             let bodies = s.solids.energy();
-            Ok(vec![
+            let known = [
                 ("speed_max", fluid.speed_max),
                 ("density_error_mean", fluid.density_error_mean),
                 ("density_error_max", fluid.density_error_max),
@@ -212,7 +212,9 @@ impl Simulation {
                 ("body_contact", bodies.contact),
                 ("energy", fluid.kinetic + fluid.potential + bodies.total()),
                 ("fluid_lost", counters.lost as f64),
-            ])
+            ];
+            let known = known.map(|(name, value)| (name.to_owned(), value));
+            Ok(known.into_iter().chain(s.volumes(&fluid, &counters)).collect())
         })
     }
 }

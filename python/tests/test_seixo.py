@@ -202,7 +202,51 @@ def test_fields_that_were_not_written_are_named(tmp_path: Path) -> None:
     assert set(few.frames[-1].solids.body) == {1, 2}
 
 
+def test_series_are_frames_by_name(tmp_path: Path) -> None:
+    series = {"name": "near", "every": 0.01, "kinds": ["fluid"], "fields": ["velocity"], "region": REGION}
+    out = seixo.run(CASE, tmp_path / "near", set={"output.series": [series]}, backend="cpu")
+    near = out.series["near"]
+    assert list(out.series) == ["near"] and out.result["series"] == {"near": len(near)}
+    assert len(near) > len(out.frames) > 1
+    assert (near[-1].fluid.position[:, 0] <= 0.25).all() and len(near[-1].fluid) < len(out.frames[-1].fluid)
+    with pytest.raises(LookupError, match="no bodies"):
+        _ = near[-1].solids
+
+
+#: Water that passes a piece of a channel.
+CHANNEL: dict[str, Any] = {
+    "run": {"spacing": 0.05, "time_step": 2e-3, "end": 0.6, "dimensions": 2},
+    "tank": {"min": [0, 0, 0], "max": [1, 0, 0.5], "open": ["z_max"]},
+    "fluid": {"block": [{"min": [0, 0, 0], "max": [1, 0, 0.2], "velocity": [0.5, 0, 0]}]},
+    "inflow": [{"name": "in", "face": "x_min", "min": [0, 0, 0], "max": [0, 0, 0.2], "velocity": 0.5}],
+    "outflow": [{"name": "out", "face": "x_max", "velocity": 0.5}],
+    "output": {"every": 0},
+}
+
+
+def test_volumes_of_water_that_passes(tmp_path: Path) -> None:
+    out = seixo.run(CHANNEL, tmp_path / "channel", backend="cpu")
+    water = out.water
+    assert set(water) == {"water_volume", "start", "lost", "inflow_in", "outflow_out"}
+    assert water["inflow_in"] > 0 and water["outflow_out"] > 0
+    left = water["start"] + water["inflow_in"] - water["outflow_out"] - water["lost"]
+    assert np.isclose(left, water["water_volume"], rtol=1e-9)
+    last = {name: out.monitors[name][len(out.monitors["time"]) - 1] for name in ("water_volume", "inflow_in", "outflow_out")}
+    assert all(np.isclose(last[name], water[name], rtol=1e-6) for name in last)
+
+
 stepped = pytest.mark.skipif(not importlib.util.find_spec("seixo._native"), reason="the compiled part is not installed")
+
+
+@stepped
+def test_stepping_tells_the_volumes_that_the_program_does(tmp_path: Path) -> None:
+    out = seixo.run(CHANNEL, tmp_path / "channel", backend="cpu", threads=1, set={"run.end": 0.2})
+    sim = seixo.open({**CHANNEL, "run": {**CHANNEL["run"], "end": 0.2}}, backend="cpu", threads=1)
+    assert sim.monitor["inflow_in"] == 0.0
+    while sim.time < 0.2 - 1e-9:
+        sim.step()
+    told = {name: sim.monitor[name] for name in ("water_volume", "inflow_in", "outflow_out")}
+    assert told == pytest.approx({name: out.water[name] for name in told}, rel=1e-9) and told["inflow_in"] > 0
 
 
 @stepped

@@ -213,7 +213,7 @@ impl Tables {
         let since = std::mem::take(&mut self.since);
         let mut row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
         let ledger = simulation.ledger()?;
-        row.extend(water_cells(simulation, &fluid, &counters));
+        row.extend(simulation.volumes(&fluid, &counters).into_iter().map(|(_, volume)| Cell::from(volume)));
         row.extend(ledger.iter().flat_map(|l| Entry::ALL.map(|entry| Cell::from(l.get(entry)))));
         totals.ledger = ledger;
         self.since.stages = simulation.stages.clone();
@@ -299,17 +299,6 @@ impl Tables {
     }
 }
 
-/// Volume of the water, and what each opening has let in or out since the start [m3], where there are any.
-fn water_cells(simulation: &Simulation, fluid: &FluidMonitor, counters: &Counters) -> Vec<Cell> {
-    let openings = &simulation.openings;
-    if openings.is_empty() {
-        return Vec::new();
-    }
-    let passed = openings.emitted().map(|(_, n)| n).chain(counters.swallowed.iter().copied());
-    let volume = simulation.params.spacing.powi(3);
-    [fluid.particles].into_iter().chain(passed).map(|n| Cell::from(n as f64 * volume)).collect()
-}
-
 fn monitor_header(stages: &[Stage], simulation: &Simulation) -> Vec<String> {
     let fixed = "step [-],time [s],dt [s],courant [-],speed_max [m/s],density_error_mean [-],density_error_max [-],\
                  kinetic [J],potential [J],body_kinetic [J],body_potential [J],body_contact [J],energy [J]";
@@ -322,12 +311,7 @@ fn monitor_header(stages: &[Stage], simulation: &Simulation) -> Vec<String> {
                 negative_pressures [-],neighbours_max [-]";
     header.extend(rest.split(',').map(String::from));
     header.extend(stages.iter().map(|s| format!("wall_{} [s]", s.name())));
-    let openings = &simulation.openings;
-    if !openings.is_empty() {
-        header.push("water_volume [m3]".into());
-        header.extend(openings.emitted().map(|(name, _)| format!("inflow_{name} [m3]")));
-        header.extend(openings.outflows().map(|name| format!("outflow_{name} [m3]")));
-    }
+    header.extend(simulation.openings.columns().into_iter().map(|name| format!("{name} [m3]")));
     if simulation.plan.ledger {
         header.extend(Entry::ALL.map(|entry| format!("work_{} [J]", entry.name())));
     }

@@ -10,7 +10,7 @@ use super::render::{LookArgs, Show, frames_of};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
-use page::{charts, escape, html, section};
+use page::{charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputField};
@@ -117,6 +117,7 @@ fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
         section("seen", "Pictures", &film(pictures)),
         section("bodies", "Bodies and moving walls", &charts(&bodies(run))),
         section("gauges", "Gauges", &charts(&gauges(run))),
+        section("water", "Water in and out", &water(run)),
         section("energy", "Energies", &charts(&energies(run))),
         section("steps", "Steps", &(charts(&steps(run)) + &limits(run)?)),
         section("time", "Where the time went", &times(run)),
@@ -245,6 +246,44 @@ const MOST_GAUGES: usize = 36;
 fn gauges(run: &Run) -> Vec<Chart> {
     let columns = run.gauges.columns().iter().skip(1).take(MOST_GAUGES);
     columns.map(|c| chart(c.clone(), &run.gauges, &[(c, c)])).collect()
+}
+
+/// What came in and went out, of a case with openings: sums, then curves.
+fn water(run: &Run) -> String {
+    let w = &run.result["water"];
+    let mut rows = vec![["", "particles", "volume [m3]"].map(String::from).to_vec()];
+    let row = |name: &str, particles: &Value, volume: &Value| {
+        let volume = volume.as_f64().map_or(String::new(), |v| format!("{v:.4e}"));
+        vec![name.to_owned(), particles.as_u64().map_or(String::new(), |n| n.to_string()), volume]
+    };
+    if w.is_object() {
+        rows.push(row("at the start", &w["particles_start"], &w["volume_start_m3"]));
+        for (way, word) in [("inflow", "in through"), ("outflow", "out through")] {
+            for one in w[way].as_array().into_iter().flatten() {
+                let name = format!("{word} {}", one["name"].as_str().unwrap_or(""));
+                rows.push(row(&name, &one["particles"], &one["volume_m3"]));
+            }
+        }
+        rows.push(row("lost", &w["particles_lost"], &Value::Null));
+        rows.push(row("at the end", &w["particles_end"], &w["volume_end_m3"]));
+    }
+    let through: Vec<(String, String)> = run
+        .monitors
+        .columns()
+        .iter()
+        .filter_map(|column| {
+            let name = column.strip_suffix(" [m3]")?;
+            let of = |way: &str, word: &str| name.strip_prefix(way).map(|n| format!("{word} {n}"));
+            Some((column.clone(), of("inflow_", "in through").or_else(|| of("outflow_", "out through"))?))
+        })
+        .collect();
+    let through: Vec<(&str, &str)> = through.iter().map(|(c, n)| (c.as_str(), n.as_str())).collect();
+    let m = &run.monitors;
+    let drawn = [
+        chart("water that there is [m3]", m, &[("water_volume [m3]", "water")]),
+        chart("let through since the start [m3]", m, &through),
+    ];
+    table(&rows) + &charts(&drawn)
 }
 
 fn energies(run: &Run) -> Vec<Chart> {
