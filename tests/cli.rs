@@ -442,3 +442,32 @@ fn a_killed_run_leaves_only_whole_files() {
     files_named_in_pvd_exist(&root, "small");
     assert!(!root.join("result.json").exists());
 }
+
+#[test]
+fn plan_tells_where_free_bodies_stand_and_what_they_weigh() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let text = std::fs::read_to_string(&case).unwrap().replace("dimensions = 2", "dimensions = 3");
+    let text = text.replace("max = [2, 0, 1]", "max = [2, 0.4, 1]").replace("0.5, 0, 0.5]", "0.5, 0.4, 0.5]");
+    // Two thirds of a wedge's length lie behind its centroid, a third of its height below.
+    let body = "[contact]\nspring = 1e4\n[[body]]\nname = \"ramp\"\nshape = \"wedge\"\nsize = [0.3, 0.2, 0.3]\n\
+                center = [1.4, 0.2, 0.7]\ndensity = 500\n[[moving_wall]]";
+    std::fs::write(
+        &case,
+        text.replace("[[moving_wall]]", body).replace("max = [0.8, 0, 0.8]", "max = [0.8, 0.4, 0.8]"),
+    )
+    .unwrap();
+    let plan = ran(&["plan", &case, "--json"]);
+    assert_eq!(plan.code, 0, "{}", plan.err);
+    let bodies = &json(&plan.out)["bodies"];
+    // What is driven is not weighed.
+    assert_eq!((bodies.as_array().unwrap().len(), &bodies[0]["name"]), (1, &"ramp".into()));
+    let near = |value: &serde_json::Value, wanted: f64| (value.as_f64().unwrap() - wanted).abs() < 1e-9;
+    assert!(near(&bodies[0]["mass_kg"], 4.5) && near(&bodies[0]["volume_m3"], 0.009), "{bodies}");
+    let corners = [("min_m", [1.2, 0.1, 0.6]), ("max_m", [1.5, 0.3, 0.9])];
+    for (key, corner) in corners {
+        assert!((0..3).all(|k| near(&bodies[0][key][k], corner[k])), "{bodies}");
+    }
+    let words = ran(&["plan", &case]).out;
+    assert!(words.contains("`ramp`: 4.5000e0 kg, 9.0000e-3 m3; x 1.2000 to 1.5000"), "{words}");
+}

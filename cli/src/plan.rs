@@ -2,6 +2,7 @@
 
 use super::setup::{self, Setup};
 use super::{CaseArgs, Exit};
+use glam::DMat3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::forecast::{Forecast, Group, groups};
@@ -103,6 +104,48 @@ impl WaveLine {
     }
 }
 
+/// A free body as it is built: what a drawing or a balance says of it, to be held against the case.
+#[derive(Serialize)]
+struct BodyLine {
+    name: String,
+    /// In two dimensions of the slice one spacing wide.
+    mass_kg: f64,
+    volume_m3: f64,
+    /// Lower and upper corner of the box around it at t = 0.
+    min_m: [f64; 3],
+    max_m: [f64; 3],
+}
+
+impl BodyLine {
+    fn new(solid: &Solid) -> Option<Self> {
+        let Drive::Free(free) = &solid.drive else { return None };
+        let (lo, hi) = solid.shape.bounds(DMat3::from_quat(solid.orientation));
+        Some(Self {
+            name: solid.name.clone(),
+            mass_kg: free.mass,
+            volume_m3: solid.shape.volume(),
+            min_m: (solid.position + lo).to_array(),
+            max_m: (solid.position + hi).to_array(),
+        })
+    }
+
+    fn words(&self) -> String {
+        let span = |k: usize| format!("{:.4} to {:.4}", self.min_m[k], self.max_m[k]);
+        format!(
+            "  `{}`: {:.4e} kg, {:.4e} m3; x {}, y {}, z {} m",
+            self.name,
+            self.mass_kg,
+            self.volume_m3,
+            span(0),
+            span(1),
+            span(2)
+        )
+    }
+}
+
+/// Free bodies that are told of; more would be no list.
+const MOST_BODIES: usize = 12;
+
 /// Constants of the fluid's scheme.
 #[derive(Serialize)]
 struct Scheme {
@@ -138,6 +181,7 @@ struct Report {
     particles: seixo::output::result::Particles,
     solids: Vec<String>,
     waves: Vec<WaveLine>,
+    bodies: Vec<BodyLine>,
     stages: Vec<StageLine>,
     contact: ContactLine,
     scheme: Option<Scheme>,
@@ -246,6 +290,7 @@ fn report(seen: &Seen) -> Result<Report> {
         end_s: case.run.end,
         particles: count,
         solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
+        bodies: scene.solids.iter().filter_map(BodyLine::new).collect(),
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
@@ -355,6 +400,12 @@ fn words(report: &Report) -> String {
     if !report.waves.is_empty() {
         lines.extend([String::new(), "waves".to_string()]);
         lines.extend(report.waves.iter().map(WaveLine::words));
+    }
+    if !report.bodies.is_empty() {
+        lines.extend([String::new(), "bodies at t = 0".to_string()]);
+        lines.extend(report.bodies.iter().take(MOST_BODIES).map(BodyLine::words));
+        let more = report.bodies.len().saturating_sub(MOST_BODIES);
+        lines.extend((more > 0).then(|| format!("  and {more} more: --json")));
     }
     for (title, planned) in [("stages", true), ("left out", false)] {
         let of = |s: &&StageLine| s.planned == planned;

@@ -114,6 +114,18 @@ impl Shape {
         }
     }
 
+    /// Lower and upper corner of the box around it, from its centre of mass [m], where `axes` takes its frame to that of the box.
+    pub fn bounds(&self, axes: DMat3) -> (DVec3, DVec3) {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => {
+                let turned = shape.vertices().iter().map(|&v| axes * v);
+                turned.fold((DVec3::MAX, DVec3::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
+            }
+            _ => (-self.extent(axes), self.extent(axes)),
+        }
+    }
+
     /// [`Geometry::depth`], for boxes without asking which shape it is at every point.
     #[inline]
     pub fn depth(&self, q: DVec3, faces: Faces) -> Option<Inside> {
