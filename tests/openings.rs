@@ -271,7 +271,7 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
             page.contains("<h2 id=\"water\">Water in and out</h2>") && page.contains("since the start [m3]")
         );
         for (name, n) in [("in through in", came), ("out through out", out), ("at the start", 800)] {
-            assert!(page.contains(&format!("<td>{name}</td><td>{n}</td>")), "{name} {n}");
+            assert!(page.contains(&format!(">{name}</td><td>{n}</td>")), "{name} {n}");
         }
     }
 }

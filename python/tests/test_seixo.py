@@ -203,7 +203,7 @@ def test_fields_that_were_not_written_are_named(tmp_path: Path) -> None:
 
 
 def test_series_are_frames_by_name(tmp_path: Path) -> None:
-    series = {"name": "near", "every": 0.01, "kinds": ["fluid"], "fields": ["velocity"], "region": REGION}
+    series = {"name": "near", "every": 0.005, "kinds": ["fluid"], "fields": ["velocity"], "region": REGION}
     out = seixo.run(CASE, tmp_path / "near", set={"output.series": [series]}, backend="cpu")
     near = out.series["near"]
     assert list(out.series) == ["near"] and out.result["series"] == {"near": len(near)}

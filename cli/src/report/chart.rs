@@ -89,8 +89,11 @@ impl Chart {
             let (low, high) =
                 all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[k]), h.max(p[k])));
             // What never changes is a line in the middle.
-            let room =
-                if high - low > 1e-12 * high.abs().max(low.abs()) { 0.0 } else { 0.5 * high.abs().max(1.0) };
+            let room = if high - low > 1e-12 * high.abs().max(low.abs()) {
+                0.0
+            } else {
+                if high == 0.0 { 0.5 } else { 0.5 * high.abs() }
+            };
             (low - room, high + room)
         };
         let ((t0, t1), (y0, y1)) = (range(0), range(1));

@@ -294,11 +294,13 @@ fn energies(run: &Run) -> Vec<Chart> {
         ("body_potential [J]", "of height"),
         ("body_contact [J]", "in contacts"),
     ];
-    vec![
-        chart("all together [J]", m, &[("energy [J]", "energy")]),
-        chart("water [J]", m, &water),
-        chart("bodies [J]", m, &body),
-    ]
+    let mut drawn =
+        vec![chart("all together [J]", m, &[("energy [J]", "energy")]), chart("water [J]", m, &water)];
+    // The columns are there without bodies, too.
+    if !run.case.body.is_empty() {
+        drawn.push(chart("bodies [J]", m, &body));
+    }
+    drawn
 }
 
 fn steps(run: &Run) -> Vec<Chart> {

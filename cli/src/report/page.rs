@@ -52,6 +52,9 @@ pub fn charts(charts: &[Chart]) -> String {
     if figures.is_empty() { figures } else { format!("<div class=\"charts\">\n{figures}</div>\n") }
 }
 
+/// Letters of a cell that is not broken.
+const LONGEST_NUMBER: usize = 14;
+
 /// A table of texts; the first row is its head.
 pub fn table(rows: &[Vec<String>]) -> String {
     let Some((head, rows)) = rows.split_first().filter(|(_, rows)| !rows.is_empty()) else {
@@ -60,7 +63,13 @@ pub fn table(rows: &[Vec<String>]) -> String {
     let cells = |row: &[String], of: &str| -> String {
         row.iter().map(|cell| format!("<{of}>{}</{}>", escape(cell), &of[..2])).collect()
     };
-    let body: String = rows.iter().map(|row| format!("<tr>{}</tr>\n", cells(row, "td"))).collect();
+    // Numbers stay whole on a narrow page, words need not.
+    let cell = |cell: &String| {
+        let class = if cell.chars().count() > LONGEST_NUMBER { " class=\"words\"" } else { "" };
+        format!("<td{class}>{}</td>", escape(cell))
+    };
+    let row = |row: &Vec<String>| format!("<tr>{}</tr>\n", row.iter().map(cell).collect::<String>());
+    let body: String = rows.iter().map(row).collect();
     format!(
         "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n",
         cells(head, "th scope=\"col\"")
