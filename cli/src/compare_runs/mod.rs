@@ -145,6 +145,27 @@ fn first_of<'a>(names: impl Iterator<Item = &'a String>) -> String {
     }
 }
 
+/// A range that is so small a part of the values is their rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The smallest range of `quantity` that says anything: a component of a vector is held against the whole vector.
+fn least(quantity: &Quantity, reference: &Run) -> f64 {
+    let vector = vector_of(&quantity.name);
+    let akin = |q: &&Quantity| {
+        q.table == quantity.table
+            && (q.name == quantity.name || vector.is_some() && vector_of(&q.name) == vector)
+    };
+    let values = reference.curves.iter().filter(akin).flat_map(|q| &q.points).map(|p| p[1].abs());
+    ROUNDING * values.fold(0.0, f64::max)
+}
+
+/// The name of a component (`box: velocity_x [m/s]`) without its axis, in two parts; nothing of what is none.
+fn vector_of(name: &str) -> Option<(&str, &str)> {
+    let (head, unit) = name.rsplit_once(" [")?;
+    let bare = head.strip_suffix(['x', 'y', 'z'])?;
+    (bare.is_empty() || bare.ends_with(['_', ' '])).then_some((bare, unit))
+}
+
 /// Adds what `other` differs by.
 fn hold(
     answer: &mut Answer,
@@ -160,14 +181,18 @@ fn hold(
         let Some(theirs) = other.curve(quantity) else { continue };
         met = true;
         match Difference::of(&quantity.points, &theirs.points, window) {
-            Some(difference) => answer.differences.push(Row {
-                run: other.name.clone(),
-                table: quantity.table,
-                quantity: quantity.name.clone(),
-                difference,
-                rms_over_range: difference.relative(difference.rms),
-                largest_over_range: difference.relative(difference.largest),
-            }),
+            Some(difference) => {
+                let least = least(quantity, reference);
+                let relative = |value: f64| difference.relative(value).filter(|_| difference.range > least);
+                answer.differences.push(Row {
+                    run: other.name.clone(),
+                    table: quantity.table,
+                    quantity: quantity.name.clone(),
+                    difference,
+                    rms_over_range: relative(difference.rms),
+                    largest_over_range: relative(difference.largest),
+                });
+            }
             None => apart.push(&quantity.name),
         }
     }
@@ -418,4 +443,19 @@ fn keys(runs: &[Run]) -> Vec<Vec<String>> {
         }
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::vector_of;
+
+    #[test]
+    fn components_are_told_from_other_names() {
+        assert_eq!(vector_of("box: velocity_x [m/s]"), vector_of("box: velocity_z [m/s]"));
+        assert_eq!(vector_of("box: x [m]"), Some(("box: ", "m]")));
+        assert_ne!(vector_of("box: x [m]"), vector_of("ball: x [m]"));
+        for other in ["flux [m3/s]", "energy [J]", "outcome", "qx [-]"] {
+            assert_eq!(vector_of(other), None, "{other}");
+        }
+    }
 }
