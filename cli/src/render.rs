@@ -87,9 +87,9 @@ pub struct LookArgs {
 enum Standpoint {
     /// From the right and above.
     Corner,
-    /// Along +y.
+    /// Along +y: x to the right, z up.
     Front,
-    /// Against the x axis.
+    /// Against the x axis: y to the right, a flume from its end.
     Side,
     /// From above.
     Top,
