@@ -12,6 +12,7 @@ use seixo::console::{remark, say, say_json};
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
 use serde::Serialize;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -148,15 +149,19 @@ fn first_of<'a>(names: impl Iterator<Item = &'a String>) -> String {
 /// A range that is so small a part of the values is their rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The smallest range of `quantity` that says anything: a component of a vector is held against the whole vector.
-fn least(quantity: &Quantity, reference: &Run) -> f64 {
-    let vector = vector_of(&quantity.name);
-    let akin = |q: &&Quantity| {
-        q.table == quantity.table
-            && (q.name == quantity.name || vector.is_some() && vector_of(&q.name) == vector)
-    };
-    let values = reference.curves.iter().filter(akin).flat_map(|q| &q.points).map(|p| p[1].abs());
-    ROUNDING * values.fold(0.0, f64::max)
+/// What the range of `quantity` is held against, by table and name: of a component the whole vector.
+fn whole(quantity: &Quantity) -> (&'static str, (&str, &str)) {
+    (quantity.table, vector_of(&quantity.name).unwrap_or((&quantity.name, "")))
+}
+
+/// The smallest range that says anything, of each of these of a run.
+fn least(reference: &Run) -> HashMap<(&'static str, (&str, &str)), f64> {
+    let mut least = HashMap::new();
+    for quantity in &reference.curves {
+        let most = least.entry(whole(quantity)).or_insert(0.0_f64);
+        *most = quantity.points.iter().map(|p| ROUNDING * p[1].abs()).fold(*most, f64::max);
+    }
+    least
 }
 
 /// The name of a component (`box: velocity_x [m/s]`) without its axis, in two parts; nothing of what is none.
@@ -177,12 +182,13 @@ fn hold(
     let before = answer.differences.len();
     let mut met = false;
     let mut apart = Vec::new();
+    let least = least(reference);
     for quantity in asked {
         let Some(theirs) = other.curve(quantity) else { continue };
         met = true;
         match Difference::of(&quantity.points, &theirs.points, window) {
             Some(difference) => {
-                let least = least(quantity, reference);
+                let least = least.get(&whole(quantity)).copied().unwrap_or(0.0);
                 let relative = |value: f64| difference.relative(value).filter(|_| difference.range > least);
                 answer.differences.push(Row {
                     run: other.name.clone(),

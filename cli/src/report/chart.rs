@@ -91,8 +91,10 @@ impl Chart {
             // What never changes is a line in the middle.
             let room = if high - low > 1e-12 * high.abs().max(low.abs()) {
                 0.0
+            } else if high == 0.0 {
+                0.5
             } else {
-                if high == 0.0 { 0.5 } else { 0.5 * high.abs() }
+                0.5 * high.abs()
             };
             (low - room, high + room)
         };
