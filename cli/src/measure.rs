@@ -1,6 +1,6 @@
 //! `seixo measure`: velocity and pressure at points of one's choice, from the frames that a run has written.
 
-use super::render::{chosen, numbers, series_of, unseen};
+use super::render::{chosen, numbers, series_of, without};
 use super::{Exit, finite};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -83,12 +83,7 @@ pub fn measure(args: &MeasureArgs) -> Exit {
         Probe { spacing: run.spacing, radius: run.effective_radius * run.spacing, flat: run.dimensions == 2 };
     let chosen = chosen(&frames, &args.times, args.every);
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
-        let text = format!(
-            "{} holds no frames with water: {}",
-            args.dir.display(),
-            unseen(&case, args.series.as_deref())
-        );
-        return Err(Error::usage("DIR", text));
+        return Err(without("frames with water", &args.dir, &case, args.series.as_deref()));
     }
     let mut table = csv::Writer::from_writer(Vec::new());
     let unwritten = |e: csv::Error| Error::io("table")(e.into());

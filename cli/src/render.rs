@@ -302,13 +302,13 @@ pub fn series_of(root: &Path, series: Option<&str>) -> Result<(Case, Vec<Frame>)
     Ok((case, frames))
 }
 
-/// Why there are no frames of the water, or none at all.
-pub fn unseen(case: &Case, series: Option<&str>) -> String {
+/// The error of a run in `root` without `frames` ("frames", "frames with water"), and why there are none.
+pub fn without(frames: &str, root: &Path, case: &Case, series: Option<&str>) -> Error {
     let others = case.output.series.first().filter(|_| series.is_none());
     let others = others.map_or(String::new(), |s| format!("; its series has its own: --series {}", s.name));
     let why =
         if case.output.every > 0.0 { "output.kinds leaves it out" } else { "the case has output.every = 0" };
-    format!("{why}{others}")
+    Error::usage("DIR", format!("{} holds no {frames}: {why}{others}", root.display()))
 }
 
 /// The frames nearest to each of `times`, or every `every`th, with their numbers.
@@ -331,8 +331,7 @@ pub fn render(args: &RenderArgs) -> Exit {
     let (case, frames) = series_of(&args.dir, series)?;
     let chosen = chosen(&frames, &args.times, args.every);
     if chosen.is_empty() {
-        let text = format!("{} holds no frames: {}", args.dir.display(), unseen(&case, series));
-        return Err(Error::usage("DIR", text));
+        return Err(without("frames", &args.dir, &case, series));
     }
     let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
     let show = Show::open(&case, &args.look, &seen)?;

@@ -1,6 +1,6 @@
 //! `seixo surface`: the surface of the water as meshes, from the frames that a run has written.
 
-use super::render::{chosen, place, series_of, unseen};
+use super::render::{chosen, place, series_of, without};
 use super::{Exit, finite};
 use clap::ValueEnum;
 use rayon::prelude::*;
@@ -63,8 +63,7 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     }
     let chosen = chosen(&frames, &args.times, args.every);
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
-        let text = format!("{} holds no frames with water: {}", args.dir.display(), unseen(&case, series));
-        return Err(Error::usage("DIR", text));
+        return Err(without("frames with water", &args.dir, &case, series));
     }
     let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("surface"));
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
