@@ -32,8 +32,17 @@ struct Sines {
     ramp: f64,
     /// Largest sum, and largest of its first and second derivative.
     most: [f64; 3],
-    /// Times between 0 and the sum's repetition [s] that show its extremes.
-    times: Vec<f64>,
+    /// Times that show its extremes.
+    looks: Looks,
+}
+
+/// Even times from 0 to the repetition of a sum of sines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Looks {
+    /// Intervals between them.
+    count: usize,
+    /// When the sum repeats [s].
+    repeat: f64,
 }
 
 /// w(t) = A (tanh th + tanh th_0) with c (t - t_0) = th / k + A tanh th: the way of the water at the piston under a wave
@@ -60,21 +69,19 @@ impl Formula {
     /// Sines that grow over `ramp` [s] and repeat after `repeat` [s] as a whole.
     pub fn sines(components: Vec<Component>, ramp: f64, repeat: f64) -> Self {
         let fastest = components.iter().map(|c| c.frequency).fold(0.0, f64::max);
-        let count = (LOOKS * repeat * fastest / TAU).ceil().max(1.0);
-        let times: Vec<f64> = (0..=count as u32).map(|k| repeat * f64::from(k) / count).collect();
+        let looks = Looks { count: (LOOKS * repeat * fastest / TAU).ceil().max(1.0) as usize, repeat };
         let sum = |order: i32| -> f64 {
             components.iter().map(|c| c.amplitude.abs() * c.frequency.powi(order)).sum()
         };
         let mut most = [0, 1, 2].map(sum);
         if components.len() > 1 {
             let mut seen = [0.0_f64; 3];
-            for &t in &times {
-                let at = sum_at(&components, t);
+            for at in looks.sums(&components) {
                 seen.iter_mut().zip(at).for_each(|(most, x)| *most = most.max(x.abs()));
             }
             most.iter_mut().zip(seen).for_each(|(most, seen)| *most = most.min(MISSED * seen));
         }
-        Self(Form::Sines(Sines { components, ramp, most, times }))
+        Self(Form::Sines(Sines { components, ramp, most, looks }))
     }
 
     /// The stroke that makes a solitary wave `eta = H / cosh^2 (number (celerity t - w))` in water of `depth` [m].
@@ -149,7 +156,7 @@ impl Formula {
     pub fn samples(&self) -> Vec<f64> {
         match &self.0 {
             Form::Sines(s) => {
-                let within = s.times.iter().map(|&t| sum_at(&s.components, t)[0]);
+                let within = s.looks.sums(&s.components).into_iter().map(|at| at[0]);
                 within.chain(self.reach()).chain([0.0]).collect()
             }
             Form::Stroke(_) => self.reach().to_vec(),
@@ -180,6 +187,36 @@ fn sum_at(components: &[Component], t: f64) -> [f64; 3] {
         let w = c.frequency;
         [x + c.amplitude * sin, v + c.amplitude * w * cos, a - c.amplitude * w * w * sin]
     })
+}
+
+/// Looks that are taken from one sine and cosine at the first of them.
+const BLOCK: usize = 128;
+
+impl Looks {
+    fn time(self, k: usize) -> f64 {
+        self.repeat * k as f64 / self.count as f64
+    }
+
+    /// [`sum_at`] every one of the times, to round-off. An irregular sea has 320 sines and 15,000 looks: the sine and cosine of each
+    /// at each look would be all that reading a case takes, so they follow from those at the first of a block and
+    /// those of the way from there.
+    fn sums(self, components: &[Component]) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.count + 1];
+        for c in components {
+            let w = c.frequency;
+            let way: [(f64, f64); BLOCK] = std::array::from_fn(|k| (w * self.time(k)).sin_cos());
+            for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
+                let (sin, cos) = (w * self.time(block * BLOCK) + c.phase).sin_cos();
+                for ([x, v, a], (s, k)) in sums.iter_mut().zip(way) {
+                    let (sin, cos) = (sin * k + cos * s, cos * k - sin * s);
+                    *x += c.amplitude * sin;
+                    *v += c.amplitude * w * cos;
+                    *a -= c.amplitude * w * w * sin;
+                }
+            }
+        }
+        sums
+    }
 }
 
 impl Stroke {
@@ -274,6 +311,23 @@ mod tests {
             phase: f64::from(k * k),
         };
         holds_together(&Formula::sines((1..9).map(of).collect(), 1.0, 4.0), 12.0);
+    }
+
+    #[test]
+    fn looks_at_all_times_at_once_are_those_at_each() {
+        let of = |k: u32| Component {
+            amplitude: 0.02 / f64::from(k),
+            frequency: f64::from(k) * TAU / 4.0,
+            phase: f64::from(k * k),
+        };
+        let components: Vec<Component> = (1..9).map(of).collect();
+        let looks = Looks { count: 3 * BLOCK + 5, repeat: 4.0 };
+        let sums = looks.sums(&components);
+        assert_eq!(sums.len(), looks.count + 1);
+        for (k, sum) in sums.iter().enumerate() {
+            let one = sum_at(&components, looks.time(k));
+            assert!((0..3).all(|n| (sum[n] - one[n]).abs() < 1e-13), "{k}: {sum:?} {one:?}");
+        }
     }
 
     #[test]
