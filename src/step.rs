@@ -10,7 +10,9 @@ impl Simulation {
     /// # Errors
     /// [`Error::Diverged`], or a device that is lost.
     pub fn step(&mut self) -> Result<StepReport> {
-        let Some(threads) = self.threads.take() else { return self.advance() };
+        // On a thread of the pool, not beside it: each loop of a stage would be handed over and waited for, and loops are short in
+        // small scenes.
+        let Some(threads) = self.threads.take() else { return rayon::scope(|_| self.advance()) };
         let report = threads.install(|| self.advance());
         self.threads = Some(threads);
         report
