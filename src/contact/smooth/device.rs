@@ -12,6 +12,7 @@ use crate::shape::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Coordinates this close to the largest or smallest of a solid, over its size, are taken as equal to it: points
 /// of a face then lie in one plane in f32 too.
@@ -135,7 +136,7 @@ pub(crate) struct Pairs {
 
 impl Pairs {
     /// Gives the device the points of all solids.
-    pub fn new(surfaces: &[Surface], link: &mut Link) -> Result<Self> {
+    pub fn new(surfaces: &[Arc<Surface>], link: &mut Link) -> Result<Self> {
         let mut points = vec![];
         let clouds = surfaces
             .iter()
@@ -312,7 +313,7 @@ impl Pairs {
     /// Points on the lists: pair, side and place (world) of each.
     pub fn listed(
         &self,
-        surfaces: &[Surface],
+        surfaces: &[Arc<Surface>],
         bodies: &[Body],
         link: &mut Link,
     ) -> Result<Vec<(usize, Other, u8, DVec3)>> {

@@ -10,6 +10,7 @@ use crate::contact::law::{Fault, Now};
 use crate::contact::substeps::{Cut, Limits, MOST_SUBSTEPS};
 use crate::shape::{Faces, Surface};
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// Depth over half of a solid's thickness from which its other side may soon be the nearer one.
 pub(super) const THROUGH: f64 = 0.8;
@@ -30,7 +31,7 @@ pub(super) struct Middles {
 }
 
 impl Middles {
-    pub fn new(bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Self {
+    pub fn new(bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) -> Self {
         let thinnest = |half: DVec3, faces: Faces| {
             let open = |axis: usize| (faces >> (2 * axis) & 3).count_ones();
             let of = |axis: usize| match open(axis) {
@@ -41,7 +42,7 @@ impl Middles {
             (0..3).map(of).fold(f64::INFINITY, f64::min)
         };
         // of a ball there is one face, all round
-        let of = |(b, s): (&Body, &Surface)| {
+        let of = |(b, s): (&Body, &Arc<Surface>)| {
             s.ball.unwrap_or_else(|| thinnest(b.shape.extent(DMat3::IDENTITY), s.all_faces))
         };
         Self {

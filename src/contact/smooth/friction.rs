@@ -211,6 +211,14 @@ impl Slip {
         {
             return false;
         }
+        // most patches of a heap stick, and nothing else is worked out for them
+        let stops = self.inverse * -velocity;
+        if sticks(self.impulse + stops, self.cap, self.spread.is_some()) {
+            self.impulse += stops;
+            (self.left, self.remaining) = (None, 0.0);
+            self.kick(bodies, stops);
+            return stops.length() > TOLERANCE * self.cap;
+        }
         let wanted = self.response * self.impulse - velocity;
         let system = System { response: self.response, inverse: self.inverse, wanted, cap: self.cap };
         let impulse = match self.spread {
@@ -243,6 +251,17 @@ impl Slip {
         if let Some(b) = self.b {
             bodies[b].kick(-push, -self.arm_b.cross(push) - twist);
         }
+    }
+}
+
+/// Whether a patch, an area or a point, of at most `cap` [N s] takes the impulse that `stops` it [N s] without slipping.
+fn sticks(stops: DVec3, cap: f64, area: bool) -> bool {
+    match area {
+        true => {
+            let ellipsoid = stops.length_squared() <= (STICKS * cap).powi(2);
+            ellipsoid || DVec2::new(stops.x, stops.y).length() + stops.z.abs() <= cap
+        }
+        false => stops.length_squared() <= cap * cap,
     }
 }
 
@@ -312,7 +331,7 @@ impl System {
     fn field(&self, spread: DMat2, guess: DVec3) -> DVec3 {
         let Self { response, inverse, wanted, cap } = *self;
         let stops = inverse * wanted;
-        if stops.length() <= STICKS * cap || DVec2::new(stops.x, stops.y).length() + stops.z.abs() <= cap {
+        if sticks(stops, cap, true) {
             return stops;
         }
         let trace = response.x_axis.x + response.y_axis.y + response.z_axis.z;

@@ -42,6 +42,7 @@ use friction::Friction;
 use pair::{Constants, LEAST, Other, Pair};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 use walls::WallBox;
 
 /// The smooth law.
@@ -64,7 +65,8 @@ const STOP_DEPTH: f64 = 0.25;
 
 /// The law: geometry, pairs, and those on a device.
 pub(crate) struct Smooth {
-    pub surfaces: Vec<Surface>,
+    /// One for all solids that are alike.
+    pub surfaces: Vec<Arc<Surface>>,
     pub walls: Vec<WallBox>,
     pub pairs: Vec<Pair>,
     friction: Friction,
@@ -80,10 +82,26 @@ pub(crate) struct Smooth {
     on_device: bool,
 }
 
+/// The surface of each solid: of a thousand equal ones there is one, which stays in the processor's caches.
+fn shared(scene: &Scene) -> Vec<Arc<Surface>> {
+    let equal = |a: &Solid, b: &Solid| {
+        a.shape == b.shape && a.wall_offset == b.wall_offset && a.wall_to_surface == b.wall_to_surface
+    };
+    let mut made: Vec<(&Solid, Arc<Surface>)> = vec![];
+    let of = |solid| match made.iter().find(|(known, _)| equal(known, solid)) {
+        Some((_, surface)) => surface.clone(),
+        None => {
+            let surface = Arc::new(solid.surface(scene.spacing, scene.dimensions));
+            made.push((solid, surface.clone()));
+            surface
+        }
+    };
+    scene.solids.iter().map(of).collect()
+}
+
 impl Smooth {
     pub fn new(scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Self {
-        let of = |s: &Solid| s.surface(scene.spacing, scene.dimensions);
-        let surfaces: Vec<Surface> = scene.solids.iter().map(of).collect();
+        let surfaces = shared(scene);
         let walls = walls::walls(scene);
         let middles = Middles::new(bodies, &surfaces, &walls);
         let harmless = (fault::THROUGH * middles.least()).min(fault::DRIVEN * scene.spacing);
@@ -113,7 +131,7 @@ impl Smooth {
 
     /// Whether any solid is round somewhere.
     fn is_round(&self) -> bool {
-        self.surfaces.iter().any(Surface::is_round)
+        self.surfaces.iter().any(|s| s.is_round())
     }
 
     /// Whether the lists are those of `candidates`.

@@ -5,6 +5,7 @@ use super::walls::WallBox;
 use crate::body::{Body, Wrench};
 use crate::shape::{Faces, Inside, Line, Shape, Surface};
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// What a free solid touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -187,8 +188,9 @@ impl Contact {
     }
 
     /// s_i of a point in a contact of effective depth `depth` [m].
+    #[inline]
     fn share(&self, depth: f64) -> f64 {
-        let x = self.depth / depth;
+        let x = self.depth * depth.recip();
         self.weight * (x * x) * (x * x) * (x * x)
     }
 }
@@ -238,7 +240,12 @@ impl Patch {
 /// `share` times the products of the parts of `arm` [m].
 fn square(arm: DVec3, share: f64) -> DMat3 {
     let weighed = share * arm;
-    DMat3::from_cols(arm.x * weighed, arm.y * weighed, arm.z * weighed)
+    let (xy, xz, yz) = (weighed.x * arm.y, weighed.x * arm.z, weighed.y * arm.z);
+    DMat3::from_cols(
+        DVec3::new(weighed.x * arm.x, xy, xz),
+        DVec3::new(xy, weighed.y * arm.y, yz),
+        DVec3::new(xz, yz, weighed.z * arm.z),
+    )
 }
 
 /// A pair of solids close to each other.
@@ -317,7 +324,7 @@ impl Pair {
         &mut self,
         way: f64,
         bodies: &[Body],
-        surfaces: &[Surface],
+        surfaces: &[Arc<Surface>],
         walls: &[WallBox],
     ) -> bool {
         if self.depth > 0.0 && self.depth.is_finite() {
@@ -376,7 +383,7 @@ impl Pair {
     pub fn find_beside_device(
         &mut self,
         bodies: &[Body],
-        surfaces: &[Surface],
+        surfaces: &[Arc<Surface>],
         walls: &[WallBox],
         spacing: f64,
         open: u32,
@@ -434,7 +441,7 @@ impl Pair {
     }
 
     /// The second solid.
-    pub(super) fn other(&self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) -> Frame {
+    pub(super) fn other(&self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) -> Frame {
         match self.b {
             Other::Solid(b) => Frame::body(&bodies[b], surfaces[b].all_faces),
             Other::Wall(w) => Frame::wall(&walls[w]),
@@ -447,7 +454,7 @@ impl Pair {
     }
 
     /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's shape.
-    pub fn collect(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
+    pub fn collect(&mut self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
         let near = |surface: &Surface, own: &Body, to: Frame| {
             let turn = to.axes.transpose() * own.rotation;
@@ -459,7 +466,7 @@ impl Pair {
         let other = self.other(bodies, surfaces, walls);
         let own = Frame::body(body, surfaces[self.a].all_faces);
         let theirs = self.b.solid().map(|b| &surfaces[b]);
-        self.round = surfaces[self.a].is_round() || theirs.is_some_and(Surface::is_round);
+        self.round = surfaces[self.a].is_round() || theirs.is_some_and(|s| s.is_round());
         self.round &= other.shape.outside(other.local(own.center)) < own.shape.radius() + skin
             && own.shape.outside(own.local(other.center)) < other.shape.radius() + skin;
         if surfaces[self.a].ball.is_some() || theirs.is_some_and(|s| s.ball.is_some()) {
@@ -473,7 +480,13 @@ impl Pair {
     }
 
     /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's shape.
-    pub fn collect_edges(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox], skin: f64) {
+    pub fn collect_edges(
+        &mut self,
+        bodies: &[Body],
+        surfaces: &[Arc<Surface>],
+        walls: &[WallBox],
+        skin: f64,
+    ) {
         let body = &bodies[self.a];
         let own = Frame::body(body, surfaces[self.a].all_faces);
         let other = self.other(bodies, surfaces, walls);
@@ -508,7 +521,7 @@ impl Pair {
     pub fn evaluate(
         &mut self,
         bodies: &[Body],
-        surfaces: &[Surface],
+        surfaces: &[Arc<Surface>],
         walls: &[WallBox],
         spacing: f64,
         least: f64,
@@ -528,7 +541,7 @@ impl Pair {
     }
 
     /// The points inside the other solid, with depth, normal and separating speed.
-    fn find(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+    fn find(&mut self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) {
         let a = &bodies[self.a];
         let own = Frame::body(a, surfaces[self.a].all_faces);
         let other = self.other(bodies, surfaces, walls);
@@ -572,7 +585,7 @@ impl Pair {
     fn find_edges(
         &mut self,
         bodies: &[Body],
-        surfaces: &[Surface],
+        surfaces: &[Arc<Surface>],
         walls: &[WallBox],
         spacing: f64,
         least: f64,
@@ -608,7 +621,7 @@ impl Pair {
     }
 
     /// Balls, rings and round sides of both inside the other one.
-    fn find_round(&mut self, bodies: &[Body], surfaces: &[Surface], walls: &[WallBox]) {
+    fn find_round(&mut self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) {
         let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
         let other = self.other(bodies, surfaces, walls);
         let theirs = self.b.solid().map(|b| &surfaces[b]);
@@ -644,19 +657,30 @@ impl Pair {
         let along = view.turn * line.along;
         let first = self.contacts.len();
         let mut push = DVec3::ZERO;
-        let a = &bodies[self.a];
-        let b = self.b.solid().map(|b| &bodies[b]);
         let least = view.least / density;
+        // places and velocities are linear along the edge: each node adds its share to those at the start
+        let (origin, direction) = (other.center + other.axes * start, other.axes * along);
+        let a = &bodies[self.a].pose;
+        let (mut slip, mut spin) = (a.velocity_at(origin), a.angular_velocity);
+        if let Some(b) = self.b.solid().map(|b| &bodies[b].pose) {
+            slip -= b.velocity_at(origin);
+            spin -= b.angular_velocity;
+        }
+        let turning = spin.cross(direction);
         other.shape.each_node((start, along, line.length), other.faces, least, |node, inside| {
             let (s, width) = (node.place, node.length);
-            let at = other.center + other.axes * (start + s * along);
             let normal = sign * (other.axes * inside.outward);
-            let velocity_b = b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
-            let speed = (a.pose.velocity_at(at) - velocity_b).dot(normal);
             push += width * inside.depth.powi(7) * inside.outward;
-            let stretch = node.deviation * (other.axes * along);
-            let contact = Contact::new(at, normal, inside.depth, density * width, speed, key);
-            self.contacts.push(Contact { stretch, ..contact });
+            self.contacts.push(Contact {
+                at: origin + s * direction,
+                normal,
+                depth: inside.depth,
+                weight: density * width,
+                speed: (slip + s * turning).dot(normal),
+                stretch: node.deviation * direction,
+                force: 0.0,
+                patch: key,
+            });
         });
         let toward = push.abs();
         let axis = toward.max_position();
@@ -675,7 +699,8 @@ impl Pair {
     fn press(&mut self) {
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
-        let sum: f64 = self.contacts.iter().map(|c| c.weight * eighth(c.depth / deepest)).sum();
+        let per_deepest = deepest.recip();
+        let sum: f64 = self.contacts.iter().map(|c| c.weight * eighth(c.depth * per_deepest)).sum();
         let mean = sum.sqrt().sqrt().sqrt();
         let depth = deepest * mean;
         self.depth = deepest;
@@ -701,38 +726,50 @@ impl Pair {
     }
 
     /// Wrenches and patches. Both solids get the same force at the same point, so momentum and angular
-    /// momentum are exchanged exactly.
+    /// momentum are exchanged to round-off.
     fn sum(&mut self, bodies: &[Body]) {
         let center_a = bodies[self.a].pose.position;
         let center_b = match self.b {
             Other::Solid(b) => bodies[b].pose.position,
             Other::Wall(_) => DVec3::ZERO,
         };
-        for c in &self.contacts {
+        let mut all = Wrench::default();
+        // contacts of a patch mostly follow each other
+        let mut known = 0;
+        for c in self.contacts.iter().filter(|c| c.force > 0.0) {
             let force = c.force * c.normal;
-            self.wrench[0] += Wrench { force, torque: (c.at - center_a).cross(force) };
-            self.wrench[1] += Wrench { force: -force, torque: -(c.at - center_b).cross(force) };
+            all += Wrench { force, torque: (c.at - center_a).cross(force) };
             let key = c.patch;
-            let known = self.patches.iter().position(|p| p.key == key);
-            let patch = known.unwrap_or_else(|| {
-                self.patches.push(Patch::new(key, DVec3::ZERO, 0.0, DVec3::ZERO, DMat3::ZERO));
-                self.patches.len() - 1
-            });
-            let patch = &mut self.patches[patch];
+            if self.patches.get(known).is_none_or(|p| p.key != key) {
+                known = self.patches.iter().position(|p| p.key == key).unwrap_or_else(|| {
+                    self.patches.push(Patch::new(key, DVec3::ZERO, 0.0, DVec3::ZERO, DMat3::ZERO));
+                    self.patches.len() - 1
+                });
+            }
+            let patch = &mut self.patches[known];
             patch.normal += force;
             patch.pressing += c.force;
             patch.at += c.force * c.at;
         }
+        let about_b = all.torque + (center_a - center_b).cross(all.force);
+        self.wrench[0] += all;
+        self.wrench[1] += Wrench { force: -all.force, torque: -about_b };
         self.patches.retain_mut(|p| {
             p.force = p.normal.length();
             p.normal = p.normal.normalize_or_zero();
             p.at /= p.pressing.max(f64::MIN_POSITIVE);
             p.force > 0.0
         });
-        for c in &self.contacts {
-            if let Some(patch) = self.patches.iter_mut().find(|p| p.key == c.patch) {
-                let share = c.force / patch.pressing;
-                patch.spread += square(c.at - patch.at, share) + square(c.stretch, share);
+        known = 0;
+        for c in self.contacts.iter().filter(|c| c.force > 0.0) {
+            if self.patches.get(known).is_none_or(|p| p.key != c.patch) {
+                known = self.patches.iter().position(|p| p.key == c.patch).unwrap_or(usize::MAX);
+            }
+            let Some(patch) = self.patches.get_mut(known) else { continue };
+            let share = c.force / patch.pressing;
+            patch.spread += square(c.at - patch.at, share);
+            if c.stretch != DVec3::ZERO {
+                patch.spread += square(c.stretch, share);
             }
         }
     }
