@@ -201,9 +201,10 @@ fn random_drops_of_the_dam_break_cube_end_flat_and_still() {
     if !device() {
         return;
     }
-    let row = drops_together(40, 1.0, |s, c| Ok(Some(compute(s, c)))).expect("it runs");
+    // Those of the host drop forty.
+    let row = drops_together(12, 1.0, |s, c| Ok(Some(compute(s, c)))).expect("it runs");
     println!("{row:?}");
-    assert_eq!((row.flat, row.at_rest, row.kept), (40, 40, 40), "{row:?}");
+    assert_eq!((row.flat, row.at_rest, row.kept), (12, 12, 12), "{row:?}");
     assert!(row.rise < 0.0 && row.energy_gain < 0.0 && row.penetration < 0.1, "{row:?}");
 }
 

@@ -186,9 +186,9 @@ fn a_floating_cube_is_carried_by_its_displacement() {
     let case = tank_with_cube(s, 0.4, "sound_speed = 4");
     let mut sim = simulation(&case);
     let (mut force, mut height, mut level, mut count) = (0.0, 0.0, 0.0, 0.0);
-    while sim.time < 1.2 {
+    while sim.time < 0.9 {
         sim.step().expect("the cube floats");
-        if sim.time > 0.6 {
+        if sim.time > 0.45 {
             force += sim.fluid_force[0].force.z;
             height += sim.solids.poses()[0].position.z;
             let m = sim.backend.monitor().expect("water");

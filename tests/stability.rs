@@ -6,6 +6,7 @@ use seixo_study::row::{Class, Row};
 use seixo_study::{builtin, stability_contact};
 
 fn rows(name: &str, keep: impl Fn(&str) -> bool) -> Vec<Row> {
+    crate::common::alone();
     let mut study = builtin::find(name, &Setup::default()).expect("the study is built in");
     study.jobs.retain(|job| keep(&job.method));
     assert!(!study.jobs.is_empty());

@@ -26,7 +26,22 @@ pub fn program() -> std::process::Command {
     }
 }
 
+thread_local! {
+    static ALONE: () = {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+        // on a thread of a pool that a test has made, it stays with that
+        drop(pool);
+    };
+}
+
+/// From here on the test computes on its own thread: tests stand side by side on all cores, and small scenes spend as much on handing
+/// work to others as on the work. That threads change no bit has tests of its own.
+pub fn alone() {
+    ALONE.with(|()| ());
+}
+
 pub fn case(text: &str) -> Case {
+    alone();
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
@@ -35,6 +50,7 @@ pub fn simulation(case: &Case) -> Simulation {
 }
 
 pub fn cpu_simulation(case: &Case, scene: impl Into<Arc<Scene>>) -> Simulation {
+    alone();
     Simulation::on(case, scene, &Processor::Cpu).expect("the simulation starts")
 }
 
