@@ -71,7 +71,7 @@ fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
             let iterations = count(Stage::ConjugateGradient) - STEPS * (once.dispatches + verdict);
             let each = solve.iteration + solve.cycle;
             println!("{solve:?}");
-            assert!(iterations >= STEPS * each.dispatches && iterations % each.dispatches == 0);
+            assert!(iterations >= STEPS * each.dispatches && iterations.is_multiple_of(each.dispatches));
             assert!(solve.build.bytes < 2 * each.bytes && solve.build.dispatches < 2 * each.dispatches);
         }
     }
