@@ -303,24 +303,24 @@ mod tests {
         assert!(sine(0.0, 1.0, 0.0, 0.0).is_still() && !f.is_still());
     }
 
-    #[test]
-    fn many_sines_hold_together() {
+    /// Eight sines that repeat after 4 s.
+    fn eight() -> Vec<Component> {
         let of = |k: u32| Component {
             amplitude: 0.02 / f64::from(k),
             frequency: f64::from(k) * TAU / 4.0,
             phase: f64::from(k * k),
         };
-        holds_together(&Formula::sines((1..9).map(of).collect(), 1.0, 4.0), 12.0);
+        (1..9).map(of).collect()
+    }
+
+    #[test]
+    fn many_sines_hold_together() {
+        holds_together(&Formula::sines(eight(), 1.0, 4.0), 12.0);
     }
 
     #[test]
     fn looks_at_all_times_at_once_are_those_at_each() {
-        let of = |k: u32| Component {
-            amplitude: 0.02 / f64::from(k),
-            frequency: f64::from(k) * TAU / 4.0,
-            phase: f64::from(k * k),
-        };
-        let components: Vec<Component> = (1..9).map(of).collect();
+        let components = eight();
         let looks = Looks { count: 3 * BLOCK + 5, repeat: 4.0 };
         let sums = looks.sums(&components);
         assert_eq!(sums.len(), looks.count + 1);

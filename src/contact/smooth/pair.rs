@@ -237,6 +237,12 @@ impl Patch {
     }
 }
 
+/// Place of the patch `key`. Contacts of one mostly follow each other: that at `last` is looked at first.
+fn place(patches: &[Patch], key: u8, last: usize) -> Option<usize> {
+    let same = patches.get(last).is_some_and(|p| p.key == key);
+    if same { Some(last) } else { patches.iter().position(|p| p.key == key) }
+}
+
 /// `share` times the products of the parts of `arm` [m].
 fn square(arm: DVec3, share: f64) -> DMat3 {
     let weighed = share * arm;
@@ -734,18 +740,15 @@ impl Pair {
             Other::Wall(_) => DVec3::ZERO,
         };
         let mut all = Wrench::default();
-        // contacts of a patch mostly follow each other
         let mut known = 0;
         for c in self.contacts.iter().filter(|c| c.force > 0.0) {
             let force = c.force * c.normal;
             all += Wrench { force, torque: (c.at - center_a).cross(force) };
             let key = c.patch;
-            if self.patches.get(known).is_none_or(|p| p.key != key) {
-                known = self.patches.iter().position(|p| p.key == key).unwrap_or_else(|| {
-                    self.patches.push(Patch::new(key, DVec3::ZERO, 0.0, DVec3::ZERO, DMat3::ZERO));
-                    self.patches.len() - 1
-                });
-            }
+            known = place(&self.patches, key, known).unwrap_or_else(|| {
+                self.patches.push(Patch::new(key, DVec3::ZERO, 0.0, DVec3::ZERO, DMat3::ZERO));
+                self.patches.len() - 1
+            });
             let patch = &mut self.patches[known];
             patch.normal += force;
             patch.pressing += c.force;
@@ -762,10 +765,9 @@ impl Pair {
         });
         known = 0;
         for c in self.contacts.iter().filter(|c| c.force > 0.0) {
-            if self.patches.get(known).is_none_or(|p| p.key != c.patch) {
-                known = self.patches.iter().position(|p| p.key == c.patch).unwrap_or(usize::MAX);
-            }
-            let Some(patch) = self.patches.get_mut(known) else { continue };
+            let Some(found) = place(&self.patches, c.patch, known) else { continue };
+            known = found;
+            let patch = &mut self.patches[known];
             let share = c.force / patch.pressing;
             patch.spread += square(c.at - patch.at, share);
             if c.stretch != DVec3::ZERO {
