@@ -236,6 +236,11 @@ struct Obstruction<'a> {
 impl Obstruction<'_> {
     /// How deep `body`, placed as `own`, reaches into it [m], and the way out; what is convex is told apart by planes.
     fn way_out(&self, own: &Placed, body: &Solid, tolerance: f64) -> (f64, DVec3) {
+        // most of a heap
+        let (gap, axis) = own.apart(&self.placed);
+        if gap > 0.0 {
+            return (-gap, axis);
+        }
         let (overlap, out) = own.way_out(&self.placed);
         if overlap <= tolerance || own.is_convex() && self.placed.is_convex() {
             return (overlap, out);
