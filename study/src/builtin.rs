@@ -2,8 +2,8 @@
 
 use super::definition::{Definition, Files, Setup};
 use super::{
-    Study, cases, compare, contact_cost, contact_hard, contact_random, dry_studies, gallery, needs,
-    pressure_size, pressure_solve, stability, wall_of_cubes, work_precision,
+    Study, cases, compare, contact_cost, contact_hard, contact_random, contact_repose, dry_studies, gallery,
+    needs, pressure_size, pressure_solve, stability, wall_of_cubes, work_precision,
 };
 use seixo::error::{Error, Result};
 
@@ -115,6 +115,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "contact-random",
         about: "random scenes of solids: energy never rises, nothing goes through a wall, the same bits twice",
         make: Maker::Function(contact_random::study),
+    },
+    Entry {
+        name: "contact-repose",
+        about: "the angle of repose of 320 balls against the coefficient of friction",
+        make: Maker::Function(contact_repose::study),
     },
 ];
 

@@ -21,6 +21,7 @@ pub mod contact_checks;
 pub mod contact_cost;
 pub mod contact_hard;
 pub mod contact_random;
+pub mod contact_repose;
 pub mod contact_rest;
 pub mod contact_statics;
 pub mod definition;
