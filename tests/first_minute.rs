@@ -30,6 +30,33 @@ fn every_case_to_begin_with_fits_its_lattice_and_runs() {
 }
 
 #[test]
+fn many_bodies_are_not_told_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text =
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -10]\n[contact]\nspring = 1e4\n\
+                    [[obstacle]]\nname = \"ground\"\nmin = [0, 0, -0.1]\nmax = [1, 0.5, 0]\n"
+            .to_owned();
+    for k in 0..25 {
+        let center = [0.1 * f64::from(k % 5) + 0.1, 0.1 * f64::from(k / 5) + 0.05, 0.1];
+        text += &format!(
+            "[[body]]\nname = \"wedge {k}\"\nshape = \"wedge\"\nsize = [0.08, 0.08, 0.06]\ncenter = {center:?}\n\
+             density = {}\n",
+            500 + k
+        );
+    }
+    std::fs::write(folder.path().join("heap.toml"), text).unwrap();
+    let args = ["run", "heap.toml", "--backend", "cpu", "--steps", "1"];
+    let output = seixo().current_dir(folder.path()).args(args).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success(), "{err}");
+    assert_eq!(err.matches("less than two particles").count(), 3, "{err}");
+    assert!(err.contains("note: 22 more like these"), "{err}");
+    assert_eq!(out.matches(": at (").count(), 20, "{out}");
+    assert!(out.contains("5 more bodies: in result.json"), "{out}");
+}
+
+#[test]
 fn a_case_comes_from_a_pipe() {
     let folder = tempfile::tempdir().unwrap();
     let text = ran(&["init", "dam-break", "-"]).out;

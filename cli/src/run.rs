@@ -271,6 +271,9 @@ pub fn run(args: &RunArgs) -> Exit {
     }
 }
 
+/// So many bodies are named at the end.
+const BODIES: usize = 20;
+
 fn words(summary: &Summary, out: &Path) -> String {
     let m = &summary.monitors;
     // Why a run failed is an error, and said as one.
@@ -301,9 +304,12 @@ fn words(summary: &Summary, out: &Path) -> String {
         ));
     }
     lines.push(format!("energy: {:.6e} J at the start, {:.6e} J at the end", m.energy_start, m.energy_end));
-    for body in &summary.bodies {
+    for body in summary.bodies.iter().take(BODIES) {
         let [x, y, z] = body.position_m;
         lines.push(format!("{}: at ({x:.4}, {y:.4}, {z:.4}) m", body.name));
+    }
+    if summary.bodies.len() > BODIES {
+        lines.push(format!("{} more bodies: in result.json", summary.bodies.len() - BODIES));
     }
     if summary.verdict.grade == Grade::Fine {
         lines.push("verdict: fine".into());

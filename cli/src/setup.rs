@@ -6,6 +6,7 @@ use seixo::console::remark;
 use seixo::error::{Error, Result};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -36,7 +37,7 @@ impl Setup {
         let scene = Arc::new(Scene::build(&loaded.case).map_err(|e| loaded.placed(e))?);
         if !quiet {
             loaded.warnings.iter().for_each(|w| remark(w));
-            scene.notes.iter().for_each(|n| remark(&format!("note: {n}")));
+            few(&scene.notes).for_each(|n| remark(&format!("note: {n}")));
         }
         Ok(Self { name, loaded, scene })
     }
@@ -48,6 +49,27 @@ impl Setup {
     pub fn simulation(&self, args: &DeviceArgs) -> Result<Simulation> {
         Simulation::on(&self.loaded.case, self.scene.clone(), &device::processor(args)?)
     }
+}
+
+/// So many notes that differ by names and numbers only are shown.
+const ALIKE: usize = 3;
+
+/// The `notes` without those that only tell once more what [`ALIKE`] others tell, and how many these are.
+fn few(notes: &[String]) -> impl Iterator<Item = String> {
+    // names stand in backticks
+    let without_names = |note: &String| note.split('`').step_by(2).collect::<String>();
+    let number = |c: char| c.is_ascii_digit() || ".-e".contains(c);
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    let mut shown = vec![];
+    for note in notes {
+        let count = counts.entry(without_names(note).replace(number, "")).or_default();
+        *count += 1;
+        if *count <= ALIKE {
+            shown.push(note.clone());
+        }
+    }
+    let more: usize = counts.values().map(|n| n.saturating_sub(ALIKE)).sum();
+    shown.into_iter().chain((more > 0).then(|| format!("{more} more like these, of other names")))
 }
 
 /// Read a case.

@@ -106,7 +106,6 @@ fn share(mesh: &Mesh, spacing: f64, wall: &Cells, out: &mut Particles) {
     if wall.points.is_empty() {
         return;
     }
-    let mut reach = 2.0 * spacing;
     for triangle in mesh.triangles.triangles() {
         let [a, b, c] = [triangle.a, triangle.b, triangle.c];
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -117,6 +116,7 @@ fn share(mesh: &Mesh, spacing: f64, wall: &Cells, out: &mut Particles) {
             for j in 0..n as i32 - i {
                 let (i, j) = (f64::from(i), f64::from(j));
                 let mut give = |at: DVec3| {
+                    let mut reach = spacing;
                     let nearest = loop {
                         match wall.nearest(at, reach) {
                             Some(k) => break k,
