@@ -57,6 +57,34 @@ fn many_bodies_are_not_told_one_by_one() {
 }
 
 #[test]
+fn of_many_problems_the_first_are_told() {
+    let mut text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[contact]\nspring = 1e4\n\
+                    [[obstacle]]\nname = \"ground\"\nmin = [0, 0, -0.1]\nmax = [4, 0.5, 0]\n"
+        .to_owned();
+    for k in 0..30 {
+        let x = 0.1 + 0.1 * f64::from(k);
+        text += &format!(
+            "[[body]]\nname = \"sunk {k}\"\nsize = [0.06, 0.06, 0.06]\ncenter = [{x}, 0.2, 0.02]\ndensity = 500\n"
+        );
+    }
+    let Err(error) = text.parse::<seixo::Case>().and_then(|case| seixo::scene::Scene::build(&case)) else {
+        panic!("they are in the ground");
+    };
+    let seixo::Error::Case(found) = &error else { panic!("{error}") };
+    assert_eq!(found.problems.len(), 30);
+    assert!(
+        error.to_string().starts_with("30 problems at t = 0:") && error.to_string().ends_with("and 10 more"),
+        "{error}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sunk.toml"), text).unwrap();
+    let output = seixo().current_dir(folder.path()).args(["plan", "sunk.toml"]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), said.matches("overlaps wall").count()), (Some(2), 20), "{said}");
+    assert!(said.contains("and 10 more"), "{said}");
+}
+
+#[test]
 fn a_case_comes_from_a_pipe() {
     let folder = tempfile::tempdir().unwrap();
     let text = ran(&["init", "dam-break", "-"]).out;

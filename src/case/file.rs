@@ -46,7 +46,10 @@ impl Loaded {
         };
         let Some(messages) = found.problems.iter().map(of).collect::<Option<Vec<_>>>() else { return error };
         let name = self.path.display().to_string();
-        let mut report = render(&name, &self.text, &messages);
+        let mut report = render(&name, &self.text, &messages[..messages.len().min(MOST_SHOWN)]);
+        if messages.len() > MOST_SHOWN {
+            report.push_str(&format!("\n\nerror: and {} more", messages.len() - MOST_SHOWN));
+        }
         if self.overridden {
             report.push_str(OVERRIDDEN);
         }

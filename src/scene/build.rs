@@ -39,12 +39,20 @@ impl Scene {
     }
 }
 
+/// Problems that are told; nobody reads a thousand.
+const MOST_TOLD: usize = 20;
+
 /// Problems of a scene as one text.
 fn listed(problems: &[Problem]) -> String {
-    let lines: Vec<String> = problems.iter().map(|p| format!("{}: {}", p.message, p.remedy)).collect();
+    let lines: Vec<String> =
+        problems.iter().take(MOST_TOLD).map(|p| format!("{}: {}", p.message, p.remedy)).collect();
     match lines.as_slice() {
         [one] => one.clone(),
-        many => format!("{} problems at t = 0:\n  - {}", many.len(), many.join("\n  - ")),
+        many => {
+            let more = problems.len() - many.len();
+            let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+            format!("{} problems at t = 0:\n  - {}{more}", problems.len(), many.join("\n  - "))
+        }
     }
 }
 
