@@ -118,7 +118,7 @@ pub const ENTRIES: &[Entry] = &[
     },
     Entry {
         name: "contact-repose",
-        about: "the angle of repose of 320 balls against the coefficient of friction",
+        about: "the angle of repose of 500 balls against the coefficient of friction",
         make: Maker::Function(contact_repose::study),
     },
 ];

@@ -20,12 +20,12 @@ use std::time::Instant;
 /// Diameter of a ball [m]; the rim of the tray is as high.
 const GRAIN: f64 = 0.02;
 /// Balls along an edge of the tray, and layers of them.
-const ROW: i32 = 8;
+const ROW: i32 = 10;
 const LAYERS: i32 = 5;
 /// Distances between the balls at the start over the diameter, across and up, and by how much chance moves them.
 const PITCH: (f64, f64, f64) = (1.06, 1.08, 0.02);
-/// Half of the tray's edge [m]: what rolls off a heap falls off the tray, so that no run-out makes it flatter.
-const TRAY: f64 = 0.5 * ROW as f64 * PITCH.0 * GRAIN;
+/// Half of the tray's edge [m], a multiple of the spacing: what rolls off a heap falls off the tray, so that no run-out makes it flatter.
+const TRAY: f64 = 0.11;
 /// Half of the edge of the floor, below all that the walls ever are, that catches what falls off [m].
 const FLOOR: f64 = 2.0;
 /// Time step [s].
@@ -175,7 +175,7 @@ fn finish(rows: &mut [Row], _: Option<f64>) -> Result<Report> {
     let block = Series::line("atan mu: a block on a slope", "#000000", Stroke::Dashed, slide);
     let chart = Chart {
         title: "Angle of repose".into(),
-        subtitle: "320 balls of 20 mm on a tray of 170 mm".into(),
+        subtitle: "500 balls of 20 mm on a tray of 220 mm".into(),
         x: Axis::linear("mu [-]"),
         y: Axis::linear("angle of the heap [degrees]"),
         series: vec![line, block],
@@ -195,7 +195,7 @@ pub fn study(setup: &Setup) -> Study {
     Study {
         name: "contact-repose".into(),
         title: "Angle of repose".into(),
-        question: "320 balls of 20 mm lie on a tray of 170 mm, its rim a ball high, between walls that then sink to the rim at 0.15 m/s: what is not \
+        question: "500 balls of 20 mm lie on a tray of 220 mm, its rim a ball high, between walls that then sink to the rim at 0.15 m/s: what is not \
                    held rolls off the tray. Two seconds later the slope of the heap that stays is fitted by least squares to the heights of its \
                    envelope over the distance from the nearest edge, between 20 and 80 % of half of the tray, against the coefficient of \
                    friction of all contacts. Nothing hinders a ball from rolling."
