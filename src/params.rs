@@ -7,6 +7,7 @@ use crate::periodic::Periodic;
 use crate::scene::Scene;
 use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// How gamma of Eq. (8) follows from the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,7 +132,7 @@ pub struct Params {
 }
 
 /// Coefficients of one step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// Time at the start of the step [s].
     pub time: f64,

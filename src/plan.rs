@@ -18,7 +18,7 @@ macro_rules! stages {
 
         /// A stage that sweeps over the particles and needs nothing but the step's coefficients: what
         /// [`crate::backend::Backend::run`] takes. The others have calls of their own.
-        #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+        #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
         pub enum ParticleStage {
             $($(#[doc = concat!("`", $text, "`")] $particles,)?)*
         }

@@ -78,7 +78,7 @@ pub struct Simulation {
 }
 
 /// When the PPE's solver stops.
-fn settings(case: &Case) -> Settings {
+pub(crate) fn settings(case: &Case) -> Settings {
     let solver = case.fluid.as_ref().map(|f: &Fluid| f.solver.clone()).unwrap_or_default();
     Settings {
         tolerance: solver.tolerance,

@@ -225,6 +225,7 @@ fn system<'a>(cpu: &'a Cpu, params: &Params) -> System<'a> {
         diagonal: &cpu.fields().diagonal,
         coefficient: laplacian_coefficient(params),
         bodies: &[],
+        among: None,
     }
 }
 

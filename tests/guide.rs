@@ -107,10 +107,15 @@ fn words(line: &str) -> Vec<String> {
 /// The commands of the program in a block, without its name.
 fn commands(text: &str) -> Vec<Vec<String>> {
     let joined = text.replace("\\\n", " ");
-    let lines =
-        joined.lines().map(|line| line.trim_start().trim_start_matches("$ ").trim_start_matches("srun "));
+    let launched =
+        |line: &'_ str| ["mpirun ", "srun "].into_iter().any(|launcher| line.starts_with(launcher));
+    let plain = joined.lines().map(|line| line.trim_start().trim_start_matches("$ ").to_owned());
+    let lines = plain.map(|line| match line.find(" seixo ") {
+        Some(at) if launched(&line) => line[at + 1..].to_owned(),
+        _ => line,
+    });
     let own = lines.filter(|line| line.starts_with("seixo "));
-    own.map(|line| words(line).split_off(1)).collect()
+    own.map(|line| words(&line).split_off(1)).collect()
 }
 
 /// What a case that a page shows needs beside it.
@@ -238,6 +243,7 @@ pages! {
     how_to_let_water_in "howto-inflow.md" 3 0;
     how_to_restart "howto-restart.md" 1 5;
     how_to_sweep "howto-cluster.md" 1 5;
+    how_to_use_ranks "howto-ranks.md" 0 4;
     how_to_look "howto-look.md" 1 6;
     from_dualsphysics "dualsphysics.md" 1 0;
     the_shapes "shapes.md" 1 0;

@@ -474,6 +474,7 @@ fn system<'a>(cpu: &'a Cpu, params: &Params) -> System<'a> {
         diagonal: &f.diagonal,
         coefficient: laplacian_coefficient(params),
         bodies: &[],
+        among: None,
     }
 }
 

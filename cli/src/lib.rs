@@ -10,6 +10,7 @@ mod keys;
 mod measure;
 mod plan;
 mod progress;
+mod ranks;
 mod render;
 mod report;
 mod run;

@@ -22,6 +22,7 @@ use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
 use seixo::run::summary::particles;
 use seixo::scene::{Drive, Solid};
+use seixo::share::Outlook;
 use seixo::time_step::{Bounds, collapse_speed, time_step};
 use seixo::waves::WaveKind;
 use serde::Serialize;
@@ -30,6 +31,9 @@ use serde::Serialize;
 pub struct PlanArgs {
     #[command(flatten)]
     case: CaseArgs,
+    /// Tell what each of so many ranks would have and say (mpirun -n N seixo run).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    ranks: Option<u16>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -185,6 +189,9 @@ struct Report {
     stages: Vec<StageLine>,
     contact: ContactLine,
     scheme: Option<Scheme>,
+    /// As many ranks as were asked about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ranks: Option<Outlook>,
     /// From the case alone, as `run` judges it.
     estimate: Estimate,
     advice: Vec<String>,
@@ -227,7 +234,7 @@ impl Seen {
 
 pub fn plan(args: &PlanArgs) -> Exit {
     seixo::threads::start(None)?;
-    let report = report(&Seen::new(&args.case, args.json)?)?;
+    let report = report(&Seen::new(&args.case, args.json)?, args.ranks)?;
     if args.json {
         say_json(&report);
     } else {
@@ -236,7 +243,7 @@ pub fn plan(args: &PlanArgs) -> Exit {
     Ok(0)
 }
 
-fn report(seen: &Seen) -> Result<Report> {
+fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let (case, scene, built) = (&seen.case, &seen.setup.scene, seen.coarser == 1.0);
     let params = Params::new(case, scene)?;
     let plan = Plan::new(case, scene, &params);
@@ -253,6 +260,8 @@ fn report(seen: &Seen) -> Result<Report> {
     } else if plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
+    let ranks = ranks.filter(|_| built && plan.wet());
+    let ranks = ranks.map(|n| Outlook::new(usize::from(n), scene, &params, &plan)).transpose()?;
     let estimate = Estimate::new(case);
     let free = |n: Option<u64>| n.map_or(f64::INFINITY, |n| n as f64);
     if estimate.memory_beside_device > free(machine::memory()) {
@@ -294,6 +303,7 @@ fn report(seen: &Seen) -> Result<Report> {
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
+        ranks,
         estimate,
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },
         advice,
@@ -458,6 +468,10 @@ fn words(report: &Report) -> String {
             s.gpu_forecasts.iter().enumerate().flat_map(|(k, f)| forecast(f, k > 0, report.spacing_m)),
         );
     }
+    if let Some(ranks) = &report.ranks {
+        lines.extend([String::new(), format!("{} ranks at t = 0", ranks.parts.len())]);
+        lines.extend(of_ranks(ranks));
+    }
     let e = &report.estimate;
     lines.extend([
         String::new(),
@@ -484,6 +498,45 @@ fn words(report: &Report) -> String {
         lines.extend(report.advice.iter().map(|a| format!("  {a}")));
     }
     lines.join("\n")
+}
+
+/// Ranks that are told of one by one.
+const MOST_RANKS: usize = 16;
+
+/// What ranks have and say.
+fn of_ranks(ranks: &Outlook) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (k, part) in ranks.parts.iter().enumerate().take(MOST_RANKS) {
+        lines.push(format!(
+            "  rank {k:<4} columns {:>4} to {:>4}: {:>9} of water, copies of {}, {} of walls",
+            part.columns[0],
+            part.columns[1] - 1,
+            part.water,
+            part.copies,
+            part.walls
+        ));
+    }
+    let more = ranks.parts.len().saturating_sub(MOST_RANKS);
+    lines.extend((more > 0).then(|| format!("  and {more} more: --json")));
+    let [messages, rounds] = [ranks.messages, ranks.rounds];
+    lines.extend([
+        format!("  largest share over the mean {:.2}; shares are made even again as the water moves", ranks.unevenness),
+        format!(
+            "  messages to each rank beside: {} a step and {} an iteration of the pressure solver, {} and {} at most",
+            messages[0],
+            messages[1],
+            bytes(ranks.message_bytes[0] as f64),
+            bytes(ranks.message_bytes[1] as f64)
+        ),
+        format!(
+            "  rounds of all ranks: {} a step and {} an iteration, {} and {} in all",
+            rounds[0],
+            rounds[1],
+            bytes(ranks.round_bytes[0] as f64),
+            bytes(ranks.round_bytes[1] as f64)
+        ),
+    ]);
+    lines
 }
 
 /// A scene against the limits of devices.

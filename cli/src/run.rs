@@ -2,6 +2,7 @@
 
 use super::plan::step_warnings;
 use super::progress::{Display, clock};
+use super::ranks::{self, Call};
 use super::setup::{self, Setup};
 use super::signals::{self, RESUME};
 use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
@@ -13,12 +14,15 @@ use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
+use seixo::ranks::Team;
 use seixo::run::resume::{Standing, standing};
 use seixo::run::{Options, Start, run as run_simulation};
+use seixo::simulation::Simulation;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct RunArgs {
     /// The case file (TOML), - for standard input; with --resume DIR the case is that of DIR.
     #[arg(required_unless_present = "resume")]
@@ -188,6 +192,25 @@ impl Asked {
 }
 
 pub fn run(args: &RunArgs) -> Exit {
+    let Some(team) = ranks::team()? else { return lead(args, None) };
+    if args.device.backend == BackendName::Gpu || args.device.adapter.is_some() {
+        return Err(Error::usage(
+            "--backend",
+            "many ranks compute on the CPU: leave --backend gpu and --adapter out",
+        ));
+    }
+    let threads = ranks::threads(&team, args.device.threads);
+    if team.rank() > 0 {
+        return ranks::serve(&team, threads);
+    }
+    let mut args = args.clone();
+    args.device = DeviceArgs { backend: BackendName::Cpu, threads: Some(threads), ..args.device };
+    lead(&args, Some(&team))
+}
+
+/// The run, by the first rank of `team` where there are many.
+fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>) -> Exit {
+    let call = Call::new(team);
     let deadline = args.max_wall.map(|wall| Instant::now() + wall);
     let stop = signals::watch(args.quiet)?;
     seixo::threads::start(args.device.threads)?;
@@ -222,7 +245,11 @@ pub fn run(args: &RunArgs) -> Exit {
     };
     fits(args, &asked, &loaded.case, matches!(start, Start::Resume(_)))?;
     let setup = Setup::build(loaded, asked.name, args.quiet)?;
-    let mut simulation = setup.simulation(&args.device)?;
+    call.tell(&setup.loaded.text);
+    let mut simulation = match team {
+        Some(team) => Simulation::on_ranks(&setup.loaded.case, setup.scene.clone(), team)?,
+        None => setup.simulation(&args.device)?,
+    };
     let options = Options {
         out: asked.out.clone(),
         name: setup.name.clone(),

@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod gpu;
+pub mod lead;
 mod processor;
 pub mod traffic;
 
@@ -17,6 +18,7 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::PressureReport;
+use crate::ranks::Standing;
 use crate::scene::Scene;
 use crate::stop::Stop;
 use glam::DVec3;
@@ -41,7 +43,7 @@ fn outflows(scene: &Scene) -> usize {
 }
 
 /// What the guards have seen since the start of the run.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Fluid particles that left the domain or became non-finite, and were taken out.
     pub lost: u64,
@@ -70,6 +72,19 @@ impl Counters {
     /// Fluid particles that are in the scene no more.
     pub fn gone(&self) -> u64 {
         self.lost + self.swallowed.iter().sum::<u64>()
+    }
+
+    /// Those of two ranks in one.
+    fn plus(mut self, other: Self) -> Self {
+        self.lost += other.lost;
+        self.displacement_clamps += other.displacement_clamps;
+        self.pressure_clamps += other.pressure_clamps;
+        self.negative_pressures += other.negative_pressures;
+        self.neighbours_max = self.neighbours_max.max(other.neighbours_max);
+        self.non_finite = self.non_finite.or(other.non_finite);
+        self.overflow = self.overflow.or(other.overflow);
+        self.swallowed.iter_mut().zip(other.swallowed).for_each(|(sum, n)| *sum += n);
+        self
     }
 
     /// Save the counters, or take them over.
@@ -215,6 +230,10 @@ pub trait Backend: Send {
     }
     /// Bytes that a step like the last one must move.
     fn traffic(&mut self) -> Result<Traffic>;
+    /// What each rank holds and said; nothing where there is one.
+    fn ranks(&mut self) -> Result<Vec<Standing>> {
+        Ok(Vec::new())
+    }
     /// What was asked of a device; nothing for a backend without one.
     fn commands(&self) -> Commands {
         Commands::default()

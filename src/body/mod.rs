@@ -7,9 +7,10 @@
 use crate::scene::{Drive, Motion, Solid};
 use crate::shape::Shape;
 use glam::{DMat3, DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// Position and velocity of a solid, world axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Centre of mass [m].
     pub position: DVec3,
@@ -57,7 +58,7 @@ impl Pose {
 }
 
 /// Force [N] and torque about the centre of mass [N m], world axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     /// Force [N].
     pub force: DVec3,
@@ -73,7 +74,7 @@ impl std::ops::AddAssign for Wrench {
 }
 
 /// A solid as the pressure equation sees it: how it answers forces, and those that act on it beside the fluid's.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeBody {
     /// 1/mass along each world axis [1/kg]; 0 where locked or prescribed.
     pub inverse_mass: DVec3,

@@ -7,10 +7,13 @@ use crate::neighbours::CHUNK;
 use crate::params::Params;
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Sums of a chunk of particles.
-#[derive(Clone)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sums {
+    particles: u64,
     kinetic: f64,
     potential: f64,
     momentum: DVec3,
@@ -28,14 +31,14 @@ pub fn speed_range(params: &Params, dt: f64) -> f64 {
     crate::monitor::SPEED_RANGE * crate::kernels::predict::DISPLACEMENT_MAX * params.spacing / dt
 }
 
-/// Monitor of the first `live` fluid slots; `dt` is the current time step [s].
-pub fn monitor(fields: &Fields, live: usize, params: &Params, dt: f64) -> FluidMonitor {
+/// Sums over the fluid slots `own`, chunk by chunk; `dt` is the current time step [s].
+pub fn sums(fields: &Fields, own: Range<usize>, params: &Params, dt: f64) -> Vec<Sums> {
     let per_bin = speed_range(params, dt) / SPEED_BINS as f64;
-    let mass = params.particle_mass();
-    let sums: Vec<Sums> = (0..live.div_ceil(8 * CHUNK))
+    (0..own.len().div_ceil(8 * CHUNK))
         .into_par_iter()
         .map(|c| {
             let mut s = Sums {
+                particles: 0,
                 kinetic: 0.0,
                 potential: 0.0,
                 momentum: DVec3::ZERO,
@@ -47,7 +50,9 @@ pub fn monitor(fields: &Fields, live: usize, params: &Params, dt: f64) -> FluidM
                 inner: 0,
                 bins: vec![0; SPEED_BINS],
             };
-            for i in c * 8 * CHUNK..((c + 1) * 8 * CHUNK).min(live) {
+            let from = own.start + c * 8 * CHUNK;
+            for i in from..(from + 8 * CHUNK).min(own.end) {
+                s.particles += 1;
                 let (x, v) = (params.periodic.wrap(fields.position[i]), fields.velocity[i]);
                 let v2 = v.length_squared();
                 s.kinetic += 0.5 * v2;
@@ -66,11 +71,18 @@ pub fn monitor(fields: &Fields, live: usize, params: &Params, dt: f64) -> FluidM
             }
             s
         })
-        .collect();
-    let mut out = FluidMonitor { particles: live as u64, ..Default::default() };
+        .collect()
+}
+
+/// Monitor of the particles of `sums`.
+pub fn monitor(sums: &[Sums], params: &Params, dt: f64) -> FluidMonitor {
+    let per_bin = speed_range(params, dt) / SPEED_BINS as f64;
+    let mass = params.particle_mass();
+    let live = sums.iter().map(|s| s.particles).sum::<u64>();
+    let mut out = FluidMonitor { particles: live, ..Default::default() };
     let (mut momentum, mut position, mut extent) = (DVec3::ZERO, DVec3::ZERO, DVec3::MIN);
     let mut bins = [0_u64; SPEED_BINS];
-    for s in &sums {
+    for s in sums {
         out.kinetic += mass * s.kinetic;
         out.potential += mass * s.potential;
         momentum += mass * s.momentum;
@@ -86,7 +98,7 @@ pub fn monitor(fields: &Fields, live: usize, params: &Params, dt: f64) -> FluidM
     out.centroid = (position / live.max(1) as f64).to_array();
     out.extent_max = if live > 0 { extent.to_array() } else { [0.0; 3] };
     out.density_error_mean /= out.inner.max(1) as f64;
-    out.speed_most = speed_most(&bins, live as u64, per_bin);
+    out.speed_most = speed_most(&bins, live, per_bin);
     out
 }
 

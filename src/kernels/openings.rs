@@ -5,10 +5,11 @@
 use crate::fields::Fields;
 use crate::scene::Kind;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// A wall layer that becomes water.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Emission {
     /// Its slots.
     pub wall: Range<usize>,
@@ -21,7 +22,7 @@ pub struct Emission {
 }
 
 /// A box in which water is swallowed; one that is empty swallows none.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outlet {
     /// Lower corner [m].
     pub low: DVec3,

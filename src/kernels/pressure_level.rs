@@ -5,20 +5,27 @@
 
 use crate::fields::State;
 
-/// Takes the mean over the unknowns off the right sides `source`.
-pub fn subtract_mean(state: &[State], source: &mut [f64]) {
-    let unknowns = |(&state, b): (&State, &mut f64)| (state == State::Inner).then_some(*b);
-    let of = state.iter().zip(source.iter_mut()).filter_map(unknowns);
-    let (sum, count) = of.fold((0.0, 0_usize), |(sum, count), b| (sum + b, count + 1));
-    let mean = sum / count.max(1) as f64;
+/// Sum of the right sides `source` over the unknowns, and how many these are.
+pub fn sum_source(state: &[State], source: &[f64]) -> [f64; 2] {
+    let of = state.iter().zip(source).filter(|(state, _)| **state == State::Inner);
+    of.fold([0.0, 0.0], |[sum, count], (_, b)| [sum + b, count + 1.0])
+}
+
+/// Takes the mean over the unknowns, of `sum` and `count`, off the right sides `source`.
+pub fn subtract_mean(state: &[State], source: &mut [f64], [sum, count]: [f64; 2]) {
+    let mean = sum / count.max(1.0);
     let inner = state.iter().zip(source).filter(|(state, _)| **state == State::Inner);
     inner.for_each(|(_, b)| *b -= mean);
 }
 
-/// Makes the smallest unknown of `pressure` [Pa] 0.
-pub fn raise(state: &[State], pressure: &mut [f64]) {
-    let inner = state.iter().zip(&*pressure).filter(|(state, _)| **state == State::Inner);
-    let least = inner.fold(f64::INFINITY, |least, (_, &p)| least.min(p));
+/// The smallest unknown of `pressure` [Pa]; infinite where there is none.
+pub fn lowest(state: &[State], pressure: &[f64]) -> f64 {
+    let inner = state.iter().zip(pressure).filter(|(state, _)| **state == State::Inner);
+    inner.fold(f64::INFINITY, |least, (_, &p)| least.min(p))
+}
+
+/// Makes the smallest unknown of `pressure`, `least` [Pa], 0.
+pub fn raise(state: &[State], pressure: &mut [f64], least: f64) {
     let inner = state.iter().zip(pressure).filter(|(state, _)| **state == State::Inner);
     inner.for_each(|(_, p)| *p -= least);
 }

@@ -2,6 +2,7 @@
 
 use super::write_whole;
 use crate::error::Result;
+use crate::ranks::Standing;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -203,6 +204,9 @@ pub struct Summary {
     pub series: BTreeMap<String, u64>,
     /// Most memory that the process has held so far [bytes], where the system tells it (Linux).
     pub memory_peak_bytes: Option<u64>,
+    /// What each rank held and said, of a run on many.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ranks: Vec<Standing>,
     /// Numbers of particles.
     pub particles: Particles,
     /// Wall-clock seconds of each stage, and of `output`.
@@ -220,13 +224,6 @@ pub struct Summary {
     /// The water, of a scene with inflows or outflows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub water: Option<Water>,
-}
-
-/// Most memory that this process has held [bytes].
-pub(crate) fn memory_peak() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
 impl Summary {

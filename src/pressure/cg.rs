@@ -2,10 +2,13 @@
 
 use super::coupling::CoupledBody;
 use super::{Outcome, PressureReport, Settings};
+use crate::body::Wrench;
 use crate::fields::State;
 use crate::kernels::conjugate_gradient::apply;
 use crate::neighbours::{CHUNK, Chunk, Neighbours};
+use crate::share::Share;
 use crate::stop::Stop;
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The system A P = b of one step, A with what free bodies add. Vectors run over all pressure-carrying slots and are zero where the
@@ -21,6 +24,17 @@ pub struct System<'a> {
     pub coefficient: f64,
     /// Free bodies in the water.
     pub bodies: &'a [CoupledBody],
+    /// The other ranks that have rows of it.
+    pub among: Option<Among<'a>>,
+}
+
+/// A system of which other ranks have rows: `state` is [`State::Inactive`] there.
+#[derive(Clone, Copy)]
+pub struct Among<'a> {
+    /// What of it is here.
+    pub share: &'a Share,
+    /// Which slots are unknowns, those that are copies of other ranks' as well.
+    pub state: &'a [State],
 }
 
 /// Approximates z = A^-1 r.
@@ -61,6 +75,21 @@ impl System<'_> {
         &self.neighbours.chunks
     }
 
+    /// `sum` over the rows of all ranks.
+    fn total(&self, sum: f64) -> f64 {
+        let Some(among) = self.among else { return sum };
+        let mut total = [sum];
+        among.share.sum(&mut total);
+        total[0]
+    }
+
+    /// Brings the copies of other ranks' rows in `p` up to date.
+    fn show(&self, mut p: &mut [f64]) {
+        if let Some(among) = self.among {
+            among.share.swap(&mut [&mut p]);
+        }
+    }
+
     /// q <- A p on the unknowns, 0 elsewhere; the chunks of dry walls stay as they are. Returns p.q.
     pub fn multiply(&self, p: &[f64], q: &mut [f64], sums: &mut Vec<f64>) -> f64 {
         (q.par_chunks_mut(CHUNK), self.chunks(), self.state.par_chunks(CHUNK))
@@ -81,8 +110,15 @@ impl System<'_> {
                 sum
             })
             .collect_into_vec(sums);
-        let water: f64 = sums.iter().sum();
-        self.bodies.iter().fold(water, |sum, body| sum + body.multiply(p, q))
+        let mut sum: f64 = sums.iter().sum();
+        let mut forces: Vec<Wrench> = self.bodies.iter().map(|body| body.force(p)).collect();
+        if let Some(among) = self.among {
+            // With the bodies' forces, in one round of all ranks.
+            forces.push(Wrench { force: DVec3::X * sum, torque: DVec3::ZERO });
+            among.share.sum_wrenches(&mut forces);
+            sum = forces.pop().map_or(sum, |last| last.force.x);
+        }
+        self.bodies.iter().zip(forces).fold(sum, |sum, (body, force)| sum + body.answer(force, q))
     }
 
     /// a.b of vectors that are zero in dry chunks, in an order that does not depend on the number of threads.
@@ -91,7 +127,7 @@ impl System<'_> {
             .into_par_iter()
             .map(|(a, b, chunk)| if chunk.is_dry() { 0.0 } else { product(a, b) })
             .collect_into_vec(sums);
-        sums.iter().sum()
+        self.total(sums.iter().sum())
     }
 
     /// r <- b - A x with x set to zero where there is no unknown, or everywhere unless `warm`. Returns r.r.
@@ -114,6 +150,7 @@ impl System<'_> {
                     [r, z, p].into_iter().for_each(|v| v.fill(0.0));
                 }
             });
+        self.show(x);
         self.multiply(x, q, sums);
         (r.par_chunks_mut(CHUNK), b.par_chunks(CHUNK), q.par_chunks(CHUNK), self.chunks())
             .into_par_iter()
@@ -146,7 +183,7 @@ impl System<'_> {
                 sum
             })
             .collect_into_vec(sums);
-        sums.iter().sum()
+        self.total(sums.iter().sum())
     }
 }
 
@@ -195,6 +232,7 @@ pub fn solve(
         v.resize(x.len(), 0.0);
     }
     let unknowns = system.state.iter().filter(|&&s| s == State::Inner).count();
+    let unknowns = system.total(unknowns as f64) as usize;
     let mut report = PressureReport { unknowns, ..Default::default() };
     let b_norm = system.dot(b, b, &mut work.sums).sqrt();
     if b_norm == 0.0 || unknowns == 0 {
@@ -229,6 +267,7 @@ pub fn solve(
                     .into_par_iter()
                     .filter(|(.., chunk)| !chunk.is_dry())
                     .for_each(|(p, z, _)| p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p));
+                system.show(p);
                 let pq = system.multiply(p, q, sums);
                 if pq > 0.0 {
                     r_norm = system.advance(rz / pq, x, work).sqrt();

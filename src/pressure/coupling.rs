@@ -33,15 +33,20 @@ impl CoupledBody {
         b[self.slots.clone()].iter_mut().zip(&self.rows).for_each(|(b, row)| *b -= product(row, &y));
     }
 
-    /// q += kappa S M^-1 S^T p. Returns p . (what was added).
-    pub fn multiply(&self, p: &[f64], q: &mut [f64]) -> f64 {
+    /// S^T p: what the pressures `p` do to the body.
+    pub fn force(&self, p: &[f64]) -> Wrench {
         let mut sum = Wrench::default();
         for (row, &p) in self.rows.iter().zip(&p[self.slots.clone()]) {
             sum += Wrench { force: p * row.force, torque: p * row.torque };
         }
-        let y = self.respond(sum);
+        sum
+    }
+
+    /// q += kappa S M^-1 `force`, [`Self::force`] of all p. Returns p . (what was added).
+    pub fn answer(&self, force: Wrench, q: &mut [f64]) -> f64 {
+        let y = self.respond(force);
         q[self.slots.clone()].iter_mut().zip(&self.rows).for_each(|(q, row)| *q += product(row, &y));
-        product(&sum, &y)
+        product(&force, &y)
     }
 
     /// z = r / D on the body's rows, with the diagonal that the body adds to `diagonal`.
@@ -95,7 +100,7 @@ mod tests {
         let (coupled, dense) = (CoupledBody::new(body(), 7.0, 3..8, wall().into_iter()), dense());
         let p: Vec<f64> = (0..10).map(|k| (k as f64 - 4.3).powi(2)).collect();
         let mut q = vec![1.0; 10];
-        let product = coupled.multiply(&p, &mut q);
+        let product = coupled.answer(coupled.force(&p), &mut q);
         let mut sum = 0.0;
         for i in 0..10 {
             let own = (3..8).contains(&i);

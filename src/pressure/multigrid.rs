@@ -2,7 +2,7 @@
 //! [`crate::kernels::multigrid_levels`] says, the cycle as [`crate::kernels::multigrid`] does, here in
 //! compressed rows. It is computed in f32: it need only be an approximation, and half the bytes move.
 
-use super::cg::{Precondition, System};
+use super::cg::{Among, Precondition, System};
 use crate::cells::Grid;
 use crate::fields::State;
 use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
@@ -84,6 +84,8 @@ pub struct Multigrid {
     t: Vec<f32>,
     levels: Vec<Level>,
     used: usize,
+    /// First of this rank's cells among those of all ranks.
+    first: usize,
     scratch: Scratch,
 }
 
@@ -217,8 +219,33 @@ impl Multigrid {
                 cursor[a as usize] += 1;
             }
         }
+        if let Some(among) = system.among {
+            self.join_cells(among, grid, position);
+        }
         for &c in &self.touched {
             self.cell_aggregate[c as usize] = u32::MAX;
+        }
+    }
+
+    /// Numbers the cells of all ranks, rank by rank: the levels are the same on each.
+    fn join_cells(&mut self, among: Among, grid: &Grid, position: &[DVec3]) {
+        let share = among.share;
+        let all = share.gather(bytemuck::cast_slice(&self.touched).to_vec());
+        let before: usize = all[..share.rank()].iter().map(Vec::len).sum();
+        self.first = before / size_of::<u32>();
+        self.touched = bytemuck::pod_collect_to_vec(&all.concat());
+        let coarse = &mut self.levels[0].coordinates;
+        coarse.clear();
+        for (k, &cell) in self.touched.iter().enumerate() {
+            coarse.push(grid.coordinates_of(cell as usize).map(|k| k as i32));
+            self.cell_aggregate[cell as usize] = k as u32;
+        }
+        self.aggregate.iter_mut().filter(|a| **a != u32::MAX).for_each(|a| *a += self.first as u32);
+        share.swap(&mut [&mut &mut self.diagonal[..]]);
+        for i in share.copies().filter(|&i| among.state[i] == State::Inner) {
+            let c = grid.coordinates(position[i]);
+            self.code[i] = place_of(c.map(|k| k as i32));
+            self.aggregate[i] = self.cell_aggregate[grid.index(c)];
         }
     }
 
@@ -234,7 +261,8 @@ impl Multigrid {
         let (codes, aggregate) = (&self.code, &self.aggregate);
         let (members, start) = (&self.members, &self.member_start);
         let level = &mut self.levels[0];
-        let (rows, cells, around) = (level.coordinates.len(), &level.coordinates, level.around);
+        let (rows, cells, around) = (start.len() - 1, &level.coordinates[self.first..], level.around);
+        let everywhere = &level.coordinates;
         let seams = around != [0; 3];
         self.scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
             // Two stencils in turn: neighbours that follow each other mostly fall into the same entry, and would wait
@@ -248,7 +276,7 @@ impl Multigrid {
                     // A pair without weight may lie further apart than neighbouring cells.
                     if codes[j] != NOWHERE && w > 0.0 {
                         let entry = if seams {
-                            place_of(step(cells[a], cells[aggregate[j] as usize], around)) + 13
+                            place_of(step(cells[a], everywhere[aggregate[j] as usize], around)) + 13
                         } else {
                             codes[j] - own
                         };
@@ -258,6 +286,10 @@ impl Multigrid {
             }
             *s = std::array::from_fn(|k| turns[0][k] + turns[1][k]);
         });
+        if let Some(among) = system.among {
+            let own = self.scratch.stencil.iter().flat_map(bytemuck::bytes_of).copied().collect();
+            self.scratch.stencil = bytemuck::pod_collect_to_vec(&among.share.gather(own).concat());
+        }
         compress(level, &mut self.scratch);
     }
 
@@ -424,7 +456,7 @@ impl Precondition for Multigrid {
             if chunk.is_dry() { 0.0 } else { r.iter().fold(0.0_f64, |m, r| m.max(r.abs())) }
         };
         let scale = (r.par_chunks(CHUNK), chunks).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
-        let scale = scale.max(f64::MIN_POSITIVE);
+        let scale = system.among.map_or(scale, |among| among.share.most(scale)).max(f64::MIN_POSITIVE);
         let (b, x, d) = (&mut self.b, &mut self.x, &self.diagonal);
         (b.par_chunks_mut(CHUNK), x.par_chunks_mut(CHUNK), d.par_chunks(CHUNK), r.par_chunks(CHUNK), chunks)
             .into_par_iter()
@@ -435,12 +467,22 @@ impl Precondition for Multigrid {
                     x[k] = first_sweep(b[k], d[k]);
                 }
             });
+        if let Some(among) = system.among {
+            among.share.swap(&mut [&mut &mut self.b[..]]);
+            among.share.copies().for_each(|i| self.x[i] = first_sweep(self.b[i], self.diagonal[i]));
+        }
         self.residual(system);
         {
             let (t, members, start) = (&self.t, &self.members, &self.member_start);
-            self.levels[0].b.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(a, b)| {
+            let own = self.first..self.first + start.len() - 1;
+            self.levels[0].b[own].par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(a, b)| {
                 *b = members[start[a] as usize..start[a + 1] as usize].iter().map(|&i| t[i as usize]).sum();
             });
+        }
+        if let Some(among) = system.among {
+            let b = &mut self.levels[0].b;
+            let own = bytemuck::cast_slice(&b[self.first..self.first + self.member_start.len() - 1]).to_vec();
+            *b = bytemuck::pod_collect_to_vec(&among.share.gather(own).concat());
         }
         self.cycle(0);
         let coarse = &self.levels[0].x;
@@ -454,6 +496,14 @@ impl Precondition for Multigrid {
                     }
                 }
             });
+        if let Some(among) = system.among {
+            // As their owners do it; their chunks may be dry here.
+            for i in among.share.copies() {
+                let a = self.aggregate[i];
+                let correction = if a == u32::MAX { 0.0 } else { OVER_CORRECTION * coarse[a as usize] };
+                self.x[i] = first_sweep(self.b[i], self.diagonal[i]) + correction;
+            }
+        }
         self.residual(system);
         let (x, t, d) = (&self.x, &self.t, &self.diagonal);
         (z.par_chunks_mut(CHUNK), x.par_chunks(CHUNK), t.par_chunks(CHUNK), d.par_chunks(CHUNK), chunks)

@@ -17,8 +17,9 @@ pub mod verdict;
 use crate::checkpoint::{Archive, Found};
 use crate::error::{Error, Result};
 use crate::gauges::Gauges;
+use crate::machine::memory_peak;
 use crate::output::folder::{Folder, Mode};
-use crate::output::result::{Grade, Status, Summary, Verdict, memory_peak};
+use crate::output::result::{Grade, Status, Summary, Verdict};
 use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
@@ -316,6 +317,7 @@ impl Run {
         summary.frames = self.frames.written();
         summary.series = self.frames.written_by_name();
         summary.memory_peak_bytes = memory_peak();
+        summary.ranks = simulation.backend.ranks()?;
         summary.stages.insert("output", self.totals.output.as_secs_f64());
         // Where the disk is full this makes room for the last word.
         folder.release();

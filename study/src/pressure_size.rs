@@ -123,6 +123,7 @@ fn on_cpu(moment: &Moment, kind: Preconditioner, tolerance: f64) -> Result<Measu
         diagonal: &fields.diagonal,
         coefficient: laplacian_coefficient(&moment.params),
         bodies: &[],
+        among: None,
     };
     let (b, settings) = (&fields.source, Settings { tolerance, ..TIGHT });
     let (grid, mut multigrid) = (Grid::new(&moment.params)?, Multigrid::default());
@@ -209,6 +210,7 @@ fn residual_in_double(moment: &Moment, device: &Fields, x: &[f64]) -> Result<f64
         diagonal: &diagonal,
         coefficient: laplacian_coefficient(&moment.params),
         bodies: &[],
+        among: None,
     };
     Ok(true_residual(&system, &b, &x))
 }

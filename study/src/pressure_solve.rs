@@ -113,6 +113,7 @@ impl Column {
             diagonal: &cpu.fields().diagonal,
             coefficient: laplacian_coefficient(&self.params),
             bodies: &[],
+            among: None,
         }
     }
 }

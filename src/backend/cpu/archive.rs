@@ -1,11 +1,25 @@
 //! The state of the CPU path.
 
 use super::Cpu;
+use crate::backend::Counters;
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, State};
+use crate::ledger::Ledger;
 use crate::neighbours::Neighbours;
 use crate::scene::Kind;
+
+/// What is saved of particles, all of them: those of one rank, or of many.
+pub(super) struct Saved<'a> {
+    /// Slots of the water.
+    pub fluid: usize,
+    pub fields: &'a mut Fields,
+    pub counters: &'a mut Counters,
+    pub work: Option<&'a mut Ledger>,
+    pub dt: &'a mut f64,
+    /// Those of the last step where the next one begins with them.
+    pub lists: Option<&'a mut Neighbours>,
+}
 
 impl Cpu {
     /// Save the particles, or take them over.
@@ -20,6 +34,7 @@ impl Cpu {
             grid: _,
             fixed: _,
             active_set: _,
+            share: _,
             // Made anew in every step before it is used.
             poses: _,
             free_bodies: _,
@@ -39,6 +54,39 @@ impl Cpu {
             dt,
             ledger,
         } = self;
+        // A state of many ranks has no lists: they are made anew.
+        let kept = archive.is_saving() || archive.sections.contains_key("list_start");
+        let viscous = params.viscosity > 0.0;
+        let saved = Saved {
+            fluid: groups.fluid,
+            fields,
+            counters,
+            // Its pressures and accelerations are made anew in every step.
+            work: ledger.as_mut().map(|ledger| &mut ledger.work),
+            dt,
+            lists: Some(neighbours).filter(|_| viscous && kept),
+        };
+        let count = saved.exchange(archive)?;
+        if !archive.is_saving() {
+            *live = count;
+            if viscous && !kept {
+                self.search_again();
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes the lists of neighbours for the particles where they are.
+    pub(super) fn search_again(&mut self) {
+        self.cell_list();
+        self.neighbour_list();
+    }
+}
+
+impl Saved<'_> {
+    /// Save it, or take it over; returns how many particles of water there are.
+    pub(super) fn exchange(self, archive: &mut Archive) -> Result<usize> {
+        let Self { fluid, fields, counters, work, dt, lists: neighbours } = self;
         let Fields {
             position,
             velocity,
@@ -64,24 +112,20 @@ impl Cpu {
         codes(archive, "kind", kind, |k| k as u8, Kind::from_code)?;
         codes(archive, "state", state, |s| s as u8, State::from_code)?;
         // The lists of the last step serve viscosity, at the start of the next one.
-        if params.viscosity > 0.0 {
+        if let Some(neighbours) = neighbours {
             lists(archive, neighbours, position.len())?;
         }
         counters.exchange(archive)?;
-        // Its pressures and accelerations are made anew in every step.
-        if let Some(ledger) = ledger {
-            ledger.work.exchange(archive, "ledger.water")?;
+        if let Some(work) = work {
+            work.exchange(archive, "ledger.water")?;
         }
         archive.number("dt", dt)?;
-        let count = kind.iter().take(groups.fluid).filter(|&&k| k == Kind::Fluid).count();
+        let count = kind.iter().take(fluid).filter(|&&k| k == Kind::Fluid).count();
         let sorted = kind.iter().take(count).all(|&k| k == Kind::Fluid);
-        if !archive.is_saving() {
-            if !sorted || id.iter().any(|&i| i as usize >= groups.fluid) {
-                return Err(Error::damaged("the checkpoint's particles are out of order"));
-            }
-            *live = count;
+        if !archive.is_saving() && (!sorted || id.iter().any(|&i| i as usize >= fluid)) {
+            return Err(Error::damaged("the checkpoint's particles are out of order"));
         }
-        Ok(())
+        Ok(count)
     }
 }
 

@@ -8,6 +8,7 @@ use crate::neighbours::CHUNK;
 use crate::params::Params;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Work so far, and what it takes to tell the cut of pressures from the pressure.
 #[derive(Default)]
@@ -20,13 +21,14 @@ pub struct WaterLedger {
     pub unclipped: Vec<DVec3>,
 }
 
-/// Sums of `of` over the particles below `live`, in an order that does not depend on the number of threads.
-fn sums<const N: usize>(live: usize, of: impl Fn(usize) -> [f64; N] + Sync) -> [f64; N] {
+/// Sums of `of` over the particles `own`, in an order that does not depend on the number of threads.
+fn sums<const N: usize>(own: Range<usize>, of: impl Fn(usize) -> [f64; N] + Sync) -> [f64; N] {
     let chunk = |c: usize| {
-        let slots = c * CHUNK..((c + 1) * CHUNK).min(live);
+        let from = own.start + c * CHUNK;
+        let slots = from..(from + CHUNK).min(own.end);
         slots.map(&of).fold([0.0; N], |a, b| std::array::from_fn(|k| a[k] + b[k]))
     };
-    let parts: Vec<[f64; N]> = (0..live.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
+    let parts: Vec<[f64; N]> = (0..own.len().div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
     parts.iter().fold([0.0; N], |a, b| std::array::from_fn(|k| a[k] + b[k]))
 }
 
@@ -37,51 +39,51 @@ impl WaterLedger {
     }
 
     /// Books `predict`, which is about to run with the viscous accelerations `viscous`.
-    pub fn predict(&mut self, live: usize, on: Particles, viscous: &[DVec3], dt: f64) {
+    pub fn predict(&mut self, own: Range<usize>, on: Particles, viscous: &[DVec3], dt: f64) {
         let of = |i: usize| predict_work(on.position[i], on.velocity[i], viscous[i], on.params, dt);
-        self.add([Entry::Gravity, Entry::Viscosity, Entry::Clamps], on.params, sums(live, of));
+        self.add([Entry::Gravity, Entry::Viscosity, Entry::Clamps], on.params, sums(own, of));
     }
 
     /// Books `absorber`, which is about to slow particle i down to `slowed(i)`.
     pub fn absorber(
         &mut self,
-        live: usize,
+        own: Range<usize>,
         params: &Params,
         velocity: &[DVec3],
         slowed: impl Fn(usize) -> DVec3 + Sync,
     ) {
         let of = |i: usize| [0.5 * (slowed(i).length_squared() - velocity[i].length_squared())];
-        self.add([Entry::Absorber], params, sums(live, of));
+        self.add([Entry::Absorber], params, sums(own, of));
     }
 
     /// Books `shift`, which is about to move particle i by `way(i)`.
-    pub fn shift(&mut self, live: usize, params: &Params, way: impl Fn(usize) -> DVec3 + Sync) {
-        self.add([Entry::Shift], params, sums(live, |i| [-params.gravity.dot(way(i))]));
+    pub fn shift(&mut self, own: Range<usize>, params: &Params, way: impl Fn(usize) -> DVec3 + Sync) {
+        self.add([Entry::Shift], params, sums(own, |i| [-params.gravity.dot(way(i))]));
     }
 
     /// Books the particles that `cell_list` is about to take out.
-    pub fn lost(&mut self, live: usize, on: Particles) {
+    pub fn lost(&mut self, own: Range<usize>, on: Particles) {
         let (params, domain) = (on.params, (on.params.domain_min, on.params.domain_max));
         let of = |i: usize| {
             let (x, v) = (params.periodic.wrap(on.position[i]), on.velocity[i]);
             let kept = inside(x, v, domain.0, domain.1, params.dimensions) || !(x + v).is_finite();
             [if kept { 0.0 } else { params.gravity.dot(x) - 0.5 * v.length_squared() }]
         };
-        self.add([Entry::Lost], params, sums(live, of));
+        self.add([Entry::Lost], params, sums(own, of));
     }
 
     /// Books `correct`, which is about to run with the accelerations `kick` by what `entry` says.
-    pub fn kick(&mut self, entry: Entry, live: usize, on: Particles, kick: &[DVec3], dt: f64) {
+    pub fn kick(&mut self, entry: Entry, own: Range<usize>, on: Particles, kick: &[DVec3], dt: f64) {
         let of = |i: usize| {
             let (v, a) = (on.velocity[i], kick[i]);
             let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
             [correct_work(v, a, a, on.params.gravity, dt), clamp]
         };
-        self.add([entry, Entry::Clamps], on.params, sums(live, of));
+        self.add([entry, Entry::Clamps], on.params, sums(own, of));
     }
 
     /// Books `correct`, which is about to run with the accelerations `total` of pressure and gravity.
-    pub fn pressure(&mut self, live: usize, on: Particles, total: &[DVec3], dt: f64) {
+    pub fn pressure(&mut self, own: Range<usize>, on: Particles, total: &[DVec3], dt: f64) {
         let gravity = on.params.balanced_gravity();
         let of = |i: usize| {
             let (v, a) = (on.velocity[i], total[i]);
@@ -90,7 +92,7 @@ impl WaterLedger {
             let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
             [work(gravity), work(solved - gravity), work(a - solved), clamp]
         };
-        let sums = sums(live, of);
+        let sums = sums(own, of);
         self.add([Entry::Gravity, Entry::Pressure, Entry::Clip, Entry::Clamps], on.params, sums);
     }
 }

@@ -9,6 +9,7 @@ mod pressure_gradient;
 mod pressure_source;
 mod row_arrays;
 mod search;
+mod team;
 mod viscosity;
 mod wide;
 
@@ -37,15 +38,18 @@ use crate::monitor::FluidMonitor;
 use crate::neighbours::{CHUNK, Chunk, Neighbours, capacity};
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan};
-use crate::pressure::cg::{Jacobi, Precondition, System, Workspace, solve_or_fall_back};
+use crate::pressure::cg::{Among, Jacobi, Precondition, System, Workspace, solve_or_fall_back};
 use crate::pressure::coupling::CoupledBody;
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
+use crate::ranks::Standing;
 use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
+use crate::share::Share;
 use crate::stop::Stop;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Particles in f64 on the host.
@@ -78,6 +82,8 @@ pub struct Cpu {
     /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
     imbalance: Vec<DVec3>,
     dt: f64,
+    /// What of it this rank computes, where there are others.
+    share: Option<Box<Share>>,
 }
 
 impl Cpu {
@@ -121,6 +127,7 @@ impl Cpu {
             ledger: (wet && plan.ledger).then(Box::default),
             imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
             dt: 0.0,
+            share: None,
         })
     }
 
@@ -165,26 +172,27 @@ impl Cpu {
     }
 
     fn absorber(&mut self, dt: f64) {
-        let (zones, n, sides) = (&self.params.absorbers, self.live, self.params.periodic);
+        let (zones, own, sides) = (&self.params.absorbers, self.own(), self.params.periodic);
         let Fields { position, velocity, .. } = &mut self.fields;
         if let Some(ledger) = &mut self.ledger {
             let slowed = |i: usize| absorber::absorber(sides.wrap(position[i]), velocity[i], zones, dt);
-            ledger.absorber(n, &self.params, velocity, slowed);
+            ledger.absorber(own.clone(), &self.params, velocity, slowed);
         }
-        (&position[..n], &mut velocity[..n])
+        (&position[own.clone()], &mut velocity[own])
             .into_par_iter()
             .for_each(|(&x, v)| *v = absorber::absorber(sides.wrap(x), *v, zones, dt));
     }
 
     fn predict(&mut self, dt: f64) {
+        let own = self.own();
         if let Some(ledger) = &mut self.ledger {
             let Fields { position, velocity, acceleration, .. } = &self.fields;
             let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
-            ledger.predict(self.live, on, acceleration, dt);
+            ledger.predict(own.clone(), on, acceleration, dt);
         }
-        let (g, l0, n) = (self.params.explicit_gravity(), self.params.spacing, self.live);
+        let (g, l0) = (self.params.explicit_gravity(), self.params.spacing);
         let Fields { position, velocity, acceleration, .. } = &mut self.fields;
-        let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n])
+        let clamps: u64 = (&mut position[own.clone()], &mut velocity[own.clone()], &mut acceleration[own])
             .into_par_iter()
             .map(|(x, v, a)| {
                 let (x1, v1, clamped) = predict::predict(*x, *v, g + *a, dt, l0);
@@ -196,13 +204,15 @@ impl Cpu {
     }
 
     fn cell_list(&mut self) {
+        let own = self.own();
         if let Some(ledger) = &mut self.ledger {
             let Fields { position, velocity, .. } = &self.fields;
             let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
-            ledger.lost(self.live, on);
+            ledger.lost(own, on);
         }
         let domain = (self.params.domain_min, self.params.domain_max);
-        let Self { fields, grid, params, fluid_start, scratch, groups, .. } = self;
+        self.settle();
+        let Self { fields, grid, params, fluid_start, scratch, groups, share, .. } = self;
         self.counters.lost +=
             cell_list::reorder_fluid(fields, grid, domain, params.dimensions, fluid_start, scratch);
         self.live = fluid_start[grid.total()] as usize;
@@ -211,6 +221,10 @@ impl Cpu {
             list.index(grid, slots, &fields.position, scratch);
             let place = |&s: &u32| grid.periodic.wrap(fields.position[s as usize]);
             coordinates.set(list.slot.par_iter().map(place));
+        }
+        if let Some(share) = share {
+            let solids = [&self.moving, &self.fixed].map(|list| list.as_ref().map(|(list, _)| list));
+            share.find_borders(fluid_start, solids);
         }
         if self.active_set {
             cell_list::mark_near_fluid(grid, fluid_start, &mut self.near_fluid);
@@ -259,6 +273,7 @@ impl Cpu {
     }
 
     fn wall_friction(&mut self, step: &Step) {
+        let own = self.own();
         let Self { fields, neighbours, params, groups, live, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
@@ -273,12 +288,14 @@ impl Cpu {
             *f += wall_friction::reaction(i, carriers(i), carriers, on, step.dt);
         });
         if let Some(ledger) = &mut self.ledger {
-            ledger.kick(Entry::Friction, self.live, on, &fields.acceleration, step.dt);
+            ledger.kick(Entry::Friction, own, on, &fields.acceleration, step.dt);
         }
         self.correct(step.dt);
+        self.show_motion();
     }
 
     fn collision(&mut self, step: &Step) {
+        let own = self.own();
         let Self { fields, neighbours, params, groups, lightness, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
@@ -295,13 +312,14 @@ impl Cpu {
             }
         });
         if let Some(ledger) = &mut self.ledger {
-            ledger.kick(Entry::Collision, self.live, on, &fields.acceleration, step.dt);
+            ledger.kick(Entry::Collision, own, on, &fields.acceleration, step.dt);
         }
         self.correct(step.dt);
+        self.show_motion();
     }
 
     fn number_density(&mut self) {
-        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let Self { fields, neighbours, params, groups, live, share, .. } = self;
         let Fields { position, velocity, number_density, state, .. } = fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         (&mut neighbours.chunks, number_density.par_chunks_mut(CHUNK), state.par_chunks_mut(CHUNK))
@@ -310,6 +328,9 @@ impl Cpu {
             .for_each(|(c, (chunk, density, state))| {
                 density_rows(c * CHUNK, *live, chunk, density, state, on)
             });
+        if let Some(share) = share {
+            share.swap(&mut [&mut &mut state[..]]);
+        }
     }
 
     fn surface_pressure(&mut self) {
@@ -319,6 +340,9 @@ impl Cpu {
         surface_pressure.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(i, p)| {
             *p = surface_pressure::surface_pressure(i, neighbours.pressure(i), state, on, pressure);
         });
+        if let Some(share) = &self.share {
+            share.swap(&mut [&mut &mut surface_pressure[..]]);
+        }
     }
 
     fn pressure_source(&mut self, step: &Step) {
@@ -340,32 +364,47 @@ impl Cpu {
 
     /// The free bodies in the pressure equation; takes the forces that are known off its right side.
     fn couple(&mut self) -> Vec<CoupledBody> {
-        let (params, fluid) = (&self.params, self.groups.fluid);
+        let (params, fluid, share) = (&self.params, self.groups.fluid, self.share.as_deref());
         let density_over_volume = params.density / params.spacing.powi(3);
         let Fields { state, reaction, source, pressure, .. } = &mut self.fields;
+        let answers =
+            |body: &FreeBody| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO;
         let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies);
-        let mut couple = |((solid, pose), body): ((&Solid, &Pose), &FreeBody)| {
-            let mut known = body.load;
+        let free: Vec<_> = free.filter(|(_, body)| answers(body)).collect();
+        let mut known: Vec<Wrench> = Vec::with_capacity(free.len());
+        let mut layers = Vec::with_capacity(free.len());
+        for &((solid, pose), body) in &free {
+            // On many ranks the load is added once, after the sum over them.
+            let mut sum = if share.is_some() { Wrench::default() } else { body.load };
             let wall = |(k, i): (usize, usize)| {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                if share.is_some_and(|share| !share.owns(i)) {
+                    return (DVec3::ZERO, arm);
+                }
                 let unknown = state[i] == State::Inner;
                 let area = if unknown { pose.orientation * solid.wall_area[k] } else { DVec3::ZERO };
                 let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let head = body_force::head(pressure[i], to_surface, pose.acceleration_at(arm), params);
                 let force = body_force::body_force(head, area, reaction);
-                known += Wrench { force, torque: arm.cross(force) };
+                sum += Wrench { force, torque: arm.cross(force) };
                 (area, arm)
             };
-            let wall: Vec<_> = solid.wall_slots.clone().enumerate().map(wall).collect();
+            layers.push(solid.wall_slots.clone().enumerate().map(wall).collect::<Vec<_>>());
+            known.push(sum);
+        }
+        if let Some(share) = share {
+            share.sum_wrenches(&mut known);
+            known.iter_mut().zip(&free).for_each(|(known, (_, body))| *known += body.load);
+        }
+        let mut out = Vec::with_capacity(free.len());
+        for ((((solid, _), body), known), wall) in free.into_iter().zip(known).zip(layers) {
             let slots = solid.wall_slots.clone();
             let coupled = CoupledBody::new(*body, density_over_volume, slots, wall.into_iter());
             coupled.subtract_known(known, source);
-            coupled
-        };
-        free.filter(|(_, body)| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO)
-            .map(&mut couple)
-            .collect()
+            out.push(coupled);
+        }
+        out
     }
 
     fn pressure_gradient(&mut self) {
@@ -393,23 +432,24 @@ impl Cpu {
     }
 
     fn shift(&mut self, step: &Step) {
-        let Self { params, fields, imbalance, ledger, live, .. } = self;
+        let own = self.own();
+        let Self { params, fields, imbalance, ledger, .. } = self;
         let Fields { position, velocity, .. } = fields;
-        let n = *live;
         if let Some(ledger) = ledger {
             let way = |i: usize| shift::shift(imbalance[i], velocity[i], step, params);
-            ledger.shift(n, params, way);
+            ledger.shift(own.clone(), params, way);
         }
-        (&mut position[..n], &velocity[..n], &imbalance[..n])
+        (&mut position[own.clone()], &velocity[own.clone()], &imbalance[own])
             .into_par_iter()
             .for_each(|(x, &v, &imbalance)| *x += shift::shift(imbalance, v, step, params));
     }
 
     fn correct(&mut self, dt: f64) {
-        let (l0, n) = (self.params.spacing, self.live);
+        let (l0, own) = (self.params.spacing, self.own());
         let Fields { position, velocity, acceleration, id, .. } = &mut self.fields;
         let bad = AtomicU32::new(u32::MAX);
-        let clamps: u64 = (&mut position[..n], &mut velocity[..n], &mut acceleration[..n], &id[..n])
+        let (position, velocity) = (&mut position[own.clone()], &mut velocity[own.clone()]);
+        let clamps: u64 = (position, velocity, &mut acceleration[own.clone()], &id[own])
             .into_par_iter()
             .map(|(x, v, a, &id)| {
                 let (x1, v1, clamped) = correct::correct(*x, *v, *a, dt, l0);
@@ -442,7 +482,10 @@ impl Backend for Cpu {
         self.dt = step.dt;
         match stage {
             ParticleStage::Absorber => self.absorber(step.dt),
-            ParticleStage::Viscosity => self.viscosity(),
+            ParticleStage::Viscosity => {
+                self.show_motion();
+                self.viscosity();
+            }
             ParticleStage::Predict => self.predict(step.dt),
             ParticleStage::CellList => self.cell_list(),
             ParticleStage::NeighbourList => self.neighbour_list(),
@@ -454,10 +497,11 @@ impl Backend for Cpu {
             ParticleStage::PressureGradient => self.pressure_gradient(),
             ParticleStage::Shift => self.shift(step),
             ParticleStage::Correct => {
+                let own = self.own();
                 if let Some(ledger) = &mut self.ledger {
                     let Fields { position, velocity, acceleration, .. } = &self.fields;
                     let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
-                    ledger.pressure(self.live, on, acceleration, step.dt);
+                    ledger.pressure(own, on, acceleration, step.dt);
                 }
                 self.correct(step.dt);
             }
@@ -466,24 +510,29 @@ impl Backend for Cpu {
     }
 
     fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()> {
-        for emission in emissions {
+        let emissions = self.emissions_here(emissions);
+        for emission in &*emissions {
             (0..emission.wall.len()).for_each(|k| openings::emit(emission, k, &mut self.fields));
+        }
+        if let Some(share) = self.share.as_mut().filter(|_| !emissions.is_empty()) {
+            let slots = emissions.iter().flat_map(|e| e.to..e.to + e.wall.len());
+            share.take_in(slots, &mut self.fields, &self.grid);
         }
         if outlets.iter().all(Outlet::is_closed) {
             return Ok(());
         }
-        let (sides, n) = (self.params.periodic, self.groups.fluid);
+        let (sides, n, share) = (self.params.periodic, self.groups.fluid, self.share.as_deref());
         let Fields { position, kind, .. } = &mut self.fields;
-        let count = |mut counts: Vec<u64>, (&x, kind): (&DVec3, &mut Kind)| {
+        let count = |mut counts: Vec<u64>, (i, (&x, kind)): (usize, (&DVec3, &mut Kind))| {
             if let Some(k) = openings::swallow(sides.wrap(x), outlets).filter(|_| *kind == Kind::Fluid) {
                 *kind = Kind::Ghost;
-                counts[k] += 1;
+                counts[k] += u64::from(share.is_none_or(|share| share.has(i)));
             }
             counts
         };
         let add = |a: Vec<u64>, b: Vec<u64>| a.iter().zip(b).map(|(a, b)| a + b).collect();
         let none = || vec![0; outlets.len()];
-        let particles = (&position[..n], &mut kind[..n]).into_par_iter().with_min_len(CHUNK);
+        let particles = (&position[..n], &mut kind[..n]).into_par_iter().enumerate().with_min_len(CHUNK);
         let counts: Vec<u64> = particles.fold(none, count).reduce(none, add);
         self.counters.swallowed.iter_mut().zip(counts).for_each(|(total, count)| *total += count);
         Ok(())
@@ -497,16 +546,30 @@ impl Backend for Cpu {
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let bodies = self.couple();
-        let Self { fields, neighbours, params, settings, work, multigrid, grid, .. } = self;
+        let Self { fields, neighbours, params, settings, work, multigrid, grid, share, .. } = self;
+        let share = share.as_deref();
+        let state = match share {
+            Some(share) => Cow::Owned(share.masked(&fields.state)),
+            None => Cow::Borrowed(&fields.state[..]),
+        };
+        if share.is_some() {
+            let foreign = fields.source.iter_mut().zip(&*state).filter(|(_, state)| **state != State::Inner);
+            foreign.for_each(|(b, _)| *b = 0.0);
+        }
         if params.filled {
-            pressure_level::subtract_mean(&fields.state, &mut fields.source);
+            let mut sums = pressure_level::sum_source(&state, &fields.source);
+            if let Some(share) = share {
+                share.sum(&mut sums);
+            }
+            pressure_level::subtract_mean(&state, &mut fields.source, sums);
         }
         let system = System {
             neighbours,
-            state: &fields.state,
+            state: &state,
             diagonal: &fields.diagonal,
             coefficient: laplacian_coefficient(params),
             bodies: &bodies,
+            among: share.map(|share| Among { share, state: &fields.state }),
         };
         let preconditioner: &mut dyn Precondition = match multigrid {
             Some(multigrid) => {
@@ -520,19 +583,30 @@ impl Backend for Cpu {
         // The solve leaves zero where the pressure is no unknown.
         fields.pressure.iter_mut().zip(&fields.surface_pressure).for_each(|(p, known)| *p += known);
         if params.filled {
-            pressure_level::raise(&fields.state, &mut fields.pressure);
+            let mut least = pressure_level::lowest(&state, &fields.pressure);
+            if let Some(share) = share {
+                least = -share.most(-least);
+            }
+            pressure_level::raise(&state, &mut fields.pressure, least);
+        }
+        if let Some(share) = share {
+            share.swap(&mut [&mut &mut fields.pressure[..]]);
         }
         if let Some(ledger) = &mut self.ledger {
             ledger.solution.clone_from(&fields.pressure);
         }
-        let cut = |p: &mut f64| {
+        let cut = |(i, p): (usize, &mut f64)| {
             let (high, low) = (*p > step.pressure_max, *p < 0.0);
             *p = p.clamp(0.0, step.pressure_max);
-            [u64::from(high), u64::from(low)]
+            let counts = share.is_none_or(|share| share.owns(i));
+            [u64::from(high && counts), u64::from(low && counts)]
         };
         let add = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
-        let cuts = |p: &mut [f64]| p.iter_mut().map(cut).fold([0; 2], add);
-        let [high, low] = fields.pressure.par_chunks_mut(CHUNK).map(cuts).reduce(|| [0; 2], add);
+        let cuts = |(c, p): (usize, &mut [f64])| {
+            let slots = c * CHUNK..;
+            slots.zip(p).map(cut).fold([0; 2], add)
+        };
+        let [high, low] = fields.pressure.par_chunks_mut(CHUNK).enumerate().map(cuts).reduce(|| [0; 2], add);
         self.counters.pressure_clamps += high;
         self.counters.negative_pressures += low;
         Ok(report)
@@ -555,11 +629,12 @@ impl Backend for Cpu {
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        let params = &self.params;
+        let (params, share) = (&self.params, self.share.as_deref());
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
-            for (k, i) in solid.wall_slots.clone().enumerate() {
+            let own = |(_, i): &(usize, usize)| share.is_none_or(|share| share.owns(*i));
+            for (k, i) in solid.wall_slots.clone().enumerate().filter(own) {
                 let area = pose.orientation * solid.wall_area[k];
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
@@ -573,30 +648,63 @@ impl Backend for Cpu {
             }
             total
         });
-        let wrenches = wrenches.collect();
+        let mut wrenches: Vec<Wrench> = wrenches.collect();
+        if let Some(share) = share {
+            share.sum_wrenches(&mut wrenches);
+        }
         fields.reaction.fill(DVec3::ZERO);
         Ok(wrenches)
     }
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {
-        Ok(self.ledger.as_ref().map(|ledger| ledger.work))
+        let own = self.ledger.as_ref().map(|ledger| ledger.work);
+        let Some((share, own)) = self.share.as_ref().zip(own) else { return Ok(own) };
+        let mut works = Entry::ALL.map(|entry| own.get(entry));
+        share.sum(&mut works);
+        let mut all = Ledger::default();
+        Entry::ALL.into_iter().zip(works).for_each(|(entry, work)| all.add(entry, work));
+        Ok(Some(all))
     }
 
     fn counters(&mut self) -> Result<Counters> {
-        Ok(self.counters.clone())
+        Ok(match &self.share {
+            Some(share) => {
+                let all = share.gather_all(vec![self.counters.clone()]);
+                all.into_iter().reduce(Counters::plus).unwrap_or_default()
+            }
+            None => self.counters.clone(),
+        })
     }
 
     fn monitor(&mut self) -> Result<FluidMonitor> {
-        Ok(monitor::monitor(&self.fields, self.live, &self.params, self.dt))
+        let sums = monitor::sums(&self.fields, self.own(), &self.params, self.dt);
+        let sums = match &self.share {
+            Some(share) => share.gather_all(sums),
+            None => sums,
+        };
+        Ok(monitor::monitor(&sums, &self.params, self.dt))
     }
 
     fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
-        Ok(slots.iter().map(|&s| self.fields.pressure[s]).collect())
+        let Some(share) = &self.share else {
+            return Ok(slots.iter().map(|&s| self.fields.pressure[s]).collect());
+        };
+        let here = slots.iter().map(|&s| share.here(s).filter(|&s| share.owns(s)));
+        let mut pressures: Vec<f64> = here.map(|s| s.map_or(0.0, |s| self.fields.pressure[s])).collect();
+        share.sum(&mut pressures);
+        Ok(pressures)
     }
 
     fn read(&mut self) -> Result<Fields> {
-        let mut fields = self.fields.clone();
-        fields.wrap(&self.groups, &self.params.periodic);
+        let mut fields = match &self.share {
+            // Only the first rank gets them.
+            Some(share) => share.gather_fields(&self.fields).unwrap_or_default(),
+            None => self.fields.clone(),
+        };
+        if !fields.position.is_empty() {
+            let groups = self.share.as_ref().map_or(self.groups, |share| share.all());
+            fields.wrap(&groups, &self.params.periodic);
+        }
         Ok(fields)
     }
 
@@ -630,6 +738,10 @@ impl Backend for Cpu {
             multigrid: self.multigrid.as_ref().map(|m| (4, m.stored())),
         };
         Ok(sizes.traffic())
+    }
+
+    fn ranks(&mut self) -> Result<Vec<Standing>> {
+        Ok(self.standings())
     }
 
     fn stop_with(&mut self, stop: &Stop) {

@@ -1,0 +1,129 @@
+//! `seixo run` as one of many processes that `mpirun` or `srun` started.
+
+use seixo::error::{Error, Result};
+use seixo::on_ranks::tell_case;
+use seixo::ranks::Team;
+use std::cell::Cell;
+use std::sync::Arc;
+
+/// How many processes the launcher started, as its environment tells.
+fn processes() -> usize {
+    let number = |name: &str| std::env::var(name).ok()?.parse::<usize>().ok();
+    let launched = ["PMIX_RANK", "PMI_RANK"].into_iter().any(|name| number(name).is_some());
+    let of_step = || number("SLURM_STEP_NUM_TASKS").or_else(|| number("SLURM_NTASKS")).filter(|_| launched);
+    number("OMPI_COMM_WORLD_SIZE").or_else(|| number("PMI_SIZE")).or_else(of_step).unwrap_or(1)
+}
+
+/// The processes that this one is one of; nothing where it is alone.
+///
+/// # Errors
+/// [`Error::Usage`] for many processes of a program that was built without MPI: each would compute the whole case.
+#[cfg(not(feature = "mpi"))]
+pub fn team() -> Result<Option<Arc<dyn Team>>> {
+    match processes() {
+        0 | 1 => Ok(None),
+        many => Err(Error::usage(
+            "ranks",
+            format!(
+                "this is one of {many} processes, but this seixo was built without MPI: build it with `--features mpi` \
+                 (docs/howto-ranks.md), or run it without mpirun or srun"
+            ),
+        )),
+    }
+}
+
+/// The processes that this one is one of, on MPI; nothing where it is alone.
+///
+/// # Errors
+/// [`Error::Usage`] if MPI does not start.
+#[cfg(feature = "mpi")]
+pub fn team() -> Result<Option<Arc<dyn Team>>> {
+    use seixo::ranks::mpi::{Processes, abort};
+    if processes() < 2 {
+        return Ok(None);
+    }
+    let started = Processes::start().ok_or_else(|| {
+        Error::usage("ranks", "MPI does not start, or bears one thread only: another MPI library is needed")
+    })?;
+    if started.ranks() < 2 {
+        let text = "the launcher started many processes, but MPI knows of one: seixo was built with another MPI library than \
+                    that of this mpirun or srun";
+        return Err(Error::usage("ranks", text));
+    }
+    // A rank that fails where the others do not takes all of them along: they would wait for it for ever.
+    let told = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |why| {
+        told(why);
+        abort(101);
+    }));
+    Ok(Some(Arc::new(started)))
+}
+
+/// Threads of this rank: as many as were asked for, or its part of the cores that it shares with other ranks.
+pub fn threads(team: &Arc<dyn Team>, asked: Option<u16>) -> u16 {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let status = read("/proc/self/status");
+    let cores = status.lines().find(|line| line.starts_with("Cpus_allowed_list")).unwrap_or_default();
+    // Launchers bind ranks to cores of their own, or to cores that several share.
+    let place = format!("{} {cores}", read("/proc/sys/kernel/hostname").trim());
+    let sharing =
+        team.gather(place.clone().into_bytes()).iter().filter(|other| **other == place.as_bytes()).count();
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    asked.unwrap_or((cores / sharing).clamp(1, 1024) as u16)
+}
+
+/// The first rank's word to the others: the case, or that there is none to compute.
+pub struct Call<'a> {
+    team: Option<&'a Arc<dyn Team>>,
+    told: Cell<bool>,
+}
+
+impl<'a> Call<'a> {
+    /// Nothing is told yet.
+    pub fn new(team: Option<&'a Arc<dyn Team>>) -> Self {
+        Self { team, told: Cell::new(team.is_none()) }
+    }
+
+    /// Have the others set up the case `text`.
+    pub fn tell(&self, text: &str) {
+        if let Some(team) = self.team {
+            self.told.set(true);
+            tell_case(&**team, Some(text));
+        }
+    }
+}
+
+impl Drop for Call<'_> {
+    fn drop(&mut self) {
+        if let Some(team) = self.team.filter(|_| !self.told.get()) {
+            tell_case(&**team, None);
+        }
+    }
+}
+
+/// The part of a rank that is not the first; there is none without MPI.
+#[cfg(not(feature = "mpi"))]
+pub fn serve(_: &Arc<dyn Team>, _: u16) -> super::Exit {
+    Ok(0)
+}
+
+/// The part of a rank that is not the first.
+#[cfg(feature = "mpi")]
+pub fn serve(team: &Arc<dyn Team>, threads: u16) -> super::Exit {
+    use seixo::on_ranks::hear_case;
+    use seixo::scene::Scene;
+    // Signals are for the first rank: it saves the state, for which it needs the others.
+    let _heedless = super::signals::watch(true)?.attend();
+    seixo::threads::start(Some(threads))?;
+    let Some(text) = hear_case(&**team) else { return Ok(0) };
+    let set_up = || {
+        let (case, ..) = seixo::case::file::parse("case", text, &[])?;
+        let scene = Scene::build(&case)?;
+        Ok((case, Arc::new(scene)))
+    };
+    if let Err(error) = seixo::on_ranks::serve(team, set_up) {
+        seixo::console::remark(&format!("rank {}: {error}", team.rank()));
+        seixo::ranks::mpi::abort(5);
+    }
+    Ok(0)
+}

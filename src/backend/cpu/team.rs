@@ -1,0 +1,240 @@
+//! The CPU path as one of many ranks: a part of the water, and all solids.
+
+use super::Cpu;
+use super::archive::Saved;
+use crate::backend::{Backend, Counters};
+use crate::cells::Grid;
+use crate::checkpoint::Archive;
+use crate::error::{Error, Result};
+use crate::fields::{Fields, State};
+use crate::kernels::openings::Emission;
+use crate::ledger::Ledger;
+use crate::neighbours::Neighbours;
+use crate::params::Params;
+use crate::plan::Plan;
+use crate::pressure::Settings;
+use crate::ranks::{Standing, Team};
+use crate::scene::{Kind, Scene};
+use crate::share::Share;
+use glam::DVec3;
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Slots for as much more water than a rank has, one part in so many, and for a few more.
+const SPARE: (usize, usize) = (8, 256);
+
+/// `scene` with the water of the slots `own` alone, in `slots` slots.
+fn part(scene: &Scene, own: &[usize], slots: usize) -> Scene {
+    let (all, parked) = (scene.groups.fluid, slots - own.len());
+    let lay = |water: &mut dyn Iterator<Item = DVec3>, solids: &[DVec3], rest: DVec3| -> Vec<DVec3> {
+        water.chain(std::iter::repeat_n(rest, parked)).chain(solids.iter().copied()).collect()
+    };
+    let kind = own.iter().map(|_| Kind::Fluid).chain(std::iter::repeat_n(Kind::Ghost, parked));
+    let mut solids = scene.solids.clone();
+    for solid in &mut solids {
+        for range in [&mut solid.wall_slots, &mut solid.dummy_slots] {
+            *range = range.start - all + slots..range.end - all + slots;
+        }
+    }
+    Scene {
+        position: lay(&mut own.iter().map(|&i| scene.position[i]), &scene.position[all..], scene.domain.0),
+        velocity: lay(&mut own.iter().map(|&i| scene.velocity[i]), &scene.velocity[all..], DVec3::ZERO),
+        kind: kind.chain(scene.kind[all..].iter().copied()).collect(),
+        solid: std::iter::repeat_n(0, slots).chain(scene.solid[all..].iter().copied()).collect(),
+        groups: crate::scene::Groups { fluid: slots, ..scene.groups },
+        reserve: parked,
+        openings: scene.openings.clone(),
+        solids,
+        walls: Vec::new(),
+        static_wall_normal: Vec::new(),
+        static_wall_shape: Vec::new(),
+        notes: Vec::new(),
+        ..*scene
+    }
+}
+
+impl Cpu {
+    /// The part of the particles of `scene` that a rank of `team` computes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for what ranks do not compute, and if there are too many of them for the tank.
+    pub fn of_team(
+        team: Arc<dyn Team>,
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+    ) -> Result<Self> {
+        if !plan.wet() {
+            return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
+        }
+        let grid = Grid::new(params)?;
+        let mut share = Share::new(team, params, scene.groups, &grid)?;
+        let own = share.choose(&scene.position, &scene.kind, &grid);
+        let slots = (own.len() + own.len() / SPARE.0 + SPARE.1).min(scene.groups.fluid);
+        let mut cpu = Self::new(&part(scene, &own, slots), params, plan, settings)?;
+        cpu.fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
+        share.begin(cpu.groups, own.len(), &cpu.fields, &cpu.grid);
+        cpu.share = Some(Box::new(share));
+        Ok(cpu)
+    }
+
+    /// What this rank computes, where there are others.
+    pub fn share(&self) -> Option<&Share> {
+        self.share.as_deref()
+    }
+
+    /// What each rank holds and said.
+    pub(super) fn standings(&self) -> Vec<Standing> {
+        let Some(share) = &self.share else { return Vec::new() };
+        share.gather_all(vec![share.standing(self.live, self.bytes())])
+    }
+
+    /// Slots of the water that is computed here: all of it but copies of other ranks'.
+    pub(super) fn own(&self) -> Range<usize> {
+        self.share.as_ref().map_or(0..self.live, |share| share.own())
+    }
+
+    /// Shows the ranks beside this one where the water at their borders is and how it moves.
+    pub(super) fn show_motion(&mut self) {
+        if let Some(share) = &self.share {
+            let Fields { position, velocity, .. } = &mut self.fields;
+            share.swap(&mut [&mut &mut position[..], &mut &mut velocity[..]]);
+        }
+    }
+
+    /// Water that has moved goes to the ranks whose it is now, and copies of that at borders come here.
+    pub(super) fn settle(&mut self) {
+        let Some(share) = &mut self.share else { return };
+        let here = share.settle(&mut self.fields, &self.grid, &self.params);
+        self.make_room(here.len());
+        if let Some(share) = &self.share {
+            share.place(&here, &mut self.fields, self.live);
+            self.live = here.len();
+        }
+    }
+
+    /// Slots for `water` particles of water, more if there are fewer: those of solids move up.
+    fn make_room(&mut self, water: usize) {
+        let (slots, Some(share)) = (self.groups.fluid, &mut self.share) else { return };
+        if water <= slots {
+            return;
+        }
+        let more = (water + water / SPARE.0 + SPARE.1).min(share.all().fluid).max(water) - slots;
+        fn insert<T: Clone>(values: &mut Vec<T>, at: usize, more: usize, value: T) {
+            values.splice(at..at, std::iter::repeat_n(value, more));
+        }
+        let Fields {
+            position,
+            velocity,
+            kind,
+            id,
+            pressure,
+            number_density,
+            surface_pressure,
+            state,
+            source,
+            diagonal,
+            acceleration,
+            // Of solids alone.
+            reaction: _,
+        } = &mut self.fields;
+        insert(position, slots, more, self.params.domain_min);
+        insert(velocity, slots, more, DVec3::ZERO);
+        insert(kind, slots, more, Kind::Ghost);
+        insert(id, slots, more, 0);
+        for values in [pressure, number_density, source] {
+            insert(values, slots, more, 0.0);
+        }
+        if !surface_pressure.is_empty() {
+            insert(surface_pressure, slots, more, 0.0);
+        }
+        insert(diagonal, slots, more, 1.0);
+        insert(state, slots, more, State::Inactive);
+        insert(acceleration, slots, more, DVec3::ZERO);
+        if !self.imbalance.is_empty() {
+            insert(&mut self.imbalance, slots, more, DVec3::ZERO);
+        }
+        self.groups.fluid += more;
+        for solid in &mut self.solids {
+            for range in [&mut solid.wall_slots, &mut solid.dummy_slots] {
+                *range = range.start + more..range.end + more;
+            }
+        }
+        if let Some((list, _)) = &mut self.fixed {
+            list.slot.iter_mut().for_each(|slot| *slot += more as u32);
+        }
+        // Made anew right after.
+        self.neighbours = Neighbours::new(self.groups.pressure());
+        share.groups_are(self.groups);
+    }
+
+    /// `emissions` with the slots that they have here.
+    pub(super) fn emissions_here<'a>(&mut self, emissions: &'a [Emission]) -> Cow<'a, [Emission]> {
+        let Some(share) = &self.share else { return Cow::Borrowed(emissions) };
+        let all = share.all().fluid;
+        let comes: usize = emissions.iter().map(|e| e.wall.len()).sum();
+        self.make_room(self.live + comes);
+        let fluid = self.groups.fluid;
+        let here = |slot: usize| slot + fluid - all;
+        let of = |e: &Emission| Emission {
+            wall: here(e.wall.start)..here(e.wall.end),
+            to: here(e.to),
+            ..e.clone()
+        };
+        emissions.iter().map(of).collect()
+    }
+
+    /// Save the state of all ranks, gathered before, as that of one.
+    pub(crate) fn save_all(
+        &mut self,
+        archive: &mut Archive,
+        mut fields: Fields,
+        mut counters: Counters,
+        mut work: Option<Ledger>,
+    ) -> Result<()> {
+        let fluid = self.share.as_ref().map_or(0, |share| share.all().fluid);
+        let (fields, counters) = (&mut fields, &mut counters);
+        let saved = Saved { fluid, fields, counters, work: work.as_mut(), dt: &mut self.dt, lists: None };
+        saved.exchange(archive).map(drop)
+    }
+
+    /// The particles of all ranks in `archive`, for [`Cpu::restore`]; the rest of the state is taken over by the first rank, this one.
+    pub(crate) fn read_all(&mut self, archive: &mut Archive) -> Result<Fields> {
+        let (mut fields, fluid) = match &self.share {
+            Some(share) => (share.blank(&self.fields), share.all().fluid),
+            None => (self.fields.clone(), self.groups.fluid),
+        };
+        let work = self.ledger.as_mut().map(|ledger| &mut ledger.work);
+        let (counters, dt) = (&mut self.counters, &mut self.dt);
+        let saved = Saved { fluid, fields: &mut fields, counters, work, dt, lists: None };
+        saved.exchange(archive)?;
+        Ok(fields)
+    }
+
+    /// Take over the state that the first rank gives: all particles, of which each rank keeps its own.
+    pub(crate) fn restore(&mut self, fields: Option<Fields>) -> Result<()> {
+        let Some(share) = self.share.as_mut() else { return Ok(()) };
+        if share.rank() > 0 {
+            // Those of the first rank are of all since the start of the run.
+            self.counters = Counters::new(self.counters.swallowed.len());
+            if let Some(ledger) = &mut self.ledger {
+                ledger.work = Ledger::default();
+            }
+        }
+        let (whole, dt) = share.tell_fields(fields.map(|fields| (fields, self.dt)));
+        self.dt = dt;
+        let own = share.choose(&whole.position, &whole.kind, &self.grid);
+        self.make_room(own.len());
+        let Some(share) = self.share.as_mut() else { return Ok(()) };
+        share.take_over(&own, &whole, &mut self.fields);
+        share.begin(self.groups, own.len(), &self.fields, &self.grid);
+        self.live = own.len();
+        self.neighbours = Neighbours::new(self.neighbours.rows());
+        if self.params.viscosity > 0.0 {
+            self.search_again();
+        }
+        Ok(())
+    }
+}

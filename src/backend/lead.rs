@@ -1,0 +1,189 @@
+//! The backend of the first of many ranks: it does what it is asked and has the others do the same, each on its own particles.
+
+use super::cpu::Cpu;
+use super::traffic::Traffic;
+use super::{Backend, Counters};
+use crate::body::{FreeBody, Pose, Wrench};
+use crate::checkpoint::Archive;
+use crate::error::Result;
+use crate::fields::Fields;
+use crate::kernels::openings::{Emission, Outlet};
+use crate::ledger::Ledger;
+use crate::monitor::FluidMonitor;
+use crate::params::Step;
+use crate::plan::ParticleStage;
+use crate::pressure::PressureReport;
+use crate::ranks::{Standing, Team, decode, encode};
+use crate::stop::Stop;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// What the first rank has the others do: a call of [`Backend`].
+#[derive(Serialize, Deserialize)]
+enum Order<'a> {
+    Run(ParticleStage, Step),
+    PassOpenings(Cow<'a, [Emission]>, Cow<'a, [Outlet]>),
+    FreeBodies(Cow<'a, [FreeBody]>),
+    SolvePressure(Step),
+    MoveSolids(Cow<'a, [Pose]>),
+    BodyForce,
+    Counters,
+    Ledger,
+    Monitor,
+    Pressures(Cow<'a, [usize]>),
+    Read,
+    Restore,
+    Ranks,
+    End,
+}
+
+/// The backend of the first rank.
+pub struct Lead {
+    team: Arc<dyn Team>,
+    cpu: Cpu,
+}
+
+impl Lead {
+    /// With its own part of the particles, `cpu`; the others [`follow`].
+    pub fn new(team: Arc<dyn Team>, cpu: Cpu) -> Self {
+        Self { team, cpu }
+    }
+
+    fn order(&self, order: &Order) {
+        self.team.hear(encode(order));
+    }
+}
+
+impl Drop for Lead {
+    fn drop(&mut self) {
+        // In a panic the others are not where they could hear it.
+        if !std::thread::panicking() {
+            self.order(&Order::End);
+        }
+    }
+}
+
+impl Backend for Lead {
+    fn description(&self) -> String {
+        let (ranks, one) = (self.team.ranks(), self.cpu.description());
+        let threads = one.strip_prefix("CPU, ").unwrap_or(&one);
+        format!("CPU, {ranks} rank{} of {threads}", if ranks == 1 { "" } else { "s" })
+    }
+
+    fn precision(&self) -> &'static str {
+        self.cpu.precision()
+    }
+
+    fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
+        self.order(&Order::Run(stage, *step));
+        self.cpu.run(stage, step)
+    }
+
+    fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()> {
+        self.order(&Order::PassOpenings(emissions.into(), outlets.into()));
+        self.cpu.pass_openings(emissions, outlets)
+    }
+
+    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {
+        self.order(&Order::FreeBodies(bodies.into()));
+        self.cpu.free_bodies(bodies)
+    }
+
+    fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        self.order(&Order::SolvePressure(*step));
+        self.cpu.solve_pressure(step)
+    }
+
+    fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
+        self.order(&Order::MoveSolids(poses.into()));
+        self.cpu.move_solids(poses)
+    }
+
+    fn body_force(&mut self) -> Result<Vec<Wrench>> {
+        self.order(&Order::BodyForce);
+        self.cpu.body_force()
+    }
+
+    fn counters(&mut self) -> Result<Counters> {
+        self.order(&Order::Counters);
+        self.cpu.counters()
+    }
+
+    fn ledger(&mut self) -> Result<Option<Ledger>> {
+        self.order(&Order::Ledger);
+        self.cpu.ledger()
+    }
+
+    fn monitor(&mut self) -> Result<FluidMonitor> {
+        self.order(&Order::Monitor);
+        self.cpu.monitor()
+    }
+
+    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
+        self.order(&Order::Pressures(slots.into()));
+        self.cpu.pressures(slots)
+    }
+
+    fn read(&mut self) -> Result<Fields> {
+        self.order(&Order::Read);
+        self.cpu.read()
+    }
+
+    fn write(&mut self, fields: &Fields) -> Result<()> {
+        self.order(&Order::Restore);
+        self.cpu.restore(Some(fields.clone()))
+    }
+
+    fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        if archive.is_saving() {
+            let (counters, work, fields) = (self.counters()?, self.ledger()?, self.read()?);
+            return self.cpu.save_all(archive, fields, counters, work);
+        }
+        // A state that does not fit is refused before the others hear of it.
+        let fields = self.cpu.read_all(archive)?;
+        self.write(&fields)
+    }
+
+    fn ranks(&mut self) -> Result<Vec<Standing>> {
+        self.order(&Order::Ranks);
+        self.cpu.ranks()
+    }
+
+    fn stop_with(&mut self, _: &Stop) {
+        // All ranks would have to give a solve up at the same iteration; steps over ranks are short, and are ended.
+    }
+
+    fn bytes(&self) -> u64 {
+        self.cpu.bytes()
+    }
+
+    fn traffic(&mut self) -> Result<Traffic> {
+        self.cpu.traffic()
+    }
+}
+
+/// What a rank does that is not the first: what that one orders, until it ends.
+///
+/// # Errors
+/// What a stage says.
+pub fn follow(team: &dyn Team, cpu: &mut Cpu) -> Result<()> {
+    loop {
+        match decode::<Order>(&team.hear(Vec::new())) {
+            Order::Run(stage, step) => cpu.run(stage, &step)?,
+            Order::PassOpenings(emissions, outlets) => cpu.pass_openings(&emissions, &outlets)?,
+            Order::FreeBodies(bodies) => cpu.free_bodies(&bodies)?,
+            Order::SolvePressure(step) => drop(cpu.solve_pressure(&step)?),
+            Order::MoveSolids(poses) => cpu.move_solids(&poses)?,
+            Order::BodyForce => drop(cpu.body_force()?),
+            Order::Counters => drop(cpu.counters()?),
+            Order::Ledger => drop(cpu.ledger()?),
+            Order::Monitor => drop(cpu.monitor()?),
+            Order::Pressures(slots) => drop(cpu.pressures(&slots)?),
+            Order::Read => drop(cpu.read()?),
+            Order::Ranks => drop(cpu.ranks()?),
+            Order::Restore => cpu.restore(None)?,
+            Order::End => return Ok(()),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! A simulation on many ranks: the first one opens it, the others serve.
+
+use crate::backend::Backend;
+use crate::backend::cpu::Cpu;
+use crate::backend::lead::{Lead, follow};
+use crate::case::Case;
+use crate::error::{Error, Result};
+use crate::params::Params;
+use crate::plan::Plan;
+use crate::ranks::{Team, decode, encode};
+use crate::scene::Scene;
+use crate::simulation::{Simulation, settings};
+use std::sync::Arc;
+
+/// What a rank makes of its start: nothing wrong, or why it cannot compute. All ranks tell each other once.
+fn agree(team: &dyn Team, own: &Result<Cpu>) -> Result<()> {
+    let wrong = own.as_ref().err().map(ToString::to_string);
+    let all = team.gather(encode(&wrong));
+    let first =
+        all.iter().enumerate().find_map(|(rank, bytes)| Some((rank, decode::<Option<String>>(bytes)?)));
+    match first {
+        Some((rank, why)) => Err(Error::usage("ranks", format!("rank {rank} of {}: {why}", team.ranks()))),
+        None => Ok(()),
+    }
+}
+
+/// The first rank has the others set up the case `text`, or end if there is none.
+pub fn tell_case(team: &dyn Team, text: Option<&str>) {
+    team.hear(text.unwrap_or_default().as_bytes().to_vec());
+}
+
+/// What the first rank tells with [`tell_case`].
+pub fn hear_case(team: &dyn Team) -> Option<String> {
+    let text = team.hear(Vec::new());
+    (!text.is_empty()).then(|| String::from_utf8_lossy(&text).into_owned())
+}
+
+impl Simulation {
+    /// Set up a `scene` that was built from `case` on the ranks of `team`, of which this is the first. The others [`serve`].
+    ///
+    /// # Errors
+    /// As [`Simulation::open`], and [`Error::Usage`] for what ranks do not compute, or what one of them could not set up.
+    pub fn on_ranks(case: &Case, scene: impl Into<Arc<Scene>>, team: &Arc<dyn Team>) -> Result<Self> {
+        let mut agreed = false;
+        let set_up = Self::with_backend(case, scene, |scene, params, plan, settings| {
+            agreed = true;
+            let cpu = Cpu::of_team(team.clone(), scene, params, plan, settings);
+            let together = agree(&**team, &cpu);
+            let cpu = cpu?;
+            together?;
+            Ok(Box::new(Lead::new(team.clone(), cpu)) as Box<dyn Backend>)
+        });
+        if !agreed {
+            let why = set_up.as_ref().err().map(ToString::to_string).unwrap_or_default();
+            // The others are told; here the error is known already.
+            let _ = agree(&**team, &Err(Error::usage("ranks", why)));
+        }
+        set_up
+    }
+}
+
+/// The part of a rank that is not the first: sets the case up as `set_up` has it and does what the first one orders, until it ends. Returns
+/// what this rank held, or nothing if the ranks could not begin, which the first one tells.
+///
+/// # Errors
+/// What a stage says.
+pub fn serve(
+    team: &Arc<dyn Team>,
+    set_up: impl FnOnce() -> Result<(Case, Arc<Scene>)>,
+) -> Result<Option<Cpu>> {
+    let cpu = set_up().and_then(|(case, scene)| {
+        let params = Params::new(&case, &scene)?;
+        let plan = Plan::new(&case, &scene, &params);
+        Cpu::of_team(team.clone(), &scene, &params, &plan, settings(&case))
+    });
+    let together = agree(&**team, &cpu);
+    let (Ok(mut cpu), Ok(())) = (cpu, together) else { return Ok(None) };
+    follow(&**team, &mut cpu)?;
+    Ok(Some(cpu))
+}

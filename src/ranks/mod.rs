@@ -1,0 +1,75 @@
+//! Ranks: processes that share the particles of a run.
+//!
+//! The tank is cut across x into slabs of whole columns of cells ([`crate::share`]). As x runs slowest in the order of the cells, the water
+//! of a slab is one range of slots, and what its neighbours need of it are two: its first and its last column, one effective radius
+//! wide. Each rank runs the stages of the CPU path over its own particles and over copies of these columns of the ranks beside
+//! it, which are made new after every stage that changes what the next one reads there.
+//!
+//! The first rank leads ([`crate::backend::lead`], [`crate::on_ranks`]): it alone has solids, clock, tables and files, and tells the others what to do, stage
+//! by stage. Sums are made in the order of the ranks, so that a run repeats to the last bit on the same number of ranks.
+//!
+//! What ranks say to each other goes through [`Team`]: threads of one process ([`threads`]), or MPI (feature `mpi`).
+
+#[cfg(feature = "mpi")]
+pub mod mpi;
+pub mod threads;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// `value` in bytes.
+pub(crate) fn encode<T: Serialize>(value: &T) -> Vec<u8> {
+    // Into memory, of plain numbers: nothing that can fail.
+    postcard::to_stdvec(value).unwrap_or_else(|e| panic!("ranks cannot say this: {e}"))
+}
+
+/// The value of `bytes` that another rank encoded.
+pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> T {
+    postcard::from_bytes(bytes).unwrap_or_else(|e| panic!("ranks of different programs: {e}"))
+}
+
+/// The ranks of a run, as one of them sees them. Every call is made by all of them, in the same order.
+pub trait Team: Send + Sync {
+    /// Number of this one, from 0.
+    fn rank(&self) -> usize;
+    /// How many there are.
+    fn ranks(&self) -> usize;
+    /// Hand `left` to the rank before this one and `right` to the one after it; returns what these hand over, nothing at the ends.
+    fn swap(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2];
+    /// What each has to say, in the order of the ranks.
+    fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>>;
+    /// As many numbers of each rank, one after the other.
+    fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
+        let all = self.gather(bytemuck::cast_slice(own).to_vec());
+        all.iter().flat_map(|bytes| bytemuck::pod_collect_to_vec::<u8, f64>(bytes)).collect()
+    }
+    /// What the first one says.
+    fn hear(&self, said: Vec<u8>) -> Vec<u8>;
+}
+
+/// What a rank holds, and what it said to the others since the start.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Standing {
+    /// Its number.
+    pub rank: usize,
+    /// Its columns of cells along x: the first, and that after the last.
+    pub columns: [u32; 2],
+    /// Particles of water that it computes.
+    pub water: usize,
+    /// Copies of other ranks' particles of water.
+    pub copies: usize,
+    /// Particles of wall layers that it computes, dry ones included.
+    pub walls: usize,
+    /// Bytes held for particles, as of the last step.
+    pub bytes: u64,
+    /// Most memory that the process has held [bytes], where the system tells it (Linux).
+    pub memory_peak_bytes: Option<u64>,
+    /// Messages to the ranks beside it.
+    pub messages: u64,
+    /// Bytes of these, and of what it had all ranks gather.
+    pub message_bytes: u64,
+    /// Times that all ranks gathered something.
+    pub rounds: u64,
+    /// Wall-clock time in messages and rounds: on their way, and waiting for slower ranks [s].
+    pub waited_s: f64,
+}

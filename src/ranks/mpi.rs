@@ -1,0 +1,106 @@
+//! Ranks that are processes under MPI.
+
+use super::Team;
+use mpi::Count;
+use mpi::datatype::PartitionMut;
+use mpi::environment::Universe;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
+
+/// This process among those that `mpirun` or `srun` started; MPI ends when it is dropped.
+pub struct Processes {
+    world: SimpleCommunicator,
+    _universe: Universe,
+}
+
+// SAFETY: MPI was asked to be called by one thread at a time, whichever it is, and said that it can; stages run one after the other, and
+// each calls it from the one thread that runs the stage.
+unsafe impl Send for Processes {}
+// SAFETY: as above.
+unsafe impl Sync for Processes {}
+
+impl Processes {
+    /// Start MPI; nothing if it is started already, or bears no thread but the first one.
+    pub fn start() -> Option<Self> {
+        let (universe, threading) = mpi::initialize_with_threading(mpi::Threading::Serialized)?;
+        (threading >= mpi::Threading::Serialized)
+            .then(|| Self { world: universe.world(), _universe: universe })
+    }
+}
+
+/// End all ranks with the exit code `code`, whatever they do.
+pub fn abort(code: u8) -> ! {
+    SimpleCommunicator::world().abort(i32::from(code))
+}
+
+fn count(n: usize) -> Count {
+    // A part of a run that is as large as this has met other limits before.
+    Count::try_from(n).unwrap_or_else(|_| panic!("{n} bytes are more than MPI sends at once"))
+}
+
+impl Team for Processes {
+    fn rank(&self) -> usize {
+        self.world.rank() as usize
+    }
+
+    fn ranks(&self) -> usize {
+        self.world.size() as usize
+    }
+
+    fn swap(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
+        let rank = self.world.rank();
+        let beside = [rank - 1, rank + 1].map(|r| (0..self.world.size()).contains(&r).then_some(r));
+        let [mut before, mut after] = [Vec::new(), Vec::new()];
+        mpi::request::scope(|scope| {
+            let a = beside[0].map(|r| self.world.process_at_rank(r).immediate_send(scope, &left[..]));
+            let b = beside[1].map(|r| self.world.process_at_rank(r).immediate_send(scope, &right[..]));
+            if let Some(r) = beside[0] {
+                before = self.world.process_at_rank(r).receive_vec::<u8>().0;
+            }
+            if let Some(r) = beside[1] {
+                after = self.world.process_at_rank(r).receive_vec::<u8>().0;
+            }
+            [a, b].into_iter().flatten().for_each(|request| {
+                request.wait();
+            });
+        });
+        [before, after]
+    }
+
+    fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
+        let mut counts = vec![0 as Count; self.ranks()];
+        self.world.all_gather_into(&count(own.len()), &mut counts[..]);
+        let starts: Vec<Count> = counts
+            .iter()
+            .scan(0, |sum: &mut usize, &n| {
+                let start = *sum;
+                *sum += n as usize;
+                Some(count(start))
+            })
+            .collect();
+        let mut all = vec![0_u8; counts.iter().map(|&n| n as usize).sum()];
+        let mut parts = PartitionMut::new(&mut all[..], &counts[..], &starts[..]);
+        self.world.all_gather_varcount_into(&own[..], &mut parts);
+        let part = |(&start, &n): (&Count, &Count)| all[start as usize..start as usize + n as usize].to_vec();
+        starts.iter().zip(&counts).map(part).collect()
+    }
+
+    fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; own.len() * self.ranks()];
+        self.world.all_gather_into(own, &mut all[..]);
+        all
+    }
+
+    fn hear(&self, said: Vec<u8>) -> Vec<u8> {
+        let root = self.world.process_at_rank(0);
+        let mut length = said.len() as u64;
+        root.broadcast_into(&mut length);
+        let mut said = said;
+        said.resize(length as usize, 0);
+        // MPI takes no empty buffer.
+        if !said.is_empty() {
+            root.broadcast_into(&mut said[..]);
+        }
+        said
+    }
+}

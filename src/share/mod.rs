@@ -1,0 +1,238 @@
+//! The particles that a rank computes: those in its slab of the tank, columns of cells `cuts[rank]..cuts[rank + 1]` along x. After
+//! [`Share::settle`] the water's slots are, in the order of the cells,
+//!
+//! | copies of the last column of the rank before | own | copies of the first column of the rank after |
+//!
+//! and these copies are in the order of their owner, as both sort the same sequence by cell. Solids keep the slots that they have on a
+//! single rank: every rank knows where they are, and computes the rows of those in its own columns.
+
+mod border;
+mod cut;
+mod moves;
+mod outlook;
+mod whole;
+
+use crate::body::Wrench;
+use crate::cells::Grid;
+use crate::error::Result;
+use crate::fields::State;
+use crate::machine::memory_peak;
+use crate::params::Params;
+use crate::ranks::{Standing, Team, decode, encode};
+use crate::scene::Groups;
+pub use border::Bordered;
+use border::Side;
+use cut::check;
+use glam::DVec3;
+pub use moves::Traveller;
+pub use outlook::{Outlook, Taken};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Instant;
+
+/// What a rank computes, and what it hands to those beside it.
+pub struct Share {
+    team: Arc<dyn Team>,
+    /// Of all ranks; slots are counted as on a single one.
+    all: Groups,
+    /// Of this one.
+    groups: Groups,
+    /// Where slots without a particle are [m].
+    corner: DVec3,
+    /// Cells of a column: of one number along x.
+    per_column: usize,
+    /// First column of each rank, and the end of the last one's.
+    cuts: Vec<u32>,
+    /// Slots of the water that this rank computes.
+    own: Range<usize>,
+    /// Slots beside them with water that has just come in.
+    come_in: Vec<usize>,
+    /// Borders to the rank before and to that after this one.
+    sides: [Option<Side>; 2],
+    /// Whether it computes each slot of the wall layers.
+    walls: Vec<bool>,
+    steps: u64,
+    /// Messages to the ranks beside this one, their bytes, rounds of all ranks, and nanoseconds in both so far.
+    said: [AtomicU64; 4],
+}
+
+impl Share {
+    /// That of a rank of `team`, in a scene of `all` these particles.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] if there are more ranks than columns of cells, or the tank is periodic along x.
+    pub fn new(team: Arc<dyn Team>, params: &Params, all: Groups, grid: &Grid) -> Result<Self> {
+        check(team.ranks(), params, grid)?;
+        Ok(Self {
+            sides: [None, None],
+            walls: vec![false; all.pressure() - all.fluid],
+            per_column: grid.total() / grid.count[0] as usize,
+            cuts: Vec::new(),
+            own: 0..0,
+            come_in: Vec::new(),
+            steps: 0,
+            said: Default::default(),
+            team,
+            corner: params.domain_min,
+            groups: all,
+            all,
+        })
+    }
+
+    /// Sizes of the groups of all ranks.
+    pub fn all(&self) -> Groups {
+        self.all
+    }
+
+    /// The slot here of the slot `i` of a single rank, if it is a solid's.
+    pub fn here(&self, i: usize) -> Option<usize> {
+        i.checked_sub(self.all.fluid).map(|k| k + self.groups.fluid)
+    }
+
+    /// Number of this rank.
+    pub fn rank(&self) -> usize {
+        self.team.rank()
+    }
+
+    /// How many there are.
+    pub fn ranks(&self) -> usize {
+        self.team.ranks()
+    }
+
+    /// Slots of the water that this rank computes.
+    pub fn own(&self) -> Range<usize> {
+        self.own.clone()
+    }
+
+    /// Whether it has the water of slot `i`, that which has just come in included.
+    pub fn has(&self, i: usize) -> bool {
+        self.own.contains(&i) || self.come_in.contains(&i)
+    }
+
+    /// Whether it computes the pressure-carrying slot `i`.
+    pub fn owns(&self, i: usize) -> bool {
+        self.own.contains(&i) || i >= self.groups.fluid && self.walls[i - self.groups.fluid]
+    }
+
+    /// The pressure-carrying slots that this rank computes: the water's, then walls'.
+    fn owned(&self) -> impl Iterator<Item = usize> + '_ {
+        let walls = self.walls.iter().enumerate().filter(|(_, owned)| **owned);
+        self.own().chain(walls.map(|(k, _)| self.groups.fluid + k))
+    }
+
+    /// The pressure-carrying slots that are copies of those beside.
+    pub fn copies(&self) -> impl Iterator<Item = usize> + '_ {
+        self.sides.iter().flatten().flat_map(Side::taken)
+    }
+
+    /// `state` of the slots that this rank computes; [`State::Inactive`] elsewhere.
+    pub fn masked(&self, state: &[State]) -> Vec<State> {
+        let of = |(i, &s): (usize, &State)| if self.owns(i) { s } else { State::Inactive };
+        state.iter().enumerate().map(of).collect()
+    }
+
+    fn columns(&self) -> Range<u32> {
+        self.cuts[self.rank()]..self.cuts[self.rank() + 1]
+    }
+
+    /// What this rank holds, `bytes` of it in all, and said so far.
+    pub fn standing(&self, live: usize, bytes: u64) -> Standing {
+        let [messages, message_bytes, rounds, waited] = [0, 1, 2, 3].map(|k| self.said[k].load(Relaxed));
+        let mine = self.columns();
+        Standing {
+            rank: self.rank(),
+            columns: [mine.start, mine.end],
+            water: self.own.len(),
+            copies: live - self.own.len(),
+            walls: self.walls.iter().filter(|owned| **owned).count(),
+            bytes,
+            memory_peak_bytes: memory_peak(),
+            messages,
+            message_bytes,
+            rounds,
+            waited_s: waited as f64 * 1e-9,
+        }
+    }
+
+    fn timed<T>(&self, said: impl FnOnce(&dyn Team) -> T) -> T {
+        let start = Instant::now();
+        let heard = said(&*self.team);
+        self.said[3].fetch_add(start.elapsed().as_nanos() as u64, Relaxed);
+        heard
+    }
+
+    fn pass(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
+        let beside = u64::from(self.rank() > 0) + u64::from(self.rank() + 1 < self.ranks());
+        self.said[0].fetch_add(beside, Relaxed);
+        self.said[1].fetch_add((left.len() + right.len()) as u64, Relaxed);
+        self.timed(|team| team.swap(left, right))
+    }
+
+    /// What every rank has to say, in the order of the ranks.
+    pub fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
+        self.said[1].fetch_add(own.len() as u64, Relaxed);
+        self.said[2].fetch_add(1, Relaxed);
+        self.timed(|team| team.gather(own))
+    }
+
+    /// As many numbers of every rank.
+    fn numbers(&self, own: &[f64]) -> Vec<f64> {
+        self.said[1].fetch_add(size_of_val(own) as u64, Relaxed);
+        self.said[2].fetch_add(1, Relaxed);
+        self.timed(|team| team.gather_numbers(own))
+    }
+
+    /// Each of `values` summed over the ranks, in their order.
+    pub fn sum(&self, values: &mut [f64]) {
+        if values.is_empty() {
+            return;
+        }
+        let all = self.numbers(values);
+        values.fill(0.0);
+        for part in all.chunks_exact(values.len()) {
+            values.iter_mut().zip(part).for_each(|(sum, v)| *sum += v);
+        }
+    }
+
+    /// The largest `value` of all ranks.
+    pub fn most(&self, value: f64) -> f64 {
+        self.numbers(&[value]).into_iter().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Each of `wrenches` summed over the ranks.
+    pub fn sum_wrenches(&self, wrenches: &mut [Wrench]) {
+        let parts = wrenches.iter().flat_map(|w| [w.force, w.torque]).flat_map(|v| v.to_array());
+        let mut numbers: Vec<f64> = parts.collect();
+        self.sum(&mut numbers);
+        for (wrench, n) in wrenches.iter_mut().zip(numbers.chunks_exact(6)) {
+            *wrench = Wrench { force: DVec3::from_slice(n), torque: DVec3::from_slice(&n[3..]) };
+        }
+    }
+
+    /// The lists of all ranks in one, in their order.
+    pub fn gather_all<T: Serialize + DeserializeOwned>(&self, own: Vec<T>) -> Vec<T> {
+        let all = self.gather(encode(&own));
+        all.iter().flat_map(|bytes| decode::<Vec<T>>(bytes)).collect()
+    }
+
+    /// Shows the ranks beside this one the border of `arrays`, and takes theirs over.
+    pub fn swap(&self, arrays: &mut [&mut dyn Bordered]) {
+        let give = |side: &Option<Side>| {
+            let mut out = Vec::new();
+            if let Some(side) = side {
+                arrays.iter().for_each(|array| array.give(side, &mut out));
+            }
+            out
+        };
+        let shown = self.pass(give(&self.sides[0]), give(&self.sides[1]));
+        for (side, bytes) in self.sides.iter().zip(&shown) {
+            if let Some(side) = side {
+                let mut from = &bytes[..];
+                arrays.iter_mut().for_each(|array| array.take(side, &mut from));
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Water that goes from rank to rank, and the borders that it leaves.
+
+use super::Share;
+use super::border::Side;
+use super::cut::{cut, unevenness};
+use crate::cells::Grid;
+use crate::fields::Fields;
+use crate::kernels::cell_list::{CellList, inside};
+use crate::params::Params;
+use crate::scene::{Groups, Kind};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+use std::ops::Range;
+
+/// Steps between looks at how even the shares are.
+const LOOK_EVERY: u64 = 20;
+/// Largest share over the mean from which on the tank is cut anew.
+const UNEVEN: f64 = 1.1;
+
+/// A particle of water on its way to another rank.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Traveller {
+    position: DVec3,
+    velocity: DVec3,
+    pressure: f64,
+    id: u64,
+}
+
+impl Share {
+    /// Cuts the tank by all water, and tells which slots of it this rank takes.
+    pub fn choose(&mut self, position: &[DVec3], kind: &[Kind], grid: &Grid) -> Vec<usize> {
+        let column = |i: usize| grid.coordinates(position[i])[0];
+        let mut load = vec![0; grid.count[0] as usize];
+        let water = || (0..self.all.fluid).filter(|&i| kind[i] == Kind::Fluid);
+        water().for_each(|i| load[column(i) as usize] += 1);
+        let cuts = cut(&load, self.ranks());
+        let mine = cuts[self.rank()]..cuts[self.rank() + 1];
+        let own = water().filter(|&i| mine.contains(&column(i))).collect();
+        self.cuts = cuts;
+        own
+    }
+
+    /// The first `own` slots of `fields`, of `groups`, are what [`Self::choose`] told; there are no copies yet.
+    pub fn begin(&mut self, groups: Groups, own: usize, fields: &Fields, grid: &Grid) {
+        self.groups = groups;
+        self.own = 0..own;
+        self.sides = [self.rank() > 0, self.rank() + 1 < self.ranks()].map(|there| there.then(Side::default));
+        let mine = self.columns();
+        for (owned, x) in self.walls.iter_mut().zip(&fields.position[groups.fluid..]) {
+            *owned = mine.contains(&grid.coordinates(*x)[0]);
+        }
+    }
+
+    /// The slots of the water are more now, those of solids behind them moved up.
+    pub fn groups_are(&mut self, groups: Groups) {
+        let more = (groups.fluid - self.groups.fluid) as u32;
+        let walls = self
+            .sides
+            .iter_mut()
+            .flatten()
+            .flat_map(|side| side.give_walls.iter_mut().chain(&mut side.take_walls));
+        walls.for_each(|slot| *slot += more);
+        self.groups = groups;
+    }
+
+    /// Takes in water that has come in through an opening, in `slots` of every rank: each keeps what is in its columns.
+    pub fn take_in(&mut self, slots: impl Iterator<Item = usize>, fields: &mut Fields, grid: &Grid) {
+        // Each gets a number that no particle has.
+        let mut named = vec![false; self.all.fluid];
+        for bytes in self.gather(bytemuck::cast_slice(&fields.id[self.own()]).to_vec()) {
+            bytemuck::pod_collect_to_vec::<u8, u32>(&bytes)
+                .into_iter()
+                .for_each(|id| named[id as usize] = true);
+        }
+        let mut free = (0..self.all.fluid as u32).filter(|&id| !named[id as usize]);
+        let mine = self.columns();
+        for i in slots {
+            fields.id[i] = free.next().unwrap_or_default();
+            if mine.contains(&grid.coordinates(fields.position[i])[0]) {
+                self.come_in.push(i);
+            } else {
+                self.park(fields, i..i + 1);
+            }
+        }
+    }
+
+    /// Takes what is in `slots` out of the computation.
+    pub(super) fn park(&self, fields: &mut Fields, slots: Range<usize>) {
+        fields.kind[slots.clone()].fill(Kind::Ghost);
+        fields.velocity[slots.clone()].fill(DVec3::ZERO);
+        fields.pressure[slots].fill(0.0);
+    }
+
+    /// Particles go to the ranks in whose columns they now are, and copies of border columns to the ranks beside. Returns what is here
+    /// then, for [`Self::place`].
+    pub fn settle(&mut self, fields: &mut Fields, grid: &Grid, params: &Params) -> Vec<Traveller> {
+        let column = |x: DVec3| grid.coordinates(x)[0];
+        let traveller = |i: usize| Traveller {
+            position: fields.position[i],
+            velocity: fields.velocity[i],
+            pressure: fields.pressure[i],
+            id: u64::from(fields.id[i]),
+        };
+        let come_in = std::mem::take(&mut self.come_in);
+        let there =
+            self.own.clone().chain(come_in.iter().copied()).filter(|&i| fields.kind[i] == Kind::Fluid);
+        let mut own: Vec<Traveller> = there.map(traveller).collect();
+        come_in.into_iter().for_each(|i| self.park(fields, i..i + 1));
+        if self.steps.is_multiple_of(LOOK_EVERY) && self.steps > 0 {
+            self.cut_anew(&own, fields, column);
+        }
+        self.steps += 1;
+        let domain = (params.domain_min, params.domain_max);
+        // What is about to be taken out stays where it is counted.
+        let stays = |t: &Traveller| {
+            !inside(grid.periodic.wrap(t.position), t.velocity, domain.0, domain.1, params.dimensions)
+        };
+        loop {
+            let mine = self.columns();
+            let (mut left, mut right) = (Vec::new(), Vec::new());
+            own.retain(|t| {
+                let c = column(t.position);
+                let goes = !mine.contains(&c) && !stays(t);
+                if goes {
+                    let to = if c < mine.start { &mut left } else { &mut right };
+                    to.extend_from_slice(bytemuck::bytes_of(t));
+                }
+                !goes
+            });
+            let come = self.pass(left, right);
+            come.iter().for_each(|bytes| own.extend(bytemuck::pod_collect_to_vec::<u8, Traveller>(bytes)));
+            // One round does it unless the tank was cut anew.
+            let mut astray =
+                [own.iter().filter(|t| !mine.contains(&column(t.position)) && !stays(t)).count() as f64];
+            self.sum(&mut astray);
+            if astray[0] == 0.0 {
+                break;
+            }
+        }
+        let mine = self.columns();
+        let border = |c: u32| {
+            let at = own.iter().filter(|t| column(t.position) == c && !stays(t));
+            bytemuck::cast_slice(&at.copied().collect::<Vec<_>>()).to_vec()
+        };
+        let [before, after] = self.pass(border(mine.start), border(mine.end - 1));
+        let [before, after] =
+            [before, after].map(|bytes| bytemuck::pod_collect_to_vec::<u8, Traveller>(&bytes));
+        [before, own, after].concat()
+    }
+
+    /// Puts what is `here` into the slots of the water, of which the first `live` held some before.
+    pub fn place(&self, here: &[Traveller], fields: &mut Fields, live: usize) {
+        for (n, t) in here.iter().enumerate() {
+            fields.position[n] = t.position;
+            fields.velocity[n] = t.velocity;
+            fields.pressure[n] = t.pressure;
+            fields.id[n] = t.id as u32;
+            fields.kind[n] = Kind::Fluid;
+        }
+        self.park(fields, here.len()..live.max(here.len()));
+    }
+
+    /// Cuts the tank anew if the shares have become uneven. Walls that change hands take their pressures along.
+    fn cut_anew(&mut self, own: &[Traveller], fields: &mut Fields, column: impl Fn(DVec3) -> u32) {
+        let mut load = vec![0.0; *self.cuts.last().unwrap_or(&0) as usize];
+        own.iter().for_each(|t| load[column(t.position) as usize] += 1.0);
+        self.sum(&mut load);
+        let load: Vec<u64> = load.into_iter().map(|n| n as u64).collect();
+        let cuts = cut(&load, self.ranks());
+        if unevenness(&load, &self.cuts) < UNEVEN || unevenness(&load, &cuts) >= unevenness(&load, &self.cuts)
+        {
+            return;
+        }
+        let fluid = self.groups.fluid;
+        let owned = (fluid..self.groups.pressure()).filter(|&i| self.owns(i));
+        let pressures: Vec<[f64; 2]> = owned.map(|i| [(i - fluid) as f64, fields.pressure[i]]).collect();
+        for bytes in self.gather(bytemuck::cast_slice(&pressures).to_vec()) {
+            for [k, p] in bytemuck::pod_collect_to_vec::<u8, [f64; 2]>(&bytes) {
+                fields.pressure[fluid + k as usize] = p;
+            }
+        }
+        self.cuts = cuts;
+    }
+
+    /// Finds the borders in the cells of this rank's water, which begin at `start`, and of solids.
+    pub fn find_borders(&mut self, start: &[u32], solids: [Option<&CellList>; 2]) {
+        let (mine, per_column) = (self.columns(), self.per_column);
+        let water = |c: Range<u32>| {
+            start[c.start as usize * per_column] as usize..start[c.end as usize * per_column] as usize
+        };
+        let (fluid, pressure) = (self.groups.fluid, self.groups.pressure());
+        let walls = |c: Range<u32>| -> Vec<u32> {
+            let lists = solids.into_iter().flatten();
+            let of = |list: &'_ CellList| -> Vec<u32> {
+                let (a, b) =
+                    (list.start[c.start as usize * per_column], list.start[c.end as usize * per_column]);
+                list.slot[a as usize..b as usize]
+                    .iter()
+                    .copied()
+                    .filter(|&s| (s as usize) < pressure)
+                    .collect()
+            };
+            lists.flat_map(of).collect()
+        };
+        self.own = water(mine.clone());
+        let side = |give: u32, take: u32| Side {
+            give: water(give..give + 1),
+            take: water(take..take + 1),
+            give_walls: walls(give..give + 1),
+            take_walls: walls(take..take + 1),
+        };
+        self.sides = [
+            (self.rank() > 0).then(|| side(mine.start, mine.start - 1)),
+            (self.rank() + 1 < self.ranks()).then(|| side(mine.end - 1, mine.end)),
+        ];
+        self.walls.fill(false);
+        walls(mine).into_iter().for_each(|s| self.walls[s as usize - fluid] = true);
+    }
+}

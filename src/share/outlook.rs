@@ -1,0 +1,100 @@
+//! What ranks would have and say, before anything is computed.
+
+use super::cut::{check, cut, unevenness};
+use crate::cells::Grid;
+use crate::error::Result;
+use crate::params::Params;
+use crate::plan::{Plan, Stage};
+use crate::scene::{Kind, Scene};
+use crate::scheme::Preconditioner;
+use glam::DVec3;
+use serde::Serialize;
+
+/// What a rank would have at t = 0.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Taken {
+    /// Its columns of cells along x: the first, and that after the last.
+    pub columns: [u32; 2],
+    /// Particles of water that it computes.
+    pub water: usize,
+    /// Copies of other ranks' particles of water.
+    pub copies: usize,
+    /// Particles of wall layers that it computes.
+    pub walls: usize,
+}
+
+/// What ranks would have and say at t = 0, before anything is computed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outlook {
+    /// Of each rank.
+    pub parts: Vec<Taken>,
+    /// Largest share of the water over the mean.
+    pub unevenness: f64,
+    /// Messages to each rank beside in a step, and in each iteration of the pressure solver.
+    pub messages: [u64; 2],
+    /// Bytes of these, from the rank that says most to the one beside it.
+    pub message_bytes: [u64; 2],
+    /// Rounds in which all ranks gather something, in a step and in each iteration.
+    pub rounds: [u64; 2],
+    /// Bytes that all ranks together gather in them, for cells of the multigrid.
+    pub round_bytes: [u64; 2],
+}
+
+impl Outlook {
+    /// That of `ranks` ranks in `scene` as `plan` has it.
+    ///
+    /// # Errors
+    /// As [`super::Share::new`].
+    pub fn new(ranks: usize, scene: &Scene, params: &Params, plan: &Plan) -> Result<Self> {
+        let grid = Grid::new(params)?;
+        check(ranks, params, &grid)?;
+        let column = |x: &DVec3| grid.coordinates(*x)[0] as usize;
+        let (groups, columns) = (scene.groups, grid.count[0] as usize);
+        let [mut water, mut walls] = [vec![0_u64; columns], vec![0_u64; columns]];
+        let is_water = |i: &usize| scene.kind[*i] == Kind::Fluid;
+        (0..groups.fluid).filter(is_water).for_each(|i| water[column(&scene.position[i])] += 1);
+        scene.position[groups.fluid..groups.pressure()].iter().for_each(|x| walls[column(x)] += 1);
+        let cuts = cut(&water, ranks);
+        let parts = cuts.windows(2).map(|c| {
+            let [from, to] = [c[0] as usize, c[1] as usize];
+            let beside = [from.checked_sub(1), Some(to).filter(|&c| c < columns)];
+            Taken {
+                columns: [c[0], c[1]],
+                water: water[from..to].iter().sum::<u64>() as usize,
+                copies: beside.into_iter().flatten().map(|c| water[c] as usize).sum(),
+                walls: walls[from..to].iter().sum::<u64>() as usize,
+            }
+        });
+        let border = |c: &u32| [*c as usize - 1, *c as usize];
+        let inner = &cuts[1..cuts.len() - 1];
+        let most = |of: &[u64]| inner.iter().flat_map(border).map(|c| of[c]).max().unwrap_or(0);
+        let (water_at, carriers_at) = (most(&water), most(&water) + most(&walls));
+        let count = |stages: &[Stage]| stages.iter().filter(|&&s| plan.has(s)).count() as u64;
+        let motions = count(&[Stage::Viscosity, Stage::WallFriction, Stage::Collision]);
+        let surface = count(&[Stage::SurfacePressure]);
+        let multigrid = u64::from(plan.preconditioner == Preconditioner::Multigrid);
+        let filled = u64::from(plan.filled);
+        // Water on its way and copies, motion after the stages that change it, states, pressures known, guessed and found, diagonals.
+        let step_messages = 2 + motions + 1 + surface + 2 + multigrid;
+        let a_water = 64 + 48 * motions;
+        let a_carrier = 1 + 8 * surface + 16 + 4 * multigrid;
+        let bodies = u64::from(plan.coupled) + count(&[Stage::BodyForce]);
+        let cells = if multigrid > 0 { wet_cells(scene, &grid) } else { 0 };
+        Ok(Self {
+            unevenness: unevenness(&water, &cuts),
+            parts: parts.collect(),
+            messages: [step_messages, 1 + multigrid],
+            message_bytes: [a_water * water_at + a_carrier * carriers_at, (8 + 4 * multigrid) * carriers_at],
+            rounds: [5 + bodies + 2 * multigrid + 2 * filled, 3 + 2 * multigrid],
+            round_bytes: [(4 + 27 * 8) * cells, 4 * cells],
+        })
+    }
+}
+
+/// Cells with water at t = 0.
+fn wet_cells(scene: &Scene, grid: &Grid) -> u64 {
+    let mut wet = vec![false; grid.total()];
+    let water = (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid);
+    water.for_each(|i| wet[grid.index(grid.coordinates(scene.position[i]))] = true);
+    wet.into_iter().filter(|wet| *wet).count() as u64
+}

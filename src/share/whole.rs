@@ -1,0 +1,161 @@
+//! The particles of all ranks in one place: gathered by the first rank, or told by it.
+
+use super::Share;
+use crate::fields::{Fields, State};
+use crate::ranks::{decode, encode};
+use crate::scene::Kind;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// What a rank has of the fields: water first, then walls.
+#[derive(Serialize, Deserialize)]
+struct Part {
+    ids: Vec<u32>,
+    /// Position and velocity of each particle of water.
+    motion: Vec<DVec3>,
+    /// Slots of wall layers.
+    walls: Vec<u32>,
+    pressure: Vec<f64>,
+    number_density: Vec<f64>,
+    surface_pressure: Vec<f64>,
+    state: Vec<u8>,
+}
+
+/// All particles, for every rank to take its own from.
+#[derive(Serialize, Deserialize)]
+struct Whole {
+    position: Vec<DVec3>,
+    velocity: Vec<DVec3>,
+    kind: Vec<u8>,
+    id: Vec<u32>,
+    pressure: Vec<f64>,
+    number_density: Vec<f64>,
+    state: Vec<u8>,
+    dt: f64,
+}
+
+impl Share {
+    /// The fields of all ranks in one, as a single rank would hold them but for the order within a cell. On the first rank
+    /// only: the others get none.
+    pub fn gather_fields(&self, fields: &Fields) -> Option<Fields> {
+        let carriers = |values: &[f64]| -> Vec<f64> { self.owned().map(|i| values[i]).collect() };
+        let own = self.own();
+        let part = Part {
+            ids: fields.id[own.clone()].to_vec(),
+            motion: own.clone().flat_map(|i| [fields.position[i], fields.velocity[i]]).collect(),
+            walls: self.owned().skip(own.len()).map(|i| (i - self.groups.fluid) as u32).collect(),
+            pressure: carriers(&fields.pressure),
+            number_density: carriers(&fields.number_density),
+            surface_pressure: if fields.surface_pressure.is_empty() {
+                Vec::new()
+            } else {
+                carriers(&fields.surface_pressure)
+            },
+            state: self.owned().map(|i| fields.state[i] as u8).collect(),
+        };
+        let parts = self.gather(encode(&part));
+        if self.rank() > 0 {
+            return None;
+        }
+        let mut out = self.blank(fields);
+        let mut n = 0;
+        for part in parts.iter().map(|bytes| decode::<Part>(bytes)) {
+            let water = part.ids.len();
+            for (k, motion) in part.motion.chunks_exact(2).enumerate() {
+                (out.position[n + k], out.velocity[n + k]) = (motion[0], motion[1]);
+                (out.id[n + k], out.kind[n + k]) = (part.ids[k], Kind::Fluid);
+            }
+            let slots = (n..n + water).chain(part.walls.iter().map(|&k| self.all.fluid + k as usize));
+            for (k, i) in slots.enumerate() {
+                out.pressure[i] = part.pressure[k];
+                out.number_density[i] = part.number_density[k];
+                out.state[i] = State::from_code(part.state[k]).unwrap_or_default();
+                if let Some(&p) = part.surface_pressure.get(k) {
+                    out.surface_pressure[i] = p;
+                }
+            }
+            n += water;
+        }
+        self.name_the_rest(&mut out, n);
+        Some(out)
+    }
+
+    /// Fields of all ranks without their water; solids are where they are in `fields`.
+    pub fn blank(&self, fields: &Fields) -> Fields {
+        let (all, here) = (self.all, self.groups.fluid);
+        let lay = |rest: DVec3, solids: &[DVec3]| -> Vec<DVec3> {
+            std::iter::repeat_n(rest, all.fluid).chain(solids.iter().copied()).collect()
+        };
+        let of_surface = if fields.surface_pressure.is_empty() { 0 } else { all.pressure() };
+        let parked = std::iter::repeat_n(Kind::Ghost, all.fluid);
+        Fields {
+            position: lay(self.corner, &fields.position[here..]),
+            velocity: lay(DVec3::ZERO, &fields.velocity[here..]),
+            kind: parked.chain(fields.kind[here..].iter().copied()).collect(),
+            id: vec![0; all.fluid],
+            pressure: vec![0.0; all.pressure()],
+            number_density: vec![0.0; all.pressure()],
+            surface_pressure: vec![0.0; of_surface],
+            state: vec![State::Inactive; all.pressure()],
+            source: Vec::new(),
+            diagonal: Vec::new(),
+            // Zero between two steps.
+            acceleration: vec![DVec3::ZERO; all.fluid],
+            reaction: vec![DVec3::ZERO; fields.reaction.len()],
+        }
+    }
+
+    /// The first rank's state of a run: `fields` of all particles, given there alone, and the time step.
+    pub fn tell_fields(&self, fields: Option<(Fields, f64)>) -> (Fields, f64) {
+        let whole = fields.map(|(fields, dt)| Whole {
+            kind: fields.kind.iter().map(|&k| k as u8).collect(),
+            state: fields.state.iter().map(|&s| s as u8).collect(),
+            position: fields.position,
+            velocity: fields.velocity,
+            id: fields.id,
+            pressure: fields.pressure,
+            number_density: fields.number_density,
+            dt,
+        });
+        let whole: Whole = decode(&self.team.hear(whole.map_or_else(Vec::new, |whole| encode(&whole))));
+        let fields = Fields {
+            kind: whole.kind.iter().map(|&code| Kind::from_code(code).unwrap_or(Kind::Ghost)).collect(),
+            state: whole.state.iter().map(|&code| State::from_code(code).unwrap_or_default()).collect(),
+            position: whole.position,
+            velocity: whole.velocity,
+            id: whole.id,
+            pressure: whole.pressure,
+            number_density: whole.number_density,
+            ..Fields::default()
+        };
+        (fields, whole.dt)
+    }
+
+    /// Gives the slots from `n` on that hold no particle the numbers that are left.
+    fn name_the_rest(&self, fields: &mut Fields, n: usize) {
+        let mut named = vec![false; self.all.fluid];
+        fields.id[..n].iter().for_each(|&id| named[id as usize] = true);
+        let free = (0..self.all.fluid as u32).filter(|&id| !named[id as usize]);
+        fields.id[n..].iter_mut().zip(free).for_each(|(id, free)| *id = free);
+    }
+
+    /// The slots `own` of `whole`, the state of all ranks, and its solids into `fields`.
+    pub fn take_over(&self, own: &[usize], whole: &Fields, fields: &mut Fields) {
+        let (all, here) = (self.all.fluid, self.groups.fluid);
+        self.park(fields, 0..here);
+        for (n, &i) in own.iter().enumerate() {
+            fields.position[n] = whole.position[i];
+            fields.velocity[n] = whole.velocity[i];
+            fields.pressure[n] = whole.pressure[i];
+            fields.number_density[n] = whole.number_density[i];
+            fields.state[n] = whole.state[i];
+            fields.id[n] = whole.id[i];
+            fields.kind[n] = Kind::Fluid;
+        }
+        fields.position[here..].copy_from_slice(&whole.position[all..]);
+        fields.velocity[here..].copy_from_slice(&whole.velocity[all..]);
+        fields.pressure[here..].copy_from_slice(&whole.pressure[all..]);
+        fields.number_density[here..].copy_from_slice(&whole.number_density[all..]);
+        fields.state[here..].copy_from_slice(&whole.state[all..]);
+    }
+}

@@ -1,0 +1,433 @@
+//! Ranks: that many of them compute what one computes, to the last bit twice, whatever crosses the cuts between them.
+
+use crate::common;
+use common::*;
+use glam::DVec3;
+use seixo::Error;
+use seixo::backend::Counters;
+use seixo::case::Case;
+use seixo::checkpoint::Archive;
+use seixo::fields::Fields;
+use seixo::ledger::{Entry, Ledger};
+use seixo::monitor::FluidMonitor;
+use seixo::on_ranks::serve;
+use seixo::params::Params;
+use seixo::plan::Plan;
+use seixo::ranks::Standing;
+use seixo::ranks::threads::team;
+use seixo::scene::Scene;
+use seixo::share::Outlook;
+use seixo::simulation::Simulation;
+use std::sync::Arc;
+
+/// What `of` says of a simulation of `case` on `ranks` threads, and how these stand then.
+fn on_ranks<T: Send>(
+    case: &Case,
+    ranks: usize,
+    of: impl FnOnce(&mut Simulation) -> T + Send,
+) -> (T, Vec<Standing>) {
+    let scene = Arc::new(Scene::build(case).expect("the scene builds"));
+    let mut team = team(ranks).into_iter();
+    let first = team.next().expect("a rank");
+    std::thread::scope(|scope| {
+        for rank in team {
+            let scene = scene.clone();
+            scope.spawn(move || {
+                alone();
+                serve(&rank, || Ok((case.clone(), scene))).expect("it serves").expect("they begin");
+            });
+        }
+        let lead = scope.spawn(move || {
+            alone();
+            let mut simulation = Simulation::on_ranks(case, scene, &first).expect("it starts");
+            let out = of(&mut simulation);
+            (out, simulation.backend.ranks().expect("they stand"))
+        });
+        lead.join().expect("the first rank ends well")
+    })
+}
+
+fn shipped(name: &str, changes: &[&str]) -> Case {
+    let sets: Vec<String> = changes.iter().map(|s| (*s).to_string()).collect();
+    let path = format!("{ROOT}/cases/{name}.toml");
+    seixo::case::file::load(path.as_ref(), None, &sets).expect("it loads").case
+}
+
+fn steps(simulation: &mut Simulation, n: u64) -> Fields {
+    for _ in 0..n {
+        simulation.step().expect("a step");
+    }
+    simulation.fields().expect("the fields")
+}
+
+/// Largest differences of the water's positions [m], velocities [m/s] and pressures [Pa], particle by particle.
+fn apart(a: &Fields, b: &Fields) -> [f64; 3] {
+    let place = |f: &Fields| {
+        let mut at = vec![usize::MAX; f.id.len()];
+        f.id.iter().enumerate().for_each(|(i, &id)| at[id as usize] = i);
+        at
+    };
+    let (a_at, b_at) = (place(a), place(b));
+    let mut out = [0.0_f64; 3];
+    for (&i, &j) in a_at.iter().zip(&b_at) {
+        assert_eq!(a.kind[i], b.kind[j]);
+        out[0] = out[0].max(a.position[i].distance(b.position[j]));
+        out[1] = out[1].max(a.velocity[i].distance(b.velocity[j]));
+        out[2] = out[2].max((a.pressure[i] - b.pressure[j]).abs());
+    }
+    for i in a.id.len()..a.pressure.len() {
+        out[2] = out[2].max((a.pressure[i] - b.pressure[i]).abs());
+    }
+    out
+}
+
+/// A flume round periodic y: viscous water, a sill, a gate that rises, a ball under water, an absorber, a body that floats and one that sinks
+/// across the tank, friction, gauges, and the ledger.
+fn flume(more: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0.5, -9.81]\n\
+         [fluid]\nviscosity = 1e-3\nsound_speed = 5\njitter = 0.1\n{more}\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.6, 0.4]\n\
+         [[absorber]]\nmin = [0.0, 0, 0]\nmax = [0.3, 0.6, 1.0]\ntowards = \"x_min\"\nrate = 5\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [2.0, 0.6, 1.0]\nopen = [\"z_max\"]\nperiodic = [\"y\"]\n\
+         [[obstacle]]\nname = \"sill\"\nmin = [1.2, 0, 0]\nmax = [1.3, 0.6, 0.1]\n\
+         [[moving_wall]]\nname = \"gate\"\nmin = [0.8, 0, 0.05]\nmax = [0.9, 0.6, 0.6]\n\
+         motion = [[0, 0, 0, 0], [1, 0, 0, 2]]\n\
+         [[body]]\nname = \"floats\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.5, 0.3, 0.55]\ndensity = 500\nvelocity = [2, 0, 0]\n\
+         [[body]]\nname = \"sinks\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [0.2, 0.3, 0.7]\ndensity = 3000\nvelocity = [1, 0, -1]\n\
+         [contact]\nspring = 1e5\nfriction = 0.3\n\
+         [gauge]\nevery = 0.01\n[[gauge.force]]\nname = \"sill\"\non = \"sill\"\n\
+         [[gauge.level]]\nname = \"level\"\nat = [0.4, 0.3]\n[[gauge.pressure]]\nname = \"floor\"\npoint = [0.3, 0.3, 0]\n\
+         [output]\nledger = true\n"
+    ))
+}
+
+/// What can be seen of a run.
+#[derive(Clone, Debug, PartialEq)]
+struct Seen {
+    fields: Vec<u8>,
+    water: FluidMonitor,
+    counters: Counters,
+    ledger: Option<Ledger>,
+    gauges: Vec<(String, u64)>,
+    solids: Vec<[DVec3; 3]>,
+    iterations: Vec<u32>,
+}
+
+impl Seen {
+    /// After `n` steps more.
+    fn after(simulation: &mut Simulation, n: u64) -> (Self, Fields) {
+        let iterations = (0..n).map(|_| simulation.step().expect("a step").pressure.iterations).collect();
+        let (water, counters) = simulation.observe().expect("seen");
+        let ledger = simulation.ledger().expect("kept");
+        let gauges =
+            simulation.gauges().expect("read").into_iter().map(|(name, v)| (name, v.to_bits())).collect();
+        let of = |s: seixo::SolidState| [s.pose.position, s.pose.velocity, s.fluid.force];
+        let solids = simulation.solids().map(of).collect();
+        let fields = simulation.fields().expect("the fields");
+        let mut bytes = bytemuck::cast_slice(&fields.position).to_vec();
+        bytes.extend_from_slice(bytemuck::cast_slice(&fields.velocity));
+        bytes.extend_from_slice(bytemuck::cast_slice(&fields.pressure));
+        bytes.extend_from_slice(bytemuck::cast_slice(&fields.id));
+        (Self { fields: bytes, water, counters, ledger, gauges, solids, iterations }, fields)
+    }
+
+    /// Asserts that another run came to the same, but for `tolerance` of each number's size.
+    fn assert_near(&self, other: &Self, tolerance: f64, what: &str) {
+        let near =
+            |a: f64, b: f64, scale: f64| (a - b).abs() <= tolerance * scale || a.is_nan() && b.is_nan();
+        let [a, b] = [&self.water, &other.water];
+        assert_eq!((a.particles, a.inner), (b.particles, b.inner), "{what}");
+        assert!(
+            near(a.kinetic, b.kinetic, a.kinetic) && near(a.potential, b.potential, a.potential.abs()),
+            "{what}: {a:?} {b:?}"
+        );
+        assert!(
+            near(a.density_error_max, b.density_error_max, 1.0)
+                && near(a.speed_max, b.speed_max, a.speed_max),
+            "{what}"
+        );
+        assert!((0..3).all(|k| near(a.extent_max[k], b.extent_max[k], 1.0)), "{what}");
+        let same = |c: &Counters| (c.lost, c.displacement_clamps, c.neighbours_max, c.swallowed.clone());
+        assert_eq!(same(&self.counters), same(&other.counters), "{what}");
+        assert_eq!(self.iterations.len(), other.iterations.len());
+        let differ = self.iterations.iter().zip(&other.iterations).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(differ <= Some(1), "{what}: {:?} {:?}", self.iterations, other.iterations);
+        assert_eq!(self.ledger.is_some(), other.ledger.is_some());
+        if let (Some(a), Some(b)) = (&self.ledger, &other.ledger) {
+            let size = Entry::ALL.iter().map(|&e| a.get(e).abs()).fold(0.0, f64::max);
+            assert!(Entry::ALL.iter().all(|&e| near(a.get(e), b.get(e), size)), "{what}: {a:?} {b:?}");
+        }
+        for ((name, a), (_, b)) in self.gauges.iter().zip(&other.gauges) {
+            let (a, b) = (f64::from_bits(*a), f64::from_bits(*b));
+            assert!(near(a, b, a.abs().max(1.0)), "{what}: {name} {a} {b}");
+        }
+        for (a, b) in self.solids.iter().zip(&other.solids) {
+            assert!(
+                (0..3).all(|k| a[k].distance(b[k]) <= tolerance * a[k].length().max(1.0)),
+                "{what}: {a:?} {b:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn many_ranks_compute_what_one_computes() {
+    let transport =
+        |more: &str| shipped("dam_break_transport", &["run.spacing=0.03", "output.ledger=true", more]);
+    // With multigrid in f32 the order of its cells is seen in what it leaves to the iterations.
+    for (name, case, steps, ranks, tolerance) in [
+        ("transport", transport("fluid.jitter=0.05"), 12, [2, 5], 1e-11),
+        ("transport, multigrid", transport("fluid.solver.preconditioner=\"multigrid\""), 12, [3, 8], 1e-7),
+        ("transport, paper", transport("fluid.preset=\"paper\""), 6, [2, 4], 1e-11),
+        ("plane", shipped("dam_break_2d", &["fluid.solver.tolerance=1e-9"]), 20, [2, 4], 1e-11),
+        ("flume", flume(""), 60, [2, 4], 1e-11),
+        ("flume, multigrid", flume("solver = { preconditioner = \"multigrid\" }"), 60, [3, 5], 1e-7),
+        ("full", full(), 20, [2, 3], 1e-9),
+        ("channel", shipped("channel", &["run.spacing=0.04"]), 90, [2, 3], 1e-8),
+    ] {
+        let (one, one_fields) = Seen::after(&mut simulation(&case), steps);
+        for ranks in ranks {
+            let ((many, fields), said) = on_ranks(&case, ranks, |s| Seen::after(s, steps));
+            // Water that comes in gets other numbers.
+            if one.counters.swallowed.is_empty() {
+                let [x, v, p] = apart(&one_fields, &fields);
+                println!(
+                    "{name}: {ranks} ranks are {x:.1e} m, {v:.1e} m/s, {p:.1e} Pa from one; {:?}",
+                    said[0]
+                );
+                assert!(
+                    x < tolerance && v < 1e2 * tolerance && p < 1e6 * tolerance,
+                    "{name} on {ranks}: {x} {v} {p}"
+                );
+            }
+            one.assert_near(&many, tolerance, &format!("{name} on {ranks}"));
+        }
+        assert!(name != "channel" || one.counters.swallowed[0] > 0, "water has gone out");
+    }
+}
+
+/// A closed tank full of water round a body that is heavier: no free surface.
+fn full() -> Case {
+    case(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -10]\n\
+         [fluid]\nsound_speed = 5\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.5]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.5]\nopen = []\n\
+         [[body]]\nname = \"cube\"\nsize = [0.15, 0.15, 0.15]\ncenter = [0.4, 0.2, 0.3]\ndensity = 2000\nvelocity = [1, 0, 0]\ndisplaces_fluid = true\n[contact]\nspring = 1e5\n",
+    )
+}
+
+#[test]
+fn a_run_repeats_to_the_last_bit_whatever_the_threads_of_its_ranks() {
+    let case = flume("solver = { preconditioner = \"multigrid\" }");
+    let run = || on_ranks(&case, 3, |s| Seen::after(s, 30)).0.0;
+    let first = run();
+    assert_eq!(first, run());
+    // A rank computes on the pool that it stands in.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+    let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
+    let mut ends = team(3).into_iter();
+    let lead = ends.next().expect("a rank");
+    let threaded = std::thread::scope(|scope| {
+        for rank in ends {
+            let (scene_of, case) = (scene.clone(), &case);
+            scope.spawn(move || {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+                pool.install(|| serve(&rank, || Ok((case.clone(), scene_of))).map(drop).expect("it serves"));
+            });
+        }
+        pool.install(|| {
+            let mut simulation = Simulation::on_ranks(&case, scene.clone(), &lead).expect("it starts");
+            Seen::after(&mut simulation, 30).0
+        })
+    });
+    assert_eq!(first, threaded);
+}
+
+#[test]
+fn the_cuts_follow_the_water() {
+    let case = shipped("dam_break_2d", &[]);
+    let water = Scene::build(&case).expect("it builds").water();
+    let ((front, first), last) = on_ranks(&case, 4, |simulation| {
+        simulation.step().expect("a step");
+        let first = simulation.backend.ranks().expect("they stand");
+        while simulation.time < 0.4 {
+            simulation.step().expect("a step");
+        }
+        (simulation.observe().expect("seen").0.extent_max[0], first)
+    });
+    println!("front {front} m\n{first:?}\n{last:?}");
+    assert!(front > 0.45, "{front}");
+    for (ranks, late) in [(&first, false), (&last, true)] {
+        assert_eq!(ranks.iter().map(|r| r.water).sum::<usize>(), water, "none is lost or twice there");
+        assert!(ranks.windows(2).all(|r| r[0].columns[1] == r[1].columns[0]));
+        // The water began in the first fourteen columns.
+        assert_eq!(ranks[3].columns[0] > 20, late, "{ranks:?}");
+        let most = ranks.iter().map(|r| r.water).max().expect("ranks");
+        // A column is a tenth of the water at first.
+        assert!(4 * most < water + water / 2, "{most} of {water}: {ranks:?}");
+        assert!(ranks.iter().all(|r| r.copies > 0 && r.walls > 0));
+    }
+}
+
+#[test]
+fn plan_tells_what_ranks_have_and_say() {
+    for (case, ranks) in [
+        (
+            shipped(
+                "dam_break_transport",
+                &["run.spacing=0.02", "fluid.solver.preconditioner=\"multigrid\""],
+            ),
+            3,
+        ),
+        (shipped("dam_break_2d", &[]), 4),
+    ] {
+        let scene = Scene::build(&case).expect("it builds");
+        let params = Params::new(&case, &scene).expect("valid");
+        let told = Outlook::new(ranks, &scene, &params, &Plan::new(&case, &scene, &params)).expect("told");
+        let stand = |steps| {
+            on_ranks(&case, ranks, |s| {
+                (0..steps).map(|_| u64::from(s.step().expect("a step").pressure.iterations)).sum::<u64>()
+            })
+        };
+        // The first step looks at the water, which is not a part of every step.
+        let ((before, first), (all, second)) = (stand(1), stand(4));
+        let iterations: u64 = all - before;
+        for (k, part) in told.parts.iter().enumerate() {
+            let (a, b) = (&first[k], &second[k]);
+            assert_eq!(
+                (part.columns, part.water, part.copies, part.walls),
+                (a.columns, a.water, a.copies, a.walls)
+            );
+            let beside = u64::from(k > 0) + u64::from(k + 1 < ranks);
+            assert_eq!(
+                b.messages - a.messages,
+                beside * (3 * told.messages[0] + iterations * told.messages[1])
+            );
+            assert_eq!(b.rounds - a.rounds, 3 * told.rounds[0] + iterations * told.rounds[1]);
+        }
+        let bytes: u64 = second.iter().zip(&first).map(|(b, a)| b.message_bytes - a.message_bytes).sum();
+        let sides = 2 * (ranks as u64 - 1);
+        let most = sides * (3 * told.message_bytes[0] + iterations * told.message_bytes[1])
+            + 3 * told.round_bytes[0]
+            + iterations * told.round_bytes[1];
+        // The largest border stands for all of them; numbers that are summed and cells of walls are not counted.
+        assert!((0.7..1.1).contains(&(bytes as f64 / most as f64)), "{bytes} said, at most {most} told");
+    }
+}
+
+#[test]
+fn memory_is_shared() {
+    let case = shipped("dam_break_transport", &["run.spacing=0.0125"]);
+    let of = |ranks| on_ranks(&case, ranks, |s| drop(steps(s, 2))).1;
+    let (one, four) = (of(1), of(4));
+    println!("{one:?}\n{four:?}");
+    // Cells and solids are everywhere; the water and the lists are not.
+    assert!(four.iter().all(|r| r.bytes < one[0].bytes * 3 / 5), "{four:?}");
+    assert_eq!(four.iter().map(|r| r.water).sum::<usize>(), one[0].water);
+}
+
+#[test]
+fn a_state_goes_on_on_any_number_of_ranks() {
+    for (case, tolerance) in
+        [(shipped("dam_break_transport", &["run.spacing=0.03"]), 1e-9), (flume(""), 1e-4)]
+    {
+        let save = |s: &mut Simulation| {
+            let mut archive = Archive::new();
+            s.exchange(&mut archive).expect("saved");
+            archive.to_restore()
+        };
+        let undisturbed = Seen::after(&mut simulation(&case), 20).0;
+        let (of_many, _) = on_ranks(&case, 3, |s| {
+            steps(s, 10);
+            save(s)
+        });
+        let of_one = {
+            let mut s = simulation(&case);
+            steps(&mut s, 10);
+            save(&mut s)
+        };
+        let go_on = |s: &mut Simulation, state: &Archive| {
+            s.exchange(&mut state.to_restore()).expect("restored");
+            assert_eq!(s.steps, 10);
+            let mut seen = Seen::after(s, 10).0;
+            seen.iterations = undisturbed.iterations.clone();
+            seen
+        };
+        for (what, state) in [("of three", &of_many), ("of one", &of_one)] {
+            if what == "of three" {
+                undisturbed.assert_near(&go_on(&mut simulation(&case), state), tolerance, "of three, on one");
+            }
+            for ranks in [2, 4] {
+                let (seen, _) = on_ranks(&case, ranks, |s| go_on(s, state));
+                undisturbed.assert_near(&seen, tolerance, &format!("{what}, on {ranks}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
+    let dry = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[[body]]\nname = \"cube\"\nsize = [1, 1, 1]\ncenter = [0, 0, 2]\nmass = 1\n\
+               [contact]\nspring = 1e5\n[[obstacle]]\nname = \"floor\"\nmin = [-2, -2, -0.5]\nmax = [2, 2, 0]\n";
+    let periodic = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 1, 0.5]\n\
+                    [tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n";
+    let short = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.2]\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\nopen = [\"z_max\"]\n";
+    for (text, ranks, words) in [
+        (dry, 2, "there is no water"),
+        (periodic, 2, "along which this one is periodic"),
+        (short, 30, "30 ranks, but only"),
+    ] {
+        let case = case(text);
+        let scene = Arc::new(Scene::build(&case).expect("it builds"));
+        let mut ends = team(ranks).into_iter();
+        let lead = ends.next().expect("a rank");
+        std::thread::scope(|scope| {
+            for rank in ends {
+                let (scene, case) = (scene.clone(), case.clone());
+                scope.spawn(move || {
+                    alone();
+                    assert!(serve(&rank, || Ok((case, scene))).expect("no fault of its own").is_none());
+                });
+            }
+            let error = Simulation::on_ranks(&case, scene.clone(), &lead).err().expect("refused").to_string();
+            assert!(error.contains(words), "{error}");
+        });
+    }
+}
+
+#[test]
+fn what_one_rank_cannot_set_up_ends_all() {
+    let case = flume("");
+    let scene = Arc::new(Scene::build(&case).expect("it builds"));
+    let mut ends = team(3).into_iter();
+    let lead = ends.next().expect("a rank");
+    std::thread::scope(|scope| {
+        for rank in ends {
+            let (scene, case) = (scene.clone(), case.clone());
+            scope.spawn(move || {
+                alone();
+                let set_up = || match rank.rank() {
+                    2 => Err(Error::Senseless("hull.stl: no such file".into())),
+                    _ => Ok((case, scene)),
+                };
+                assert!(serve(&rank, set_up).expect("no fault of a stage").is_none());
+            });
+        }
+        let error = Simulation::on_ranks(&case, scene.clone(), &lead).err().expect("refused").to_string();
+        assert_eq!(error, "rank 2 of 3: hull.stl: no such file");
+    });
+}
+
+#[test]
+fn a_program_without_mpi_does_not_compute_a_case_many_times() {
+    let out = program()
+        .args(["run", &format!("{ROOT}/cases/dam_break_2d.toml"), "-o", "/nonexistent"])
+        .env("OMPI_COMM_WORLD_SIZE", "4")
+        .output()
+        .expect("it runs");
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    assert!(said.contains("one of 4 processes, but this seixo was built without MPI"), "{said}");
+}
