@@ -7,6 +7,7 @@ use crate::fields::Fields;
 use crate::scene::Kind;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Particles by cell: those of cell c are `start[c]..start[c + 1]`.
 #[derive(Clone, Default, Debug)]
@@ -129,12 +130,12 @@ fn permute<T: Copy + Send + Sync>(values: &mut [T], order: &[u32], scratch: &mut
     values.par_chunks_mut(PART).zip(scratch.par_chunks(PART)).for_each(|(v, s)| v.copy_from_slice(s));
 }
 
-/// Mark every cell within one cell of a cell that holds fluid: only walls there can feel or be felt.
-pub fn mark_near_fluid(grid: &Grid, start: &[u32], near: &mut Vec<bool>) {
+/// Mark every cell within one cell of a cell that holds fluid, which all lies in `columns` along x: only walls there can feel or be felt.
+pub fn mark_near_fluid(grid: &Grid, start: &[u32], columns: Range<u32>, near: &mut Vec<bool>) {
     near.clear();
     near.resize(grid.total(), false);
-    let [nx, ny, nz] = grid.count;
-    for x in 0..nx {
+    let [_, ny, nz] = grid.count;
+    for x in columns {
         for y in 0..ny {
             let column = grid.index([x, y, 0]);
             for z in 0..nz {

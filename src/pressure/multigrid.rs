@@ -8,8 +8,11 @@ use crate::fields::State;
 use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
 use crate::kernels::multigrid_levels::{LevelSums, level_cells, offset_of, place_of, step};
 use crate::neighbours::{CHUNK, Chunk};
+use crate::share::Side;
+use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows below which a level is not worth threads.
 const PARALLEL: usize = 4096;
@@ -20,6 +23,9 @@ struct Level {
     coordinates: Vec<[i32; 3]>,
     /// Cells along periodic axes, 0 along the others.
     around: [i32; 3],
+    /// Its rows that are computed here: all of them, or of the first level those of this rank.
+    own: Range<usize>,
+    /// Starts of these rows.
     start: Vec<u32>,
     column: Vec<u32>,
     value: Vec<f32>,
@@ -33,16 +39,17 @@ struct Level {
 
 impl Level {
     fn rows(&self) -> usize {
-        self.diagonal.len()
+        self.coordinates.len()
     }
 
     /// out_i <- f(i, b_i - (A x)_i).
     fn residual(&mut self, update: impl Fn(usize, f32) -> f32 + Sync) {
-        let Self { start, column, value, diagonal, x, b, r, .. } = self;
+        let Self { own, start, column, value, diagonal, x, b, r, .. } = self;
+        let (r, b, own_x) = (&mut r[own.clone()], &b[own.clone()], &x[own.clone()]);
         let row = |(i, r): (usize, &mut f32)| {
             let (a, e) = (start[i] as usize, start[i + 1] as usize);
             let sum = gather(&column[a..e], &value[a..e], x);
-            *r = update(i, b[i] - diagonal[i] * x[i] - sum);
+            *r = update(i, b[i] - diagonal[i] * own_x[i] - sum);
         };
         if diagonal.len() < PARALLEL {
             r.iter_mut().enumerate().for_each(row);
@@ -54,13 +61,13 @@ impl Level {
     /// One damped Jacobi sweep.
     fn smooth(&mut self) {
         self.residual(|_, r| r);
-        let (x, r, d) = (&mut self.x, &self.r, &self.diagonal);
+        let (x, r, d) = (&mut self.x[self.own.clone()], &self.r[self.own.clone()], &self.diagonal);
         x.iter_mut().zip(r).zip(d).for_each(|((x, r), d)| *x = sweep(*x, *r, *d));
     }
 
     /// The first sweep, from zero.
     fn first_smooth(&mut self) {
-        let (x, b, d) = (&mut self.x, &self.b, &self.diagonal);
+        let (x, b, d) = (&mut self.x[self.own.clone()], &self.b[self.own.clone()], &self.diagonal);
         x.iter_mut().zip(b).zip(d).for_each(|((x, b), d)| *x = first_sweep(*b, *d));
     }
 }
@@ -84,9 +91,37 @@ pub struct Multigrid {
     t: Vec<f32>,
     levels: Vec<Level>,
     used: usize,
-    /// First of this rank's cells among those of all ranks.
-    first: usize,
+    joined: Joined,
     scratch: Scratch,
+}
+
+/// Where the first coarse level, of which each rank has a part, meets those of the others, and the next, which all compute.
+#[derive(Default, Debug)]
+struct Joined {
+    /// Its borders.
+    sides: [Option<Side>; 2],
+    /// Rows of the next level to which each rank's cells belong.
+    parents: Vec<Vec<u32>>,
+}
+
+impl Joined {
+    /// Shows the ranks beside this one the border of `level`'s x.
+    fn show(&self, among: Option<Among>, level: &mut Level) {
+        if let Some(among) = among {
+            among.share.swap_at(&self.sides, &mut [&mut &mut level.x[..]]);
+        }
+    }
+
+    /// Sums `values` of the next level's rows over the ranks, each of which has added what its own cells bring.
+    fn sum<T: Pod + Default>(&self, among: Among, values: &mut [T], add: impl Fn(&mut T, T)) {
+        let own = self.parents[among.share.rank()].iter();
+        let own: Vec<T> = own.map(|&p| std::mem::take(&mut values[p as usize])).collect();
+        let all = among.share.gather(bytemuck::cast_slice(&own).to_vec());
+        for (parents, bytes) in self.parents.iter().zip(&all) {
+            let part = bytemuck::pod_collect_to_vec::<u8, T>(bytes);
+            parents.iter().zip(part).for_each(|(&p, v)| add(&mut values[p as usize], v));
+        }
+    }
 }
 
 /// Buffers of the construction.
@@ -123,7 +158,8 @@ impl Multigrid {
         self.first_level(system);
         for l in 1..self.used {
             let (fine, coarse) = self.levels.split_at_mut(l);
-            coarsen(&mut fine[l - 1], &mut coarse[0], &mut self.scratch);
+            let join = system.among.filter(|_| l == 1).map(|among| (among, &mut self.joined));
+            coarsen(&mut fine[l - 1], &mut coarse[0], &mut self.scratch, join);
         }
     }
 
@@ -219,6 +255,7 @@ impl Multigrid {
                 cursor[a as usize] += 1;
             }
         }
+        self.levels[0].own = 0..self.touched.len();
         if let Some(among) = system.among {
             self.join_cells(among, grid, position);
         }
@@ -232,7 +269,8 @@ impl Multigrid {
         let share = among.share;
         let all = share.gather(bytemuck::cast_slice(&self.touched).to_vec());
         let before: usize = all[..share.rank()].iter().map(Vec::len).sum();
-        self.first = before / size_of::<u32>();
+        let first = before / size_of::<u32>();
+        self.levels[0].own = first..first + self.touched.len();
         self.touched = bytemuck::pod_collect_to_vec(&all.concat());
         let coarse = &mut self.levels[0].coordinates;
         coarse.clear();
@@ -240,7 +278,10 @@ impl Multigrid {
             coarse.push(grid.coordinates_of(cell as usize).map(|k| k as i32));
             self.cell_aggregate[cell as usize] = k as u32;
         }
-        self.aggregate.iter_mut().filter(|a| **a != u32::MAX).for_each(|a| *a += self.first as u32);
+        self.aggregate.iter_mut().filter(|a| **a != u32::MAX).for_each(|a| *a += first as u32);
+        let cells = &self.levels[0].coordinates;
+        let of = |c: u32| (0..cells.len() as u32).filter(|&k| cells[k as usize][0] == c as i32).collect();
+        self.joined.sides = share.borders(of);
         share.swap(&mut [&mut &mut self.diagonal[..]]);
         for i in share.copies().filter(|&i| among.state[i] == State::Inner) {
             let c = grid.coordinates(position[i]);
@@ -261,7 +302,7 @@ impl Multigrid {
         let (codes, aggregate) = (&self.code, &self.aggregate);
         let (members, start) = (&self.members, &self.member_start);
         let level = &mut self.levels[0];
-        let (rows, cells, around) = (start.len() - 1, &level.coordinates[self.first..], level.around);
+        let (rows, cells, around) = (start.len() - 1, &level.coordinates[level.own.clone()], level.around);
         let everywhere = &level.coordinates;
         let seams = around != [0; 3];
         self.scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
@@ -286,36 +327,44 @@ impl Multigrid {
             }
             *s = std::array::from_fn(|k| turns[0][k] + turns[1][k]);
         });
-        if let Some(among) = system.among {
-            let own = self.scratch.stencil.iter().flat_map(bytemuck::bytes_of).copied().collect();
-            self.scratch.stencil = bytemuck::pod_collect_to_vec(&among.share.gather(own).concat());
-        }
         compress(level, &mut self.scratch);
     }
 
-    /// x <- B b on level `l` (0 is the first coarse one).
-    fn cycle(&mut self, l: usize) {
-        if l + 1 == self.used {
-            self.levels[l].first_smooth();
-            (1..SWEEPS).for_each(|_| self.levels[l].smooth());
-            return;
-        }
+    /// x <- B b on level `l` (0 is the first coarse one, of which ranks have parts).
+    fn cycle(&mut self, l: usize, among: Option<Among>) {
+        let among = among.filter(|_| l == 0);
         self.levels[l].first_smooth();
-        for visit in 0..visits(l) {
-            if visit > 0 {
+        if l + 1 == self.used {
+            for _ in 1..SWEEPS {
+                self.joined.show(among, &mut self.levels[l]);
                 self.levels[l].smooth();
             }
+            self.joined.show(among, &mut self.levels[l]);
+            return;
+        }
+        for visit in 0..visits(l) {
+            if visit > 0 {
+                self.joined.show(among, &mut self.levels[l]);
+                self.levels[l].smooth();
+            }
+            self.joined.show(among, &mut self.levels[l]);
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
             let (level, next) = (&mut fine[l], &mut coarse[0]);
             level.residual(|_, r| r);
             next.b.fill(0.0);
-            level.r.iter().zip(&level.parent).for_each(|(r, &p)| next.b[p as usize] += r);
-            self.cycle(l + 1);
+            let own = level.own.clone();
+            level.r[own.clone()].iter().zip(&level.parent[own]).for_each(|(r, &p)| next.b[p as usize] += r);
+            if let Some(among) = among {
+                self.joined.sum(among, &mut next.b, |sum, b| *sum += b);
+            }
+            self.cycle(l + 1, None);
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
             let (level, next, factor) = (&mut fine[l], &coarse[0], over_correction(l));
+            // Those of other ranks, shown before, as well: they stay as their owners have them.
             level.x.iter_mut().zip(&level.parent).for_each(|(x, &p)| *x += factor * next.x[p as usize]);
             level.smooth();
         }
+        self.joined.show(among, &mut self.levels[l]);
     }
 
     /// t <- b - A x on the finest level, in f32.
@@ -352,8 +401,13 @@ fn gather(index: &[u32], weight: &[f32], x: &[f32]) -> f32 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
+/// Entries of a row.
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+#[repr(transparent)]
+struct Stencil([f64; 27]);
+
 /// Next coarser level of `fine`.
-fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) {
+fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch, join: Option<(Among, &mut Joined)>) {
     let mut low = [i32::MAX; 3];
     let mut high = [i32::MIN; 3];
     for c in &fine.coordinates {
@@ -379,23 +433,33 @@ fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) {
         fine.parent.push(*slot);
     }
     let stencil = scratch.stencils(coarse.coordinates.len());
-    for i in 0..fine.rows() {
+    for (row, i) in fine.own.clone().enumerate() {
         let p = fine.parent[i] as usize;
         let s = &mut stencil[p];
-        s[13] += f64::from(fine.diagonal[i]);
-        for k in fine.start[i] as usize..fine.start[i + 1] as usize {
+        s[13] += f64::from(fine.diagonal[row]);
+        for k in fine.start[row] as usize..fine.start[row + 1] as usize {
             let q = fine.parent[fine.column[k] as usize] as usize;
             let way = step(coarse.coordinates[p], coarse.coordinates[q], coarse.around);
             s[(place_of(way) + 13) as usize] += f64::from(fine.value[k]);
         }
     }
+    if let Some((among, joined)) = join {
+        let mut own: Vec<u32> = fine.parent[fine.own.clone()].to_vec();
+        own.sort_unstable();
+        own.dedup();
+        let all = among.share.gather(bytemuck::cast_slice(&own).to_vec());
+        joined.parents = all.iter().map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
+        let add = |sum: &mut Stencil, part: Stencil| sum.0.iter_mut().zip(part.0).for_each(|(a, b)| *a += b);
+        joined.sum(among, bytemuck::cast_slice_mut(stencil), add);
+    }
+    coarse.own = 0..coarse.coordinates.len();
     compress(coarse, scratch);
 }
 
 /// Rows of `level` from the stencils of its cells.
 fn compress(level: &mut Level, scratch: &mut Scratch) {
     let Scratch { stencil, map, .. } = scratch;
-    let n = stencil.len();
+    let n = level.coordinates.len();
     let mut low = [i32::MAX; 3];
     let mut high = [i32::MIN; 3];
     for c in &level.coordinates {
@@ -423,7 +487,7 @@ fn compress(level: &mut Level, scratch: &mut Scratch) {
         let d = offset_of(k).map(|d| d as isize);
         (d[0] * size[1] as isize + d[1]) * size[2] as isize + d[2]
     });
-    for (&c, s) in level.coordinates.iter().zip(&*stencil) {
+    for (&c, s) in level.coordinates[level.own.clone()].iter().zip(&*stencil) {
         let own = place(c);
         for (k, &v) in s.iter().enumerate() {
             if k != 13 && v != 0.0 {
@@ -474,17 +538,13 @@ impl Precondition for Multigrid {
         self.residual(system);
         {
             let (t, members, start) = (&self.t, &self.members, &self.member_start);
-            let own = self.first..self.first + start.len() - 1;
-            self.levels[0].b[own].par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(a, b)| {
+            let level = &mut self.levels[0];
+            let b = &mut level.b[level.own.clone()];
+            b.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(a, b)| {
                 *b = members[start[a] as usize..start[a + 1] as usize].iter().map(|&i| t[i as usize]).sum();
             });
         }
-        if let Some(among) = system.among {
-            let b = &mut self.levels[0].b;
-            let own = bytemuck::cast_slice(&b[self.first..self.first + self.member_start.len() - 1]).to_vec();
-            *b = bytemuck::pod_collect_to_vec(&among.share.gather(own).concat());
-        }
-        self.cycle(0);
+        self.cycle(0, system.among);
         let coarse = &self.levels[0].x;
         (self.x.par_chunks_mut(CHUNK), self.aggregate.par_chunks(CHUNK), chunks)
             .into_par_iter()

@@ -45,6 +45,11 @@ fn take<T, U: Pod>(
 }
 
 impl Side {
+    /// Of the places `give` and `take` of an array.
+    pub(super) fn of(give: Vec<u32>, take: Vec<u32>) -> Self {
+        Self { give: 0..0, take: 0..0, give_walls: give, take_walls: take }
+    }
+
     fn given(&self) -> impl Iterator<Item = usize> + '_ {
         self.give.clone().chain(self.give_walls.iter().map(|&s| s as usize))
     }

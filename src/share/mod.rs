@@ -20,8 +20,7 @@ use crate::machine::memory_peak;
 use crate::params::Params;
 use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::Groups;
-pub use border::Bordered;
-use border::Side;
+pub use border::{Bordered, Side};
 use cut::check;
 use glam::DVec3;
 pub use moves::Traveller;
@@ -134,6 +133,12 @@ impl Share {
         state.iter().enumerate().map(of).collect()
     }
 
+    /// Columns of cells along x with water that this rank computes or has copies of.
+    pub fn columns_seen(&self) -> Range<u32> {
+        let (mine, end) = (self.columns(), self.cuts.last().copied().unwrap_or(0));
+        mine.start.saturating_sub(1)..(mine.end + 1).min(end)
+    }
+
     fn columns(&self) -> Range<u32> {
         self.cuts[self.rank()]..self.cuts[self.rank() + 1]
     }
@@ -220,6 +225,11 @@ impl Share {
 
     /// Shows the ranks beside this one the border of `arrays`, and takes theirs over.
     pub fn swap(&self, arrays: &mut [&mut dyn Bordered]) {
+        self.swap_at(&self.sides, arrays);
+    }
+
+    /// The same at borders of their own, [`Self::borders`].
+    pub fn swap_at(&self, sides: &[Option<Side>; 2], arrays: &mut [&mut dyn Bordered]) {
         let give = |side: &Option<Side>| {
             let mut out = Vec::new();
             if let Some(side) = side {
@@ -227,12 +237,22 @@ impl Share {
             }
             out
         };
-        let shown = self.pass(give(&self.sides[0]), give(&self.sides[1]));
-        for (side, bytes) in self.sides.iter().zip(&shown) {
+        let shown = self.pass(give(&sides[0]), give(&sides[1]));
+        for (side, bytes) in sides.iter().zip(&shown) {
             if let Some(side) = side {
                 let mut from = &bytes[..];
                 arrays.iter_mut().for_each(|array| array.take(side, &mut from));
             }
         }
+    }
+
+    /// Borders of what else lies in columns of cells: `of` tells what is in one, in an order that the ranks beside know as well.
+    pub fn borders(&self, of: impl Fn(u32) -> Vec<u32>) -> [Option<Side>; 2] {
+        let mine = self.columns();
+        let side = |give: u32, take: u32| Side::of(of(give), of(take));
+        [
+            (self.rank() > 0).then(|| side(mine.start, mine.start - 1)),
+            (self.rank() + 1 < self.ranks()).then(|| side(mine.end - 1, mine.end)),
+        ]
     }
 }

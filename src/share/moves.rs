@@ -190,7 +190,7 @@ impl Share {
             start[c.start as usize * per_column] as usize..start[c.end as usize * per_column] as usize
         };
         let (fluid, pressure) = (self.groups.fluid, self.groups.pressure());
-        let walls = |c: Range<u32>| -> Vec<u32> {
+        let walls_of = |c: Range<u32>| -> Vec<u32> {
             let lists = solids.into_iter().flatten();
             let of = |list: &'_ CellList| -> Vec<u32> {
                 let (a, b) =
@@ -204,17 +204,17 @@ impl Share {
             lists.flat_map(of).collect()
         };
         self.own = water(mine.clone());
-        let side = |give: u32, take: u32| Side {
-            give: water(give..give + 1),
-            take: water(take..take + 1),
-            give_walls: walls(give..give + 1),
-            take_walls: walls(take..take + 1),
-        };
-        self.sides = [
-            (self.rank() > 0).then(|| side(mine.start, mine.start - 1)),
-            (self.rank() + 1 < self.ranks()).then(|| side(mine.end - 1, mine.end)),
-        ];
+        let walls = |c: u32| walls_of(c..c + 1);
+        let mut sides = self.borders(walls);
+        let ends = [mine.start..mine.start + 1, mine.end - 1..mine.end];
+        for (k, (side, end)) in sides.iter_mut().zip(ends).enumerate() {
+            if let Some(side) = side {
+                let beyond = if k == 0 { end.start - 1..end.start } else { end.end..end.end + 1 };
+                (side.give, side.take) = (water(end), water(beyond));
+            }
+        }
+        self.sides = sides;
         self.walls.fill(false);
-        walls(mine).into_iter().for_each(|s| self.walls[s as usize - fluid] = true);
+        walls_of(mine.clone()).into_iter().for_each(|s| self.walls[s as usize - fluid] = true);
     }
 }

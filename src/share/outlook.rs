@@ -3,12 +3,15 @@
 use super::cut::{check, cut, unevenness};
 use crate::cells::Grid;
 use crate::error::Result;
+use crate::kernels::multigrid::{SWEEPS, visits};
+use crate::kernels::multigrid_levels::level_cells;
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
 use crate::scene::{Kind, Scene};
 use crate::scheme::Preconditioner;
 use glam::DVec3;
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// What a rank would have at t = 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -79,22 +82,38 @@ impl Outlook {
         let a_water = 64 + 48 * motions;
         let a_carrier = 1 + 8 * surface + 16 + 4 * multigrid;
         let bodies = u64::from(plan.coupled) + count(&[Stage::BodyForce]);
-        let cells = if multigrid > 0 { wet_cells(scene, &grid) } else { 0 };
+        // The first coarse level has borders, shown before each use; the next is summed from all ranks on each visit to it.
+        let levels = level_cells(grid.count).len();
+        let (shown, visited) = match (multigrid, levels) {
+            (0, _) => (0, 0),
+            (_, 1) => (SWEEPS as u64, 0),
+            _ => (2 * visits(0) as u64, visits(0) as u64),
+        };
+        let [cells, parents, border_cells] = if multigrid > 0 { wet_cells(scene, &grid) } else { [0; 3] };
+        let joins = multigrid * (1 + 2 * u64::from(levels > 1));
         Ok(Self {
             unevenness: unevenness(&water, &cuts),
             parts: parts.collect(),
-            messages: [step_messages, 1 + multigrid],
-            message_bytes: [a_water * water_at + a_carrier * carriers_at, (8 + 4 * multigrid) * carriers_at],
-            rounds: [5 + bodies + 2 * multigrid + 2 * filled, 3 + 2 * multigrid],
-            round_bytes: [(4 + 27 * 8) * cells, 4 * cells],
+            messages: [step_messages, 1 + multigrid + shown],
+            message_bytes: [
+                a_water * water_at + a_carrier * carriers_at,
+                (8 + 4 * multigrid) * carriers_at + 4 * shown * border_cells,
+            ],
+            rounds: [5 + bodies + joins + 2 * filled, 3 + multigrid + visited],
+            round_bytes: [4 * cells + (4 + 27 * 8) * parents, 4 * visited * parents],
         })
     }
 }
 
-/// Cells with water at t = 0.
-fn wet_cells(scene: &Scene, grid: &Grid) -> u64 {
-    let mut wet = vec![false; grid.total()];
-    let water = (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid);
-    water.for_each(|i| wet[grid.index(grid.coordinates(scene.position[i]))] = true);
-    wet.into_iter().filter(|wet| *wet).count() as u64
+/// Cells with water at t = 0, cells of the next level with some of them, and the most in a column.
+fn wet_cells(scene: &Scene, grid: &Grid) -> [u64; 3] {
+    let [mut wet, mut above] = [BTreeSet::new(), BTreeSet::new()];
+    for i in (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid) {
+        let c = grid.coordinates(scene.position[i]);
+        wet.insert(c);
+        above.insert(c.map(|k| k >> 1));
+    }
+    let mut columns = vec![0_u64; grid.count[0] as usize];
+    wet.iter().for_each(|c| columns[c[0] as usize] += 1);
+    [wet.len() as u64, above.len() as u64, columns.into_iter().max().unwrap_or(0)]
 }

@@ -227,7 +227,8 @@ impl Cpu {
             share.find_borders(fluid_start, solids);
         }
         if self.active_set {
-            cell_list::mark_near_fluid(grid, fluid_start, &mut self.near_fluid);
+            let columns = share.as_ref().map_or(0..grid.count[0], |share| share.columns_seen());
+            cell_list::mark_near_fluid(grid, fluid_start, columns, &mut self.near_fluid);
         } else {
             self.near_fluid.clear();
             self.near_fluid.resize(grid.total(), true);
