@@ -75,6 +75,6 @@ pub fn serve(
     });
     let together = agree(&**team, &cpu);
     let (Ok(mut cpu), Ok(())) = (cpu, together) else { return Ok(None) };
-    follow(&**team, &mut cpu)?;
+    follow(&mut cpu)?;
     Ok(Some(cpu))
 }

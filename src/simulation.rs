@@ -197,8 +197,10 @@ impl Simulation {
     /// Give up a step in progress with [`Error::Interrupted`] when `stop` has become overdue. The state is that of no
     /// moment then; one that was kept before can be taken over with [`Self::exchange`].
     pub fn stop_with(&mut self, stop: &Stop) {
-        self.stop = stop.clone();
-        self.backend.stop_with(stop);
+        if self.backend.gives_up() {
+            self.stop = stop.clone();
+            self.backend.stop_with(stop);
+        }
     }
 
     /// When the PPE's solver stops.

@@ -374,10 +374,14 @@ fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
                     [tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n";
     let short = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.2]\n\
                  [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\nopen = [\"z_max\"]\n";
+    let near = short
+        .replace("[run]", "[run]\neffective_radius = 1.5")
+        .replace("[fluid]", "[fluid]\ncollision_distance = 0.9");
     for (text, ranks, words) in [
         (dry, 2, "there is no water"),
         (periodic, 2, "along which this one is periodic"),
         (short, 30, "30 ranks, but only"),
+        (&near, 2, "more than half of run.effective_radius"),
     ] {
         let case = case(text);
         let scene = Arc::new(Scene::build(&case).expect("it builds"));

@@ -112,11 +112,11 @@ pub fn serve(_: &Arc<dyn Team>, _: u16) -> super::Exit {
 pub fn serve(team: &Arc<dyn Team>, threads: u16) -> super::Exit {
     use seixo::on_ranks::hear_case;
     use seixo::scene::Scene;
-    // Signals are for the first rank: it saves the state, for which it needs the others.
-    let _heedless = super::signals::watch(true)?.attend();
-    seixo::threads::start(Some(threads))?;
     let Some(text) = hear_case(&**team) else { return Ok(0) };
     let set_up = || {
+        // Signals are for the first rank: it saves the state, for which it needs the others.
+        std::mem::forget(super::signals::watch(true)?.attend());
+        seixo::threads::start(Some(threads))?;
         let (case, ..) = seixo::case::file::parse("case", text, &[])?;
         let scene = Scene::build(&case)?;
         Ok((case, Arc::new(scene)))

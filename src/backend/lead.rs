@@ -150,9 +150,12 @@ impl Backend for Lead {
         self.cpu.ranks()
     }
 
-    fn stop_with(&mut self, _: &Stop) {
-        // All ranks would have to give a solve up at the same iteration; steps over ranks are short, and are ended.
+    fn gives_up(&self) -> bool {
+        // Steps over ranks are short, and the state of all of them is long in the making.
+        false
     }
+
+    fn stop_with(&mut self, _: &Stop) {}
 
     fn bytes(&self) -> u64 {
         self.cpu.bytes()
@@ -167,9 +170,9 @@ impl Backend for Lead {
 ///
 /// # Errors
 /// What a stage says.
-pub fn follow(team: &dyn Team, cpu: &mut Cpu) -> Result<()> {
-    loop {
-        match decode::<Order>(&team.hear(Vec::new())) {
+pub fn follow(cpu: &mut Cpu) -> Result<()> {
+    while let Some(order) = cpu.share().map(|share| share.hear()) {
+        match decode::<Order>(&order) {
             Order::Run(stage, step) => cpu.run(stage, &step)?,
             Order::PassOpenings(emissions, outlets) => cpu.pass_openings(&emissions, &outlets)?,
             Order::FreeBodies(bodies) => cpu.free_bodies(&bodies)?,
@@ -186,4 +189,5 @@ pub fn follow(team: &dyn Team, cpu: &mut Cpu) -> Result<()> {
             Order::End => return Ok(()),
         }
     }
+    Ok(())
 }

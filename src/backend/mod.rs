@@ -220,6 +220,10 @@ pub trait Backend: Send {
     fn wait(&mut self) -> Result<()> {
         Ok(())
     }
+    /// Whether a step may be given up between two stages, for a state kept in memory to go back to.
+    fn gives_up(&self) -> bool {
+        true
+    }
     /// A solve in progress may be given up when `stop` has become overdue; it ends as if its iterations had run out.
     fn stop_with(&mut self, stop: &Stop);
     /// Bytes that the backend holds for particles.

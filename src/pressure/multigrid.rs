@@ -533,7 +533,10 @@ impl Precondition for Multigrid {
             });
         if let Some(among) = system.among {
             among.share.swap(&mut [&mut &mut self.b[..]]);
-            among.share.copies().for_each(|i| self.x[i] = first_sweep(self.b[i], self.diagonal[i]));
+            for i in among.share.copies() {
+                let unknown = among.state[i] == State::Inner;
+                self.x[i] = if unknown { first_sweep(self.b[i], self.diagonal[i]) } else { 0.0 };
+            }
         }
         self.residual(system);
         {
@@ -561,7 +564,8 @@ impl Precondition for Multigrid {
             for i in among.share.copies() {
                 let a = self.aggregate[i];
                 let correction = if a == u32::MAX { 0.0 } else { OVER_CORRECTION * coarse[a as usize] };
-                self.x[i] = first_sweep(self.b[i], self.diagonal[i]) + correction;
+                let unknown = among.state[i] == State::Inner;
+                self.x[i] = if unknown { first_sweep(self.b[i], self.diagonal[i]) + correction } else { 0.0 };
             }
         }
         self.residual(system);

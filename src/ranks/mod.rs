@@ -38,6 +38,11 @@ pub trait Team: Send + Sync {
     fn swap(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2];
     /// What each has to say, in the order of the ranks.
     fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>>;
+    /// The same, for the first rank alone; the others get nothing.
+    fn collect(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
+        let all = self.gather(own);
+        if self.rank() == 0 { all } else { Vec::new() }
+    }
     /// As many numbers of each rank, one after the other.
     fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
         let all = self.gather(bytemuck::cast_slice(own).to_vec());

@@ -33,6 +33,9 @@ pub fn abort(code: u8) -> ! {
     SimpleCommunicator::world().abort(i32::from(code))
 }
 
+/// Bytes that are sent at once; MPI counts them in 31 bits.
+const PIECE: usize = 1 << 30;
+
 fn count(n: usize) -> Count {
     // A part of a run that is as large as this has met other limits before.
     Count::try_from(n).unwrap_or_else(|_| panic!("{n} bytes are more than MPI sends at once"))
@@ -85,6 +88,25 @@ impl Team for Processes {
         starts.iter().zip(&counts).map(part).collect()
     }
 
+    fn collect(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
+        let first = self.world.process_at_rank(0);
+        if self.world.rank() > 0 {
+            first.send(&(own.len() as u64));
+            own.chunks(PIECE).for_each(|piece| first.send(piece));
+            return Vec::new();
+        }
+        let mut all = vec![own];
+        for rank in 1..self.world.size() {
+            let from = self.world.process_at_rank(rank);
+            let mut part = vec![0; from.receive::<u64>().0 as usize];
+            part.chunks_mut(PIECE).for_each(|piece| {
+                from.receive_into(piece);
+            });
+            all.push(part);
+        }
+        all
+    }
+
     fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; own.len() * self.ranks()];
         self.world.all_gather_into(own, &mut all[..]);
@@ -97,10 +119,8 @@ impl Team for Processes {
         root.broadcast_into(&mut length);
         let mut said = said;
         said.resize(length as usize, 0);
-        // MPI takes no empty buffer.
-        if !said.is_empty() {
-            root.broadcast_into(&mut said[..]);
-        }
+        // MPI takes no empty buffer, and none of more than 2 GiB.
+        said.chunks_mut(PIECE).for_each(|piece| root.broadcast_into(piece));
         said
     }
 }

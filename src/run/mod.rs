@@ -219,7 +219,7 @@ impl Run {
 
     /// Keep a state of late in memory, to go back to if a long step is given up.
     fn keep(&mut self, simulation: &mut Simulation) -> Result<()> {
-        if !self.saving.keeps() {
+        if !simulation.backend.gives_up() || !self.saving.keeps() {
             return Ok(());
         }
         // Two at a time would be one too many: they may be large.

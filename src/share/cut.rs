@@ -32,6 +32,11 @@ pub(super) fn check(ranks: usize, params: &Params, grid: &Grid) -> Result<()> {
         let text = "ranks cut the tank across x, along which this one is periodic: run it on one rank";
         return Err(Error::usage("ranks", text));
     }
+    if ranks > 1 && 2.0 * params.collision_distance > params.effective_radius {
+        let text = "ranks: fluid.collision_distance is more than half of run.effective_radius, and who collides beyond a cut is not \
+                    seen: take a larger run.effective_radius, or run it on one rank";
+        return Err(Error::usage("ranks", text));
+    }
     if ranks > columns {
         let text = format!(
             "{ranks} ranks, but only {columns} columns of cells along x, of which each rank takes one or more: use fewer"

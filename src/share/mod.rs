@@ -3,7 +3,7 @@
 //!
 //! | copies of the last column of the rank before | own | copies of the first column of the rank after |
 //!
-//! and these copies are in the order of their owner, as both sort the same sequence by cell. Solids keep the slots that they have on a
+//! and these copies are in the order of their owner, as both sort the same sequence by cell. Solids come behind the water as on a
 //! single rank: every rank knows where they are, and computes the rows of those in its own columns.
 
 mod border;
@@ -53,6 +53,8 @@ pub struct Share {
     sides: [Option<Side>; 2],
     /// Whether it computes each slot of the wall layers.
     walls: Vec<bool>,
+    /// Positions of the pressure-carrying slots at the search [m], by which they are this rank's.
+    searched: Vec<DVec3>,
     steps: u64,
     /// Messages to the ranks beside this one, their bytes, rounds of all ranks, and nanoseconds in both so far.
     said: [AtomicU64; 4],
@@ -72,6 +74,7 @@ impl Share {
             cuts: Vec::new(),
             own: 0..0,
             come_in: Vec::new(),
+            searched: Vec::new(),
             steps: 0,
             said: Default::default(),
             team,
@@ -79,6 +82,11 @@ impl Share {
             groups: all,
             all,
         })
+    }
+
+    /// Positions of the pressure-carrying slots at the search [m]: what collisions have moved across a cut since is still whose it was.
+    pub fn searched(&self) -> &[DVec3] {
+        &self.searched
     }
 
     /// Sizes of the groups of all ranks.
@@ -169,6 +177,11 @@ impl Share {
         heard
     }
 
+    /// What the first rank orders; the wait for it counts.
+    pub fn hear(&self) -> Vec<u8> {
+        self.timed(|team| team.hear(Vec::new()))
+    }
+
     fn pass(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
         let beside = u64::from(self.rank() > 0) + u64::from(self.rank() + 1 < self.ranks());
         self.said[0].fetch_add(beside, Relaxed);
@@ -181,6 +194,13 @@ impl Share {
         self.said[1].fetch_add(own.len() as u64, Relaxed);
         self.said[2].fetch_add(1, Relaxed);
         self.timed(|team| team.gather(own))
+    }
+
+    /// The same, for the first rank alone.
+    pub(super) fn collect(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
+        self.said[1].fetch_add(own.len() as u64, Relaxed);
+        self.said[2].fetch_add(1, Relaxed);
+        self.timed(|team| team.collect(own))
     }
 
     /// As many numbers of every rank.

@@ -45,6 +45,7 @@ impl Share {
     pub fn begin(&mut self, groups: Groups, own: usize, fields: &Fields, grid: &Grid) {
         self.groups = groups;
         self.own = 0..own;
+        self.come_in.clear();
         self.sides = [self.rank() > 0, self.rank() + 1 < self.ranks()].map(|there| there.then(Side::default));
         let mine = self.columns();
         for (owned, x) in self.walls.iter_mut().zip(&fields.position[groups.fluid..]) {
@@ -184,7 +185,9 @@ impl Share {
     }
 
     /// Finds the borders in the cells of this rank's water, which begin at `start`, and of solids.
-    pub fn find_borders(&mut self, start: &[u32], solids: [Option<&CellList>; 2]) {
+    pub fn find_borders(&mut self, position: &[DVec3], start: &[u32], solids: [Option<&CellList>; 2]) {
+        self.searched.clear();
+        self.searched.extend_from_slice(&position[..self.groups.pressure()]);
         let (mine, per_column) = (self.columns(), self.per_column);
         let water = |c: Range<u32>| {
             start[c.start as usize * per_column] as usize..start[c.end as usize * per_column] as usize

@@ -53,7 +53,7 @@ impl Share {
             },
             state: self.owned().map(|i| fields.state[i] as u8).collect(),
         };
-        let parts = self.gather(encode(&part));
+        let parts = self.collect(encode(&part));
         if self.rank() > 0 {
             return None;
         }

@@ -152,7 +152,7 @@ impl Cpu {
     }
 
     fn viscosity(&mut self) {
-        let Self { fields, neighbours, params, groups, .. } = self;
+        let Self { fields, neighbours, params, groups, share, .. } = self;
         if neighbours.pairs() == 0 {
             return;
         }
@@ -166,7 +166,11 @@ impl Cpu {
             .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
         let reaction = |arrays: &mut RowArrays, (k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
-            *f = viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays);
+            *f = if share.as_ref().is_none_or(|share| share.owns(i)) {
+                viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays)
+            } else {
+                DVec3::ZERO
+            };
         };
         fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::default, reaction);
     }
@@ -224,7 +228,7 @@ impl Cpu {
         }
         if let Some(share) = share {
             let solids = [&self.moving, &self.fixed].map(|list| list.as_ref().map(|(list, _)| list));
-            share.find_borders(fluid_start, solids);
+            share.find_borders(&fields.position, fluid_start, solids);
         }
         if self.active_set {
             let columns = share.as_ref().map_or(0..grid.count[0], |share| share.columns_seen());
@@ -275,7 +279,7 @@ impl Cpu {
 
     fn wall_friction(&mut self, step: &Step) {
         let own = self.own();
-        let Self { fields, neighbours, params, groups, live, .. } = self;
+        let Self { fields, neighbours, params, groups, live, share, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let carriers = |i: usize| neighbours.pressure(i).neighbour;
@@ -286,7 +290,9 @@ impl Cpu {
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            *f += wall_friction::reaction(i, carriers(i), carriers, on, step.dt);
+            if share.as_ref().is_none_or(|share| share.owns(i)) {
+                *f += wall_friction::reaction(i, carriers(i), carriers, on, step.dt);
+            }
         });
         if let Some(ledger) = &mut self.ledger {
             ledger.kick(Entry::Friction, own, on, &fields.acceleration, step.dt);
@@ -297,7 +303,7 @@ impl Cpu {
 
     fn collision(&mut self, step: &Step) {
         let own = self.own();
-        let Self { fields, neighbours, params, groups, lightness, .. } = self;
+        let Self { fields, neighbours, params, groups, lightness, share, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let among = collision::Colliding { on, rows: neighbours, lightness };
@@ -308,7 +314,7 @@ impl Cpu {
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if close(i) {
+            if close(i) && share.as_ref().is_none_or(|share| share.owns(i)) {
                 *f += collision::reaction(i, among, step.dt);
             }
         });
@@ -380,12 +386,14 @@ impl Cpu {
             let wall = |(k, i): (usize, usize)| {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 if share.is_some_and(|share| !share.owns(i)) {
+                    // Of the step's beginning, when it was this rank's.
+                    sum += Wrench { force: reaction, torque: arm.cross(reaction) };
                     return (DVec3::ZERO, arm);
                 }
                 let unknown = state[i] == State::Inner;
                 let area = if unknown { pose.orientation * solid.wall_area[k] } else { DVec3::ZERO };
-                let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let head = body_force::head(pressure[i], to_surface, pose.acceleration_at(arm), params);
                 let force = body_force::body_force(head, area, reaction);
                 sum += Wrench { force, torque: arm.cross(force) };
@@ -574,7 +582,7 @@ impl Backend for Cpu {
         };
         let preconditioner: &mut dyn Precondition = match multigrid {
             Some(multigrid) => {
-                multigrid.build(&system, grid, &fields.position);
+                multigrid.build(&system, grid, share.map_or(&fields.position, |share| share.searched()));
                 multigrid
             }
             None => &mut Jacobi,
@@ -634,14 +642,14 @@ impl Backend for Cpu {
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
-            let own = |(_, i): &(usize, usize)| share.is_none_or(|share| share.owns(*i));
-            for (k, i) in solid.wall_slots.clone().enumerate().filter(own) {
+            for (k, i) in solid.wall_slots.clone().enumerate() {
+                let own = share.is_none_or(|share| share.owns(i));
                 let area = pose.orientation * solid.wall_area[k];
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
                 let (pressure, unknown) = (fields.pressure[i], fields.state[i] == State::Inner);
                 let head = body_force::head(pressure, to_surface, pose.acceleration_at(arm), params);
-                let pressure = body_force::surface_pressure(pressure, unknown, head);
+                let pressure = if own { body_force::surface_pressure(pressure, unknown, head) } else { 0.0 };
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;

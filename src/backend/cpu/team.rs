@@ -229,6 +229,9 @@ impl Cpu {
         self.make_room(own.len());
         let Some(share) = self.share.as_mut() else { return Ok(()) };
         share.take_over(&own, &whole, &mut self.fields);
+        // Zero between two steps.
+        self.fields.acceleration.fill(DVec3::ZERO);
+        self.fields.reaction.fill(DVec3::ZERO);
         share.begin(self.groups, own.len(), &self.fields, &self.grid);
         self.live = own.len();
         self.neighbours = Neighbours::new(self.neighbours.rows());
