@@ -366,6 +366,27 @@ fn a_state_goes_on_on_any_number_of_ranks() {
     }
 }
 
+/// What the first of `ranks` that cannot begin says of `case`; one of them, `lacks`, cannot set it up.
+fn refusal(case: &Case, ranks: usize, lacks: Option<usize>) -> String {
+    let scene = Arc::new(Scene::build(case).expect("it builds"));
+    let mut ends = team(ranks).into_iter();
+    let lead = ends.next().expect("a rank");
+    std::thread::scope(|scope| {
+        for rank in ends {
+            let (scene, case) = (scene.clone(), case.clone());
+            scope.spawn(move || {
+                alone();
+                let set_up = || match Some(rank.rank()) == lacks {
+                    true => Err(Error::Senseless("hull.stl: no such file".into())),
+                    false => Ok((case, scene)),
+                };
+                assert!(serve(&rank, set_up).expect("no fault of its own").is_none());
+            });
+        }
+        Simulation::on_ranks(case, scene.clone(), &lead).err().expect("refused").to_string()
+    })
+}
+
 #[test]
 fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
     let dry = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[[body]]\nname = \"cube\"\nsize = [1, 1, 1]\ncenter = [0, 0, 2]\nmass = 1\n\
@@ -383,45 +404,14 @@ fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
         (short, 30, "30 ranks, but only"),
         (&near, 2, "more than half of run.effective_radius"),
     ] {
-        let case = case(text);
-        let scene = Arc::new(Scene::build(&case).expect("it builds"));
-        let mut ends = team(ranks).into_iter();
-        let lead = ends.next().expect("a rank");
-        std::thread::scope(|scope| {
-            for rank in ends {
-                let (scene, case) = (scene.clone(), case.clone());
-                scope.spawn(move || {
-                    alone();
-                    assert!(serve(&rank, || Ok((case, scene))).expect("no fault of its own").is_none());
-                });
-            }
-            let error = Simulation::on_ranks(&case, scene.clone(), &lead).err().expect("refused").to_string();
-            assert!(error.contains(words), "{error}");
-        });
+        let error = refusal(&case(text), ranks, None);
+        assert!(error.contains(words), "{error}");
     }
 }
 
 #[test]
 fn what_one_rank_cannot_set_up_ends_all() {
-    let case = flume("");
-    let scene = Arc::new(Scene::build(&case).expect("it builds"));
-    let mut ends = team(3).into_iter();
-    let lead = ends.next().expect("a rank");
-    std::thread::scope(|scope| {
-        for rank in ends {
-            let (scene, case) = (scene.clone(), case.clone());
-            scope.spawn(move || {
-                alone();
-                let set_up = || match rank.rank() {
-                    2 => Err(Error::Senseless("hull.stl: no such file".into())),
-                    _ => Ok((case, scene)),
-                };
-                assert!(serve(&rank, set_up).expect("no fault of a stage").is_none());
-            });
-        }
-        let error = Simulation::on_ranks(&case, scene.clone(), &lead).err().expect("refused").to_string();
-        assert_eq!(error, "rank 2 of 3: hull.stl: no such file");
-    });
+    assert_eq!(refusal(&flume(""), 3, Some(2)), "rank 2 of 3: hull.stl: no such file");
 }
 
 #[test]

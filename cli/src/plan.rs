@@ -260,12 +260,14 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     } else if plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
-    let asked = ranks.is_some();
-    let ranks = ranks.filter(|_| built && plan.wet());
-    let ranks = ranks.map(|n| Outlook::new(usize::from(n), scene, &params, &plan)).transpose()?;
-    if asked && ranks.is_none() {
-        advice.push("ranks: not told, of a scene without water or one that was not built whole".into());
-    }
+    let ranks = match ranks {
+        Some(n) if built && plan.wet() => Some(Outlook::new(usize::from(n), scene, &params, &plan)?),
+        Some(_) => {
+            advice.push("ranks: not told, of a scene without water or one that was not built whole".into());
+            None
+        }
+        None => None,
+    };
     let estimate = Estimate::new(case);
     let free = |n: Option<u64>| n.map_or(f64::INFINITY, |n| n as f64);
     if estimate.memory_beside_device > free(machine::memory()) {

@@ -47,9 +47,7 @@ impl Loaded {
         let Some(messages) = found.problems.iter().map(of).collect::<Option<Vec<_>>>() else { return error };
         let name = self.path.display().to_string();
         let mut report = render(&name, &self.text, &messages[..messages.len().min(MOST_SHOWN)]);
-        if messages.len() > MOST_SHOWN {
-            report.push_str(&format!("\n\nerror: and {} more", messages.len() - MOST_SHOWN));
-        }
+        report.push_str(&and_more(messages.len()));
         if self.overridden {
             report.push_str(OVERRIDDEN);
         }
@@ -60,6 +58,14 @@ impl Loaded {
 
 /// Said where lines are not those of the file.
 const OVERRIDDEN: &str = "\n\nnote: lines are counted with --spacing and --set applied";
+
+/// Said of the rest of `problems` of which [`MOST_SHOWN`] are shown.
+fn and_more(problems: usize) -> String {
+    match problems.saturating_sub(MOST_SHOWN) {
+        0 => String::new(),
+        more => format!("\n\nerror: and {more} more"),
+    }
+}
 
 /// Reads a case: `spacing` overrides `run.spacing` [m], `sets` are `key=value` pairs such as
 /// `body.0.density=780`.
@@ -180,9 +186,7 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
     if !errors.is_empty() {
         let shown: Vec<Message> = errors.iter().take(MOST_SHOWN).map(located).collect();
         let mut report = wrong(&shown);
-        if errors.len() > MOST_SHOWN {
-            report.push_str(&format!("\n\nerror: and {} more", errors.len() - MOST_SHOWN));
-        }
+        report.push_str(&and_more(errors.len()));
         let problems = errors.iter().map(|p| located(p).problem(name, &text)).collect();
         return Err(CaseError::new(problems, report).into());
     }

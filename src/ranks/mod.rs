@@ -5,8 +5,8 @@
 //! wide. Each rank runs the stages of the CPU path over its own particles and over copies of these columns of the ranks beside
 //! it, which are made new after every stage that changes what the next one reads there.
 //!
-//! The first rank leads ([`crate::backend::lead`], [`crate::on_ranks`]): it alone has solids, clock, tables and files, and tells the others what to do, stage
-//! by stage. Sums are made in the order of the ranks, so that a run repeats to the last bit on the same number of ranks.
+//! The first rank leads ([`crate::backend::lead`], [`crate::on_ranks`]): it alone moves solids and has clock, tables and files, and tells the others
+//! what to do, stage by stage. Sums are made in the order of the ranks, so that a run repeats to the last bit on the same number of ranks.
 //!
 //! What ranks say to each other goes through [`Team`]: threads of one process ([`threads`]), or MPI (feature `mpi`).
 

@@ -5,7 +5,7 @@ use bytemuck::Pod;
 use glam::DVec3;
 use std::ops::Range;
 
-/// A border: what this rank gives and what it takes, of water and of wall layers.
+/// A border: what this rank gives and what it takes, ranges of water and single places, of wall layers (or of cells, [`super::Share::borders`]).
 #[derive(Clone, Debug, Default)]
 pub struct Side {
     pub(super) give: Range<usize>,

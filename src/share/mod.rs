@@ -89,6 +89,12 @@ impl Share {
         &self.searched
     }
 
+    /// Keep these, the positions now.
+    pub fn keep_searched(&mut self, position: &[DVec3]) {
+        self.searched.clear();
+        self.searched.extend_from_slice(position);
+    }
+
     /// Sizes of the groups of all ranks.
     pub fn all(&self) -> Groups {
         self.all

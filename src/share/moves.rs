@@ -53,15 +53,8 @@ impl Share {
         }
     }
 
-    /// The slots of the water are more now, those of solids behind them moved up.
+    /// The slots of the water are more now, those of solids behind them moved up; borders are found anew before they are used.
     pub fn groups_are(&mut self, groups: Groups) {
-        let more = (groups.fluid - self.groups.fluid) as u32;
-        let walls = self
-            .sides
-            .iter_mut()
-            .flatten()
-            .flat_map(|side| side.give_walls.iter_mut().chain(&mut side.take_walls));
-        walls.for_each(|slot| *slot += more);
         self.groups = groups;
     }
 
@@ -185,9 +178,7 @@ impl Share {
     }
 
     /// Finds the borders in the cells of this rank's water, which begin at `start`, and of solids.
-    pub fn find_borders(&mut self, position: &[DVec3], start: &[u32], solids: [Option<&CellList>; 2]) {
-        self.searched.clear();
-        self.searched.extend_from_slice(&position[..self.groups.pressure()]);
+    pub fn find_borders(&mut self, start: &[u32], solids: [Option<&CellList>; 2]) {
         let (mine, per_column) = (self.columns(), self.per_column);
         let water = |c: Range<u32>| {
             start[c.start as usize * per_column] as usize..start[c.end as usize * per_column] as usize

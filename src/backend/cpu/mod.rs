@@ -19,6 +19,7 @@ use self::pressure_gradient::gradient_rows;
 use self::pressure_source::source_rows;
 use self::row_arrays::RowArrays;
 use self::search::{Candidates, Coordinates, Search, neighbour_list};
+use self::team::owns;
 use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
@@ -166,7 +167,7 @@ impl Cpu {
             .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
         let reaction = |arrays: &mut RowArrays, (k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
-            *f = if share.as_ref().is_none_or(|share| share.owns(i)) {
+            *f = if owns(share.as_deref(), i) {
                 viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays)
             } else {
                 DVec3::ZERO
@@ -228,7 +229,10 @@ impl Cpu {
         }
         if let Some(share) = share {
             let solids = [&self.moving, &self.fixed].map(|list| list.as_ref().map(|(list, _)| list));
-            share.find_borders(&fields.position, fluid_start, solids);
+            share.find_borders(fluid_start, solids);
+            if self.multigrid.is_some() {
+                share.keep_searched(&fields.position[..groups.pressure()]);
+            }
         }
         if self.active_set {
             let columns = share.as_ref().map_or(0..grid.count[0], |share| share.columns_seen());
@@ -290,7 +294,7 @@ impl Cpu {
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if share.as_ref().is_none_or(|share| share.owns(i)) {
+            if owns(share.as_deref(), i) {
                 *f += wall_friction::reaction(i, carriers(i), carriers, on, step.dt);
             }
         });
@@ -314,7 +318,7 @@ impl Cpu {
         });
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if close(i) && share.as_ref().is_none_or(|share| share.owns(i)) {
+            if close(i) && owns(share.as_deref(), i) {
                 *f += collision::reaction(i, among, step.dt);
             }
         });
@@ -387,7 +391,7 @@ impl Cpu {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
                 let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
-                if share.is_some_and(|share| !share.owns(i)) {
+                if !owns(share, i) {
                     // Of the step's beginning, when it was this rank's.
                     sum += Wrench { force: reaction, torque: arm.cross(reaction) };
                     return (DVec3::ZERO, arm);
@@ -607,7 +611,7 @@ impl Backend for Cpu {
         let cut = |(i, p): (usize, &mut f64)| {
             let (high, low) = (*p > step.pressure_max, *p < 0.0);
             *p = p.clamp(0.0, step.pressure_max);
-            let counts = share.is_none_or(|share| share.owns(i));
+            let counts = owns(share, i);
             [u64::from(high && counts), u64::from(low && counts)]
         };
         let add = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
@@ -643,7 +647,7 @@ impl Backend for Cpu {
         let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
             let mut total = Wrench::default();
             for (k, i) in solid.wall_slots.clone().enumerate() {
-                let own = share.is_none_or(|share| share.owns(i));
+                let own = owns(share, i);
                 let area = pose.orientation * solid.wall_area[k];
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;

@@ -14,7 +14,7 @@ use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
 use crate::ranks::{Standing, Team};
-use crate::scene::{Kind, Scene};
+use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::share::Share;
 use glam::DVec3;
 use std::borrow::Cow;
@@ -24,6 +24,23 @@ use std::sync::Arc;
 /// Slots for as much more water than a rank has, one part in so many, and for a few more.
 const SPARE: (usize, usize) = (8, 256);
 
+/// Whether the pressure-carrying slot `i` is computed here: on one rank, or as `share` has it.
+pub(super) fn owns(share: Option<&Share>, i: usize) -> bool {
+    share.is_none_or(|share| share.owns(i))
+}
+
+/// Slots for `water` particles of water and some more, `all` at most where that is enough.
+fn room(water: usize, all: usize) -> usize {
+    (water + water / SPARE.0 + SPARE.1).min(all).max(water)
+}
+
+/// The slots of `solids` come behind `to` of the water, where they came behind `from`.
+fn move_slots(solids: &mut [Solid], from: usize, to: usize) {
+    for range in solids.iter_mut().flat_map(|s| [&mut s.wall_slots, &mut s.dummy_slots]) {
+        *range = range.start - from + to..range.end - from + to;
+    }
+}
+
 /// `scene` with the water of the slots `own` alone, in `slots` slots.
 fn part(scene: &Scene, own: &[usize], slots: usize) -> Scene {
     let (all, parked) = (scene.groups.fluid, slots - own.len());
@@ -32,17 +49,13 @@ fn part(scene: &Scene, own: &[usize], slots: usize) -> Scene {
     };
     let kind = own.iter().map(|_| Kind::Fluid).chain(std::iter::repeat_n(Kind::Ghost, parked));
     let mut solids = scene.solids.clone();
-    for solid in &mut solids {
-        for range in [&mut solid.wall_slots, &mut solid.dummy_slots] {
-            *range = range.start - all + slots..range.end - all + slots;
-        }
-    }
+    move_slots(&mut solids, all, slots);
     Scene {
         position: lay(&mut own.iter().map(|&i| scene.position[i]), &scene.position[all..], scene.domain.0),
         velocity: lay(&mut own.iter().map(|&i| scene.velocity[i]), &scene.velocity[all..], DVec3::ZERO),
         kind: kind.chain(scene.kind[all..].iter().copied()).collect(),
         solid: std::iter::repeat_n(0, slots).chain(scene.solid[all..].iter().copied()).collect(),
-        groups: crate::scene::Groups { fluid: slots, ..scene.groups },
+        groups: Groups { fluid: slots, ..scene.groups },
         reserve: parked,
         openings: scene.openings.clone(),
         solids,
@@ -72,7 +85,7 @@ impl Cpu {
         let grid = Grid::new(params)?;
         let mut share = Share::new(team, params, scene.groups, &grid)?;
         let own = share.choose(&scene.position, &scene.kind, &grid);
-        let slots = (own.len() + own.len() / SPARE.0 + SPARE.1).min(scene.groups.fluid);
+        let slots = room(own.len(), scene.groups.fluid);
         let mut cpu = Self::new(&part(scene, &own, slots), params, plan, settings)?;
         cpu.fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
         share.begin(cpu.groups, own.len(), &cpu.fields, &cpu.grid);
@@ -121,7 +134,7 @@ impl Cpu {
         if water <= slots {
             return;
         }
-        let more = (water + water / SPARE.0 + SPARE.1).min(share.all().fluid).max(water) - slots;
+        let more = room(water, share.all().fluid) - slots;
         fn insert<T: Clone>(values: &mut Vec<T>, at: usize, more: usize, value: T) {
             values.splice(at..at, std::iter::repeat_n(value, more));
         }
@@ -157,11 +170,7 @@ impl Cpu {
             insert(&mut self.imbalance, slots, more, DVec3::ZERO);
         }
         self.groups.fluid += more;
-        for solid in &mut self.solids {
-            for range in [&mut solid.wall_slots, &mut solid.dummy_slots] {
-                *range = range.start + more..range.end + more;
-            }
-        }
+        move_slots(&mut self.solids, slots, self.groups.fluid);
         if let Some((list, _)) = &mut self.fixed {
             list.slot.iter_mut().for_each(|slot| *slot += more as u32);
         }
