@@ -374,6 +374,20 @@ fn leaving_dry_walls_out_and_adding_threads_change_no_bit() {
     }
 }
 
+#[test]
+fn a_step_needs_little_stack_however_many_threads_there_are() {
+    // A thread that waits begins other work on the same stack: with 64 threads seven halves of a loop lie on it, and
+    // what each of them holds counts so often.
+    let case = dam_break(0.0125, 5e-4, "viscosity = 1e-6");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(64).stack_size(256 << 10).build().unwrap();
+    pool.install(|| {
+        let mut sim = simulation(&case);
+        for _ in 0..3 {
+            sim.step().unwrap();
+        }
+    });
+}
+
 /// Field rms of the pressure error over rho g H, slope of P(z), kinetic energy and settled depth, means over
 /// `window` [s] of a still tank.
 fn hydrostatics(fluid: &str, dt: f64, window: (f64, f64)) -> [f64; 4] {

@@ -165,7 +165,7 @@ impl Cpu {
             .zip(&neighbours.chunks)
             .enumerate()
             .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
-        let reaction = |arrays: &mut RowArrays, (k, f): (usize, &mut DVec3)| {
+        let reaction = |arrays: &mut Box<RowArrays>, (k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
             *f = if owns(share.as_deref(), i) {
                 viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays)
@@ -173,7 +173,7 @@ impl Cpu {
                 DVec3::ZERO
             };
         };
-        fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::default, reaction);
+        fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::boxed, reaction);
     }
 
     fn absorber(&mut self, dt: f64) {

@@ -17,7 +17,7 @@ wide! {
         state: &mut [State],
         on: Particles,
     ) {
-        let mut arrays = RowArrays::default();
+        let mut arrays = RowArrays::boxed();
         for k in 0..density.len() {
             let (i, range) = (first + k, chunk.range(k));
             if range.is_empty() {

@@ -25,7 +25,7 @@ wide! {
         pressure: &[f64],
         on: Particles,
     ) {
-        let mut arrays = RowArrays::default();
+        let mut arrays = RowArrays::boxed();
         for (k, a) in accelerations.iter_mut().enumerate() {
             let i = first + k;
             let mut one_side = DVec3::ZERO;

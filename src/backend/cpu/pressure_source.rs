@@ -25,7 +25,7 @@ wide! {
         step: &Step,
     ) {
         let ((density, state), (source, diagonal)) = (given, out);
-        let (mut arrays, c) = (RowArrays::default(), laplacian_coefficient(on.params));
+        let (mut arrays, c) = (RowArrays::boxed(), laplacian_coefficient(on.params));
         let compressible = step.compressibility * (on.params.density / step.dt) / step.dt;
         for k in 0..source.len() {
             (source[k], diagonal[k]) = (0.0, 1.0);

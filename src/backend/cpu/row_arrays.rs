@@ -6,6 +6,7 @@
 use crate::neighbourhood::Particles;
 use crate::neighbours::CAPACITY;
 use crate::periodic::Periodic;
+use bytemuck::Zeroable;
 use glam::DVec3;
 
 /// Partial sums of a sum.
@@ -18,7 +19,7 @@ pub(crate) const LONGEST: usize = 2 * CAPACITY + LANES;
 pub type Column = [f64; LONGEST];
 
 /// A vector for each neighbour.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub struct Columns {
     /// Components along x.
     pub x: Column,
@@ -81,8 +82,9 @@ impl Columns {
     }
 }
 
-/// Room for the rows of one thread.
-#[derive(Clone, Debug)]
+/// Room for the rows of one thread: 97 KiB, too much for the stack of a thread of the pool, which holds as many pieces
+/// of work begun as it waits for.
+#[derive(Clone, Debug, Zeroable)]
 pub struct RowArrays {
     /// r_j - r_i.
     pub r: Columns,
@@ -98,10 +100,10 @@ pub struct RowArrays {
     pub h: Column,
 }
 
-impl Default for RowArrays {
-    fn default() -> Self {
-        let v = Columns { x: [0.0; LONGEST], y: [0.0; LONGEST], z: [0.0; LONGEST] };
-        Self { r: v, v, e: v, w: [0.0; LONGEST], s: [0.0; LONGEST], h: [0.0; LONGEST] }
+impl RowArrays {
+    /// Zeros, on the heap.
+    pub fn boxed() -> Box<Self> {
+        bytemuck::zeroed_box()
     }
 }
 
@@ -158,11 +160,11 @@ mod tests {
         let field: Vec<DVec3> = (0..60)
             .map(|k| DVec3::new(0.1 * f64::from(k), f64::from(k % 7), -1.0 / f64::from(k + 1)))
             .collect();
-        let mut arrays = RowArrays::default();
+        let mut arrays = RowArrays::boxed();
         for n in (0..50).rev() {
             let row: Vec<u32> = (0..n).map(|k| (3 * k + 1) % 60).collect();
             let filled = arrays.r.differences(5, &row, &field);
-            assert!(filled >= row.len() && filled % LANES == 0);
+            assert!(filled >= row.len() && filled.is_multiple_of(LANES));
             let plain: DVec3 = row.iter().map(|&j| field[j as usize] - field[5]).sum();
             let got = arrays.r.weighted_sum(&[1.0; LONGEST][..filled]);
             assert!((got - plain).length() < 1e-12, "{n}: {got} for {plain}");

@@ -11,7 +11,7 @@ use glam::DVec3;
 wide! {
     /// Viscous acceleration of the fluid slots from `first` on.
     pub(crate) fn viscosity_rows(first: usize, chunk: &Chunk, acceleration: &mut [DVec3], on: Particles) {
-        let (mut arrays, nu) = (RowArrays::default(), coefficient(on.params));
+        let (mut arrays, nu) = (RowArrays::boxed(), coefficient(on.params));
         for (k, a) in acceleration.iter_mut().enumerate() {
             let neighbour = chunk.pressure(k).neighbour;
             let share = |j| share(first + k, j, on);
