@@ -59,17 +59,32 @@ pub fn team() -> Result<Option<Arc<dyn Team>>> {
     Ok(Some(Arc::new(started)))
 }
 
-/// Threads of this rank: as many as were asked for, or its part of the cores that it shares with other ranks.
-pub fn threads(team: &Arc<dyn Team>, asked: Option<u16>) -> u16 {
+/// A rank's place on its machine.
+#[derive(Clone, Copy)]
+pub struct Place {
+    /// Threads of this rank.
+    pub threads: u16,
+    /// Ranks on this machine.
+    pub here: usize,
+    /// All ranks.
+    pub all: usize,
+}
+
+/// The place of this rank, with as many threads as were `asked` for, or its part of the cores that it shares with other ranks.
+pub fn place(team: &Arc<dyn Team>, asked: Option<u16>) -> Place {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let status = read("/proc/self/status");
-    let cores = status.lines().find(|line| line.starts_with("Cpus_allowed_list")).unwrap_or_default();
     // Launchers bind ranks to cores of their own, or to cores that several share.
-    let place = format!("{} {cores}", read("/proc/sys/kernel/hostname").trim());
-    let sharing =
-        team.gather(place.clone().into_bytes()).iter().filter(|other| **other == place.as_bytes()).count();
+    let cores = status.lines().find(|line| line.starts_with("Cpus_allowed_list")).unwrap_or_default();
+    let machine = read("/proc/sys/kernel/hostname");
+    let own = format!("{}\n{cores}", machine.trim());
+    let places = team.gather(own.clone().into_bytes());
+    let sharing = places.iter().filter(|other| **other == own.as_bytes()).count();
+    let of_machine = format!("{}\n", machine.trim());
+    let here = places.iter().filter(|other| other.starts_with(of_machine.as_bytes())).count();
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    asked.unwrap_or((cores / sharing).clamp(1, 1024) as u16)
+    let threads = asked.unwrap_or((cores / sharing).clamp(1, 1024) as u16);
+    Place { threads, here, all: team.ranks() }
 }
 
 /// The first rank's word to the others: the case, or that there is none to compute.

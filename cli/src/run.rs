@@ -2,7 +2,7 @@
 
 use super::plan::step_warnings;
 use super::progress::{Display, clock};
-use super::ranks::{self, Call};
+use super::ranks::{self, Call, Place};
 use super::setup::{self, Setup};
 use super::signals::{self, RESUME};
 use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
@@ -105,26 +105,31 @@ fn size(text: &str) -> std::result::Result<u64, String> {
 }
 
 /// Refuses a case that the machine cannot hold, before anything is built.
-fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool) -> Result<()> {
+fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool, place: Option<Place>) -> Result<()> {
     let estimate = Estimate::new(case).at_most(args.steps);
     let on_cpu = match args.device.backend {
         BackendName::Cpu => true,
         BackendName::Gpu => false,
         BackendName::Auto => args.device.adapter.is_none(),
     };
-    let needs = |cpu: bool| if cpu { estimate.memory_cpu } else { estimate.memory_beside_device };
+    let needs = |cpu: bool| match place {
+        Some(Place { here, all, .. }) => estimate.memory_on_ranks(here, all),
+        None if cpu => estimate.memory_cpu,
+        None => estimate.memory_beside_device,
+    };
     let limit = args.memory_limit.or_else(machine::memory).map_or(f64::INFINITY, |n| n as f64);
     // Drivers are asked only if it matters whether there is one.
     let on_cpu = on_cpu
         && (args.device.backend == BackendName::Cpu || needs(true) <= limit || !Gpu::hardware_available());
     if needs(on_cpu) > limit {
         let text = format!(
-            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory, {} are {}: use a larger run.spacing \
+            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory{}, {} are {}: use a larger run.spacing \
              or a smaller domain, or say with --memory-limit what the run may take",
             asked.name,
             estimate.particles,
             estimate.cells,
             bytes(needs(on_cpu)),
+            place.map_or(String::new(), |p| format!(" for {} of {} ranks here", p.here, p.all)),
             bytes(limit),
             if args.memory_limit.is_some() { "allowed" } else { "free" }
         );
@@ -192,24 +197,24 @@ impl Asked {
 }
 
 pub fn run(args: &RunArgs) -> Exit {
-    let Some(team) = ranks::team()? else { return lead(args, None) };
+    let Some(team) = ranks::team()? else { return lead(args, None, None) };
     if args.device.backend == BackendName::Gpu || args.device.adapter.is_some() {
         return Err(Error::usage(
             "--backend",
             "many ranks compute on the CPU: leave --backend gpu and --adapter out",
         ));
     }
-    let threads = ranks::threads(&team, args.device.threads);
+    let place = ranks::place(&team, args.device.threads);
     if team.rank() > 0 {
-        return ranks::serve(&team, threads);
+        return ranks::serve(&team, place.threads);
     }
     let mut args = args.clone();
-    args.device = DeviceArgs { backend: BackendName::Cpu, threads: Some(threads), ..args.device };
-    lead(&args, Some(&team))
+    args.device = DeviceArgs { backend: BackendName::Cpu, threads: Some(place.threads), ..args.device };
+    lead(&args, Some(&team), Some(place))
 }
 
-/// The run, by the first rank of `team` where there are many.
-fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>) -> Exit {
+/// The run, by the first rank of `team`, at its `place`, where there are many.
+fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>, place: Option<Place>) -> Exit {
     let call = Call::new(team);
     let deadline = args.max_wall.map(|wall| Instant::now() + wall);
     let stop = signals::watch(args.quiet)?;
@@ -243,7 +248,7 @@ fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>) -> Exit {
             }
         },
     };
-    fits(args, &asked, &loaded.case, matches!(start, Start::Resume(_)))?;
+    fits(args, &asked, &loaded.case, matches!(start, Start::Resume(_)), place)?;
     let setup = Setup::build(loaded, asked.name, args.quiet)?;
     call.tell(&setup.loaded.text);
     let mut simulation = match team {
