@@ -159,21 +159,20 @@ impl Cpu {
         }
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
-        fields
-            .acceleration
-            .par_chunks_mut(CHUNK)
-            .zip(&neighbours.chunks)
-            .enumerate()
-            .for_each(|(c, (acceleration, chunk))| viscosity_rows(c * CHUNK, chunk, acceleration, on));
-        let reaction = |arrays: &mut Box<RowArrays>, (k, f): (usize, &mut DVec3)| {
+        fields.acceleration.par_chunks_mut(CHUNK).zip(&neighbours.chunks).enumerate().for_each(
+            |(c, (acceleration, chunk))| {
+                RowArrays::with(|arrays| viscosity_rows(c * CHUNK, chunk, acceleration, on, arrays));
+            },
+        );
+        let reaction = |(k, f): (usize, &mut DVec3)| {
             let i = groups.fluid + k;
             *f = if owns(share.as_deref(), i) {
-                viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays)
+                RowArrays::with(|arrays| viscosity::reaction(i, neighbours.pressure(i).neighbour, on, arrays))
             } else {
                 DVec3::ZERO
             };
         };
-        fields.reaction.par_iter_mut().enumerate().for_each_init(RowArrays::boxed, reaction);
+        fields.reaction.par_iter_mut().enumerate().for_each(reaction);
     }
 
     fn absorber(&mut self, dt: f64) {
@@ -337,7 +336,7 @@ impl Cpu {
             .into_par_iter()
             .enumerate()
             .for_each(|(c, (chunk, density, state))| {
-                density_rows(c * CHUNK, *live, chunk, density, state, on)
+                RowArrays::with(|arrays| density_rows(c * CHUNK, *live, chunk, density, state, on, arrays));
             });
         if let Some(share) = share {
             share.swap(&mut [&mut &mut state[..]]);
@@ -369,7 +368,9 @@ impl Cpu {
             .into_par_iter()
             .enumerate()
             .for_each(|(c, (chunk, given, out))| {
-                source_rows(c * CHUNK, chunk, given, surface_pressure, out, on, step);
+                RowArrays::with(|arrays| {
+                    source_rows(c * CHUNK, chunk, given, surface_pressure, out, on, step, arrays);
+                });
             });
     }
 
@@ -434,7 +435,9 @@ impl Cpu {
                 .enumerate()
                 .for_each(|(c, (a, imbalance, chunk, state))| {
                     let imbalance = imbalance.unwrap_or_default();
-                    gradient_rows(c * CHUNK, live, chunk, a, imbalance, state, pressure, on);
+                    RowArrays::with(|arrays| {
+                        gradient_rows(c * CHUNK, live, chunk, a, imbalance, state, pressure, on, arrays);
+                    });
                 });
         };
         rows(pressure, acceleration, imbalance);

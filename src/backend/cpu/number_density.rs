@@ -16,8 +16,8 @@ wide! {
         density: &mut [f64],
         state: &mut [State],
         on: Particles,
+        arrays: &mut RowArrays,
     ) {
-        let mut arrays = RowArrays::boxed();
         for k in 0..density.len() {
             let (i, range) = (first + k, chunk.range(k));
             if range.is_empty() {
@@ -25,7 +25,7 @@ wide! {
                 continue;
             }
             let neighbour = &chunk.neighbour[range.clone()];
-            (density[k], state[k]) = number_density(i, neighbour, on, &mut arrays);
+            (density[k], state[k]) = number_density(i, neighbour, on, arrays);
             chunk.weight[range].copy_from_slice(&arrays.w[..neighbour.len()]);
         }
     }

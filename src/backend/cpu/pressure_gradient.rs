@@ -24,8 +24,8 @@ wide! {
         state: &[State],
         pressure: &[f64],
         on: Particles,
+        arrays: &mut RowArrays,
     ) {
-        let mut arrays = RowArrays::boxed();
         for (k, a) in accelerations.iter_mut().enumerate() {
             let i = first + k;
             let mut one_side = DVec3::ZERO;
@@ -33,7 +33,7 @@ wide! {
             if i < live {
                 let gradient;
                 (gradient, one_side) =
-                    pressure_gradient(i, chunk.parts(k), state[k], on, pressure, &mut arrays);
+                    pressure_gradient(i, chunk.parts(k), state[k], on, pressure, arrays);
                 *a = acceleration(gradient, on.params);
             }
             if let Some(imbalance) = imbalance.get_mut(k) {

@@ -23,9 +23,10 @@ wide! {
         out: (&mut [f64], &mut [f64]),
         on: Particles,
         step: &Step,
+        arrays: &mut RowArrays,
     ) {
         let ((density, state), (source, diagonal)) = (given, out);
-        let (mut arrays, c) = (RowArrays::boxed(), laplacian_coefficient(on.params));
+        let c = laplacian_coefficient(on.params);
         let compressible = step.compressibility * (on.params.density / step.dt) / step.dt;
         for k in 0..source.len() {
             (source[k], diagonal[k]) = (0.0, 1.0);
@@ -40,7 +41,7 @@ wide! {
             diagonal[k] = c * links + compressible;
             source[k] = match on.params.source {
                 Source::NumberDensity => number_density_source(density[k], on.params, step),
-                Source::Mixed => mixed_source(first + k, chunk.parts(k), on, step, &mut arrays),
+                Source::Mixed => mixed_source(first + k, chunk.parts(k), on, step, arrays),
             };
             if !surface_pressure.is_empty() {
                 source[k] += c * known(chunk.pressure(k), surface_pressure);

@@ -8,6 +8,7 @@ use crate::neighbours::CAPACITY;
 use crate::periodic::Periodic;
 use bytemuck::Zeroable;
 use glam::DVec3;
+use std::cell::RefCell;
 
 /// Partial sums of a sum.
 pub(crate) const LANES: usize = 8;
@@ -100,10 +101,15 @@ pub struct RowArrays {
     pub h: Column,
 }
 
+thread_local! {
+    static ARRAYS: RefCell<Box<RowArrays>> = RefCell::new(bytemuck::zeroed_box());
+}
+
 impl RowArrays {
-    /// Zeros, on the heap.
-    pub fn boxed() -> Box<Self> {
-        bytemuck::zeroed_box()
+    /// What `f` makes with the arrays of this thread. They hold what the last row has left in them; `f` hands no work to
+    /// other threads.
+    pub fn with<R>(f: impl FnOnce(&mut Self) -> R) -> R {
+        ARRAYS.with_borrow_mut(|arrays| f(arrays))
     }
 }
 
@@ -160,7 +166,7 @@ mod tests {
         let field: Vec<DVec3> = (0..60)
             .map(|k| DVec3::new(0.1 * f64::from(k), f64::from(k % 7), -1.0 / f64::from(k + 1)))
             .collect();
-        let mut arrays = RowArrays::boxed();
+        let mut arrays: Box<RowArrays> = bytemuck::zeroed_box();
         for n in (0..50).rev() {
             let row: Vec<u32> = (0..n).map(|k| (3 * k + 1) % 60).collect();
             let filled = arrays.r.differences(5, &row, &field);

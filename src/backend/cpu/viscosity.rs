@@ -10,12 +10,18 @@ use glam::DVec3;
 
 wide! {
     /// Viscous acceleration of the fluid slots from `first` on.
-    pub(crate) fn viscosity_rows(first: usize, chunk: &Chunk, acceleration: &mut [DVec3], on: Particles) {
-        let (mut arrays, nu) = (RowArrays::boxed(), coefficient(on.params));
+    pub(crate) fn viscosity_rows(
+        first: usize,
+        chunk: &Chunk,
+        acceleration: &mut [DVec3],
+        on: Particles,
+        arrays: &mut RowArrays,
+    ) {
+        let nu = coefficient(on.params);
         for (k, a) in acceleration.iter_mut().enumerate() {
             let neighbour = chunk.pressure(k).neighbour;
             let share = |j| share(first + k, j, on);
-            *a = nu * laplacian_sum(first + k, neighbour, share, on, &mut arrays);
+            *a = nu * laplacian_sum(first + k, neighbour, share, on, arrays);
         }
     }
 }
