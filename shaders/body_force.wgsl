@@ -10,6 +10,9 @@
 @group(0) @binding(6) var<storage, read> poses: array<Pose>;
 @group(0) @binding(7) var<storage, read> force_chunk: array<vec4u>; // first of the moving-wall slots, how many, solid
 @group(0) @binding(8) var<storage, read_write> wrench: array<vec4f>; // force and torque of each chunk
+//#if COUPLED
+@group(0) @binding(9) var<storage, read> coupling: array<vec4f>; // as in shaders/coupling.wgsl
+//#endif
 
 var<workgroup> force_of: array<vec3f, 256>;
 var<workgroup> torque_of: array<vec3f, 256>;
@@ -25,15 +28,25 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let k = chunk.x + t;
         let pose = poses[chunk.z];
         let wall = wall_layer[k];
-        if state[params.fluid + k] == INNER {
-            let p = pressure[params.fluid + k];
+        let under_water = state[params.fluid + k] == INNER;
+        let p = pressure[params.fluid + k];
+        if under_water {
             force = -max(p + surface_head(p, pose, wall), 0.0) * rotate(pose.orientation, wall.area.xyz);
+//#if COUPLED
+            force *= 1.0 - coupling[4u * k].w;
+//#endif
         }
 //#if REACTION
         force += reaction[k].xyz;
         reaction[k] = vec4f(0.0);
 //#endif
         torque = cross(rotate(pose.orientation, wall.arm.xyz), force);
+//#if COUPLED
+        if under_water {
+            force += p * coupling[4u * k].xyz + coupling[4u * k + 2u].xyz;
+            torque += p * coupling[4u * k + 1u].xyz + coupling[4u * k + 3u].xyz;
+        }
+//#endif
     }
     force_of[t] = force;
     torque_of[t] = torque;

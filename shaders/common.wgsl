@@ -68,7 +68,7 @@ struct Constants {
     period: vec3f,         // from a periodic side to the opposite one, 0 along other axes
     wall_contact: f32,     // sum w of a particle of a flat wall's layer with the water above it
     inverse_period: vec3f, // 1 / period, 0 along other axes
-    pad_inverse: f32,
+    body_wall: u32,        // wall-layer particles of bodies, the first of the moving solids
     cell_width: vec3f,
     pad_width: f32,
     drive: vec3f,          // what of gravity lies along periodic axes; `gravity` is the rest
@@ -333,6 +333,12 @@ fn rotate(q: vec4f, v: vec3f) -> vec3f {
 
 // Pressure on the true surface of a moving solid over `pressure`, that of a particle half a spacing inside: weight and
 // inertia of the water that would lie between. See head in src/kernels/body_force.rs.
+// Place of a moving-wall slot's row in the buffer `coupling`, and of what a free body answers: behind four vectors a slot of what
+// slots between solids bring it.
+fn coupled_row(k: u32) -> u32 {
+    return 4u * params.moving_wall + 2u * k;
+}
+
 fn surface_head(pressure: f32, pose: Pose, wall: WallParticle) -> f32 {
     let to_surface = rotate(pose.orientation, wall.to_surface.xyz);
     var head = params.density * dot(params.gravity, to_surface) + params.surface_head;

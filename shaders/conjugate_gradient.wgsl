@@ -52,9 +52,10 @@ fn of_body(i: u32) -> f32 {
     if i < params.fluid || k >= params.moving_wall {
         return 0.0;
     }
-    let force = coupling[2u * k];
+    let row = coupled_row(k);
+    let force = coupling[row];
     let y = u32(force.w);
-    return dot(force.xyz, coupling[y].xyz) + dot(coupling[2u * k + 1u].xyz, coupling[y + 1u].xyz);
+    return dot(force.xyz, coupling[y].xyz) + dot(coupling[row + 1u].xyz, coupling[y + 1u].xyz);
 }
 
 //#endif
@@ -171,7 +172,7 @@ fn divisor(i: u32, diagonal: f32) -> f32 {
 //#if COUPLED
     let k = i - params.fluid;
     if i >= params.fluid && k < params.moving_wall {
-        return diagonal + coupling[2u * k + 1u].w;
+        return diagonal + coupling[coupled_row(k) + 1u].w;
     }
 //#endif
     return diagonal;

@@ -10,7 +10,9 @@
 @group(0) @binding(4) var<storage, read> state: array<u32>;
 @group(0) @binding(5) var<storage, read> free_body: array<FreeBody>;
 @group(0) @binding(6) var<storage, read_write> source_diagonal: array<vec2f>;
-// Of each moving-wall slot force and the place of its y, torque and what it adds to the diagonal; then y of each body.
+// Of each moving-wall slot what slots between solids bring it (of a pascal force and the part of its own area that is taken,
+// torque; force and torque of the water's weight); then of each force and the place of its y, torque and what it adds to the
+// diagonal; then y of each body.
 @group(0) @binding(7) var<storage, read_write> coupling: array<vec4f>;
 @group(0) @binding(8) var<storage, read> preconditioned: array<vec4f>;
 @group(0) @binding(9) var<storage, read> pressure: array<f32>; // of the last step
@@ -79,7 +81,7 @@ fn product(row: Wrench, y: Wrench) -> f32 {
 fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
     let b = group.x;
     let pose = poses[free_body[b].solid];
-    let place = f32(2u * (params.moving_wall + b));
+    let place = f32(coupled_row(params.moving_wall + b));
     let end = free_body[b].first + free_body[b].count;
     var known = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
@@ -88,24 +90,29 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         var row = Wrench(vec3f(0.0), vec3f(0.0));
         var force = vec3f(0.0);
         if state[params.fluid + k] == INNER {
-            row.force = -rotate(pose.orientation, wall.area.xyz);
+            let slot = coupling[4u * k];
+            row.force = (slot.w - 1.0) * rotate(pose.orientation, wall.area.xyz);
             row.torque = cross(arm, row.force);
             force = surface_head(pressure[params.fluid + k], pose, wall) * row.force;
+            row.force += slot.xyz;
+            row.torque += coupling[4u * k + 1u].xyz;
+            known.force += coupling[4u * k + 2u].xyz;
+            known.torque += coupling[4u * k + 3u].xyz;
         }
 //#if REACTION
         force += reaction[k].xyz;
 //#endif
         known.force += force;
         known.torque += cross(arm, force);
-        coupling[2u * k] = vec4f(row.force, place);
-        coupling[2u * k + 1u] = vec4f(row.torque, product(row, respond_to(b, row)));
+        coupling[coupled_row(k)] = vec4f(row.force, place);
+        coupling[coupled_row(k) + 1u] = vec4f(row.torque, product(row, respond_to(b, row)));
     }
     known = workgroup_sum(known, t);
     known.force += free_body[b].force.xyz;
     known.torque += free_body[b].torque.xyz;
     let y = respond_to(b, known);
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
-        let row = Wrench(coupling[2u * k].xyz, coupling[2u * k + 1u].xyz);
+        let row = Wrench(coupling[coupled_row(k)].xyz, coupling[coupled_row(k) + 1u].xyz);
         source_diagonal[params.fluid + k].x -= product(row, y);
     }
 }
@@ -117,13 +124,14 @@ fn respond(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     var sum = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
         let z = preconditioned[params.fluid + k].w;
-        sum.force += z * coupling[2u * k].xyz;
-        sum.torque += z * coupling[2u * k + 1u].xyz;
+        sum.force += z * coupling[coupled_row(k)].xyz;
+        sum.torque += z * coupling[coupled_row(k) + 1u].xyz;
     }
     sum = workgroup_sum(sum, t);
     if t == 0u {
         let y = respond_to(b, sum);
-        coupling[2u * (params.moving_wall + b)] = vec4f(y.force, 0.0);
-        coupling[2u * (params.moving_wall + b) + 1u] = vec4f(y.torque, 0.0);
+        let place = coupled_row(params.moving_wall + b);
+        coupling[place] = vec4f(y.force, 0.0);
+        coupling[place + 1u] = vec4f(y.torque, 0.0);
     }
 }

@@ -58,6 +58,13 @@ fn divergence(sums: Sums) -> f32 {
 }
 
 //#endif
+//#if MIXED
+// Whether a slot is one of a body's wall layer.
+fn is_body(i: u32) -> bool {
+    return i >= params.fluid && i < params.fluid + params.body_wall;
+}
+
+//#endif
 @compute @workgroup_size(WORKGROUP)
 fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;
@@ -99,14 +106,18 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
 //#if MIXED
+    // Whether a wall's row is a body's or lies at one. Rows of walls have other walls among the dummies.
+    var at_body = is_body(i);
     let dummies = dummies_of(count);
     for (var k = 0u; k < dummies; k++) {
         let j = neighbour_list[dummy_place(i, k)];
+        at_body = at_body || is_body(j);
         let r = offset(x, position[j].xyz);
         sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);
     }
     // A wall's row undoes as much as there is water before it.
-    let wet = select(min(links / params.wall_contact, 1.0), 1.0, i < params.fluid);
+    let share = links / params.wall_contact;
+    let wet = select(saturate(select(share, 2.0 * share - 1.0, at_body)), 1.0, i < params.fluid);
     var b = wet * now.source_density * (sums.density - params.smooth_density) / params.smooth_density
         - wet * now.source_divergence * divergence(sums)
         - params.density * dot(params.gravity, first_moment);

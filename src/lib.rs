@@ -104,6 +104,7 @@ pub mod sense;
 pub mod shape;
 pub mod share;
 pub mod simulation;
+pub mod slots;
 mod step;
 pub mod stop;
 pub mod threads;

@@ -97,6 +97,8 @@ pub struct Params {
     pub wall_shear: f64,
     /// [`Lattice::wall_contact`].
     pub wall_contact: f64,
+    /// Wall-layer particles of bodies; their slots follow those of the fluid.
+    pub body_wall: usize,
     /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
     pub wall_friction: f64,
     /// Free-surface threshold beta [-]; 0, which no density is below, where the water fills all its room.
@@ -193,6 +195,7 @@ impl Params {
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
             wall_shear: if paper { 1.0 } else { lattice.wall_shear },
             wall_contact: lattice.wall_contact,
+            body_wall: scene.solids.iter().filter(|s| s.is_body).map(|s| s.wall_slots.len()).sum(),
             wall_friction: friction / (l0 * lattice.wall_contact),
             free_surface_threshold: if filled {
                 0.0

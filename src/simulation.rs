@@ -14,6 +14,7 @@ use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
+use crate::slots::Slots;
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, time_step};
 use glam::{DMat3, DVec3};
@@ -68,6 +69,8 @@ pub struct Simulation {
     pub groups: Groups,
     /// Work of and on the solids, and the energy of the free ones [J], if the ledger is kept.
     solids_ledger: Option<(Ledger, f64)>,
+    /// Slots between free bodies and other solids, where free bodies stand in the pressure equation.
+    slots: Option<Slots>,
     /// Where water comes in and goes out.
     pub openings: Openings,
     /// Particles that were gone when last looked.
@@ -121,6 +124,7 @@ impl Simulation {
         }
         Ok(Self {
             backend,
+            slots: plan.needs(Arrays::Coupling).then(|| Slots::new(&scene, params.density)),
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
@@ -158,6 +162,8 @@ impl Simulation {
             stop: _,
             // Looked up when it matters.
             gone: _,
+            // Follows from the case.
+            slots: _,
             // Times by the clock are those of each process.
             stages: _,
             backend,
@@ -326,7 +332,8 @@ impl Simulation {
         let report = self.timed(Stage::ConjugateGradient, |s| {
             if s.plan.needs(Arrays::Coupling) {
                 let rest = s.params.balanced_gravity();
-                s.backend.free_bodies(&s.solids.free_bodies(rest))?;
+                let slots = s.slots.as_ref().map(|slots| slots.rows(s.solids.predicted()));
+                s.backend.free_bodies(&s.solids.free_bodies(rest), &slots.unwrap_or_default())?;
             }
             s.backend.solve_pressure(step)
         })?;

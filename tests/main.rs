@@ -44,6 +44,7 @@ mod scene;
 mod shaders;
 mod shaped;
 mod shapes;
+mod slots;
 mod stability;
 mod study;
 mod surface;

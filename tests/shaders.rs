@@ -243,7 +243,7 @@ fn structs_lie_the_same_on_both_sides() {
             period,
             wall_contact,
             inverse_period,
-            pad_inverse,
+            body_wall,
             cell_width,
             pad_width,
             drive,

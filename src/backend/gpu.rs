@@ -26,6 +26,7 @@ pub use bandwidth::bandwidth;
 
 use super::traffic::Traffic;
 use super::{Backend, Commands, Counters, Timing};
+use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
@@ -67,6 +68,8 @@ pub struct Gpu {
     solids: usize,
     /// First of the moving-wall slots and number of each solid's wall layer.
     wall_layers: Vec<(usize, usize)>,
+    /// The device has rows at slots between solids.
+    slots_shown: bool,
     /// Free bodies in the next solve.
     coupled: u64,
     counters: Counters,
@@ -191,6 +194,7 @@ impl Gpu {
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
             wall_layers: wall_layers.collect(),
+            slots_shown: false,
             coupled: 0,
             counters: Counters::new(super::outflows(scene)),
             coefficients: Coefficients::default(),
@@ -428,7 +432,7 @@ impl Backend for Gpu {
         self.context.pass([(kernels::openings::swallow, groups(self.sizes.fluid))])
     }
 
-    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {
+    fn free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
         let p = &self.params;
         let factor = p.density / p.spacing.powi(3) / layout::laplacian_coefficient(p);
         let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
@@ -455,7 +459,21 @@ impl Backend for Gpu {
             return Ok(());
         }
         self.context.begin(Some(Stage::ConjugateGradient));
-        self.context.upload(buffers::free_body, &free)
+        self.context.upload(buffers::free_body, &free)?;
+        // Zeros stand for rows at no slot, also before the first upload.
+        if slots.is_empty() && !self.slots_shown {
+            return Ok(());
+        }
+        self.slots_shown = !slots.is_empty();
+        let mut rows = vec![[0.0; 4]; 4 * self.groups.moving_wall];
+        for slot in slots {
+            let k = 4 * (self.wall_layers[slot.solid as usize].0 + slot.row as usize);
+            rows[k] = slot.per_pascal.force.as_vec3().extend(slot.taken as f32).to_array();
+            rows[k + 1] = four(slot.per_pascal.torque);
+            rows[k + 2] = four(slot.head.force);
+            rows[k + 3] = four(slot.head.torque);
+        }
+        self.context.upload(buffers::coupling, &rows)
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {

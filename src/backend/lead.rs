@@ -3,6 +3,7 @@
 use super::cpu::Cpu;
 use super::traffic::Traffic;
 use super::{Backend, Counters};
+use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::checkpoint::Archive;
 use crate::error::Result;
@@ -24,7 +25,7 @@ use std::sync::Arc;
 enum Order<'a> {
     Run(ParticleStage, Step),
     PassOpenings(Cow<'a, [Emission]>, Cow<'a, [Outlet]>),
-    FreeBodies(Cow<'a, [FreeBody]>),
+    FreeBodies(Cow<'a, [FreeBody]>, Cow<'a, [SlotRow]>),
     SolvePressure(Step),
     MoveSolids(Cow<'a, [Pose]>),
     BodyForce,
@@ -85,9 +86,9 @@ impl Backend for Lead {
         self.cpu.pass_openings(emissions, outlets)
     }
 
-    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {
-        self.order(&Order::FreeBodies(bodies.into()));
-        self.cpu.free_bodies(bodies)
+    fn free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
+        self.order(&Order::FreeBodies(bodies.into(), slots.into()));
+        self.cpu.free_bodies(bodies, slots)
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
@@ -175,7 +176,7 @@ pub fn follow(cpu: &mut Cpu) -> Result<()> {
         match decode::<Order>(&order) {
             Order::Run(stage, step) => cpu.run(stage, &step)?,
             Order::PassOpenings(emissions, outlets) => cpu.pass_openings(&emissions, &outlets)?,
-            Order::FreeBodies(bodies) => cpu.free_bodies(&bodies)?,
+            Order::FreeBodies(bodies, slots) => cpu.free_bodies(&bodies, &slots)?,
             Order::SolvePressure(step) => drop(cpu.solve_pressure(&step)?),
             Order::MoveSolids(poses) => cpu.move_solids(&poses)?,
             Order::BodyForce => drop(cpu.body_force()?),

@@ -7,6 +7,7 @@ mod processor;
 pub mod traffic;
 
 use self::traffic::Traffic;
+use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::checkpoint::Archive;
 use crate::compute::Compute;
@@ -177,9 +178,9 @@ pub trait Backend: Send {
     /// Water that comes in and goes out: layers that become water in slots that no particle has, and boxes that swallow, one
     /// an outflow; needed where the plan has [`Stage::Openings`].
     fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()>;
-    /// How the moving solids answer forces in the next solve, in the pose given last; needed where the plan has
-    /// [`crate::plan::Arrays::Coupling`].
-    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()>;
+    /// How the moving solids answer forces in the next solve, in the pose given last, and rows of theirs at slots, in the
+    /// order of solids and rows; needed where the plan has [`crate::plan::Arrays::Coupling`].
+    fn free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()>;
     /// Solve the PPE.
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport>;
     /// Give the particles of moving solids the poses of their solids.

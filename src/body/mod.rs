@@ -4,6 +4,8 @@
 //! follows from the momentum and the orientation, so that a free body keeps its momentum to round-off
 //! while it tumbles. A prescribed solid is a body of infinite mass that follows its table.
 
+pub mod slots;
+
 use crate::scene::{Drive, Motion, Solid};
 use crate::shape::Shape;
 use glam::{DMat3, DQuat, DVec3};
@@ -64,6 +66,14 @@ pub struct Wrench {
     pub force: DVec3,
     /// Torque about the centre of mass [N m].
     pub torque: DVec3,
+}
+
+impl Wrench {
+    /// Adds `factor` times `other`.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        self.force += factor * other.force;
+        self.torque += factor * other.torque;
+    }
 }
 
 impl std::ops::AddAssign for Wrench {

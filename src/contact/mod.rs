@@ -6,7 +6,7 @@
 
 mod advice;
 mod archive;
-mod broad;
+pub(crate) mod broad;
 mod candidates;
 pub mod device;
 mod law;

@@ -45,7 +45,7 @@ pub fn pressure_source(
         Source::NumberDensity => number_density_source(n, params, step),
         Source::Mixed => {
             let first_moment: DVec3 = all.iter().take(carry).map(|(j, w)| w * on.offset(i, j)).sum();
-            let wet = if i < on.fluid { 1.0 } else { wet_share(links, params) };
+            let wet = wet_share(i, links, all.neighbour, on);
             wet * step.relaxation * per_time / step.dt * deviation(all, params)
                 - wet * (1.0 - step.relaxation) * per_time * divergence(i, all, on)
                 - c * params.density * params.gravity.dot(first_moment)
@@ -59,12 +59,19 @@ pub fn pressure_source(
     (b + c * known, c * links + step.compressibility * per_time / step.dt)
 }
 
-/// Part of divergence and deviation that a wall's row undoes, whose weights with water sum to `links` [-]: all of them on a flat wall
+/// Part of divergence and deviation that the wall's row `i` undoes, whose weights with water sum to `links` [-]: all of them on a flat wall
 /// under water. A row in a slot between solids meets hardly any water, of which a little that is left to be undone, as of solids that touch,
-/// would ask a large pressure.
+/// would ask a large pressure. At a body a row undoes nothing below half of a flat wall's water, as at the edge that a body
+/// stands on: the rest would press a tenth too much into the slot under it.
 #[inline(always)]
-pub fn wet_share(links: f64, params: &Params) -> f64 {
-    (links / params.wall_contact).min(1.0)
+pub fn wet_share(i: usize, links: f64, neighbour: &[u32], on: Particles) -> f64 {
+    if i < on.fluid {
+        return 1.0;
+    }
+    let share = links / on.params.wall_contact;
+    let bodies = on.fluid..on.fluid + on.params.body_wall;
+    let at_body = bodies.contains(&i) || neighbour.iter().any(|&j| bodies.contains(&(j as usize)));
+    if at_body { (2.0 * share - 1.0).clamp(0.0, 1.0) } else { share.min(1.0) }
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).

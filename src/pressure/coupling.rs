@@ -2,8 +2,7 @@
 //! adds six sums over its wall layer, and six numbers to each of its rows.
 
 use crate::body::{FreeBody, Wrench};
-use crate::kernels::coupling::{product, respond, row};
-use glam::DVec3;
+use crate::kernels::coupling::{product, respond};
 use std::ops::Range;
 
 /// A free body in the pressure equation of one step.
@@ -16,15 +15,10 @@ pub struct CoupledBody {
 }
 
 impl CoupledBody {
-    /// The body whose wall layer takes the slots `slots`: each of outward area [m2] and arm [m] as `wall` has it, world
-    /// axes; an area of zero takes no part. `density_over_volume` is rho / l0^3 [kg/m6].
-    pub fn new(
-        body: FreeBody,
-        density_over_volume: f64,
-        slots: Range<usize>,
-        wall: impl Iterator<Item = (DVec3, DVec3)>,
-    ) -> Self {
-        Self { body, density_over_volume, slots, rows: wall.map(|(area, arm)| row(area, arm)).collect() }
+    /// The body whose wall layer takes the slots `slots`, with the `rows` of S, times l0^3; one of zero takes no part.
+    /// `density_over_volume` is rho / l0^3 [kg/m6].
+    pub fn new(body: FreeBody, density_over_volume: f64, slots: Range<usize>, rows: Vec<Wrench>) -> Self {
+        Self { body, density_over_volume, slots, rows }
     }
 
     /// b - kappa S M^-1 f, with `known` the wrench l0^3 f that acts on the body beside the pressure.
@@ -64,7 +58,8 @@ impl CoupledBody {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DMat3;
+    use crate::kernels::coupling::row;
+    use glam::{DMat3, DVec3};
 
     fn wall() -> Vec<(DVec3, DVec3)> {
         let at = |k: usize| DVec3::new((k as f64).sin(), (2.0 * k as f64).cos(), 0.3 * k as f64);
@@ -97,7 +92,8 @@ mod tests {
 
     #[test]
     fn a_body_adds_what_its_area_does_when_its_pressures_move_it() {
-        let (coupled, dense) = (CoupledBody::new(body(), 7.0, 3..8, wall().into_iter()), dense());
+        let rows = wall().into_iter().map(|(area, arm)| row(area, arm)).collect();
+        let (coupled, dense) = (CoupledBody::new(body(), 7.0, 3..8, rows), dense());
         let p: Vec<f64> = (0..10).map(|k| (k as f64 - 4.3).powi(2)).collect();
         let mut q = vec![1.0; 10];
         let product = coupled.answer(coupled.force(&p), &mut q);

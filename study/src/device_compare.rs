@@ -14,6 +14,7 @@ use seixo::params::Params;
 use seixo::plan::{ContactPlan, ParticleStage, Stage};
 use seixo::scene::{Drive, Scene, Solid};
 use seixo::simulation::Simulation;
+use seixo::slots::Slots;
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
@@ -289,9 +290,10 @@ pub fn compare_stages(
             }
             Stage::ConjugateGradient => {
                 if plan.coupled {
+                    let slots = Slots::new(scene, pair.params.density).rows(&poses);
                     let bodies = simulation.solids.free_bodies(pair.params.balanced_gravity());
-                    pair.cpu.free_bodies(&bodies)?;
-                    pair.gpu.free_bodies(&bodies)?;
+                    pair.cpu.free_bodies(&bodies, &slots)?;
+                    pair.gpu.free_bodies(&bodies, &slots)?;
                 }
                 pair.cpu.solve_pressure(&step)?;
                 pair.gpu.solve_pressure(&step)?;

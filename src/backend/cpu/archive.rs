@@ -38,6 +38,7 @@ impl Cpu {
             // Made anew in every step before it is used.
             poses: _,
             free_bodies: _,
+            slots: _,
             fluid_start: _,
             coordinates: _,
             moving: _,

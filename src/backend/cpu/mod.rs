@@ -23,6 +23,7 @@ use self::team::owns;
 use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
+use crate::body::slots::{self, SlotRow};
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::error::Result;
@@ -31,7 +32,7 @@ use crate::kernels::cell_list::{self, CellList, Scratch};
 use crate::kernels::openings::{Emission, Outlet};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
-    Particles, absorber, body_force, collision, correct, monitor, move_solids, openings, predict,
+    Particles, absorber, body_force, collision, correct, coupling, monitor, move_solids, openings, predict,
     pressure_level, shift, surface_pressure, wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
@@ -62,6 +63,8 @@ pub struct Cpu {
     poses: Vec<Pose>,
     /// One a solid where the pressure is to know how they answer, else none.
     free_bodies: Vec<FreeBody>,
+    /// Rows at slots, in the order of solids and rows.
+    slots: Vec<SlotRow>,
     /// [`collision::lightness`] of each wall-layer slot of the moving solids.
     lightness: Vec<f64>,
     fields: Fields,
@@ -110,6 +113,7 @@ impl Cpu {
             solids: scene.solids.clone(),
             poses: Vec::new(),
             free_bodies: Vec::new(),
+            slots: Vec::new(),
             lightness: scene.solids.iter().flat_map(|s| s.wall_slots.clone().map(|_| lightness(s))).collect(),
             fields: if wet { super::start(scene, plan) } else { Fields::default() },
             grid,
@@ -381,40 +385,43 @@ impl Cpu {
         let Fields { state, reaction, source, pressure, .. } = &mut self.fields;
         let answers =
             |body: &FreeBody| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO;
-        let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies);
-        let free: Vec<_> = free.filter(|(_, body)| answers(body)).collect();
+        let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies).enumerate();
+        let free: Vec<_> = free.filter(|(_, (_, body))| answers(body)).collect();
         let mut known: Vec<Wrench> = Vec::with_capacity(free.len());
         let mut layers = Vec::with_capacity(free.len());
-        for &((solid, pose), body) in &free {
+        for &(k, ((solid, pose), body)) in &free {
+            let mut slot = slots::of(&self.slots, k);
             // On many ranks the load is added once, after the sum over them.
             let mut sum = if share.is_some() { Wrench::default() } else { body.load };
             let wall = |(k, i): (usize, usize)| {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
                 let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
-                if !owns(share, i) {
+                let slot = slot(k);
+                if !owns(share, i) || state[i] != State::Inner {
                     // Of the step's beginning, when it was this rank's.
                     sum += Wrench { force: reaction, torque: arm.cross(reaction) };
-                    return (DVec3::ZERO, arm);
+                    return Wrench::default();
                 }
-                let unknown = state[i] == State::Inner;
-                let area = if unknown { pose.orientation * solid.wall_area[k] } else { DVec3::ZERO };
+                let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
                 let head = body_force::head(pressure[i], to_surface, pose.acceleration_at(arm), params);
                 let force = body_force::body_force(head, area, reaction);
                 sum += Wrench { force, torque: arm.cross(force) };
-                (area, arm)
+                sum += slot.head;
+                let mut row = coupling::row(area, arm);
+                row += slot.per_pascal;
+                row
             };
             layers.push(solid.wall_slots.clone().enumerate().map(wall).collect::<Vec<_>>());
             known.push(sum);
         }
         if let Some(share) = share {
             share.sum_wrenches(&mut known);
-            known.iter_mut().zip(&free).for_each(|(known, (_, body))| *known += body.load);
+            known.iter_mut().zip(&free).for_each(|(known, (_, (_, body)))| *known += body.load);
         }
         let mut out = Vec::with_capacity(free.len());
-        for ((((solid, _), body), known), wall) in free.into_iter().zip(known).zip(layers) {
-            let slots = solid.wall_slots.clone();
-            let coupled = CoupledBody::new(*body, density_over_volume, slots, wall.into_iter());
+        for (((_, ((solid, _), body)), known), rows) in free.into_iter().zip(known).zip(layers) {
+            let coupled = CoupledBody::new(*body, density_over_volume, solid.wall_slots.clone(), rows);
             coupled.subtract_known(known, source);
             out.push(coupled);
         }
@@ -554,9 +561,11 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn free_bodies(&mut self, bodies: &[FreeBody]) -> Result<()> {
+    fn free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
         self.free_bodies.clear();
         self.free_bodies.extend_from_slice(bodies);
+        self.slots.clear();
+        self.slots.extend_from_slice(slots);
         Ok(())
     }
 
@@ -647,14 +656,20 @@ impl Backend for Cpu {
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
         let (params, share) = (&self.params, self.share.as_deref());
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
-        let wrenches = self.solids.iter().zip(&self.poses).map(|(solid, pose)| {
+        let wrenches = self.solids.iter().zip(&self.poses).enumerate().map(|(n, (solid, pose))| {
+            let mut slot = slots::of(&self.slots, n);
             let mut total = Wrench::default();
             for (k, i) in solid.wall_slots.clone().enumerate() {
                 let own = owns(share, i);
-                let area = pose.orientation * solid.wall_area[k];
+                let slot = slot(k);
+                let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
                 let (pressure, unknown) = (fields.pressure[i], fields.state[i] == State::Inner);
+                if own && unknown {
+                    total.add(pressure, &slot.per_pascal);
+                    total += slot.head;
+                }
                 let head = body_force::head(pressure, to_surface, pose.acceleration_at(arm), params);
                 let pressure = if own { body_force::surface_pressure(pressure, unknown, head) } else { 0.0 };
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);

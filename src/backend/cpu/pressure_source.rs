@@ -83,7 +83,7 @@ fn mixed_source(
     }
     s.copy_from_slice(w);
     s[carry..].fill(0.0);
-    let wet = if i < on.fluid { 1.0 } else { wet_share(sum(s), params) };
+    let wet = wet_share(i, sum(s), all.neighbour, on);
     let first_moment = r.weighted_sum(s);
     corrected_products(inverse, e, v, s);
     let divergence = scale(on) * sum(s);

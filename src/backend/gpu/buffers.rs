@@ -118,8 +118,8 @@ table! {
         force_chunk: [u32; 4], Writes, Force, |s, _| s.force_chunks();
         wrench: [f32; 4], Reads, Force, |s, _| 2 * s.force_chunks();
         free_body: FreeBody, Writes, Coupling, |s, _| s.solids;
-        /// Rows of the moving-wall slots, then what each body answers.
-        coupling: [f32; 4], None, Coupling, |s, _| 2 * (s.moving_wall + s.solids);
+        /// What the moving-wall slots have of slots between solids, four numbers each; their rows; what each body answers.
+        coupling: [f32; 4], Writes, Coupling, |s, _| 6 * s.moving_wall + 2 * s.solids;
         absorber_zone: AbsorberZone, Writes, Absorber, |s, _| s.absorbers;
         emission: Emission, Writes, Openings, |s, _| s.openings;
         outlet: Outlet, Writes, Openings, |s, _| s.openings;

@@ -1,0 +1,205 @@
+//! Slots between a free body and another solid, too narrow for a particle of water: a body on the floor, against a wall, on
+//! another body. Rows of the wall layer deep in one meet no water and would press nothing on the body, although water stands
+//! in any such slot. It is taken to press there as it does at the slot's rim, its outermost rows: linear between what it is
+//! there, with the weight of the water between, and nothing where the rim is dry (the uplift under a dam, as practice has
+//! it).
+//!
+//! The rows at the rim then carry what the slot passes on: with xi = (x - c) / l0, c the rim's middle, and
+//! C = sum_r xi xi^T + 0.1 N over its N rows,
+//!
+//! P_f = sum_r h_fr (P_r + rho g . (x_f - x_r)),  h_fr = 1/N + xi_f . C^-1 xi_r,
+//!
+//! and a row of S in [`crate::kernels::coupling`] becomes S_r + sum_f h_fr S_f: as P does work on the body there, the
+//! body's motion sucks water in at the rim, and the equation stays symmetric.
+
+use crate::body::slots::SlotRow;
+use crate::body::{Pose, Wrench};
+use crate::contact::broad::{Bounds, PointGrid, meeting};
+use crate::kernels::coupling::row;
+use crate::scene::{Drive, Scene, Solid};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
+/// at all: gaps of a half and of 1.1 spacings. Water comes in between.
+const FACING: (f64, f64) = (1.5, 2.1);
+/// Another solid's particle is faced by a row if it lies this near its outward direction (cosine of the angle).
+const AHEAD: f64 = 0.5;
+/// Edge of the cells that points lie in, over l0: twice the reach, so that two an axis are looked into.
+const CELL: f64 = 4.2;
+/// Rows of a layer this near each other, over l0, are neighbours in it.
+const ADJACENT: f64 = 1.2;
+/// Keeps the slope at bay along directions in which the rim has no extent.
+const STIFFENING: f64 = 0.1;
+
+/// A solid's wall layer, in its frame.
+struct Layer {
+    free: bool,
+    offset: Vec<DVec3>,
+    area: Vec<DVec3>,
+    to_surface: Vec<DVec3>,
+    radius: f64,
+    grid: PointGrid,
+    adjacent: Vec<Vec<u32>>,
+}
+
+impl Layer {
+    fn new(solid: &Solid, l0: f64) -> Self {
+        let free = matches!(solid.drive, Drive::Free(_));
+        let offset = solid.wall_offset.clone();
+        let grid = PointGrid::new(offset.clone(), CELL * l0);
+        let near = |(k, &x): (usize, &DVec3)| {
+            let mut found = vec![];
+            grid.near(x, ADJACENT * l0, |n| found.push(n));
+            found.retain(|&n| n as usize != k);
+            found
+        };
+        let adjacent = if free { offset.iter().enumerate().map(near).collect() } else { Vec::new() };
+        Self {
+            free,
+            radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
+            area: solid.wall_area.clone(),
+            to_surface: solid.wall_to_surface.clone(),
+            offset,
+            grid,
+            adjacent,
+        }
+    }
+
+    fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {
+        let reach = DVec3::splat(self.radius + margin);
+        (pose.position - reach, pose.position + reach)
+    }
+}
+
+/// Finds the slots of the free bodies of a scene.
+pub struct Slots {
+    spacing: f64,
+    /// Weight of the water [N/m3].
+    weight: DVec3,
+    fixed: PointGrid,
+    layers: Vec<Layer>,
+}
+
+impl Slots {
+    /// The slots of the free bodies of `scene`, in water of `density` [kg/m3].
+    pub fn new(scene: &Scene, density: f64) -> Self {
+        let l0 = scene.spacing;
+        let fixed = scene.position[scene.groups.static_wall_range()].to_vec();
+        Self {
+            spacing: l0,
+            weight: density * scene.gravity,
+            fixed: PointGrid::new(fixed, CELL * l0),
+            layers: scene.solids.iter().map(|solid| Layer::new(solid, l0)).collect(),
+        }
+    }
+
+    /// Rows at slots or in them with the solids at `poses`, in the order of solids and rows.
+    pub fn rows(&self, poses: &[Pose]) -> Vec<SlotRow> {
+        let margin = FACING.1 * self.spacing;
+        let boxes: Vec<Bounds> =
+            self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect();
+        let mut others = vec![vec![]; boxes.len()];
+        for (a, b) in meeting(&boxes) {
+            others[a].push(b);
+            others[b].push(a);
+        }
+        let of = |(k, layer): (usize, &Layer)| {
+            let mut out = vec![];
+            let at_walls = layer.free && self.at_walls(layer, &poses[k], margin);
+            if layer.free && (at_walls || !others[k].is_empty()) {
+                let shares = self.shares(k, at_walls, &others[k], poses);
+                self.pass_on(k, layer, &poses[k], &shares, &mut out);
+            }
+            out
+        };
+        self.layers.par_iter().enumerate().flat_map_iter(of).collect()
+    }
+
+    /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
+    fn at_walls(&self, layer: &Layer, pose: &Pose, margin: f64) -> bool {
+        let mut found = false;
+        self.fixed.near(pose.position, layer.radius + margin, |_| found = true);
+        found
+    }
+
+    /// How much of each row of layer `k` lies in a slot [-], with fixed walls if it is `at_walls` and with `others`.
+    fn shares(&self, k: usize, at_walls: bool, others: &[usize], poses: &[Pose]) -> Vec<f64> {
+        let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
+        let reach = FACING.1 * l0;
+        let share = |(&offset, &area): (&DVec3, &DVec3)| {
+            let outward = pose.orientation * area.normalize_or_zero();
+            let x = pose.position + pose.orientation * offset;
+            let mut nearest = reach;
+            let mut see = |r: DVec3| {
+                let distance = r.length();
+                if r.dot(outward) > AHEAD * distance {
+                    nearest = nearest.min(distance);
+                }
+            };
+            if at_walls {
+                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x));
+            }
+            for &other in others {
+                let (layer, pose) = (&self.layers[other], &poses[other]);
+                let local = pose.orientation.inverse() * (x - pose.position);
+                layer.grid.near(local, reach, |n| see(pose.orientation * (layer.grid.point(n) - local)));
+            }
+            ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0)
+        };
+        (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
+    }
+
+    /// Adds the rows of layer `k` that lie in slots by `shares`, and those at the rim with what they pass on.
+    fn pass_on(&self, k: usize, layer: &Layer, pose: &Pose, shares: &[f64], out: &mut Vec<SlotRow>) {
+        if shares.iter().all(|&share| share == 0.0) {
+            return;
+        }
+        let is_rim = |&n: &usize| layer.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
+        let (rim, deep): (Vec<usize>, Vec<usize>) =
+            (0..shares.len()).filter(|&n| shares[n] > 0.0).partition(is_rim);
+        if rim.is_empty() || deep.is_empty() {
+            return;
+        }
+        // Relative to the centre of mass, world axes.
+        let place = |n: usize| pose.orientation * layer.offset[n];
+        let count = rim.len() as f64;
+        let middle = rim.iter().map(|&n| place(n)).sum::<DVec3>() / count;
+        let xi = |n: usize| (place(n) - middle) / self.spacing;
+        let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
+        let spread = rim.iter().map(|&n| outer(xi(n))).fold(DMat3::ZERO, |sum, m| sum + m);
+        let inverse = (spread + DMat3::from_diagonal(DVec3::splat(STIFFENING * count))).inverse();
+        // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
+        let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
+        for &n in &deep {
+            let to_surface = pose.orientation * layer.to_surface[n];
+            let row = row(pose.orientation * layer.area[n], place(n) + to_surface);
+            let head = self.weight.dot(place(n) + to_surface - middle);
+            let along = xi(n).to_array();
+            for (factor, (mean, slope)) in [1.0, head].into_iter().zip(mean.iter_mut().zip(&mut slope)) {
+                mean.add(shares[n] * factor, &row);
+                slope.iter_mut().zip(along).for_each(|(s, along)| s.add(shares[n] * factor * along, &row));
+            }
+        }
+        let passed = |n: usize| {
+            let along = (inverse * xi(n)).to_array();
+            let of = |m: usize| {
+                let mut sum = Wrench::default();
+                sum.add(1.0 / count, &mean[m]);
+                slope[m].iter().zip(along).for_each(|(s, along)| sum.add(along, s));
+                sum
+            };
+            let (per_pascal, mut head) = (of(0), of(1));
+            head.add(-self.weight.dot(place(n) - middle), &per_pascal);
+            (per_pascal, head)
+        };
+        let (first, solid) = (out.len(), k as u32);
+        out.extend(rim.iter().map(|&n| {
+            let (per_pascal, head) = passed(n);
+            SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head }
+        }));
+        let inside = |&n: &usize| SlotRow { solid, row: n as u32, taken: shares[n], ..SlotRow::default() };
+        out.extend(deep.iter().map(inside));
+        out[first..].sort_unstable_by_key(|slot| slot.row);
+    }
+}

@@ -1,0 +1,121 @@
+//! Water in slots too narrow for a particle: under a body that stands on the floor, between bodies.
+
+use crate::common::{case, simulation};
+use glam::DVec3;
+use seixo::backend::{Processor, gpu};
+use seixo::body::{Pose, Wrench};
+use seixo::case::Case;
+use seixo::kernels::coupling::row;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+use seixo::slots::Slots;
+
+/// A block of 0.1 m on the floor under 0.2 m of water, which stands in the tank up to `depth`.
+fn standing(spacing: f64, depth: f64) -> Case {
+    case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = {}\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\nsound_speed = 10\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.3, 0.3, {depth}]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.3, 0.3, 0.3]\nopen = [\"z_max\"]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.3\nfriction = 0.3\n\
+         [[body]]\nname = \"block\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.15, 0.15, 0.05]\ndensity = 2500\n\
+         displaces_fluid = true\nstanding = true\n",
+        spacing * 0.05
+    ))
+}
+
+/// The first adapter, if there is one.
+fn device() -> Option<Processor> {
+    (!gpu::adapters().is_empty()).then_some(Processor::Gpu { adapter: None })
+}
+
+fn pose(position: DVec3) -> Pose {
+    let scene = Scene::build(&standing(0.0125, 0.2)).expect("the scene builds");
+    let mut pose = seixo::contact::Solids::new(&scene, standing(0.0125, 0.2).contact.as_ref())
+        .expect("bodies")
+        .poses()[0];
+    pose.position = position;
+    pose
+}
+
+#[test]
+fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
+    let scene = Scene::build(&standing(0.0125, 0.2)).expect("the scene builds");
+    let slots = Slots::new(&scene, 1000.0);
+    let solid = &scene.solids[0];
+    let rows = slots.rows(&[pose(solid.position)]);
+    // Eight an edge: six by six deep under it.
+    let deep = rows.iter().filter(|slot| slot.taken == 1.0).count();
+    assert_eq!((deep, rows.len()), (36, 64));
+    for (slope, allowed) in
+        [(DVec3::new(0.0, 0.0, -9810.0), 1e-9), (DVec3::new(500.0, -300.0, -9810.0), 0.03)]
+    {
+        // Pressure at x relative to the centre of mass.
+        let p = |x: DVec3| 2000.0 + slope.dot(x);
+        let (mut passed, mut there) = (Wrench::default(), Wrench::default());
+        for slot in &rows {
+            let k = slot.row as usize;
+            let (x, to_surface) = (solid.wall_offset[k], solid.wall_to_surface[k]);
+            passed.add(p(x), &slot.per_pascal);
+            passed += slot.head;
+            there.add(slot.taken * p(x + to_surface), &row(solid.wall_area[k], x + to_surface));
+        }
+        println!("force {} for {}, torque {} for {}", passed.force, there.force, passed.torque, there.torque);
+        assert!((there.force.z - 0.5625 * 0.01 * p(DVec3::new(0.0, 0.0, -0.05))).abs() < 1e-9);
+        assert!((passed.force - there.force).length() < 1e-9 * there.force.length());
+        let size = 1e-9 * there.force.length() + allowed * there.torque.length();
+        assert!((passed.torque - there.torque).length() < size);
+    }
+    // As the body rises the slot fades, and a body that swims has none; no more has the air an opinion.
+    let part = |gap: f64| {
+        let rows = slots.rows(&[pose(solid.position + gap * scene.spacing * DVec3::Z)]);
+        rows.iter().map(|slot| slot.taken).fold(0.0, f64::max)
+    };
+    let faded = [0.0, 0.4, 0.8, 1.2].map(part);
+    assert!(
+        faded[0] == 1.0 && faded[1] == 1.0 && (0.4..0.6).contains(&faded[2]) && faded[3] == 0.0,
+        "{faded:?}"
+    );
+}
+
+/// Mean force of the water on the block from 0.15 s to 0.2 s [N].
+fn lift(mut simulation: Simulation) -> f64 {
+    let (mut sum, mut steps) = (0.0, 0.0);
+    while simulation.time < 0.2 {
+        simulation.step().expect("the block stands");
+        if simulation.time > 0.15 {
+            (sum, steps) = (sum + simulation.fluid_force[0].force.z, steps + 1.0);
+        }
+    }
+    sum / steps
+}
+
+#[test]
+fn water_under_a_block_on_the_floor_carries_it_at_any_resolution() {
+    // 4.1 N at ten particles an edge while rows that meet no water carried nothing.
+    for spacing in [0.02, 0.0125, 0.01] {
+        let force = lift(simulation(&standing(spacing, 0.2)));
+        println!("l0 {spacing}: {force:.3} N for 9.81 N");
+        assert!((force / 9.81 - 1.0).abs() < 0.01, "l0 {spacing}: {force} N");
+    }
+    if let Some(gpu) = device() {
+        let case = standing(0.0125, 0.2);
+        let force = lift(Simulation::on(&case, Scene::build(&case).expect("builds"), &gpu).expect("starts"));
+        println!("on the device {force:.3} N");
+        assert!((force / 9.81 - 1.0).abs() < 0.01, "{force} N");
+    }
+}
+
+#[test]
+fn a_dry_slot_carries_nothing() {
+    // Water at rest beside the block, which does not reach it.
+    let mut simulation = simulation(&case(
+        "[run]\nspacing = 0.0125\ntime_step = 6e-4\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\nsound_speed = 10\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.1, 0.2, 0.1]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.2, 0.2]\nopen = [\"z_max\"]\n[contact]\nspring = 1e5\n\
+         [[body]]\nname = \"block\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.5, 0.1, 0.05]\ndensity = 2500\nstanding = true\n",
+    ));
+    for _ in 0..20 {
+        simulation.step().expect("the block stands");
+        assert_eq!(simulation.fluid_force[0], Wrench::default());
+    }
+}
