@@ -331,14 +331,14 @@ fn rotate(q: vec4f, v: vec3f) -> vec3f {
     return v + q.w * t + cross(q.xyz, t);
 }
 
-// Pressure on the true surface of a moving solid over `pressure`, that of a particle half a spacing inside: weight and
-// inertia of the water that would lie between. See head in src/kernels/body_force.rs.
 // Place of a moving-wall slot's row in the buffer `coupling`, and of what a free body answers: behind four vectors a slot of what
 // slots between solids bring it.
 fn coupled_row(k: u32) -> u32 {
     return 4u * params.moving_wall + 2u * k;
 }
 
+// Pressure on the true surface of a moving solid over `pressure`, that of a particle half a spacing inside: weight and
+// inertia of the water that would lie between. See head in src/kernels/body_force.rs.
 fn surface_head(pressure: f32, pose: Pose, wall: WallParticle) -> f32 {
     let to_surface = rotate(pose.orientation, wall.to_surface.xyz);
     var head = params.density * dot(params.gravity, to_surface) + params.surface_head;

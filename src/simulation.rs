@@ -2,6 +2,7 @@
 //! `step.rs`.
 
 use crate::backend::{Backend, Counters, Timing};
+use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
 use crate::case::{Case, ContactDevice, Fluid};
 use crate::checkpoint::Archive;
@@ -328,12 +329,18 @@ impl Simulation {
         })
     }
 
+    /// Rows of free bodies at slots, in the poses that [`Solids::predict`] gave last; none where no free body stands in the
+    /// pressure equation.
+    pub fn slot_rows(&self) -> Vec<SlotRow> {
+        self.slots.as_ref().map(|slots| slots.rows(self.solids.predicted())).unwrap_or_default()
+    }
+
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let report = self.timed(Stage::ConjugateGradient, |s| {
             if s.plan.needs(Arrays::Coupling) {
                 let rest = s.params.balanced_gravity();
-                let slots = s.slots.as_ref().map(|slots| slots.rows(s.solids.predicted()));
-                s.backend.free_bodies(&s.solids.free_bodies(rest), &slots.unwrap_or_default())?;
+                let slots = s.slot_rows();
+                s.backend.free_bodies(&s.solids.free_bodies(rest), &slots)?;
             }
             s.backend.solve_pressure(step)
         })?;

@@ -105,15 +105,14 @@ impl Slots {
             others[b].push(a);
         }
         let of = |(k, layer): (usize, &Layer)| {
-            let mut out = vec![];
-            let at_walls = layer.free && self.at_walls(layer, &poses[k], margin);
-            if layer.free && (at_walls || !others[k].is_empty()) {
-                let shares = self.shares(k, at_walls, &others[k], poses);
-                self.pass_on(k, layer, &poses[k], &shares, &mut out);
+            let at_walls = self.at_walls(layer, &poses[k], margin);
+            if !at_walls && others[k].is_empty() {
+                return vec![];
             }
-            out
+            let shares = self.shares(k, at_walls, &others[k], poses);
+            self.passed_on(k, &poses[k], &shares)
         };
-        self.layers.par_iter().enumerate().flat_map_iter(of).collect()
+        self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect()
     }
 
     /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
@@ -150,16 +149,14 @@ impl Slots {
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }
 
-    /// Adds the rows of layer `k` that lie in slots by `shares`, and those at the rim with what they pass on.
-    fn pass_on(&self, k: usize, layer: &Layer, pose: &Pose, shares: &[f64], out: &mut Vec<SlotRow>) {
-        if shares.iter().all(|&share| share == 0.0) {
-            return;
-        }
+    /// The rows of layer `k` that lie deep in slots by `shares`, and those at the rim with what they pass on.
+    fn passed_on(&self, k: usize, pose: &Pose, shares: &[f64]) -> Vec<SlotRow> {
+        let layer = &self.layers[k];
         let is_rim = |&n: &usize| layer.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
         let (rim, deep): (Vec<usize>, Vec<usize>) =
             (0..shares.len()).filter(|&n| shares[n] > 0.0).partition(is_rim);
         if rim.is_empty() || deep.is_empty() {
-            return;
+            return vec![];
         }
         // Relative to the centre of mass, world axes.
         let place = |n: usize| pose.orientation * layer.offset[n];
@@ -193,13 +190,14 @@ impl Slots {
             head.add(-self.weight.dot(place(n) - middle), &per_pascal);
             (per_pascal, head)
         };
-        let (first, solid) = (out.len(), k as u32);
-        out.extend(rim.iter().map(|&n| {
+        let solid = k as u32;
+        let at_rim = |&n: &usize| {
             let (per_pascal, head) = passed(n);
             SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head }
-        }));
+        };
         let inside = |&n: &usize| SlotRow { solid, row: n as u32, taken: shares[n], ..SlotRow::default() };
-        out.extend(deep.iter().map(inside));
-        out[first..].sort_unstable_by_key(|slot| slot.row);
+        let mut out: Vec<SlotRow> = rim.iter().map(at_rim).chain(deep.iter().map(inside)).collect();
+        out.sort_unstable_by_key(|slot| slot.row);
+        out
     }
 }

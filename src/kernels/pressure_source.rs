@@ -69,9 +69,12 @@ pub fn wet_share(i: usize, links: f64, neighbour: &[u32], on: Particles) -> f64 
         return 1.0;
     }
     let share = links / on.params.wall_contact;
+    if share >= 1.0 {
+        return 1.0;
+    }
     let bodies = on.fluid..on.fluid + on.params.body_wall;
     let at_body = bodies.contains(&i) || neighbour.iter().any(|&j| bodies.contains(&(j as usize)));
-    if at_body { (2.0 * share - 1.0).clamp(0.0, 1.0) } else { share.min(1.0) }
+    if at_body { (2.0 * share - 1.0).max(0.0) } else { share }
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).

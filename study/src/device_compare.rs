@@ -14,7 +14,6 @@ use seixo::params::Params;
 use seixo::plan::{ContactPlan, ParticleStage, Stage};
 use seixo::scene::{Drive, Scene, Solid};
 use seixo::simulation::Simulation;
-use seixo::slots::Slots;
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
@@ -290,7 +289,7 @@ pub fn compare_stages(
             }
             Stage::ConjugateGradient => {
                 if plan.coupled {
-                    let slots = Slots::new(scene, pair.params.density).rows(&poses);
+                    let slots = simulation.slot_rows();
                     let bodies = simulation.solids.free_bodies(pair.params.balanced_gravity());
                     pair.cpu.free_bodies(&bodies, &slots)?;
                     pair.gpu.free_bodies(&bodies, &slots)?;

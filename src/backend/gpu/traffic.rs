@@ -5,7 +5,7 @@ use super::hierarchy::Levels;
 use super::{Gpu, buffers};
 use crate::backend::traffic::{Solve, Traffic, Work, passes};
 use crate::error::Result;
-use crate::plan::Stage;
+use crate::plan::{Arrays, Stage};
 
 /// Sums over the neighbour lists as they are.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,6 +47,8 @@ impl Gpu {
         let walls = 3 * v * rows.used.saturating_sub(f);
         let lists = k * pairs;
         let equation = buffers::source_diagonal.size();
+        // What slots between solids bring a wall-layer particle.
+        let slots = if self.plan.needs(Arrays::Coupling) { 4 * buffers::coupling.size() } else { 0 };
         let stages = [
             (Stage::Viscosity, f * (3 * v + k) + followed * (4 * v + k) + k * rows.fluid_near),
             (Stage::Absorber, f * 3 * v),
@@ -68,7 +70,7 @@ impl Gpu {
             (Stage::PressureGradient, f * (gradient + n + 2 * k) + lists * f / rows.used.max(1) + walls),
             (Stage::Correct, update),
             (Stage::Shift, f * 4 * v),
-            (Stage::BodyForce, s.moving_wall * (buffers::wall_layer.size() + 2 * v + n + k)),
+            (Stage::BodyForce, s.moving_wall * (buffers::wall_layer.size() + 2 * v + n + k + slots)),
         ];
         let unknowns = self.unknowns()?;
         Ok(Traffic {
