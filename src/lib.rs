@@ -101,6 +101,7 @@ pub mod run;
 pub mod scene;
 pub mod scheme;
 pub mod sense;
+mod settle;
 pub mod shape;
 pub mod share;
 pub mod simulation;

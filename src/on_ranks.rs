@@ -9,6 +9,7 @@ use crate::params::Params;
 use crate::plan::Plan;
 use crate::ranks::{Team, decode, encode};
 use crate::scene::Scene;
+use crate::settle::settle;
 use crate::simulation::{Simulation, settings};
 use std::sync::Arc;
 
@@ -70,8 +71,10 @@ pub fn serve(
 ) -> Result<Option<Cpu>> {
     let cpu = set_up().and_then(|(case, scene)| {
         let params = Params::new(&case, &scene)?;
-        let plan = Plan::new(&case, &scene, &params);
-        Cpu::of_team(team.clone(), &scene, &params, &plan, settings(&case))
+        let (plan, settings) = (Plan::new(&case, &scene, &params), settings(&case));
+        // Every rank finds the same places: it is little work, and bits repeat.
+        let scene = settle(scene, &params, &plan, settings)?;
+        Cpu::of_team(team.clone(), &scene, &params, &plan, settings)
     });
     let together = agree(&**team, &cpu);
     let (Ok(mut cpu), Ok(())) = (cpu, together) else { return Ok(None) };

@@ -15,6 +15,7 @@ use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
+use crate::settle::settle;
 use crate::slots::Slots;
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, time_step};
@@ -115,6 +116,7 @@ impl Simulation {
         let settings = settings(case);
         let mut solids = Solids::new(&scene, case.contact.as_ref())?;
         crate::sense::refuse(case, &scene, &params, &solids)?;
+        let scene = settle(scene, &params, &plan, settings)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {

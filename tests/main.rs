@@ -41,6 +41,7 @@ mod render;
 mod report;
 mod restart;
 mod scene;
+mod settle;
 mod shaders;
 mod shaped;
 mod shapes;

@@ -265,6 +265,9 @@ fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>, place: Option<Place>) -> E
         inputs: asked.inputs,
     };
     if !args.quiet {
+        // Those of the scene were shown when it was built.
+        let more = &simulation.scene.notes[setup.scene.notes.len()..];
+        more.iter().for_each(|note| remark(&format!("note: {note}")));
         let groups = simulation.groups;
         let device = simulation.backend.description();
         remark(&format!(

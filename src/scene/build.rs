@@ -4,7 +4,7 @@
 //! obstacles and moving walls of any other shape, water, bodies.
 
 use super::bodies;
-use super::lattice::{Cells, Grid, Lattice};
+use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice};
 use super::opening::Planned;
 use super::oriented::Placed;
 use super::placement::{Surroundings, point};
@@ -67,6 +67,8 @@ pub(super) struct Builder<'a> {
     pub(super) periodic: Periodic,
     pub(super) fixed: Fixed,
     pub(super) moving_walls: Vec<Solid>,
+    /// Walls that are no boxes of the lattice.
+    pub(super) off_lattice: Vec<Placed>,
     pub(super) openings: Vec<Planned>,
     pub(super) bodies: Vec<Solid>,
     pub(super) water: Water,
@@ -116,6 +118,7 @@ impl<'a> Builder<'a> {
             periodic,
             fixed: Fixed::default(),
             moving_walls: Vec::new(),
+            off_lattice: Vec::new(),
             openings: Vec::new(),
             bodies: Vec::new(),
             water: Water::default(),
@@ -185,7 +188,9 @@ impl<'a> Builder<'a> {
         }
         for plane in &case.plane {
             let left_out = self.fixed.plane(plane, &lattice, &mut self.grid, layers);
-            let n = PlaneFrame::new(plane, &lattice).n.map(|n| f64::from(n) * lattice.spacing);
+            let frame = PlaneFrame::new(plane, &lattice);
+            self.off_lattice.push(frame.displaced(layers));
+            let n = frame.n.map(|n| f64::from(n) * lattice.spacing);
             for (k, length) in n.into_iter().enumerate().filter(|&(k, _)| !(lattice.plane && k == 1)) {
                 if (length - plane.size[k]).abs() > 0.01 * lattice.spacing {
                     self.notes.push(format!(
@@ -215,8 +220,8 @@ impl<'a> Builder<'a> {
             if !self.on_lattice(&key, &key, (block.min, block.max)) {
                 continue;
             }
-            let filled = self.water.fill(block, &self.lattice, &mut self.grid);
-            if filled == 0 {
+            self.water.fill(block, &self.lattice, &mut self.grid);
+            if self.beside_walls() == 0 {
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
                 self.problems.push(Problem::new(key, message, remedy));
@@ -236,7 +241,8 @@ impl<'a> Builder<'a> {
             if self.lattice.plane {
                 velocity.y = 0.0;
             }
-            if self.water.shape(&placed, velocity, &self.lattice, &mut self.grid) == 0 {
+            self.water.shape(&placed, velocity, &self.lattice, &mut self.grid);
+            if self.beside_walls() == 0 {
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
                 self.problems.push(Problem::new(key, message, remedy));
@@ -244,7 +250,10 @@ impl<'a> Builder<'a> {
         }
         for (k, fill) in fluid.fill.iter().enumerate() {
             match self.water.flood(fill, &self.lattice, &mut self.grid, self.tank) {
-                Ok(count) => self.notes.push(format!("fluid.fill.{k}: {count} particles of water")),
+                Ok(()) => {
+                    let count = self.beside_walls();
+                    self.notes.push(format!("fluid.fill.{k}: {count} particles of water"));
+                }
                 Err(problem) => {
                     let key = format!("fluid.fill.{k}.{}", problem.key);
                     let message = format!("fluid.fill.{k}: {}", problem.message);
@@ -263,6 +272,16 @@ impl<'a> Builder<'a> {
         let gravity = self.periodic.across(self.gravity());
         self.depth = self.water.depth(gravity, &self.lattice);
         self.depth = self.depth_with_inflows(gravity);
+    }
+
+    /// Takes away what of the water laid last stands where walls do that are no boxes of the lattice; returns how many particles it has then.
+    fn beside_walls(&mut self) -> usize {
+        let from = self.water.clear;
+        for shape in &self.off_lattice {
+            self.water.remove(shape, (from, BLOCKED), &self.lattice, &mut self.grid);
+        }
+        self.water.clear = self.water.cell.len();
+        self.water.clear - from
     }
 
     fn bodies(&mut self) {
@@ -297,9 +316,12 @@ impl<'a> Builder<'a> {
             let what = solid.what();
             self.seams(&format!("body.{k}"), what, &solid.name, &solid.placed(), false);
             let shape = solid.placed();
-            let wet = self.water.inside(&shape, &self.lattice);
+            let wet = if body.displaces_fluid {
+                self.water.remove(&shape, (0, FREE), &self.lattice, &mut self.grid)
+            } else {
+                self.water.inside(&shape, &self.lattice)
+            };
             if wet > 0 && body.displaces_fluid {
-                self.water.remove(&shape, &self.lattice, &mut self.grid);
                 self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
             } else if wet > 0 {
                 let place = point(solid.position);

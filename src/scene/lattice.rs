@@ -1,7 +1,9 @@
 //! The background lattice: which cell belongs to which shape, as a dense grid.
 
+use super::oriented::Placed;
 use crate::error::{CaseError, Problem, Result};
 use glam::{DVec3, IVec3};
+use rayon::prelude::*;
 
 /// What stands in a cell.
 pub(super) const FREE: u8 = 0;
@@ -13,6 +15,8 @@ pub(super) const BLOCKED: u8 = 2;
 pub(super) const FLUID: u8 = 3;
 /// A cell that the search for leaks has reached.
 pub(super) const REACHED: u8 = 4;
+/// The face of a shape runs through it: water may stand in it, and nothing goes on from there.
+pub(super) const FACE: u8 = 5;
 
 /// Rounding slack in cells: a face that lies on a cell's centre up to this much counts as on it.
 const SLACK: f64 = 1e-6;
@@ -143,6 +147,25 @@ impl Grid {
             }
         }
         c
+    }
+    /// Puts a shape into free cells: nothing enters its inside, and the water in the cells of its faces is what is left of their room.
+    pub fn put(&mut self, shape: &Placed, lattice: &Lattice) {
+        // Water closer to a face than a quarter of a spacing goes no further.
+        let (l0, near) = (lattice.spacing, 0.25);
+        let reach = shape.bounds() + near * l0;
+        let range = lattice.cells(shape.center - reach, shape.center + reach);
+        let (lo, hi) = (range.lo.max(self.cells.lo), range.hi.min(self.cells.hi));
+        // A slice at a time: a dry shape may be as large as the grid.
+        for x in lo.x..hi.x {
+            let slice = Cells { lo: IVec3 { x, ..lo }, hi: IVec3 { x: x + 1, ..hi } };
+            let free: Vec<IVec3> = slice.iter().filter(|c| self.get(*c) == FREE).collect();
+            let state = |c: IVec3| {
+                let off = shape.distance(lattice.center(c)) / l0;
+                (off < near).then_some((c, if off < SLACK - 0.5 { BLOCKED } else { FACE }))
+            };
+            let taken: Vec<(IVec3, u8)> = free.into_par_iter().filter_map(state).collect();
+            taken.into_iter().for_each(|(c, state)| self.set(c, state));
+        }
     }
     /// Whether a cell lies beyond a periodic side.
     pub fn is_beyond(&self, c: IVec3) -> bool {

@@ -3,7 +3,7 @@
 use super::build::Builder;
 use super::jitter::jitter;
 use super::{Drive, Groups, Kind, Scene, Solid};
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 impl Builder<'_> {
     /// Lays the particles out in their groups, with slots for `reserve` more of water.
@@ -53,6 +53,7 @@ impl Builder<'_> {
         Scene {
             dimensions: self.case.run.dimensions,
             spacing: self.lattice.spacing,
+            node: self.lattice.center(IVec3::ZERO),
             gravity,
             position: layout.position,
             velocity: layout.velocity,

@@ -21,6 +21,7 @@ mod layout;
 mod motion;
 mod opening;
 mod oriented;
+mod part;
 mod placement;
 mod shaped;
 mod support;
@@ -240,6 +241,8 @@ pub struct Scene {
     pub dimensions: u32,
     /// Initial particle spacing l0 [m].
     pub spacing: f64,
+    /// A node of the lattice on which the water stands at first, and the walls that fit it [m].
+    pub node: DVec3,
     /// Gravity [m/s2].
     pub gravity: DVec3,
     /// Positions at t = 0 [m], all groups.

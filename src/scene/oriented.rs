@@ -45,6 +45,11 @@ impl Placed {
     pub fn holds(&self, p: DVec3, margin: f64) -> bool {
         self.shape.outside(self.axes.transpose() * (p - self.center)) < -margin
     }
+    /// Signed distance of a point from its surface [m], below 0 inside; of a box beyond the plane of a face.
+    pub fn distance(&self, p: DVec3) -> f64 {
+        let q = self.axes.transpose() * (p - self.center);
+        if self.shape.as_cuboid().is_some() { self.shape.outside(q) } else { self.shape.distance(q).0 }
+    }
     /// Whether planes tell it apart from what does not touch it.
     pub fn is_convex(&self) -> bool {
         match self.shape {

@@ -1,16 +1,13 @@
 //! Obstacles and moving walls of any shape: solids that stand still or follow a table, with water around them.
 
 use super::build::Builder;
-use super::lattice::{BLOCKED, Cells, FREE};
 use super::oriented::Placed;
 use super::placement::point;
 use super::walls::{closed, near_solid, wall_motion};
-use super::water::margin;
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
-use glam::{DMat3, DVec3, IVec3};
-use rayon::prelude::*;
+use glam::{DMat3, DVec3};
 
 /// A wall without particles, where it stands; `moved` if it moves.
 fn wall(
@@ -107,7 +104,8 @@ impl Builder<'_> {
                 self.bury(&key, &mut solid);
             }
             if !solid.wall_offset.is_empty() {
-                self.block(&solid.placed());
+                self.grid.put(&solid.placed(), &self.lattice);
+                self.off_lattice.push(solid.placed());
                 self.moving_walls.push(solid);
             }
         }
@@ -166,24 +164,6 @@ impl Builder<'_> {
             || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
             || earlier().any(|b| b.holds(at, slack))
             || near && near_solid(lattice, &self.grid, at)
-    }
-
-    /// Keeps water out of a shape.
-    fn block(&mut self, shape: &Placed) {
-        // Only what stands as the lattice does is in register with it.
-        let turned = shape.axes != DMat3::IDENTITY;
-        let margin = if turned { -0.25 * self.lattice.spacing } else { margin(shape, self.lattice.spacing) };
-        let reach = shape.bounds() - margin;
-        let range = self.lattice.cells(shape.center - reach, shape.center + reach);
-        let (lo, hi) = (range.lo.max(self.grid.cells.lo), range.hi.min(self.grid.cells.hi));
-        for x in lo.x..hi.x {
-            let slice = Cells { lo: IVec3 { x, ..lo }, hi: IVec3 { x: x + 1, ..hi } };
-            let free: Vec<IVec3> = slice.iter().filter(|c| self.grid.get(*c) == FREE).collect();
-            let lattice = self.lattice;
-            let held: Vec<IVec3> =
-                free.into_par_iter().filter(|c| shape.holds(lattice.center(*c), margin)).collect();
-            held.into_iter().for_each(|c| self.grid.set(c, BLOCKED));
-        }
     }
 
     /// What is thinner than two particles has none inside, and what is thinner than one none at all. `key` is that of

@@ -149,16 +149,7 @@ impl Fixed {
                 }
             }
         }
-        // Water keeps out of the layers, and no closer than about 3/4 l0 to the wall layer's centres.
-        let grown = Placed::cuboid(slab.center, frame.half(layers) + 0.25 * l0, slab.axes);
-        let reach = grown.bounds();
-        let range = lattice.cells(slab.center - reach, slab.center + reach);
-        let range = Cells { lo: range.lo.max(grid.cells.lo), hi: range.hi.min(grid.cells.hi) };
-        for c in range.iter() {
-            if grid.get(c) == FREE && grown.holds(lattice.center(c), 0.0) {
-                grid.set(c, BLOCKED);
-            }
-        }
+        grid.put(&frame.displaced(layers), lattice);
         left_out
     }
 
@@ -333,6 +324,12 @@ impl PlaneFrame {
     /// The layers as a box.
     pub(crate) fn slab(&self, layers: i32) -> Placed {
         let half = self.half(layers);
+        Placed::cuboid(self.center - self.axes.z_axis * half.z, half, self.axes)
+    }
+    /// What of them displaces water: but for the surface they are dummies, to which it comes no nearer than 3/4 l0.
+    pub(crate) fn displaced(&self, layers: i32) -> Placed {
+        let by = 0.25 * self.spacing;
+        let half = self.half(layers) + DVec3::new(by, by, 0.5 * by);
         Placed::cuboid(self.center - self.axes.z_axis * half.z, half, self.axes)
     }
 }

@@ -1,6 +1,6 @@
 //! Water at t = 0: filling the free cells, making room for bodies, and looking for leaks.
 
-use super::lattice::{Cells, FLUID, FREE, Grid, Lattice, REACHED};
+use super::lattice::{Cells, FACE, FLUID, FREE, Grid, Lattice, REACHED};
 use super::oriented::Placed;
 use super::placement::point;
 use super::walls::face_name;
@@ -14,32 +14,31 @@ use rayon::prelude::*;
 pub(super) struct Water {
     pub cell: Vec<IVec3>,
     pub velocity: Vec<DVec3>,
+    /// How many of them are known to stand clear of the walls.
+    pub clear: usize,
 }
 
 impl Water {
-    /// Fills the free cells of a block; returns how many.
-    pub fn fill(&mut self, block: &case::Block, lattice: &Lattice, grid: &mut Grid) -> usize {
-        let before = self.cell.len();
+    /// Fills the free cells of a block.
+    pub fn fill(&mut self, block: &case::Block, lattice: &Lattice, grid: &mut Grid) {
         let mut velocity: DVec3 = block.velocity.into();
         if lattice.plane {
             velocity.y = 0.0;
         }
         for c in lattice.cells(block.min.into(), block.max.into()).iter() {
-            if grid.get(c) == FREE {
+            if matches!(grid.get(c), FREE | FACE) {
                 grid.set(c, FLUID);
                 self.cell.push(c);
                 self.velocity.push(velocity);
             }
         }
-        self.cell.len() - before
     }
 
-    /// Fills the free cells whose centres lie in a shape; returns how many.
-    pub fn shape(&mut self, shape: &Placed, velocity: DVec3, lattice: &Lattice, grid: &mut Grid) -> usize {
-        let before = self.cell.len();
+    /// Fills the free cells whose centres lie in a shape.
+    pub fn shape(&mut self, shape: &Placed, velocity: DVec3, lattice: &Lattice, grid: &mut Grid) {
         let reach = shape.bounds();
         let range = lattice.cells(shape.center - reach, shape.center + reach);
-        let free: Vec<IVec3> = range.iter().filter(|&c| grid.get(c) == FREE).collect();
+        let free: Vec<IVec3> = range.iter().filter(|&c| matches!(grid.get(c), FREE | FACE)).collect();
         let slack = -1e-6 * lattice.spacing;
         let held: Vec<IVec3> =
             free.into_par_iter().filter(|&c| shape.holds(lattice.center(c), slack)).collect();
@@ -48,10 +47,9 @@ impl Water {
             self.cell.push(c);
             self.velocity.push(velocity);
         }
-        self.cell.len() - before
     }
 
-    /// Fills the free cells below a level that can be reached from a seed; returns how many.
+    /// Fills the free cells below a level that can be reached from a seed.
     ///
     /// # Errors
     /// A seed that is not free, or a way out of everything there is; the key is that of the fill's table.
@@ -61,8 +59,7 @@ impl Water {
         lattice: &Lattice,
         grid: &mut Grid,
         tank: Option<Cells>,
-    ) -> Result<usize, Box<Problem>> {
-        let before = self.cell.len();
+    ) -> Result<(), Box<Problem>> {
         let (seed, l0) = (DVec3::from(fill.seed), lattice.spacing);
         let mut velocity: DVec3 = fill.velocity.into();
         let mut start = lattice.cell(seed);
@@ -94,6 +91,8 @@ impl Water {
         let mut queue: Vec<(IVec3, usize)> = vec![(start, usize::MAX)];
         let mut next = 0;
         grid.set(start, REACHED);
+        // Cells of faces, from which it does not go on.
+        let mut faces = Vec::new();
         while next < queue.len() {
             let (c, _) = queue[next];
             for way in 0..6 {
@@ -108,6 +107,7 @@ impl Water {
                 }
                 if !grid.cells.contains(to) {
                     queue.iter().for_each(|&(c, _)| grid.set(c, FREE));
+                    faces.iter().for_each(|&c| grid.set(c, FACE));
                     let out = leaves(&queue, next, tank);
                     let message = format!(
                         "water filled from {} up to z = {} leaks out at {}",
@@ -120,19 +120,21 @@ impl Water {
                         "lower the level, or close the gap there with a wall of two particles or more";
                     return Err(Box::new(Problem::new(key, message, remedy)));
                 }
-                if grid.get(to) == FREE {
-                    grid.set(to, REACHED);
-                    queue.push((to, next));
+                match grid.get(to) {
+                    FREE => queue.push((to, next)),
+                    FACE => faces.push(to),
+                    _ => continue,
                 }
+                grid.set(to, REACHED);
             }
             next += 1;
         }
-        for (c, _) in queue {
+        for c in queue.into_iter().map(|(c, _)| c).chain(faces) {
             grid.set(c, FLUID);
             self.cell.push(c);
             self.velocity.push(velocity);
         }
-        Ok(self.cell.len() - before)
+        Ok(())
     }
 
     /// Number of particles whose centres lie inside a shape or on its faces.
@@ -141,17 +143,37 @@ impl Water {
         self.cell.iter().filter(|&&c| body.holds(lattice.center(c), margin)).count()
     }
 
-    /// Removes the particles whose centres lie inside a shape or on its faces.
-    pub fn remove(&mut self, body: &Placed, lattice: &Lattice, grid: &mut Grid) {
-        let margin = margin(body, lattice.spacing);
-        let keep: Vec<bool> = self.cell.iter().map(|&c| !body.holds(lattice.center(c), margin)).collect();
-        for (&c, _) in self.cell.iter().zip(&keep).filter(|(_, keep)| !**keep) {
-            grid.set(c, FREE);
+    /// Removes as much water as a shape displaces, what lies deepest inside of it first: of the particles from the `from`-th on, whose
+    /// cells are `left` then. Returns how many.
+    pub fn remove(
+        &mut self,
+        body: &Placed,
+        (from, left): (usize, u8),
+        lattice: &Lattice,
+        grid: &mut Grid,
+    ) -> usize {
+        let l0 = lattice.spacing;
+        let reach = body.bounds() + l0;
+        let near = lattice.cells(body.center - reach, body.center + reach);
+        // Signed distance of a cell's centre, in whole percents of l0: of those on one face an even choice is taken.
+        let depth = |(k, &c): (usize, &IVec3)| {
+            let off = (near.contains(c)).then(|| body.distance(lattice.center(c)) / l0)?;
+            (off < 0.5 - 1e-6).then(|| ((100.0 * off).round() as i64, even(c), k, (0.5 - off).min(1.0)))
+        };
+        let mut cut: Vec<_> = self.cell.par_iter().enumerate().skip(from).filter_map(depth).collect();
+        let displaced: f64 = cut.iter().map(|(.., share)| share).sum();
+        cut.sort_by_key(|&(off, even, k, _)| (off, even, k));
+        cut.truncate(displaced.round() as usize);
+        let mut keep = vec![true; self.cell.len()];
+        for &(_, _, k, _) in &cut {
+            keep[k] = false;
+            grid.set(self.cell[k], left);
         }
         let mut kept = keep.iter();
         self.cell.retain(|_| kept.next().copied().unwrap_or(true));
         let mut kept = keep.iter();
         self.velocity.retain(|_| kept.next().copied().unwrap_or(true));
+        cut.len()
     }
 
     /// Largest depth along gravity [m]: the highest column of cells where gravity follows an axis of the
@@ -242,6 +264,15 @@ fn leaves(queue: &[(IVec3, usize)], end: usize, tank: Option<Cells>) -> IVec3 {
     let outside = |c: &&IVec3| tank.is_some_and(|tank| !tank.contains(**c));
     // It runs from its end back to the seed.
     path.iter().rev().find(outside).copied().unwrap_or(queue[end].0)
+}
+
+/// An order of cells, any part of which is spread evenly: the fractional part of a plane's multiples that no lattice repeats (Roberts 2018).
+fn even(c: IVec3) -> u64 {
+    const BY: [u64; 3] = [0xd1b5_4a32_d192_ed03, 0xabc9_8388_fb8f_ac03, 0x8cb9_2ba7_2f3d_8dd7];
+    c.to_array()
+        .into_iter()
+        .zip(BY)
+        .fold(0, |sum, (k, by)| sum.wrapping_add((i64::from(k) as u64).wrapping_mul(by)))
 }
 
 /// How far inside a shape water may stand [m]. The lattice of a round body's layers is never the water's: as

@@ -48,6 +48,7 @@ impl DryScene {
         let scene = Scene {
             dimensions: 3,
             spacing,
+            node: DVec3::ZERO,
             gravity: DVec3::new(0.0, 0.0, -GRAVITY),
             position: vec![],
             velocity: vec![],

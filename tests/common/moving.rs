@@ -175,6 +175,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
     Scene {
         dimensions,
         spacing: SPACING,
+        node: 0.5 * DVec3::new(SPACING, if d3 { SPACING } else { 0.0 }, SPACING),
         gravity: DVec3::new(0.0, 0.0, -9.806_65),
         velocity: vec![DVec3::ZERO; position.len()],
         position,

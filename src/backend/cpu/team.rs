@@ -14,7 +14,7 @@ use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
 use crate::ranks::{Standing, Team};
-use crate::scene::{Groups, Kind, Scene, Solid};
+use crate::scene::{Kind, Scene};
 use crate::share::Share;
 use glam::DVec3;
 use std::borrow::Cow;
@@ -32,39 +32,6 @@ pub(super) fn owns(share: Option<&Share>, i: usize) -> bool {
 /// Slots for `water` particles of water and some more, `all` at most where that is enough.
 fn room(water: usize, all: usize) -> usize {
     (water + water / SPARE.0 + SPARE.1).min(all).max(water)
-}
-
-/// The slots of `solids` come behind `to` of the water, where they came behind `from`.
-fn move_slots(solids: &mut [Solid], from: usize, to: usize) {
-    for range in solids.iter_mut().flat_map(|s| [&mut s.wall_slots, &mut s.dummy_slots]) {
-        *range = range.start - from + to..range.end - from + to;
-    }
-}
-
-/// `scene` with the water of the slots `own` alone, in `slots` slots.
-fn part(scene: &Scene, own: &[usize], slots: usize) -> Scene {
-    let (all, parked) = (scene.groups.fluid, slots - own.len());
-    let lay = |water: &mut dyn Iterator<Item = DVec3>, solids: &[DVec3], rest: DVec3| -> Vec<DVec3> {
-        water.chain(std::iter::repeat_n(rest, parked)).chain(solids.iter().copied()).collect()
-    };
-    let kind = own.iter().map(|_| Kind::Fluid).chain(std::iter::repeat_n(Kind::Ghost, parked));
-    let mut solids = scene.solids.clone();
-    move_slots(&mut solids, all, slots);
-    Scene {
-        position: lay(&mut own.iter().map(|&i| scene.position[i]), &scene.position[all..], scene.domain.0),
-        velocity: lay(&mut own.iter().map(|&i| scene.velocity[i]), &scene.velocity[all..], DVec3::ZERO),
-        kind: kind.chain(scene.kind[all..].iter().copied()).collect(),
-        solid: std::iter::repeat_n(0, slots).chain(scene.solid[all..].iter().copied()).collect(),
-        groups: Groups { fluid: slots, ..scene.groups },
-        reserve: parked,
-        openings: scene.openings.clone(),
-        solids,
-        walls: Vec::new(),
-        static_wall_normal: Vec::new(),
-        static_wall_shape: Vec::new(),
-        notes: Vec::new(),
-        ..*scene
-    }
 }
 
 impl Cpu {
@@ -86,7 +53,7 @@ impl Cpu {
         let mut share = Share::new(team, params, scene.groups, &grid)?;
         let own = share.choose(&scene.position, &scene.kind, &grid);
         let slots = room(own.len(), scene.groups.fluid);
-        let mut cpu = Self::new(&part(scene, &own, slots), params, plan, settings)?;
+        let mut cpu = Self::new(&scene.part(&own, slots, &[]), params, plan, settings)?;
         cpu.fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
         share.begin(cpu.groups, own.len(), &cpu.fields, &cpu.grid);
         cpu.share = Some(Box::new(share));
@@ -170,7 +137,7 @@ impl Cpu {
             insert(&mut self.imbalance, slots, more, DVec3::ZERO);
         }
         self.groups.fluid += more;
-        move_slots(&mut self.solids, slots, self.groups.fluid);
+        self.solids.iter_mut().for_each(|solid| solid.move_slots(more as isize, more as isize));
         if let Some((list, _)) = &mut self.fixed {
             list.slot.iter_mut().for_each(|slot| *slot += more as u32);
         }
