@@ -2,13 +2,16 @@
 
 pub mod wall_force;
 
+use crate::backend::RowPressure;
+use crate::body::Wrench;
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
-use crate::kernels::body_force::{head, surface_pressure};
+use crate::kernels::body_force;
 use crate::output::table::{Cell, vector_cells, vector_columns};
 use crate::params::Params;
 use crate::periodic::Periodic;
+use crate::plan::Arrays;
 use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
@@ -135,9 +138,9 @@ impl Gauges {
         }
         for (_, target) in &self.force {
             let (wrench, viscous) = match target {
-                Target::Solid(solid) => (simulation.fluid_force[*solid], None),
+                Target::Solid(solid) => (on_solid(simulation, *solid)?, None),
                 Target::Fixed(wall) => {
-                    let pressures = simulation.backend.pressures(&wall.slots)?;
+                    let pressures = simulation.backend.wall_pressures(&wall.slots)?;
                     let mut wrench = wall.pressure_force(&pressures, &simulation.params);
                     let viscous = fields.as_ref().filter(|_| viscous).map_or(DVec3::ZERO, |f| {
                         wall.viscous_force(f, &simulation.groups, &simulation.params)
@@ -158,19 +161,42 @@ impl Gauges {
     /// the water's surface. A dry particle has none.
     fn pressures(&self, simulation: &mut Simulation, known: bool, row: &mut Vec<Cell>) -> Result<()> {
         let slots: Vec<usize> = self.pressure.iter().flat_map(|g| &g.slots).copied().collect();
-        let pressures = if slots.is_empty() { Vec::new() } else { simulation.backend.pressures(&slots)? };
+        let pressures =
+            if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
         let params = &simulation.params;
         let mut rest = pressures.as_slice();
         for gauge in &self.pressure {
             let (own, after) = rest.split_at(gauge.slots.len());
             rest = after;
-            let at_point =
-                |(&p, &way): (&f64, &DVec3)| surface_pressure(p, p > 0.0, head(p, way, DVec3::ZERO, params));
+            let at_point = |(p, &way): (&RowPressure, &DVec3)| p.on_surface(way, params);
             let sum: f64 = own.iter().zip(&gauge.to_point).map(at_point).sum();
             row.push(Cell::from(if known { sum / own.len() as f64 } else { f64::NAN }));
         }
         Ok(())
     }
+}
+
+/// Force and torque of the fluid on solid `k`. What moves freely is moved by the pressure of its rows, which is what it tells; one that does
+/// not has the pressure on its surface.
+fn on_solid(simulation: &mut Simulation, k: usize) -> Result<Wrench> {
+    let mut wrench = simulation.fluid_force[k];
+    if simulation.solids.is_free(k) || !simulation.plan.needs(Arrays::Excess) {
+        return Ok(wrench);
+    }
+    let solid = &simulation.scene.solids[k];
+    let slots: Vec<usize> = solid.wall_slots.clone().collect();
+    let pressures = simulation.backend.wall_pressures(&slots)?;
+    let (pose, params) = (simulation.solids.poses()[k], &simulation.params);
+    for (n, wall) in pressures.iter().enumerate() {
+        let to_surface = pose.orientation * solid.wall_to_surface[n];
+        let arm = pose.orientation * solid.wall_offset[n] + to_surface;
+        let head = body_force::head(wall.pressure, to_surface, pose.acceleration_at(arm), params);
+        let counted = body_force::surface_pressure(wall.pressure, wall.pressure > 0.0, head);
+        let more = wall.on_surface(to_surface, params) - counted;
+        let force = -more * (pose.orientation * solid.wall_area[n]);
+        wrench += Wrench { force, torque: arm.cross(force) };
+    }
+    Ok(wrench)
 }
 
 impl Target {

@@ -112,6 +112,8 @@ pub enum Arrays {
     Force,
     /// Force of viscosity, friction and collisions on the wall layer of moving solids, which the fluid's force takes in.
     Reaction,
+    /// What walls' pressures are above those on their surface, for gauges.
+    Excess,
     /// Levels of the multigrid preconditioner.
     Multigrid,
     /// Of free bodies in the pressure equation.
@@ -187,6 +189,8 @@ pub struct Plan {
     /// Whether bodies move in the fluid as its pressure acts on them. With the paper's source, the number density alone,
     /// they follow the pressure a step later, as in the paper.
     pub coupled: bool,
+    /// Whether gauges tell of pressures on walls whose rows undo a divergence.
+    pub wall_gauges: bool,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
     /// Whether the water fills all its room, so that the pressure needs a level.
@@ -254,7 +258,18 @@ impl Plan {
         let fixed_walls = fluid && !scene.groups.static_range().is_empty();
         let ledger = case.output.ledger;
         let filled = params.filled;
-        Self { reasons: reasons.to_vec(), preconditioner, coupled, contact, filled, ledger, fixed_walls }
+        let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
+        let wall_gauges = gauges && params.source == Source::Mixed;
+        Self {
+            reasons: reasons.to_vec(),
+            preconditioner,
+            coupled,
+            wall_gauges,
+            contact,
+            filled,
+            ledger,
+            fixed_walls,
+        }
     }
 
     /// Whether `stage` runs.
@@ -278,6 +293,7 @@ impl Plan {
                     && [Stage::Viscosity, Stage::WallFriction, Stage::Collision].into_iter().any(acts)
             }
             Arrays::Coupling => self.coupled,
+            Arrays::Excess => self.wet() && self.wall_gauges,
             Arrays::Ledger => self.wet() && self.ledger,
             Arrays::Openings => self.has(Stage::Openings),
             Arrays::Absorber => self.has(Stage::Absorber),

@@ -218,8 +218,8 @@ fn floor(case: &Case, steps: usize) -> (f64, f64, DVec3) {
     for k in 0..steps {
         sim.step().expect("a step");
         if 2 * k >= steps {
-            let p = sim.backend.pressures(&slots).expect("read");
-            mean += p.iter().sum::<f64>() / slots.len() as f64;
+            let p = sim.backend.wall_pressures(&slots).expect("read");
+            mean += p.iter().map(|p| p.pressure).sum::<f64>() / slots.len() as f64;
             count += 1.0;
             let m = sim.backend.monitor().expect("measured");
             speed = speed.max(m.speed_max);

@@ -13,14 +13,16 @@ use seixo::backend::{Backend, Processor};
 use seixo::body::slots::SlotRow;
 use seixo::body::{FreeBody, Pose, Wrench};
 use seixo::fields::{Fields, State};
+use seixo::kernels::Particles;
 use seixo::kernels::pressure_source::laplacian_coefficient;
+use seixo::kernels::wall_excess::wall_excess as kernel;
 use seixo::params::{Params, Step};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::cg::System;
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
 use seixo::scene::{Kind, Scene};
-use seixo::scheme::{Gradient, Preconditioner};
+use seixo::scheme::{Gradient, Preconditioner, Source};
 use seixo::simulation::Simulation;
 use seixo_study::device_compare::{self as compare, StageError};
 use std::sync::Arc;
@@ -69,7 +71,8 @@ impl Pair {
         // No lattice plane on a border of cells: f32 and f64 would disagree about the side.
         scene.domain.0 -= 0.003 * DVec3::new(1.0, if dimensions == 2 { 0.0 } else { 1.0 }, 1.0);
         let params = Params::new(&case, &scene).expect("valid");
-        let plan = Plan { preconditioner, ..Plan::new(&case, &scene, &params) };
+        let wall_gauges = params.source == Source::Mixed;
+        let plan = Plan { preconditioner, wall_gauges, ..Plan::new(&case, &scene, &params) };
         let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
         let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
         let gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
@@ -920,13 +923,45 @@ fn monitor() {
 }
 
 #[test]
+fn wall_excess() {
+    each(|pair| {
+        pair.run_all(&LISTS);
+        pair.run_to_source();
+        pair.gpu.solve_pressure(&pair.step).expect("the device solves");
+        pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
+        let groups = pair.scene.groups;
+        let slots: Vec<usize> = (groups.fluid..groups.pressure()).collect();
+        let [gpu, cpu] = [pair.gpu.wall_pressures(&slots), pair.cpu.wall_pressures(&slots)];
+        let (gpu, cpu) = (gpu.expect("readable"), cpu.expect("readable"));
+        let fields = pair.cpu.fields();
+        let (position, velocity) = (&fields.position, &fields.velocity);
+        let on = Particles { params: &pair.params, position, velocity, fluid: groups.fluid };
+        let most = fields.pressure.iter().fold(0.0_f64, |most, p| most.max(*p));
+        let mut largest = 0.0_f64;
+        for ((&i, g), c) in slots.iter().zip(&gpu).zip(&cpu) {
+            let carriers = pair.cpu.neighbours().pressure(i).neighbour;
+            let expected = match pair.params.source {
+                Source::Mixed => kernel(i, carriers, on, &fields.pressure),
+                Source::NumberDensity => 0.0,
+            };
+            largest = largest.max(expected.abs());
+            assert!((c.excess - expected).abs() <= 1e-12 * most, "{i}: {c:?} for {expected}");
+            // Each has what its own solve has left.
+            assert!((g.excess - expected).abs() <= SOLVE * most, "{i}: {g:?} for {expected}");
+        }
+        assert!(pair.params.source == Source::NumberDensity || largest > 0.01 * most, "{largest} {most}");
+    });
+}
+
+#[test]
 fn pressures_of_single_slots() {
     let Some(mut pair) = Pair::new(3, "preset = \"accurate\"") else { return };
-    let slots: Vec<usize> = (0..pair.scene.groups.pressure()).step_by(7).collect();
+    let groups = pair.scene.groups;
+    let slots: Vec<usize> = (groups.fluid..groups.pressure()).step_by(7).collect();
     let all = pair.gpu.read().expect("readable").pressure;
-    let some = pair.gpu.pressures(&slots).expect("readable");
-    assert!(some.iter().any(|&p| p > 0.0));
-    assert_eq!(some, slots.iter().map(|&s| all[s]).collect::<Vec<_>>());
+    let some = pair.gpu.wall_pressures(&slots).expect("readable");
+    assert!(some.iter().any(|p| p.pressure > 0.0));
+    assert!(some.iter().zip(&slots).all(|(p, &s)| p.pressure == all[s]));
 }
 
 #[test]

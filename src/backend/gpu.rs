@@ -25,7 +25,7 @@ pub use adapter::{AdapterInfo, adapters};
 pub use bandwidth::bandwidth;
 
 use super::traffic::Traffic;
-use super::{Backend, Commands, Counters, Timing};
+use super::{Backend, Commands, Counters, RowPressure, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
@@ -479,7 +479,12 @@ impl Backend for Gpu {
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         self.context.begin(Some(Stage::ConjugateGradient));
         self.set_step(step)?;
-        self.conjugate_gradient()
+        let report = self.conjugate_gradient()?;
+        if self.plan.needs(Arrays::Excess) {
+            let walls = self.sizes.pressure - self.sizes.fluid;
+            self.context.pass([(kernels::wall_excess::wall_excess, groups(walls))])?;
+        }
+        Ok(report)
     }
 
     fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
@@ -574,10 +579,17 @@ impl Backend for Gpu {
         Ok(Some(packed.into_iter().map(|x| f64::from(x[3])).collect()))
     }
 
-    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
+    fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
         let parts: Vec<_> = slots.iter().map(|&s| (s, 1)).collect();
         let pressures = self.context.download_parts(buffers::pressure, &parts)?;
-        Ok(pressures.into_iter().map(f64::from).collect())
+        let excess = if self.plan.needs(Arrays::Excess) {
+            let parts: Vec<_> = slots.iter().map(|&s| (s - self.groups.fluid, 1)).collect();
+            self.context.download_parts(buffers::excess, &parts)?
+        } else {
+            vec![0.0; slots.len()]
+        };
+        let both = pressures.into_iter().zip(excess);
+        Ok(both.map(|(p, over)| RowPressure { pressure: p.into(), excess: over.into() }).collect())
     }
 
     fn read(&mut self) -> Result<Fields> {

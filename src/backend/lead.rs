@@ -2,7 +2,7 @@
 
 use super::cpu::Cpu;
 use super::traffic::Traffic;
-use super::{Backend, Counters};
+use super::{Backend, Counters, RowPressure};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::checkpoint::Archive;
@@ -121,9 +121,9 @@ impl Backend for Lead {
         self.cpu.monitor()
     }
 
-    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
+    fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
         self.order(&Order::Pressures(slots.into()));
-        self.cpu.pressures(slots)
+        self.cpu.wall_pressures(slots)
     }
 
     fn read(&mut self) -> Result<Fields> {
@@ -183,7 +183,7 @@ pub fn follow(cpu: &mut Cpu) -> Result<()> {
             Order::Counters => drop(cpu.counters()?),
             Order::Ledger => drop(cpu.ledger()?),
             Order::Monitor => drop(cpu.monitor()?),
-            Order::Pressures(slots) => drop(cpu.pressures(&slots)?),
+            Order::Pressures(slots) => drop(cpu.wall_pressures(&slots)?),
             Order::Read => drop(cpu.read()?),
             Order::Ranks => drop(cpu.ranks()?),
             Order::Restore => cpu.restore(None)?,

@@ -13,10 +13,11 @@ use crate::checkpoint::Archive;
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::kernels::body_force;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
-use crate::params::Step;
+use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::PressureReport;
 use crate::ranks::Standing;
@@ -167,6 +168,25 @@ impl Commands {
     }
 }
 
+/// What a particle of a wall tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowPressure {
+    /// Pressure of its row [Pa].
+    pub pressure: f64,
+    /// What that is above the pressure on the surface, but for the weight of the water between [Pa].
+    pub excess: f64,
+}
+
+impl RowPressure {
+    /// Pressure on the surface [Pa], which lies `to_surface` [m] from the particle. A particle without pressure before water without any is
+    /// dry and has none.
+    pub fn on_surface(&self, to_surface: DVec3, params: &Params) -> f64 {
+        let weight = body_force::head(self.pressure, to_surface, DVec3::ZERO, params);
+        let wet = self.pressure > 0.0 || self.excess < 0.0;
+        body_force::surface_pressure(self.pressure, wet, weight - self.excess)
+    }
+}
+
 /// A backend holds the particles and runs stages on them.
 pub trait Backend: Send {
     /// Name of the processor, e.g. `CPU, f64, 2 threads` or the adapter's name.
@@ -209,8 +229,9 @@ pub trait Backend: Send {
     fn solution(&mut self) -> Result<Option<Vec<f64>>> {
         Ok(None)
     }
-    /// Pressures of single slots [Pa].
-    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>>;
+    /// Pressures of single particles of walls [Pa], each with what it is above that on the surface but for the weight of the water
+    /// between ([`crate::kernels::wall_excess`]): none where no gauge of the case asks, or the scheme knows none.
+    fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>>;
     /// All fields, on the host.
     fn read(&mut self) -> Result<Fields>;
     /// Overwrite all fields (positions, velocities, kinds, ids, pressures).

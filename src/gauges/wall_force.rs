@@ -1,12 +1,11 @@
-//! Force of the fluid on a fixed wall: pressure times area over its wall layer, as on bodies
-//! ([`crate::kernels::body_force`]), and the reactions of viscosity ([`crate::kernels::viscosity`]) and of the friction of
+//! Force of the fluid on a fixed wall: pressure on the surface ([`crate::kernels::wall_excess`]) times area over its wall layer, and the reactions of viscosity ([`crate::kernels::viscosity`]) and of the friction of
 //! unresolved boundary layers ([`crate::kernels::wall_friction`]).
 //!
 //! Collisions of particles with the wall, Eq. (18), are not in it.
 
+use crate::backend::RowPressure;
 use crate::body::Wrench;
 use crate::fields::Fields;
-use crate::kernels::body_force::{head, surface_pressure};
 use crate::kernels::number_density::pair_weight;
 use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
@@ -67,12 +66,11 @@ impl FixedWall {
         Some(out)
     }
 
-    /// Force and torque of the pressures of its slots [N, N m]. Pressure 0 is that of a dry particle.
-    pub fn pressure_force(&self, pressures: &[f64], params: &Params) -> Wrench {
+    /// Force and torque of the pressures of its slots [N, N m].
+    pub fn pressure_force(&self, pressures: &[RowPressure], params: &Params) -> Wrench {
         let mut sum = Wrench::default();
-        for (k, &p) in pressures.iter().enumerate() {
-            let p = surface_pressure(p, p > 0.0, head(p, self.to_surface[k], DVec3::ZERO, params));
-            let force = -p * self.area[k];
+        for (k, p) in pressures.iter().enumerate() {
+            let force = -p.on_surface(self.to_surface[k], params) * self.area[k];
             sum.force += force;
             sum.torque += (self.position[k] + self.to_surface[k] - self.about).cross(force);
         }

@@ -24,6 +24,7 @@ pub mod pressure_source;
 pub mod shift;
 pub mod surface_pressure;
 pub mod viscosity;
+pub mod wall_excess;
 pub mod wall_friction;
 
 pub use crate::neighbourhood::Particles;
@@ -108,6 +109,7 @@ pub mod device {
         shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
         surface_pressure[super::WORKGROUP] Stage(SurfacePressure), Rows: surface_pressure_main;
         viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
+        wall_excess[super::WORKGROUP] Arrays(Excess), Own: wall_excess;
         wall_friction[super::WORKGROUP] Stage(WallFriction), FluidAndReaction: wall_friction;
     }
 

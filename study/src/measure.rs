@@ -252,8 +252,8 @@ impl Sampler {
             self.slope += slope;
         }
         if let Some(slot) = self.sensor {
-            let p = simulation.backend.pressures(&[slot])?;
-            self.sensed.push(p.first().map_or(f64::NAN, |p| p / (self.weight * depth)));
+            let p = simulation.backend.wall_pressures(&[slot])?;
+            self.sensed.push(p.first().map_or(f64::NAN, |p| p.pressure / (self.weight * depth)));
         }
         if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::Draft)) {
             self.sample_draft(simulation, fields);

@@ -28,6 +28,8 @@ impl Cpu {
             // Follows from the case.
             params,
             settings: _,
+            // Found by every solve.
+            excess: _,
             lightness: _,
             groups,
             solids: _,

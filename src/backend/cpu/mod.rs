@@ -22,7 +22,7 @@ use self::search::{Candidates, Coordinates, Search, neighbour_list};
 use self::team::owns;
 use self::viscosity::viscosity_rows;
 use super::traffic::{Sizes, Traffic};
-use super::{Backend, Counters};
+use super::{Backend, Counters, RowPressure};
 use crate::body::slots::{self, SlotRow};
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
@@ -33,7 +33,7 @@ use crate::kernels::openings::{Emission, Outlet};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
     Particles, absorber, body_force, collision, correct, coupling, monitor, move_solids, openings, predict,
-    pressure_level, shift, surface_pressure, wall_friction,
+    pressure_level, shift, surface_pressure, wall_excess, wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -86,6 +86,8 @@ pub struct Cpu {
     /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
     imbalance: Vec<DVec3>,
     dt: f64,
+    /// What walls' pressures are above those on their surface [Pa], a wall that carries pressure, if gauges ask.
+    excess: Vec<f64>,
     /// What of it this rank computes, where there are others.
     share: Option<Box<Share>>,
 }
@@ -132,6 +134,7 @@ impl Cpu {
             ledger: (wet && plan.ledger).then(Box::default),
             imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
             dt: 0.0,
+            excess: vec![0.0; if plan.needs(Arrays::Excess) { groups.pressure() - groups.fluid } else { 0 }],
             share: None,
         })
     }
@@ -632,6 +635,12 @@ impl Backend for Cpu {
             slots.zip(p).map(cut).fold([0; 2], add)
         };
         let [high, low] = fields.pressure.par_chunks_mut(CHUNK).enumerate().map(cuts).reduce(|| [0; 2], add);
+        let Fields { position, velocity, pressure, .. } = &self.fields;
+        let on = Particles { params, position, velocity, fluid: self.groups.fluid };
+        self.excess.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(wall, excess)| {
+            let i = on.fluid + wall;
+            *excess = wall_excess::wall_excess(i, neighbours.pressure(i).neighbour, on, pressure);
+        });
         self.counters.pressure_clamps += high;
         self.counters.negative_pressures += low;
         Ok(report)
@@ -716,14 +725,22 @@ impl Backend for Cpu {
         Ok(monitor::monitor(&sums, &self.params, self.dt))
     }
 
-    fn pressures(&mut self, slots: &[usize]) -> Result<Vec<f64>> {
-        let Some(share) = &self.share else {
-            return Ok(slots.iter().map(|&s| self.fields.pressure[s]).collect());
+    fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
+        let Self { fields, groups, excess, share, .. } = self;
+        let of = |i: usize| {
+            let wall = i.checked_sub(groups.fluid);
+            [fields.pressure[i], wall.and_then(|wall| excess.get(wall)).copied().unwrap_or_default()]
         };
-        let here = slots.iter().map(|&s| share.here(s).filter(|&s| share.owns(s)));
-        let mut pressures: Vec<f64> = here.map(|s| s.map_or(0.0, |s| self.fields.pressure[s])).collect();
-        share.sum(&mut pressures);
-        Ok(pressures)
+        let told = match share {
+            None => slots.iter().map(|&s| of(s)).collect::<Vec<_>>(),
+            Some(share) => {
+                let here = slots.iter().map(|&s| share.here(s).filter(|&s| share.owns(s)));
+                let mut told: Vec<f64> = here.flat_map(|s| s.map_or([0.0; 2], of)).collect();
+                share.sum(&mut told);
+                told.chunks_exact(2).map(|both| [both[0], both[1]]).collect()
+            }
+        };
+        Ok(told.into_iter().map(|[pressure, excess]| RowPressure { pressure, excess }).collect())
     }
 
     fn read(&mut self) -> Result<Fields> {

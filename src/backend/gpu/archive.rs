@@ -24,7 +24,7 @@ const SAVED: [&str; 10] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 45] = [
+const MADE_ANEW: [&str; 46] = [
     "unclipped",
     "clipped",
     "surface_pressure",
@@ -68,6 +68,7 @@ const MADE_ANEW: [&str; 45] = [
     "wrench",
     "free_body",
     "coupling",
+    "excess",
     "monitor_sum",
     "speed_bin",
 ];

@@ -76,6 +76,10 @@ table! {
         partial_sum: [f32; 4], None, Fluid, |s, _| 2 * s.reduction_groups();
         solve: Solve, Both, Fluid, |_, _| 1;
     }
+    "gauges" {
+        /// Of the walls' rows.
+        excess: f32, Reads, Excess, |s, _| (s.pressure - s.fluid).max(1);
+    }
     "multigrid" {
         hierarchy: Hierarchy, Uniform, Multigrid, |_, _| 1;
         cell_mark: u32, Writes, Multigrid, |_, l| l.cells;

@@ -168,6 +168,7 @@ mod tests {
             reasons,
             preconditioner: Preconditioner::Multigrid,
             coupled: true,
+            wall_gauges: true,
             contact: Default::default(),
             fixed_walls: true,
             filled: false,
