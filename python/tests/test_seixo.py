@@ -150,7 +150,9 @@ def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
 def test_ctrl_c_reaches_python_after_the_state_is_saved(tmp_path: Path) -> None:
     import subprocess
 
-    script = f"import seixo; seixo.run({str(ROOT / 'cases/dam_break_2d.toml')!r}, 'out', until=50.0, backend='cpu')"
+    # What is started in the background ignores SIGINT.
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    script = heed + f"import seixo; seixo.run({str(ROOT / 'cases/dam_break_2d.toml')!r}, 'out', until=50.0, backend='cpu')"
     process = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True)
     import os
     import time
