@@ -1,11 +1,15 @@
 // Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer. P is
-// the pressure on the true surface, half a spacing outside of the particles' centres: what the weight and the inertia of
-// the water between would add is known. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
+// the pressure on the true surface, half a spacing outside of the particles' centres: without the excess of the particle's row
+// (wall_excess.wgsl), with the weight of the water between. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
 // Twin: src/kernels/body_force.rs
 
 @group(0) @binding(2) var<storage, read> pressure: array<f32>;
 @group(0) @binding(3) var<storage, read_write> reaction: array<vec4f>;
+//#if MIXED
+@group(0) @binding(4) var<storage, read> excess: array<f32>; // of the walls' rows, the moving ones first
+//#else
 @group(0) @binding(4) var<storage, read> state: array<u32>;
+//#endif
 @group(0) @binding(5) var<storage, read> wall_layer: array<WallParticle>;
 @group(0) @binding(6) var<storage, read> poses: array<Pose>;
 @group(0) @binding(7) var<storage, read> force_chunk: array<vec4u>; // first of the moving-wall slots, how many, solid
@@ -28,10 +32,17 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let k = chunk.x + t;
         let pose = poses[chunk.z];
         let wall = wall_layer[k];
-        let under_water = state[params.fluid + k] == INNER;
         let p = pressure[params.fluid + k];
+        var on_surface = p + surface_head(pose, wall);
+//#if MIXED
+        let under_water = excess[k] < DRY;
+        on_surface -= excess[k];
+//#else
+        let under_water = state[params.fluid + k] == INNER;
+        on_surface = max(on_surface, 0.0);
+//#endif
         if under_water {
-            force = -max(p + surface_head(p, pose, wall), 0.0) * rotate(pose.orientation, wall.area.xyz);
+            force = -on_surface * rotate(pose.orientation, wall.area.xyz);
 //#if COUPLED
             force *= 1.0 - coupling[4u * k].w;
 //#endif

@@ -17,6 +17,8 @@ const GHOST: f32 = 5.0;
 const INACTIVE: u32 = 0u;
 const SURFACE: u32 = 1u;
 const INNER: u32 = 2u;
+// Excess of a wall's row whose pressure is no unknown; DRY in src/backend/gpu/layout.rs.
+const DRY: f32 = 3.0e38;
 
 // As crate::kernels::predict::DISPLACEMENT_MAX and crate::kernels::number_density::CLOSEST.
 const DISPLACEMENT_MAX: f32 = 0.5;
@@ -94,8 +96,6 @@ struct Pose {
     orientation: vec4f,
     velocity: vec4f,
     angular_velocity: vec4f,
-    acceleration: vec4f, // over the last step
-    angular_acceleration: vec4f,
 }
 
 // A wall-layer particle of a moving solid, in the solid's frame: outward area, from the centre of mass to the surface, from
@@ -103,7 +103,7 @@ struct Pose {
 struct WallParticle {
     area: vec4f, // and its lightness in collisions
     arm: vec4f,
-    to_surface: vec4f,
+    to_surface: vec4f, // and cut_share of src/kernels/wall_excess.rs
 }
 
 // A box in which the water comes to rest. Corners relative to the middle of the domain; s = ramp.xyz . (r - start.xyz).
@@ -337,17 +337,8 @@ fn coupled_row(k: u32) -> u32 {
     return 4u * params.moving_wall + 2u * k;
 }
 
-// Pressure on the true surface of a moving solid over `pressure`, that of a particle half a spacing inside: weight and
-// inertia of the water that would lie between. See head in src/kernels/body_force.rs.
-fn surface_head(pressure: f32, pose: Pose, wall: WallParticle) -> f32 {
-    let to_surface = rotate(pose.orientation, wall.to_surface.xyz);
-    var head = params.density * dot(params.gravity, to_surface) + params.surface_head;
-//#if MIXED
-    let arm = rotate(pose.orientation, wall.arm.xyz);
-    let acceleration = pose.acceleration.xyz + cross(pose.angular_acceleration.xyz, arm);
-    // Water does not pull.
-    let most = max(pressure, 0.0);
-    head -= clamp(params.density * dot(acceleration, to_surface), -most, most);
-//#endif
-    return head;
+// Pressure of still water on the true surface of a moving solid over that of a wall-layer particle, half a spacing inside.
+// See head in src/kernels/body_force.rs.
+fn surface_head(pose: Pose, wall: WallParticle) -> f32 {
+    return params.density * dot(params.gravity, rotate(pose.orientation, wall.to_surface.xyz)) + params.surface_head;
 }

@@ -7,7 +7,7 @@
 
 @group(0) @binding(2) var<storage, read> poses: array<Pose>;
 @group(0) @binding(3) var<storage, read> wall_layer: array<WallParticle>;
-@group(0) @binding(4) var<storage, read> state: array<u32>;
+@group(0) @binding(4) var<storage, read> excess: array<f32>; // of the walls' rows, the moving ones first
 @group(0) @binding(5) var<storage, read> free_body: array<FreeBody>;
 @group(0) @binding(6) var<storage, read_write> source_diagonal: array<vec2f>;
 // Of each moving-wall slot what slots between solids bring it (of a pascal force and the part of its own area that is taken,
@@ -15,9 +15,8 @@
 // diagonal; then y of each body.
 @group(0) @binding(7) var<storage, read_write> coupling: array<vec4f>;
 @group(0) @binding(8) var<storage, read> preconditioned: array<vec4f>;
-@group(0) @binding(9) var<storage, read> pressure: array<f32>; // of the last step
 //#if REACTION
-@group(0) @binding(10) var<storage, read> reaction: array<vec4f>;
+@group(0) @binding(9) var<storage, read> reaction: array<vec4f>;
 //#endif
 
 // How a body answers: M^-1 times rho / (c l0^3), with the c by which the device's equation is divided.
@@ -89,11 +88,11 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         let arm = rotate(pose.orientation, wall.arm.xyz);
         var row = Wrench(vec3f(0.0), vec3f(0.0));
         var force = vec3f(0.0);
-        if state[params.fluid + k] == INNER {
+        if excess[k] < DRY {
             let slot = coupling[4u * k];
             row.force = (slot.w - 1.0) * rotate(pose.orientation, wall.area.xyz);
             row.torque = cross(arm, row.force);
-            force = surface_head(pressure[params.fluid + k], pose, wall) * row.force;
+            force = (surface_head(pose, wall) - excess[k]) * row.force;
             row.force += slot.xyz;
             row.torque += coupling[4u * k + 1u].xyz;
             known.force += coupling[4u * k + 2u].xyz;

@@ -55,6 +55,9 @@ pub struct Fields {
     /// Force of viscosity and collisions on the wall layer of moving solids [N], moving-wall slots; empty where the
     /// plan leaves it out.
     pub reaction: Vec<DVec3>,
+    /// What the last step left of the excess of free bodies' rows beside what their equations told ([`crate::kernels::wall_excess`]) [Pa],
+    /// moving-wall slots; empty where the plan leaves it out.
+    pub inertia_head: Vec<f64>,
 }
 
 impl Fields {
@@ -75,6 +78,7 @@ impl Fields {
             diagonal: vec![1.0; p],
             acceleration: vec![DVec3::ZERO; g.fluid],
             reaction: Vec::new(),
+            inertia_head: Vec::new(),
         }
     }
 

@@ -3,15 +3,12 @@
 pub mod wall_force;
 
 use crate::backend::RowPressure;
-use crate::body::Wrench;
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
-use crate::kernels::body_force;
 use crate::output::table::{Cell, vector_cells, vector_columns};
 use crate::params::Params;
 use crate::periodic::Periodic;
-use crate::plan::Arrays;
 use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
@@ -138,7 +135,7 @@ impl Gauges {
         }
         for (_, target) in &self.force {
             let (wrench, viscous) = match target {
-                Target::Solid(solid) => (on_solid(simulation, *solid)?, None),
+                Target::Solid(solid) => (simulation.fluid_force[*solid], None),
                 Target::Fixed(wall) => {
                     let pressures = simulation.backend.wall_pressures(&wall.slots)?;
                     let mut wrench = wall.pressure_force(&pressures, &simulation.params);
@@ -174,29 +171,6 @@ impl Gauges {
         }
         Ok(())
     }
-}
-
-/// Force and torque of the fluid on solid `k`. What moves freely is moved by the pressure of its rows, which is what it tells; one that does
-/// not has the pressure on its surface.
-fn on_solid(simulation: &mut Simulation, k: usize) -> Result<Wrench> {
-    let mut wrench = simulation.fluid_force[k];
-    if simulation.solids.is_free(k) || !simulation.plan.needs(Arrays::Excess) {
-        return Ok(wrench);
-    }
-    let solid = &simulation.scene.solids[k];
-    let slots: Vec<usize> = solid.wall_slots.clone().collect();
-    let pressures = simulation.backend.wall_pressures(&slots)?;
-    let (pose, params) = (simulation.solids.poses()[k], &simulation.params);
-    for (n, wall) in pressures.iter().enumerate() {
-        let to_surface = pose.orientation * solid.wall_to_surface[n];
-        let arm = pose.orientation * solid.wall_offset[n] + to_surface;
-        let head = body_force::head(wall.pressure, to_surface, pose.acceleration_at(arm), params);
-        let counted = body_force::surface_pressure(wall.pressure, wall.pressure > 0.0, head);
-        let more = wall.on_surface(to_surface, params) - counted;
-        let force = -more * (pose.orientation * solid.wall_area[n]);
-        wrench += Wrench { force, torque: arm.cross(force) };
-    }
-    Ok(wrench)
 }
 
 impl Target {

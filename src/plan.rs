@@ -5,7 +5,7 @@ use crate::case::{self, Case, ContactDevice};
 use crate::compute::Program;
 use crate::contact;
 use crate::params::Params;
-use crate::scene::{Drive, Scene};
+use crate::scene::{Scene, Solid};
 use crate::scheme::{Gradient, Preconditioner, Source};
 
 macro_rules! stages {
@@ -112,7 +112,7 @@ pub enum Arrays {
     Force,
     /// Force of viscosity, friction and collisions on the wall layer of moving solids, which the fluid's force takes in.
     Reaction,
-    /// What walls' pressures are above those on their surface, for gauges.
+    /// What walls' pressures are above those on their surface.
     Excess,
     /// Levels of the multigrid preconditioner.
     Multigrid,
@@ -155,7 +155,7 @@ impl ContactPlan {
 
     fn judge(case: &Case, scene: &Scene, asked: ContactDevice) -> Self {
         let host = |reason: &str| Self { program: None, reason: reason.into() };
-        let free = |s: &&crate::scene::Solid| matches!(s.drive, Drive::Free(_));
+        let free = |s: &&Solid| s.is_free();
         let points: usize = scene.solids.iter().filter(free).map(|s| s.wall_offset.len()).sum();
         let program = match case.contact.as_ref().map(|c| c.law) {
             None => return host("no contact"),
@@ -179,6 +179,28 @@ impl ContactPlan {
     }
 }
 
+/// Walls of which the pressure on the surface is told, where it is not that of their rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Excess {
+    /// None.
+    None,
+    /// Those that move: bodies are pressed by it.
+    Moving,
+    /// All: gauges ask.
+    All,
+}
+
+impl Excess {
+    /// Rows of them in a scene of `walls`, of which the first `moving` move.
+    pub fn rows(self, walls: usize, moving: usize) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Moving => moving,
+            Self::All => walls,
+        }
+    }
+}
+
 /// What a scene needs.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -189,8 +211,8 @@ pub struct Plan {
     /// Whether bodies move in the fluid as its pressure acts on them. With the paper's source, the number density alone,
     /// they follow the pressure a step later, as in the paper.
     pub coupled: bool,
-    /// Whether gauges tell of pressures on walls whose rows undo a divergence.
-    pub wall_gauges: bool,
+    /// Of which walls the pressure on the surface is told, where their rows undo a divergence.
+    pub excess: Excess,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
     /// Whether the water fills all its room, so that the pressure needs a level.
@@ -206,7 +228,7 @@ impl Plan {
     pub fn new(case: &Case, scene: &Scene, params: &Params) -> Self {
         let fluid = scene.groups.fluid > 0;
         let moving = !scene.solids.is_empty();
-        let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
+        let free = scene.solids.iter().any(Solid::is_free);
         let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| s.name == g.on));
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
@@ -259,12 +281,17 @@ impl Plan {
         let ledger = case.output.ledger;
         let filled = params.filled;
         let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
-        let wall_gauges = gauges && params.source == Source::Mixed;
+        let pressed = reasons.iter().any(|r| matches!(r, (Stage::BodyForce, Ok(_))));
+        let excess = match params.source {
+            Source::Mixed if gauges => Excess::All,
+            Source::Mixed if pressed => Excess::Moving,
+            _ => Excess::None,
+        };
         Self {
             reasons: reasons.to_vec(),
             preconditioner,
             coupled,
-            wall_gauges,
+            excess,
             contact,
             filled,
             ledger,
@@ -293,7 +320,7 @@ impl Plan {
                     && [Stage::Viscosity, Stage::WallFriction, Stage::Collision].into_iter().any(acts)
             }
             Arrays::Coupling => self.coupled,
-            Arrays::Excess => self.wet() && self.wall_gauges,
+            Arrays::Excess => self.wet() && self.excess != Excess::None,
             Arrays::Ledger => self.wet() && self.ledger,
             Arrays::Openings => self.has(Stage::Openings),
             Arrays::Absorber => self.has(Stage::Absorber),

@@ -16,7 +16,7 @@ use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::{Bounds, PointGrid, meeting};
 use crate::kernels::coupling::row;
-use crate::scene::{Drive, Scene, Solid};
+use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -45,7 +45,7 @@ struct Layer {
 
 impl Layer {
     fn new(solid: &Solid, l0: f64) -> Self {
-        let free = matches!(solid.drive, Drive::Free(_));
+        let free = solid.is_free();
         let offset = solid.wall_offset.clone();
         let grid = PointGrid::new(offset.clone(), CELL * l0);
         let near = |(k, &x): (usize, &DVec3)| {

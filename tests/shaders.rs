@@ -265,10 +265,7 @@ fn structs_lie_the_same_on_both_sides() {
     );
     same_layout!("multigrid_levels", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
-    same_layout!(
-        "move_solids",
-        Pose { position, orientation, velocity, angular_velocity, acceleration, angular_acceleration }
-    );
+    same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
     same_layout!("body_force", WallParticle { area, arm, to_surface });
     same_layout!("openings", Emission { wall, count, to, pad, shift, velocity });
     same_layout!("openings", Outlet { low, high });

@@ -37,6 +37,7 @@ pub use crate::kernels::device as kernels;
 use crate::kernels::device::Over;
 use crate::kernels::monitor::{speed_most, speed_range};
 use crate::kernels::openings::{Emission, Outlet};
+use crate::kernels::wall_excess::cut_share;
 use crate::ledger::Ledger;
 use crate::monitor::{FluidMonitor, SPEED_BINS};
 use crate::params::{Params, Step};
@@ -255,13 +256,14 @@ impl Gpu {
             let mut chunks: Vec<[u32; 4]> = Vec::new();
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
+                let felt = cut_share(solid, &self.params);
                 let lightness = collision::lightness(solid, &self.params);
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
                     layer[first + p] = WallParticle {
                         area: four(solid.wall_area[p], lightness as f32),
                         arm: four(solid.wall_offset[p] + to_surface, 0.0),
-                        to_surface: four(to_surface, 0.0),
+                        to_surface: four(to_surface, felt as f32),
                     };
                 }
                 for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {
@@ -479,10 +481,15 @@ impl Backend for Gpu {
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         self.context.begin(Some(Stage::ConjugateGradient));
         self.set_step(step)?;
+        if self.plan.needs(Arrays::Coupling) {
+            let moving = self.sizes.moving_wall;
+            self.context.pass([(kernels::wall_excess::before_solve, groups(moving))])?;
+        }
         let report = self.conjugate_gradient()?;
         if self.plan.needs(Arrays::Excess) {
-            let walls = self.sizes.pressure - self.sizes.fluid;
-            self.context.pass([(kernels::wall_excess::wall_excess, groups(walls))])?;
+            let Groups { moving_wall, .. } = self.groups;
+            let rows = self.plan.excess.rows(self.groups.pressure() - self.groups.fluid, moving_wall);
+            self.context.pass([(kernels::wall_excess::after_solve, groups(rows as u64))])?;
         }
         Ok(report)
     }
@@ -497,8 +504,6 @@ impl Backend for Gpu {
             orientation: p.orientation.as_quat().to_array(),
             velocity: four(p.velocity),
             angular_velocity: four(p.angular_velocity),
-            acceleration: four(p.acceleration),
-            angular_acceleration: four(p.angular_acceleration),
         };
         let poses: Vec<_> = poses.iter().map(device).collect();
         self.context.begin(Some(Stage::MoveSolids));
@@ -589,7 +594,11 @@ impl Backend for Gpu {
             vec![0.0; slots.len()]
         };
         let both = pressures.into_iter().zip(excess);
-        Ok(both.map(|(p, over)| RowPressure { pressure: p.into(), excess: over.into() }).collect())
+        let told = |(p, over): (f32, f32)| {
+            let excess = if over < layout::DRY { over.into() } else { 0.0 };
+            RowPressure { pressure: p.into(), excess }
+        };
+        Ok(both.map(told).collect())
     }
 
     fn read(&mut self) -> Result<Fields> {

@@ -33,6 +33,9 @@ fn start(scene: &Scene, plan: &Plan) -> Fields {
     if plan.needs(Arrays::Reaction) {
         fields.reaction = vec![DVec3::ZERO; scene.groups.moving_wall];
     }
+    if plan.needs(Arrays::Coupling) {
+        fields.inertia_head = vec![0.0; scene.groups.moving_wall];
+    }
     if plan.needs(Arrays::SurfacePressure) {
         fields.surface_pressure = vec![0.0; scene.groups.pressure()];
     }
@@ -181,9 +184,9 @@ impl RowPressure {
     /// Pressure on the surface [Pa], which lies `to_surface` [m] from the particle. A particle without pressure before water without any is
     /// dry and has none.
     pub fn on_surface(&self, to_surface: DVec3, params: &Params) -> f64 {
-        let weight = body_force::head(self.pressure, to_surface, DVec3::ZERO, params);
         let wet = self.pressure > 0.0 || self.excess < 0.0;
-        body_force::surface_pressure(self.pressure, wet, weight - self.excess)
+        let p = body_force::surface_pressure(self.pressure, self.excess, to_surface, params);
+        if wet { p.max(0.0) } else { 0.0 }
     }
 }
 

@@ -22,10 +22,6 @@ pub struct Pose {
     pub velocity: DVec3,
     /// Angular velocity [rad/s].
     pub angular_velocity: DVec3,
-    /// Acceleration of the centre of mass over the last step [m/s2].
-    pub acceleration: DVec3,
-    /// Angular acceleration over the last step [rad/s2].
-    pub angular_acceleration: DVec3,
 }
 
 impl Pose {
@@ -37,17 +33,6 @@ impl Pose {
     /// Velocity [m/s] of the solid at the world point `at` [m].
     pub fn velocity_at(&self, at: DVec3) -> DVec3 {
         self.velocity + self.angular_velocity.cross(at - self.position)
-    }
-
-    /// Acceleration [m/s2] of the solid's surface at `arm` from the centre of mass [m], world axes, as its speed grows.
-    pub fn acceleration_at(&self, arm: DVec3) -> DVec3 {
-        self.acceleration + self.angular_acceleration.cross(arm)
-    }
-
-    /// Tells the acceleration over the step of `dt` [s] that began at `before`.
-    pub(crate) fn accelerate_from(&mut self, before: &Self, dt: f64) {
-        self.acceleration = (self.velocity - before.velocity) / dt;
-        self.angular_acceleration = (self.angular_velocity - before.angular_velocity) / dt;
     }
 
     /// Whether every number is finite.
@@ -129,8 +114,6 @@ impl Body {
                 orientation: solid.orientation.normalize(),
                 velocity: DVec3::ZERO,
                 angular_velocity: DVec3::ZERO,
-                acceleration: DVec3::ZERO,
-                angular_acceleration: DVec3::ZERO,
             },
             rotation: DMat3::from_quat(solid.orientation.normalize()),
             momentum: DVec3::ZERO,

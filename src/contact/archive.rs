@@ -10,12 +10,11 @@ use crate::error::Result;
 use glam::{DQuat, DVec3};
 
 /// A pose as numbers.
-const POSE: usize = 19;
+const POSE: usize = 13;
 
 fn numbers(pose: &Pose) -> [f64; POSE] {
-    let Pose { position, orientation, velocity, angular_velocity, acceleration, angular_acceleration } =
-        *pose;
-    let vectors = [position, velocity, angular_velocity, acceleration, angular_acceleration];
+    let Pose { position, orientation, velocity, angular_velocity } = *pose;
+    let vectors = [position, velocity, angular_velocity];
     let mut n = [0.0; POSE];
     n[..4].copy_from_slice(&orientation.to_array());
     n[4..].copy_from_slice(vectors.map(|v| v.to_array()).as_flattened());
@@ -29,8 +28,6 @@ fn pose(n: &[f64]) -> Pose {
         orientation: DQuat::from_slice(n),
         velocity: vector(1),
         angular_velocity: vector(2),
-        acceleration: vector(3),
-        angular_acceleration: vector(4),
     }
 }
 

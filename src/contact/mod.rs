@@ -160,10 +160,7 @@ impl Solids {
     pub fn predict(&mut self, t: f64, dt: f64, gravity: DVec3, contact: bool) -> &[Pose] {
         for (k, body) in self.bodies.iter().enumerate() {
             self.predicted[k] = match body.prescribed(t, dt) {
-                Some(mut pose) => {
-                    pose.accelerate_from(&self.poses[k], dt);
-                    pose
-                }
+                Some(pose) => pose,
                 None => {
                     let mut body = body.clone();
                     let contact = if contact { self.contact[k] } else { Wrench::default() };
@@ -240,7 +237,6 @@ impl Solids {
         }
         report.penetration_max_over_l0 /= self.spacing;
         for (k, body) in self.bodies.iter_mut().enumerate() {
-            body.pose.accelerate_from(&self.poses[k], dt);
             self.poses[k] = body.pose;
             if !body.is_free() {
                 continue;

@@ -251,7 +251,7 @@ fn fastest_speed(scene: &Scene) -> f64 {
 /// Speed [m/s] of a body that falls from where it starts to the lowest wall, or of water that falls its depth.
 fn falling_speed(scene: &Scene) -> f64 {
     let up = -scene.gravity.normalize_or_zero();
-    let free = scene.solids.iter().filter(|s| matches!(s.drive, Drive::Free(_)));
+    let free = scene.solids.iter().filter(|s| s.is_free());
     let highest = free.map(|s| s.position.dot(up) + s.shape.radius()).fold(f64::NEG_INFINITY, f64::max);
     // of each wall the lowest corner of the face that looks up most
     let floor = |w: &WallShape| {

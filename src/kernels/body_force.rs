@@ -6,25 +6,22 @@ use crate::params::Params;
 use crate::scheme::Source;
 use glam::DVec3;
 
-/// Pressure on the true surface of the solid [Pa], `head` above that of a wall-layer particle, whose centre lies half a
-/// spacing inside. Particles that are no unknown feel no pressure.
+/// Pressure on the true surface of the solid [Pa], `to_surface` from a wall-layer particle of `pressure` inside (world axes [m]): without the
+/// `excess` of its row ([`super::wall_excess`], none in the paper's scheme), with the weight of the water between.
+/// In the paper's scheme water does not pull; in the other one nothing is cut, or a body would not get what the water loses.
 #[inline(always)]
-pub fn surface_pressure(pressure: f64, unknown: bool, head: f64) -> f64 {
-    if unknown { (pressure + head).max(0.0) } else { 0.0 }
+pub fn surface_pressure(pressure: f64, excess: f64, to_surface: DVec3, params: &Params) -> f64 {
+    let p = pressure - excess + head(to_surface, params);
+    match params.source {
+        Source::NumberDensity => p.max(0.0),
+        Source::Mixed => p,
+    }
 }
 
-/// Pressure on the true surface over `pressure` [Pa], that of a wall-layer particle, which lies `to_surface` inside
-/// (world axes [m]): rho (g - a) . to_surface. The weight of the water that would lie between presses too, and so does its
-/// inertia where the surface accelerates with a = `acceleration` [m/s2]; the scheme that solves for the number density leaves that out.
-/// Inertia takes or gives no more than there is: water does not pull.
+/// Pressure on the true surface of water at rest over that of a particle, from which it lies `to_surface` [m]: rho g . to_surface [Pa].
 #[inline(always)]
-pub fn head(pressure: f64, to_surface: DVec3, acceleration: DVec3, params: &Params) -> f64 {
-    let inertia = match params.source {
-        Source::NumberDensity => 0.0,
-        Source::Mixed => params.density * acceleration.dot(to_surface),
-    };
-    let most = pressure.max(0.0);
-    params.density * params.gravity.dot(to_surface) + missing_head(params) - inertia.clamp(-most, most)
+pub fn head(to_surface: DVec3, params: &Params) -> f64 {
+    params.density * params.gravity.dot(to_surface) + missing_head(params)
 }
 
 /// What the pressure lacks at the water's surface [Pa].

@@ -109,7 +109,7 @@ pub mod device {
         shift[super::WORKGROUP] Stage(Shift), Fluid: shift;
         surface_pressure[super::WORKGROUP] Stage(SurfacePressure), Rows: surface_pressure_main;
         viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
-        wall_excess[super::WORKGROUP] Arrays(Excess), Own: wall_excess;
+        wall_excess[super::WORKGROUP] Arrays(Excess), Own: before_solve after_solve;
         wall_friction[super::WORKGROUP] Stage(WallFriction), FluidAndReaction: wall_friction;
     }
 

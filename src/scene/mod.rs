@@ -201,6 +201,11 @@ pub struct Solid {
 }
 
 impl Solid {
+    /// Whether forces move it.
+    pub fn is_free(&self) -> bool {
+        matches!(self.drive, Drive::Free(_))
+    }
+
     /// Whether it stands still for ever: an obstacle that is no box of the lattice.
     pub fn is_still(&self) -> bool {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())

@@ -6,7 +6,7 @@
 
 use super::oriented::Placed;
 use super::walls::Fixed;
-use super::{Drive, Shape, Solid, WallShape};
+use super::{Shape, Solid, WallShape};
 use crate::case::Law;
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
@@ -73,7 +73,7 @@ impl Surroundings<'_> {
     /// The fixed walls and earlier solids. Prescribed bodies may reach into what does not move under forces: a table
     /// of motion is the user's word.
     fn obstructions(&self, body: &Solid) -> Vec<Obstruction<'_>> {
-        let free = |s: &Solid| matches!(s.drive, Drive::Free(_));
+        let free = Solid::is_free;
         let mut all = Vec::new();
         if free(body) {
             let wall = |w: &WallShape| Obstruction {
@@ -178,14 +178,14 @@ impl Surroundings<'_> {
             (a.min(b) - reach, a.max(b) + reach)
         };
         let near = |p: &DVec3| p.cmpge(lo).all() && p.cmple(hi).all();
-        let free = matches!(body.drive, Drive::Free(_));
+        let free = body.is_free();
         let mut others: Vec<(DVec3, Partner)> = Vec::new();
         if free {
             let walls = self.fixed.wall.iter().zip(&self.fixed.shape_of);
             others.extend(walls.filter(|(p, _)| near(p)).map(|(&p, &of)| (p, Partner::Wall(of))));
         }
         for (k, solid) in self.earlier.iter().enumerate() {
-            if free || matches!(solid.drive, Drive::Free(_)) {
+            if free || solid.is_free() {
                 others.extend(solid.wall_positions().filter(|p| near(p)).map(|p| (p, Partner::Solid(k))));
             }
         }

@@ -85,6 +85,30 @@ macro_rules! of_carriers {
 }
 of_carriers!(f32 f64);
 
+/// Numbers of the first walls that carry pressure, behind `fluid` slots of water; other slots of the border have none.
+pub struct OfWalls<'a> {
+    /// Slots of the water.
+    pub fluid: usize,
+    /// One a wall.
+    pub values: &'a mut [f64],
+}
+
+/// Numbers of those of `slots` that are of the first `count` walls behind `fluid` slots of water.
+fn walls(slots: impl Iterator<Item = usize>, fluid: usize, count: usize) -> impl Iterator<Item = usize> {
+    slots.filter_map(move |i| i.checked_sub(fluid)).filter(move |&k| k < count)
+}
+
+impl Bordered for OfWalls<'_> {
+    fn give(&self, side: &Side, out: &mut Vec<u8>) {
+        give(self.values, walls(side.given(), self.fluid, self.values.len()), |v| v, out);
+    }
+
+    fn take(&mut self, side: &Side, from: &mut &[u8]) {
+        let walls = walls(side.taken(), self.fluid, self.values.len());
+        take(self.values, walls, |v: f64| v, from);
+    }
+}
+
 impl Bordered for &mut [State] {
     fn give(&self, side: &Side, out: &mut Vec<u8>) {
         give(self, side.given(), |s| s as u8, out);

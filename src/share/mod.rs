@@ -20,7 +20,7 @@ use crate::machine::memory_peak;
 use crate::params::Params;
 use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::Groups;
-pub use border::{Bordered, Side};
+pub use border::{Bordered, OfWalls, Side};
 use cut::check;
 use glam::DVec3;
 pub use moves::Traveller;

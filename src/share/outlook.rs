@@ -78,7 +78,8 @@ impl Outlook {
         let multigrid = u64::from(plan.preconditioner == Preconditioner::Multigrid);
         let filled = u64::from(plan.filled);
         // Water on its way and copies, motion after the stages that change it, states, pressures known, guessed and found, diagonals.
-        let step_messages = 2 + motions + 1 + surface + 2 + multigrid;
+        // The excess of bodies' rows, which is not much beside them.
+        let step_messages = 2 + motions + 1 + surface + 2 + multigrid + u64::from(plan.coupled);
         let a_water = 64 + 48 * motions;
         let a_carrier = 1 + 8 * surface + 16 + 4 * multigrid;
         let bodies = u64::from(plan.coupled) + count(&[Stage::BodyForce]);

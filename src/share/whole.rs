@@ -18,6 +18,8 @@ struct Part {
     pressure: Vec<f64>,
     number_density: Vec<f64>,
     surface_pressure: Vec<f64>,
+    /// Of moving walls among `walls`.
+    inertia_head: Vec<f64>,
     state: Vec<u8>,
 }
 
@@ -30,6 +32,7 @@ struct Whole {
     id: Vec<u32>,
     pressure: Vec<f64>,
     number_density: Vec<f64>,
+    inertia_head: Vec<f64>,
     state: Vec<u8>,
     dt: f64,
 }
@@ -51,6 +54,11 @@ impl Share {
             } else {
                 carriers(&fields.surface_pressure)
             },
+            inertia_head: self
+                .owned()
+                .skip(own.len())
+                .filter_map(|i| fields.inertia_head.get(i - self.groups.fluid).copied())
+                .collect(),
             state: self.owned().map(|i| fields.state[i] as u8).collect(),
         };
         let parts = self.collect(encode(&part));
@@ -74,6 +82,9 @@ impl Share {
                     out.surface_pressure[i] = p;
                 }
             }
+            let moving = part.walls.iter().filter(|&&k| (k as usize) < out.inertia_head.len());
+            let heads: Vec<_> = moving.copied().zip(part.inertia_head).collect();
+            heads.into_iter().for_each(|(k, head)| out.inertia_head[k as usize] = head);
             n += water;
         }
         self.name_the_rest(&mut out, n);
@@ -102,6 +113,7 @@ impl Share {
             // Zero between two steps.
             acceleration: vec![DVec3::ZERO; all.fluid],
             reaction: vec![DVec3::ZERO; fields.reaction.len()],
+            inertia_head: vec![0.0; fields.inertia_head.len()],
         }
     }
 
@@ -115,6 +127,7 @@ impl Share {
             id: fields.id,
             pressure: fields.pressure,
             number_density: fields.number_density,
+            inertia_head: fields.inertia_head,
             dt,
         });
         let whole: Whole = decode(&self.team.hear(whole.map_or_else(Vec::new, |whole| encode(&whole))));
@@ -126,6 +139,7 @@ impl Share {
             id: whole.id,
             pressure: whole.pressure,
             number_density: whole.number_density,
+            inertia_head: whole.inertia_head,
             ..Fields::default()
         };
         (fields, whole.dt)
@@ -157,5 +171,6 @@ impl Share {
         fields.pressure[here..].copy_from_slice(&whole.pressure[all..]);
         fields.number_density[here..].copy_from_slice(&whole.number_density[all..]);
         fields.state[here..].copy_from_slice(&whole.state[all..]);
+        fields.inertia_head.copy_from_slice(&whole.inertia_head);
     }
 }

@@ -76,6 +76,7 @@ pub fn by_number(fields: &Fields) -> Fields {
         diagonal: sort(&fields.diagonal, &slot),
         acceleration: sort(&fields.acceleration, &slot),
         reaction: fields.reaction.clone(),
+        inertia_head: fields.inertia_head.clone(),
     }
 }
 

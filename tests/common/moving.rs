@@ -212,8 +212,6 @@ pub fn poses(scene: &Scene, t: f64) -> Vec<Pose> {
                 orientation: DQuat::from_scaled_axis(turn),
                 velocity,
                 angular_velocity,
-                acceleration: 8.0 * velocity,
-                angular_acceleration: -5.0 * angular_velocity,
             }
         })
         .collect()

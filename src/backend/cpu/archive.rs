@@ -31,6 +31,7 @@ impl Cpu {
             // Found by every solve.
             excess: _,
             lightness: _,
+            cut_share: _,
             groups,
             solids: _,
             grid: _,
@@ -104,6 +105,7 @@ impl Saved<'_> {
             diagonal: _,
             acceleration,
             reaction,
+            inertia_head,
         } = fields;
         archive.array("position", position, true)?;
         archive.array("velocity", velocity, true)?;
@@ -112,6 +114,7 @@ impl Saved<'_> {
         archive.array("number_density", number_density, true)?;
         archive.array("acceleration", acceleration, true)?;
         archive.array("reaction", reaction, true)?;
+        archive.array("inertia_head", inertia_head, true)?;
         codes(archive, "kind", kind, |k| k as u8, Kind::from_code)?;
         codes(archive, "state", state, |s| s as u8, State::from_code)?;
         // The lists of the last step serve viscosity, at the start of the next one.

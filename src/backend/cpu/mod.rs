@@ -47,7 +47,7 @@ use crate::pressure::{PressureReport, Settings};
 use crate::ranks::Standing;
 use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
-use crate::share::Share;
+use crate::share::{OfWalls, Share};
 use crate::stop::Stop;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -67,6 +67,8 @@ pub struct Cpu {
     slots: Vec<SlotRow>,
     /// [`collision::lightness`] of each wall-layer slot of the moving solids.
     lightness: Vec<f64>,
+    /// [`wall_excess::cut_share`] of each wall-layer slot of the moving solids; empty where none is free.
+    cut_share: Vec<f64>,
     fields: Fields,
     grid: Grid,
     fluid_start: Vec<u32>,
@@ -86,7 +88,7 @@ pub struct Cpu {
     /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
     imbalance: Vec<DVec3>,
     dt: f64,
-    /// What walls' pressures are above those on their surface [Pa], a wall that carries pressure, if gauges ask.
+    /// What walls' pressures are above those on their surface [Pa], a wall that carries pressure, of those of which it is told.
     excess: Vec<f64>,
     /// What of it this rank computes, where there are others.
     share: Option<Box<Share>>,
@@ -108,11 +110,14 @@ impl Cpu {
             coordinates.set(list.slot.par_iter().map(place));
             (list, coordinates)
         });
+        let rows = |s: &Solid| std::iter::repeat_n(wall_excess::cut_share(s, params), s.wall_slots.len());
+        let cut_share = scene.solids.iter().filter(|_| plan.needs(Arrays::Coupling)).flat_map(rows);
         Ok(Self {
             params: params.clone(),
             settings,
             groups,
             solids: scene.solids.clone(),
+            cut_share: cut_share.collect(),
             poses: Vec::new(),
             free_bodies: Vec::new(),
             slots: Vec::new(),
@@ -134,7 +139,7 @@ impl Cpu {
             ledger: (wet && plan.ledger).then(Box::default),
             imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
             dt: 0.0,
-            excess: vec![0.0; if plan.needs(Arrays::Excess) { groups.pressure() - groups.fluid } else { 0 }],
+            excess: vec![0.0; plan.excess.rows(groups.pressure() - groups.fluid, groups.moving_wall)],
             share: None,
         })
     }
@@ -385,7 +390,8 @@ impl Cpu {
     fn couple(&mut self) -> Vec<CoupledBody> {
         let (params, fluid, share) = (&self.params, self.groups.fluid, self.share.as_deref());
         let density_over_volume = params.density / params.spacing.powi(3);
-        let Fields { state, reaction, source, pressure, .. } = &mut self.fields;
+        let Fields { state, reaction, source, .. } = &mut self.fields;
+        let excess = &self.excess;
         let answers =
             |body: &FreeBody| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO;
         let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies).enumerate();
@@ -407,8 +413,9 @@ impl Cpu {
                     return Wrench::default();
                 }
                 let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
-                let head = body_force::head(pressure[i], to_surface, pose.acceleration_at(arm), params);
-                let force = body_force::body_force(head, area, reaction);
+                // What acts at a pressure of zero.
+                let known = body_force::surface_pressure(0.0, excess[i - fluid], to_surface, params);
+                let force = body_force::body_force(known, area, reaction);
                 sum += Wrench { force, torque: arm.cross(force) };
                 sum += slot.head;
                 let mut row = coupling::row(area, arm);
@@ -429,6 +436,74 @@ impl Cpu {
             out.push(coupled);
         }
         out
+    }
+
+    /// What the rows of bodies take off their pressures in the solve.
+    fn excess_before(&mut self) {
+        let Self { fields, neighbours, params, groups, excess, share, .. } = self;
+        let Fields { position, velocity, state, source, surface_pressure, inertia_head, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let (c, share) = (laplacian_coefficient(params), share.as_deref());
+        excess.par_iter_mut().zip(inertia_head).with_min_len(CHUNK).enumerate().for_each(
+            |(wall, (excess, head))| {
+                let i = on.fluid + wall;
+                *excess = if owns(share, i) && state[i] == State::Inner {
+                    let carriers = neighbours.pressure(i).neighbour;
+                    *head + wall_excess::known_excess(i, carriers, on, source[i] / c, surface_pressure)
+                } else {
+                    0.0
+                };
+            },
+        );
+    }
+
+    /// What bodies have answered is another excess than what the solution has: the next step begins with the difference. `excess` becomes
+    /// the pressure on their surface without what [`Self::excess_after`] adds.
+    fn excess_solved(&mut self) {
+        let Self { fields, neighbours, params, groups, excess, cut_share, share, .. } = self;
+        let Fields { position, velocity, state, pressure, inertia_head, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let share = share.as_deref();
+        (excess, inertia_head, &cut_share[..]).into_par_iter().with_min_len(CHUNK).enumerate().for_each(
+            |(wall, (excess, head, &felt))| {
+                let i = on.fluid + wall;
+                if felt > 0.0 && owns(share, i) && state[i] == State::Inner {
+                    let solved = wall_excess::wall_excess(i, neighbours.pressure(i).neighbour, on, pressure);
+                    *head = solved - (*excess - *head);
+                    *excess = (1.0 - felt) * pressure[i] - *excess + felt * solved;
+                } else {
+                    (*excess, *head) = (0.0, 0.0);
+                }
+            },
+        );
+    }
+
+    /// What the pressures of walls are above those on their surface.
+    fn excess_after(&mut self) {
+        let Self { fields, neighbours, params, groups, excess, cut_share, share, .. } = self;
+        let Fields { position, velocity, state, pressure, inertia_head, .. } = fields;
+        let on = Particles { params, position, velocity, fluid: groups.fluid };
+        let of = share.as_deref();
+        let found = |wall: usize| {
+            let i = on.fluid + wall;
+            (owns(of, i) && state[i] == State::Inner)
+                .then(|| wall_excess::wall_excess(i, neighbours.pressure(i).neighbour, on, pressure))
+        };
+        excess.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(wall, excess)| {
+            let felt = cut_share.get(wall).filter(|felt| **felt > 0.0);
+            *excess = match (found(wall), felt) {
+                (Some(found), Some(felt)) => {
+                    let p = pressure[on.fluid + wall];
+                    p - (*excess + felt * (p - found))
+                }
+                (found, _) => found.unwrap_or(0.0),
+            };
+        });
+        if let Some(share) = share
+            && !inertia_head.is_empty()
+        {
+            share.swap(&mut [&mut OfWalls { fluid: groups.fluid, values: inertia_head }]);
+        }
     }
 
     fn pressure_gradient(&mut self) {
@@ -573,6 +648,7 @@ impl Backend for Cpu {
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
+        self.excess_before();
         let bodies = self.couple();
         let Self { fields, neighbours, params, settings, work, multigrid, grid, share, .. } = self;
         let share = share.as_deref();
@@ -623,6 +699,9 @@ impl Backend for Cpu {
         if let Some(ledger) = &mut self.ledger {
             ledger.solution.clone_from(&fields.pressure);
         }
+        self.excess_solved();
+        let Self { fields, share, .. } = self;
+        let share = share.as_deref();
         let cut = |(i, p): (usize, &mut f64)| {
             let (high, low) = (*p > step.pressure_max, *p < 0.0);
             *p = p.clamp(0.0, step.pressure_max);
@@ -635,14 +714,9 @@ impl Backend for Cpu {
             slots.zip(p).map(cut).fold([0; 2], add)
         };
         let [high, low] = fields.pressure.par_chunks_mut(CHUNK).enumerate().map(cuts).reduce(|| [0; 2], add);
-        let Fields { position, velocity, pressure, .. } = &self.fields;
-        let on = Particles { params, position, velocity, fluid: self.groups.fluid };
-        self.excess.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(wall, excess)| {
-            let i = on.fluid + wall;
-            *excess = wall_excess::wall_excess(i, neighbours.pressure(i).neighbour, on, pressure);
-        });
         self.counters.pressure_clamps += high;
         self.counters.negative_pressures += low;
+        self.excess_after();
         Ok(report)
     }
 
@@ -674,13 +748,13 @@ impl Backend for Cpu {
                 let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
-                let (pressure, unknown) = (fields.pressure[i], fields.state[i] == State::Inner);
-                if own && unknown {
-                    total.add(pressure, &slot.per_pascal);
+                let mut pressure = 0.0;
+                if own && fields.state[i] == State::Inner {
+                    total.add(fields.pressure[i], &slot.per_pascal);
                     total += slot.head;
+                    let excess = self.excess.get(i - fluid).copied().unwrap_or(0.0);
+                    pressure = body_force::surface_pressure(fields.pressure[i], excess, to_surface, params);
                 }
-                let head = body_force::head(pressure, to_surface, pose.acceleration_at(arm), params);
-                let pressure = if own { body_force::surface_pressure(pressure, unknown, head) } else { 0.0 };
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;

@@ -119,6 +119,7 @@ impl Cpu {
             acceleration,
             // Of solids alone.
             reaction: _,
+            inertia_head: _,
         } = &mut self.fields;
         insert(position, slots, more, self.params.domain_min);
         insert(velocity, slots, more, DVec3::ZERO);

@@ -9,7 +9,7 @@ use bytemuck::Pod;
 
 /// Buffers that hold the state between two steps.
 #[cfg(test)]
-const SAVED: [&str; 10] = [
+const SAVED: [&str; 11] = [
     "ledger_sum",
     "position",
     "velocity",
@@ -18,6 +18,7 @@ const SAVED: [&str; 10] = [
     "state",
     "acceleration",
     "reaction",
+    "inertia_head",
     "neighbour_list",
     "neighbour_count",
 ];
@@ -86,6 +87,9 @@ impl Gpu {
             self.buffer(archive, buffers::acceleration, g.fluid)?;
             if self.plan.needs(Arrays::Reaction) {
                 self.buffer(archive, buffers::reaction, g.moving_wall)?;
+            }
+            if self.plan.needs(Arrays::Coupling) {
+                self.buffer(archive, buffers::inertia_head, g.moving_wall)?;
             }
             // The lists of the last step serve viscosity, at the start of the next one.
             if self.params.viscosity > 0.0 {

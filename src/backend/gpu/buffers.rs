@@ -76,9 +76,10 @@ table! {
         partial_sum: [f32; 4], None, Fluid, |s, _| 2 * s.reduction_groups();
         solve: Solve, Both, Fluid, |_, _| 1;
     }
-    "gauges" {
+    "pressure on walls" {
         /// Of the walls' rows.
         excess: f32, Reads, Excess, |s, _| (s.pressure - s.fluid).max(1);
+        inertia_head: f32, Both, Coupling, |s, _| s.moving_wall;
     }
     "multigrid" {
         hierarchy: Hierarchy, Uniform, Multigrid, |_, _| 1;

@@ -168,7 +168,7 @@ mod tests {
             reasons,
             preconditioner: Preconditioner::Multigrid,
             coupled: true,
-            wall_gauges: true,
+            excess: crate::plan::Excess::All,
             contact: Default::default(),
             fixed_walls: true,
             filled: false,

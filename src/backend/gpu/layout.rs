@@ -24,6 +24,8 @@ pub(crate) const SCAN_BLOCK: u64 = 4 * WORKGROUP;
 pub(crate) const SCAN_GROUPS_MAX: u64 = 1024;
 /// Fluid slots whose ghosts share a key of the counting sort; `GHOST_BLOCK` in shaders/common.wgsl.
 pub const GHOST_BLOCK: u64 = 64;
+/// Excess of a wall's row whose pressure is no unknown [Pa]; `DRY` in shaders/common.wgsl.
+pub(crate) const DRY: f32 = 3.0e38;
 /// Fluid particles at most: numbers travel in an f32.
 pub(crate) const FLUID_MAX: usize = 1 << 24;
 
@@ -138,8 +140,6 @@ pub struct Pose {
     pub orientation: [f32; 4],
     pub velocity: [f32; 4],
     pub angular_velocity: [f32; 4],
-    pub acceleration: [f32; 4],
-    pub angular_acceleration: [f32; 4],
 }
 
 /// A wall-layer particle of a moving solid; see `WallParticle` in shaders/body_force.wgsl.
@@ -523,7 +523,7 @@ mod tests {
             reasons,
             preconditioner: Preconditioner::Multigrid,
             coupled: true,
-            wall_gauges: true,
+            excess: crate::plan::Excess::All,
             contact: Default::default(),
             fixed_walls: true,
             filled: false,
@@ -545,7 +545,7 @@ mod tests {
             reasons,
             preconditioner: Preconditioner::Jacobi,
             coupled: false,
-            wall_gauges: false,
+            excess: crate::plan::Excess::None,
             contact: Default::default(),
             fixed_walls: false,
             filled: false,

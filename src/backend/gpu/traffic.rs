@@ -92,6 +92,9 @@ impl Gpu {
         let work = |bytes, dispatches| Work { bytes, dispatches };
         let respond = u64::from(self.coupled > 0);
         let prepare = respond;
+        // What presses on walls, before the solve and after it.
+        let before = u64::from(self.plan.needs(Arrays::Coupling));
+        let after = u64::from(self.plan.needs(Arrays::Excess));
         // z lies next to the positions, in one record.
         let (z, r, p) = (buffers::preconditioned.size(), buffers::residual.size(), buffers::pressure.size());
         let search = buffers::search.size();
@@ -104,13 +107,21 @@ impl Gpu {
         let start = equation + u * (r + 2 * z);
         let ends = work(
             pack + 2 * residual + start + slots * (p + 2 * z) + 2 * p * slots,
-            6 + prepare + 2 * respond,
+            6 + prepare + 2 * respond + before + after,
         );
         // Rows of the bodies: read by `respond` beside the z there, and by `multiply`.
         let coupled = respond * self.sizes.moving_wall * (4 * buffers::coupling.size() + z);
         let multiply = equation + lists + u * (z + 2 * search);
         let advance = equation + u * (search + 2 * p + 2 * r + 2 * z);
         let mut ends = ends;
+        let walls = (self.groups.pressure() - self.groups.fluid) as u64;
+        let excess = before * self.sizes.moving_wall
+            + after * {
+                let moving = self.sizes.moving_wall as usize;
+                self.plan.excess.rows(walls as usize, moving) as u64
+            };
+        let row = buffers::position.size() + buffers::source_diagonal.size() + k + p + buffers::excess.size();
+        ends.bytes += excess * row + k * rows.near * excess / rows.used.max(1);
         if self.params.filled {
             // The right side is read and read and written, so is the pressure, each time beside the state.
             ends.bytes += slots * (4 * buffers::state.size() + 3 * buffers::source_diagonal.size() + 3 * p);

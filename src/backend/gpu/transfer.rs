@@ -101,6 +101,9 @@ impl Gpu {
         if self.plan.needs(Arrays::Reaction) {
             context.upload(buffers::reaction, &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
         }
+        if self.plan.needs(Arrays::Coupling) {
+            context.upload(buffers::inertia_head, &scalar(&fields.inertia_head))?;
+        }
         context.upload(buffers::counters, &counter::START)?;
         context.clear(buffers::neighbour_count)
     }
@@ -144,6 +147,9 @@ impl Gpu {
             wide(if known > 0 { context.download(buffers::surface_pressure, known)? } else { Vec::new() });
         let felt = if self.plan.needs(Arrays::Reaction) { g.moving_wall } else { 0 };
         let reaction = if felt > 0 { context.download(buffers::reaction, felt)? } else { Vec::new() };
+        let heads = if self.plan.needs(Arrays::Coupling) { g.moving_wall } else { 0 };
+        let inertia_head =
+            wide(if heads > 0 { context.download(buffers::inertia_head, heads)? } else { Vec::new() });
         let c = laplacian_coefficient(&self.params);
         let diagonal = |e: &[f32; 2]| if e[1] > 0.0 { f64::from(e[1]) * c } else { 1.0 };
         let mut fields = Fields {
@@ -159,6 +165,7 @@ impl Gpu {
             diagonal: equations.iter().map(diagonal).collect(),
             acceleration: acceleration.iter().map(vector).collect(),
             reaction: reaction.iter().map(vector).collect(),
+            inertia_head,
         };
         fields.wrap(&g, &self.params.periodic);
         Ok(fields)
