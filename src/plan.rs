@@ -281,7 +281,7 @@ impl Plan {
         let ledger = case.output.ledger;
         let filled = params.filled;
         let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
-        let pressed = reasons.iter().any(|r| matches!(r, (Stage::BodyForce, Ok(_))));
+        let pressed = fluid && moving && (free || gauged || ledger);
         let excess = match params.source {
             Source::Mixed if gauges => Excess::All,
             Source::Mixed if pressed => Excess::Moving,

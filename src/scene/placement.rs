@@ -73,9 +73,8 @@ impl Surroundings<'_> {
     /// The fixed walls and earlier solids. Prescribed bodies may reach into what does not move under forces: a table
     /// of motion is the user's word.
     fn obstructions(&self, body: &Solid) -> Vec<Obstruction<'_>> {
-        let free = Solid::is_free;
         let mut all = Vec::new();
-        if free(body) {
+        if body.is_free() {
             let wall = |w: &WallShape| Obstruction {
                 name: format!("wall `{}`", w.name),
                 placed: w.into(),
@@ -83,7 +82,7 @@ impl Surroundings<'_> {
             };
             all.extend(self.fixed.shapes.iter().map(wall));
         }
-        let solids = self.earlier.iter().filter(|s| free(body) || free(s));
+        let solids = self.earlier.iter().filter(|s| body.is_free() || s.is_free());
         all.extend(solids.map(|&s| Obstruction { name: solid_name(s), placed: s.placed(), solid: Some(s) }));
         all
     }

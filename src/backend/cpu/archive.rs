@@ -31,7 +31,6 @@ impl Cpu {
             // Found by every solve.
             excess: _,
             lightness: _,
-            cut_share: _,
             groups,
             solids: _,
             grid: _,

@@ -11,6 +11,7 @@ mod row_arrays;
 mod search;
 mod team;
 mod viscosity;
+mod wall_excess;
 mod wide;
 
 use self::ledger::WaterLedger;
@@ -21,6 +22,7 @@ use self::row_arrays::RowArrays;
 use self::search::{Candidates, Coordinates, Search, neighbour_list};
 use self::team::owns;
 use self::viscosity::viscosity_rows;
+use self::wall_excess::{Rows, WallExcess};
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters, RowPressure};
 use crate::body::slots::{self, SlotRow};
@@ -33,7 +35,7 @@ use crate::kernels::openings::{Emission, Outlet};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{
     Particles, absorber, body_force, collision, correct, coupling, monitor, move_solids, openings, predict,
-    pressure_level, shift, surface_pressure, wall_excess, wall_friction,
+    pressure_level, shift, surface_pressure, wall_friction,
 };
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -47,7 +49,7 @@ use crate::pressure::{PressureReport, Settings};
 use crate::ranks::Standing;
 use crate::scene::{Groups, Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
-use crate::share::{OfWalls, Share};
+use crate::share::Share;
 use crate::stop::Stop;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -67,8 +69,6 @@ pub struct Cpu {
     slots: Vec<SlotRow>,
     /// [`collision::lightness`] of each wall-layer slot of the moving solids.
     lightness: Vec<f64>,
-    /// [`wall_excess::cut_share`] of each wall-layer slot of the moving solids; empty where none is free.
-    cut_share: Vec<f64>,
     fields: Fields,
     grid: Grid,
     fluid_start: Vec<u32>,
@@ -88,8 +88,7 @@ pub struct Cpu {
     /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
     imbalance: Vec<DVec3>,
     dt: f64,
-    /// What walls' pressures are above those on their surface [Pa], a wall that carries pressure, of those of which it is told.
-    excess: Vec<f64>,
+    excess: WallExcess,
     /// What of it this rank computes, where there are others.
     share: Option<Box<Share>>,
 }
@@ -110,14 +109,11 @@ impl Cpu {
             coordinates.set(list.slot.par_iter().map(place));
             (list, coordinates)
         });
-        let rows = |s: &Solid| std::iter::repeat_n(wall_excess::cut_share(s, params), s.wall_slots.len());
-        let cut_share = scene.solids.iter().filter(|_| plan.needs(Arrays::Coupling)).flat_map(rows);
         Ok(Self {
             params: params.clone(),
             settings,
             groups,
             solids: scene.solids.clone(),
-            cut_share: cut_share.collect(),
             poses: Vec::new(),
             free_bodies: Vec::new(),
             slots: Vec::new(),
@@ -139,7 +135,7 @@ impl Cpu {
             ledger: (wet && plan.ledger).then(Box::default),
             imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
             dt: 0.0,
-            excess: vec![0.0; plan.excess.rows(groups.pressure() - groups.fluid, groups.moving_wall)],
+            excess: WallExcess::new(scene, params, plan),
             share: None,
         })
     }
@@ -414,7 +410,7 @@ impl Cpu {
                 }
                 let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
                 // What acts at a pressure of zero.
-                let known = body_force::surface_pressure(0.0, excess[i - fluid], to_surface, params);
+                let known = body_force::surface_pressure(0.0, excess.of(i - fluid), to_surface, params);
                 let force = body_force::body_force(known, area, reaction);
                 sum += Wrench { force, torque: arm.cross(force) };
                 sum += slot.head;
@@ -438,72 +434,10 @@ impl Cpu {
         out
     }
 
-    /// What the rows of bodies take off their pressures in the solve.
-    fn excess_before(&mut self) {
+    /// The walls' excess, and what its rows are made of.
+    fn wall_excess(&mut self) -> (&mut WallExcess, Rows<'_>, &mut Fields) {
         let Self { fields, neighbours, params, groups, excess, share, .. } = self;
-        let Fields { position, velocity, state, source, surface_pressure, inertia_head, .. } = fields;
-        let on = Particles { params, position, velocity, fluid: groups.fluid };
-        let (c, share) = (laplacian_coefficient(params), share.as_deref());
-        excess.par_iter_mut().zip(inertia_head).with_min_len(CHUNK).enumerate().for_each(
-            |(wall, (excess, head))| {
-                let i = on.fluid + wall;
-                *excess = if owns(share, i) && state[i] == State::Inner {
-                    let carriers = neighbours.pressure(i).neighbour;
-                    *head + wall_excess::known_excess(i, carriers, on, source[i] / c, surface_pressure)
-                } else {
-                    0.0
-                };
-            },
-        );
-    }
-
-    /// What bodies have answered is another excess than what the solution has: the next step begins with the difference. `excess` becomes
-    /// the pressure on their surface without what [`Self::excess_after`] adds.
-    fn excess_solved(&mut self) {
-        let Self { fields, neighbours, params, groups, excess, cut_share, share, .. } = self;
-        let Fields { position, velocity, state, pressure, inertia_head, .. } = fields;
-        let on = Particles { params, position, velocity, fluid: groups.fluid };
-        let share = share.as_deref();
-        (excess, inertia_head, &cut_share[..]).into_par_iter().with_min_len(CHUNK).enumerate().for_each(
-            |(wall, (excess, head, &felt))| {
-                let i = on.fluid + wall;
-                if felt > 0.0 && owns(share, i) && state[i] == State::Inner {
-                    let solved = wall_excess::wall_excess(i, neighbours.pressure(i).neighbour, on, pressure);
-                    *head = solved - (*excess - *head);
-                    *excess = (1.0 - felt) * pressure[i] - *excess + felt * solved;
-                } else {
-                    (*excess, *head) = (0.0, 0.0);
-                }
-            },
-        );
-    }
-
-    /// What the pressures of walls are above those on their surface.
-    fn excess_after(&mut self) {
-        let Self { fields, neighbours, params, groups, excess, cut_share, share, .. } = self;
-        let Fields { position, velocity, state, pressure, inertia_head, .. } = fields;
-        let on = Particles { params, position, velocity, fluid: groups.fluid };
-        let of = share.as_deref();
-        let found = |wall: usize| {
-            let i = on.fluid + wall;
-            (owns(of, i) && state[i] == State::Inner)
-                .then(|| wall_excess::wall_excess(i, neighbours.pressure(i).neighbour, on, pressure))
-        };
-        excess.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(wall, excess)| {
-            let felt = cut_share.get(wall).filter(|felt| **felt > 0.0);
-            *excess = match (found(wall), felt) {
-                (Some(found), Some(felt)) => {
-                    let p = pressure[on.fluid + wall];
-                    p - (*excess + felt * (p - found))
-                }
-                (found, _) => found.unwrap_or(0.0),
-            };
-        });
-        if let Some(share) = share
-            && !inertia_head.is_empty()
-        {
-            share.swap(&mut [&mut OfWalls { fluid: groups.fluid, values: inertia_head }]);
-        }
+        (excess, Rows { neighbours, params, fluid: groups.fluid, share: share.as_deref() }, fields)
     }
 
     fn pressure_gradient(&mut self) {
@@ -648,7 +582,8 @@ impl Backend for Cpu {
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
-        self.excess_before();
+        let (excess, rows, fields) = self.wall_excess();
+        excess.before_solve(rows, fields);
         let bodies = self.couple();
         let Self { fields, neighbours, params, settings, work, multigrid, grid, share, .. } = self;
         let share = share.as_deref();
@@ -699,7 +634,8 @@ impl Backend for Cpu {
         if let Some(ledger) = &mut self.ledger {
             ledger.solution.clone_from(&fields.pressure);
         }
-        self.excess_solved();
+        let (excess, rows, fields) = self.wall_excess();
+        excess.after_solve(rows, fields);
         let Self { fields, share, .. } = self;
         let share = share.as_deref();
         let cut = |(i, p): (usize, &mut f64)| {
@@ -716,7 +652,8 @@ impl Backend for Cpu {
         let [high, low] = fields.pressure.par_chunks_mut(CHUNK).enumerate().map(cuts).reduce(|| [0; 2], add);
         self.counters.pressure_clamps += high;
         self.counters.negative_pressures += low;
-        self.excess_after();
+        let (excess, rows, fields) = self.wall_excess();
+        excess.after_cut(rows, fields);
         Ok(report)
     }
 
@@ -752,7 +689,7 @@ impl Backend for Cpu {
                 if own && fields.state[i] == State::Inner {
                     total.add(fields.pressure[i], &slot.per_pascal);
                     total += slot.head;
-                    let excess = self.excess.get(i - fluid).copied().unwrap_or(0.0);
+                    let excess = self.excess.of(i - fluid);
                     pressure = body_force::surface_pressure(fields.pressure[i], excess, to_surface, params);
                 }
                 let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
@@ -803,7 +740,7 @@ impl Backend for Cpu {
         let Self { fields, groups, excess, share, .. } = self;
         let of = |i: usize| {
             let wall = i.checked_sub(groups.fluid);
-            [fields.pressure[i], wall.and_then(|wall| excess.get(wall)).copied().unwrap_or_default()]
+            [fields.pressure[i], wall.map_or(0.0, |wall| excess.of(wall))]
         };
         let told = match share {
             None => slots.iter().map(|&s| of(s)).collect::<Vec<_>>(),
