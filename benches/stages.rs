@@ -39,14 +39,15 @@ fn dam_break() -> (Cpu, Step, usize) {
     let plan = Plan::new(&case, &scene, &params);
     let mut cpu = Cpu::new(&scene, &params, &plan, sim.settings()).expect("the CPU can");
     cpu.write(&sim.backend.read().expect("readable")).expect("writable");
+    let step = params.step(sim.time, case.run.time_step, 2.0);
     cpu.move_solids(sim.solids.predict(
-        sim.time,
-        case.run.time_step,
+        step.time,
+        step.dt,
+        step.ahead,
         sim.params.explicit_gravity(),
         !sim.plan.coupled,
     ))
     .expect("solids move");
-    let step = params.step(sim.time, case.run.time_step, 2.0);
     for stage in [
         ParticleStage::Predict,
         ParticleStage::CellList,

@@ -87,7 +87,7 @@ struct Coefficients {
     pressure_max: f32,
     speed_per_bin: f32,     // of the monitor's histogram
     shift_speed: f32,       // of particles at rest
-    pad: f32,
+    ahead: f32,             // from the start of the step to where forces are found
 }
 
 // Of a moving solid; its position relative to the middle of the domain.
@@ -147,6 +147,11 @@ fn finite_vector(v: vec3f) -> bool {
 fn shortened(v: vec3f, longest: f32) -> vec3f {
     let squared = dot(v, v);
     return select(v, v * (longest * inverseSqrt(squared)), squared > longest * longest);
+}
+
+// Longest way of a particle in the part `time` of the step.
+fn longest_way(time: f32) -> f32 {
+    return DISPLACEMENT_MAX * params.spacing * (time / now.dt);
 }
 
 // r_j - r_i, to the nearest image of j where sides are periodic; as crate::periodic::Periodic::nearest.

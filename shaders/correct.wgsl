@@ -1,4 +1,5 @@
-// Correction: v = v* + dt a, r = r* + dt^2 a with a of the collision or of the pressure gradient.
+// Correction: v = v* + dt a with a of wall friction, of collisions or of the pressure gradient. Where r* is the end of the step it
+// moves the particle as well, r = r* + dt^2 a; where it is the middle, the second half is gone with the new velocity, r = r* + dt v / 2.
 // Twin: src/kernels/correct.rs
 
 @group(0) @binding(2) var<storage, read_write> position: array<vec4f>;
@@ -6,8 +7,36 @@
 @group(0) @binding(4) var<storage, read_write> acceleration: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 
+// The way `way`, no longer than `longest`; counted if it was.
+fn limited(way: vec3f, longest: f32) -> vec3f {
+    let squared = dot(way, way);
+    if squared > longest * longest {
+        atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
+        return way * (longest * inverseSqrt(squared));
+    }
+    return way;
+}
+
+// `last`: the particle goes what is left of its way.
+fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
+    let change = limited(now.dt * a, DISPLACEMENT_MAX * params.spacing / now.dt);
+    let v = old.xyz + change;
+    if !finite_vector(v) {
+        atomicMin(&counters[NON_FINITE], u32(old.w));
+    }
+    velocity[i] = vec4f(v, old.w);
+    acceleration[i] = vec4f(0.0);
+    let rest = now.dt - now.ahead;
+    if rest == 0.0 {
+        position[i] = vec4f(x.xyz + now.dt * change, x.w);
+    } else if last {
+        position[i] = vec4f(x.xyz + limited(rest * v, longest_way(rest)), x.w);
+    }
+}
+
+// What comes before the last change of a step.
 @compute @workgroup_size(WORKGROUP)
-fn correct(@builtin(global_invocation_id) id: vec3u) {
+fn kick(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;
     if i >= params.fluid {
         return;
@@ -19,21 +48,19 @@ fn correct(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w != FLUID {
+    if x.w == FLUID {
+        change(i, x, old, a, false);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn correct(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if i >= params.fluid {
         return;
     }
-    var change = now.dt * a;
-    let longest = DISPLACEMENT_MAX * params.spacing / now.dt;
-    let squared = dot(change, change);
-    if squared > longest * longest {
-        change *= longest * inverseSqrt(squared);
-        atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
+    let x = position[i];
+    if x.w == FLUID {
+        change(i, x, velocity[i], acceleration[i].xyz, true);
     }
-    let v = old.xyz + change;
-    if !finite_vector(v) {
-        atomicMin(&counters[NON_FINITE], u32(old.w));
-    }
-    position[i] = vec4f(x.xyz + now.dt * change, x.w);
-    velocity[i] = vec4f(v, old.w);
-    acceleration[i] = vec4f(0.0);
 }

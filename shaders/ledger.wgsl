@@ -73,19 +73,23 @@ fn gain(v: vec3f, change: vec3f, way: vec3f) -> f32 {
     return dot(change, v + 0.5 * change) - dot(params.gravity, way);
 }
 
-// Work of the acceleration `part` where `total` acts, in `correct` without its clamp.
-fn correct_work(v: vec3f, part: vec3f, total: vec3f) -> f32 {
-    return now.dt * dot(part, v + 0.5 * now.dt * total) - now.dt * now.dt * dot(params.gravity, part);
+// Work of the acceleration `part` where `total` acts, in `kick` without its clamp.
+fn kick_work(v: vec3f, part: vec3f, total: vec3f) -> f32 {
+    let work = now.dt * dot(part, v + 0.5 * now.dt * total);
+    return select(work, work - now.dt * now.dt * dot(params.gravity, part), now.ahead == now.dt);
 }
 
-// Work of the clamp in `correct`.
-fn correct_clamp(v: vec3f, total: vec3f) -> f32 {
+// Work of the clamps in `kick` and, with what is left of the step, in `correct`.
+fn clamp_work(v: vec3f, total: vec3f, rest: f32) -> f32 {
     let longest = DISPLACEMENT_MAX * params.spacing / now.dt;
     let change = shortened(now.dt * total, longest);
-    if all(change == now.dt * total) {
+    // Neither limit is met by a way of nothing.
+    let way = shortened(rest * (v + change), longest_way(rest));
+    if all(change == now.dt * total) && all(way == rest * (v + change)) {
         return 0.0;
     }
-    return gain(v, change, now.dt * change) - correct_work(v, total, total);
+    let carried = select(vec3f(0.0), now.dt * change, now.ahead == now.dt);
+    return gain(v, change, carried + way) - kick_work(v, total, total) + rest * dot(params.gravity, v + now.dt * total);
 }
 
 //#if ABSORBER
@@ -132,10 +136,10 @@ fn predict_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocat
             viscosity = now.dt * dot(viscous, v + 0.5 * now.dt * total);
 //#endif
             let change = now.dt * total;
-            let way = now.dt * (v + change);
+            let way = now.ahead * (v + change);
             let unclamped = gain(v, change, way);
-            let clamp_work = -dot(params.gravity, shortened(way, DISPLACEMENT_MAX * params.spacing) - way);
-            sum += vec4f(unclamped - viscosity, viscosity, clamp_work, 0.0);
+            let clamped = -dot(params.gravity, shortened(way, longest_way(now.ahead)) - way);
+            sum += vec4f(unclamped - viscosity, viscosity, clamped, 0.0);
         }
     }
     book(vec4u(GRAVITY, VISCOSITY, CLAMPS, CLAMPS), sum, t, group.x);
@@ -163,7 +167,7 @@ fn kick(entry: u32, first: u32, t: u32, group: u32, groups: u32) {
         let a = acceleration[i].xyz;
         if position[i].w == FLUID && any(a != vec3f(0.0)) {
             let v = velocity[i].xyz;
-            sum += vec4f(correct_work(v, a, a), correct_clamp(v, a), 0.0, 0.0);
+            sum += vec4f(kick_work(v, a, a), clamp_work(v, a, 0.0), 0.0, 0.0);
         }
     }
     book(vec4u(entry, CLAMPS, CLAMPS, CLAMPS), sum, t, group);
@@ -195,8 +199,10 @@ fn pressure_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
             let v = velocity[i].xyz;
             let a = acceleration[i].xyz;
             let solved = unclipped[i].xyz;
-            sum += vec4f(correct_work(v, gravity, a), correct_work(v, solved - gravity, a),
-                         correct_work(v, a - solved, a), correct_clamp(v, a));
+            let rest = now.dt - now.ahead;
+            let fallen = rest * dot(params.gravity, v + now.dt * a);
+            sum += vec4f(kick_work(v, gravity, a) - fallen, kick_work(v, solved - gravity, a),
+                         kick_work(v, a - solved, a), clamp_work(v, a, rest));
         }
     }
     book(vec4u(GRAVITY, PRESSURE, CLIP, CLAMPS), sum, t, group.x);

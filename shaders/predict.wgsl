@@ -1,4 +1,5 @@
-// Explicit part of the step: v* = v + dt (g + nu lap v), r* = r + dt v*; Eq. (2) without pressure.
+// Explicit part of the step: v* = v + dt (g + nu lap v), Eq. (2) without pressure, and the way with it to r*, where the other forces
+// are found: r* = r + dt v* in the paper's scheme and where there is no free surface, else r + dt v* / 2.
 // Gravity along periodic axes, which no pressure balances, acts here in any scheme.
 // Twin: src/kernels/predict.rs
 
@@ -32,8 +33,8 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
 //#endif
     let old = velocity[i];
     let v = old.xyz + now.dt * a;
-    var way = now.dt * v;
-    let longest = DISPLACEMENT_MAX * params.spacing;
+    var way = now.ahead * v;
+    let longest = longest_way(now.ahead);
     let squared = dot(way, way);
     if squared > longest * longest {
         way *= longest * inverseSqrt(squared);

@@ -41,6 +41,8 @@ struct Gate {
 pub struct Openings {
     gates: Vec<Gate>,
     spacing: f64,
+    /// Until when the walls have gone [s]: where the water of the last step found its forces.
+    reached: f64,
 }
 
 /// What passes the openings in a step.
@@ -66,7 +68,7 @@ impl Openings {
             taken: 0,
             opening: opening.clone(),
         };
-        Self { gates: scene.openings.iter().map(gate).collect(), spacing: scene.spacing }
+        Self { gates: scene.openings.iter().map(gate).collect(), spacing: scene.spacing, reached: 0.0 }
     }
 
     /// Whether there are none.
@@ -79,19 +81,20 @@ impl Openings {
         self.gates.iter().map(|g| g.opening.fastest(from, to)).fold(0.0, f64::max)
     }
 
-    /// Moves the walls on from `t` to `t + dt` [s]; water that comes in takes the last of `slots` fluid slots.
-    pub fn advance(&mut self, t: f64, dt: f64, slots: usize) -> Passage {
-        let l0 = self.spacing;
+    /// Moves the walls on until `to` [s]; water that comes in takes the last of `slots` fluid slots.
+    pub fn advance(&mut self, to: f64, slots: usize) -> Passage {
+        let (l0, from) = (self.spacing, self.reached);
+        self.reached = to;
         let mut out = Passage::default();
         for gate in &mut self.gates {
             let way = match &gate.opening.passes {
                 Passes::In(speed) | Passes::Out(speed) => {
-                    gate.speed = speed.value(t + dt);
-                    speed.integral(t, t + dt)
+                    gate.speed = speed.value(to);
+                    speed.integral(from, to)
                 }
                 Passes::Drawn(discharge) => {
-                    gate.speed = discharge.value(t + dt) / gate.area;
-                    discharge.integral(t, t + dt) / gate.area
+                    gate.speed = discharge.value(to) / gate.area;
+                    discharge.integral(from, to) / gate.area
                 }
                 Passes::Free => 0.0,
             };
@@ -122,17 +125,17 @@ impl Openings {
                 Outlet::CLOSED
             });
         }
-        let mut to = slots;
+        let mut first = slots;
         for emission in out.emissions.iter_mut().rev() {
-            to -= emission.wall.len();
-            emission.to = to;
+            first -= emission.wall.len();
+            emission.to = first;
         }
         out
     }
 
-    /// Takes in what the outflows have swallowed since the start, at time `t` [s]: walls that follow a discharge hurry or wait.
-    pub fn count(&mut self, t: f64, passage: &Passage, swallowed: &[u64]) {
-        let l0 = self.spacing;
+    /// Takes in what the outflows have swallowed since the start: walls that follow a discharge hurry or wait.
+    pub fn count(&mut self, passage: &Passage, swallowed: &[u64]) {
+        let (l0, t) = (self.spacing, self.reached);
         let outflows = self.gates.iter_mut().filter(|g| !g.opening.is_inflow());
         for ((gate, outlet), &total) in outflows.zip(&passage.outlets).zip(swallowed) {
             let Passes::Drawn(discharge) = &gate.opening.passes else { continue };
@@ -202,6 +205,9 @@ impl Openings {
             archive.number(&format!("openings.{k}.area"), area)?;
             archive.count(&format!("openings.{k}.layers"), layers)?;
             archive.count(&format!("openings.{k}.taken"), taken)?;
+        }
+        if !self.gates.is_empty() {
+            archive.number("openings.reached", &mut self.reached)?;
         }
         Ok(())
     }

@@ -19,6 +19,11 @@ pub enum Relaxation {
     Speed(f64),
 }
 
+/// Derived c_s over the speed of the flow. A slow one leaves calm water calm, a fast one keeps violent water from crowding.
+const SOUND_OVER_FLOW: f64 = 2.5;
+/// Least part of the derived c_s that a calm flow has.
+const CALM: f64 = 0.5;
+
 /// Reach of the pressure within a step over the water's depth: what is missing at the floor of still water,
 /// 1 - tanh(1 / 5) 5 = 1.3 %, the density has to make up for.
 const REACH: f64 = 5.0;
@@ -113,6 +118,8 @@ pub struct Params {
     pub free_surface: FreeSurface,
     /// gamma.
     pub relaxation: Relaxation,
+    /// Whether its speed is the largest of a derived one, which follows the flow.
+    pub follows_flow: bool,
     /// alpha of Eq. (8) [1/Pa], if typed.
     pub compressibility: Option<f64>,
     /// How colliding pairs share their impulses.
@@ -140,6 +147,10 @@ pub struct Step {
     pub time: f64,
     /// Time step [s].
     pub dt: f64,
+    /// From the start of the step to the positions r* at which forces are found [s].
+    pub ahead: f64,
+    /// How long a change of velocity there moves a particle for itself [s]; what follows of it moves with the new velocity.
+    pub carried: f64,
     /// gamma of Eq. (8) [-].
     pub relaxation: f64,
     /// alpha of Eq. (8) [1/Pa].
@@ -148,6 +159,13 @@ pub struct Step {
     pub pressure_max: f64,
     /// Speed by which particles at rest shift, over the imbalance [m/s].
     pub shift_speed: f64,
+}
+
+impl Step {
+    /// The same with forces at its end.
+    pub fn whole(self) -> Self {
+        Self { ahead: self.dt, carried: self.dt, ..self }
+    }
 }
 
 impl Params {
@@ -178,6 +196,8 @@ impl Params {
             _ => Relaxation::Speed(derived_speed),
         };
         let source = fluid.and_then(|f| f.source).unwrap_or(source);
+        let typed = fluid.is_some_and(|f| f.relaxation.is_some() || f.sound_speed.is_some());
+        let follows_flow = source == Source::Mixed && !typed;
         // The paper's source takes the density's deviation for the pressure: its mean is the level.
         let filled = scene.filled && source == Source::Mixed;
         let friction = fluid.and_then(|f| f.wall_friction).unwrap_or(if paper { 0.0 } else { WALL_FRICTION });
@@ -207,6 +227,7 @@ impl Params {
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),
             free_surface: fluid.and_then(|f| f.free_surface).unwrap_or(free_surface),
             relaxation,
+            follows_flow,
             compressibility: fluid.and_then(|f| f.compressibility),
             collision: if paper { Collision::Single } else { Collision::Shared },
             collision_distance: fluid.map_or(0.8, |f| f.collision_distance) * l0,
@@ -262,6 +283,19 @@ impl Params {
         }
     }
 
+    /// gamma of Eq. (8) in a step of `dt` [s] of water whose fastest has the speed `flow` [m/s].
+    pub fn relaxation(&self, dt: f64, flow: f64) -> f64 {
+        match self.relaxation {
+            Relaxation::Fixed(gamma) => gamma,
+            Relaxation::Speed(c) => {
+                // Without weight only the flow says how fast.
+                let most = if self.gravity == DVec3::ZERO { f64::INFINITY } else { c };
+                let c = if self.follows_flow { (SOUND_OVER_FLOW * flow).clamp(CALM * c, most) } else { c };
+                (c * dt / self.spacing).powi(2).min(RELAXATION_MAX)
+            }
+        }
+    }
+
     /// Mass of a fluid particle [kg]; in two dimensions of a slice l0 wide.
     pub fn particle_mass(&self) -> f64 {
         self.density * self.spacing.powi(3)
@@ -287,17 +321,22 @@ impl Params {
 
     /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected [m/s].
     pub fn step(&self, time: f64, dt: f64, speed: f64) -> Step {
-        let relaxation = match self.relaxation {
-            Relaxation::Fixed(gamma) => gamma,
-            Relaxation::Speed(c) => (c * dt / self.spacing).powi(2).min(RELAXATION_MAX),
-        };
+        let relaxation = self.relaxation(dt, speed);
         let head = self.gravity.length() * self.depth;
         let compressibility =
             self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));
+        let (ahead, carried) = if self.source == Source::Mixed && !self.filled {
+            // Half a step, the change of velocity, half a step with the new one: of second order, and it damps no oscillation.
+            (0.5 * dt, 0.0)
+        } else {
+            // Semi-implicit MPS: r* is the end of the step, and what changes a velocity there moves the particle as well. Where there
+            // is no surface pressures pull, and without that damping particles crowd.
+            (dt, dt)
+        };
         let c = self.sound_speed(dt);
         let pressure_max = 5.0 * self.density * (c * c).max(speed * speed).max(head);
         let fastest = if self.filled { speed } else { 0.0 };
         let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
-        Step { time, dt, relaxation, compressibility, pressure_max, shift_speed }
+        Step { time, dt, ahead, carried, relaxation, compressibility, pressure_max, shift_speed }
     }
 }

@@ -78,6 +78,8 @@ pub struct Simulation {
     /// Particles that were gone when last looked.
     gone: u64,
     speed: f64,
+    /// Speed of the fastest particle, when last looked [m/s].
+    fastest: f64,
     pub(crate) stop: Stop,
     pub(crate) threads: Option<ThreadPool>,
 }
@@ -118,6 +120,7 @@ impl Simulation {
         crate::sense::refuse(case, &scene, &params, &solids)?;
         let scene = settle(scene, &params, &plan, settings)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
+        let fastest = scene.velocity[..scene.water()].iter().map(|v| v.length()).fold(0.0, f64::max);
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let message = "contact.device = \"gpu\": this run is on the CPU";
@@ -143,6 +146,7 @@ impl Simulation {
             stages: BTreeMap::new(),
             wait_for_stages: false,
             speed: 0.0,
+            fastest,
             stop: Stop::default(),
             threads: None,
         })
@@ -175,6 +179,7 @@ impl Simulation {
             time,
             steps,
             speed,
+            fastest,
             solids_ledger,
             openings,
         } = self;
@@ -188,6 +193,7 @@ impl Simulation {
         archive.number("time", time)?;
         archive.count("steps", steps)?;
         archive.number("speed", speed)?;
+        archive.number("fastest", fastest)?;
         let vectors = fluid_force.iter().flat_map(|w| [w.force, w.torque]);
         let mut vectors: Vec<DVec3> = vectors.collect();
         archive.array("fluid_force", &mut vectors, true)?;
@@ -232,7 +238,11 @@ impl Simulation {
             0.0
         };
         let dt = time_step(&self.params, typed, adaptive, flow.max(fastest));
-        self.params.step(self.time, dt, flow)
+        // The speed of the collapse is one to be ready for; calm water may never have it.
+        let relaxation = self.params.relaxation(dt, self.speed);
+        let step = Step { relaxation, ..self.params.step(self.time, dt, flow) };
+        // What jumps over its neighbours needs the damping.
+        if self.fastest * dt > self.params.spacing { step.whole() } else { step }
     }
 
     /// An error if a step has become so short that the run would not end.
@@ -297,7 +307,7 @@ impl Simulation {
         self.timed(Stage::Openings, |s| {
             let there = s.scene.water() as u64 + s.openings.total_emitted();
             let slots = s.groups.fluid;
-            let passage = s.openings.advance(step.time, step.dt, slots);
+            let passage = s.openings.advance(step.time + step.ahead, slots);
             let comes: usize = passage.emissions.iter().map(|e| e.wall.len()).sum();
             let fits = |gone: u64| there - gone + comes as u64 <= slots as u64;
             if comes > 0 && !fits(s.gone) {
@@ -314,19 +324,20 @@ impl Simulation {
             s.backend.pass_openings(&passage.emissions, &passage.outlets)?;
             if passage.counts {
                 let counters = s.backend.counters()?;
-                s.openings.count(step.time + step.dt, &passage, &counters.swallowed);
+                s.openings.count(&passage, &counters.swallowed);
             }
             Ok(())
         })
     }
 
     /// Solids move as they would without the fluid's force in this step.
-    pub(crate) fn move_solids(&mut self, t: f64, dt: f64) -> Result<()> {
+    pub(crate) fn move_solids(&mut self, step: &Step) -> Result<()> {
         if !self.plan.has(Stage::MoveSolids) {
             return Ok(());
         }
         self.timed(Stage::MoveSolids, |s| {
-            let poses = s.solids.predict(t, dt, s.params.explicit_gravity(), !s.plan.needs(Arrays::Coupling));
+            let (gravity, contact) = (s.params.explicit_gravity(), !s.plan.needs(Arrays::Coupling));
+            let poses = s.solids.predict(step.time, step.dt, step.ahead, gravity, contact);
             s.backend.move_solids(&s.openings.place(poses))
         })
     }
@@ -463,7 +474,7 @@ impl Simulation {
         }
         let (monitor, counters) = self.observe()?;
         self.check(&counters, step)?;
-        self.speed = monitor.speed_most;
+        (self.speed, self.fastest) = (monitor.speed_most, monitor.speed_max);
         if !monitor.kinetic.is_finite() {
             return Err(self.diverged(step, Stage::Correct, "the kinetic energy is not a number".into()));
         }

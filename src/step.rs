@@ -35,7 +35,7 @@ impl Simulation {
                 Stage::Contact => report.contact = self.advance_solids(&step)?,
                 _ if !self.plan.wet() => {}
                 Stage::Openings => self.pass_openings(&step)?,
-                Stage::MoveSolids => self.move_solids(t, dt)?,
+                Stage::MoveSolids => self.move_solids(&step)?,
                 Stage::ConjugateGradient => report.pressure = self.solve_pressure(&step)?,
                 particles => {
                     if let Some(stage) = particles.over_particles() {

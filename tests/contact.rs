@@ -336,7 +336,7 @@ fn a_moving_wall_pushes_a_body() {
         let dt = 1e-3;
         for step in 0..1500 {
             let t = f64::from(step) * dt;
-            let ahead = solids.predict(t, dt, DVec3::ZERO, true)[1].position;
+            let ahead = solids.predict(t, dt, dt, DVec3::ZERO, true)[1].position;
             solids.advance(t, dt, &[Wrench::default(); 2]).unwrap();
             assert_eq!(solids.poses()[1].position, ahead);
         }
@@ -353,7 +353,7 @@ fn the_prediction_of_a_resting_body_does_not_move_it() {
         solids.advance(f64::from(step) * dt, dt, &[Wrench::default()]).unwrap();
     }
     let now = solids.poses()[0];
-    let ahead = solids.predict(0.9, dt, DVec3::NEG_Z * GRAVITY, true)[0];
+    let ahead = solids.predict(0.9, dt, dt, DVec3::NEG_Z * GRAVITY, true)[0];
     assert!((ahead.position - now.position).length() < 1e-12);
     assert!(ahead.velocity.length() < 1e-9);
     let force = solids.contact_wrenches()[0].force;

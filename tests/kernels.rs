@@ -11,7 +11,8 @@ use seixo::fields::State;
 use seixo::kernels::cell_list::{CellList, Scratch};
 use seixo::kernels::neighbour_list::{Candidates, neighbour_list};
 use seixo::kernels::{
-    Particles, number_density, pressure_gradient, pressure_source, shift, viscosity, wall_friction,
+    Particles, correct, number_density, predict, pressure_gradient, pressure_source, shift, viscosity,
+    wall_friction,
 };
 use seixo::params::{Params, Step};
 use seixo::plan::{ParticleStage, Plan};
@@ -79,6 +80,35 @@ fn close(fast: &[DVec3], plain: &[DVec3]) -> f64 {
         assert!((*f - *p).length() <= ROUND_OFF * scale, "{k}: {f} for {p}");
     }
     scale
+}
+
+/// A particle that a spring holds, twenty periods in so many steps each: what is left of its swing, and how far from where it should be
+/// it is then, over its swing at the start.
+fn swung(fluid: &str, steps: u32) -> (f64, f64) {
+    let case = common::case(2, fluid);
+    let scene = common::scene(2, 1);
+    let params = Params::new(&case, &scene).expect("valid");
+    let (l0, period, omega) = (1.0, 1.0, 2.0 * std::f64::consts::PI);
+    let step = params.step(0.0, period / f64::from(steps), 1.0);
+    let start = 1e-3;
+    let (mut x, mut v) = (DVec3::new(start, 0.0, 0.0), DVec3::ZERO);
+    for _ in 0..20 * steps {
+        (x, v, _) = predict::predict(x, v, DVec3::ZERO, &step, l0);
+        (x, v, _) = correct::correct(x, v, -omega * omega * x, &step, l0);
+    }
+    (x.x.hypot(v.x / omega) / start, (x.x / start - 1.0).abs())
+}
+
+#[test]
+fn a_step_is_of_second_order_and_damps_no_swing_but_the_paper_s() {
+    let (coarse, fine) = (swung("", 50), swung("", 100));
+    println!("left of a swing, error of its place: {coarse:.5?}, {fine:.5?}");
+    assert!((coarse.0 - 1.0).abs() < 1e-4 && (fine.0 - 1.0).abs() < 1e-5, "{coarse:?}, {fine:?}");
+    assert!(fine.1 < 0.005 && fine.1 < 0.1 * coarse.1, "{coarse:?}, {fine:?}");
+    // exp(-omega^2 dt t / 2)
+    let (left, _) = swung("preset = \"paper\"", 100);
+    let omega = 2.0 * std::f64::consts::PI;
+    assert!((left / (-0.5 * omega * omega * 0.01 * 20.0).exp() - 1.0).abs() < 0.05, "{left}");
 }
 
 #[test]

@@ -260,7 +260,7 @@ fn structs_lie_the_same_on_both_sides() {
             pressure_max,
             speed_per_bin,
             shift_speed,
-            pad,
+            ahead,
         }
     );
     same_layout!("multigrid_levels", Hierarchy { level, operation, levels, capacity, cells, operations });

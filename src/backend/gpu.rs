@@ -398,7 +398,7 @@ impl Backend for Gpu {
         if matches!(stage, ParticleStage::WallFriction | ParticleStage::Collision) {
             self.book_kick(stage)?;
             // What they found is applied as any acceleration is.
-            self.context.pass([(kernels::correct::correct, groups(s.fluid))])?;
+            self.context.pass([(kernels::correct::kick, groups(s.fluid))])?;
         }
         Ok(())
     }

@@ -259,20 +259,20 @@ impl Body {
         self.pose.angular_velocity = self.inverse_inertia * self.momentum;
     }
 
-    /// Pose of a prescribed solid at `t + dt`, with its mean velocities since `t`: its way and its turn over dt, so that it
-    /// arrives where the table says whatever kink lies inside the step.
-    pub fn prescribed(&self, t: f64, dt: f64) -> Option<Pose> {
+    /// Pose of a prescribed solid at `t + ahead`, with its mean velocities from `t` to `t + dt`: its way and its turn over dt, so that
+    /// it arrives where the table says whatever kink lies inside the step.
+    pub fn prescribed(&self, t: f64, dt: f64, ahead: f64) -> Option<Pose> {
         let (position, orientation, motion) = self.motion.as_ref()?;
-        let end = motion.displacement(t + dt);
-        let velocity = (end - motion.displacement(t)) / dt;
-        let mut pose = Pose { position: *position + end, velocity, ..self.pose };
+        let velocity = (motion.displacement(t + dt) - motion.displacement(t)) / dt;
+        let position = *position + motion.displacement(t + ahead);
+        let mut pose = Pose { position, velocity, ..self.pose };
         if motion.turns() {
             let turned = motion.turn(t + dt);
             let mut way = turned * motion.turn(t).inverse();
             if way.w < 0.0 {
                 way = -way;
             }
-            pose.orientation = (turned * *orientation).normalize();
+            pose.orientation = (motion.turn(t + ahead) * *orientation).normalize();
             pose.angular_velocity = way.to_scaled_axis() / dt;
         }
         Some(pose)
@@ -280,7 +280,7 @@ impl Body {
 
     /// Gives a prescribed solid its mean velocities from `t` to `t + h` [s].
     pub fn follow(&mut self, t: f64, h: f64) {
-        if let Some(pose) = self.prescribed(t, h) {
+        if let Some(pose) = self.prescribed(t, h, h) {
             self.pose.velocity = pose.velocity;
             self.pose.angular_velocity = pose.angular_velocity;
         }

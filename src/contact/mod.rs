@@ -153,19 +153,19 @@ impl Solids {
         &self.contact
     }
 
-    /// Poses at `t + dt` for the explicit stage of the fluid: V* = V + dt (`gravity` + contact acceleration of
-    /// the last step), X* = X + dt V*, the same for the angular momentum; prescribed solids by their table.
+    /// Poses at `t + ahead`, where the fluid finds its forces in the step of `dt` [s]: V* = V + dt (`gravity` + contact acceleration of
+    /// the last step), X* = X + ahead V*, the same for the angular momentum; prescribed solids by their table.
     /// `gravity` is that of the fluid's explicit stage ([`crate::params::Params::explicit_gravity`]), so that body
     /// and water fall together there. Without `contact` where that acts with the pressure, see [`Solids::free_bodies`].
-    pub fn predict(&mut self, t: f64, dt: f64, gravity: DVec3, contact: bool) -> &[Pose] {
+    pub fn predict(&mut self, t: f64, dt: f64, ahead: f64, gravity: DVec3, contact: bool) -> &[Pose] {
         for (k, body) in self.bodies.iter().enumerate() {
-            self.predicted[k] = match body.prescribed(t, dt) {
+            self.predicted[k] = match body.prescribed(t, dt, ahead) {
                 Some(pose) => pose,
                 None => {
                     let mut body = body.clone();
                     let contact = if contact { self.contact[k] } else { Wrench::default() };
                     body.kick(dt * (body.mass * gravity + contact.force), dt * contact.torque);
-                    body.drift(dt);
+                    body.drift(ahead);
                     body.pose
                 }
             };

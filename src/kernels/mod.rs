@@ -89,7 +89,7 @@ pub mod device {
         collision[super::WORKGROUP] Stage(Collision), FluidAndReaction: collision;
         conjugate_gradient[super::WORKGROUP] Stage(ConjugateGradient), Own:
             pack start_residual start descend ascend multiply advance end_pack end_residual end;
-        correct[super::WORKGROUP] Stage(Correct), Fluid: correct;
+        correct[super::WORKGROUP] Stage(Correct), Fluid: correct kick;
         coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare respond;
         ledger[super::WORKGROUP] Arrays(Ledger), Own:
             absorber_work predict_work lost_work friction_work collision_work pressure_work shift_work as_solved as_clipped;

@@ -264,7 +264,8 @@ pub fn compare_stages(
     pair.cpu.write(&start)?;
     let step = simulation.next_step();
     let gravity = simulation.params.explicit_gravity();
-    let poses: Vec<Pose> = simulation.solids.predict(step.time, step.dt, gravity, !plan.coupled).to_vec();
+    let poses: Vec<Pose> =
+        simulation.solids.predict(step.time, step.dt, step.ahead, gravity, !plan.coupled).to_vec();
     // Viscosity takes the neighbours of the step before.
     for stage in [ParticleStage::CellList, ParticleStage::NeighbourList] {
         pair.cpu.run(stage, &step)?;
@@ -279,7 +280,7 @@ pub fn compare_stages(
         match stage {
             Stage::Contact => continue,
             Stage::Openings => {
-                let passage = simulation.openings.advance(step.time, step.dt, simulation.groups.fluid);
+                let passage = simulation.openings.advance(step.time + step.ahead, simulation.groups.fluid);
                 pair.cpu.pass_openings(&passage.emissions, &passage.outlets)?;
                 pair.gpu.pass_openings(&passage.emissions, &passage.outlets)?;
             }

@@ -163,6 +163,8 @@ pub fn scenes(full: bool) -> Vec<Scene> {
         );
         pool([20, 15], 0.02, [0.0, 0.0])
             .replace("max = [0.4, 0.02, 0.6]", "max = [0.4, 0.02, 1.0]")
+            // With a lid: what splashes over the rim is lost by right.
+            .replace("open = [\"z_max\"]", "open = []")
             .replace("[output]", &format!("{block}[output]"))
     };
     let mut all = vec![
@@ -235,7 +237,7 @@ pub fn scenes(full: bool) -> Vec<Scene> {
         Scene::new("1 km from the origin", pool([20, 10], 0.02, [1000.0, 1000.0]), 300, still(3.0)),
         Scene::new("no gravity", pool([20, 10], 0.02, [0.0; 2]), 300, still(0.1))
             .set(&["run.gravity=[0,0,0]"]),
-        Scene::new("gravity sideways", pool([20, 10], 0.02, [0.0; 2]), 300, still(4.0))
+        Scene::new("gravity sideways", pool([20, 10], 0.02, [0.0; 2]), 300, still(5.0))
             .set(&["run.gravity=[9.81,0,0]", "tank.open=[]"]),
         Scene::new("gravity upwards, out of the tank", pool([20, 10], 0.02, [0.0; 2]), 10, Expect::Refuse)
             .set(&["run.gravity=[0,0,9.81]"]),

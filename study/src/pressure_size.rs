@@ -63,7 +63,8 @@ impl Moment {
         }
         let step = simulation.next_step();
         let gravity = simulation.params.explicit_gravity();
-        let poses = simulation.solids.predict(step.time, step.dt, gravity, !simulation.plan.coupled).to_vec();
+        let contact = !simulation.plan.coupled;
+        let poses = simulation.solids.predict(step.time, step.dt, step.ahead, gravity, contact).to_vec();
         let fields = simulation.backend.read()?;
         let Simulation { params, plan, scene, .. } = simulation;
         Ok(Self { params, plan, step, poses, fields, scene })

@@ -2,10 +2,10 @@
 
 use crate::kernels::Particles;
 use crate::kernels::cell_list::inside;
-use crate::kernels::ledger::{correct_clamp, correct_work, predict_work};
+use crate::kernels::ledger::{correct_clamp, kick_clamp, kick_work, predict_work, rest_work};
 use crate::ledger::{Entry, Ledger};
 use crate::neighbours::CHUNK;
-use crate::params::Params;
+use crate::params::{Params, Step};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -39,8 +39,8 @@ impl WaterLedger {
     }
 
     /// Books `predict`, which is about to run with the viscous accelerations `viscous`.
-    pub fn predict(&mut self, own: Range<usize>, on: Particles, viscous: &[DVec3], dt: f64) {
-        let of = |i: usize| predict_work(on.position[i], on.velocity[i], viscous[i], on.params, dt);
+    pub fn predict(&mut self, own: Range<usize>, on: Particles, viscous: &[DVec3], step: &Step) {
+        let of = |i: usize| predict_work(on.position[i], on.velocity[i], viscous[i], on.params, step);
         self.add([Entry::Gravity, Entry::Viscosity, Entry::Clamps], on.params, sums(own, of));
     }
 
@@ -72,25 +72,26 @@ impl WaterLedger {
         self.add([Entry::Lost], params, sums(own, of));
     }
 
-    /// Books `correct`, which is about to run with the accelerations `kick` by what `entry` says.
-    pub fn kick(&mut self, entry: Entry, own: Range<usize>, on: Particles, kick: &[DVec3], dt: f64) {
+    /// Books a kick, which is about to run with the accelerations `kick` by what `entry` says.
+    pub fn kick(&mut self, entry: Entry, own: Range<usize>, on: Particles, kick: &[DVec3], step: &Step) {
         let of = |i: usize| {
             let (v, a) = (on.velocity[i], kick[i]);
-            let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
-            [correct_work(v, a, a, on.params.gravity, dt), clamp]
+            let clamp = kick_clamp(on.position[i], v, a, on.params, step);
+            [kick_work(v, a, a, on.params.gravity, step), clamp]
         };
         self.add([entry, Entry::Clamps], on.params, sums(own, of));
     }
 
     /// Books `correct`, which is about to run with the accelerations `total` of pressure and gravity.
-    pub fn pressure(&mut self, own: Range<usize>, on: Particles, total: &[DVec3], dt: f64) {
+    pub fn pressure(&mut self, own: Range<usize>, on: Particles, total: &[DVec3], step: &Step) {
         let gravity = on.params.balanced_gravity();
         let of = |i: usize| {
             let (v, a) = (on.velocity[i], total[i]);
-            let work = |part| correct_work(v, part, a, on.params.gravity, dt);
+            let work = |part| kick_work(v, part, a, on.params.gravity, step);
             let solved = self.unclipped[i];
-            let clamp = correct_clamp(on.position[i], v, a, on.params, dt);
-            [work(gravity), work(solved - gravity), work(a - solved), clamp]
+            let clamp = correct_clamp(on.position[i], v, a, on.params, step);
+            let fallen = rest_work(v, a, on.params.gravity, step);
+            [work(gravity) + fallen, work(solved - gravity), work(a - solved), clamp]
         };
         let sums = sums(own, of);
         self.add([Entry::Gravity, Entry::Pressure, Entry::Clip, Entry::Clamps], on.params, sums);

@@ -195,19 +195,19 @@ impl Cpu {
             .for_each(|(&x, v)| *v = absorber::absorber(sides.wrap(x), *v, zones, dt));
     }
 
-    fn predict(&mut self, dt: f64) {
+    fn predict(&mut self, step: &Step) {
         let own = self.own();
         if let Some(ledger) = &mut self.ledger {
             let Fields { position, velocity, acceleration, .. } = &self.fields;
             let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
-            ledger.predict(own.clone(), on, acceleration, dt);
+            ledger.predict(own.clone(), on, acceleration, step);
         }
         let (g, l0) = (self.params.explicit_gravity(), self.params.spacing);
         let Fields { position, velocity, acceleration, .. } = &mut self.fields;
         let clamps: u64 = (&mut position[own.clone()], &mut velocity[own.clone()], &mut acceleration[own])
             .into_par_iter()
             .map(|(x, v, a)| {
-                let (x1, v1, clamped) = predict::predict(*x, *v, g + *a, dt, l0);
+                let (x1, v1, clamped) = predict::predict(*x, *v, g + *a, step, l0);
                 (*x, *v, *a) = (x1, v1, DVec3::ZERO);
                 u64::from(clamped)
             })
@@ -306,9 +306,9 @@ impl Cpu {
             }
         });
         if let Some(ledger) = &mut self.ledger {
-            ledger.kick(Entry::Friction, own, on, &fields.acceleration, step.dt);
+            ledger.kick(Entry::Friction, own, on, &fields.acceleration, step);
         }
-        self.correct(step.dt);
+        self.apply(step, correct::kick);
         self.show_motion();
     }
 
@@ -330,9 +330,9 @@ impl Cpu {
             }
         });
         if let Some(ledger) = &mut self.ledger {
-            ledger.kick(Entry::Collision, own, on, &fields.acceleration, step.dt);
+            ledger.kick(Entry::Collision, own, on, &fields.acceleration, step);
         }
-        self.correct(step.dt);
+        self.apply(step, correct::kick);
         self.show_motion();
     }
 
@@ -479,7 +479,12 @@ impl Cpu {
             .for_each(|(x, &v, &imbalance)| *x += shift::shift(imbalance, v, step, params));
     }
 
-    fn correct(&mut self, dt: f64) {
+    /// Applies the accelerations `by` [`correct::kick`] or [`correct::correct`].
+    fn apply(
+        &mut self,
+        step: &Step,
+        by: impl Fn(DVec3, DVec3, DVec3, &Step, f64) -> (DVec3, DVec3, bool) + Sync,
+    ) {
         let (l0, own) = (self.params.spacing, self.own());
         let Fields { position, velocity, acceleration, id, .. } = &mut self.fields;
         let bad = AtomicU32::new(u32::MAX);
@@ -487,7 +492,7 @@ impl Cpu {
         let clamps: u64 = (position, velocity, &mut acceleration[own.clone()], &id[own])
             .into_par_iter()
             .map(|(x, v, a, &id)| {
-                let (x1, v1, clamped) = correct::correct(*x, *v, *a, dt, l0);
+                let (x1, v1, clamped) = by(*x, *v, *a, step, l0);
                 if !v1.is_finite() {
                     bad.fetch_min(id, Relaxed);
                 }
@@ -521,7 +526,7 @@ impl Backend for Cpu {
                 self.show_motion();
                 self.viscosity();
             }
-            ParticleStage::Predict => self.predict(step.dt),
+            ParticleStage::Predict => self.predict(step),
             ParticleStage::CellList => self.cell_list(),
             ParticleStage::NeighbourList => self.neighbour_list(),
             ParticleStage::WallFriction => self.wall_friction(step),
@@ -536,9 +541,9 @@ impl Backend for Cpu {
                 if let Some(ledger) = &mut self.ledger {
                     let Fields { position, velocity, acceleration, .. } = &self.fields;
                     let on = Particles { params: &self.params, position, velocity, fluid: self.groups.fluid };
-                    ledger.pressure(own, on, acceleration, step.dt);
+                    ledger.pressure(own, on, acceleration, step);
                 }
-                self.correct(step.dt);
+                self.apply(step, correct::correct);
             }
         }
         Ok(())

@@ -112,7 +112,7 @@ pub struct Coefficients {
     pub pressure_max: f32,
     pub speed_per_bin: f32,
     pub shift_speed: f32,
-    pub pad: f32,
+    pub ahead: f32,
 }
 
 /// State of the conjugate gradients; see `Solve` in shaders/conjugate_gradient.wgsl.
@@ -324,7 +324,7 @@ impl Coefficients {
             pressure_max: step.pressure_max as f32,
             speed_per_bin: (range / SPEED_BINS as f64) as f32,
             shift_speed: step.shift_speed as f32,
-            pad: 0.0,
+            ahead: step.ahead as f32,
         }
     }
 }
