@@ -143,10 +143,14 @@ fn finite_vector(v: vec3f) -> bool {
     return finite(v.x) && finite(v.y) && finite(v.z);
 }
 
+// Whether v is longer than `longest`.
+fn longer(v: vec3f, longest: f32) -> bool {
+    return dot(v, v) > longest * longest;
+}
+
 // v, no longer than `longest`.
 fn shortened(v: vec3f, longest: f32) -> vec3f {
-    let squared = dot(v, v);
-    return select(v, v * (longest * inverseSqrt(squared)), squared > longest * longest);
+    return select(v, v * (longest * inverseSqrt(dot(v, v))), longer(v, longest));
 }
 
 // Longest way of a particle in the part `time` of the step.

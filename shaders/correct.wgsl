@@ -7,19 +7,12 @@
 @group(0) @binding(4) var<storage, read_write> acceleration: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 
-// The way `way`, no longer than `longest`; counted if it was.
-fn limited(way: vec3f, longest: f32) -> vec3f {
-    let squared = dot(way, way);
-    if squared > longest * longest {
-        atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
-        return way * (longest * inverseSqrt(squared));
-    }
-    return way;
-}
-
 // `last`: the particle goes what is left of its way.
 fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
-    let change = limited(now.dt * a, DISPLACEMENT_MAX * params.spacing / now.dt);
+    let asked = now.dt * a;
+    let most = DISPLACEMENT_MAX * params.spacing / now.dt;
+    var clamped = longer(asked, most);
+    let change = shortened(asked, most);
     let v = old.xyz + change;
     if !finite_vector(v) {
         atomicMin(&counters[NON_FINITE], u32(old.w));
@@ -30,7 +23,12 @@ fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
     if rest == 0.0 {
         position[i] = vec4f(x.xyz + now.dt * change, x.w);
     } else if last {
-        position[i] = vec4f(x.xyz + limited(rest * v, longest_way(rest)), x.w);
+        let way = rest * v;
+        clamped = clamped || longer(way, longest_way(rest));
+        position[i] = vec4f(x.xyz + shortened(way, longest_way(rest)), x.w);
+    }
+    if clamped {
+        atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
     }
 }
 

@@ -33,13 +33,11 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
 //#endif
     let old = velocity[i];
     let v = old.xyz + now.dt * a;
-    var way = now.ahead * v;
+    let way = now.ahead * v;
     let longest = longest_way(now.ahead);
-    let squared = dot(way, way);
-    if squared > longest * longest {
-        way *= longest * inverseSqrt(squared);
+    if longer(way, longest) {
         atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
     }
-    position[i] = vec4f(x.xyz + way, x.w);
+    position[i] = vec4f(x.xyz + shortened(way, longest), x.w);
     velocity[i] = vec4f(v, old.w);
 }

@@ -149,8 +149,6 @@ pub struct Step {
     pub dt: f64,
     /// From the start of the step to the positions r* at which forces are found [s].
     pub ahead: f64,
-    /// How long a change of velocity there moves a particle for itself [s]; what follows of it moves with the new velocity.
-    pub carried: f64,
     /// gamma of Eq. (8) [-].
     pub relaxation: f64,
     /// alpha of Eq. (8) [1/Pa].
@@ -164,7 +162,18 @@ pub struct Step {
 impl Step {
     /// The same with forces at its end.
     pub fn whole(self) -> Self {
-        Self { ahead: self.dt, carried: self.dt, ..self }
+        Self { ahead: self.dt, ..self }
+    }
+
+    /// What is left of it after the forces [s].
+    pub fn rest(&self) -> f64 {
+        self.dt - self.ahead
+    }
+
+    /// How long a change of velocity moves a particle for itself [s]: for the whole step where forces are at its end; else what is left
+    /// of the way is gone with the new velocity.
+    pub fn carried(&self) -> f64 {
+        if self.ahead == self.dt { self.dt } else { 0.0 }
     }
 }
 
@@ -325,18 +334,18 @@ impl Params {
         let head = self.gravity.length() * self.depth;
         let compressibility =
             self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));
-        let (ahead, carried) = if self.source == Source::Mixed && !self.filled {
+        let ahead = if self.source == Source::Mixed && !self.filled {
             // Half a step, the change of velocity, half a step with the new one: of second order, and it damps no oscillation.
-            (0.5 * dt, 0.0)
+            0.5 * dt
         } else {
             // Semi-implicit MPS: r* is the end of the step, and what changes a velocity there moves the particle as well. Where there
             // is no surface pressures pull, and without that damping particles crowd.
-            (dt, dt)
+            dt
         };
         let c = self.sound_speed(dt);
         let pressure_max = 5.0 * self.density * (c * c).max(speed * speed).max(head);
         let fastest = if self.filled { speed } else { 0.0 };
         let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
-        Step { time, dt, ahead, carried, relaxation, compressibility, pressure_max, shift_speed }
+        Step { time, dt, ahead, relaxation, compressibility, pressure_max, shift_speed }
     }
 }

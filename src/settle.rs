@@ -47,9 +47,9 @@ pub(crate) fn settle(
     let mut part = scene.part(&own, own.len(), &held);
     part.velocity.fill(DVec3::ZERO);
     let mut cpu = Cpu::new(&part, &still, &plan, settings)?;
-    // Any time step gives the same places. Forces are found where a step begins, and move particles for the whole of it.
-    let step = still.step(0.0, 1.0, 0.0);
-    let step = Step { ahead: 0.0, carried: 0.0, relaxation: RATE, pressure_max: f64::INFINITY, ..step };
+    // Any time step gives the same places.
+    let step = still.step(0.0, 1.0, 0.0).whole();
+    let step = Step { relaxation: RATE, pressure_max: f64::INFINITY, ..step };
     for _ in 0..MOST_STEPS {
         for stage in [
             ParticleStage::CellList,

@@ -11,13 +11,13 @@ use glam::DVec3;
 #[inline(always)]
 pub fn kick(x: DVec3, v: DVec3, acceleration: DVec3, step: &Step, spacing: f64) -> (DVec3, DVec3, bool) {
     let (change, clamped) = clamp_length(step.dt * acceleration, DISPLACEMENT_MAX * spacing / step.dt);
-    (x + step.carried * change, v + change, clamped)
+    (x + step.carried() * change, v + change, clamped)
 }
 
 /// The last [`kick`] of a step, and the rest of the way.
 #[inline(always)]
 pub fn correct(x: DVec3, v: DVec3, acceleration: DVec3, step: &Step, spacing: f64) -> (DVec3, DVec3, bool) {
     let (x, v, kicked) = kick(x, v, acceleration, step, spacing);
-    let (way, clamped) = drift(v, step.dt - step.ahead, step.dt, spacing);
+    let (way, clamped) = drift(v, step.rest(), step.dt, spacing);
     (x + way, v, kicked || clamped)
 }

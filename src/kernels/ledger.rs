@@ -25,29 +25,33 @@ pub(crate) fn predict_work(x: DVec3, v: DVec3, viscous: DVec3, params: &Params, 
 /// Work of the acceleration `part` where `total` acts, in `kick` without its clamp: the velocity is changed, and
 /// the position by what the change would have moved it.
 pub(crate) fn kick_work(v: DVec3, part: DVec3, total: DVec3, gravity: DVec3, step: &Step) -> f64 {
-    step.dt * part.dot(v + 0.5 * step.dt * total) - step.carried * step.dt * gravity.dot(part)
+    step.dt * part.dot(v + 0.5 * step.dt * total) - step.carried() * step.dt * gravity.dot(part)
 }
 
 /// Work of gravity on what is left of the way after `total` has acted in `correct`.
 pub(crate) fn rest_work(v: DVec3, total: DVec3, gravity: DVec3, step: &Step) -> f64 {
-    -(step.dt - step.ahead) * gravity.dot(v + step.dt * total)
+    -step.rest() * gravity.dot(v + step.dt * total)
+}
+
+/// Work of the clamps of a particle that went from `before` to `after` where it would have gained `free`.
+fn clamp_work(
+    before: (DVec3, DVec3),
+    after: (DVec3, DVec3, bool),
+    gravity: DVec3,
+    free: impl Fn() -> f64,
+) -> f64 {
+    let (to, new, clamped) = after;
+    if clamped { gain(before, (to, new), gravity) - free() } else { 0.0 }
 }
 
 /// Work of the clamp in `kick`.
 pub(crate) fn kick_clamp(x: DVec3, v: DVec3, total: DVec3, params: &Params, step: &Step) -> f64 {
-    let (to, new, clamped) = kick(x, v, total, step, params.spacing);
-    if !clamped {
-        return 0.0;
-    }
-    gain((x, v), (to, new), params.gravity) - kick_work(v, total, total, params.gravity, step)
+    let after = kick(x, v, total, step, params.spacing);
+    clamp_work((x, v), after, params.gravity, || kick_work(v, total, total, params.gravity, step))
 }
 
 /// Work of the clamps in `correct`.
 pub(crate) fn correct_clamp(x: DVec3, v: DVec3, total: DVec3, params: &Params, step: &Step) -> f64 {
-    let (to, new, clamped) = correct(x, v, total, step, params.spacing);
-    if !clamped {
-        return 0.0;
-    }
-    let free = kick_work(v, total, total, params.gravity, step) + rest_work(v, total, params.gravity, step);
-    gain((x, v), (to, new), params.gravity) - free
+    let (after, g) = (correct(x, v, total, step, params.spacing), params.gravity);
+    clamp_work((x, v), after, g, || kick_work(v, total, total, g, step) + rest_work(v, total, g, step))
 }
