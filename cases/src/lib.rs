@@ -31,9 +31,10 @@ pub fn text(path: &str) -> Option<&'static str> {
     CASES.get_file(parts.join("/"))?.contents_utf8()
 }
 
-/// Names, without `.toml`, of the files of `folder`, sorted.
+/// Names, without `.toml`, of the files of `folder`, sorted; "" is where the cases are.
 pub fn names(folder: &str) -> Vec<&'static str> {
-    let files = CASES.get_dir(folder).into_iter().flat_map(Dir::files);
+    let dir = if folder.is_empty() { Some(&CASES) } else { CASES.get_dir(folder) };
+    let files = dir.into_iter().flat_map(Dir::files);
     let mut names: Vec<&str> = files
         .filter(|f| f.path().extension().is_some_and(|e| e == "toml"))
         .filter_map(|f| f.path().file_stem()?.to_str())
@@ -53,5 +54,6 @@ mod tests {
         assert!(text("study/hydrostatic.toml").unwrap() != hydrostatic);
         assert!(text("study/none.toml").is_none());
         assert!(names("study").contains(&"hydrostatic"));
+        assert!(names("").contains(&"dam_break"));
     }
 }
