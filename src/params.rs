@@ -116,6 +116,8 @@ pub struct Params {
     pub gradient: Gradient,
     /// Free-surface test.
     pub free_surface: FreeSurface,
+    /// Speed of the fastest water at t = 0 [m/s].
+    pub speed_at_start: f64,
     /// gamma.
     pub relaxation: Relaxation,
     /// Whether its speed is the largest of a derived one, which follows the flow.
@@ -206,7 +208,8 @@ impl Params {
         };
         let source = fluid.and_then(|f| f.source).unwrap_or(source);
         let typed = fluid.is_some_and(|f| f.relaxation.is_some() || f.sound_speed.is_some());
-        let follows_flow = source == Source::Mixed && !typed;
+        // Without weight the flow alone tells how fast, whatever the source.
+        let follows_flow = (source == Source::Mixed || g == 0.0) && !typed;
         // The paper's source takes the density's deviation for the pressure: its mean is the level.
         let filled = scene.filled && source == Source::Mixed;
         let friction = fluid.and_then(|f| f.wall_friction).unwrap_or(if paper { 0.0 } else { WALL_FRICTION });
@@ -235,6 +238,7 @@ impl Params {
             source,
             gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),
             free_surface: fluid.and_then(|f| f.free_surface).unwrap_or(free_surface),
+            speed_at_start: scene.fastest(),
             relaxation,
             follows_flow,
             compressibility: fluid.and_then(|f| f.compressibility),

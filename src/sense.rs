@@ -5,9 +5,9 @@ use crate::contact::Solids;
 use crate::error::{CaseError, Problem, Result};
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::time_step::{collapse_speed, time_step};
+use crate::time_step::{expected_speed, time_step};
 
-/// v dt / l0 of the collapse from rest beyond which a fixed step means nothing: particles pass through each other.
+/// v dt / l0 of water as it starts or collapses beyond which a fixed step means nothing: particles pass through each other.
 const COURANT_REFUSED: f64 = 4.0;
 /// Compression of the water at the floor beyond which it is none, alpha rho g H / gamma [-].
 const COMPRESSION_REFUSED: f64 = 1.0;
@@ -19,8 +19,8 @@ const COMPRESSION_REFUSED: f64 = 1.0;
 pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> Result<()> {
     let mut problems = Vec::new();
     let wet = scene.groups.fluid > 0;
-    // The longest step of a run: that of a flow that only expects to collapse.
-    let dt = time_step(params, case.run.time_step, case.run.adaptive && wet, collapse_speed(params));
+    // The longest step of a run: that of a flow before any speed is measured.
+    let dt = time_step(params, case.run.time_step, case.run.adaptive && wet, expected_speed(params));
     if wet {
         problems.extend(too_long(case, params));
         problems.extend(too_soft(case, params, dt));
@@ -29,15 +29,14 @@ pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> R
     if problems.is_empty() { Ok(()) } else { Err(CaseError::all(problems).into()) }
 }
 
-/// A fixed time step against the speed of the collapse from rest.
+/// A fixed time step against the speed of the water.
 fn too_long(case: &Case, params: &Params) -> Option<CaseError> {
     let (dt, l0) = (case.run.time_step, params.spacing);
-    let speed = collapse_speed(params);
+    let speed = expected_speed(params);
     let courant = speed * dt / l0;
     (!case.run.adaptive && courant > COURANT_REFUSED).then(|| {
-        let message = format!(
-            "{dt} s takes water that collapses at {speed:.2} m/s {courant:.1} particles far in a step"
-        );
+        let message =
+            format!("{dt} s takes water of up to {speed:.2} m/s {courant:.1} particles far in a step");
         let remedy = format!("use {:.1e} s or less, or run.adaptive = true", 0.35 * l0 / speed);
         Problem::new("run.time_step", message, remedy).into()
     })
@@ -47,7 +46,7 @@ fn too_long(case: &Case, params: &Params) -> Option<CaseError> {
 fn too_soft(case: &Case, params: &Params, dt: f64) -> Option<CaseError> {
     let alpha = case.fluid.as_ref()?.compressibility?;
     let head = params.density * params.gravity.length() * params.depth;
-    let gamma = params.step(0.0, dt, collapse_speed(params)).relaxation;
+    let gamma = params.step(0.0, dt, expected_speed(params)).relaxation;
     let compression = alpha * head / gamma;
     (compression > COMPRESSION_REFUSED).then(|| {
         let message = format!(

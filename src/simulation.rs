@@ -18,7 +18,7 @@ use crate::scene::{Groups, Scene};
 use crate::settle::settle;
 use crate::slots::Slots;
 use crate::stop::Stop;
-use crate::time_step::{collapse_speed, time_step};
+use crate::time_step::{expected_speed, time_step};
 use glam::{DMat3, DVec3};
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
@@ -114,13 +114,13 @@ impl Simulation {
     ) -> Result<Self> {
         let scene: Arc<Scene> = scene.into();
         let params = Params::new(case, &scene)?;
+        let fastest = params.speed_at_start;
         let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);
         let mut solids = Solids::new(&scene, case.contact.as_ref())?;
         crate::sense::refuse(case, &scene, &params, &solids)?;
         let scene = settle(scene, &params, &plan, settings)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
-        let fastest = scene.velocity[..scene.water()].iter().map(|v| v.length()).fold(0.0, f64::max);
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
             let message = "contact.device = \"gpu\": this run is on the CPU";
@@ -145,7 +145,7 @@ impl Simulation {
             steps: 0,
             stages: BTreeMap::new(),
             wait_for_stages: false,
-            speed: 0.0,
+            speed: fastest,
             fastest,
             stop: Stop::default(),
             threads: None,
@@ -223,14 +223,10 @@ impl Simulation {
         settings(&self.case)
     }
 
-    /// Largest speed to expect in the fluid [m/s]: of the collapse from rest, or measured.
-    fn expected_speed(&self) -> f64 {
-        self.speed.max(collapse_speed(&self.params))
-    }
-
     /// Coefficients of the next step, with the time step that the case, the flow and the solids allow.
     pub fn next_step(&self) -> Step {
-        let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
+        let (adaptive, flow) =
+            (self.case.run.adaptive && self.plan.wet(), self.speed.max(expected_speed(&self.params)));
         let typed = self.case.run.time_step;
         let fastest = if adaptive {
             self.solids.fastest(self.time, typed).max(self.openings.fastest(self.time, self.time + typed))
@@ -498,7 +494,8 @@ impl Simulation {
         let fluid = self.scene.water() as u64 + self.openings.total_emitted();
         if counters.lost as f64 > (LOST_MAX * fluid as f64).max(10.0) {
             let what = format!(
-                "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began",
+                "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began, and \
+                 enlarge run.domain if they may go there",
                 counters.lost, fluid
             );
             return Err(self.diverged(step, Stage::CellList, what));

@@ -2,6 +2,7 @@
 
 use crate::lattice::Lattice;
 use crate::params::{Params, Relaxation};
+use glam::DVec3;
 
 /// Displacement of the fastest particles in a step over l0, v dt / l0, at most [-].
 pub(crate) const COURANT_MAX: f64 = 0.35;
@@ -26,6 +27,8 @@ impl Bounds {
     pub fn new(params: &Params, speed: f64) -> Self {
         let l0 = params.spacing;
         let sound = match params.relaxation {
+            // Without weight there is no speed but the flow's, and gamma is held back instead of the step.
+            Relaxation::Speed(_) if params.follows_flow && params.gravity == DVec3::ZERO => f64::INFINITY,
             Relaxation::Speed(c) => SOUND_MAX * l0 / c,
             Relaxation::Fixed(_) => f64::INFINITY,
         };
@@ -45,12 +48,11 @@ impl Bounds {
     }
 }
 
-/// Speed of a collapse of the water from rest, 2 sqrt(g H) [m/s]; 0 where it fills all its room.
-pub fn collapse_speed(params: &Params) -> f64 {
-    if params.filled {
-        return 0.0;
-    }
-    2.0 * (params.gravity.length() * params.depth).sqrt()
+/// Largest speed to be ready for before any is measured [m/s]: that of the water at t = 0, or of its collapse from rest, 2 sqrt(g H),
+/// for which it has no room where it fills all there is.
+pub fn expected_speed(params: &Params) -> f64 {
+    let collapse = if params.filled { 0.0 } else { 2.0 * (params.gravity.length() * params.depth).sqrt() };
+    collapse.max(params.speed_at_start)
 }
 
 /// The time step [s] of a case whose largest is `typed` [s].

@@ -111,6 +111,11 @@ const WRONG: &[(&str, &str, &[&str])] = &[
         "max = [0.05, 1.0, 0.5]",
         &["fluid.block.0: the block is 0.0500 m", "run.spacing = 0.05 or less"],
     ),
+    (
+        "max = [0.5, 1.0, 0.5]",
+        "max = [0.5, 1.0, 0.5]\nvelocity_gradient = [[1, 0, 0], [0, 0, 0], [0, 0, 0]]",
+        &["fluid.block.0.velocity_gradient: a divergence of 1 1/s", "add up to 0"],
+    ),
     ("spacing = 0.1", "spacing = 0.11", &["moving wall `gate` is 0.1000 m across along x", "0.1 or less"]),
     (
         "[0.2, 0.2, 0.2]",

@@ -1,10 +1,13 @@
 //! Water at t = 0 by shapes and by seeds.
 
 use crate::cli::ran;
+use crate::common::case;
 use crate::meshes::{ball, file, stl};
 use glam::DVec3;
+use seixo::backend::{Processor, gpu};
 use seixo::case::Case;
 use seixo::scene::{Kind, Scene};
+use seixo::simulation::Simulation;
 
 const L0: f64 = 0.02;
 
@@ -123,4 +126,47 @@ fn a_fill_that_leaks_says_where_and_a_run_of_one_that_does_not_goes() {
     let out = folder.path().join("out").display().to_string();
     let ran = ran(&["run", &shown, "-o", &out, "--backend", "cpu", "-q", "--set", "output.every=0"]);
     assert_eq!(ran.code, 0, "{}", ran.err);
+}
+
+/// The long semi-axis [m] of a disc of 1 m that flows with (x, -z) at t = 0 and its kinetic energy over that of the start, after 1 s.
+fn stretched(preset: &str, processor: &Processor) -> [f64; 2] {
+    let case = case(&format!(
+        "[run]\nspacing = 0.05\ntime_step = 8e-3\nend = 1.0\ngravity = [0, 0, 0]\ndimensions = 2\n\
+         [fluid]\npreset = \"{preset}\"\njitter = 0.05\n\
+         [[fluid.shape]]\nshape = \"cylinder\"\nradius = 1\nheight = 1\naxis = [0, 1, 0]\ncenter = [0.3, 0, -0.2]\n\
+         velocity = [0.2, 0, 0]\nvelocity_gradient = [[1, 0, 0], [0, 0, 0], [0, 0, -1]]\n"
+    ));
+    let scene = Scene::build(&case).expect("the scene builds");
+    let mut simulation = Simulation::on(&case, scene, processor).expect("the simulation starts");
+    let start = simulation.backend.monitor().expect("a monitor").kinetic;
+    while simulation.time < 1.0 - 1e-9 {
+        simulation.step().expect("nothing diverges");
+    }
+    let monitor = simulation.backend.monitor().expect("a monitor");
+    assert_eq!(
+        simulation.backend.counters().expect("counters").lost,
+        0,
+        "the domain has room for its flight"
+    );
+    let fields = simulation.backend.read().expect("fields");
+    let n = simulation.groups.fluid as f64;
+    let square = fields.position.iter().map(|x| (x.x - monitor.centroid[0]).powi(2)).sum::<f64>() / n;
+    assert!((monitor.centroid[0] - 0.5).abs() < 0.01, "{:?}", monitor.centroid);
+    [2.0 * square.sqrt(), monitor.kinetic / start]
+}
+
+#[test]
+fn a_drop_in_weightlessness_is_drawn_out_into_the_ellipse_of_theory() {
+    // a' = alpha a, alpha' = alpha^2 (b^2 - a^2) / (a^2 + b^2), a b = 1: 2.2755 after 1 s (Monaghan 1994).
+    for (preset, allowed, lost) in [("accurate", 0.012, 0.035), ("paper", 0.03, 0.08)] {
+        let [axis, energy] = stretched(preset, &Processor::Cpu);
+        println!("{preset}: {axis:.4} m, {energy:.4} of the energy");
+        assert!((axis / 2.2755 - 1.0).abs() < allowed, "{preset}: {axis}");
+        assert!((1.0 - lost..1.005).contains(&energy), "{preset}: {energy}");
+    }
+    if !gpu::adapters().is_empty() {
+        let [axis, energy] = stretched("accurate", &Processor::Gpu { adapter: None });
+        println!("on the device: {axis:.4} m, {energy:.4}");
+        assert!((axis / 2.2755 - 1.0).abs() < 0.012 && (0.965..1.005).contains(&energy), "{axis} {energy}");
+    }
 }

@@ -23,7 +23,7 @@ use seixo::pressure::Settings;
 use seixo::run::summary::particles;
 use seixo::scene::{Drive, Solid};
 use seixo::share::Outlook;
-use seixo::time_step::{Bounds, collapse_speed, time_step};
+use seixo::time_step::{Bounds, expected_speed, time_step};
 use seixo::waves::WaveKind;
 use serde::Serialize;
 
@@ -247,7 +247,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let (case, scene, built) = (&seen.case, &seen.setup.scene, seen.coarser == 1.0);
     let params = Params::new(case, scene)?;
     let plan = Plan::new(case, scene, &params);
-    let dt = time_step(&params, case.run.time_step, case.run.adaptive && plan.wet(), collapse_speed(&params));
+    let dt = time_step(&params, case.run.time_step, case.run.adaptive && plan.wet(), expected_speed(&params));
     let mut advice =
         if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive).0 } else { vec![] };
     let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
@@ -317,7 +317,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
 }
 
 fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> {
-    let step = params.step(0.0, dt, collapse_speed(params));
+    let step = params.step(0.0, dt, expected_speed(params));
     let (scene, built) = (&seen.setup.scene, seen.coarser == 1.0);
     // The lists at t = 0 tell the memory and, of the scene itself, whether the lattice is sound.
     let settings = Settings { tolerance: 1e-3, max_iterations: 1, warm_start: false };
@@ -357,7 +357,7 @@ pub fn step_warnings(params: &Params, typed: f64, adaptive: bool) -> Vec<String>
 
 /// What there is to say of the time step, and whether there is something to change.
 fn step_advice(params: &Params, typed: f64, adaptive: bool) -> (Vec<String>, bool) {
-    let speed = collapse_speed(params);
+    let speed = expected_speed(params);
     let bounds = Bounds::new(params, speed);
     let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous)];
     let further = further.iter().filter(|(_, dt)| dt.is_finite());

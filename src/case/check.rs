@@ -204,6 +204,7 @@ impl Checker<'_> {
         }
         for (k, block) in fluid.block.iter().enumerate() {
             let path = format!("fluid.block.{k}");
+            self.gradient(&path, block.velocity_gradient.as_ref());
             if self.box_edges(&path, &format!("{path}.max"), &block.min, &block.max) {
                 self.fits(&path, "the block", &block.min, &block.max);
             }

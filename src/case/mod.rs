@@ -37,6 +37,9 @@ use serde::{Deserialize, Serialize};
 /// A three-component vector as written in a case file.
 pub type Vector = [f64; 3];
 
+/// Three rows of x, y, z.
+pub type Matrix = [Vector; 3];
+
 /// A case: one experiment. All quantities in SI units.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -293,6 +296,8 @@ pub struct Block {
     /// Velocity at t = 0 [m/s].
     #[serde(default)]
     pub velocity: Vector,
+    /// What is added to `velocity` a metre away from the block's centre [1/s]: rows of x, y, z for the velocity along x, y and z.
+    pub velocity_gradient: Option<Matrix>,
 }
 
 /// A face of a box.

@@ -3,7 +3,7 @@
 use super::check::Checker;
 use super::check_geometry::WallKeys;
 use super::shape::{form, large, place};
-use super::{BodyShape, Face, Form, Place, Tank, Turn, Vector};
+use super::{BodyShape, Face, Form, Matrix, Place, Tank, Turn, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,8 @@ pub struct WaterShape {
     /// Velocity at t = 0 [m/s].
     #[serde(default)]
     pub velocity: Vector,
+    /// What is added to `velocity` a metre away from the shape's centroid [1/s]: rows of x, y, z for the velocity along x, y and z.
+    pub velocity_gradient: Option<Matrix>,
 }
 
 /// Water that fills what can be reached from a place below a level, through what is free of walls.
@@ -67,11 +69,26 @@ impl WaterShape {
 }
 
 impl Checker<'_> {
+    /// A flow that keeps its volume; the pressure would take the rest away in the first step.
+    pub(super) fn gradient(&mut self, path: &str, gradient: Option<&Matrix>) {
+        let Some(gradient) = gradient else { return };
+        let divergence: f64 = self.axes().map(|k| gradient[k][k]).sum();
+        let largest = gradient.as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        if divergence.abs() > 1e-6 * largest {
+            self.add(
+                format!("{path}.velocity_gradient"),
+                format!("a divergence of {divergence} 1/s: water keeps its volume"),
+                "let the numbers of the diagonal add up to 0",
+            );
+        }
+    }
+
     /// Shapes of water and fills.
     pub(super) fn water(&mut self, shapes: &[WaterShape], fills: &[Fill]) {
         let case = self.case;
         for (k, water) in shapes.iter().enumerate() {
             let path = format!("fluid.shape.{k}");
+            self.gradient(&path, water.velocity_gradient.as_ref());
             if water.shape == BodyShape::Terrain {
                 let message = "a terrain is ground and has no end";
                 self.add(format!("{path}.shape"), message, "use a [[fluid.fill]], or set shape = \"mesh\"");

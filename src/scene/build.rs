@@ -10,7 +10,7 @@ use super::oriented::Placed;
 use super::placement::{Surroundings, point};
 use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
-use super::water::Water;
+use super::water::{Flow, Water};
 use super::{Scene, Solid, wall_at};
 use crate::case::{self, Case, Law};
 use crate::error::{CaseError, Problem, Result};
@@ -237,11 +237,8 @@ impl<'a> Builder<'a> {
                     continue;
                 }
             };
-            let mut velocity: DVec3 = water.velocity.into();
-            if self.lattice.plane {
-                velocity.y = 0.0;
-            }
-            self.water.shape(&placed, velocity, &self.lattice, &mut self.grid);
+            let flow = Flow::new(water.velocity, water.velocity_gradient, placed.center, &self.lattice);
+            self.water.shape(&placed, &flow, &self.lattice, &mut self.grid);
             if self.beside_walls() == 0 {
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";

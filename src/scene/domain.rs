@@ -6,6 +6,10 @@ use super::oriented::Placed;
 use crate::error::Problem;
 use glam::{DMat3, DVec3, IVec3};
 
+/// The room around water and bodies that nothing holds is longer by their flight, but by this many times itself at most: cells
+/// cost memory, and a domain can be typed.
+const FLIGHT: f64 = 4.0;
+
 impl Builder<'_> {
     /// The case's domain, or one with room around everything; complains of what lies outside.
     pub(super) fn domain(&mut self) -> (DVec3, DVec3) {
@@ -64,6 +68,12 @@ impl Builder<'_> {
         let held = self.tank.is_some() && !self.water.cell.is_empty();
         let around = if held { room } else { (0.5 * (hi - lo).length()).max(room) };
         let (mut lo, mut hi) = (lo - around, hi + around);
+        if !held {
+            let (back, ahead) = self.flight();
+            let farthest = DVec3::splat(FLIGHT * around);
+            lo -= back.min(farthest);
+            hi += ahead.min(farthest);
+        }
         let gravity = self.gravity();
         if gravity.length() > 0.0 {
             let up = -gravity.normalize();
@@ -77,6 +87,18 @@ impl Builder<'_> {
             hi += head.max(DVec3::ZERO);
         }
         self.in_plane(lo, hi)
+    }
+
+    /// How far water and bodies fly with their velocity at t = 0 until the end, against and along each axis [m].
+    fn flight(&self) -> (DVec3, DVec3) {
+        let free = self.bodies.iter().filter_map(|s| match &s.drive {
+            Drive::Free(free) => Some(free.velocity),
+            Drive::Prescribed(_) => None,
+        });
+        let (least, most) = (self.water.velocity.iter().copied())
+            .chain(free)
+            .fold((DVec3::ZERO, DVec3::ZERO), |(a, b), v| (a.min(v), b.max(v)));
+        (-self.case.run.end * least, self.case.run.end * most)
     }
 
     /// In two dimensions a domain is one cell wide; along a periodic axis it is the tank.

@@ -233,6 +233,11 @@ impl Scene {
         self.groups.fluid - self.reserve
     }
 
+    /// Speed of the fastest water at t = 0 [m/s].
+    pub fn fastest(&self) -> f64 {
+        self.velocity[..self.water()].iter().map(|v| v.length()).fold(0.0, f64::max)
+    }
+
     /// Solids that tables follow: all but the walls in openings, which come last.
     pub fn followed(&self) -> usize {
         self.solids.len() - self.openings.iter().filter(|o| o.solid.is_some()).count()

@@ -6,8 +6,34 @@ use super::placement::point;
 use super::walls::face_name;
 use crate::case;
 use crate::error::Problem;
-use glam::{DVec3, IVec3};
+use glam::{DMat3, DVec3, IVec3};
 use rayon::prelude::*;
+
+/// Velocity of water at t = 0: `velocity` at `center`, and linear about it.
+pub(super) struct Flow {
+    velocity: DVec3,
+    gradient: DMat3,
+    center: DVec3,
+}
+
+impl Flow {
+    /// In two dimensions there is no velocity along y, and none changes along it.
+    pub fn new(
+        velocity: case::Vector,
+        gradient: Option<case::Matrix>,
+        center: DVec3,
+        lattice: &Lattice,
+    ) -> Self {
+        let there = if lattice.plane { DVec3::new(1.0, 0.0, 1.0) } else { DVec3::ONE };
+        let plane = DMat3::from_diagonal(there);
+        let gradient = DMat3::from_cols_array_2d(&gradient.unwrap_or_default()).transpose();
+        Self { velocity: there * DVec3::from(velocity), gradient: plane * gradient * plane, center }
+    }
+
+    fn at(&self, x: DVec3) -> DVec3 {
+        self.velocity + self.gradient * (x - self.center)
+    }
+}
 
 /// The cells that hold water, with the velocity at t = 0.
 #[derive(Default, Debug)]
@@ -21,21 +47,19 @@ pub(super) struct Water {
 impl Water {
     /// Fills the free cells of a block.
     pub fn fill(&mut self, block: &case::Block, lattice: &Lattice, grid: &mut Grid) {
-        let mut velocity: DVec3 = block.velocity.into();
-        if lattice.plane {
-            velocity.y = 0.0;
-        }
+        let center = 0.5 * (DVec3::from(block.min) + DVec3::from(block.max));
+        let flow = Flow::new(block.velocity, block.velocity_gradient, center, lattice);
         for c in lattice.cells(block.min.into(), block.max.into()).iter() {
             if matches!(grid.get(c), FREE | FACE) {
                 grid.set(c, FLUID);
                 self.cell.push(c);
-                self.velocity.push(velocity);
+                self.velocity.push(flow.at(lattice.center(c)));
             }
         }
     }
 
     /// Fills the free cells whose centres lie in a shape.
-    pub fn shape(&mut self, shape: &Placed, velocity: DVec3, lattice: &Lattice, grid: &mut Grid) {
+    pub fn shape(&mut self, shape: &Placed, flow: &Flow, lattice: &Lattice, grid: &mut Grid) {
         let reach = shape.bounds();
         let range = lattice.cells(shape.center - reach, shape.center + reach);
         let free: Vec<IVec3> = range.iter().filter(|&c| matches!(grid.get(c), FREE | FACE)).collect();
@@ -45,7 +69,7 @@ impl Water {
         for c in held {
             grid.set(c, FLUID);
             self.cell.push(c);
-            self.velocity.push(velocity);
+            self.velocity.push(flow.at(lattice.center(c)));
         }
     }
 
@@ -61,10 +85,10 @@ impl Water {
         tank: Option<Cells>,
     ) -> Result<(), Box<Problem>> {
         let (seed, l0) = (DVec3::from(fill.seed), lattice.spacing);
-        let mut velocity: DVec3 = fill.velocity.into();
+        let velocity = Flow::new(fill.velocity, None, seed, lattice).velocity;
         let mut start = lattice.cell(seed);
         if lattice.plane {
-            (start.y, velocity.y) = (0, 0.0);
+            start.y = 0;
         }
         let wrong = |message: String, remedy: &str| Err(Box::new(Problem::new("seed", message, remedy)));
         if !grid.cells.contains(start) {

@@ -40,6 +40,8 @@ pub enum Measure {
     Bodies,
     /// Centroid, momentum and kinetic energy of the water over time.
     Fluid,
+    /// Standard deviation of the water's places along each axis over time, see [`super::record`].
+    Spread,
 }
 
 /// What to measure, and when.
@@ -96,7 +98,7 @@ impl Sampler {
         let needs = |what: &str| {
             Error::key("measure", format!("this study measures what the case lacks: {what}"), "")
         };
-        let dry = [Measure::BodyHeight, Measure::Bodies, Measure::Gauges, Measure::Fluid];
+        let dry = [Measure::BodyHeight, Measure::Bodies, Measure::Gauges, Measure::Fluid, Measure::Spread];
         if block.is_none() && spec.of.iter().any(|m| !dry.contains(m)) {
             return Err(needs("a fluid.block"));
         }

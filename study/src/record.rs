@@ -5,6 +5,7 @@
 //! | `gauges` | the columns of gauges.csv: `NAME [Pa]`, `NAME [m]`, `NAME_force_x [N]`, `NAME_torque_y [N m]` |
 //! | `bodies` | `NAME x [m]`, `NAME vx [m/s]`, `NAME tilt [deg]` of every body and moving wall |
 //! | `fluid` | `fluid x [m]` of the centroid, `fluid kinetic [J]`, `fluid momentum x [kg m/s]` |
+//! | `spread` | `fluid spread x [m]`: standard deviation of the water's places; half a semi-axis of an ellipse |
 //! | `measure.profile` | the profile's name: mean over the window against a coordinate |
 
 use super::measure::{Measure, Spec};
@@ -108,6 +109,7 @@ pub struct Recorder {
     gauges: Option<Gauges>,
     bodies: bool,
     fluid: bool,
+    spread: bool,
     profiles: Vec<Sums>,
     curves: BTreeMap<String, Vec<[f64; 2]>>,
 }
@@ -131,6 +133,7 @@ impl Recorder {
             gauges: if has(Measure::Gauges) { Some(Gauges::new(&simulation.case, scene)?) } else { None },
             bodies: has(Measure::Bodies),
             fluid: has(Measure::Fluid) && simulation.plan.wet(),
+            spread: has(Measure::Spread) && simulation.plan.wet(),
             profiles: spec.profile.iter().map(sums).collect(),
             curves: BTreeMap::new(),
         })
@@ -142,7 +145,7 @@ impl Recorder {
     /// [`Error::Checkpoint`] if the state holds none of them.
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         // What is recorded follows from study and case.
-        let Self { gauges: _, bodies: _, fluid: _, profiles, curves } = self;
+        let Self { gauges: _, bodies: _, fluid: _, spread: _, profiles, curves } = self;
         for Sums { profile, bins } in profiles {
             archive.array(&format!("profile.{}", profile.name), bins, true)?;
         }
@@ -193,8 +196,18 @@ impl Recorder {
             }
             put("fluid kinetic [J]".into(), monitor.kinetic);
         }
-        if in_window && !self.profiles.is_empty() {
-            let fields = simulation.backend.read()?;
+        let profiled = in_window && !self.profiles.is_empty();
+        if !(self.spread || profiled) {
+            return Ok(());
+        }
+        let fields = simulation.backend.read()?;
+        if self.spread {
+            let [x, y, z] = spread(&fields, simulation.groups.fluid).to_array();
+            put("fluid spread x [m]".into(), x);
+            put("fluid spread y [m]".into(), y);
+            put("fluid spread z [m]".into(), z);
+        }
+        if profiled {
             self.profiles.iter_mut().for_each(|p| p.add(&fields, simulation.groups.fluid));
         }
         Ok(())
@@ -205,6 +218,14 @@ impl Recorder {
         out.curves.extend(self.curves);
         out.curves.extend(self.profiles.iter().map(|p| (p.profile.name.clone(), p.curve())));
     }
+}
+
+/// Standard deviation of the water's places about their mean, along each axis [m].
+fn spread(fields: &Fields, fluid: usize) -> DVec3 {
+    let places = || (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid).map(|i| fields.position[i]);
+    let n = places().count() as f64;
+    let mean = places().sum::<DVec3>() / n;
+    (places().map(|x| (x - mean) * (x - mean)).sum::<DVec3>() / n).map(f64::sqrt)
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ use seixo::output::replay::Frame;
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::scene::Scene;
-use seixo::time_step::{Bounds, collapse_speed};
+use seixo::time_step::{Bounds, expected_speed};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -324,7 +324,7 @@ fn limits(run: &Run) -> Result<String> {
     };
     let scene = Scene::build(&run.case)?;
     let params = Params::new(&run.case, &scene)?;
-    let bounds = Bounds::new(&params, collapse_speed(&params));
+    let bounds = Bounds::new(&params, expected_speed(&params));
     let same = |a: f64, b: f64| (a - b).abs() < 1e-6 * b;
     let mut counts = [
         ("run.time_step, as typed", 0),
