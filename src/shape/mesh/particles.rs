@@ -1,13 +1,22 @@
 //! Particles that fill a mesh.
 
-use super::super::{Geometry, Particles, close};
+use super::super::{ALL_FACES, Geometry, Particles, close};
 use super::Mesh;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Particles of the wall layer stand at least so far apart, over the spacing.
+/// Particles stand at least so far apart, over the spacing.
 const APART: f64 = 0.6;
+/// A lattice fits a surface whose wall layer is moved by no more, over the spacing.
+const FITS: f64 = 0.2;
+/// How far particles of a layer push each other away, over the spacing.
+const REACH: f64 = 1.5;
+/// How far a push of 1 moves a particle in a round, over the spacing.
+const STRIDE: f64 = 0.3;
+/// Rounds of pushing, and after how many a particle is put back to its depth.
+const ROUNDS: usize = 40;
+const LOOK: usize = 4;
 
 /// Points in cells.
 pub(super) struct Cells {
@@ -30,6 +39,19 @@ impl Cells {
         self.points.push(x);
     }
 
+    /// Every point within `reach` [m] of `x`.
+    fn near(&self, x: DVec3, reach: f64, mut visit: impl FnMut(DVec3)) {
+        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
+        for cx in low.x..=high.x {
+            for cy in low.y..=high.y {
+                for cz in low.z..=high.z {
+                    let here = self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten();
+                    here.map(|&k| self.points[k]).filter(|p| p.distance(x) < reach).for_each(&mut visit);
+                }
+            }
+        }
+    }
+
     /// The nearest point within `reach` [m] of `x`.
     pub fn nearest(&self, x: DVec3, reach: f64) -> Option<usize> {
         let (low, high) = (self.cell(x - reach), self.cell(x + reach));
@@ -50,8 +72,29 @@ impl Cells {
     }
 }
 
-/// A lattice of about `spacing` [m] along the axes of the file in the box around `mesh`: what is less than a spacing deep goes into the wall layer,
-/// moved along the normal to half of one; the rest lies below, hollow beyond `layers`.
+/// A place of a layer, and the way out of the solid there.
+#[derive(Clone, Copy)]
+struct Place {
+    at: DVec3,
+    outward: DVec3,
+    /// Its depth is not the layer's: near an edge, in a thin part. It stays.
+    fixed: bool,
+}
+
+impl Place {
+    /// Moved along the normal to `depth` [m]; `None` if that leads nearer to another side.
+    fn at_depth(mesh: &Mesh, at: DVec3, depth: f64, spacing: f64) -> Option<Self> {
+        let inside = mesh.depth(at, ALL_FACES)?;
+        let at = at + (inside.depth - depth) * inside.outward;
+        let inside = mesh.depth(at, ALL_FACES)?;
+        let sound = (inside.depth - depth).abs() < 0.1 * spacing;
+        sound.then_some(Self { at, outward: inside.outward, fixed: false })
+    }
+}
+
+/// Layers of particles at half a spacing, one and a half and so on below the surface of `mesh`, `layers` of them: those of a lattice of about
+/// `spacing` [m] along the axes of the file, moved along the normal. Where that is no small way they would stand as uneven as steps, and
+/// water that slides over steps is held back: there each layer is made even.
 pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     let (low, high) = mesh.along_file;
     let to_own = mesh.frame.inverse();
@@ -62,43 +105,84 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
         let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
         to_own * (low + (cell + 0.5) * step)
     };
+    // A lattice that fits has its layers at odd halves of its step.
+    let border = step.max_element().max(spacing) * (1.0 + 1e-6);
+    let deepest = f64::from(layers) * border;
     let found: Vec<(DVec3, f64, DVec3)> = (0..nx * ny * nz)
         .into_par_iter()
         .filter_map(|k| {
-            let inside = mesh.depth(place(k), super::super::ALL_FACES)?;
-            Some((place(k), inside.depth, inside.outward))
+            let inside = mesh.depth(place(k), ALL_FACES)?;
+            (inside.depth <= deepest).then(|| (place(k), inside.depth, inside.outward))
         })
         .collect();
-    // A lattice that fits has its layers at odd halves of its step.
-    let border = step.max_element().max(spacing) * (1.0 + 1e-6);
-    let deepest = (f64::from(layers) + 0.5) * spacing;
+    let off = |depth: f64| (depth - 0.5 * spacing).abs();
+    let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing);
     let mut out = Particles::default();
-    let mut shallow: Vec<_> = found.iter().filter(|f| f.1 <= border).collect();
-    shallow.sort_by(|a, b| (a.1 - 0.5 * spacing).abs().total_cmp(&(b.1 - 0.5 * spacing).abs()));
+    let mut taken = Cells::new(spacing);
+    for layer in 0..layers {
+        let (above, depth) = (f64::from(layer) * border, (f64::from(layer) + 0.5) * spacing);
+        let mut here: Vec<_> = found.iter().filter(|f| f.1 > above && f.1 <= above + border).collect();
+        if here.is_empty() {
+            break;
+        }
+        here.sort_by(|a, b| (a.1 - depth).abs().total_cmp(&(b.1 - depth).abs()));
+        let mut places: Vec<Place> = here
+            .into_par_iter()
+            .map(|&(at, _, outward)| {
+                let stays = Place { at, outward, fixed: true };
+                // Below a wall layer that fits the lattice lies the lattice.
+                if fits && layer > 0 {
+                    stays
+                } else {
+                    Place::at_depth(mesh, at, depth, spacing).unwrap_or(stays)
+                }
+            })
+            .collect();
+        if !fits {
+            places = even(mesh, places, depth, spacing);
+        }
+        for Place { at, .. } in places {
+            if taken.nearest(at, APART * spacing).is_none() {
+                let Some(inside) = mesh.depth(at, ALL_FACES) else { continue };
+                taken.add(at);
+                out.add(layer, at, DVec3::ZERO, inside.depth * inside.outward);
+            }
+        }
+    }
     let mut wall = Cells::new(spacing);
-    for &&(at, depth, outward) in &shallow {
-        let moved = at + (depth - 0.5 * spacing) * outward;
-        // Near an edge or in a thin place the way may lead nearer to another side.
-        let sound = mesh.depth(moved, super::super::ALL_FACES);
-        let (at, inside) = match sound {
-            Some(inside) if (inside.depth - 0.5 * spacing).abs() < 0.1 * spacing => (moved, inside),
-            _ => match mesh.depth(at, super::super::ALL_FACES) {
-                Some(inside) => (at, inside),
-                None => continue,
-            },
-        };
-        if wall.nearest(at, APART * spacing).is_none() {
-            wall.add(at);
-            out.add(0, at, DVec3::ZERO, inside.depth * inside.outward);
-        }
-    }
-    for &(at, depth, _) in found.iter().filter(|f| f.1 > border && f.1 < deepest) {
-        if wall.nearest(at, APART * spacing).is_none() {
-            out.add(1, at, DVec3::ZERO, depth * DVec3::Z);
-        }
-    }
+    out.wall.iter().for_each(|&at| wall.add(at));
     share(mesh, spacing, &wall, &mut out);
     out
+}
+
+/// The places of a layer at `depth` [m], pushed apart along it until they lie evenly.
+fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Place> {
+    let reach = REACH * spacing;
+    for round in 1..=ROUNDS {
+        let mut cells = Cells::new(reach);
+        places.iter().for_each(|p| cells.add(p.at));
+        let pushed = |p: &Place| {
+            let mut push = DVec3::ZERO;
+            cells.near(p.at, reach, |x| {
+                let (way, d) = (p.at - x, p.at.distance(x));
+                if d > 0.0 {
+                    push += (1.0 - d / reach).powi(2) / d * way;
+                }
+            });
+            let along = push - push.dot(p.outward) * p.outward;
+            p.at + (STRIDE * spacing * along).clamp_length_max(0.1 * spacing)
+        };
+        places = places
+            .par_iter()
+            .map(|p| match p.fixed {
+                true => *p,
+                // Between the looks at the surface the tangent is good enough.
+                false if round % LOOK > 0 => Place { at: pushed(p), ..*p },
+                false => Place::at_depth(mesh, pushed(p), depth, spacing).unwrap_or(*p),
+            })
+            .collect();
+    }
+    places
 }
 
 /// Gives each small piece of the surface to the nearest particle of the wall layer.
