@@ -5,9 +5,9 @@ use crate::contact::Solids;
 use crate::error::{CaseError, Problem, Result};
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::time_step::{expected_speed, time_step};
+use crate::time_step::{collapse_speed, expected_speed, time_step};
 
-/// v dt / l0 of water as it starts or collapses beyond which a fixed step means nothing: particles pass through each other.
+/// v dt / l0 of the collapse from rest beyond which a fixed step means nothing: particles pass through each other.
 const COURANT_REFUSED: f64 = 4.0;
 /// Compression of the water at the floor beyond which it is none, alpha rho g H / gamma [-].
 const COMPRESSION_REFUSED: f64 = 1.0;
@@ -29,14 +29,15 @@ pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> R
     if problems.is_empty() { Ok(()) } else { Err(CaseError::all(problems).into()) }
 }
 
-/// A fixed time step against the speed of the water.
+/// A fixed time step against the speed of the collapse from rest.
 fn too_long(case: &Case, params: &Params) -> Option<CaseError> {
     let (dt, l0) = (case.run.time_step, params.spacing);
-    let speed = expected_speed(params);
+    let speed = collapse_speed(params);
     let courant = speed * dt / l0;
     (!case.run.adaptive && courant > COURANT_REFUSED).then(|| {
-        let message =
-            format!("{dt} s takes water of up to {speed:.2} m/s {courant:.1} particles far in a step");
+        let message = format!(
+            "{dt} s takes water that collapses at {speed:.2} m/s {courant:.1} particles far in a step"
+        );
         let remedy = format!("use {:.1e} s or less, or run.adaptive = true", 0.35 * l0 / speed);
         Problem::new("run.time_step", message, remedy).into()
     })

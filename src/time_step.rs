@@ -48,11 +48,14 @@ impl Bounds {
     }
 }
 
-/// Largest speed to be ready for before any is measured [m/s]: that of the water at t = 0, or of its collapse from rest, 2 sqrt(g H),
-/// for which it has no room where it fills all there is.
+/// Speed of a collapse of the water from rest, 2 sqrt(g H) [m/s]; 0 where it fills all its room.
+pub fn collapse_speed(params: &Params) -> f64 {
+    if params.filled { 0.0 } else { 2.0 * (params.gravity.length() * params.depth).sqrt() }
+}
+
+/// Largest speed to be ready for before any is measured [m/s]: of the water at t = 0, or of its collapse.
 pub fn expected_speed(params: &Params) -> f64 {
-    let collapse = if params.filled { 0.0 } else { 2.0 * (params.gravity.length() * params.depth).sqrt() };
-    collapse.max(params.speed_at_start)
+    collapse_speed(params).max(params.speed_at_start)
 }
 
 /// The time step [s] of a case whose largest is `typed` [s].

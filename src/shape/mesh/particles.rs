@@ -14,9 +14,11 @@ const FITS: f64 = 0.2;
 const REACH: f64 = 1.5;
 /// How far a push of 1 moves a particle in a round, over the spacing.
 const STRIDE: f64 = 0.3;
-/// Rounds of pushing, and after how many a particle is put back to its depth.
-const ROUNDS: usize = 40;
-const LOOK: usize = 4;
+/// Rounds of pushing between two looks at the surface, how many of these, and how much nearer two particles may come between them, over the
+/// spacing.
+const ROUNDS: usize = 15;
+const LOOKS: usize = 2;
+const MARGIN: f64 = 0.5;
 
 /// Points in cells.
 pub(super) struct Cells {
@@ -39,17 +41,19 @@ impl Cells {
         self.points.push(x);
     }
 
-    /// Every point within `reach` [m] of `x`.
-    fn near(&self, x: DVec3, reach: f64, mut visit: impl FnMut(DVec3)) {
-        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
+    /// Every point within the cells' edge of `x`.
+    fn near(&self, x: DVec3) -> Vec<usize> {
+        let (low, high) = (self.cell(x - self.edge), self.cell(x + self.edge));
+        let mut found = Vec::new();
         for cx in low.x..=high.x {
             for cy in low.y..=high.y {
                 for cz in low.z..=high.z {
                     let here = self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten();
-                    here.map(|&k| self.points[k]).filter(|p| p.distance(x) < reach).for_each(&mut visit);
+                    found.extend(here.filter(|&&k| self.points[k].distance(x) < self.edge));
                 }
             }
         }
+        found
     }
 
     /// The nearest point within `reach` [m] of `x`.
@@ -72,23 +76,27 @@ impl Cells {
     }
 }
 
-/// A place of a layer, and the way out of the solid there.
+/// A place of a layer.
 #[derive(Clone, Copy)]
 struct Place {
     at: DVec3,
-    outward: DVec3,
+    /// Its depth [m] and the way out of the solid.
+    inside: (f64, DVec3),
     /// Its depth is not the layer's: near an edge, in a thin part. It stays.
     fixed: bool,
 }
 
 impl Place {
-    /// Moved along the normal to `depth` [m]; `None` if that leads nearer to another side.
-    fn at_depth(mesh: &Mesh, at: DVec3, depth: f64, spacing: f64) -> Option<Self> {
-        let inside = mesh.depth(at, ALL_FACES)?;
-        let at = at + (inside.depth - depth) * inside.outward;
-        let inside = mesh.depth(at, ALL_FACES)?;
+    /// A place whose depth is not known yet, moved along `outward` from `inside` [m] to `depth` [m].
+    fn moved(at: DVec3, (inside, outward): (f64, DVec3), depth: f64) -> Self {
+        Self { at: at + (inside - depth) * outward, inside: (depth, outward), fixed: false }
+    }
+
+    /// The same with its depth looked up; `None` if that is not about `depth` [m], as where the way led nearer to another side.
+    fn looked_up(self, mesh: &Mesh, depth: f64, spacing: f64) -> Option<Self> {
+        let inside = mesh.depth(self.at, ALL_FACES)?;
         let sound = (inside.depth - depth).abs() < 0.1 * spacing;
-        sound.then_some(Self { at, outward: inside.outward, fixed: false })
+        sound.then_some(Self { inside: (inside.depth, inside.outward), ..self })
     }
 }
 
@@ -128,24 +136,22 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
         here.sort_by(|a, b| (a.1 - depth).abs().total_cmp(&(b.1 - depth).abs()));
         let mut places: Vec<Place> = here
             .into_par_iter()
-            .map(|&(at, _, outward)| {
-                let stays = Place { at, outward, fixed: true };
+            .map(|&(at, inside, outward)| {
+                let stays = Place { at, inside: (inside, outward), fixed: true };
                 // Below a wall layer that fits the lattice lies the lattice.
                 if fits && layer > 0 {
-                    stays
-                } else {
-                    Place::at_depth(mesh, at, depth, spacing).unwrap_or(stays)
+                    return stays;
                 }
+                Place::moved(at, stays.inside, depth).looked_up(mesh, depth, spacing).unwrap_or(stays)
             })
             .collect();
         if !fits {
             places = even(mesh, places, depth, spacing);
         }
-        for Place { at, .. } in places {
+        for Place { at, inside: (depth, outward), .. } in places {
             if taken.nearest(at, APART * spacing).is_none() {
-                let Some(inside) = mesh.depth(at, ALL_FACES) else { continue };
                 taken.add(at);
-                out.add(layer, at, DVec3::ZERO, inside.depth * inside.outward);
+                out.add(layer, at, DVec3::ZERO, depth * outward);
             }
         }
     }
@@ -158,27 +164,40 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
 /// The places of a layer at `depth` [m], pushed apart along it until they lie evenly.
 fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Place> {
     let reach = REACH * spacing;
-    for round in 1..=ROUNDS {
-        let mut cells = Cells::new(reach);
+    for look in 0..LOOKS {
+        let mut cells = Cells::new(reach + MARGIN * spacing);
         places.iter().for_each(|p| cells.add(p.at));
-        let pushed = |p: &Place| {
-            let mut push = DVec3::ZERO;
-            cells.near(p.at, reach, |x| {
-                let (way, d) = (p.at - x, p.at.distance(x));
-                if d > 0.0 {
-                    push += (1.0 - d / reach).powi(2) / d * way;
+        let around: Vec<Vec<usize>> =
+            places.par_iter().map(|p| if p.fixed { vec![] } else { cells.near(p.at) }).collect();
+        let mut moved: Vec<DVec3> = places.iter().map(|p| p.at).collect();
+        for _ in 0..ROUNDS {
+            let pushed = |k: usize| {
+                let (x, outward) = (moved[k], places[k].inside.1);
+                let mut push = DVec3::ZERO;
+                for &j in &around[k] {
+                    let (way, d) = (x - moved[j], x.distance(moved[j]));
+                    if d > 0.0 && d < reach {
+                        push += (1.0 - d / reach).powi(2) / d * way;
+                    }
                 }
-            });
-            let along = push - push.dot(p.outward) * p.outward;
-            p.at + (STRIDE * spacing * along).clamp_length_max(0.1 * spacing)
-        };
-        places = places
-            .par_iter()
-            .map(|p| match p.fixed {
-                true => *p,
                 // Between the looks at the surface the tangent is good enough.
-                false if round % LOOK > 0 => Place { at: pushed(p), ..*p },
-                false => Place::at_depth(mesh, pushed(p), depth, spacing).unwrap_or(*p),
+                let along = push - push.dot(outward) * outward;
+                x + (STRIDE * spacing * along).clamp_length_max(0.1 * spacing)
+            };
+            moved = (0..places.len()).into_par_iter().map(pushed).collect();
+        }
+        let last = look + 1 == LOOKS;
+        places = (places.par_iter().zip(&moved))
+            .map(|(p, &at)| {
+                if p.fixed {
+                    return *p;
+                }
+                let Some(inside) = mesh.depth(at, ALL_FACES) else { return *p };
+                let put = Place::moved(at, (inside.depth, inside.outward), depth);
+                // On its way it has not left the layer for another side's; where it ends that is looked up.
+                let strays = (inside.depth - depth).abs() > 0.5 * spacing;
+                let put = if last { put.looked_up(mesh, depth, spacing) } else { (!strays).then_some(put) };
+                put.unwrap_or(*p)
             })
             .collect();
     }
