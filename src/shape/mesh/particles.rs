@@ -104,6 +104,10 @@ impl Place {
 /// `spacing` [m] along the axes of the file, moved along the normal. Where that is no small way they would stand as uneven as steps, and
 /// water that slides over steps is held back: there each layer is made even.
 pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
+    if !mesh.is_file {
+        // Wedges and cones: what is pushed apart leaves holes at their sharp edges.
+        return lattice(mesh, spacing, layers);
+    }
     let (low, high) = mesh.along_file;
     let to_own = mesh.frame.inverse();
     let count = ((high - low) / spacing).round().max(DVec3::ONE);
@@ -157,6 +161,57 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     }
     let mut wall = Cells::new(spacing);
     out.wall.iter().for_each(|&at| wall.add(at));
+    share(mesh, spacing, &wall, &mut out);
+    out
+}
+
+/// A lattice of about `spacing` [m] along the axes of the file in the box around `mesh`: what is less than a spacing deep goes into the wall layer,
+/// moved along the normal to half of one; the rest lies below, hollow beyond `layers`.
+fn lattice(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
+    let (low, high) = mesh.along_file;
+    let to_own = mesh.frame.inverse();
+    let count = ((high - low) / spacing).round().max(DVec3::ONE);
+    let step = (high - low) / count;
+    let [nx, ny, nz] = count.to_array().map(|n| n as usize);
+    let place = |k: usize| {
+        let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
+        to_own * (low + (cell + 0.5) * step)
+    };
+    let found: Vec<(DVec3, f64, DVec3)> = (0..nx * ny * nz)
+        .into_par_iter()
+        .filter_map(|k| {
+            let inside = mesh.depth(place(k), ALL_FACES)?;
+            Some((place(k), inside.depth, inside.outward))
+        })
+        .collect();
+    // A lattice that fits has its layers at odd halves of its step.
+    let border = step.max_element().max(spacing) * (1.0 + 1e-6);
+    let deepest = (f64::from(layers) + 0.5) * spacing;
+    let mut out = Particles::default();
+    let mut shallow: Vec<_> = found.iter().filter(|f| f.1 <= border).collect();
+    shallow.sort_by(|a, b| (a.1 - 0.5 * spacing).abs().total_cmp(&(b.1 - 0.5 * spacing).abs()));
+    let mut wall = Cells::new(spacing);
+    for &&(at, depth, outward) in &shallow {
+        let moved = at + (depth - 0.5 * spacing) * outward;
+        // Near an edge or in a thin place the way may lead nearer to another side.
+        let sound = mesh.depth(moved, ALL_FACES);
+        let (at, inside) = match sound {
+            Some(inside) if (inside.depth - 0.5 * spacing).abs() < 0.1 * spacing => (moved, inside),
+            _ => match mesh.depth(at, ALL_FACES) {
+                Some(inside) => (at, inside),
+                None => continue,
+            },
+        };
+        if wall.nearest(at, APART * spacing).is_none() {
+            wall.add(at);
+            out.add(0, at, DVec3::ZERO, inside.depth * inside.outward);
+        }
+    }
+    for &(at, depth, _) in found.iter().filter(|f| f.1 > border && f.1 < deepest) {
+        if wall.nearest(at, APART * spacing).is_none() {
+            out.add(1, at, DVec3::ZERO, depth * DVec3::Z);
+        }
+    }
     share(mesh, spacing, &wall, &mut out);
     out
 }
