@@ -18,7 +18,7 @@ use crate::scene::{Groups, Scene};
 use crate::settle::settle;
 use crate::slots::Slots;
 use crate::stop::Stop;
-use crate::time_step::{expected_speed, time_step};
+use crate::time_step::{collapse_speed, time_step};
 use glam::{DMat3, DVec3};
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
@@ -223,10 +223,14 @@ impl Simulation {
         settings(&self.case)
     }
 
+    /// Largest speed to expect in the fluid [m/s]: of the collapse from rest, or of the water when last looked.
+    fn expected_speed(&self) -> f64 {
+        self.speed.max(collapse_speed(&self.params))
+    }
+
     /// Coefficients of the next step, with the time step that the case, the flow and the solids allow.
     pub fn next_step(&self) -> Step {
-        let (adaptive, flow) =
-            (self.case.run.adaptive && self.plan.wet(), self.speed.max(expected_speed(&self.params)));
+        let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
         let typed = self.case.run.time_step;
         let fastest = if adaptive {
             self.solids.fastest(self.time, typed).max(self.openings.fastest(self.time, self.time + typed))

@@ -3,7 +3,7 @@
 use crate::output::result::{Grade, Summary, Verdict};
 use crate::scene::{Drive, Scene};
 use crate::simulation::Simulation;
-use crate::time_step::expected_speed;
+use crate::time_step::collapse_speed;
 
 /// Part of the solves that may fail, of the particles that may get lost, in a fine result and in one that means
 /// anything [-].
@@ -59,7 +59,7 @@ impl Scale {
         // Water at rest without gravity is never quite at rest.
         let noise = if water > 0.0 { 0.1 * params.sound_speed(simulation.case.run.time_step) } else { 0.0 };
         Self {
-            speed: (speed * speed + 2.0 * g * height).sqrt().max(expected_speed(params)).max(noise),
+            speed: (speed * speed + 2.0 * g * height).sqrt().max(collapse_speed(params)).max(noise),
             energy: g * (water * params.depth + bodies * height)
                 + (water + bodies) * speed * speed
                 + turning

@@ -100,6 +100,27 @@ impl Place {
     }
 }
 
+/// The places inside `mesh` of a lattice of about `spacing` [m] along the axes of the file, each with its depth [m] and the way out of the solid there, and
+/// its largest step [m].
+fn cells(mesh: &Mesh, spacing: f64) -> (Vec<(DVec3, f64, DVec3)>, f64) {
+    let (low, high) = mesh.along_file;
+    let to_own = mesh.frame.inverse();
+    let count = ((high - low) / spacing).round().max(DVec3::ONE);
+    let step = (high - low) / count;
+    let [nx, ny, nz] = count.to_array().map(|n| n as usize);
+    let found = (0..nx * ny * nz)
+        .into_par_iter()
+        .filter_map(|k| {
+            let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
+            let at = to_own * (low + (cell + 0.5) * step);
+            let inside = mesh.depth(at, ALL_FACES)?;
+            Some((at, inside.depth, inside.outward))
+        })
+        .collect();
+    // A lattice that fits has its layers at odd halves of its step.
+    (found, step.max_element().max(spacing) * (1.0 + 1e-6))
+}
+
 /// Layers of particles at half a spacing, one and a half and so on below the surface of `mesh`, `layers` of them: those of a lattice of about
 /// `spacing` [m] along the axes of the file, moved along the normal. Where that is no small way they would stand as uneven as steps, and
 /// water that slides over steps is held back: there each layer is made even.
@@ -108,25 +129,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
         // Wedges and cones: what is pushed apart leaves holes at their sharp edges.
         return lattice(mesh, spacing, layers);
     }
-    let (low, high) = mesh.along_file;
-    let to_own = mesh.frame.inverse();
-    let count = ((high - low) / spacing).round().max(DVec3::ONE);
-    let step = (high - low) / count;
-    let [nx, ny, nz] = count.to_array().map(|n| n as usize);
-    let place = |k: usize| {
-        let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
-        to_own * (low + (cell + 0.5) * step)
-    };
-    // A lattice that fits has its layers at odd halves of its step.
-    let border = step.max_element().max(spacing) * (1.0 + 1e-6);
-    let deepest = f64::from(layers) * border;
-    let found: Vec<(DVec3, f64, DVec3)> = (0..nx * ny * nz)
-        .into_par_iter()
-        .filter_map(|k| {
-            let inside = mesh.depth(place(k), ALL_FACES)?;
-            (inside.depth <= deepest).then(|| (place(k), inside.depth, inside.outward))
-        })
-        .collect();
+    let (found, border) = cells(mesh, spacing);
     let off = |depth: f64| (depth - 0.5 * spacing).abs();
     let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing);
     let mut out = Particles::default();
@@ -168,24 +171,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
 /// A lattice of about `spacing` [m] along the axes of the file in the box around `mesh`: what is less than a spacing deep goes into the wall layer,
 /// moved along the normal to half of one; the rest lies below, hollow beyond `layers`.
 fn lattice(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
-    let (low, high) = mesh.along_file;
-    let to_own = mesh.frame.inverse();
-    let count = ((high - low) / spacing).round().max(DVec3::ONE);
-    let step = (high - low) / count;
-    let [nx, ny, nz] = count.to_array().map(|n| n as usize);
-    let place = |k: usize| {
-        let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
-        to_own * (low + (cell + 0.5) * step)
-    };
-    let found: Vec<(DVec3, f64, DVec3)> = (0..nx * ny * nz)
-        .into_par_iter()
-        .filter_map(|k| {
-            let inside = mesh.depth(place(k), ALL_FACES)?;
-            Some((place(k), inside.depth, inside.outward))
-        })
-        .collect();
-    // A lattice that fits has its layers at odd halves of its step.
-    let border = step.max_element().max(spacing) * (1.0 + 1e-6);
+    let (found, border) = cells(mesh, spacing);
     let deepest = (f64::from(layers) + 0.5) * spacing;
     let mut out = Particles::default();
     let mut shallow: Vec<_> = found.iter().filter(|f| f.1 <= border).collect();
