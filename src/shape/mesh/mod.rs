@@ -41,6 +41,8 @@ pub struct Mesh {
     /// Turn from this frame to the file's.
     frame: DQuat,
     is_file: bool,
+    /// Ground below an open surface: its edges lie at its ends, beyond what water reaches.
+    is_ground: bool,
     /// Centre of mass in the file's coordinates [m].
     center: DVec3,
     /// Corners of its convex hull [m].
@@ -132,6 +134,7 @@ impl Mesh {
         let (vertices, triangles) = make()?;
         let mut mesh = Self::new(&key.0, vertices, triangles)?;
         mesh.is_file = key.1 != 0;
+        mesh.is_ground = mesh.is_file && f64::from_bits(key.2[1]) > 0.0;
         let mesh: &'static Self = Box::leak(Box::new(mesh));
         made.push((key, mesh));
         Ok(mesh)
@@ -184,6 +187,7 @@ impl Mesh {
             moments,
             frame,
             is_file: false,
+            is_ground: false,
             center,
             hull,
             radius,
