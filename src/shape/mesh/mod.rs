@@ -1,13 +1,14 @@
 //! A closed surface of triangles: a solid from an STL or OBJ file, ground below an open one, a cone or a wedge.
 //!
-//! Volume, moments and distances are those of the triangles (parry). Particles stand on a lattice that fills the body; its
-//! wall layer is brought to half a spacing below the surface. Points of the surface press into others: those above the
+//! Volume, moments and distances are those of the triangles (parry). Particles stand in layers half a
+//! spacing, one and a half and so on below the surface. Points of the surface press into others: those above the
 //! wall layer, the vertices and the sharp edges.
 
 mod ground;
 mod particles;
 mod primitives;
 mod read;
+mod skin;
 
 use super::surface::Surface;
 use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, along};
@@ -135,6 +136,9 @@ impl Mesh {
         let mut mesh = Self::new(&key.0, vertices, triangles)?;
         mesh.is_file = key.1 != 0;
         mesh.is_ground = mesh.is_file && f64::from_bits(key.2[1]) > 0.0;
+        if mesh.is_ground {
+            mesh.thickness = mesh.thinnest_above();
+        }
         let mesh: &'static Self = Box::leak(Box::new(mesh));
         made.push((key, mesh));
         Ok(mesh)
@@ -178,8 +182,7 @@ impl Mesh {
         let triangles = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
             .map_err(|e| Unfit::new(format!("{path}: {e}"), "repair the surface"))?;
         let thickness = thinnest(&triangles);
-        let place = frame * thickness.place + center;
-        let thickness = Thickness { place, ..thickness };
+        let thickness = Thickness { place: frame * thickness.place + center, ..thickness };
         let moments = moments / volume;
         Ok(Self {
             triangles,
@@ -196,6 +199,20 @@ impl Mesh {
             sharp,
             thickness,
         })
+    }
+
+    /// Where ground is thinnest between two places of the surface that was given: its sides and its bottom end nowhere that water reaches.
+    fn thinnest_above(&self) -> Thickness {
+        let up = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|k| self.triangles.vertices()[k as usize]);
+            (self.frame * (b - a).cross(c - a).normalize_or_zero()).z > 1e-6
+        };
+        let above: Vec<[u32; 3]> = self.triangles.indices().iter().filter(|t| up(t)).copied().collect();
+        let vertices = self.triangles.vertices().to_vec();
+        // Of triangles that a mesh was made of already.
+        let Ok(above) = TriMesh::new(vertices, above) else { return self.thickness };
+        let thickness = thinnest(&above);
+        Thickness { place: self.frame * thickness.place + self.center, ..thickness }
     }
 
     /// Turn from the frame of its principal axes to the file's.

@@ -2,14 +2,17 @@
 
 use super::super::{ALL_FACES, Geometry, Particles, close};
 use super::Mesh;
+use super::skin::Skin;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Particles stand at least so far apart, over the spacing.
-const APART: f64 = 0.6;
+pub(super) const APART: f64 = 0.6;
 /// A lattice fits a surface whose wall layer is moved by no more, over the spacing.
 const FITS: f64 = 0.2;
+/// Where the normal's largest part along an axis of the lattice is more, its places lie evenly enough to begin with.
+const GENTLE: f64 = 0.95;
 /// How far particles of a layer push each other away, over the spacing.
 const REACH: f64 = 1.5;
 /// How far a push of 1 moves a particle in a round, over the spacing.
@@ -42,7 +45,7 @@ impl Cells {
     }
 
     /// Every point within the cells' edge of `x`.
-    fn near(&self, x: DVec3) -> Vec<usize> {
+    pub fn near(&self, x: DVec3) -> Vec<usize> {
         let (low, high) = (self.cell(x - self.edge), self.cell(x + self.edge));
         let mut found = Vec::new();
         for cx in low.x..=high.x {
@@ -50,6 +53,21 @@ impl Cells {
                 for cz in low.z..=high.z {
                     let here = self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten();
                     found.extend(here.filter(|&&k| self.points[k].distance(x) < self.edge));
+                }
+            }
+        }
+        found
+    }
+
+    /// Every point within `reach` [m] of `x`.
+    pub fn near_within(&self, x: DVec3, reach: f64) -> Vec<DVec3> {
+        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
+        let mut found = Vec::new();
+        for cx in low.x..=high.x {
+            for cy in low.y..=high.y {
+                for cz in low.z..=high.z {
+                    let here = self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten();
+                    found.extend(here.map(|&k| self.points[k]).filter(|p| p.distance(x) < reach));
                 }
             }
         }
@@ -78,12 +96,12 @@ impl Cells {
 
 /// A place of a layer.
 #[derive(Clone, Copy)]
-struct Place {
-    at: DVec3,
+pub(super) struct Place {
+    pub at: DVec3,
     /// Its depth [m] and the way out of the solid.
-    inside: (f64, DVec3),
+    pub inside: (f64, DVec3),
     /// Its depth is not the layer's: near an edge, in a thin part. It stays.
-    fixed: bool,
+    pub fixed: bool,
 }
 
 impl Place {
@@ -122,40 +140,35 @@ fn cells(mesh: &Mesh, spacing: f64) -> (Vec<(DVec3, f64, DVec3)>, f64) {
 }
 
 /// Layers of particles at half a spacing, one and a half and so on below the surface of `mesh`, `layers` of them: those of a lattice of about
-/// `spacing` [m] along the axes of the file, moved along the normal. Where that is no small way they would stand as uneven as steps, and
-/// water that slides over steps is held back: there each layer is made even.
+/// `spacing` [m] along the axes of the file where that fits, and else layers of their own, each pushed apart until it lies evenly. Water that
+/// slides over the steps of a lattice is held back.
 pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
-    if !(mesh.is_ground || mesh.sharp.is_empty()) {
-        // The lattice behind its wall layer keeps water out where that has too few places for a layer of its own: along a slope of 45
-        // degrees 0.7 of those it needs. A wedge whose layers were pushed apart let water in by 1.4 spacings.
-        return lattice(mesh, spacing, layers);
-    }
     let (found, border) = cells(mesh, spacing);
     let off = |depth: f64| (depth - 0.5 * spacing).abs();
     let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing);
+    let skin = (!fits).then(|| Skin::new(mesh, spacing));
     let mut out = Particles::default();
     let mut taken = Cells::new(spacing);
     for layer in 0..layers {
         let (above, depth) = (f64::from(layer) * border, (f64::from(layer) + 0.5) * spacing);
         let mut here: Vec<_> = found.iter().filter(|f| f.1 > above && f.1 <= above + border).collect();
-        if here.is_empty() {
-            break;
-        }
         here.sort_by(|a, b| (a.1 - depth).abs().total_cmp(&(b.1 - depth).abs()));
-        let mut places: Vec<Place> = here
-            .into_par_iter()
-            .map(|&(at, inside, outward)| {
+        let places: Vec<Place> = if let Some(skin) = &skin {
+            let moved = here.into_par_iter().filter_map(|&(at, inside, outward)| {
+                let gentle = (mesh.frame * outward).abs().max_element() > GENTLE;
+                gentle.then(|| Place::moved(at, (inside, outward), depth).looked_up(mesh, depth, spacing))?
+            });
+            even(mesh, skin.layer(depth, moved.collect(), &taken), depth, spacing)
+        } else {
+            let put = |&&(at, inside, outward): &&(DVec3, f64, DVec3)| {
                 let stays = Place { at, inside: (inside, outward), fixed: true };
                 // Below a wall layer that fits the lattice lies the lattice.
-                if fits && layer > 0 {
-                    return stays;
-                }
-                Place::moved(at, stays.inside, depth).looked_up(mesh, depth, spacing).unwrap_or(stays)
-            })
-            .collect();
-        if !fits {
-            places = even(mesh, places, depth, spacing);
-        }
+                let moved = (layer == 0)
+                    .then(|| Place::moved(at, stays.inside, depth).looked_up(mesh, depth, spacing));
+                moved.flatten().unwrap_or(stays)
+            };
+            here.par_iter().map(put).collect()
+        };
         for Place { at, inside: (depth, outward), .. } in places {
             if taken.nearest(at, APART * spacing).is_none() {
                 taken.add(at);
@@ -165,40 +178,6 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     }
     let mut wall = Cells::new(spacing);
     out.wall.iter().for_each(|&at| wall.add(at));
-    share(mesh, spacing, &wall, &mut out);
-    out
-}
-
-/// A lattice of about `spacing` [m] along the axes of the file in the box around `mesh`: what is less than a spacing deep goes into the wall layer,
-/// moved along the normal to half of one; the rest lies below, hollow beyond `layers`.
-fn lattice(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
-    let (found, border) = cells(mesh, spacing);
-    let deepest = (f64::from(layers) + 0.5) * spacing;
-    let mut out = Particles::default();
-    let mut shallow: Vec<_> = found.iter().filter(|f| f.1 <= border).collect();
-    shallow.sort_by(|a, b| (a.1 - 0.5 * spacing).abs().total_cmp(&(b.1 - 0.5 * spacing).abs()));
-    let mut wall = Cells::new(spacing);
-    for &&(at, depth, outward) in &shallow {
-        let moved = at + (depth - 0.5 * spacing) * outward;
-        // Near an edge or in a thin place the way may lead nearer to another side.
-        let sound = mesh.depth(moved, ALL_FACES);
-        let (at, inside) = match sound {
-            Some(inside) if (inside.depth - 0.5 * spacing).abs() < 0.1 * spacing => (moved, inside),
-            _ => match mesh.depth(at, ALL_FACES) {
-                Some(inside) => (at, inside),
-                None => continue,
-            },
-        };
-        if wall.nearest(at, APART * spacing).is_none() {
-            wall.add(at);
-            out.add(0, at, DVec3::ZERO, inside.depth * inside.outward);
-        }
-    }
-    for &(at, depth, _) in found.iter().filter(|f| f.1 > border && f.1 < deepest) {
-        if wall.nearest(at, APART * spacing).is_none() {
-            out.add(1, at, DVec3::ZERO, depth * DVec3::Z);
-        }
-    }
     share(mesh, spacing, &wall, &mut out);
     out
 }
