@@ -296,14 +296,20 @@ impl Params {
         }
     }
 
-    /// gamma of Eq. (8) in a step of `dt` [s] of water whose fastest has the speed `flow` [m/s].
-    pub fn relaxation(&self, dt: f64, flow: f64) -> f64 {
+    /// gamma of Eq. (8) in a step of `dt` [s] of water whose fastest has the speed `flow`, among solids and openings whose fastest has the
+    /// speed `driven` [m/s].
+    pub fn relaxation(&self, dt: f64, flow: f64, driven: f64) -> f64 {
         match self.relaxation {
             Relaxation::Fixed(gamma) => gamma,
             Relaxation::Speed(c) => {
-                // Without weight only the flow says how fast.
+                // Without weight only the flow says how fast. What plunges into water that is slower presses it together before that
+                // has taken its speed.
                 let most = if self.gravity == DVec3::ZERO { f64::INFINITY } else { c };
-                let c = if self.follows_flow { (SOUND_OVER_FLOW * flow).clamp(CALM * c, most) } else { c };
+                let c = if self.follows_flow {
+                    (SOUND_OVER_FLOW * flow).clamp(CALM * c, most).max(SOUND_OVER_FLOW * driven)
+                } else {
+                    c
+                };
                 (c * dt / self.spacing).powi(2).min(RELAXATION_MAX)
             }
         }
@@ -332,9 +338,18 @@ impl Params {
         if self.depth > 0.0 { (REACH * self.depth).min(farthest) } else { farthest }
     }
 
-    /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected [m/s].
+    /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected of the water, and `driven` the largest of
+    /// solids and openings [m/s].
+    pub fn step_driven(&self, time: f64, dt: f64, speed: f64, driven: f64) -> Step {
+        let step = self.step(time, dt, speed.max(driven));
+        // A slam: for a wedge of 10 degrees 40 rho v^2.
+        let slam = 5.0 * self.density * (SOUND_OVER_FLOW * driven).powi(2);
+        Step { pressure_max: step.pressure_max.max(slam), ..step }
+    }
+
+    /// The same where nothing is driven.
     pub fn step(&self, time: f64, dt: f64, speed: f64) -> Step {
-        let relaxation = self.relaxation(dt, speed);
+        let relaxation = self.relaxation(dt, speed, 0.0);
         let head = self.gravity.length() * self.depth;
         let compressibility =
             self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));

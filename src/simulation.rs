@@ -18,7 +18,7 @@ use crate::scene::{Groups, Scene};
 use crate::settle::settle;
 use crate::slots::Slots;
 use crate::stop::Stop;
-use crate::time_step::{collapse_speed, time_step};
+use crate::time_step::{collapse_speed, shortened, time_step};
 use glam::{DMat3, DVec3};
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
@@ -232,15 +232,16 @@ impl Simulation {
     pub fn next_step(&self) -> Step {
         let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
         let typed = self.case.run.time_step;
-        let fastest = if adaptive {
+        let driven = if self.plan.wet() {
             self.solids.fastest(self.time, typed).max(self.openings.fastest(self.time, self.time + typed))
         } else {
             0.0
         };
-        let dt = time_step(&self.params, typed, adaptive, flow.max(fastest));
+        let dt = time_step(&self.params, typed, adaptive, flow.max(driven));
+        let dt = if adaptive { shortened(&self.params, dt, self.fastest) } else { dt };
         // The speed of the collapse is one to be ready for; calm water may never have it.
-        let relaxation = self.params.relaxation(dt, self.speed);
-        let step = Step { relaxation, ..self.params.step(self.time, dt, flow) };
+        let relaxation = self.params.relaxation(dt, self.speed, driven);
+        let step = Step { relaxation, ..self.params.step_driven(self.time, dt, flow, driven) };
         // What jumps over its neighbours needs the damping.
         if self.fastest * dt > self.params.spacing { step.whole() } else { step }
     }

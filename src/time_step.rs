@@ -6,6 +6,11 @@ use glam::DVec3;
 
 /// Displacement of the fastest particles in a step over l0, v dt / l0, at most [-].
 pub(crate) const COURANT_MAX: f64 = 0.35;
+/// The same of the fastest one alone, spray that flies freely included, as long as that makes a step no shorter than
+/// a part of [`SPRAY`] of it.
+const COURANT_FASTEST: f64 = 0.6;
+/// See [`COURANT_FASTEST`].
+const SPRAY: f64 = 0.25;
 /// c_s dt / l0 at most [-].
 pub(crate) const SOUND_MAX: f64 = 0.7;
 /// nu dt / l0^2 at most, as a part of the limit of explicit viscosity [-].
@@ -61,4 +66,31 @@ pub fn expected_speed(params: &Params) -> f64 {
 /// The time step [s] of a case whose largest is `typed` [s].
 pub fn time_step(params: &Params, typed: f64, adaptive: bool, speed: f64) -> f64 {
     if adaptive { typed.min(Bounds::new(params, speed).shortest()) } else { typed }
+}
+
+/// An adaptive step of `dt` [s], shortened for the single fastest particle of water [m/s].
+pub fn shortened(params: &Params, dt: f64, fastest: f64) -> f64 {
+    dt.min((COURANT_FASTEST * params.spacing / fastest).max(SPRAY * dt))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use crate::scene::Scene;
+
+    #[test]
+    fn spray_shortens_a_step_to_a_quarter_at_most_and_what_plunges_sets_c_s() {
+        let text = "[run]\nspacing = 0.1\ntime_step = 1e-2\nend = 1.0\ngravity = [0, 0, 0]\n[fluid]\n[[fluid.block]]\n\
+                    min = [0, 0, 0]\nmax = [1, 1, 1]\n";
+        let case: Case = toml::from_str(text).expect("a case");
+        let params = Params::new(&case, &Scene::build(&case).expect("a scene")).expect("parameters");
+        let of = |fastest: f64| shortened(&params, 1e-2, fastest);
+        assert_eq!([of(0.0), of(6.0)], [1e-2; 2]);
+        assert!((of(12.0) - 5e-3).abs() < 1e-12);
+        assert_eq!(of(100.0), 2.5e-3);
+        // Without weight there is no other speed.
+        let c_s = |flow: f64, driven: f64| params.relaxation(1e-2, flow, driven).sqrt() * 0.1 / 1e-2;
+        assert!((c_s(1.0, 0.0) - 2.5).abs() < 1e-12 && (c_s(1.0, 2.0) - 5.0).abs() < 1e-12);
+    }
 }

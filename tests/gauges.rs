@@ -2,6 +2,7 @@
 
 use crate::common;
 use common::*;
+use glam::DVec3;
 use seixo::backend::{Processor, RowPressure, gpu};
 use seixo::case::Case;
 use seixo::gauges::Gauges;
@@ -206,4 +207,47 @@ fn a_jet_presses_on_a_wall_with_the_momentum_that_it_loses() {
         );
         assert!((pressed / lost - 1.0).abs() < 0.08, "{pressed} N s for {lost}");
     }
+}
+
+#[test]
+fn a_wedge_that_plunges_into_weightless_water_feels_the_force_of_theory() {
+    // Zhao and Faltinsen 1993, J. Fluid Mech. 246, for a deadrise of 30 degrees: F = 14.139 rho V^3 t for a unit of length. Water at rest
+    // does not tell how fast it is about to be: c_s has to follow what plunges, or the water collapses onto itself.
+    let (l0, speed) = (0.03, 2.0);
+    let (half, rise) = (0.45, 0.45 / 3.0_f64.sqrt());
+    let section = [[0.0, 0.0], [half, rise], [half, rise + 0.1], [-half, rise + 0.1], [-half, rise]];
+    let at = |k: usize, y: f64| DVec3::new(section[k % 5][0], y, section[k % 5][1]);
+    let length = 7.0 * l0;
+    let mut triangles = vec![];
+    for k in 0..5 {
+        let [a, b, c, d] = [at(k, 0.0), at(k + 1, 0.0), at(k + 1, length), at(k, length)];
+        triangles.extend([[a, c, b], [a, d, c]]);
+        if (1..4).contains(&k) {
+            triangles.push([at(0, 0.0), at(k, 0.0), at(k + 1, 0.0)]);
+            triangles.push([at(0, length), at(k + 1, length), at(k, length)]);
+        }
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = crate::meshes::file(&folder, "wedge.stl", &crate::meshes::stl(&triangles));
+    let case = case(&format!(
+        "[run]\nspacing = {l0}\ntime_step = 1.5e-3\nadaptive = true\nend = 0.1\ngravity = [0, 0, 0]\n\
+         [fluid]\n[[fluid.block]]\nmin = [-1.2, 0, 0]\nmax = [1.2, {length}, 0.99]\n\
+         [tank]\nmin = [-1.2, 0, 0]\nmax = [1.2, {length}, 2.01]\nopen = [\"z_max\"]\nperiodic = [\"y\"]\n\
+         [[moving_wall]]\nname = \"wedge\"\nshape = \"mesh\"\nfile = \"{path}\"\nposition = [0, 0, 1.01]\n\
+         motion = [[0, 0, 0, 0], [1, 0, 0, -2]]\n[[gauge.force]]\nname = \"f\"\non = \"wedge\"\n"
+    ));
+    let scene = Arc::new(Scene::build(&case).expect("it builds"));
+    let gauges = Gauges::new(&case, &scene).expect("a gauge");
+    let mut sim = cpu_simulation(&case, scene);
+    let (mut impulse, mut expected) = (0.0, 0.0);
+    while sim.time < 0.07 {
+        let dt = sim.step().expect("a step").dt;
+        if sim.time > 0.025 {
+            impulse += dt * row(&gauges, &mut sim)["f_force_z [N]"] / length;
+            expected += dt * 14.139 * 1000.0 * speed * speed * speed * (sim.time - 0.01);
+        }
+    }
+    println!("{:.3} of the impulse of the similarity solution", impulse / expected);
+    // The tank is 4 to 6 times as wide as what is wet of the wedge, and as deep as it is wide: some per cent more.
+    assert!((0.9..1.2).contains(&(impulse / expected)), "{impulse} for {expected}");
 }
