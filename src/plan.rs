@@ -126,8 +126,8 @@ pub enum Arrays {
     Openings,
 }
 
-/// Unknowns from which multigrid pays: below, an iteration of it costs more than it saves.
-pub(crate) const MULTIGRID_UNKNOWNS: usize = 30_000;
+/// Particles of water from which multigrid pays on either processor: below, an iteration of it costs more than it saves.
+pub(crate) const MULTIGRID_UNKNOWNS: usize = 8_000;
 
 /// Surface points of bodies that move freely from which the device searches and presses their contacts. A sub-step
 /// costs a round trip to the device, 0.1 ms or so, however many bodies there are; the host takes 2.4 us for a cube
