@@ -175,6 +175,16 @@ fn layers_below_a_round_surface_lie_even() {
     assert!((share - 1.0).abs() < 0.06, "{share} of the particles of a lattice");
 }
 
+/// Momentum along x of water that slides down a slope (of its rise over its run) until `end` [s], over that which its weight gives it.
+fn slid(simulation: &mut Simulation, end: f64, slope: f64) -> f64 {
+    while simulation.time < end {
+        simulation.step().expect("it slides");
+    }
+    let momentum = simulation.backend.monitor().expect("a monitor").momentum[0];
+    let mass = simulation.groups.fluid as f64 * simulation.params.particle_mass();
+    momentum / (mass * 9.81 * slope / (1.0 + slope * slope) * simulation.time)
+}
+
 #[test]
 fn water_slides_down_a_terrain_as_fast_as_its_weight_says() {
     let folder = TempDir::new().unwrap();
@@ -188,12 +198,7 @@ fn water_slides_down_a_terrain_as_fast_as_its_weight_says() {
          [fluid]\nwall_friction = 0\njitter = 0.02\n[[fluid.shape]]\nshape = \"box\"\nsize = [0.6, 0.175, 0.1]\n\
          center = [0.5098, 0.0875, 0.65]\norientation = {{ axis = [0, 1, 0], angle_deg = 11.3099 }}\n"
     )));
-    while simulation.time < 0.5 {
-        simulation.step().expect("it slides");
-    }
-    let momentum = simulation.backend.monitor().expect("a monitor").momentum[0];
-    let mass = simulation.groups.fluid as f64 * simulation.params.particle_mass();
-    let along = momentum / (mass * 9.81 * 0.2 / 1.04 * simulation.time);
+    let along = slid(&mut simulation, 0.5, 0.2);
     println!("{along:.4} of the momentum without friction");
     // 0.79 if layers below a slope stood as steps.
     assert!((along - 1.0).abs() < 0.06, "{along}");
@@ -296,12 +301,7 @@ fn water_slides_down_a_steep_ramp_as_fast_as_its_weight_says() {
              [fluid]\nwall_friction = 0\njitter = 0.02\n[[fluid.shape]]\nshape = \"box\"\nsize = [0.4, 0.175, 0.1]\n\
              center = [0.33536, 0.0875, 0.73536]\norientation = {{ axis = [0, 1, 0], angle_deg = 45 }}\n"
         )));
-        while simulation.time < 0.3 {
-            simulation.step().expect("it slides");
-        }
-        let momentum = simulation.backend.monitor().expect("a monitor").momentum[0];
-        let mass = simulation.groups.fluid as f64 * simulation.params.particle_mass();
-        let along = momentum / (mass * 9.81 * 0.5 * simulation.time);
+        let along = slid(&mut simulation, 0.3, 1.0);
         println!("{shape}: {along:.4} of the momentum without friction");
         // 0.75 on the lattice of the file's axes. (0.013 s of weight are lost at the start.)
         assert!((along - 1.0).abs() < 0.06, "{shape}: {along}");

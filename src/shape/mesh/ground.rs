@@ -7,7 +7,7 @@ use glam::DVec3;
 /// Depth of the ground below the lowest place of its surface, over the spacing: more than the layers of a wall.
 pub(super) const BASE: f64 = 6.0;
 /// Slope of a triangle that overhangs by more than round-off: the z part of its unit normal.
-const OVERHANG: f64 = -1e-6;
+pub(super) const OVERHANG: f64 = -1e-6;
 
 /// The closed surface of what lies between `vertices` and `triangles`, z upwards, and the level `base` [m] below the lowest
 /// vertex.

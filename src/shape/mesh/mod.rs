@@ -16,6 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
+use std::collections::HashMap;
 use std::sync::Mutex;
 
 /// What is wrong with a file, and what to do about it.
@@ -42,8 +43,6 @@ pub struct Mesh {
     /// Turn from this frame to the file's.
     frame: DQuat,
     is_file: bool,
-    /// Ground below an open surface: its edges lie at its ends, beyond what water reaches.
-    is_ground: bool,
     /// Centre of mass in the file's coordinates [m].
     center: DVec3,
     /// Corners of its convex hull [m].
@@ -135,10 +134,8 @@ impl Mesh {
         let (vertices, triangles) = make()?;
         let mut mesh = Self::new(&key.0, vertices, triangles)?;
         mesh.is_file = key.1 != 0;
-        mesh.is_ground = mesh.is_file && f64::from_bits(key.2[1]) > 0.0;
-        if mesh.is_ground {
-            mesh.thickness = mesh.thinnest_above();
-        }
+        // A base makes it ground.
+        mesh.thickness = mesh.thinnest(mesh.is_file && f64::from_bits(key.2[1]) > 0.0);
         let mesh: &'static Self = Box::leak(Box::new(mesh));
         made.push((key, mesh));
         Ok(mesh)
@@ -181,8 +178,6 @@ impl Mesh {
         let radius = hull.iter().map(|v| v.length()).fold(0.0, f64::max);
         let triangles = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
             .map_err(|e| Unfit::new(format!("{path}: {e}"), "repair the surface"))?;
-        let thickness = thinnest(&triangles);
-        let thickness = Thickness { place: frame * thickness.place + center, ..thickness };
         let moments = moments / volume;
         Ok(Self {
             triangles,
@@ -190,28 +185,31 @@ impl Mesh {
             moments,
             frame,
             is_file: false,
-            is_ground: false,
             center,
             hull,
             radius,
             bounds,
             along_file,
             sharp,
-            thickness,
+            thickness: Thickness { least: f64::INFINITY, place: center },
         })
     }
 
-    /// Where ground is thinnest between two places of the surface that was given: its sides and its bottom end nowhere that water reaches.
-    fn thinnest_above(&self) -> Thickness {
-        let up = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|k| self.triangles.vertices()[k as usize]);
-            (self.frame * (b - a).cross(c - a).normalize_or_zero()).z > 1e-6
+    /// Where it is thinnest. Of ground, between two places of the surface that was given: its sides and its bottom end nowhere that water
+    /// reaches.
+    fn thinnest(&self, is_ground: bool) -> Thickness {
+        let thickness = if is_ground {
+            let up = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|k| self.vertices()[k as usize]);
+                (self.frame * (b - a).cross(c - a).normalize_or_zero()).z > -ground::OVERHANG
+            };
+            let above = self.triangles.indices().iter().filter(|t| up(t)).copied().collect();
+            // Triangles that a mesh was made of already, one of which looks up at least.
+            let above = TriMesh::new(self.vertices().to_vec(), above);
+            above.map_or(self.thickness, |above| thinnest(&above))
+        } else {
+            thinnest(&self.triangles)
         };
-        let above: Vec<[u32; 3]> = self.triangles.indices().iter().filter(|t| up(t)).copied().collect();
-        let vertices = self.triangles.vertices().to_vec();
-        // Of triangles that a mesh was made of already.
-        let Ok(above) = TriMesh::new(vertices, above) else { return self.thickness };
-        let thickness = thinnest(&above);
         Thickness { place: self.frame * thickness.place + self.center, ..thickness }
     }
 
@@ -280,19 +278,22 @@ fn face(normal: DVec3) -> Faces {
     1 << (2 * axis + usize::from(normal[axis] > 0.0))
 }
 
+/// The triangle of each edge, which runs the way that the triangle turns.
+fn edges(triangles: &[[u32; 3]]) -> HashMap<(u32, u32), usize> {
+    let around = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+    triangles.iter().enumerate().flat_map(|(k, t)| around(t).map(|edge| (edge, k))).collect()
+}
+
 /// Sharp convex edges.
 fn sharp(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<(DVec3, DVec3, Faces)> {
     let at = |k: u32| vertices[k as usize];
     let normal = |t: &[u32; 3]| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalize_or_zero();
-    let mut other = std::collections::HashMap::new();
-    for (k, t) in triangles.iter().enumerate() {
-        (0..3).for_each(|e| _ = other.insert((t[e], t[(e + 1) % 3]), k));
-    }
+    let of = edges(triangles);
     let mut out = vec![];
     for t in triangles {
         for e in 0..3 {
             let (a, b, apex) = (t[e], t[(e + 1) % 3], t[(e + 2) % 3]);
-            let Some(&k) = other.get(&(b, a)).filter(|_| a < b) else { continue };
+            let Some(&k) = of.get(&(b, a)).filter(|_| a < b) else { continue };
             let (n, m) = (normal(t), normal(&triangles[k]));
             let convex = m.dot(at(apex) - at(a)) < 0.0;
             if convex && n.angle_between(m) > SHARP {

@@ -44,53 +44,26 @@ impl Cells {
         self.points.push(x);
     }
 
-    /// Every point within the cells' edge of `x`.
-    pub fn near(&self, x: DVec3) -> Vec<usize> {
-        let (low, high) = (self.cell(x - self.edge), self.cell(x + self.edge));
-        let mut found = Vec::new();
-        for cx in low.x..=high.x {
-            for cy in low.y..=high.y {
-                for cz in low.z..=high.z {
-                    let here = self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten();
-                    found.extend(here.filter(|&&k| self.points[k].distance(x) < self.edge));
-                }
-            }
-        }
-        found
+    /// Every point within `reach` [m] of `x`, and how far it is [m].
+    pub fn within(&self, x: DVec3, reach: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
+        let columns = (low.x..=high.x).flat_map(move |cx| (low.y..=high.y).map(move |cy| (cx, cy)));
+        let around = columns.flat_map(move |(cx, cy)| (low.z..=high.z).map(move |cz| IVec3::new(cx, cy, cz)));
+        around
+            .flat_map(|cell| self.cells.get(&cell).into_iter().flatten())
+            .map(move |&k| (k, self.points[k].distance(x)))
+            .filter(move |&(_, d)| d <= reach)
     }
 
-    /// Every point within `reach` [m] of `x`.
-    pub fn near_within(&self, x: DVec3, reach: f64) -> Vec<DVec3> {
-        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
-        let mut found = Vec::new();
-        for cx in low.x..=high.x {
-            for cy in low.y..=high.y {
-                for cz in low.z..=high.z {
-                    let here = self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten();
-                    found.extend(here.map(|&k| self.points[k]).filter(|p| p.distance(x) < reach));
-                }
-            }
-        }
-        found
+    /// Every point within the cells' edge of `x`.
+    pub fn numbers(&self, x: DVec3) -> Vec<usize> {
+        self.within(x, self.edge).map(|(k, _)| k).collect()
     }
 
     /// The nearest point within `reach` [m] of `x`.
     pub fn nearest(&self, x: DVec3, reach: f64) -> Option<usize> {
-        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
-        let mut found: Option<(f64, usize)> = None;
-        for cx in low.x..=high.x {
-            for cy in low.y..=high.y {
-                for cz in low.z..=high.z {
-                    for &k in self.cells.get(&IVec3::new(cx, cy, cz)).into_iter().flatten() {
-                        let d = self.points[k].distance(x);
-                        if d <= reach && found.is_none_or(|(least, _)| d < least) {
-                            found = Some((d, k));
-                        }
-                    }
-                }
-            }
-        }
-        found.map(|(_, k)| k)
+        let near = self.within(x, reach);
+        near.reduce(|found, here| if here.1 < found.1 { here } else { found }).map(|(k, _)| k)
     }
 }
 
@@ -100,7 +73,7 @@ pub(super) struct Place {
     pub at: DVec3,
     /// Its depth [m] and the way out of the solid.
     pub inside: (f64, DVec3),
-    /// Its depth is not the layer's: near an edge, in a thin part. It stays.
+    /// It stays where it is: on the lattice of a face, or on that which fills the mesh.
     pub fixed: bool,
 }
 
@@ -189,7 +162,7 @@ fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Pl
         let mut cells = Cells::new(reach + MARGIN * spacing);
         places.iter().for_each(|p| cells.add(p.at));
         let around: Vec<Vec<usize>> =
-            places.par_iter().map(|p| if p.fixed { vec![] } else { cells.near(p.at) }).collect();
+            places.par_iter().map(|p| if p.fixed { vec![] } else { cells.numbers(p.at) }).collect();
         let mut moved: Vec<DVec3> = places.iter().map(|p| p.at).collect();
         for _ in 0..ROUNDS {
             let pushed = |k: usize| {

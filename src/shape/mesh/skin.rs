@@ -90,10 +90,7 @@ impl<'a> Skin<'a> {
         let at = |k: u32| vertices[k as usize];
         let cross = |t: &[u32; 3]| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0]));
         let normals: Vec<DVec3> = triangles.iter().map(|t| cross(t).normalize_or_zero()).collect();
-        let mut beyond = HashMap::new();
-        for (k, t) in triangles.iter().enumerate() {
-            (0..3).for_each(|e| _ = beyond.insert((t[(e + 1) % 3], t[e]), k));
-        }
+        let of_edge = super::edges(triangles);
         let edges = |k: usize| (0..3).map(move |e| (triangles[k][e], triangles[k][(e + 1) % 3]));
         let mut order: Vec<usize> = (0..triangles.len()).collect();
         order.sort_by(|&a, &b| cross(&triangles[b]).length().total_cmp(&cross(&triangles[a]).length()));
@@ -113,7 +110,7 @@ impl<'a> Skin<'a> {
             while let Some(k) = open.pop() {
                 area += 0.5 * cross(&triangles[k]).length();
                 for (a, b) in edges(k) {
-                    if let Some(&j) = beyond.get(&(a, b))
+                    if let Some(&j) = of_edge.get(&(b, a))
                         && face_of[j] == usize::MAX
                         && flat(j)
                     {
@@ -128,7 +125,7 @@ impl<'a> Skin<'a> {
         let mut around: HashMap<u32, Vec<DVec3>> = HashMap::new();
         for k in 0..triangles.len() {
             for (a, b) in edges(k) {
-                let Some(&j) = beyond.get(&(a, b)) else { continue };
+                let Some(&j) = of_edge.get(&(b, a)) else { continue };
                 let (n, m, ends) = (normals[k], normals[j], [at(a), at(b)]);
                 let outward = (ends[1] - ends[0]).cross(n).normalize_or_zero();
                 let turn = n.angle_between(m) * m.dot(outward).signum();
@@ -222,47 +219,36 @@ impl<'a> Skin<'a> {
         let mut out = vec![];
         let per_area = CANDIDATES / (self.spacing * self.spacing);
         let (mut due, mut number) = (0.5, 0_u64);
-        // Two numbers in 0..1 that fill the square evenly (the R2 sequence).
-        let mut spread = |area: f64, mut place: Box<dyn FnMut(f64, f64) + '_>| {
+        // As many pairs of numbers in 0..1 as belong on an area; all of them fill the square evenly (the R2 sequence).
+        let mut spread = |area: f64| {
             due += area * per_area;
+            let mut pairs = vec![];
             while due >= 1.0 {
                 due -= 1.0;
                 number += 1;
-                let [s, t] =
-                    [0.754_877_666_246_693, 0.569_840_290_998_053].map(|a| (a * number as f64).fract());
-                place(s, t);
+                pairs.push(
+                    [0.754_877_666_246_693, 0.569_840_290_998_053].map(|a| (a * number as f64).fract()),
+                );
             }
+            pairs
         };
         let vertices = self.mesh.triangles.vertices();
         for (t, &(face, normal)) in self.mesh.triangles.indices().iter().zip(&self.of) {
             let [a, b, c] = t.map(|v| vertices[v as usize]);
             let area = 0.5 * (b - a).cross(c - a).length();
-            let place = |s: f64, t: f64| {
-                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
-                let candidate = (a + s * (b - a) + t * (c - a), normal, face);
-                if !held(&candidate) {
-                    out.push(candidate);
-                }
-            };
-            spread(area, Box::new(place));
+            let all = spread(area).into_iter().map(folded);
+            let all = all.map(|[s, t]| (a + s * (b - a) + t * (c - a), normal, face));
+            out.extend(all.filter(|candidate| !held(candidate)));
         }
         for Gap { ends: [a, b], normals: [n, m, l] } in &self.gaps {
-            let is_fold = m == l;
-            let area = if is_fold {
-                a.distance(*b) * depth * n.angle_between(*m)
+            let mut add = |at: DVec3, way: DVec3| out.push((at, way.normalize_or(*n), usize::MAX));
+            if m == l {
+                let pairs = spread(a.distance(*b) * depth * n.angle_between(*m));
+                pairs.into_iter().for_each(|[s, t]| add(a.lerp(*b, s), turned(*n, *m, t)));
             } else {
-                depth * depth * solid_angle(*n, *m, *l)
-            };
-            let place = |s: f64, t: f64| {
-                let (at, way) = if is_fold {
-                    (a.lerp(*b, s), turned(*n, *m, t))
-                } else {
-                    let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
-                    (*a, (1.0 - s - t) * *n + s * *m + t * *l)
-                };
-                out.push((at, way.normalize_or(*n), usize::MAX));
-            };
-            spread(area, Box::new(place));
+                let pairs = spread(depth * depth * solid_angle(*n, *m, *l)).into_iter().map(folded);
+                pairs.for_each(|[s, t]| add(*a, (1.0 - s - t) * *n + s * *m + t * *l));
+            }
         }
         out
     }
@@ -331,6 +317,11 @@ impl Face {
     }
 }
 
+/// A place of the unit square folded into the triangle below its diagonal.
+fn folded([s, t]: [f64; 2]) -> [f64; 2] {
+    if s + t > 1.0 { [1.0 - s, 1.0 - t] } else { [s, t] }
+}
+
 /// The unit vector `share` of the way from `n` to `m`.
 fn turned(n: DVec3, m: DVec3, share: f64) -> DVec3 {
     let angle = n.angle_between(m);
@@ -370,11 +361,11 @@ fn thinned(standing: &Cells, left: Vec<Place>, wanted: usize, spacing: f64) -> V
     let weight = |d: f64| (1.0 - d / reach).max(0.0).powi(8);
     let mut cells = Cells::new(reach);
     left.iter().for_each(|p| cells.add(p.at));
-    let near: Vec<Vec<usize>> = left.par_iter().map(|p| cells.near(p.at)).collect();
+    let near: Vec<Vec<usize>> = left.par_iter().map(|p| cells.numbers(p.at)).collect();
     let crowd = |k: usize| -> f64 {
         let x = left[k].at;
         let others = near[k].iter().filter(|&&j| j != k).map(|&j| weight(left[j].at.distance(x)));
-        let stand = standing.near_within(x, reach).into_iter().map(|at| weight(at.distance(x)));
+        let stand = standing.within(x, reach).map(|(_, d)| weight(d));
         others.chain(stand).sum()
     };
     let mut crowded: Vec<f64> = (0..left.len()).into_par_iter().map(crowd).collect();
