@@ -8,7 +8,7 @@
 @group(0) @binding(6) var<storage, read_write> state: array<u32>;
 
 // Distance of the neighbours' centroid, over l0, from which a thin particle counts as surface.
-const OFFSET: f32 = 0.1;
+const OFFSET: f32 = 0.2;
 
 @compute @workgroup_size(WORKGROUP)
 fn number_density_main(@builtin(global_invocation_id) id: vec3u) {

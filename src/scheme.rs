@@ -31,7 +31,7 @@ pub enum Gradient {
 pub enum FreeSurface {
     /// The paper's: n < beta n0.
     Threshold,
-    /// n < 0.8 beta n0, or n < beta n0 and the neighbours' centroid lies more than 0.1 l0 away.
+    /// n < 0.8 beta n0, or n < beta n0 and the neighbours' centroid lies more than 0.2 l0 away.
     ThresholdOffset,
 }
 

@@ -36,6 +36,7 @@ mod output;
 mod output_fields;
 mod packages;
 mod periodic;
+mod prisms;
 mod ranks;
 mod render;
 mod report;

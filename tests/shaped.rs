@@ -73,8 +73,8 @@ fn water_fills_what_solids_of_any_shape_leave_and_no_more() {
             if *kind == Kind::Fluid {
                 let off = solid.shape.distance(local(*x)).0;
                 least = least.min(off);
-                // Beside a sharp ridge, where the nearest particle of the solid is a spacing behind it, by 0.04 spacings.
-                assert!(off > -0.05 * L0, "{keys}: water {off} m from the surface at {x}");
+                // Beside a sharp ridge, where the nearest particle of the solid is a spacing behind it, by 0.08 spacings.
+                assert!(off > -0.1 * L0, "{keys}: water {off} m from the surface at {x}");
             }
         }
         let fluid = &scene.position[..scene.groups.fluid];
@@ -91,7 +91,8 @@ fn water_fills_what_solids_of_any_shape_leave_and_no_more() {
             least / L0
         );
         assert!((0.995..1.002).contains(&(filled / 0.0288)), "{keys}: {filled} m3 of water and solid");
-        assert!(nearest > 0.55 * L0, "{keys}: {nearest} m between water and solid");
+        // Least at the tip of the cone.
+        assert!(nearest > 0.49 * L0, "{keys}: {nearest} m between water and solid");
     }
 }
 

@@ -207,6 +207,7 @@ impl Checker<'_> {
             let foreign = [
                 ("radius", form.radius.is_some(), "cylinder"),
                 ("height", form.height.is_some(), "cylinder"),
+                ("section", form.section.is_some(), "prism"),
                 ("file", form.file.is_some(), "mesh"),
             ];
             for (name, _, shape) in foreign.into_iter().filter(|f| f.1) {
@@ -241,7 +242,7 @@ impl Checker<'_> {
             let message = format!("{label}: only a box from `min` to `max` has faces to leave open");
             self.add(key("open"), message, "remove `open`");
         }
-        let (own, other) = if form.shape.is_file() { (1, 0) } else { (0, 1) };
+        let (own, other) = if form.shape.has_origin() { (1, 0) } else { (0, 1) };
         let names = ["center", "position"];
         if keys.places[other].is_some() {
             let message = format!("{label} is a {name}: `{}` does not belong to it", names[other]);

@@ -1,6 +1,7 @@
 //! The part of the check that judges bodies and their contact.
 
 use super::check::{Checker, length};
+use super::section::flaw;
 use super::{Body, BodyShape, ContactDevice, Form, Law};
 use glam::DMat3;
 
@@ -132,6 +133,7 @@ impl Checker<'_> {
             ("size", form.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
             ("radius", form.radius.is_some(), "0.1", "[m]"),
             ("height", form.height.is_some(), "0.2", "the length along the axis [m]"),
+            ("section", form.section.is_some(), "[[0, 0], [1, 0], [1, 0.5]]", "its corners x and z [m]"),
             ("file", form.file.is_some(), "\"hull.stl\"", "an STL or OBJ file"),
         ];
         let mut complete = true;
@@ -143,6 +145,7 @@ impl Checker<'_> {
             } else if given && !needed.contains(&key) {
                 let other = match key {
                     "size" => "box",
+                    "section" => "prism",
                     "file" => "mesh",
                     _ => "cylinder",
                 };
@@ -161,10 +164,15 @@ impl Checker<'_> {
                 self.positive(&path(key), length, "m");
             }
         }
+        if let Some(flaw) = form.section.and_then(flaw) {
+            complete = false;
+            let corner = flaw.corner.map_or(String::new(), |k| format!(".{k}"));
+            self.add(path(&format!("section{corner}")), format!("{label}: {}", flaw.message), flaw.remedy);
+        }
         let flat = self.flat();
         if flat && form.shape.needs_space() {
             let message = format!("{label}: there are no {name}s in two dimensions");
-            let remedy = "set shape = \"cylinder\" with `radius` and `height`: it lies along y";
+            let remedy = "set shape = \"prism\" with a `section`, or \"cylinder\": it lies along y";
             self.add(path("shape"), message, remedy);
         }
         if let Some(axis) = form.axis {

@@ -1,9 +1,10 @@
 //! Shapes that a solid may have: the keys that each needs and what it makes of them. With the shape's own file and its
 //! arm in `src/shape` all that a new one takes.
 
+use super::section::flaw;
 use super::{Body, MovingWall, Obstacle, Tank, Turn, Vector};
 use crate::error::Problem;
-use crate::shape::{Cylinder, Disc, Shape, Sphere};
+use crate::shape::{Cylinder, Disc, Polygon, Shape, Sphere};
 #[cfg(feature = "mesh")]
 use crate::shape::{Mesh, Unfit};
 use glam::{DQuat, DVec3};
@@ -30,8 +31,11 @@ pub enum BodyShape {
     /// lies a quarter of the height above the base.
     Cone,
     /// A wedge: of the box of `size`, what lies below the plane that rises from its lower edge at x min to its upper
-    /// edge at x max (three dimensions). Its centroid lies two thirds of the way along x and one third up.
+    /// edge at x max. Its centroid lies two thirds of the way along x and one third up.
     Wedge,
+    /// What the closed line through the corners of `section` encloses, in x and z, over a `height` along y. A body's
+    /// `center` is where its centre of mass goes; a wall's section has the coordinates of the case, moved by `position`.
+    Prism,
     /// The watertight surface in the STL or OBJ `file` (three dimensions). A body's `center` is where its centre of mass
     /// goes.
     Mesh,
@@ -48,6 +52,7 @@ impl BodyShape {
             Self::Cylinder => ("cylinder", &["radius", "height"]),
             Self::Cone => ("cone", &["radius", "height"]),
             Self::Wedge => ("wedge", &["size"]),
+            Self::Prism => ("prism", &["section", "height"]),
             Self::Mesh => ("mesh", &["file"]),
             Self::Terrain => ("terrain", &["file"]),
         }
@@ -63,9 +68,14 @@ impl BodyShape {
         matches!(self, Self::Mesh | Self::Terrain)
     }
 
+    /// Whether it has coordinates of its own, whose origin `position` places.
+    pub(super) fn has_origin(self) -> bool {
+        self.is_file() || self == Self::Prism
+    }
+
     /// Whether there is none of it in two dimensions.
     pub(super) fn needs_space(self) -> bool {
-        !matches!(self, Self::Box | Self::Cylinder)
+        !matches!(self, Self::Box | Self::Cylinder | Self::Wedge | Self::Prism)
     }
 }
 
@@ -76,6 +86,7 @@ pub(crate) struct Form<'a> {
     pub size: Option<Vector>,
     pub radius: Option<f64>,
     pub height: Option<f64>,
+    pub section: Option<&'a [[f64; 2]]>,
     pub file: Option<&'a str>,
     pub scale: Option<f64>,
     pub axis: Option<Vector>,
@@ -89,7 +100,7 @@ pub(crate) struct Form<'a> {
 pub(crate) enum Place {
     /// Its centroid [m].
     Center(Vector),
-    /// The origin of its file [m].
+    /// The origin of its file or section [m].
     Position(Vector),
 }
 
@@ -116,6 +127,7 @@ macro_rules! form {
             size: $keys.size,
             radius: $keys.radius,
             height: $keys.height,
+            section: $keys.section.as_deref(),
             file: $keys.file.as_deref(),
             scale: $keys.scale,
             axis: $keys.axis,
@@ -128,7 +140,7 @@ pub(super) use form;
 
 /// Where a shape of these keys stands.
 pub(super) fn place(shape: BodyShape, center: Option<Vector>, position: Option<Vector>) -> Place {
-    if shape.is_file() {
+    if shape.has_origin() {
         Place::Position(position.unwrap_or_default())
     } else {
         Place::Center(center.unwrap_or_default())
@@ -207,7 +219,15 @@ impl Form<'_> {
             BodyShape::Sphere => (Shape::Sphere(Sphere { radius }), 1.0),
             BodyShape::Cylinder if plane => (Shape::Disc(Disc { radius, width: spacing }), slice(height)),
             BodyShape::Cylinder => (Shape::Cylinder(Cylinder { radius, half_height: 0.5 * height }), 1.0),
-            BodyShape::Cone | BodyShape::Wedge | BodyShape::Mesh | BodyShape::Terrain => {
+            BodyShape::Wedge if plane => {
+                let section = [[0.0, 0.0], [size.x, 0.0], [size.x, size.z]];
+                (Shape::Polygon(Polygon::new(&section, spacing)), slice(size.y))
+            }
+            BodyShape::Prism if plane => {
+                let section = self.sound_section()?;
+                (Shape::Polygon(Polygon::new(section, spacing)), slice(height))
+            }
+            BodyShape::Cone | BodyShape::Wedge | BodyShape::Prism | BodyShape::Mesh | BodyShape::Terrain => {
                 (self.mesh(spacing)?, 1.0)
             }
         })
@@ -221,6 +241,15 @@ impl Form<'_> {
         match self.axis {
             Some(axis) if !plane => turn * DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
             _ => turn,
+        }
+    }
+
+    /// The corners of a section that encloses something.
+    fn sound_section(&self) -> Result<&[[f64; 2]], Box<Problem>> {
+        let section = self.section.unwrap_or_default();
+        match flaw(section) {
+            Some(flaw) => Err(Box::new(Problem::new("section", flaw.message, flaw.remedy))),
+            None => Ok(section),
         }
     }
 
@@ -240,6 +269,11 @@ impl Form<'_> {
             BodyShape::Wedge => {
                 let size = self.size.unwrap_or_default().into();
                 return Ok(Shape::Mesh(Mesh::wedge(size).map_err(unfit("shape"))?));
+            }
+            BodyShape::Prism => {
+                let section = self.sound_section()?;
+                let height = self.height.unwrap_or_default();
+                return Ok(Shape::Mesh(Mesh::prism(section, height).map_err(unfit("section"))?));
             }
             BodyShape::Terrain => Mesh::terrain(path, scale, spacing).map_err(unfit("file"))?,
             _ => Mesh::open(path, scale).map_err(unfit("file"))?,
@@ -268,7 +302,19 @@ impl Form<'_> {
         let round = self.radius.unwrap_or(0.0).hypot(0.5 * self.height.unwrap_or(0.0));
         // the centroid of a cone or wedge is not in the middle
         let off = if matches!(self.shape, BodyShape::Cone | BodyShape::Wedge) { 2.0 } else { 1.0 };
-        off * box_.max(round)
+        let [x, height, z] = self.around();
+        (off * box_.max(round)).max(x.hypot(height).hypot(z))
+    }
+
+    /// Edges of the box around a prism [m]; zero of other shapes.
+    fn around(&self) -> Vector {
+        let Some(section) = self.section.filter(|s| !s.is_empty()) else { return [0.0; 3] };
+        let across = |k: usize| {
+            let places = section.iter().map(|corner| corner[k]);
+            let ends = places.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)));
+            ends.1 - ends.0
+        };
+        [across(0), self.height.unwrap_or_default(), across(1)]
     }
 
     /// The key that its smallest length comes from, and the edges of the box around it [m].
@@ -281,6 +327,7 @@ impl Form<'_> {
                 (key, [2.0 * radius, 2.0 * radius, height])
             }
             BodyShape::Sphere | BodyShape::Cylinder | BodyShape::Cone => ("radius", [2.0 * radius; 3]),
+            BodyShape::Prism => ("section", self.around()),
             // Known when the file is read.
             BodyShape::Mesh | BodyShape::Terrain => ("file", [f64::NAN; 3]),
         }

@@ -23,6 +23,8 @@ pub struct WaterShape {
     /// Length of a cylinder or cone along its axis [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
+    /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
+    pub section: Option<Vec<[f64; 2]>>,
     /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
@@ -32,7 +34,7 @@ pub struct WaterShape {
     pub axis: Option<Vector>,
     /// Centroid [m], of what is not from a file.
     pub center: Option<Vector>,
-    /// Where the origin of the file's coordinates goes [m]; [0, 0, 0] if absent.
+    /// Where the origin of the file's or section's coordinates goes [m]; [0, 0, 0] if absent.
     pub position: Option<Vector>,
     /// Turn about `center` or `position`.
     pub orientation: Option<Turn>,

@@ -221,6 +221,7 @@ fn asks_much(shape: &Shape) -> bool {
     match shape {
         #[cfg(feature = "mesh")]
         Shape::Mesh(_) => true,
+        Shape::Polygon(_) => true,
         _ => false,
     }
 }

@@ -55,6 +55,7 @@ impl Placed {
         match self.shape {
             #[cfg(feature = "mesh")]
             Shape::Mesh(_) => false,
+            Shape::Polygon(_) => false,
             _ => true,
         }
     }

@@ -276,6 +276,7 @@ fn surface_points<'a>(at: &'a Placed, solid: Option<&'a Solid>) -> Box<dyn Itera
     let corners: Vec<DVec3> = match (&at.shape, at.shape.as_cuboid()) {
         #[cfg(feature = "mesh")]
         (Shape::Mesh(mesh), _) => mesh.vertices().to_vec(),
+        (Shape::Polygon(polygon), _) => polygon.corners().collect(),
         (_, Some(cuboid)) => (0..8)
             .map(|k| cuboid.half * DVec3::from_array([0, 1, 2].map(|b| f64::from(k >> b & 1) * 2.0 - 1.0)))
             .collect(),

@@ -7,6 +7,7 @@ use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
+use crate::shape::Cells;
 use glam::{DMat3, DVec3};
 
 /// A wall without particles, where it stands; `moved` if it moves.
@@ -119,7 +120,7 @@ impl Builder<'_> {
         let dummies: Vec<DVec3> =
             solid.dummy_offset.iter().filter(|o| !self.buried(at(o), true)).copied().collect();
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
-        let mut areas = solid.wall_area.clone();
+        let mut areas = self.cut(solid, &kept);
         for (area, offset) in areas.iter_mut().zip(&solid.wall_offset) {
             for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
                 let own = solid.orientation.inverse() * e;
@@ -149,16 +150,51 @@ impl Builder<'_> {
         }
     }
 
+    /// The areas of a solid's particles as far as they lie between the tank's sides: one at a side keeps a part, and what one beyond it has
+    /// on this side goes to the nearest that is `kept`.
+    fn cut(&self, solid: &Solid, kept: &[bool]) -> Vec<DVec3> {
+        let l0 = self.lattice.spacing;
+        let Some((low, high)) = self.closed_sides() else { return solid.wall_area.clone() };
+        let at = |k: usize| solid.position + solid.orientation * solid.wall_offset[k];
+        let inside = |x: DVec3| {
+            let reach = (x + 0.5 * l0).min(high) - (x - 0.5 * l0).max(low);
+            (reach / l0).clamp(DVec3::ZERO, DVec3::ONE).element_product()
+        };
+        let shares: Vec<f64> = (0..kept.len()).map(|k| inside(at(k))).collect();
+        let mut areas: Vec<DVec3> =
+            solid.wall_area.iter().zip(&shares).map(|(a, share)| *a * *share).collect();
+        let stays: Vec<usize> = (0..kept.len()).filter(|&k| kept[k]).collect();
+        let mut near = Cells::new(l0);
+        stays.iter().for_each(|&k| near.add(at(k)));
+        for k in (0..kept.len()).filter(|&k| !kept[k] && shares[k] > 0.0) {
+            let taker = near.nearest(at(k), 1.5 * l0).map(|j| stays[j]);
+            if let Some(taker) = taker.filter(|&j| solid.wall_area[j].dot(areas[k]) > 0.0) {
+                let area = areas[k];
+                areas[taker] += area;
+            }
+        }
+        areas
+    }
+
+    /// Lower and upper corner of the room between those sides of the tank that have walls or a seam [m]; infinite where they have none.
+    fn closed_sides(&self) -> Option<(DVec3, DVec3)> {
+        let (cells, tank) = self.tank.zip(self.case.tank.as_ref())?;
+        let (closed, seam) = (closed(&tank.open, self.lattice.plane), tank.periodic());
+        let ends = |k: usize, side: usize| closed[k][side] || seam[k];
+        let side = |corner: DVec3, side: usize, open: f64| {
+            DVec3::from_array([0, 1, 2].map(|k| if ends(k, side) { corner[k] } else { open }))
+        };
+        let (low, high) = (self.lattice.corner(cells.lo), self.lattice.corner(cells.hi));
+        Some((side(low, 0, f64::NEG_INFINITY), side(high, 1, f64::INFINITY)))
+    }
+
     /// Whether a place lies inside a wall or beyond the tank's; `near`: or closer to a particle of the lattice's walls
     /// than half a spacing.
     fn buried(&self, at: DVec3, near: bool) -> bool {
         let (lattice, slack) = (&self.lattice, 1e-6 * self.lattice.spacing);
-        let beyond = self.tank.zip(self.case.tank.as_ref()).is_some_and(|(cells, tank)| {
-            let (lo, hi) = (lattice.corner(cells.lo), lattice.corner(cells.hi));
-            let (closed, seam) = (closed(&tank.open, lattice.plane), tank.periodic());
-            let ends = |k: usize, side: usize| closed[k][side] || seam[k];
-            (0..3).any(|k| ends(k, 0) && at[k] < lo[k] - slack || ends(k, 1) && at[k] > hi[k] + slack)
-        });
+        let beyond = self
+            .closed_sides()
+            .is_some_and(|(low, high)| at.cmplt(low - slack).any() || at.cmpgt(high + slack).any());
         let earlier = || self.moving_walls.iter().filter(|s| s.is_still()).map(Solid::placed);
         beyond
             || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
@@ -170,11 +206,17 @@ impl Builder<'_> {
     /// its table.
     pub(super) fn thin(&mut self, key: &str, solid: &Solid) {
         let l0 = self.lattice.spacing;
-        let (least, place, of) = match solid.shape {
+        let (least, place, of, whose) = match solid.shape {
             #[cfg(feature = "mesh")]
             Shape::Mesh(mesh) => {
                 let thin = mesh.thickness();
-                (thin.least, thin.place, if mesh.is_file() { "file" } else { "shape" })
+                let (of, whose) =
+                    if mesh.is_file() { ("file", "of its file") } else { ("shape", "of its own frame") };
+                (thin.least, thin.place, of, whose)
+            }
+            Shape::Polygon(polygon) => {
+                let (least, place) = polygon.thinnest();
+                (least, place, "shape", "of its section")
             }
             _ if solid.is_body => return,
             shape => {
@@ -182,10 +224,9 @@ impl Builder<'_> {
                 if self.lattice.plane {
                     lengths.y = lengths.x;
                 }
-                (lengths.min_element(), DVec3::ZERO, "shape")
+                (lengths.min_element(), DVec3::ZERO, "shape", "of its own frame")
             }
         };
-        let whose = if of == "file" { "of its file" } else { "of its own frame" };
         let message =
             format!("{} `{}` is {least:.2e} m thin at {} {whose}", solid.what(), solid.name, point(place));
         if least < l0 * (1.0 - 1e-6) || solid.wall_offset.len() < 4 {

@@ -3,15 +3,18 @@
 //! Everything else asks a shape: the scene for its particles and its volume, a body for its inertia, contact
 //! for its depth below a point and for what of its surface presses into others ([`Surface`]).
 
+mod cells;
 mod convex;
 mod cuboid;
 mod cylinder;
 mod disc;
 #[cfg(feature = "mesh")]
 mod mesh;
+mod polygon;
 mod sphere;
 mod surface;
 
+pub(crate) use cells::Cells;
 pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;
 pub(crate) use cuboid::{ALL_FACES, face_normal};
@@ -19,8 +22,8 @@ pub use cylinder::Cylinder;
 pub use disc::Disc;
 #[cfg(feature = "mesh")]
 pub use mesh::{Mesh, Thickness, Unfit};
+pub use polygon::Polygon;
 pub use sphere::Sphere;
-#[cfg(feature = "mesh")]
 use sphere::close;
 pub use surface::{Line, Ring, Side, Surface};
 
@@ -48,6 +51,12 @@ impl Node {
     }
 }
 
+/// The face of a box that looks like a surface with this normal.
+fn face(normal: DVec3) -> Faces {
+    let axis = normal.abs().max_position();
+    1 << (2 * axis + usize::from(normal[axis] > 0.0))
+}
+
 /// Where a point lies inside a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inside {
@@ -70,6 +79,8 @@ pub enum Shape {
     Cylinder(Cylinder),
     /// A round slice, of two dimensions.
     Disc(Disc),
+    /// A slice of any section, of two dimensions.
+    Polygon(&'static Polygon),
     /// A closed surface of triangles.
     #[cfg(feature = "mesh")]
     Mesh(&'static Mesh),
@@ -84,6 +95,7 @@ impl Deref for Shape {
             Self::Sphere(shape) => shape,
             Self::Cylinder(shape) => shape,
             Self::Disc(shape) => shape,
+            Self::Polygon(shape) => *shape,
             #[cfg(feature = "mesh")]
             Self::Mesh(shape) => *shape,
         }
@@ -105,9 +117,10 @@ impl Shape {
         }
     }
 
-    /// Its centre in the coordinates of its file [m], before [`Shape::frame`] is left.
+    /// Its centre in the coordinates of its file or section [m], before [`Shape::frame`] is left.
     pub(crate) fn origin(&self) -> DVec3 {
         match self {
+            Self::Polygon(shape) => shape.center(),
             #[cfg(feature = "mesh")]
             Self::Mesh(shape) => shape.center(),
             _ => DVec3::ZERO,
@@ -121,6 +134,13 @@ impl Shape {
             Self::Mesh(shape) => {
                 let turned = shape.vertices().iter().map(|&v| axes * v);
                 turned.fold((DVec3::MAX, DVec3::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
+            }
+            Self::Polygon(_) => {
+                let reach = |way: f64| {
+                    let to_shape = axes.transpose();
+                    DVec3::from_array(DVec3::AXES.map(|axis| way * self.reach(to_shape * (way * axis))))
+                };
+                (reach(-1.0), reach(1.0))
             }
             _ => (-self.extent(axes), self.extent(axes)),
         }

@@ -123,6 +123,10 @@ pub(super) fn close(particles: &mut Particles, volume: f64) {
             *moment.col_mut(k) += x[k] * *a;
         }
     }
+    // A slice has no areas that face along y.
+    if moment.y_axis == DVec3::ZERO {
+        moment.y_axis = volume * DVec3::Y;
+    }
     let correct = volume * moment.inverse();
     particles.area.iter_mut().for_each(|a| *a = correct * *a);
 }

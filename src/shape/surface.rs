@@ -77,6 +77,21 @@ impl Surface {
         Self { ball: Some(radius), all_faces: 1, smallest_weight: 1.0, ..Self::default() }
     }
 
+    /// Points alone, each on its `faces`, all of one weight, which sum to 1 over the face that has most of them.
+    pub fn even(points: Vec<DVec3>, faces: Vec<Faces>, all_faces: Faces) -> Self {
+        let on = |side: u8| faces.iter().filter(|f| *f & (1 << side) != 0).count();
+        let most = (0..6).map(on).max().unwrap_or(1).max(1);
+        let weight = 1.0 / most as f64;
+        Self {
+            weights: vec![weight; points.len()],
+            points,
+            faces,
+            all_faces,
+            smallest_weight: weight,
+            ..Self::default()
+        }
+    }
+
     /// Whether it has parts that a device has no kernel for.
     pub(crate) fn is_round(&self) -> bool {
         self.ball.is_some() || self.side.is_some() || !self.rings.is_empty()

@@ -10,8 +10,9 @@ mod primitives;
 mod read;
 mod skin;
 
+use super::cells::Cells;
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, along};
+use super::{ALL_FACES, Faces, Geometry, Inside, Node, Particles, WallLayer, along, face};
 use glam::{DMat3, DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
@@ -272,12 +273,6 @@ fn tetrahedron([a, b, c]: [DVec3; 3]) -> f64 {
     a.dot(b.cross(c)) / 6.0
 }
 
-/// The face of a box that looks like a triangle with this normal.
-fn face(normal: DVec3) -> Faces {
-    let axis = normal.abs().max_position();
-    1 << (2 * axis + usize::from(normal[axis] > 0.0))
-}
-
 /// The triangle of each edge, which runs the way that the triangle turns.
 fn edges(triangles: &[[u32; 3]]) -> HashMap<(u32, u32), usize> {
     let around = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
@@ -435,7 +430,7 @@ impl Geometry for Mesh {
             points.push(*at + *to_surface);
             faces.push(face(*to_surface));
         }
-        let mut thinned = particles::Cells::new(0.4 * spacing);
+        let mut thinned = Cells::new(0.4 * spacing);
         for &(a, b, on) in &self.sharp {
             let pieces = (a.distance(b) / (0.5 * spacing)).ceil().max(1.0);
             for k in 0..=pieces as i32 {
@@ -457,16 +452,6 @@ impl Geometry for Mesh {
                 faces.push(face(at));
             }
         }
-        let on = |side: u8| faces.iter().filter(|f| *f & (1 << side) != 0).count();
-        let most = (0..6).map(on).max().unwrap_or(1).max(1);
-        let weight = 1.0 / most as f64;
-        Surface {
-            weights: vec![weight; points.len()],
-            points,
-            faces,
-            all_faces: super::ALL_FACES,
-            smallest_weight: weight,
-            ..Surface::default()
-        }
+        Surface::even(points, faces, ALL_FACES)
     }
 }

@@ -1,11 +1,11 @@
 //! Particles that fill a mesh.
 
+use super::super::cells::Cells;
 use super::super::{ALL_FACES, Geometry, Particles, close};
 use super::Mesh;
 use super::skin::Skin;
-use glam::{DVec3, IVec3};
+use glam::DVec3;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Particles stand at least so far apart, over the spacing.
 pub(super) const APART: f64 = 0.6;
@@ -22,50 +22,6 @@ const STRIDE: f64 = 0.3;
 const ROUNDS: usize = 15;
 const LOOKS: usize = 2;
 const MARGIN: f64 = 0.5;
-
-/// Points in cells.
-pub(super) struct Cells {
-    edge: f64,
-    points: Vec<DVec3>,
-    cells: HashMap<IVec3, Vec<usize>>,
-}
-
-impl Cells {
-    pub fn new(edge: f64) -> Self {
-        Self { edge, points: vec![], cells: HashMap::new() }
-    }
-
-    fn cell(&self, x: DVec3) -> IVec3 {
-        (x / self.edge).floor().as_ivec3()
-    }
-
-    pub fn add(&mut self, x: DVec3) {
-        self.cells.entry(self.cell(x)).or_default().push(self.points.len());
-        self.points.push(x);
-    }
-
-    /// Every point within `reach` [m] of `x`, and how far it is [m].
-    pub fn within(&self, x: DVec3, reach: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let (low, high) = (self.cell(x - reach), self.cell(x + reach));
-        let columns = (low.x..=high.x).flat_map(move |cx| (low.y..=high.y).map(move |cy| (cx, cy)));
-        let around = columns.flat_map(move |(cx, cy)| (low.z..=high.z).map(move |cz| IVec3::new(cx, cy, cz)));
-        around
-            .flat_map(|cell| self.cells.get(&cell).into_iter().flatten())
-            .map(move |&k| (k, self.points[k].distance(x)))
-            .filter(move |&(_, d)| d <= reach)
-    }
-
-    /// Every point within the cells' edge of `x`.
-    pub fn numbers(&self, x: DVec3) -> Vec<usize> {
-        self.within(x, self.edge).map(|(k, _)| k).collect()
-    }
-
-    /// The nearest point within `reach` [m] of `x`.
-    pub fn nearest(&self, x: DVec3, reach: f64) -> Option<usize> {
-        let near = self.within(x, reach);
-        near.reduce(|found, here| if here.1 < found.1 { here } else { found }).map(|(k, _)| k)
-    }
-}
 
 /// A place of a layer.
 #[derive(Clone, Copy)]
@@ -200,7 +156,7 @@ fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Pl
 
 /// Gives each small piece of the surface to the nearest particle of the wall layer.
 fn share(mesh: &Mesh, spacing: f64, wall: &Cells, out: &mut Particles) {
-    if wall.points.is_empty() {
+    if wall.is_empty() {
         return;
     }
     for triangle in mesh.triangles.triangles() {
@@ -213,13 +169,7 @@ fn share(mesh: &Mesh, spacing: f64, wall: &Cells, out: &mut Particles) {
             for j in 0..n as i32 - i {
                 let (i, j) = (f64::from(i), f64::from(j));
                 let mut give = |at: DVec3| {
-                    let mut reach = spacing;
-                    let nearest = loop {
-                        match wall.nearest(at, reach) {
-                            Some(k) => break k,
-                            None => reach *= 2.0,
-                        }
-                    };
+                    let nearest = wall.nearest_of_all(at);
                     out.area[nearest] += area;
                 };
                 give(point(i + 1.0 / 3.0, j + 1.0 / 3.0));

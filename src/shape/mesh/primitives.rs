@@ -1,7 +1,8 @@
-//! Cones and wedges, as triangles.
+//! Cones, wedges and prisms, as triangles.
 
 use super::read::Soup;
 use super::{Mesh, Unfit};
+use earcut::Earcut;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -25,6 +26,15 @@ impl Mesh {
     pub fn wedge(size: DVec3) -> Result<&'static Self, Unfit> {
         let key = ("wedge".to_owned(), 0, size.to_array().map(f64::to_bits));
         Self::made(key, || Ok(wedge(size)))
+    }
+
+    /// What the closed line through the corners `section`, x and z [m], encloses, from 0 to `height` [m] along y.
+    ///
+    /// # Errors
+    /// A prism without a volume.
+    pub fn prism(section: &[[f64; 2]], height: f64) -> Result<&'static Self, Unfit> {
+        let key = (format!("prism {section:?}"), 0, [height, 0.0, 0.0].map(f64::to_bits));
+        Self::made(key, || Ok(prism(section, height)))
     }
 }
 
@@ -51,6 +61,35 @@ fn wedge(size: DVec3) -> Soup {
     let triangles =
         vec![[0, 1, 2], [3, 5, 4], [0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [0, 2, 5], [0, 5, 3]];
     (vertices, triangles)
+}
+
+fn prism(section: &[[f64; 2]], height: f64) -> Soup {
+    let n = section.len() as u32;
+    let end = |y: f64| section.iter().map(move |&[x, z]| DVec3::new(x, y, z));
+    let vertices: Vec<DVec3> = end(0.0).chain(end(height)).collect();
+    let mut flat: Vec<u32> = vec![];
+    Earcut::new().earcut(section.iter().copied(), &[], &mut flat);
+    // Sides turn with the section, and the ends with them; what is inside out is turned when the mesh is made.
+    let mut triangles: Vec<[u32; 3]> = (0..n)
+        .flat_map(|a| {
+            let b = (a + 1) % n;
+            [[a, n + a, n + b], [a, n + b, b]]
+        })
+        .collect();
+    for t in flat.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]];
+        let corner = |k: u32| glam::DVec2::from(section[k as usize]);
+        let along = (corner(b) - corner(a)).perp_dot(corner(c) - corner(a)) * signed_area(section) > 0.0;
+        let [a, b, c] = if along { [a, b, c] } else { [a, c, b] };
+        triangles.extend([[a, b, c], [n + a, n + c, n + b]]);
+    }
+    (vertices, triangles)
+}
+
+/// Area of a section, positive where its inside is on the left [m2].
+fn signed_area(section: &[[f64; 2]]) -> f64 {
+    let corner = |k: usize| glam::DVec2::from(section[k % section.len()]);
+    (0..section.len()).map(|k| 0.5 * corner(k).perp_dot(corner(k + 1))).sum()
 }
 
 #[cfg(test)]

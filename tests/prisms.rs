@@ -1,0 +1,233 @@
+//! Prisms, in space and as sections in the plane: the water around them, the force on them, their contact, what is wrong with them.
+
+use crate::common::dry::{Dry, G};
+use crate::common::{case, cpu_simulation};
+use glam::DVec3;
+use seixo::backend::Processor;
+use seixo::error::Error;
+use seixo::scene::{Kind, Scene};
+use seixo::shape::Shape;
+use seixo::simulation::Simulation;
+
+const L0: f64 = 0.02;
+/// A breakwater with a berm and a slot: not convex.
+const SECTION: &str =
+    "[[0, 0], [0.5, 0], [0.42, 0.1], [0.34, 0.1], [0.34, 0.03], [0.24, 0.03], [0.24, 0.18], [0.18, 0.18]]";
+/// Its area [m2].
+const AREA: f64 = 0.042;
+
+/// Still water 0.8 m long and 0.24 m deep, in the plane or 0.16 m wide, with `solids` in it.
+fn still(dimensions: u32, solids: &str) -> String {
+    format!(
+        "[run]\nspacing = {L0}\ntime_step = 1e-3\nend = 1\ndimensions = {dimensions}\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.16, 0.24]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.16, 0.34]\nopen = [\"z_max\"]\n{solids}"
+    )
+}
+
+fn breakwater(orientation: &str) -> String {
+    format!(
+        "[[obstacle]]\nname = \"it\"\nshape = \"prism\"\nsection = {SECTION}\nheight = 0.16\nposition = [0.15, 0, 0]\n{orientation}"
+    )
+}
+
+#[test]
+fn water_stands_still_around_a_section_that_is_not_convex_and_fills_the_rest() {
+    for dimensions in [2, 3] {
+        let case = case(&still(dimensions, &breakwater("")));
+        let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}"));
+        let width = if dimensions == 2 { L0 } else { 0.16 };
+        let solid = &scene.solids[0];
+        assert!((solid.shape.volume() / (AREA * width) - 1.0).abs() < 1e-9, "{}", solid.shape.volume());
+        let mut sim = cpu_simulation(&case, scene);
+        let water = |sim: &Simulation| sim.scene.position[..sim.scene.groups.fluid].to_vec();
+        let filled = water(&sim).len() as f64 * L0 * L0 * L0 + AREA * width;
+        println!("{dimensions}D: water and solid {filled:.6} m3 for {:.6}", 0.192 * width);
+        assert!((filled / (0.192 * width) - 1.0).abs() < 5e-3, "{filled}");
+        let mut nearest = f64::INFINITY;
+        let solid = &sim.scene.solids[0];
+        for slot in solid.wall_slots.clone().chain(solid.dummy_slots.clone()) {
+            let at = sim.scene.position[slot];
+            let inside = solid.shape.distance(solid.orientation.inverse() * (at - solid.position)).0;
+            // Along a mesh's edges they stand where there is room.
+            assert!(
+                inside < if dimensions == 2 { -0.45 * L0 } else { 0.0 },
+                "a particle {inside} m from the surface at {at}"
+            );
+            nearest = water(&sim).iter().map(|f| f.distance(at)).fold(nearest, f64::min);
+        }
+        assert!(nearest > 0.5 * L0, "{nearest} m between water and solid");
+        for _ in 0..250 {
+            sim.step().expect("still water is no trouble");
+        }
+        let kinetic = sim.backend.monitor().expect("it reads").kinetic;
+        // Over its weight times its depth; from its surface, as without the obstacle (9e-4 J in the plane after 2 s).
+        let scale = 1000.0 * G * (0.192 - AREA) * width * 0.24;
+        println!(
+            "{dimensions}D: kinetic energy {kinetic:.2e} J, {:.1e} of the weight times the depth",
+            kinetic / scale
+        );
+        assert!(kinetic < 1.5e-4 * scale, "{kinetic} J");
+    }
+}
+
+#[test]
+fn a_section_held_under_water_is_lifted_by_what_it_displaces_on_both_processors() {
+    // A rhomb and a wedge, which is what a prism of its three corners is.
+    let rhomb = "shape = \"prism\"\nsection = [[0, 0.08], [0.12, 0], [0.24, 0.08], [0.12, 0.16]]\nheight = 0.16\nposition = [0.3, 0, 0.04]";
+    let wedge = "shape = \"wedge\"\nsize = [0.24, 0.16, 0.12]\ncenter = [0.4, 0.08, 0.1]";
+    let same = "shape = \"prism\"\nsection = [[-0.16, -0.04], [0.08, -0.04], [0.08, 0.08]]\nheight = 0.16\nposition = [0.4, 0, 0.1]";
+    let mut processors = vec![Processor::Cpu];
+    if !seixo::backend::gpu::adapters().is_empty() {
+        processors.push(Processor::Gpu { adapter: None });
+    }
+    let mut of_wedges = vec![];
+    for (keys, area) in [(rhomb, 0.0192), (wedge, 0.0144), (same, 0.0144)] {
+        let case = case(&still(
+            2,
+            &format!("[[obstacle]]\nname = \"it\"\n{keys}\n[[gauge.force]]\nname = \"f\"\non = \"it\"\n"),
+        ));
+        let exact = 1000.0 * G * area * L0;
+        let (mut lifts, mut scatters) = (vec![], vec![]);
+        for processor in &processors {
+            let mut sim =
+                Simulation::on(&case, Scene::build(&case).expect("builds"), processor).expect("starts");
+            let mut forces = vec![];
+            for step in 0..250 {
+                sim.step().expect("still water is no trouble");
+                if step >= 100 {
+                    forces.push(sim.fluid_force[0].force.z);
+                }
+            }
+            let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+            let scatter = forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / forces.len() as f64;
+            scatters.push(scatter.sqrt() / mean);
+            lifts.push(mean);
+        }
+        println!("{keys}: lift {lifts:.4?} N for {exact:.4} N, scatter {scatters:.4?}");
+        // Water below a sharp tip that is taken for surface makes it jump by more than all of it.
+        assert!(scatters.iter().all(|s| *s < 0.03), "{keys}: {scatters:?}");
+        assert!(lifts.iter().all(|l| (l / exact - 1.0).abs() < 0.04), "{keys}: {lifts:?} N for {exact} N");
+        assert!(lifts.iter().all(|l| (l / lifts[0] - 1.0).abs() < 1e-2), "{lifts:?}");
+        if area < 0.015 {
+            of_wedges.push(lifts[0]);
+        }
+    }
+    assert!((of_wedges[0] / of_wedges[1] - 1.0).abs() < 1e-6, "{of_wedges:?}");
+}
+
+#[test]
+fn a_section_slides_down_a_slope_by_coulombs_law_and_lands_on_its_tip() {
+    let (slope, friction) = (0.75_f64.atan(), 0.3);
+    for (law, mu) in [("smooth", friction), ("smooth", 0.0)] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\n\
+             [[obstacle]]\nname = \"slope\"\nshape = \"prism\"\nsection = [[0, 0], [2, 0], [0, 1.5]]\nheight = 1\n\
+             [[body]]\nname = \"it\"\nshape = \"prism\"\nsection = [[0, 0], [0.4, -0.3], [0.4, 0]]\nheight = 1\n\
+             density = 2000\ncenter = [0.5667, 0, 1.3]\nstanding = true\n\
+             [contact]\nlaw = \"{law}\"\nspring = 1e7\nrestitution = 0.1\nfriction = {mu}\n"
+        ));
+        let start = dry.run(0.2)[0];
+        let end = dry.run(0.6)[0];
+        // 0.4 s later: `run` goes to a time.
+        let gained = (end.velocity - start.velocity).length() / 0.4;
+        let exact = G * (slope.sin() - mu * slope.cos());
+        println!("mu {mu}: {gained:.4} m/s2 for {exact:.4}");
+        assert!((gained / exact - 1.0).abs() < 5e-3, "mu {mu}: {gained} for {exact}");
+        assert!((end.velocity.z / end.velocity.x + 0.75).abs() < 1e-3, "{end:?}");
+    }
+    // The same body falls onto a floor, tip first, turns over and lies on its long side.
+    let mut dry = Dry::new(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 2\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [3, 0, 2]\nopen = [\"z_max\"]\n\
+         [[body]]\nname = \"it\"\nshape = \"prism\"\nsection = [[0, 0], [0.4, -0.3], [0.4, 0]]\nheight = 1\n\
+         density = 2000\ncenter = [1.5, 0, 0.6]\n\
+         [contact]\nlaw = \"smooth\"\nspring = 1e6\nrestitution = 0.2\nfriction = 0.3\n",
+    );
+    let end = dry.run(2.0)[0];
+    // Of a right triangle the centroid lies a third of the height above a side.
+    let height = 0.4 * 0.3 / 0.5 / 3.0;
+    println!("lies at {:.5} m for {height:.5}", end.position.z);
+    assert!((end.position.z - height).abs() < 1e-3 && end.velocity.length() < 1e-3, "{end:?}");
+}
+
+#[test]
+fn a_slice_and_the_prism_in_space_have_the_same_shape() {
+    let scene = |dimensions| Scene::build(&case(&still(dimensions, &breakwater("")))).expect("builds");
+    let (flat, deep) = (scene(2), scene(3));
+    let (slice, prism) = (&flat.solids[0], &deep.solids[0]);
+    assert!(matches!(slice.shape, Shape::Polygon(_)) && matches!(prism.shape, Shape::Mesh(_)));
+    let centers = (slice.position - prism.position) * DVec3::new(1.0, 0.0, 1.0);
+    assert!(centers.length() < 1e-12 && (prism.position.y - 0.08).abs() < 1e-12, "{centers}");
+    for k in 0..2000 {
+        let at = DVec3::new(0.1 + f64::from(k % 50) * 0.014, 0.0, -0.04 + f64::from(k / 50) * 0.007);
+        let own = |solid: &seixo::scene::Solid, x: DVec3| {
+            let (d, outward) = solid.shape.distance(solid.orientation.inverse() * (x - solid.position));
+            (d, solid.orientation * outward)
+        };
+        let ((d, n), (e, m)) = (own(slice, at), own(prism, at + 0.08 * DVec3::Y));
+        // In the middle between its ends the prism's sides are the nearest as far as 0.08 m.
+        if d > -0.079 {
+            assert!((d - e).abs() < 1e-9, "{at}: {d} {e}");
+            assert!((n - m).length() < 1e-6 || d.abs() < 1e-6 || d.abs() > 0.02, "{at}: {n} {m}");
+        }
+    }
+}
+
+#[test]
+fn water_takes_the_form_of_a_section() {
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\n\
+                [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 0.5]\n\
+                [fluid]\n[[fluid.shape]]\nshape = \"prism\"\nsection = [[0, 0], [0.6, 0], [0.2, 0.4], [0, 0.4]]\nheight = 1\n";
+    let scene = Scene::build(&case(text)).expect("builds");
+    let water: Vec<DVec3> = (0..scene.groups.fluid)
+        .filter(|&i| scene.kind[i] == Kind::Fluid)
+        .map(|i| scene.position[i])
+        .collect();
+    assert!((water.len() as f64 * L0 * L0 / 0.16 - 1.0).abs() < 0.03, "{}", water.len());
+    assert!(water.iter().all(|x| x.x + x.z < 0.6 + 1e-9 && x.z < 0.4));
+}
+
+#[test]
+fn what_is_wrong_with_a_section_is_said_with_its_key() {
+    let prism = |rest: &str| format!("shape = \"prism\"\n{rest}");
+    for (keys, key, part) in [
+        (prism("height = 0.2"), "obstacle.0", "without `section`"),
+        (prism("section = [[0, 0], [0.2, 0], [0.2, 0.2]]"), "obstacle.0", "without `height`"),
+        (prism("section = [[0, 0], [0.2, 0]]\nheight = 0.1"), "obstacle.0.section", "2 corners"),
+        (
+            prism("section = [[0, 0], [0.2, 0.2], [0.2, 0], [0, 0.2]]\nheight = 0.1"),
+            "obstacle.0.section.2",
+            "after corner 0 meets",
+        ),
+        (
+            prism("section = [[0, 0], [0.2, 0], [0.2, 0.2]]\nheight = 0.1\ncenter = [0, 0, 0]"),
+            "obstacle.0.center",
+            "use `position`",
+        ),
+        (
+            prism("section = [[0, 0], [0.2, 0], [0.2, 0.01], [0, 0.01]]\nheight = 0.1"),
+            "obstacle.0.section",
+            "less than one particle",
+        ),
+        (
+            prism("section = [[0, 0], [0.2, 0], [0.2, 0.2], [0.19, 0.2], [0.19, 0.05], [0, 0.05]]\nheight = 0.1"),
+            "obstacle.0.shape",
+            "thin at (0.1",
+        ),
+        ("min = [0, 0, 0]\nmax = [0.1, 0.1, 0.1]\nsection = [[0, 0], [1, 0], [1, 1]]".into(), "obstacle.0.section", "prism"),
+        ("shape = \"cylinder\"\nradius = 0.1\nheight = 0.1\ncenter = [0.2, 0, 0.1]\nsection = [[0, 0], [1, 0], [1, 1]]".into(),
+         "obstacle.0.section", "prism"),
+    ] {
+        let text = still(2, &format!("[[obstacle]]\nname = \"it\"\n{keys}\n"));
+        match Scene::build(&case(&text)) {
+            Err(Error::Case(why)) => {
+                let problem = &why.problems[0];
+                let said = format!("{why} {}", problem.remedy);
+                assert_eq!(problem.key, key, "{keys}: {said}");
+                assert!(said.contains(part) && !problem.remedy.is_empty(), "{keys}: {said}");
+            }
+            other => panic!("{keys}: expected a refusal, got {:?}", other.map(|_| ())),
+        }
+    }
+}
