@@ -131,6 +131,18 @@ struct Outlet {
     high: vec4f,
 }
 
+// A whole number below 2^30 as the word of a vector: bits of a normal f32, which no device flushes to zero; and back, where
+// 0.0 stands for 0 as well. As crate::backend::gpu::layout::word_of.
+const FIRST_WORD: u32 = 0x3f800000u;
+
+fn word_of(number: u32) -> f32 {
+    return bitcast<f32>(FIRST_WORD + number);
+}
+
+fn number_of(word: f32) -> u32 {
+    return max(bitcast<u32>(word), FIRST_WORD) - FIRST_WORD;
+}
+
 @group(0) @binding(0) var<uniform> params: Constants;
 @group(0) @binding(1) var<uniform> now: Coefficients;
 

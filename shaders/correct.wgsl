@@ -15,7 +15,7 @@ fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
     let change = shortened(asked, most);
     let v = old.xyz + change;
     if !finite_vector(v) {
-        atomicMin(&counters[NON_FINITE], u32(old.w));
+        atomicMin(&counters[NON_FINITE], number_of(old.w));
     }
     velocity[i] = vec4f(v, old.w);
     acceleration[i] = vec4f(0.0);

@@ -80,7 +80,7 @@ fn product(row: Wrench, y: Wrench) -> f32 {
 fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
     let b = group.x;
     let pose = poses[free_body[b].solid];
-    let place = f32(coupled_row(params.moving_wall + b));
+    let place = word_of(coupled_row(params.moving_wall + b));
     let end = free_body[b].first + free_body[b].count;
     var known = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {

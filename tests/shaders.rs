@@ -402,6 +402,8 @@ fn constants_are_the_same_on_both_sides() {
     ] {
         assert_eq!(constant(text("ledger"), name), f64::from(entry as u8), "{name}");
     }
+    let first_word = format!("const FIRST_WORD: u32 = {:#x}u;", seixo::backend::gpu::layout::FIRST_WORD);
+    assert!(shader::COMMON.contains(&first_word));
     let on_wall = format!("const ON_WALL: u32 = {:#x}u;", seixo::contact::device::paper::ON_WALL);
     assert!(text("contact_paper").contains(&on_wall));
     use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};

@@ -55,7 +55,7 @@ table! {
     "particles" {
         /// x, y, z and kind.
         position: [f32; 4], Both, Fluid, |s, _| s.total;
-        /// u, v, w and number.
+        /// u, v, w and, of the fluid, the word of its number.
         velocity: [f32; 4], Both, Fluid, |s, _| s.total;
         pressure: f32, Both, Fluid, |s, _| s.pressure;
         number_density: f32, Both, Fluid, |s, _| s.pressure;

@@ -26,8 +26,20 @@ pub(crate) const SCAN_GROUPS_MAX: u64 = 1024;
 pub const GHOST_BLOCK: u64 = 64;
 /// Excess of a wall's row whose pressure is no unknown [Pa]; `DRY` in shaders/common.wgsl.
 pub(crate) const DRY: f32 = 3.0e38;
-/// Fluid particles at most: numbers travel in an f32.
-pub(crate) const FLUID_MAX: usize = 1 << 24;
+/// Fluid particles at most: so many numbers have a word.
+pub(crate) const FLUID_MAX: usize = 1 << 30;
+/// The word of number 0, 1.0; `FIRST_WORD` in shaders/common.wgsl.
+pub const FIRST_WORD: u32 = 0x3f80_0000;
+
+/// A number below [`FLUID_MAX`] as the fourth component of a vector: the bits of a normal f32, which no device flushes to zero.
+pub(crate) fn word_of(number: u32) -> f32 {
+    f32::from_bits(FIRST_WORD + number)
+}
+
+/// The number of a word; 0 of 0.0, which stands beside what has no number.
+pub(crate) fn number_of(word: f32) -> u32 {
+    word.to_bits().max(FIRST_WORD) - FIRST_WORD
+}
 
 /// Places in the buffer of counters.
 pub mod counter {
@@ -536,6 +548,17 @@ mod tests {
         assert!(large.total() < 2_000_000_000, "{}", large.total());
         assert!(large.largest().1 < (1 << 31) - 1 && large.workgroups < 65_536, "{:?}", large.largest());
         assert_eq!(large.largest().0, "neighbour_list");
+    }
+
+    #[test]
+    fn numbers_travel_as_words_that_are_no_denormals_and_no_infinities() {
+        let last = FLUID_MAX as u32 - 1;
+        for number in [0, 1, (1 << 23) - 1, 1 << 23, (1 << 24) + 1, 80_600_407, last] {
+            assert!(word_of(number).is_normal(), "{number}");
+            assert_eq!(number_of(word_of(number)), number);
+        }
+        assert_eq!(word_of(last), f32::MAX);
+        assert_eq!(number_of(0.0), 0);
     }
 
     #[test]
