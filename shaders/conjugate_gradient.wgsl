@@ -137,7 +137,7 @@ fn neighbours(i: u32, x: vec3f) -> f32 {
     let near = near_of(neighbour_count[i]);
     var sum = 0.0;
     for (var k = 0u; k < near; k++) {
-        let other = preconditioned[neighbour_list[near_place(i, k)]];
+        let other = preconditioned[neighbour_list_at(k, i)];
         let r = offset(x, other.xyz);
         sum += weight(dot(r, r)) * other.w;
     }
@@ -292,7 +292,7 @@ fn ascend(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
             let near = near_of(neighbour_count[i]);
             var others = 0.0;
             for (var k = 0u; k < near; k++) {
-                let other = corrected[neighbour_list[near_place(i, k)]];
+                let other = corrected[neighbour_list_at(k, i)];
                 let r = offset(me.xyz, other.xyz);
                 others += weight(dot(r, r)) * other.w;
             }
