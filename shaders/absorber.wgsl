@@ -8,7 +8,7 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn absorber(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid {
         return;
     }

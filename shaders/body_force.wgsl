@@ -25,7 +25,11 @@ var<workgroup> torque_row: array<vec3f, 16>;
 
 @compute @workgroup_size(WORKGROUP)
 fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let chunk = force_chunk[group.x];
+    let number = group_number(group);
+    if number >= arrayLength(&force_chunk) {
+        return;
+    }
+    let chunk = force_chunk[number];
     var force = vec3f(0.0);
     var torque = vec3f(0.0);
     if t < chunk.y {
@@ -80,7 +84,7 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
             force += force_row[k];
             torque += torque_row[k];
         }
-        wrench[2u * group.x] = vec4f(force, 0.0);
-        wrench[2u * group.x + 1u] = vec4f(torque, 0.0);
+        wrench[2u * number] = vec4f(force, 0.0);
+        wrench[2u * number + 1u] = vec4f(torque, 0.0);
     }
 }

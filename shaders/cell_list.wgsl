@@ -43,7 +43,7 @@ fn slot_of(k: u32) -> u32 {
 
 @compute @workgroup_size(WORKGROUP)
 fn count(@builtin(global_invocation_id) id: vec3u) {
-    let k = id.x;
+    let k = thread(id);
     if k >= particles() {
         return;
     }
@@ -58,7 +58,7 @@ fn count(@builtin(global_invocation_id) id: vec3u) {
             atomicAdd(&counters[LOST], 1u);
         }
     }
-    cell_of[k] = vec2u(key, atomicAdd(&cell_count[key], 1u));
+    cell_of[k] = vec2u(key, add_cell_count(key, 1u));
 }
 
 var<workgroup> lane: array<u32, 256>;
@@ -98,20 +98,20 @@ fn blocks() -> u32 {
 @compute @workgroup_size(WORKGROUP)
 fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
                @builtin(num_workgroups) groups: vec3u) {
-    for (var block = group.x; block < blocks(); block += groups.x) {
+    for (var block = group_number(group); block < blocks(); block += group_count(groups)) {
         let first = (block * WORKGROUP + t) * 4u;
         var before: vec4u;
         var sum = 0u;
         for (var k = 0u; k < 4u; k++) {
             before[k] = sum;
             if first + k < keys() {
-                sum += atomicLoad(&cell_count[first + k]);
+                sum += cell_count_at(first + k);
             }
         }
         let scan = exclusive_scan(sum, t);
         for (var k = 0u; k < 4u; k++) {
             if first + k < keys() {
-                cell_start[first + k] = scan.x + before[k];
+                set_cell_start(first + k, scan.x + before[k]);
             }
         }
         if t == 0u {
@@ -140,44 +140,46 @@ fn scan_sums(@builtin(local_invocation_index) t: u32) {
 @compute @workgroup_size(WORKGROUP)
 fn scan_add(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
             @builtin(num_workgroups) groups: vec3u) {
-    for (var block = group.x; block < blocks(); block += groups.x) {
+    for (var block = group_number(group); block < blocks(); block += group_count(groups)) {
         let first = (block * WORKGROUP + t) * 4u;
         for (var k = 0u; k < 4u; k++) {
             if first + k < keys() {
-                cell_start[first + k] += block_sum[block];
+                set_cell_start(first + k, cell_start_at(first + k) + block_sum[block]);
             }
         }
     }
-    if group.x == 0u && t == 0u {
-        cell_start[keys()] = particles();
+    if group_number(group) == 0u && t == 0u {
+        set_cell_start(keys(), particles());
     }
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn scatter(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= particles() {
+    let k = thread(id);
+    if k >= particles() {
         return;
     }
-    let cell = cell_of[id.x];
-    unsorted[cell_start[cell.x] + cell.y] = id.x;
+    let cell = cell_of[k];
+    unsorted[cell_start_at(cell.x) + cell.y] = k;
 }
 
 fn store(at: u32, v: vec4f) {
-    sorted[at] = v.x;
-    sorted[at + 1u] = v.y;
-    sorted[at + 2u] = v.z;
-    sorted[at + 3u] = v.w;
+    set_sorted(at, v.x);
+    set_sorted(at + 1u, v.y);
+    set_sorted(at + 2u, v.z);
+    set_sorted(at + 3u, v.w);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn place(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= particles() {
+    let at = thread(id);
+    if at >= particles() {
         return;
     }
-    let me = unsorted[id.x];
+    let me = unsorted[at];
     let key = cell_of[me].x;
-    let first = cell_start[key];
-    let end = cell_start[key + 1u];
+    let first = cell_start_at(key);
+    let end = cell_start_at(key + 1u);
     var rank = 0u;
     for (var k = first; k < end; k++) {
         rank += u32(unsorted[k] < me);
@@ -195,10 +197,10 @@ fn place(@builtin(global_invocation_id) id: vec3u) {
         let x = position[me];
         store(4u * to, vec4f(wrapped(x.xyz), x.w));
         store(velocities + 4u * to, velocity[me]);
-        sorted[pressures + to] = pressure[me];
+        set_sorted(pressures + to, pressure[me]);
     } else {
         store(4u * to, vec4f(params.lower, GHOST));
         store(velocities + 4u * to, vec4f(0.0, 0.0, 0.0, velocity[me].w));
-        sorted[pressures + to] = 0.0;
+        set_sorted(pressures + to, 0.0);
     }
 }

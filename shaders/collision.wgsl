@@ -47,12 +47,12 @@ fn parts(i: u32) -> f32 {
     let count = neighbour_count[i];
     var pairs = 0u;
     for (var k = 0u; k < near_of(count); k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         pairs += u32((is_fluid || j < params.fluid) && any(rebound(x, v, j) != vec3f(0.0)));
     }
     if is_fluid {
         for (var k = 0u; k < dummies_of(count); k++) {
-            pairs += u32(any(rebound(x, v, neighbour_list[dummy_place(i, k)]) != vec3f(0.0)));
+            pairs += u32(any(rebound(x, v, neighbour_list_at(dummy_plane(k), i)) != vec3f(0.0)));
         }
     }
     own *= max(f32(pairs), 1.0);
@@ -62,7 +62,7 @@ fn parts(i: u32) -> f32 {
 
 @compute @workgroup_size(WORKGROUP)
 fn collision(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid + params.moving_wall {
         return;
     }
@@ -74,7 +74,7 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
         let near = near_of(count);
         let own = parts(i);
         for (var k = 0u; k < near; k++) {
-            let j = neighbour_list[near_place(i, k)];
+            let j = neighbour_list_at(k, i);
             if i >= params.fluid && j >= params.fluid {
                 continue;
             }
@@ -86,7 +86,7 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
         if i < params.fluid {
             let dummies = dummies_of(count);
             for (var k = 0u; k < dummies; k++) {
-                change += rebound(x, v, neighbour_list[dummy_place(i, k)]) / own;
+                change += rebound(x, v, neighbour_list_at(dummy_plane(k), i)) / own;
             }
         }
     }

@@ -131,6 +131,47 @@ struct Outlet {
     high: vec4f,
 }
 
+// A whole number below 2^30 as the word of a vector: bits of a normal f32, which no device flushes to zero; and back, where
+// 0.0 stands for 0 as well. As crate::backend::gpu::layout::word_of.
+const FIRST_WORD: u32 = 0x3f800000u;
+
+fn word_of(number: u32) -> f32 {
+    return bitcast<f32>(FIRST_WORD + number);
+}
+
+fn number_of(word: f32) -> u32 {
+    return max(bitcast<u32>(word), FIRST_WORD) - FIRST_WORD;
+}
+
+// Numbers of a thread and of a workgroup, and how many workgroups there are. Where a dispatch has more than a device starts along
+// one dimension it is folded into rows of DISPATCH_WIDTH, a constant that src/backend/gpu/shader.rs adds; the last row may be more
+// than was asked for. Kernels that stride over all particles by fixed numbers of workgroups have few and are never folded.
+//#if FOLDED
+fn thread(id: vec3u) -> u32 {
+    return id.y * (DISPATCH_WIDTH * WORKGROUP) + id.x;
+}
+
+fn group_number(group: vec3u) -> u32 {
+    return group.y * DISPATCH_WIDTH + group.x;
+}
+
+fn group_count(groups: vec3u) -> u32 {
+    return groups.x * groups.y;
+}
+//#else
+fn thread(id: vec3u) -> u32 {
+    return id.x;
+}
+
+fn group_number(group: vec3u) -> u32 {
+    return group.x;
+}
+
+fn group_count(groups: vec3u) -> u32 {
+    return groups.x;
+}
+//#endif
+
 @group(0) @binding(0) var<uniform> params: Constants;
 @group(0) @binding(1) var<uniform> now: Coefficients;
 
@@ -276,14 +317,10 @@ fn sees_wall(word: u32) -> bool {
     return (word & 0x2000000u) != 0u;
 }
 
-// Places in `neighbour_list`, column after column so that neighbouring threads read neighbouring words: those that carry
+// `neighbour_list` has a plane for each place in a row, so that neighbouring threads read neighbouring words: those that carry
 // pressure from the front, dummies from the back.
-fn near_place(i: u32, k: u32) -> u32 {
-    return k * params.pressure_slots + i;
-}
-
-fn dummy_place(i: u32, k: u32) -> u32 {
-    return (params.capacity - 1u - k) * params.pressure_slots + i;
+fn dummy_plane(k: u32) -> u32 {
+    return params.capacity - 1u - k;
 }
 
 fn cell_coordinates(x: vec3f) -> vec3u {

@@ -54,7 +54,7 @@ fn of_body(i: u32) -> f32 {
     }
     let row = coupled_row(k);
     let force = coupling[row];
-    let y = u32(force.w);
+    let y = number_of(force.w);
     return dot(force.xyz, coupling[y].xyz) + dot(coupling[row + 1u].xyz, coupling[y + 1u].xyz);
 }
 
@@ -64,7 +64,7 @@ struct Solve {
     done: atomic<u32>,
     outcome: u32,
     iterations: u32,
-    unknowns: u32,
+    unknowns: atomic<u32>,
     source_squared: f32,
     residual_squared: f32,
     true_residual_squared: f32,
@@ -137,7 +137,7 @@ fn neighbours(i: u32, x: vec3f) -> f32 {
     let near = near_of(neighbour_count[i]);
     var sum = 0.0;
     for (var k = 0u; k < near; k++) {
-        let other = preconditioned[neighbour_list[near_place(i, k)]];
+        let other = preconditioned[neighbour_list_at(k, i)];
         let r = offset(x, other.xyz);
         sum += weight(dot(r, r)) * other.w;
     }
@@ -201,6 +201,8 @@ fn start_residual(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoc
     let sum = residuals(id.x, t);
     if t == 0u {
         partial_sum[group.x] = sum;
+        // A workgroup's number is exact in f32, that of all may be too large for it.
+        atomicAdd(&solve.unknowns, u32(sum.z));
     }
 }
 
@@ -231,7 +233,6 @@ fn start(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
         partial_sum[params.reduction_groups + group.x] = sum;
         if group.x == 0u {
             solve.source_squared = first.x;
-            solve.unknowns = u32(first.z);
             if zero {
                 finish(ZERO_SOURCE);
             }
@@ -291,7 +292,7 @@ fn ascend(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
             let near = near_of(neighbour_count[i]);
             var others = 0.0;
             for (var k = 0u; k < near; k++) {
-                let other = corrected[neighbour_list[near_place(i, k)]];
+                let other = corrected[neighbour_list_at(k, i)];
                 let r = offset(me.xyz, other.xyz);
                 others += weight(dot(r, r)) * other.w;
             }

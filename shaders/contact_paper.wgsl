@@ -18,7 +18,7 @@ struct PaperPair {
     row: u32,     // place in `contact_row`
     list: u32,    // place of the candidates
     candidates: u32,
-    pad: u32,
+    pairs: u32,   // how many there are
 }
 
 // Where the two are now: B's frame in A's, in two parts.
@@ -99,7 +99,10 @@ var<workgroup> scan: array<u32, GROUP>;
 // Candidates of each particle of A in the pair's rows of `contact_row`, and of all of them at the start of it.
 @compute @workgroup_size(GROUP)
 fn count(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group.x;
+    let n = group_number(group);
+    if n >= paper_pair[0].pairs {
+        return;
+    }
     let size = paper_pair[n].count;
     var own = 0u;
     for (var i = t; i < size.x; i += GROUP) {
@@ -125,7 +128,10 @@ fn count(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
 // The candidates, ordered by i and j.
 @compute @workgroup_size(GROUP)
 fn fill(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group.x;
+    let n = group_number(group);
+    if n >= paper_pair[0].pairs {
+        return;
+    }
     let size = paper_pair[n].count;
     var place = paper_pair[n].list;
     for (var start = 0u; start < size.x; start += GROUP) {
@@ -164,7 +170,10 @@ var<workgroup> part_z: array<vec4f, GROUP>;
 // and largest d_c - d.
 @compute @workgroup_size(GROUP)
 fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group.x;
+    let n = group_number(group);
+    if n >= paper_pair[0].pairs {
+        return;
+    }
     let law = paper_law[0];
     let turn = mat3x3f(
         paper_pose[n].high_x.xyz + paper_pose[n].low_x.xyz,

@@ -36,7 +36,8 @@ struct SmoothPair {
     share: f32,   // of a point's weight
     skin: f32,
     open: u32, // faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's
-    pad: array<u32, 3>,
+    pairs: u32, // how many there are
+    pad: vec2u,
 }
 
 // Where the two are now.
@@ -112,7 +113,10 @@ var<workgroup> listed: array<atomic<u32>, 2>;
 // Lists the points of each side within the skin of the other's box, in their order.
 @compute @workgroup_size(GROUP)
 fn search(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group.x;
+    let n = group_number(group);
+    if n >= smooth_pair[0].pairs {
+        return;
+    }
     let skin = smooth_pair[n].skin;
     var place = smooth_pair[n].list;
     var near = vec2u(0u);
@@ -230,7 +234,10 @@ var<workgroup> seen: vec2u;
 // of the force; that centre, seen from A's.
 @compute @workgroup_size(GROUP)
 fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group.x;
+    let n = group_number(group);
+    if n >= smooth_pair[0].pairs {
+        return;
+    }
     let list = smooth_pair[n].list;
     let near = smooth_pair[n].near;
     let points = near.x + near.y;

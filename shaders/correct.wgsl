@@ -15,7 +15,7 @@ fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
     let change = shortened(asked, most);
     let v = old.xyz + change;
     if !finite_vector(v) {
-        atomicMin(&counters[NON_FINITE], u32(old.w));
+        atomicMin(&counters[NON_FINITE], number_of(old.w));
     }
     velocity[i] = vec4f(v, old.w);
     acceleration[i] = vec4f(0.0);
@@ -35,7 +35,7 @@ fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
 // What comes before the last change of a step.
 @compute @workgroup_size(WORKGROUP)
 fn kick(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid {
         return;
     }
@@ -53,7 +53,7 @@ fn kick(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(WORKGROUP)
 fn correct(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid {
         return;
     }

@@ -30,7 +30,7 @@ struct FreeBody {
     first: u32, // of the moving-wall slots
     count: u32,
     solid: u32,
-    pad: u32,
+    bodies: u32, // how many there are
 }
 
 struct Wrench {
@@ -78,9 +78,12 @@ fn product(row: Wrench, y: Wrench) -> f32 {
 
 @compute @workgroup_size(WORKGROUP)
 fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let b = group.x;
+    let b = group_number(group);
+    if b >= free_body[0].bodies {
+        return;
+    }
     let pose = poses[free_body[b].solid];
-    let place = f32(coupled_row(params.moving_wall + b));
+    let place = word_of(coupled_row(params.moving_wall + b));
     let end = free_body[b].first + free_body[b].count;
     var known = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
@@ -118,7 +121,10 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
 
 @compute @workgroup_size(WORKGROUP)
 fn respond(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let b = group.x;
+    let b = group_number(group);
+    if b >= free_body[0].bodies {
+        return;
+    }
     let end = free_body[b].first + free_body[b].count;
     var sum = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {

@@ -225,7 +225,7 @@ fn shift_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocatio
 // Puts the pressure as solved in place of the cut one.
 @compute @workgroup_size(WORKGROUP)
 fn as_solved(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i < params.pressure_slots {
         clipped[i] = pressure[i];
         var p = preconditioned[i].w;
@@ -239,7 +239,7 @@ fn as_solved(@builtin(global_invocation_id) id: vec3u) {
 // And back.
 @compute @workgroup_size(WORKGROUP)
 fn as_clipped(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i < params.pressure_slots {
         pressure[i] = clipped[i];
     }

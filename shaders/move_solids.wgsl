@@ -8,13 +8,14 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn move_solids(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= params.moving {
+    let k = thread(id);
+    if k >= params.moving {
         return;
     }
-    let offset = solid_offset[id.x];
+    let offset = solid_offset[k];
     let pose = poses[u32(offset.w)];
     let arm = rotate(pose.orientation, offset.xyz);
-    let i = moving_slot_of(id.x);
+    let i = moving_slot_of(k);
     position[i] = vec4f(pose.position.xyz + arm, position[i].w);
     velocity[i] = vec4f(pose.velocity.xyz + cross(pose.angular_velocity.xyz, arm), 0.0);
 }

@@ -55,7 +55,7 @@ fn end_row(level: u32) -> u32 {
 }
 
 fn diagonal(row: u32) -> f32 {
-    return bitcast<f32>(entry[13u * hierarchy.capacity + row].y);
+    return bitcast<f32>(entry_at(13u, row).y);
 }
 
 fn place_b(row: u32) -> u32 {
@@ -66,7 +66,7 @@ fn place_b(row: u32) -> u32 {
 fn multiply(row: u32, source: u32) -> f32 {
     var sum = 0.0;
     for (var k = 0u; k < 27u; k++) {
-        let e = entry[k * hierarchy.capacity + row];
+        let e = entry_at(k, row);
         sum += bitcast<f32>(e.y) * coarse[source + e.x];
     }
     return sum;
@@ -91,7 +91,7 @@ fn down(level: u32, group: u32, groups: u32, t: u32) {
             let p = vec3u(cell / (next.y * next.z), cell / next.z % next.y, cell % next.z);
             let c = 2u * p + ((vec3u(t) >> vec3u(2u, 1u, 0u)) & vec3u(1u));
             if all(c < fine.xyz) {
-                let child = cell_row[fine.w + (c.x * fine.y + c.y) * fine.z + c.z].x;
+                let child = cell_row_at(fine.w + (c.x * fine.y + c.y) * fine.z + c.z).x;
                 if child > 0u {
                     r = coarse[place_b(child - 1u)] - multiply(child - 1u, 0u);
                 }
@@ -119,7 +119,7 @@ fn up(level: u32, id: u32, threads: u32) {
         var sum = 0.0;
         var x = 0.0;
         for (var k = 0u; k < 27u; k++) {
-            let e = entry[k * hierarchy.capacity + row];
+            let e = entry_at(k, row);
             x = coarse[e.x] + factor * coarse[y + row_cell[e.x].y - 1u];
             sum += bitcast<f32>(e.y) * x;
         }
@@ -148,7 +148,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gro
         return;
     }
     let end = end_row(0u);
-    for (var row = first_row(0u) + id.x; row < end; row += groups.x * WORKGROUP) {
+    for (var row = first_row(0u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
         let cell = row_cell[row];
         var sum = 0.0;
         for (var m = cell.z; m < cell.w; m++) {
@@ -164,7 +164,7 @@ fn down_first(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     if stopped() {
         return;
     }
-    down(0u, group.x, groups.x, t);
+    down(0u, group_number(group), group_count(groups), t);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -172,7 +172,7 @@ fn up_first(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) g
     if stopped() {
         return;
     }
-    up(0u, id.x, groups.x * WORKGROUP);
+    up(0u, thread(id), group_count(groups) * WORKGROUP);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -180,7 +180,7 @@ fn back_first(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups)
     if stopped() {
         return;
     }
-    sweep(0u, hierarchy.capacity, 0u, id.x, groups.x * WORKGROUP);
+    sweep(0u, hierarchy.capacity, 0u, thread(id), group_count(groups) * WORKGROUP);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -189,7 +189,7 @@ fn down_second(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
     if stopped() {
         return;
     }
-    down(1u, group.x, groups.x, t);
+    down(1u, group_number(group), group_count(groups), t);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -197,7 +197,7 @@ fn up_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) 
     if stopped() {
         return;
     }
-    up(1u, id.x, groups.x * WORKGROUP);
+    up(1u, thread(id), group_count(groups) * WORKGROUP);
 }
 
 // The cycle over the small levels.
@@ -232,7 +232,7 @@ fn spread(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gro
     if stopped() {
         return;
     }
-    for (var i = id.x; i < params.pressure_slots; i += groups.x * WORKGROUP) {
+    for (var i = thread(id); i < params.pressure_slots; i += group_count(groups) * WORKGROUP) {
         var me = preconditioned[i];
         let row = aggregate[i].x;
         if row > 0u {

@@ -88,12 +88,12 @@ fn near_fluid(cell: u32) -> bool {
 //#if PERIODIC
             for (var z = low.z; z <= high.z; z++) {
                 let around = cell_index(beyond(vec3u(x, y, z)));
-                if cell_start[around] < cell_start[around + 1u] {
+                if cell_start_at(around) < cell_start_at(around + 1u) {
                     return true;
                 }
             }
 //#else
-            if cell_start[cell_index(vec3u(x, y, low.z))] < cell_start[cell_index(vec3u(x, y, high.z)) + 1u] {
+            if cell_start_at(cell_index(vec3u(x, y, low.z))) < cell_start_at(cell_index(vec3u(x, y, high.z)) + 1u) {
                 return true;
             }
 //#endif
@@ -105,16 +105,16 @@ fn near_fluid(cell: u32) -> bool {
 //#endif
 fn listed(cell: u32) -> Listed {
     var out: Listed;
-    out.first.x = cell_start[cell];
-    out.count.x = cell_start[cell + 1u] - out.first.x;
+    out.first.x = cell_start_at(cell);
+    out.count.x = cell_start_at(cell + 1u) - out.first.x;
 //#if MOVING
     let moving = moving_key() + cell;
-    out.first.y = cell_start[moving] - params.fluid;
-    out.count.y = cell_start[moving + 1u] - params.fluid - out.first.y;
+    out.first.y = cell_start_at(moving) - params.fluid;
+    out.count.y = cell_start_at(moving + 1u) - params.fluid - out.first.y;
 //#endif
 //#if STATIC
-    out.first.z = static_start[cell];
-    out.count.z = static_start[cell + 1u] - out.first.z;
+    out.first.z = static_start_at(cell);
+    out.count.z = static_start_at(cell + 1u) - out.first.z;
     if out.count.z > 0u && !near_fluid(cell) {
         out.count.z = 0u;
     }
@@ -151,7 +151,7 @@ fn diagonal_of(slot: u32) -> f32 {
 // Count the unknowns of each cell and mark the cells above.
 @compute @workgroup_size(WORKGROUP)
 fn mark(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var cell = id.x; cell < params.cell_total; cell += groups.x * WORKGROUP) {
+    for (var cell = thread(id); cell < params.cell_total; cell += group_count(groups) * WORKGROUP) {
         let l = listed(cell);
         let all = l.count.x + l.count.y + l.count.z;
         var unknowns = 0u;
@@ -159,11 +159,11 @@ fn mark(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
             unknowns += u32(diagonal_of(slot_of(l, k)) > 0.0);
         }
         if unknowns > 0u {
-            atomicStore(&cell_mark[hierarchy.level[0].w + cell], unknowns);
+            set_cell_mark(hierarchy.level[0].w + cell, unknowns);
             var c = coordinates_of(0u, cell);
             for (var level = 1u; level < hierarchy.levels; level++) {
                 c = c >> vec3u(1u);
-                atomicStore(&cell_mark[cell_at(level, c)], ABOVE);
+                set_cell_mark(cell_at(level, c), ABOVE);
             }
         }
     }
@@ -203,7 +203,7 @@ fn brings(cell: u32) -> vec2u {
     if cell >= hierarchy.cells {
         return vec2u(0u);
     }
-    let mark = atomicLoad(&cell_mark[cell]);
+    let mark = cell_mark_at(cell);
     return vec2u(u32(mark != 0u), mark & ~ABOVE);
 }
 
@@ -215,7 +215,7 @@ fn blocks() -> u32 {
 @compute @workgroup_size(WORKGROUP)
 fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
                @builtin(num_workgroups) groups: vec3u) {
-    for (var block = group.x; block < blocks(); block += groups.x) {
+    for (var block = group_number(group); block < blocks(); block += group_count(groups)) {
         let first = (block * WORKGROUP + t) * 4u;
         var sum = vec2u(0u);
         for (var k = 0u; k < 4u; k++) {
@@ -225,7 +225,7 @@ fn scan_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
         var before = scan.xy;
         for (var k = 0u; k < 4u; k++) {
             if first + k < hierarchy.cells {
-                cell_row[first + k] = before;
+                set_cell_row(first + k, before);
             }
             before += brings(first + k);
         }
@@ -256,7 +256,7 @@ fn scan_sums(@builtin(local_invocation_index) t: u32) {
 }
 
 fn number_row(cell: u32, before: vec2u) {
-    let number = cell_row[cell] + before;
+    let number = cell_row_at(cell) + before;
     let own = brings(cell);
     // The level that the cell belongs to: levels lie coarsest first.
     var level = 0u;
@@ -267,7 +267,7 @@ fn number_row(cell: u32, before: vec2u) {
         row_cell[hierarchy.capacity + 1u + level].x = min(number.x, hierarchy.capacity);
     }
     let used = own.x > 0u && number.x < hierarchy.capacity;
-    cell_row[cell] = vec2u(select(0u, number.x + 1u, used), number.y);
+    set_cell_row(cell, vec2u(select(0u, number.x + 1u, used), number.y));
     if used {
         row_cell[number.x] = vec4u(cell - hierarchy.level[level].w, 0u, number.y, number.y + own.y);
     }
@@ -276,7 +276,7 @@ fn number_row(cell: u32, before: vec2u) {
 @compute @workgroup_size(WORKGROUP)
 fn number_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
                @builtin(num_workgroups) groups: vec3u) {
-    for (var block = group.x; block < blocks(); block += groups.x) {
+    for (var block = group_number(group); block < blocks(); block += group_count(groups)) {
         for (var k = 0u; k < 4u; k++) {
             let cell = (block * WORKGROUP + t) * 4u + k;
             if cell < hierarchy.cells {
@@ -289,8 +289,8 @@ fn number_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
 // The unknowns of each cell, in the order of the lists; they learn their row.
 @compute @workgroup_size(WORKGROUP)
 fn members(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    for (var cell = id.x; cell < params.cell_total; cell += groups.x * WORKGROUP) {
-        let row = cell_row[hierarchy.level[0].w + cell];
+    for (var cell = thread(id); cell < params.cell_total; cell += group_count(groups) * WORKGROUP) {
+        let row = cell_row_at(hierarchy.level[0].w + cell);
         if row.x > 0u {
 //#if PERIODIC
             let place = cell;
@@ -326,10 +326,10 @@ fn empty_stencil(row: u32) {
 // Keep the stencil; the row learns its parent.
 fn keep_stencil(level: u32, row: u32, c: vec3u) {
     for (var k = 0u; k < 27u; k++) {
-        entry[k * hierarchy.capacity + row] = vec2u(column[k], bitcast<u32>(value[k]));
+        set_entry(k, row, vec2u(column[k], bitcast<u32>(value[k])));
     }
     if level + 1u < hierarchy.levels {
-        row_cell[row].y = cell_row[cell_at(level + 1u, c >> vec3u(1u))].x;
+        row_cell[row].y = cell_row_at(cell_at(level + 1u, c >> vec3u(1u))).x;
     }
 }
 
@@ -337,7 +337,7 @@ fn keep_stencil(level: u32, row: u32, c: vec3u) {
 @compute @workgroup_size(WORKGROUP)
 fn galerkin(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let end = end_row(0u);
-    for (var row = first_row(0u) + id.x; row < end; row += groups.x * WORKGROUP) {
+    for (var row = first_row(0u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
         let cell = row_cell[row];
         let c = coordinates_of(0u, cell.x);
 //#if PERIODIC
@@ -351,7 +351,7 @@ fn galerkin(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) g
             let x = position[i].xyz;
             let near = near_of(neighbour_count[i]);
             for (var k = 0u; k < near; k++) {
-                let j = neighbour_list[near_place(i, k)];
+                let j = neighbour_list_at(k, i);
                 let other = aggregate[j];
                 if other.x > 0u {
                     let r = offset(x, position[j].xyz);
@@ -378,10 +378,10 @@ fn coarsen(level: u32, row: u32) {
     for (var octant = 0u; octant < 8u; octant++) {
         let c = 2u * p + ((vec3u(octant) >> vec3u(2u, 1u, 0u)) & vec3u(1u));
         if all(c < size) {
-            let child = cell_row[cell_at(level - 1u, c)].x;
+            let child = cell_row_at(cell_at(level - 1u, c)).x;
             if child > 0u {
                 for (var k = 0u; k < 27u; k++) {
-                    let e = entry[k * hierarchy.capacity + child - 1u];
+                    let e = entry_at(k, child - 1u);
                     let v = bitcast<f32>(e.y);
                     if v != 0.0 {
                         let d = vec3i(vec3u(k / 9u, k / 3u % 3u, k % 3u)) - 1;
@@ -404,7 +404,7 @@ fn coarsen(level: u32, row: u32) {
 @compute @workgroup_size(WORKGROUP)
 fn coarsen_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let end = end_row(1u);
-    for (var row = first_row(1u) + id.x; row < end; row += groups.x * WORKGROUP) {
+    for (var row = first_row(1u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
         coarsen(1u, row);
     }
 }

@@ -30,13 +30,13 @@ fn see(i: u32, j: u32, r: vec3f) {
     let room = near + dummies < params.capacity;
     if j < carriers {
         if room {
-            neighbour_list[near_place(i, near)] = j;
+            set_neighbour_list(near, i, j);
         }
         near += 1u;
         wall = wall || j >= params.fluid;
     } else {
         if room {
-            neighbour_list[dummy_place(i, dummies)] = j;
+            set_neighbour_list(dummy_plane(dummies), i, j);
         }
         dummies += 1u;
     }
@@ -44,7 +44,7 @@ fn see(i: u32, j: u32, r: vec3f) {
 
 // Whether there is fluid in a column of cells, the last one included.
 fn holds_fluid(first: u32, last: u32) -> bool {
-    return cell_start[first] < cell_start[last + 1u];
+    return cell_start_at(first) < cell_start_at(last + 1u);
 }
 
 fn near_fluid(low: vec3u, high: vec3u) -> bool {
@@ -69,21 +69,21 @@ fn near_fluid(low: vec3u, high: vec3u) -> bool {
 
 // The particles of a column of cells, the last one not included.
 fn see_cells(i: u32, me: vec3f, first: u32, last: u32) {
-    let fluid_end = cell_start[last];
-    for (var j = cell_start[first]; j < fluid_end; j++) {
+    let fluid_end = cell_start_at(last);
+    for (var j = cell_start_at(first); j < fluid_end; j++) {
         see(i, j, offset(me, position[j].xyz));
     }
 //#if MOVING
     let moving = moving_key();
-    let moving_end = cell_start[moving + last] - params.fluid;
-    for (var k = cell_start[moving + first] - params.fluid; k < moving_end; k++) {
+    let moving_end = cell_start_at(moving + last) - params.fluid;
+    for (var k = cell_start_at(moving + first) - params.fluid; k < moving_end; k++) {
         let j = moving_slot[k];
         see(i, j, offset(me, position[j].xyz));
     }
 //#endif
 //#if STATIC
-    let static_end = static_start[last];
-    for (var k = static_start[first]; k < static_end; k++) {
+    let static_end = static_start_at(last);
+    for (var k = static_start_at(first); k < static_end; k++) {
         let other = static_particle[k];
         see(i, other.w, offset(me, bitcast<vec3f>(other.xyz)));
     }
@@ -92,7 +92,7 @@ fn see_cells(i: u32, me: vec3f, first: u32, last: u32) {
 
 @compute @workgroup_size(WORKGROUP)
 fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.pressure_slots {
         return;
     }

@@ -12,7 +12,7 @@ const OFFSET: f32 = 0.2;
 
 @compute @workgroup_size(WORKGROUP)
 fn number_density_main(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.pressure_slots {
         return;
     }
@@ -24,7 +24,7 @@ fn number_density_main(@builtin(global_invocation_id) id: vec3u) {
     var centroid = vec3f(0.0);
     var wet = i < params.fluid && me.w == FLUID;
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         let r = offset(me.xyz, position[j].xyz);
         let w = weight(dot(r, r));
         n += w;
@@ -32,7 +32,7 @@ fn number_density_main(@builtin(global_invocation_id) id: vec3u) {
         wet = wet || (j < params.fluid && w > 0.0);
     }
     for (var k = 0u; k < dummies; k++) {
-        let r = offset(me.xyz, position[neighbour_list[dummy_place(i, k)]].xyz);
+        let r = offset(me.xyz, position[neighbour_list_at(dummy_plane(k), i)].xyz);
         let w = weight(dot(r, r));
         n += w;
         centroid += w * r;

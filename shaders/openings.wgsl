@@ -12,7 +12,7 @@
 // A thread for each particle of the emissions, one after the other.
 @compute @workgroup_size(WORKGROUP)
 fn emit(@builtin(global_invocation_id) id: vec3u) {
-    var k = id.x;
+    var k = thread(id);
     for (var e = 0u; e < arrayLength(&emission); e += 1u) {
         let layer = emission[e];
         if k < layer.count {
@@ -29,7 +29,7 @@ fn emit(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(WORKGROUP)
 fn swallow(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid {
         return;
     }

@@ -21,7 +21,7 @@ fn hydrostatic(r: vec3f) -> f32 {
 
 @compute @workgroup_size(WORKGROUP)
 fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid {
         return;
     }
@@ -41,7 +41,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     var level = own;
 //#endif
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         reference = min(reference, pressure[j]);
 //#if CONSISTENT
         level = min(level, pressure[j] - hydrostatic(offset(x.xyz, position[j].xyz)));
@@ -59,7 +59,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     var moment = Moment(vec3f(0.0), vec3f(0.0));
 //#endif
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         let r = offset(x.xyz, position[j].xyz);
         let e = pair_vector(weight(dot(r, r)), r);
         sum += (pressure[j] - reference) * e;
@@ -72,7 +72,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     if inner {
         let dummies = dummies_of(count);
         for (var k = 0u; k < dummies; k++) {
-            let r = offset(x.xyz, position[neighbour_list[dummy_place(i, k)]].xyz);
+            let r = offset(x.xyz, position[neighbour_list_at(dummy_plane(k), i)].xyz);
             let e = pair_vector(weight(dot(r, r)), r);
             sum += (own + hydrostatic(r) - reference) * e;
             one_side += e;

@@ -67,7 +67,7 @@ fn is_body(i: u32) -> bool {
 //#endif
 @compute @workgroup_size(WORKGROUP)
 fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.pressure_slots {
         return;
     }
@@ -89,7 +89,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     var sums = Sums(1.0, Moment(vec3f(0.0), vec3f(0.0)), zero, zero, vec3f(0.0));
 //#endif
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         let r = offset(x, position[j].xyz);
         let w = weight(dot(r, r));
         links += w;
@@ -110,7 +110,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     var at_body = is_body(i);
     let dummies = dummies_of(count);
     for (var k = 0u; k < dummies; k++) {
-        let j = neighbour_list[dummy_place(i, k)];
+        let j = neighbour_list_at(dummy_plane(k), i);
         at_body = at_body || is_body(j);
         let r = offset(x, position[j].xyz);
         sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);

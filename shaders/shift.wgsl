@@ -9,7 +9,7 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn shift(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.fluid {
         return;
     }

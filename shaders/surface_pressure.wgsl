@@ -14,7 +14,7 @@ fn of_water(i: u32, x: vec3f, near: u32) -> f32 {
     let own = pressure[i];
     var sum = vec3f(0.0);
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         let r = offset(x, position[j].xyz);
         sum += (pressure[j] + own) * pair_vector(weight(dot(r, r)), r);
     }
@@ -26,7 +26,7 @@ fn of_wall(i: u32, x: vec3f, near: u32) -> f32 {
     var sum = 0.0;
     var height = 0.0;
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         if j < params.fluid && state[j] == SURFACE {
             let r = offset(x, position[j].xyz);
             let w = weight(dot(r, r));
@@ -40,7 +40,7 @@ fn of_wall(i: u32, x: vec3f, near: u32) -> f32 {
 
 @compute @workgroup_size(WORKGROUP)
 fn surface_pressure_main(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i >= params.pressure_slots {
         return;
     }

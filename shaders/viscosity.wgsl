@@ -15,7 +15,7 @@ fn shear(i: u32, below: u32) -> vec3f {
     let neighbours = near_of(neighbour_count[i]);
     var sum = vec3f(0.0);
     for (var k = 0u; k < neighbours; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         let r = offset(x, position[j].xyz);
         let distance_squared = dot(r, r);
         // The particles have moved since the list was made.
@@ -31,7 +31,7 @@ fn shear(i: u32, below: u32) -> vec3f {
 
 @compute @workgroup_size(WORKGROUP)
 fn viscosity(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i < params.fluid {
         acceleration[i] = vec4f(shear(i, params.pressure_slots), 0.0);
     }

@@ -19,7 +19,7 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn before_solve(@builtin(global_invocation_id) id: vec3u) {
-    let k = id.x;
+    let k = thread(id);
     if k >= params.moving_wall {
         return;
     }
@@ -34,7 +34,7 @@ fn before_solve(@builtin(global_invocation_id) id: vec3u) {
     var links = 0.0;
     var sum = equation.x;
     for (var n = 0u; n < near; n++) {
-        let j = neighbour_list[near_place(i, n)];
+        let j = neighbour_list_at(n, i);
         let r = offset(x, position[j].xyz);
         let w = weight(dot(r, r));
         links += w;
@@ -50,15 +50,16 @@ fn before_solve(@builtin(global_invocation_id) id: vec3u) {
 //#endif
 @compute @workgroup_size(WORKGROUP)
 fn after_solve(@builtin(global_invocation_id) id: vec3u) {
-    let i = params.fluid + id.x;
+    let wall = thread(id);
+    let i = params.fluid + wall;
     if i >= params.pressure_slots {
         return;
     }
     if source_diagonal[i].y == 0.0 {
-        excess[id.x] = DRY;
+        excess[wall] = DRY;
 //#if COUPLED
-        if id.x < params.moving_wall {
-            inertia_head[id.x] = 0.0;
+        if wall < params.moving_wall {
+            inertia_head[wall] = 0.0;
         }
 //#endif
         return;
@@ -73,7 +74,7 @@ fn after_solve(@builtin(global_invocation_id) id: vec3u) {
 //#endif
     var left = 0.0;
     for (var k = 0u; k < near; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         let other = preconditioned[j];
         let r = offset(own.xyz, other.xyz);
         let w = weight(dot(r, r));
@@ -89,23 +90,23 @@ fn after_solve(@builtin(global_invocation_id) id: vec3u) {
 //#if COUPLED
     // A free body is pressed with what it has answered in the solve, and with what it feels of the cut.
     var felt = 0.0;
-    if id.x < params.moving_wall {
-        felt = wall_layer[id.x].to_surface.w;
+    if wall < params.moving_wall {
+        felt = wall_layer[wall].to_surface.w;
     }
     if felt > 0.0 {
         solved = half * (solved + weight_of_water);
-        let answered = excess[id.x];
+        let answered = excess[wall];
 //#if FILLED
         let cut = 0.0;
 //#else
         let cut = own_cut - own.w;
 //#endif
-        excess[id.x] = answered + cut - felt * (cut - (left - solved));
-        inertia_head[id.x] = solved - (answered - inertia_head[id.x]);
+        excess[wall] = answered + cut - felt * (cut - (left - solved));
+        inertia_head[wall] = solved - (answered - inertia_head[wall]);
         return;
     }
 //#endif
-    excess[id.x] = left;
+    excess[wall] = left;
 }
 
 //#if COUPLED

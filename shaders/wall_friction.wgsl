@@ -22,7 +22,7 @@ fn friction(i: u32) -> vec4f {
     var wall = vec3f(0.0);
     var normal = vec3f(0.0);
     for (var k = 0u; k < neighbours; k++) {
-        let j = neighbour_list[near_place(i, k)];
+        let j = neighbour_list_at(k, i);
         if j >= params.fluid {
             let r = offset(x, position[j].xyz);
             let w = weight(dot(r, r));
@@ -46,7 +46,7 @@ fn friction(i: u32) -> vec4f {
 
 @compute @workgroup_size(WORKGROUP)
 fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
+    let i = thread(id);
     if i < params.fluid {
         acceleration[i] = vec4f(friction(i).xyz, 0.0);
     }
@@ -56,7 +56,7 @@ fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
         let neighbours = near_of(neighbour_count[i]);
         var taken = vec3f(0.0);
         for (var k = 0u; k < neighbours; k++) {
-            let j = neighbour_list[near_place(i, k)];
+            let j = neighbour_list_at(k, i);
             if j < params.fluid {
                 let other = friction(j);
                 if other.w > 0.0 {

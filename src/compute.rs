@@ -198,7 +198,7 @@ pub trait Compute {
     /// Records kernels, each with its number of workgroups, to run one after the other.
     ///
     /// # Errors
-    /// [`crate::error::Error::Gpu`] if the plan has no such kernel or a device cannot run so many workgroups.
+    /// [`crate::error::Error::Gpu`] if the plan has no such kernel.
     fn dispatch(&mut self, kernels: &[(Kernel, u64)]) -> Result<()>;
     /// Waits for what was recorded, and reads the start of a buffer.
     ///

@@ -26,6 +26,7 @@ mod guide;
 mod hulls;
 mod immersed;
 mod kernels;
+mod large;
 mod layers;
 mod ledger;
 mod measure;

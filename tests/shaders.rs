@@ -7,6 +7,7 @@ use seixo::backend::gpu::layout::{
     AbsorberZone, Coefficients, Constants, Emission, FreeBody, MonitorSum, Outlet, Pose, Solve, WallParticle,
     counter,
 };
+use seixo::backend::gpu::parts::{Division, Parts, Split};
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
 use seixo::compute::{Host, Program};
 use seixo::contact::device::paper::{self, PaperLaw, PaperPair, PaperPose};
@@ -80,7 +81,9 @@ fn every_shader_is_valid_with_every_switch_and_agrees_with_the_tables() {
         let mut seen = BTreeSet::new();
         for switches in combinations(text) {
             let source = shader::source(text, &switches);
-            assert_eq!(source.lines().count(), text.lines().count() + shader::COMMON.lines().count());
+            // A line is itself or left out, so that messages name the file's lines; what is added stands behind.
+            let lines = text.lines().chain(shader::COMMON.lines());
+            assert!(lines.zip(source.lines()).all(|(file, line)| line.is_empty() || line == file), "{name}");
             let entries =
                 shader::entries(name, &source).unwrap_or_else(|e| panic!("{name} {switches:?}: {e}"));
             assert!(!entries.is_empty(), "{name} {switches:?}: no entry point");
@@ -107,6 +110,44 @@ fn every_shader_is_valid_with_every_switch_and_agrees_with_the_tables() {
     let of_contact = kernels::programs().flat_map(|p| p.buffers);
     let listed = buffers::TABLE.iter().map(|row| &row.spec).chain(of_contact).map(|s| s.id.name().to_owned());
     assert_eq!(bound, listed.collect(), "buffers that no shader binds, or the other way");
+}
+
+/// Where buffers and dispatches are divided the same kernels bind the same buffers, with all their parts.
+#[test]
+fn every_shader_is_valid_on_a_device_that_divides() {
+    let divided = buffers::TABLE.iter().filter(|row| !matches!(row.split, Split::Whole));
+    // A power of two is a number of planes, too.
+    let parts = |(k, row): (usize, &buffers::Row)| Parts {
+        buffer: row.spec.id.name(),
+        count: 2 + (k % 3) as u64,
+        each: 8,
+    };
+    let division = Division { parts: divided.enumerate().map(parts).collect(), fold: Some(7) };
+    assert!(division.parts.len() >= 8, "{division:?}");
+    let mut used = BTreeSet::new();
+    for Program { name, text, .. } in kernels::programs() {
+        for switches in combinations(text) {
+            let whole = shader::entries(name, &shader::source(text, &switches)).expect("valid");
+            let source = shader::divided(text, &switches, &division);
+            let entries =
+                shader::entries(name, &source).unwrap_or_else(|e| panic!("{name} {switches:?}: {e}"));
+            for (whole, entry) in whole.iter().zip(&entries) {
+                let mut bound: Vec<_> = entry.bindings.iter().map(|b| (b.name.clone(), b.part)).collect();
+                let mut wanted = Vec::new();
+                for binding in &whole.bindings {
+                    let count = division.of(&binding.name).map_or(1, |p| p.count as usize);
+                    wanted.extend((0..count).map(|part| (binding.name.clone(), part)));
+                    used.extend((count > 1).then(|| binding.name.clone()));
+                }
+                bound.sort();
+                wanted.sort();
+                assert_eq!(bound, wanted, "{name}.{}", entry.name);
+                let numbers: BTreeSet<u32> = entry.bindings.iter().map(|b| b.number).collect();
+                assert_eq!(numbers.len(), entry.bindings.len(), "{name}.{}", entry.name);
+            }
+        }
+    }
+    assert_eq!(used, division.parts.iter().map(|p| p.buffer.to_owned()).collect());
 }
 
 /// Whether the pointer `at` leads to a component of a vector in a storage buffer that is chosen while the shader runs.
@@ -272,7 +313,18 @@ fn structs_lie_the_same_on_both_sides() {
     same_layout!("absorber", AbsorberZone { low, high, start, ramp });
     same_layout!(
         "coupling",
-        FreeBody { inverse_mass, inertia_x, inertia_y, inertia_z, force, torque, first, count, solid, pad }
+        FreeBody {
+            inverse_mass,
+            inertia_x,
+            inertia_y,
+            inertia_z,
+            force,
+            torque,
+            first,
+            count,
+            solid,
+            bodies
+        }
     );
     same_layout!(
         "conjugate_gradient",
@@ -310,6 +362,7 @@ fn structs_lie_the_same_on_both_sides() {
             share,
             skin,
             open,
+            pairs,
             pad,
         }
     );
@@ -317,7 +370,7 @@ fn structs_lie_the_same_on_both_sides() {
         "contact_smooth",
         SmoothPose { row_x, row_y, row_z, spin, below_b, above_b, below_a, above_a, found, given }
     );
-    same_layout!("contact_paper", PaperPair { first, count, row, list, candidates, pad });
+    same_layout!("contact_paper", PaperPair { first, count, row, list, candidates, pairs });
     same_layout!(
         "contact_paper",
         PaperPose { high_x, high_y, high_z, low_x, low_y, low_z, velocity, spin, spin_b }
@@ -402,6 +455,8 @@ fn constants_are_the_same_on_both_sides() {
     ] {
         assert_eq!(constant(text("ledger"), name), f64::from(entry as u8), "{name}");
     }
+    let first_word = format!("const FIRST_WORD: u32 = {:#x}u;", seixo::backend::gpu::layout::FIRST_WORD);
+    assert!(shader::COMMON.contains(&first_word));
     let on_wall = format!("const ON_WALL: u32 = {:#x}u;", seixo::contact::device::paper::ON_WALL);
     assert!(text("contact_paper").contains(&on_wall));
     use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};

@@ -7,6 +7,7 @@ use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::forecast::{Forecast, Group, groups};
 use seixo::backend::gpu::layout::{Memory, Sizes};
+use seixo::backend::gpu::shader::switches;
 use seixo::backend::gpu::sizes;
 use seixo::case::Case;
 use seixo::case::file::load_text;
@@ -330,7 +331,11 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
     let coarse = sizes.pressure as f64;
     let sizes = if built { sizes } else { sizes.refined(seen.coarser) };
     let memory = Memory::new(&sizes, plan);
-    let forecasts = FORECASTS.iter().filter(|&&n| n > sizes.total).map(|&n| Forecast::new(&sizes, plan, n));
+    let switches = switches(&own, plan);
+    let mut forecasts = vec![Forecast::at(&sizes, plan, &switches, 1.0)?];
+    for &particles in FORECASTS.iter().filter(|&&n| n > sizes.total) {
+        forecasts.push(Forecast::new(&sizes, plan, &switches, particles)?);
+    }
     Ok(Scheme {
         number_density: params.number_density,
         laplacian_over_l0_squared: params.laplacian / params.spacing.powi(2),
@@ -345,7 +350,7 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
         gpu_bytes: memory.total(),
         gpu_bytes_per_particle: memory.total() as f64 / sizes.total as f64,
         gpu_groups: groups(&memory),
-        gpu_forecasts: std::iter::once(Forecast::at(&sizes, plan, 1.0)).chain(forecasts).collect(),
+        gpu_forecasts: forecasts,
     })
 }
 
@@ -558,6 +563,17 @@ fn forecast(f: &Forecast, ahead: bool, spacing: f64) -> Vec<String> {
             f.largest.0,
             f.largest.1 as f64 / 1e9
         ));
+    }
+    if !f.parts.is_empty() {
+        let parts: Vec<_> = f.parts.iter().map(|(buffer, parts)| format!("{buffer} {parts}")).collect();
+        lines.push(format!(
+            "    in parts, since devices bind no more than 2.15 GB: {}; a kernel binds up to {} buffers",
+            parts.join(", "),
+            f.bindings
+        ));
+    }
+    if f.rows > 1 {
+        lines.push(format!("    dispatches of up to {} workgroups, in {} rows", f.workgroups, f.rows));
     }
     lines.extend(f.excesses.iter().map(|e| {
         let bytes = e.limit.ends_with("size");

@@ -16,12 +16,13 @@ pub mod forecast;
 pub mod hierarchy;
 pub mod layout;
 mod ledger;
+pub mod parts;
 pub mod shader;
 mod solve;
 mod traffic;
 mod transfer;
 
-pub use adapter::{AdapterInfo, adapters};
+pub use adapter::{AdapterInfo, Caps, adapters};
 pub use bandwidth::bandwidth;
 
 use super::traffic::Traffic;
@@ -29,7 +30,7 @@ use super::{Backend, Commands, Counters, RowPressure, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
-use crate::compute::{Compute, Id, Kernel};
+use crate::compute::{Compute, Id, Kernel, Program};
 use crate::error::{Error, GpuError, Result};
 use crate::fields::Fields;
 use crate::kernels::collision;
@@ -52,11 +53,14 @@ use layout::{
     Coefficients, Constants, Memory, MonitorSum, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, WallParticle,
     counter,
 };
+use parts::Division;
+use shader::Shader;
 use std::collections::BTreeMap;
 
 /// Particles in f32 on a device.
 pub struct Gpu {
     context: Context,
+    division: Division,
     params: Params,
     plan: Plan,
     settings: Settings,
@@ -107,6 +111,59 @@ fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
     Ok(Grid::nothing())
 }
 
+/// A scene as it fits a device.
+struct Fitted {
+    grid: Grid,
+    sizes: Sizes,
+    memory: Memory,
+    division: Division,
+    shaders: Vec<Shader>,
+    /// Bytes of a buffer at most.
+    most: u64,
+    /// To ask for.
+    limits: wgpu::Limits,
+}
+
+impl Fitted {
+    /// `scene` on a device `info` with limits `have`.
+    fn new(
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        info: &AdapterInfo,
+        have: &wgpu::Limits,
+    ) -> Result<Self> {
+        let fluid = scene.groups.fluid;
+        if fluid > layout::FLUID_MAX {
+            let text = format!(
+                "{fluid} fluid particles are more than the GPU path numbers ({}); use a larger run.spacing or \
+                 --backend cpu",
+                layout::FLUID_MAX
+            );
+            let (needs, has) = (fluid as u64, Some(layout::FLUID_MAX as u64));
+            return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
+        }
+        let grid = grid(params, plan)?;
+        let mut sizes = Sizes::new(scene, params, &grid);
+        if info.device_type == "cpu" {
+            sizes.rows_per_thread = 4;
+        }
+        let memory = Memory::new(&sizes, plan);
+        let most = adapter::buffer_most(have);
+        let width = adapter::width(have);
+        let division = Division::new(&memory, most, width);
+        let switches = shader::switches(params, plan);
+        // The pairs of solids that come close may become any number.
+        let of_pairs = Division { fold: Some(width), ..division.clone() };
+        let of_contact = |p: &&Program| plan.contact.program.is_some_and(|c| c.name == p.name);
+        let particles = kernels::planned(plan).filter(|p| !of_contact(p));
+        let mut shaders = Shader::all(particles, &switches, &division)?;
+        shaders.extend(Shader::all(plan.contact.program.into_iter(), &switches, &of_pairs)?);
+        let limits = adapter::limits(&memory, Shader::bindings(&shaders), have, &info.name)?;
+        Ok(Self { grid, sizes, memory, division, shaders, most, limits })
+    }
+}
+
 impl Gpu {
     /// `true` if the machine has a GPU, as opposed to software that acts as one.
     pub fn hardware_available() -> bool {
@@ -125,25 +182,52 @@ impl Gpu {
         settings: Settings,
         adapter: Option<&str>,
     ) -> Result<Self> {
+        Self::capped(scene, params, plan, settings, adapter, Caps::default())
+    }
+
+    /// [`Gpu::new`] on a device that is asked for no more than `caps`.
+    #[doc(hidden)]
+    pub fn capped(
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+        adapter: Option<&str>,
+        caps: Caps,
+    ) -> Result<Self> {
         let (adapter, info) = adapter::choose(adapter)?;
-        let limits = adapter::limits(&memory(scene, params, plan)?, &adapter.limits(), &info.name)?;
+        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(adapter.limits()))?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("seixo"),
-            required_limits: limits,
+            required_limits: fitted.limits.clone(),
             required_features: adapter.features() & clock::FEATURES,
             ..Default::default()
         };
         let device = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| Error::gpu(format!("{}: {e}", info.name)))?;
-        Self::on(device, info, scene, params, plan, settings)
+        Self::on(device, info, fitted, scene, params, plan, settings)
     }
 
     /// Build everything on a device that computes nothing: pipelines, bindings and limits are checked with
     /// no driver.
     pub fn dry_run(scene: &Scene, params: &Params, plan: &Plan, settings: Settings) -> Result<Self> {
-        let have = wgpu::Limits { max_storage_buffer_binding_size: 1 << 30, ..Default::default() };
-        let limits = adapter::limits(&memory(scene, params, plan)?, &have, "noop")?;
-        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        Self::dry_run_capped(scene, params, plan, settings, Caps::default())
+    }
+
+    /// [`Gpu::dry_run`] on a device that is asked for no more than `caps`.
+    #[doc(hidden)]
+    pub fn dry_run_capped(
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+        caps: Caps,
+    ) -> Result<Self> {
+        let have = wgpu::Limits {
+            max_storage_buffer_binding_size: 1 << 30,
+            max_storage_buffers_per_shader_stage: 64,
+            ..Default::default()
+        };
         let text = |s: &str| s.to_owned();
         let info = AdapterInfo {
             name: text("noop"),
@@ -151,40 +235,29 @@ impl Gpu {
             device_type: text("other"),
             driver: text(""),
         };
-        Self::on(wgpu::Device::noop(&descriptor), info, scene, params, plan, settings)
+        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(have))?;
+        let descriptor =
+            wgpu::DeviceDescriptor { required_limits: fitted.limits.clone(), ..Default::default() };
+        Self::on(wgpu::Device::noop(&descriptor), info, fitted, scene, params, plan, settings)
     }
 
     fn on(
         device: (wgpu::Device, wgpu::Queue),
         info: AdapterInfo,
+        fitted: Fitted,
         scene: &Scene,
         params: &Params,
         plan: &Plan,
         settings: Settings,
     ) -> Result<Self> {
         let groups = scene.groups;
-        if groups.fluid > layout::FLUID_MAX {
-            let text = format!(
-                "{} fluid particles are more than the GPU path numbers ({}); use a larger run.spacing or \
-                 --backend cpu",
-                groups.fluid,
-                layout::FLUID_MAX
-            );
-            let (needs, has) = (groups.fluid as u64, Some(layout::FLUID_MAX as u64));
-            return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
-        }
-        let grid = grid(params, plan)?;
-        let mut sizes = Sizes::new(scene, params, &grid);
-        if info.device_type == "cpu" {
-            sizes.rows_per_thread = 4;
-        }
-        let memory = Memory::new(&sizes, plan);
-        let switches = shader::switches(params, plan);
+        let Fitted { grid, sizes, memory, division, shaders, most, .. } = fitted;
         let layer = |s: &Solid| (s.wall_slots.start.saturating_sub(groups.fluid), s.wall_slots.len());
         let wall_layers = scene.solids.iter().map(layer);
         let levels = plan.needs(Arrays::Multigrid).then(|| Levels::new(&sizes));
         let mut gpu = Self {
-            context: Context::new(device, info, &memory, kernels::planned(plan), &switches)?,
+            context: Context::new(device, info, &memory, most, &shaders)?,
+            division,
             params: params.clone(),
             plan: plan.clone(),
             settings,
@@ -225,6 +298,11 @@ impl Gpu {
     /// Where each key of the counting sort begins, as the last sort left it.
     pub fn key_starts(&mut self) -> Result<Vec<u32>> {
         self.context.download(buffers::cell_start, self.sizes.keys() as usize + 1)
+    }
+
+    /// How buffers and dispatches are divided on the device.
+    pub fn division(&self) -> &Division {
+        &self.division
     }
 
     /// Bytes that the driver's allocator has given out for this device, where it tells.
@@ -450,12 +528,14 @@ impl Backend for Gpu {
                 first: first as u32,
                 count: count as u32,
                 solid: solid as u32,
-                pad: 0,
+                bodies: 0,
             }
         };
         let of = bodies.iter().zip(&self.wall_layers).enumerate();
         let free = of.filter(|(_, (b, _))| b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO);
-        let free: Vec<_> = free.map(device).collect();
+        let mut free: Vec<_> = free.map(device).collect();
+        let count = free.len() as u32;
+        free.iter_mut().for_each(|body| body.bodies = count);
         self.coupled = free.len() as u64;
         if free.is_empty() {
             return Ok(());
@@ -650,15 +730,6 @@ impl Compute for Gpu {
     }
 
     fn dispatch(&mut self, kernels: &[(Kernel, u64)]) -> Result<()> {
-        let most = self.context.workgroups_max();
-        if let Some((_, groups)) = kernels.iter().find(|(_, groups)| *groups > most) {
-            let text = format!(
-                "{groups} pairs of solids are close, {most} is what {} takes at a time; use contact.device = \"host\"",
-                self.context.info.name
-            );
-            let limit = "max_compute_workgroups_per_dimension";
-            return Err(GpuError::TooSmall { limit, needs: *groups, has: Some(most), text }.into());
-        }
         self.context.begin(Some(Stage::Contact));
         self.context.pass(kernels.iter().copied())
     }

@@ -104,10 +104,53 @@ fn megabytes(bytes: u64) -> String {
     format!("{:.0} MB", bytes as f64 / 1e6)
 }
 
-/// Limits to ask of an adapter with limits `have`, or what it lacks. Nothing is allocated before this.
-pub(super) fn limits(memory: &Memory, have: &wgpu::Limits, name: &str) -> Result<wgpu::Limits> {
+/// Limits below those of a device, to try on small scenes what large ones need.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Caps {
+    /// Bytes that a shader binds, and that a buffer has, at most.
+    pub binding: Option<u64>,
+    /// Workgroups along one dimension of a dispatch at most.
+    pub workgroups: Option<u32>,
+}
+
+impl Caps {
+    /// `have`, no higher than these.
+    pub(super) fn lower(&self, have: wgpu::Limits) -> wgpu::Limits {
+        let binding = self.binding.unwrap_or(u64::MAX);
+        let workgroups = self.workgroups.unwrap_or(u32::MAX);
+        wgpu::Limits {
+            max_storage_buffer_binding_size: have.max_storage_buffer_binding_size.min(binding),
+            max_buffer_size: have.max_buffer_size.min(binding),
+            max_compute_workgroups_per_dimension: have.max_compute_workgroups_per_dimension.min(workgroups),
+            ..have
+        }
+    }
+}
+
+/// Bytes of a buffer at most on a device with limits `have`: what is larger is made as several.
+pub(super) fn buffer_most(have: &wgpu::Limits) -> u64 {
+    have.max_storage_buffer_binding_size.min(have.max_buffer_size)
+}
+
+/// Workgroups along one dimension of a dispatch at most that are asked of a device with limits `have`.
+pub(super) fn width(have: &wgpu::Limits) -> u32 {
+    let usual = wgpu::Limits::default().max_compute_workgroups_per_dimension;
+    usual.min(have.max_compute_workgroups_per_dimension)
+}
+
+/// Limits to ask of an adapter with limits `have` for kernels of up to `bindings` storage buffers, or what it lacks. Nothing is
+/// allocated before this.
+pub(super) fn limits(
+    memory: &Memory,
+    bindings: u32,
+    have: &wgpu::Limits,
+    name: &str,
+) -> Result<wgpu::Limits> {
     let mut ask = wgpu::Limits::default();
-    let (largest, bytes) = memory.largest();
+    let most = buffer_most(have);
+    let parts = memory.buffers.iter().map(|b| (b.id.name(), b.part(most)));
+    let (largest, bytes) = parts.max_by_key(|(_, bytes)| *bytes).unwrap_or(("nothing", 0));
     for (what, limit, available) in [
         (
             "max_storage_buffer_binding_size",
@@ -127,15 +170,29 @@ pub(super) fn limits(memory: &Memory, have: &wgpu::Limits, name: &str) -> Result
         }
         *limit = (*limit).max(bytes).min(available);
     }
-    let groups = u64::from(have.max_compute_workgroups_per_dimension);
-    if memory.workgroups > groups {
-        let (limit, needs) = ("max_compute_workgroups_per_dimension", memory.workgroups);
+    let groups = u64::from(width(have));
+    if memory.strided > groups {
+        let (limit, needs) = ("max_compute_workgroups_per_dimension", memory.strided);
         let text = format!(
-            "a kernel needs {needs} workgroups, but {name} allows {groups} ({limit}); use a larger run.spacing, a \
-             smaller run.domain or --backend cpu"
+            "a kernel needs {needs} workgroups, but {name} allows {groups} ({limit}); use a larger run.spacing, \
+             another adapter or --backend cpu"
         );
         return Err(GpuError::TooSmall { limit, needs, has: Some(groups), text }.into());
     }
+    ask.max_compute_workgroups_per_dimension = width(have);
+    let available = have.max_storage_buffers_per_shader_stage;
+    if bindings > available {
+        let limit = "max_storage_buffers_per_shader_stage";
+        let text = format!(
+            "a kernel needs {bindings} storage buffers, among them the parts of those that are too large for one, but \
+             {name} allows {available} ({limit}); use a larger run.spacing, a smaller run.domain, another adapter or \
+             --backend cpu"
+        );
+        let (needs, has) = (bindings.into(), Some(available.into()));
+        return Err(GpuError::TooSmall { limit, needs, has, text }.into());
+    }
+    ask.max_storage_buffers_per_shader_stage =
+        ask.max_storage_buffers_per_shader_stage.max(bindings).min(available);
     Ok(ask)
 }
 
@@ -144,18 +201,20 @@ mod tests {
     use super::super::buffers;
     use super::super::layout::Allocation;
     use super::*;
+    use crate::backend::gpu::parts::Grain;
     use crate::compute::Host;
     use crate::error::Error;
 
-    fn memory(bytes: u64, workgroups: u64) -> Memory {
-        let id = buffers::neighbour_list.id();
-        Memory { buffers: vec![Allocation { id, bytes, host: Host::None, purpose: "lists" }], workgroups }
+    fn memory(bytes: u64, strided: u64) -> Memory {
+        let id = buffers::position.id();
+        let one = Allocation { id, bytes, host: Host::None, purpose: "particles", grain: Grain::Whole };
+        Memory { buffers: vec![one], workgroups: strided, strided }
     }
 
     #[test]
     fn what_an_adapter_lacks_is_named() {
         let have = wgpu::Limits::default();
-        let refusal = |m: &Memory| limits(m, &have, "small").expect_err("too large");
+        let refusal = |m: &Memory| limits(m, 8, &have, "small").expect_err("too large");
         let text = |m: &Memory| refusal(m).to_string();
         match refusal(&memory(300 << 20, 1)) {
             Error::Gpu(GpuError::TooSmall { limit, needs, has, .. }) => {
@@ -165,12 +224,21 @@ mod tests {
             other => panic!("{other:?}"),
         }
         let large = text(&memory(300 << 20, 1));
-        for part in ["neighbour_list", "315 MB", "134 MB", "max_storage_buffer_binding_size", "--backend cpu"]
-        {
+        for part in ["position", "315 MB", "134 MB", "max_storage_buffer_binding_size", "--backend cpu"] {
             assert!(large.contains(part), "{large}");
         }
         let many = text(&memory(1 << 20, 70_000));
         assert!(many.contains("70000 workgroups") && many.contains("65535"), "{many}");
+        let bound = limits(&memory(1 << 20, 1), 9, &have, "small").expect_err("too many").to_string();
+        for part in
+            ["9 storage buffers", "small allows 8", "max_storage_buffers_per_shader_stage", "run.spacing"]
+        {
+            assert!(bound.contains(part), "{bound}");
+        }
+        let low = Caps { binding: Some(1 << 20), workgroups: Some(100) }.lower(have.clone());
+        let asked = limits(&memory(1 << 20, 100), 8, &low, "small").expect("fits");
+        assert_eq!((asked.max_storage_buffer_binding_size, asked.max_buffer_size), (1 << 20, 1 << 20));
+        assert_eq!(asked.max_compute_workgroups_per_dimension, 100);
     }
 
     #[test]
@@ -180,9 +248,9 @@ mod tests {
             max_buffer_size: 1 << 31,
             ..Default::default()
         };
-        let asked = limits(&memory(300 << 20, 1), &have, "large").expect("fits");
+        let asked = limits(&memory(300 << 20, 1), 8, &have, "large").expect("fits");
         assert_eq!((asked.max_storage_buffer_binding_size, asked.max_buffer_size), (300 << 20, 300 << 20));
-        let asked = limits(&memory(1 << 20, 1), &have, "large").expect("fits");
+        let asked = limits(&memory(1 << 20, 1), 8, &have, "large").expect("fits");
         let usual = wgpu::Limits::default();
         assert_eq!(asked.max_storage_buffer_binding_size, usual.max_storage_buffer_binding_size);
     }

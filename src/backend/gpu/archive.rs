@@ -7,6 +7,9 @@ use crate::error::{Error, Result};
 use crate::plan::Arrays;
 use bytemuck::Pod;
 
+/// Bytes of neighbour lists that are on the host at a time, unless a plane takes more.
+const PLANES_BYTES: usize = 64 << 20;
+
 /// Buffers that hold the state between two steps.
 #[cfg(test)]
 const SAVED: [&str; 11] = [
@@ -131,17 +134,33 @@ impl Gpu {
     }
 
     /// The neighbours that carry pressure, row by row without gaps. The dummies, at the other end of the rows, are
-    /// listed anew before they are read.
+    /// listed anew before they are read. The lists travel some planes at a time: together they are many times what the
+    /// rows hold.
     fn lists(&mut self, archive: &mut Archive) -> Result<()> {
         let (rows, capacity) = (self.groups.pressure(), self.sizes.capacity as usize);
         self.buffer(archive, buffers::neighbour_count, rows)?;
         let count = self.context.download(buffers::neighbour_count, rows)?;
         let near = |i: usize| (count[i] & 0xfff) as usize;
-        let total: usize = (0..rows).map(near).sum();
-        let mut packed: Vec<u32> = Vec::with_capacity(total);
+        let held = |i: usize| near(i).min(capacity);
+        let total: usize = (0..rows).map(held).sum();
+        let most = (0..rows).map(held).max().unwrap_or(0);
+        let planes = (PLANES_BYTES / (size_of::<u32>() * rows.max(1))).max(1);
+        // Of each batch of planes the row's neighbours in it, with their places in `packed`.
+        let each = |first: usize, end: usize, take: &mut dyn FnMut(usize, usize)| {
+            let mut start = 0;
+            for i in 0..rows {
+                (first..held(i).min(end)).for_each(|k| take((k - first) * rows + i, start + k));
+                start += held(i);
+            }
+        };
+        let batches = || (0..most).step_by(planes).map(|first| (first, most.min(first + planes)));
+        let mut packed = vec![0_u32; if archive.is_saving() { total } else { 0 }];
         if archive.is_saving() {
-            let list = self.context.download(buffers::neighbour_list, capacity * rows)?;
-            (0..rows).for_each(|i| packed.extend((0..near(i).min(capacity)).map(|k| list[k * rows + i])));
+            for (first, end) in batches() {
+                let part = [(first * rows, (end - first) * rows)];
+                let list = self.context.download_parts(buffers::neighbour_list, &part)?;
+                each(first, end, &mut |at, place| packed[place] = list[at]);
+            }
         }
         archive.array("neighbour_list", &mut packed, false)?;
         if archive.is_saving() {
@@ -151,14 +170,13 @@ impl Gpu {
         if !fits || packed.iter().any(|&j| j as usize >= self.groups.total()) {
             return Err(Error::damaged("the checkpoint's neighbour lists are damaged"));
         }
-        let mut list = vec![0_u32; capacity * rows];
-        let mut next = packed.into_iter();
-        for i in 0..rows {
-            for (k, j) in next.by_ref().take(near(i)).enumerate() {
-                list[k * rows + i] = j;
-            }
+        for (first, end) in batches() {
+            let mut list = vec![0_u32; (end - first) * rows];
+            each(first, end, &mut |at, place| list[at] = packed[place]);
+            let place = (size_of::<u32>() * first * rows) as u64;
+            self.context.upload_to(buffers::neighbour_list.id(), place, bytemuck::cast_slice(&list))?;
         }
-        self.context.upload(buffers::neighbour_list, &list)
+        Ok(())
     }
 }
 

@@ -6,6 +6,7 @@ use super::layout::{
     AbsorberZone, Coefficients, Constants, Emission, FreeBody, LEDGER_WIDTH, MonitorSum, Outlet, Pose,
     SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
 };
+use super::parts::Split;
 use crate::compute::{Buffer, Host, Spec, shader_structs};
 use crate::monitor::SPEED_BINS;
 use crate::plan::Arrays;
@@ -32,12 +33,14 @@ pub struct Row {
     pub purpose: &'static str,
     /// Which scenes need it.
     pub arrays: Arrays,
+    /// How it is divided where a device cannot bind it whole.
+    pub split: Split,
     /// Elements.
     pub length: fn(&Sizes, &Levels) -> u64,
 }
 
 macro_rules! table {
-    ($($purpose:literal { $($(#[$doc:meta])* $name:ident: $element:ty, $host:ident, $arrays:ident, $length:expr;)* })*) => {
+    ($($purpose:literal { $($(#[$doc:meta])* $name:ident: $element:ty, $host:ident, $arrays:ident, $length:expr $(, $split:expr)?;)* })*) => {
         $($($(#[$doc])* #[allow(non_upper_case_globals, missing_docs)]
             pub const $name: Buffer<$element> = Buffer::new(stringify!($name), Host::$host);)*)*
         /// The table.
@@ -45,17 +48,27 @@ macro_rules! table {
             spec: $name.spec(),
             purpose: $purpose,
             arrays: Arrays::$arrays,
+            split: table!(@split $($split)?),
             length: $length,
         }),*),*];
     };
+    (@split) => { Split::Whole };
+    (@split $split:expr) => { $split };
 }
 
-// Name as in the shaders: element, the host's use, the scenes that need it, length of scene `s` with levels `l`.
+/// A plane for each place of a row.
+const OF_ROWS: Split = Split::Planes { length: |s, _| s.pressure, pitch: "params.pressure_slots" };
+/// A plane for each entry of a stencil.
+const OF_STENCILS: Split = Split::Planes { length: |_, l| l.capacity, pitch: "hierarchy.capacity" };
+
+// Name as in the shaders: element, the host's use, the scenes that need it, length of scene `s` with levels `l`, and how it is
+// divided. What can be divided is what a hundred million particles take beyond what devices bind, and what cells take, of which
+// there may be more than particles.
 table! {
     "particles" {
         /// x, y, z and kind.
         position: [f32; 4], Both, Fluid, |s, _| s.total;
-        /// u, v, w and number.
+        /// u, v, w and, of the fluid, the word of its number.
         velocity: [f32; 4], Both, Fluid, |s, _| s.total;
         pressure: f32, Both, Fluid, |s, _| s.pressure;
         number_density: f32, Both, Fluid, |s, _| s.pressure;
@@ -65,7 +78,7 @@ table! {
         imbalance: [f32; 4], None, Imbalance, |s, _| s.fluid;
     }
     "neighbour lists" {
-        neighbour_list: u32, Both, Fluid, |s, _| s.capacity * s.pressure;
+        neighbour_list: u32, Both, Fluid, |s, _| s.capacity * s.pressure, OF_ROWS;
         neighbour_count: u32, Both, Fluid, |s, _| s.pressure;
     }
     "pressure solver" {
@@ -83,13 +96,13 @@ table! {
     }
     "multigrid" {
         hierarchy: Hierarchy, Uniform, Multigrid, |_, _| 1;
-        cell_mark: u32, Writes, Multigrid, |_, l| l.cells;
-        cell_row: [u32; 2], None, Multigrid, |_, l| l.cells;
+        cell_mark: u32, Writes, Multigrid, |_, l| l.cells, Split::Ranges;
+        cell_row: [u32; 2], None, Multigrid, |_, l| l.cells, Split::Ranges;
         row_block: [u32; 2], None, Multigrid, |_, l| l.blocks();
         row_cell: [u32; 4], Reads, Multigrid, |_, l| l.capacity + 1 + l.count.len() as u64;
         member: [u32; 2], None, Multigrid, |s, _| s.pressure;
         aggregate: [u32; 2], Writes, Multigrid, |s, _| s.pressure;
-        entry: [u32; 2], Reads, Multigrid, |_, l| 27 * l.capacity;
+        entry: [u32; 2], Reads, Multigrid, |_, l| 27 * l.capacity, OF_STENCILS;
         coarse: f32, None, Multigrid, |_, l| 3 * l.capacity;
         smoothed: f32, None, Multigrid, |s, _| s.pressure;
         corrected: [f32; 4], None, Multigrid, |s, _| s.pressure;
@@ -102,14 +115,14 @@ table! {
     }
     "search" {
         cell_of: [u32; 2], None, Fluid, |s, _| s.sorted();
-        cell_count: u32, Writes, Fluid, |s, _| s.keys();
-        cell_start: u32, Reads, Fluid, |s, _| s.keys() + 1;
+        cell_count: u32, Writes, Fluid, |s, _| s.keys(), Split::Ranges;
+        cell_start: u32, Reads, Fluid, |s, _| s.keys() + 1, Split::Ranges;
         block_sum: u32, None, Fluid, |s, _| s.keys().div_ceil(SCAN_BLOCK);
         unsorted: u32, None, Fluid, |s, _| s.sorted();
         /// Positions, velocities and pressures of the fluid, one after the other.
-        sorted: f32, Reads, Fluid, |s, _| (4 + 4 + 1) * s.fluid;
+        sorted: f32, Reads, Fluid, |s, _| (4 + 4 + 1) * s.fluid, Split::Ranges;
         moving_slot: u32, None, Solids, |s, _| s.moving;
-        static_start: u32, Writes, FixedWalls, |s, _| s.cells + 1;
+        static_start: u32, Writes, FixedWalls, |s, _| s.cells + 1, Split::Ranges;
         static_particle: [u32; 4], Writes, FixedWalls, |s, _| s.fixed;
     }
     "solids and the rest" {

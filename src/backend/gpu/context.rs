@@ -3,9 +3,10 @@
 use super::adapter::AdapterInfo;
 use super::clock::Clock;
 use super::layout::{Allocation, Memory};
-use super::shader;
+use super::parts::Buffers;
+use super::shader::Shader;
 use crate::backend::Commands;
-use crate::compute::{Host, Id, Kernel, Program};
+use crate::compute::{Host, Id, Kernel};
 use crate::error::{Error, GpuError, Result};
 use crate::plan::Stage;
 use std::collections::HashMap;
@@ -19,8 +20,8 @@ const MAIL: u64 = 64 << 10;
 struct Pipeline {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
-    /// Number and buffer of each binding.
-    bound: Vec<(u32, Id)>,
+    /// Number, buffer and part of each binding.
+    bound: Vec<(u32, Id, usize)>,
 }
 
 /// A device at work.
@@ -28,8 +29,10 @@ pub(super) struct Context {
     pub info: AdapterInfo,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
-    buffers: HashMap<Id, wgpu::Buffer>,
+    buffers: HashMap<Id, Buffers>,
     pipelines: HashMap<Kernel, Pipeline>,
+    /// Workgroups along one dimension of a dispatch at most.
+    width: u64,
     pub(super) staging: wgpu::Buffer,
     /// Small uploads on their way, and the bytes of it that are in use.
     pub(super) mail: (wgpu::Buffer, u64),
@@ -44,13 +47,13 @@ pub(super) struct Context {
 }
 
 impl Context {
-    /// Allocate `memory` and build the pipelines of `programs` with `switches` on.
+    /// Allocate `memory`, in buffers of no more than `most` bytes as far as it can be divided, and build the pipelines of `shaders`.
     pub fn new(
         (device, queue): (wgpu::Device, wgpu::Queue),
         info: AdapterInfo,
         memory: &Memory,
-        programs: impl Iterator<Item = &'static Program>,
-        switches: &[&str],
+        most: u64,
+        shaders: &[Shader],
     ) -> Result<Self> {
         let fault = Arc::new(Mutex::new(None));
         let note = |fault: &Arc<Mutex<Option<String>>>, what: String| {
@@ -87,11 +90,13 @@ impl Context {
                 Host::Both => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
                 Host::Uniform => Usage::UNIFORM | Usage::COPY_DST,
             };
-            (b.id, create(b.id.name(), b.bytes, usage))
+            let part = b.part(most);
+            let parts = (0..b.bytes.div_ceil(part)).map(|k| part.min(b.bytes - k * part));
+            (b.id, Buffers::new(part, parts.map(|bytes| create(b.id.name(), bytes, usage)).collect()))
         });
         let buffers: HashMap<_, _> = buffers.collect();
         let readable = |b: &&Allocation| matches!(b.host, Host::Reads | Host::Both);
-        let largest = memory.buffers.iter().filter(readable).map(|b| b.bytes).max().unwrap_or(16);
+        let largest = memory.buffers.iter().filter(readable).map(|b| b.part(most)).max().unwrap_or(16);
         let staging_bytes = largest.clamp(STAGING.0, STAGING.1);
         let staging = create("staging", staging_bytes, Usage::MAP_READ | Usage::COPY_DST);
         let mail = create("mail", MAIL, Usage::COPY_SRC | Usage::COPY_DST);
@@ -112,6 +117,7 @@ impl Context {
             bytes: memory.total() + staging_bytes + MAIL,
             info,
             clock: Clock::new(&device, &queue),
+            width: device.limits().max_compute_workgroups_per_dimension.into(),
             device,
             queue,
             buffers,
@@ -123,19 +129,20 @@ impl Context {
             stage: None,
             commands: Commands::default(),
         };
-        for program in programs {
-            context.compile(program, &shader::source(program.text, switches))?;
+        for shader in shaders {
+            context.compile(shader)?;
         }
         context.check()?;
         Ok(context)
     }
 
-    fn compile(&mut self, program: &Program, source: &str) -> Result<()> {
+    fn compile(&mut self, shader: &Shader) -> Result<()> {
+        let Shader { program, source, entries } = shader;
         let file = program.name;
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(file),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(source.as_str().into()),
         };
         let module = if self.info.is_hardware() {
             let mut checks = wgpu::ShaderRuntimeChecks::checked();
@@ -148,7 +155,7 @@ impl Context {
             // Software is there to find mistakes, not to be fast.
             self.device.create_shader_module(descriptor)
         };
-        for entry in shader::entries(file, source)? {
+        for entry in entries {
             let name = format!("{file}.{}", entry.name);
             let listed = program.kernels.iter().find(|k| k.entry == entry.name);
             let kernel = *listed.ok_or_else(|| Error::gpu(format!("{name} is in no list of kernels")))?;
@@ -168,7 +175,7 @@ impl Context {
                 let found = self.buffers.keys().find(|id| id.name() == field).copied();
                 found.ok_or_else(|| Error::gpu(format!("{name} binds {field}, which the plan leaves out")))
             };
-            let bound = entry.bindings.iter().map(|b| Ok((b.number, find(&b.name)?)));
+            let bound = entry.bindings.iter().map(|b| Ok((b.number, find(&b.name)?, b.part)));
             let bound = bound.collect::<Result<Vec<_>>>()?;
             let group = self.group(&name, &pipeline, &bound)?;
             self.pipelines.insert(kernel, Pipeline { pipeline, group, bound });
@@ -184,11 +191,13 @@ impl Context {
         &self,
         name: &str,
         pipeline: &wgpu::ComputePipeline,
-        bound: &[(u32, Id)],
+        bound: &[(u32, Id, usize)],
     ) -> Result<wgpu::BindGroup> {
         let mut entries = Vec::with_capacity(bound.len());
-        for &(binding, id) in bound {
-            entries.push(wgpu::BindGroupEntry { binding, resource: self.buffer(id)?.as_entire_binding() });
+        for &(binding, id, part) in bound {
+            let missing = || Error::gpu(format!("{} has no part {part}", id.name()));
+            let buffer = self.buffers(id)?.parts.get(part).ok_or_else(missing)?;
+            entries.push(wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() });
         }
         Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(name),
@@ -198,10 +207,10 @@ impl Context {
     }
 
     /// Make a buffer hold at least `bytes`; by half more than asked, so that it does not grow every time. What
-    /// it held is lost if it grows.
+    /// it held is lost if it grows. For buffers that are never divided.
     pub(crate) fn reserve(&mut self, id: Id, bytes: u64) -> Result<()> {
-        let (old, name) = (self.buffer(id)?, id.name());
-        let (have, usage) = (old.size(), old.usage());
+        let (old, name) = (self.buffers(id)?, id.name());
+        let (have, usage) = (old.size(), old.parts[0].usage());
         if bytes <= have {
             return Ok(());
         }
@@ -245,11 +254,11 @@ impl Context {
             self.bytes += wanted - staging;
             self.staging = larger;
         }
-        self.buffers.insert(id, buffer);
+        self.buffers.insert(id, Buffers::new(size, vec![buffer]));
         let users: Vec<Kernel> = self
             .pipelines
             .iter()
-            .filter(|(_, p)| p.bound.iter().any(|(_, bound)| *bound == id))
+            .filter(|(_, p)| p.bound.iter().any(|(_, bound, _)| *bound == id))
             .map(|(kernel, _)| *kernel)
             .collect();
         for kernel in users {
@@ -260,11 +269,6 @@ impl Context {
             }
         }
         Ok(())
-    }
-
-    /// Workgroups of a dispatch at most.
-    pub(crate) fn workgroups_max(&self) -> u64 {
-        u64::from(self.device.limits().max_compute_workgroups_per_dimension)
     }
 
     /// Bytes that the allocator has given out, where it tells.
@@ -284,7 +288,7 @@ impl Context {
         fault.map_or(Ok(()), |what| Err(Error::gpu(format!("{}: {what}", self.info.name))))
     }
 
-    pub(super) fn buffer(&self, id: Id) -> Result<&wgpu::Buffer> {
+    pub(super) fn buffers(&self, id: Id) -> Result<&Buffers> {
         let missing = || Error::gpu(format!("there is no buffer {}: the plan leaves it out", id.name()));
         self.buffers.get(&id).ok_or_else(missing)
     }
@@ -311,10 +315,20 @@ impl Context {
         })
     }
 
-    /// Record a pass over kernels, each with its number of workgroups.
+    /// Where `bytes` of a buffer from byte `first` on lie.
+    pub(super) fn pieces(&self, id: Id, first: u64, bytes: u64) -> Result<Vec<(wgpu::Buffer, u64, u64)>> {
+        let pieces = self.buffers(id)?.pieces(first, bytes);
+        Ok(pieces.map(|(buffer, first, bytes)| (buffer.clone(), first, bytes)).collect())
+    }
+
+    /// Record a pass over kernels, each with its number of workgroups; more than the device starts along one dimension are folded
+    /// into rows, the last of them full as well.
     pub fn pass(&mut self, kernels: impl IntoIterator<Item = (Kernel, u64)>) -> Result<()> {
         self.record();
-        let Self { encoder: Some(encoder), pipelines, commands, stage, .. } = self else { return Ok(()) };
+        let Self { encoder: Some(encoder), pipelines, commands, stage, width, .. } = self else {
+            return Ok(());
+        };
+        let width = *width;
         let mut pass = encoder.begin_compute_pass(&Default::default());
         for (kernel, groups) in kernels {
             let Kernel { file, entry, .. } = kernel;
@@ -322,22 +336,27 @@ impl Context {
             let Pipeline { pipeline, group, .. } = pipelines.get(&kernel).ok_or_else(missing)?;
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
-            pass.dispatch_workgroups(groups as u32, 1, 1);
+            pass.dispatch_workgroups(groups.min(width) as u32, groups.div_ceil(width).max(1) as u32, 1);
             commands.add(*stage);
         }
         Ok(())
     }
 
     pub fn clear(&mut self, buffer: impl Into<Id>) -> Result<()> {
-        let buffer = self.buffer(buffer.into())?.clone();
-        self.record().clear_buffer(&buffer, 0, None);
+        for buffer in self.buffers(buffer.into())?.parts.clone() {
+            self.record().clear_buffer(&buffer, 0, None);
+        }
         Ok(())
     }
 
-    /// Copy `bytes` from byte `first` of a buffer to the start of another.
+    /// Copy `bytes` from byte `first` of a buffer, perhaps a divided one, to the start of another.
     pub fn copy(&mut self, from: impl Into<Id>, first: u64, to: impl Into<Id>, bytes: u64) -> Result<()> {
-        let (source, target) = (self.buffer(from.into())?.clone(), self.buffer(to.into())?.clone());
-        self.record().copy_buffer_to_buffer(&source, first, &target, 0, bytes);
+        let target = self.buffers(to.into())?.parts[0].clone();
+        let mut at = 0;
+        for (source, first, bytes) in self.pieces(from.into(), first, bytes)? {
+            self.record().copy_buffer_to_buffer(&source, first, &target, at, bytes);
+            at += bytes;
+        }
         Ok(())
     }
 }

@@ -29,19 +29,32 @@ impl Context {
 
     /// [`Context::upload`] of bytes.
     pub(crate) fn upload_bytes(&mut self, buffer: Id, data: &[u8]) -> Result<()> {
+        self.upload_to(buffer, 0, data)
+    }
+
+    /// Write to a buffer from byte `first` on.
+    pub(super) fn upload_to(&mut self, buffer: Id, first: u64, data: &[u8]) -> Result<()> {
+        let mut rest = data;
+        for (target, first, bytes) in self.pieces(buffer, first, data.len() as u64)? {
+            let (piece, behind) = rest.split_at(bytes as usize);
+            self.upload_piece(&target, first, piece);
+            rest = behind;
+        }
+        Ok(())
+    }
+
+    fn upload_piece(&mut self, target: &wgpu::Buffer, first: u64, data: &[u8]) {
         let (mail, at) = (self.mail.0.clone(), self.mail.1);
         let end = at + data.len() as u64;
-        let target = self.buffer(buffer)?.clone();
         if end > mail.size() {
             self.submit();
-            self.queue.write_buffer(&target, 0, data);
+            self.queue.write_buffer(target, first, data);
         } else {
             // The queue writes before the submission; no two uploads of one share a place.
             self.queue.write_buffer(&mail, at, data);
-            self.record().copy_buffer_to_buffer(&mail, at, &target, 0, data.len() as u64);
+            self.record().copy_buffer_to_buffer(&mail, at, target, first, data.len() as u64);
             self.mail.1 = end;
         }
-        Ok(())
     }
 
     /// Read the first `count` elements of a buffer.
@@ -68,8 +81,11 @@ impl Context {
         let mut out = Vec::with_capacity(total as usize);
         let mut filled = 0;
         let staging = self.staging.clone();
+        let mut pieces = Vec::with_capacity(parts.len());
         for &(id, first, bytes) in parts {
-            let buffer = self.buffer(id)?.clone();
+            pieces.extend(self.pieces(id, first, bytes)?);
+        }
+        for (buffer, first, bytes) in pieces {
             let (mut at, end) = (first, first + bytes);
             while at < end {
                 if filled == staging.size() {

@@ -1,15 +1,18 @@
 //! Memory of a scene by groups of buffers, and of the same scene with finer particles: what fits, and which limit
 //! comes first.
 
-use super::buffers;
+use super::kernels;
 use super::layout::{Allocation, FLUID_MAX, Memory, Sizes};
+use super::parts::Division;
+use super::shader::Shader;
+use crate::error::Result;
 use crate::plan::Plan;
 use serde::Serialize;
 
 /// Bytes that a shader binds at most on any device [bytes].
 pub(crate) const BINDING_MAX: u64 = (1 << 31) - 1;
 /// Workgroups that a dispatch starts along one dimension.
-pub(crate) const WORKGROUPS_MAX: u64 = 65_535;
+pub(crate) const WORKGROUPS_MAX: u32 = 65_535;
 
 /// Buffers that serve one purpose.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -57,37 +60,21 @@ pub struct Excess {
 pub fn excesses(sizes: &Sizes, memory: &Memory) -> Vec<Excess> {
     let mut out = Vec::new();
     for buffer in &memory.buffers {
-        let (bytes, id) = (buffer.bytes, buffer.id);
         let (limit, allows) = ("max_storage_buffer_binding_size", BINDING_MAX);
-        if bytes <= allows {
-            continue;
+        let needs = buffer.part(allows);
+        if needs > allows {
+            let devices = needs.div_ceil(allows);
+            let remedy = format!("{devices} ranges of slots, or {devices} devices");
+            out.push(Excess { what: buffer.id.name().into(), needs, allows, limit, remedy });
         }
-        let parts = bytes.div_ceil(allows);
-        let remedy = if id == buffers::neighbour_list.id() {
-            format!("{parts} ranges of slots, each with a list and dispatches of its own")
-        } else if id == buffers::entry.id() {
-            format!("{parts} ranges of the 27 entries of a row")
-        } else {
-            format!("{parts} ranges of slots, or {parts} devices")
-        };
-        out.push(Excess { what: id.name().into(), needs: bytes, allows, limit, remedy });
-    }
-    if memory.workgroups > WORKGROUPS_MAX {
-        out.push(Excess {
-            what: "workgroups".into(),
-            needs: memory.workgroups,
-            allows: WORKGROUPS_MAX,
-            limit: "max_compute_workgroups_per_dimension",
-            remedy: "dispatches in two dimensions".into(),
-        });
     }
     if sizes.fluid > FLUID_MAX as u64 {
         out.push(Excess {
             what: "fluid particles".into(),
             needs: sizes.fluid,
             allows: FLUID_MAX as u64,
-            limit: "whole numbers in an f32",
-            remedy: "a particle's number as bits of a word".into(),
+            limit: "numbers in a word",
+            remedy: "a second word for a particle's number".into(),
         });
     }
     out.sort_by(|a, b| (b.needs as f64 / b.allows as f64).total_cmp(&(a.needs as f64 / a.allows as f64)));
@@ -107,33 +94,53 @@ pub struct Forecast {
     pub bytes: u64,
     /// Largest buffer and its bytes.
     pub largest: (&'static str, u64),
+    /// Buffers that are made as several, since devices do not bind them whole, and of how many parts each.
+    pub parts: Vec<(&'static str, u64)>,
+    /// Storage buffers of a kernel at most, parts counted.
+    pub bindings: u32,
+    /// Workgroups of the largest dispatch.
+    pub workgroups: u64,
+    /// Rows that it is folded into: more than one where a device starts fewer along one dimension.
+    pub rows: u64,
     /// Limits that it does not keep.
     pub excesses: Vec<Excess>,
 }
 
 impl Forecast {
-    /// Of `sizes` refined to about `particles`.
-    pub fn new(sizes: &Sizes, plan: &Plan, particles: u64) -> Self {
+    /// Of `sizes` refined to about `particles`, with the shaders' `switches` on.
+    ///
+    /// # Errors
+    /// A shader that is not valid.
+    pub fn new(sizes: &Sizes, plan: &Plan, switches: &[&str], particles: u64) -> Result<Self> {
         // Bisection: the number grows with the refinement.
         let (mut low, mut high) = (1e-3_f64, 1e3_f64);
         for _ in 0..60 {
             let middle = (low * high).sqrt();
             if sizes.refined(middle).total < particles { low = middle } else { high = middle }
         }
-        Self::at(&sizes.refined(high), plan, 1.0 / high)
+        Self::at(&sizes.refined(high), plan, switches, 1.0 / high)
     }
 
     /// Of `sizes`, whose spacing is `spacing_ratio` times that of the scene.
-    pub fn at(sizes: &Sizes, plan: &Plan, spacing_ratio: f64) -> Self {
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn at(sizes: &Sizes, plan: &Plan, switches: &[&str], spacing_ratio: f64) -> Result<Self> {
         let memory = Memory::new(sizes, plan);
-        Self {
+        let division = Division::new(&memory, BINDING_MAX, WORKGROUPS_MAX);
+        let shaders = Shader::all(kernels::planned(plan), switches, &division)?;
+        Ok(Self {
             particles: sizes.total,
             fluid: sizes.fluid,
             spacing_ratio,
             bytes: memory.total(),
             largest: memory.largest(),
+            parts: division.parts.iter().map(|p| (p.buffer, p.count)).collect(),
+            bindings: Shader::bindings(&shaders),
+            workgroups: memory.workgroups,
+            rows: memory.workgroups.div_ceil(WORKGROUPS_MAX.into()).max(1),
             excesses: excesses(sizes, &memory),
-        }
+        })
     }
 }
 
@@ -176,6 +183,11 @@ mod tests {
         }
     }
 
+    fn forecast(particles: u64) -> Forecast {
+        Forecast::new(&sizes(), &plan(), &["COUPLED", "MIXED", "MOVING", "MULTIGRID", "STATIC"], particles)
+            .expect("the shaders are valid")
+    }
+
     #[test]
     fn water_grows_with_the_cube_and_walls_with_the_square() {
         let fine = sizes().refined(2.0);
@@ -188,14 +200,26 @@ mod tests {
     }
 
     #[test]
-    fn ten_million_fit_and_the_first_limit_of_a_hundred_is_named() {
-        let ten = Forecast::new(&sizes(), &plan(), 10_000_000);
+    fn ten_million_fit_whole_and_a_hundred_in_parts_break_no_limit() {
+        let ten = forecast(10_000_000);
         assert!(ten.particles.abs_diff(10_000_000) < 1000 && ten.spacing_ratio < 0.4, "{ten:?}");
         assert!(ten.bytes < 24_000_000_000 && ten.excesses.is_empty(), "{ten:?}");
-        let hundred = Forecast::new(&sizes(), &plan(), 100_000_000);
-        let first = &hundred.excesses[0];
-        assert_eq!((first.what.as_str(), first.limit), ("neighbour_list", "max_storage_buffer_binding_size"));
-        assert!(hundred.excesses.iter().any(|e| e.what == "fluid particles"), "{hundred:?}");
+        assert!(ten.parts.is_empty(), "{ten:?}");
+        let hundred = forecast(100_000_000);
+        assert!(hundred.bytes < 80_000_000_000 && hundred.excesses.is_empty(), "{hundred:?}");
+        assert_eq!(hundred.parts[0].0, "neighbour_list");
+        // No part is larger than what is bound, and together they are what there is.
+        let memory = Memory::new(&sizes().refined(1.0 / hundred.spacing_ratio), &plan());
+        for buffer in &memory.buffers {
+            let (part, parts) = (buffer.part(BINDING_MAX), buffer.parts(BINDING_MAX));
+            assert!(part <= BINDING_MAX && part * parts >= buffer.bytes && part * (parts - 1) < buffer.bytes);
+        }
+        assert_eq!((ten.rows, hundred.rows), (1, hundred.workgroups.div_ceil(65_535)));
+        // What wgpu has at least, and what graphics cards have by far.
+        assert!(ten.bindings <= 8 && hundred.bindings < 64 && hundred.rows > 1, "{hundred:?}");
+        // What cannot be divided is named.
+        let thousand = forecast(1_000_000_000);
+        assert!(thousand.excesses.iter().any(|e| e.what == "position"), "{thousand:?}");
     }
 
     #[test]

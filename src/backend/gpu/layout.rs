@@ -1,7 +1,8 @@
 //! What the device holds: the structs shared with the shaders, and how much of everything a scene takes.
 
-use super::buffers::TABLE;
+use super::buffers::{Row, TABLE};
 use super::hierarchy::Levels;
+use super::parts::{Grain, Split};
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Spec};
 pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
@@ -26,8 +27,20 @@ pub(crate) const SCAN_GROUPS_MAX: u64 = 1024;
 pub const GHOST_BLOCK: u64 = 64;
 /// Excess of a wall's row whose pressure is no unknown [Pa]; `DRY` in shaders/common.wgsl.
 pub(crate) const DRY: f32 = 3.0e38;
-/// Fluid particles at most: numbers travel in an f32.
-pub(crate) const FLUID_MAX: usize = 1 << 24;
+/// Fluid particles at most: so many numbers have a word.
+pub(crate) const FLUID_MAX: usize = 1 << 30;
+/// The word of number 0, 1.0; `FIRST_WORD` in shaders/common.wgsl.
+pub const FIRST_WORD: u32 = 0x3f80_0000;
+
+/// A number below [`FLUID_MAX`] as the fourth component of a vector: the bits of a normal f32, which no device flushes to zero.
+pub(crate) fn word_of(number: u32) -> f32 {
+    f32::from_bits(FIRST_WORD + number)
+}
+
+/// The number of a word; 0 of 0.0, which stands beside what has no number.
+pub(crate) fn number_of(word: f32) -> u32 {
+    word.to_bits().max(FIRST_WORD) - FIRST_WORD
+}
 
 /// Places in the buffer of counters.
 pub mod counter {
@@ -226,7 +239,7 @@ pub struct FreeBody {
     pub first: u32,
     pub count: u32,
     pub solid: u32,
-    pub pad: u32,
+    pub bodies: u32,
 }
 
 /// Sums of one workgroup in the ledger: the first entries of [`crate::ledger::Entry`], then the number of lost particles.
@@ -443,12 +456,21 @@ pub struct Allocation {
     pub host: Host,
     /// What it serves.
     pub purpose: &'static str,
+    /// What of it stays together where it is divided.
+    pub grain: Grain,
 }
 
 impl Allocation {
-    /// Of `length` elements; of 16 bytes at least, since devices bind no empty buffers.
-    fn new(spec: &Spec, length: u64, purpose: &'static str) -> Self {
-        Self { id: spec.id, bytes: (spec.size * length).max(16), host: spec.host, purpose }
+    /// The buffer of a row of the table; of 16 bytes at least, since devices bind no empty buffers.
+    fn new(row: &Row, sizes: &Sizes, levels: &Levels) -> Self {
+        let Spec { id, size, host, .. } = row.spec;
+        let grain = match row.split {
+            Split::Whole => Grain::Whole,
+            Split::Planes { length, .. } => Grain::Plane((size * length(sizes, levels)).max(16)),
+            Split::Ranges => Grain::Element(size),
+        };
+        let bytes = (size * (row.length)(sizes, levels)).max(16);
+        Self { id, bytes, host, purpose: row.purpose, grain }
     }
 }
 
@@ -462,25 +484,31 @@ pub struct Memory {
     pub buffers: Vec<Allocation>,
     /// Workgroups of the largest dispatch.
     pub workgroups: u64,
+    /// Workgroups of the largest of the dispatches that are never folded into rows: their number is fixed, since their order of
+    /// sums follows it.
+    pub strided: u64,
 }
 
 impl Memory {
     /// The buffers of `sizes` for the planned stages; of a dry scene only those of contact, if it is planned there.
     pub fn new(s: &Sizes, plan: &Plan) -> Self {
         let of_contact = plan.contact.program.map_or(&[][..], |p| p.buffers).iter();
-        let contact = of_contact.map(|spec| Allocation {
-            bytes: CONTACT_START,
-            ..Allocation::new(spec, 0, "contact, to begin with")
+        let contact = of_contact.map(|&Spec { id, host, .. }| {
+            let purpose = "contact, to begin with";
+            Allocation { id, bytes: CONTACT_START, host, purpose, grain: Grain::Whole }
         });
         if !plan.wet() {
-            return Self { buffers: contact.collect(), workgroups: 0 };
+            return Self { buffers: contact.collect(), workgroups: 0, strided: 0 };
         }
         let levels = Levels::new(s);
         let planned = TABLE.iter().filter(|row| plan.needs(row.arrays));
-        let of_particles =
-            planned.map(|row| Allocation::new(&row.spec, (row.length)(s, &levels), row.purpose));
-        let workgroups = s.pressure.max(s.sorted()).div_ceil(WORKGROUP);
-        Self { buffers: of_particles.chain(contact).collect(), workgroups }
+        let of_particles = planned.map(|row| Allocation::new(row, s, &levels));
+        let threads = s.pressure.max(s.sorted()).div_ceil(WORKGROUP);
+        // What scans and levels take at most, whatever the scene.
+        let workgroups =
+            [threads, s.force_chunks(), s.solids, SCAN_GROUPS_MAX].into_iter().max().unwrap_or(1);
+        let strided = s.reduction_groups().max(s.monitor_groups());
+        Self { buffers: of_particles.chain(contact).collect(), workgroups, strided }
     }
 
     /// All bytes.
@@ -488,7 +516,7 @@ impl Memory {
         self.buffers.iter().map(|b| b.bytes).sum()
     }
 
-    /// Name and bytes of the largest buffer.
+    /// Name and bytes of the largest buffer, its parts together.
     pub fn largest(&self) -> (&'static str, u64) {
         self.buffers.iter().max_by_key(|b| b.bytes).map_or(("nothing", 0), |b| (b.id.name(), b.bytes))
     }
@@ -536,6 +564,17 @@ mod tests {
         assert!(large.total() < 2_000_000_000, "{}", large.total());
         assert!(large.largest().1 < (1 << 31) - 1 && large.workgroups < 65_536, "{:?}", large.largest());
         assert_eq!(large.largest().0, "neighbour_list");
+    }
+
+    #[test]
+    fn numbers_travel_as_words_that_are_no_denormals_and_no_infinities() {
+        let last = FLUID_MAX as u32 - 1;
+        for number in [0, 1, (1 << 23) - 1, 1 << 23, (1 << 24) + 1, 80_600_407, last] {
+            assert!(word_of(number).is_normal(), "{number}");
+            assert_eq!(number_of(word_of(number)), number);
+        }
+        assert_eq!(word_of(last), f32::MAX);
+        assert_eq!(number_of(0.0), 0);
     }
 
     #[test]

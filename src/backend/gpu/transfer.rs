@@ -1,6 +1,6 @@
 //! Fields between host (f64, absolute) and device (f32, relative to the middle of the domain).
 
-use super::layout::{counter, laplacian_coefficient};
+use super::layout::{counter, laplacian_coefficient, number_of, word_of};
 use super::{Gpu, buffers};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
@@ -69,7 +69,7 @@ impl Gpu {
             return Err(Error::gpu("the fields are those of another scene"));
         }
         let position = packed(&fields.position, self.middle, |i| f32::from(fields.kind[i] as u8));
-        let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| id as f32);
+        let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| word_of(id));
         let velocity = packed(&fields.velocity, DVec3::ZERO, number);
         let c = laplacian_coefficient(&self.params);
         let equation = |i: usize| {
@@ -155,7 +155,7 @@ impl Gpu {
         let mut fields = Fields {
             kind: position.iter().map(|x| kind(x[3])).collect(),
             position: position.iter().map(|x| vector(x) + self.middle).collect(),
-            id: velocity[..g.fluid].iter().map(|v| v[3] as u32).collect(),
+            id: velocity[..g.fluid].iter().map(|v| number_of(v[3])).collect(),
             velocity: velocity.iter().map(vector).collect(),
             pressure,
             number_density,

@@ -25,7 +25,7 @@ pub struct PaperPair {
     pub row: u32,
     pub list: u32,
     pub candidates: u32,
-    pub pad: u32,
+    pub pairs: u32,
 }
 
 /// See `PaperPose` in shaders/contact_paper.wgsl.
@@ -233,7 +233,8 @@ impl Pairs {
 
     /// Records and poses of the pairs.
     fn send(&mut self, bodies: &[Body], link: &mut Link) -> Result<()> {
-        let records: Vec<PaperPair> = self.entries.iter().map(|e| e.record).collect();
+        let pairs = place(self.entries.len())?;
+        let records: Vec<PaperPair> = self.entries.iter().map(|e| PaperPair { pairs, ..e.record }).collect();
         link.write(buffer::paper_pair, &records)?;
         self.send_poses(bodies, link)
     }

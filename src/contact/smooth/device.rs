@@ -44,7 +44,8 @@ pub struct SmoothPair {
     pub share: f32,
     pub skin: f32,
     pub open: u32,
-    pub pad: [u32; 3],
+    pub pairs: u32,
+    pub pad: [u32; 2],
 }
 
 /// See `SmoothPose` in shaders/contact_smooth.wgsl.
@@ -200,6 +201,8 @@ impl Pairs {
         }
         if !self.pairs.is_empty() {
             self.place_poses(model, bodies)?;
+            let pairs = place(self.records.len())?;
+            self.records.iter_mut().for_each(|r| r.pairs = pairs);
             link.write(buffer::smooth_pair, &self.records)?;
             link.write(buffer::smooth_pose, &self.poses)?;
             link.reserve(buffer::contact_list, list)?;
@@ -285,8 +288,10 @@ impl Pairs {
         self.place_poses(model, bodies)?;
         link.reserve(buffer::contact_state, self.states)?;
         if !self.sent {
+            let pairs = place(self.records.len())?;
             for (record, pair) in self.records.iter_mut().zip(&self.pairs) {
                 let c = &pair.constants;
+                record.pairs = pairs;
                 (record.spring, record.stop) = (c.spring as f32, c.stop as f32);
                 (record.stop_depth, record.damping) = (c.stop_depth as f32, c.damping as f32);
                 record.step = c.step as f32;
