@@ -283,3 +283,71 @@ impl Shader {
         entries.map(|e| e.bindings.iter().filter(|b| b.storage).count()).max().unwrap_or(0) as u32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "@group(0) @binding(2) var<storage, read_write> cell_count: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> neighbour_list: array<u32>;
+@group(0) @binding(4) var<storage, read> position: array<vec4f>;
+";
+
+    /// What stands behind the text and what is common.
+    fn added(division: &Division) -> String {
+        let whole = divided(TEXT, &[], division);
+        let lines: Vec<&str> =
+            whole.lines().skip(TEXT.lines().count() + COMMON.lines().count()).map(str::trim).collect();
+        lines.join(" ")
+    }
+
+    #[test]
+    fn elements_of_a_buffer_in_one_part_are_reached_by_the_plain_index() {
+        let expected = "fn cell_count_at(place: u32) -> u32 { return atomicLoad(&cell_count[place]); } \
+                        fn set_cell_count(place: u32, value: u32) { atomicStore(&cell_count[place], value); } \
+                        fn add_cell_count(place: u32, value: u32) -> u32 { return atomicAdd(&cell_count[place], value); } \
+                        fn neighbour_list_at(plane: u32, place: u32) -> u32 { \
+                        return neighbour_list[plane * params.pressure_slots + place]; }";
+        assert_eq!(added(&Division::default()), expected);
+    }
+
+    #[test]
+    fn elements_of_a_divided_buffer_are_sought_in_their_part() {
+        let of = |buffer, count, each| Parts { buffer, count, each };
+        let division =
+            Division { parts: vec![of("cell_count", 2, 8), of("neighbour_list", 3, 6)], fold: Some(128) };
+        let text = added(&division);
+        for part in [
+            "const DISPATCH_WIDTH: u32 = 128u; @group(0) @binding(32) var<storage, read_write> cell_count_part1: \
+             array<atomic<u32>>;",
+            "fn cell_count_at(place: u32) -> u32 { let at = place & 7u; switch place >> 3u { case 0u: { return \
+             atomicLoad(&cell_count[at]); } default: { return atomicLoad(&cell_count_part1[at]); } } }",
+            "@group(0) @binding(33) var<storage, read> neighbour_list_part1: array<u32>; @group(0) @binding(34)",
+            "let at = plane % 6u * params.pressure_slots + place; switch plane / 6u { case 0u: { return \
+             neighbour_list[at]; } case 1u: { return neighbour_list_part1[at]; } default: { return \
+             neighbour_list_part2[at]; } }",
+        ] {
+            assert!(text.contains(part), "{part}\n{text}");
+        }
+        let [entry] =
+            &entries("text", &divided(&format!("{TEXT}{KERNEL}"), &[], &division)).expect("valid")[..]
+        else {
+            panic!("one entry point")
+        };
+        let mut bound: Vec<_> = entry.bindings.iter().map(|b| (b.number, b.name.as_str(), b.part)).collect();
+        bound.sort_unstable();
+        let list = |number, part| (number, "neighbour_list", part);
+        let count = |number, part| (number, "cell_count", part);
+        assert_eq!(
+            bound,
+            [(0, "params", 0), count(2, 0), list(3, 0), count(32, 1), list(33, 1), list(34, 2)]
+        );
+    }
+
+    const KERNEL: &str = "@compute @workgroup_size(WORKGROUP)
+fn kernel(@builtin(global_invocation_id) id: vec3u) {
+    let k = thread(id);
+    set_cell_count(k, neighbour_list_at(0u, k));
+}
+";
+}
