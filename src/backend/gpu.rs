@@ -5,6 +5,7 @@
 //! the host needs an answer. Only what the plan names is compiled and allocated. Nothing outside this module names
 //! wgpu.
 
+mod access;
 mod adapter;
 mod archive;
 mod bandwidth;
@@ -12,6 +13,7 @@ pub mod buffers;
 mod clock;
 mod context;
 mod exchange;
+mod fitted;
 pub mod forecast;
 pub mod hierarchy;
 pub mod layout;
@@ -30,8 +32,8 @@ use super::{Backend, Commands, Counters, RowPressure, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
-use crate::compute::{Compute, Id, Kernel, Program};
-use crate::error::{Error, GpuError, Result};
+use crate::compute::{Compute, Id, Kernel};
+use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::kernels::collision;
 pub use crate::kernels::device as kernels;
@@ -47,6 +49,7 @@ use crate::pressure::{PressureReport, Settings};
 use crate::scene::{Groups, Scene, Solid};
 use crate::stop::Stop;
 use context::Context;
+use fitted::Fitted;
 use glam::{DMat3, DVec3, Vec3};
 use hierarchy::Levels;
 use layout::{
@@ -54,7 +57,6 @@ use layout::{
     counter,
 };
 use parts::Division;
-use shader::Shader;
 use std::collections::BTreeMap;
 
 /// Particles in f32 on a device.
@@ -109,59 +111,6 @@ fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
         return Grid::new(params);
     }
     Ok(Grid::nothing())
-}
-
-/// A scene as it fits a device.
-struct Fitted {
-    grid: Grid,
-    sizes: Sizes,
-    memory: Memory,
-    division: Division,
-    shaders: Vec<Shader>,
-    /// Bytes of a buffer at most.
-    most: u64,
-    /// To ask for.
-    limits: wgpu::Limits,
-}
-
-impl Fitted {
-    /// `scene` on a device `info` with limits `have`.
-    fn new(
-        scene: &Scene,
-        params: &Params,
-        plan: &Plan,
-        info: &AdapterInfo,
-        have: &wgpu::Limits,
-    ) -> Result<Self> {
-        let fluid = scene.groups.fluid;
-        if fluid > layout::FLUID_MAX {
-            let text = format!(
-                "{fluid} fluid particles are more than the GPU path numbers ({}); use a larger run.spacing or \
-                 --backend cpu",
-                layout::FLUID_MAX
-            );
-            let (needs, has) = (fluid as u64, Some(layout::FLUID_MAX as u64));
-            return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
-        }
-        let grid = grid(params, plan)?;
-        let mut sizes = Sizes::new(scene, params, &grid);
-        if info.device_type == "cpu" {
-            sizes.rows_per_thread = 4;
-        }
-        let memory = Memory::new(&sizes, plan);
-        let most = adapter::buffer_most(have);
-        let width = adapter::width(have);
-        let division = Division::new(&memory, most, width);
-        let switches = shader::switches(params, plan);
-        // The pairs of solids that come close may become any number.
-        let of_pairs = Division { fold: Some(width), ..division.clone() };
-        let of_contact = |p: &&Program| plan.contact.program.is_some_and(|c| c.name == p.name);
-        let particles = kernels::planned(plan).filter(|p| !of_contact(p));
-        let mut shaders = Shader::all(particles, &switches, &division)?;
-        shaders.extend(Shader::all(plan.contact.program.into_iter(), &switches, &of_pairs)?);
-        let limits = adapter::limits(&memory, Shader::bindings(&shaders), have, &info.name)?;
-        Ok(Self { grid, sizes, memory, division, shaders, most, limits })
-    }
 }
 
 impl Gpu {

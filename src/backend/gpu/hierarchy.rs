@@ -129,6 +129,12 @@ impl Levels {
         (threads * self.expected[level]).div_ceil(WORKGROUP).min(GROUPS_MAX)
     }
 
+    /// Workgroups of the largest of their dispatches, but for those over the particles.
+    pub(crate) fn workgroups(&self) -> u64 {
+        let of_levels = (0..self.count.len()).map(|level| self.groups(level, 8));
+        self.build().iter().map(|(_, groups)| *groups).chain(of_levels).max().unwrap_or(1)
+    }
+
     /// Dispatches that build the levels.
     pub fn build(&self) -> Vec<(Kernel, u64)> {
         let [x, y, z] = self.count[0].map(u64::from);

@@ -11,7 +11,7 @@ use crate::kernels::openings;
 use crate::monitor::SPEED_BINS;
 use crate::neighbours::capacity;
 use crate::params::{Params, Step, Zone};
-use crate::plan::Plan;
+use crate::plan::{Arrays, Plan};
 use crate::pressure::Settings;
 use crate::scene::{Groups, Scene};
 use bytemuck::{Pod, Zeroable};
@@ -504,9 +504,10 @@ impl Memory {
         let planned = TABLE.iter().filter(|row| plan.needs(row.arrays));
         let of_particles = planned.map(|row| Allocation::new(row, s, &levels));
         let threads = s.pressure.max(s.sorted()).div_ceil(WORKGROUP);
-        // What scans and levels take at most, whatever the scene.
-        let workgroups =
-            [threads, s.force_chunks(), s.solids, SCAN_GROUPS_MAX].into_iter().max().unwrap_or(1);
+        let scan = s.keys().div_ceil(SCAN_BLOCK).min(SCAN_GROUPS_MAX);
+        let of_levels = plan.needs(Arrays::Multigrid).then(|| levels.workgroups());
+        let workgroups = [threads, scan, s.force_chunks(), s.solids].into_iter().chain(of_levels);
+        let workgroups = workgroups.max().unwrap_or(1);
         let strided = s.reduction_groups().max(s.monitor_groups());
         Self { buffers: of_particles.chain(contact).collect(), workgroups, strided }
     }

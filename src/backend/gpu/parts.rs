@@ -2,7 +2,7 @@
 //!
 //! Drivers give out no single buffer much beyond what a shader binds, so windows into one large buffer would not help:
 //! every part is a buffer of its own with a binding of its own. The shaders reach the elements through functions that
-//! [`super::shader`] writes; where there is one part those are the plain indices.
+//! `access` writes; where there is one part those are the plain indices.
 
 use super::hierarchy::Levels;
 use super::layout::{Allocation, Memory, Sizes};

@@ -1,8 +1,8 @@
 //! The shaders' sources, the switches that shape them, the functions by which they reach what may be divided, and what they bind.
 
-use super::buffers::{Row, TABLE};
-use super::parts::{Division, Parts, Split};
-use crate::compute::{Program, Spec};
+use super::access::{self, PART};
+use super::parts::Division;
+use crate::compute::Program;
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Arrays, Plan, Stage};
@@ -84,94 +84,8 @@ pub fn divided(text: &str, switches: &[&str], division: &Division) -> String {
     if let Some(width) = division.fold {
         out.push_str(&format!("const DISPATCH_WIDTH: u32 = {width}u;\n"));
     }
-    let access: String = {
-        let mut next = FIRST_PART;
-        out.lines().filter_map(|line| Some(Access::new(line, division)?.text(&mut next))).collect()
-    };
+    let access = access::functions(&out, division);
     out + &access
-}
-
-/// First number of the bindings of further parts; the files number their own below.
-const FIRST_PART: u32 = 32;
-/// Between the name of a buffer and the number of a further part.
-const PART: &str = "_part";
-
-/// Access to a buffer that may be divided, as a file declares it.
-struct Access<'a> {
-    row: &'static Row,
-    writes: bool,
-    /// In the array's brackets.
-    held: &'a str,
-    parts: Option<&'a Parts>,
-}
-
-impl<'a> Access<'a> {
-    /// That of a line, if it declares such a buffer.
-    fn new(line: &'a str, division: &'a Division) -> Option<Self> {
-        let (access, rest) =
-            line.strip_prefix("@group(0) ")?.split_once("var<storage, ")?.1.split_once("> ")?;
-        let (name, rest) = rest.split_once(": array<")?;
-        let row = TABLE.iter().find(|r| r.spec.id.name() == name && !matches!(r.split, Split::Whole))?;
-        let held = rest.split_once(">;")?.0;
-        Some(Self { row, writes: access == "read_write", held, parts: division.of(name) })
-    }
-
-    /// Declarations of the further parts, numbered from `next` on, and the functions.
-    fn text(&self, next: &mut u32) -> String {
-        let Spec { id, element, .. } = self.row.spec;
-        let name = id.name();
-        let atomic = self.held.starts_with("atomic");
-        let access = if self.writes { "read_write" } else { "read" };
-        let mut out = String::new();
-        for part in 1..self.parts.map_or(1, |p| p.count) {
-            let held = self.held;
-            out += &format!(
-                "@group(0) @binding({next}) var<storage, {access}> {name}{PART}{part}: array<{held}>;\n"
-            );
-            *next += 1;
-        }
-        let at = self.arguments();
-        let read =
-            |b: &str| if atomic { format!("return atomicLoad(&{b});") } else { format!("return {b};") };
-        out += &format!("fn {name}_at({at}) -> {element} {{\n{}}}\n", self.body(read));
-        if self.writes {
-            let set =
-                |b: &str| if atomic { format!("atomicStore(&{b}, value);") } else { format!("{b} = value;") };
-            out += &format!("fn set_{name}({at}, value: {element}) {{\n{}}}\n", self.body(set));
-        }
-        if atomic {
-            let add = |b: &str| format!("return atomicAdd(&{b}, value);");
-            out += &format!("fn add_{name}({at}, value: {element}) -> {element} {{\n{}}}\n", self.body(add));
-        }
-        out
-    }
-
-    fn arguments(&self) -> &'static str {
-        if matches!(self.row.split, Split::Planes { .. }) { "plane: u32, place: u32" } else { "place: u32" }
-    }
-
-    /// What is `done` to an element of the buffer: of the one that there is, or of the part that the element lies in.
-    fn body(&self, done: impl Fn(&str) -> String) -> String {
-        let name = self.row.spec.id.name();
-        let pitch = if let Split::Planes { pitch, .. } = self.row.split { Some(pitch) } else { None };
-        let Some(parts) = self.parts else {
-            let at = pitch.map_or("place".into(), |pitch| format!("plane * {pitch} + place"));
-            return format!("    {}\n", done(&format!("{name}[{at}]")));
-        };
-        let each = parts.each;
-        let (at, part) = match pitch {
-            Some(pitch) => (format!("plane % {each}u * {pitch} + place"), format!("plane / {each}u")),
-            // A power of two.
-            None => (format!("place & {}u", each - 1), format!("place >> {}u", each.ilog2())),
-        };
-        let mut out = format!("    let at = {at};\n    switch {part} {{\n");
-        for part in 0..parts.count {
-            let case = if part + 1 < parts.count { format!("case {part}u:") } else { "default:".into() };
-            let buffer = if part == 0 { name.to_owned() } else { format!("{name}{PART}{part}") };
-            out += &format!("        {case} {{ {} }}\n", done(&format!("{buffer}[at]")));
-        }
-        out + "    }\n"
-    }
 }
 
 /// A buffer as a shader declares it.

@@ -1,0 +1,65 @@
+//! A scene as it fits a device: what is divided, the shaders, the limits to ask for. Nothing is allocated yet.
+
+use super::adapter::{self, AdapterInfo};
+use super::layout::{FLUID_MAX, Memory, Sizes};
+use super::parts::Division;
+use super::shader::{self, Shader};
+use super::{grid, kernels};
+use crate::cells::Grid;
+use crate::compute::Program;
+use crate::error::{GpuError, Result};
+use crate::params::Params;
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// A scene as it fits a device.
+pub(super) struct Fitted {
+    pub grid: Grid,
+    pub sizes: Sizes,
+    pub memory: Memory,
+    pub division: Division,
+    pub shaders: Vec<Shader>,
+    /// Bytes of a buffer at most.
+    pub most: u64,
+    /// To ask for.
+    pub limits: wgpu::Limits,
+}
+
+impl Fitted {
+    /// `scene` on a device `info` with limits `have`.
+    pub fn new(
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        info: &AdapterInfo,
+        have: &wgpu::Limits,
+    ) -> Result<Self> {
+        let fluid = scene.groups.fluid;
+        if fluid > FLUID_MAX {
+            let text = format!(
+                "{fluid} fluid particles are more than the GPU path numbers ({FLUID_MAX}); use a larger run.spacing or \
+                 --backend cpu"
+            );
+            let (needs, has) = (fluid as u64, Some(FLUID_MAX as u64));
+            return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
+        }
+        let grid = grid(params, plan)?;
+        let mut sizes = Sizes::new(scene, params, &grid);
+        if info.device_type == "cpu" {
+            sizes.rows_per_thread = 4;
+        }
+        let memory = Memory::new(&sizes, plan);
+        let most = adapter::buffer_most(have);
+        let width = adapter::width(have);
+        let division = Division::new(&memory, most, width);
+        let switches = shader::switches(params, plan);
+        // The pairs of solids that come close may become any number.
+        let of_pairs = Division { fold: Some(width), ..division.clone() };
+        let of_contact = |p: &&Program| plan.contact.program.is_some_and(|c| c.name == p.name);
+        let particles = kernels::planned(plan).filter(|p| !of_contact(p));
+        let mut shaders = Shader::all(particles, &switches, &division)?;
+        shaders.extend(Shader::all(plan.contact.program.into_iter(), &switches, &of_pairs)?);
+        let limits = adapter::limits(&memory, Shader::bindings(&shaders), have, &info.name)?;
+        Ok(Self { grid, sizes, memory, division, shaders, most, limits })
+    }
+}
