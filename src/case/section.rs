@@ -1,5 +1,6 @@
 //! Sections of prisms: whether a line through given corners encloses something.
 
+use crate::shape::signed_area;
 use glam::DVec2;
 
 /// Lengths below this share of the section's size are none.
@@ -21,7 +22,8 @@ pub(super) fn flaw(section: &[[f64; 2]]) -> Option<Flaw> {
         let message = format!("a section of {n} corners encloses nothing");
         return at(None, message, "give three corners or more, each as [x, z]");
     }
-    let corner = |k: usize| DVec2::from(section[k % n]);
+    let corners: Vec<DVec2> = section.iter().map(|&corner| corner.into()).collect();
+    let corner = |k: usize| corners[k % n];
     if let Some(k) = (0..n).find(|&k| !corner(k).is_finite()) {
         return at(Some(k), "a corner that is no place".into(), "give finite numbers");
     }
@@ -65,8 +67,7 @@ pub(super) fn flaw(section: &[[f64; 2]]) -> Option<Flaw> {
             }
         }
     }
-    let twice: f64 = (0..n).map(|k| corner(k).perp_dot(corner(k + 1))).sum();
-    (twice.abs() <= NOTHING * size * size).then(|| Flaw {
+    (2.0 * signed_area(&corners).abs() <= NOTHING * size * size).then(|| Flaw {
         corner: None,
         message: "the section encloses no area".into(),
         remedy: "give corners that do not lie on a line",

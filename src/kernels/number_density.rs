@@ -8,7 +8,7 @@ use crate::params::Params;
 use crate::scheme::FreeSurface;
 use glam::DVec3;
 
-/// Distance of the neighbours' centroid, over l0, from which a thin particle counts as surface; 0.49 for one of a flat surface, and as
+/// Distance of the neighbours' centroid, over l0, from which a thin particle counts as surface; 0.49 for one of a flat surface in the plane, 0.38 in space, and as
 /// Tsukamoto, Cheng and Motezuki (2016) have it. Already 0.1 takes water beside a thin edge of a solid for surface, now and then.
 const OFFSET: f64 = 0.2;
 

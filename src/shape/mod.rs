@@ -23,6 +23,7 @@ pub use disc::Disc;
 #[cfg(feature = "mesh")]
 pub use mesh::{Mesh, Thickness, Unfit};
 pub use polygon::Polygon;
+pub(crate) use polygon::signed_area;
 pub use sphere::Sphere;
 use sphere::close;
 pub use surface::{Line, Ring, Side, Surface};
@@ -32,6 +33,9 @@ use std::ops::Deref;
 
 /// Faces of a shape: bit 2 k for the lower face of axis k, bit 2 k + 1 for the upper one.
 pub type Faces = u8;
+
+/// The faces of a slice of two dimensions: those that look along x and z.
+pub(crate) const PLANE_FACES: Faces = 0b11_0011;
 
 /// A node of a rule along a stretch of a line.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +59,35 @@ impl Node {
 fn face(normal: DVec3) -> Faces {
     let axis = normal.abs().max_position();
     1 << (2 * axis + usize::from(normal[axis] > 0.0))
+}
+
+/// The nodes of a shape that need not be convex along a line that goes through its surface at `crossings`, in order: every stretch inside has its own.
+fn nodes_between(
+    shape: &impl Geometry,
+    (start, way, length): (DVec3, DVec3, f64),
+    crossings: Vec<f64>,
+    faces: Faces,
+    visit: &mut dyn FnMut(Node, Inside),
+) {
+    let mut ends = vec![0.0];
+    ends.extend(crossings);
+    ends.push(length);
+    for stretch in ends.windows(2) {
+        let (from, width) = (stretch[0], stretch[1] - stretch[0]);
+        let middle = start + (from + 0.5 * width) * way;
+        if width <= 0.0 || shape.depth(middle, faces).is_none() {
+            continue;
+        }
+        let distance = |s: f64| {
+            let (d, gradient) = shape.distance(start + (from + s) * way);
+            (d.min(-f64::MIN_POSITIVE), gradient.dot(way))
+        };
+        along(width, distance, |s, share| {
+            if let Some(inside) = shape.depth(start + (from + s) * way, faces) {
+                visit(Node::point(from + s, share), inside);
+            }
+        });
+    }
 }
 
 /// Where a point lies inside a shape.
@@ -136,11 +169,9 @@ impl Shape {
                 turned.fold((DVec3::MAX, DVec3::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
             }
             Self::Polygon(_) => {
-                let reach = |way: f64| {
-                    let to_shape = axes.transpose();
-                    DVec3::from_array(DVec3::AXES.map(|axis| way * self.reach(to_shape * (way * axis))))
-                };
-                (reach(-1.0), reach(1.0))
+                let to_shape = axes.transpose();
+                let end = |way: f64| DVec3::AXES.map(|axis| way * self.reach(to_shape * (way * axis)));
+                (end(-1.0).into(), end(1.0).into())
             }
             _ => (-self.extent(axes), self.extent(axes)),
         }
@@ -199,7 +230,8 @@ pub trait Geometry: std::fmt::Debug + Sync {
     /// Half extents of its bounding box along the axes to which `rotation` turns it [m].
     fn extent(&self, rotation: DMat3) -> DVec3 {
         let to_shape = rotation.transpose();
-        DVec3::from_array(DVec3::AXES.map(|axis| self.reach(to_shape * axis)))
+        let reach = |axis: DVec3| self.reach(to_shape * axis).max(self.reach(to_shape * -axis));
+        DVec3::from_array(DVec3::AXES.map(reach))
     }
 
     /// A lower bound of the distance of `q` from it [m]; negative inside.

@@ -5,8 +5,8 @@
 
 use super::cells::Cells;
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, along, close, face};
-use glam::{DMat3, DVec2, DVec3};
+use super::{Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, close, face, nodes_between};
+use glam::{DVec2, DVec3};
 use std::sync::Mutex;
 
 /// A layer goes on smoothly where it turns by less [rad].
@@ -17,9 +17,6 @@ const APART: f64 = 0.6;
 const STEP: f64 = 0.05;
 /// Pieces of a side that go to the nearest particle each, over the spacing.
 const PIECE: f64 = 0.1;
-
-/// Faces that look along x and z.
-const IN_PLANE: Faces = 0b11_0011;
 
 /// A closed line of straight sides in the plane y = 0, and what it encloses.
 #[derive(Debug)]
@@ -55,7 +52,7 @@ fn plane(x: DVec3) -> DVec2 {
 }
 
 /// Area of a closed line, positive where the inside is on its left [m2].
-fn signed_area(corners: &[DVec2]) -> f64 {
+pub(crate) fn signed_area(corners: &[DVec2]) -> f64 {
     sides_of(corners).map(|[a, b]| 0.5 * a.perp_dot(b)).sum()
 }
 
@@ -115,7 +112,7 @@ impl Polygon {
     /// Where it is thinnest: the shortest way from the middle of a side inwards to another one [m], and that middle, in the coordinates
     /// that it was given in [m].
     pub(crate) fn thinnest(&self) -> (f64, DVec3) {
-        let ways = sides_of(&self.corners).map(|[a, b]| {
+        let ways = self.sides().map(|[a, b]| {
             let (middle, inwards) = (0.5 * (a + b), (b - a).normalize().perp());
             let start = middle + 1e-9 * self.radius * inwards;
             let way = self.crossings(start, inwards, 4.0 * self.radius).first().copied();
@@ -305,12 +302,6 @@ impl Geometry for Polygon {
         most + 0.5 * self.width * n.y.abs()
     }
 
-    fn extent(&self, rotation: DMat3) -> DVec3 {
-        let to_shape = rotation.transpose();
-        let reach = |axis: DVec3| self.reach(to_shape * axis).max(self.reach(to_shape * -axis));
-        DVec3::from_array(DVec3::AXES.map(reach))
-    }
-
     fn distance(&self, q: DVec3) -> (f64, DVec3) {
         let q = plane(q);
         let (nearest, normal) = self.nearest(q);
@@ -338,33 +329,9 @@ impl Geometry for Polygon {
         plane(nearest).length() < self.radius + margin
     }
 
-    /// It need not be convex: every stretch inside has its own nodes.
-    fn nodes(
-        &self,
-        (start, along_line, length): (DVec3, DVec3, f64),
-        faces: Faces,
-        _: f64,
-        visit: &mut dyn FnMut(Node, Inside),
-    ) {
-        let mut ends = vec![0.0];
-        ends.extend(self.crossings(plane(start), plane(along_line), length));
-        ends.push(length);
-        for stretch in ends.windows(2) {
-            let (from, width) = (stretch[0], stretch[1] - stretch[0]);
-            let middle = start + (from + 0.5 * width) * along_line;
-            if width <= 0.0 || self.depth(middle, faces).is_none() {
-                continue;
-            }
-            let distance = |s: f64| {
-                let (d, gradient) = self.distance(start + (from + s) * along_line);
-                (d.min(-f64::MIN_POSITIVE), gradient.dot(along_line))
-            };
-            along(width, distance, |s, share| {
-                if let Some(inside) = self.depth(start + (from + s) * along_line, faces) {
-                    visit(Node::point(from + s, share), inside);
-                }
-            });
-        }
+    fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, _: f64, visit: &mut dyn FnMut(Node, Inside)) {
+        let crossings = self.crossings(plane(line.0), plane(line.1), line.2);
+        nodes_between(self, line, crossings, faces, visit);
     }
 
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
@@ -417,6 +384,6 @@ impl Geometry for Polygon {
                 faces.push(of.map(|[a, b]| face(-space((b - a).perp()))).fold(0, |all, one| all | one));
             }
         }
-        Surface::even(points, faces, IN_PLANE)
+        Surface::even(points, faces, PLANE_FACES)
     }
 }

@@ -5,7 +5,7 @@
 //! whatever comes in through it, and a force to match.
 
 use crate::scene::Scene;
-use crate::shape::{ALL_FACES, Cuboid, Faces, Geometry, Line, Shape, face_normal};
+use crate::shape::{ALL_FACES, Cuboid, Faces, Geometry, Line, PLANE_FACES, Shape, face_normal};
 use glam::{DMat3, DVec3};
 
 /// A fixed wall.
@@ -61,7 +61,7 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
         })
         .collect();
     for k in 0..walls.len() {
-        let all: Faces = if flat { 0b11_0011 } else { ALL_FACES };
+        let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
         let open = |face: u8| all & 1 << face != 0 && !face_is_covered(&walls, k, face, spacing, flat);
         walls[k].faces = (0..6).filter(|&face| open(face)).map(|face| 1 << face).sum();
     }

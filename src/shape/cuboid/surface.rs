@@ -1,7 +1,7 @@
 //! The surface of a box: points at its particles, edges, and weights that make a face rock like an even pressure.
 
 use super::super::surface::{Line, Surface};
-use super::super::{Faces, WallLayer};
+use super::super::{Faces, PLANE_FACES, WallLayer};
 use super::ALL_FACES;
 use glam::{DMat2, DVec2, DVec3};
 
@@ -36,7 +36,7 @@ impl Surface {
                 mine.iter().sum::<f64>() / mine.len().max(1) as f64
             })
             .collect();
-        let all_faces = if dimensions == 2 { 0b11_0011 } else { ALL_FACES };
+        let all_faces = if dimensions == 2 { PLANE_FACES } else { ALL_FACES };
         let smallest_weight = weights.iter().copied().fold(1.0, f64::min);
         let mut surface = Self { points, weights, faces, all_faces, smallest_weight, ..Self::default() };
         if dimensions == 3 {

@@ -12,8 +12,8 @@ mod skin;
 
 use super::cells::Cells;
 use super::surface::Surface;
-use super::{ALL_FACES, Faces, Geometry, Inside, Node, Particles, WallLayer, along, face};
-use glam::{DMat3, DQuat, DVec3};
+use super::{ALL_FACES, Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
+use glam::{DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
@@ -337,13 +337,6 @@ impl Geometry for Mesh {
         self.hull.iter().map(|v| v.dot(n)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    fn extent(&self, rotation: DMat3) -> DVec3 {
-        let to_shape = rotation.transpose();
-        DVec3::from_array(
-            DVec3::AXES.map(|axis| self.reach(to_shape * axis).max(self.reach(to_shape * -axis))),
-        )
-    }
-
     /// Of the box around it, and of its surface only near that.
     fn outside(&self, q: DVec3) -> f64 {
         let (low, high) = self.bounds;
@@ -389,33 +382,9 @@ impl Geometry for Mesh {
         start.min(end).cmple(high).all() && start.max(end).cmpge(low).all()
     }
 
-    /// The surface need not be convex: every stretch inside has its own nodes.
-    fn nodes(
-        &self,
-        (start, along_line, length): (DVec3, DVec3, f64),
-        faces: Faces,
-        _: f64,
-        visit: &mut dyn FnMut(Node, Inside),
-    ) {
-        let mut ends = vec![0.0];
-        ends.extend(self.crossings(start, along_line, length));
-        ends.push(length);
-        for stretch in ends.windows(2) {
-            let (from, width) = (stretch[0], stretch[1] - stretch[0]);
-            let middle = start + (from + 0.5 * width) * along_line;
-            if width <= 0.0 || self.depth(middle, faces).is_none() {
-                continue;
-            }
-            let distance = |s: f64| {
-                let (d, gradient) = self.distance(start + (from + s) * along_line);
-                (d.min(-f64::MIN_POSITIVE), gradient.dot(along_line))
-            };
-            along(width, distance, |s, share| {
-                if let Some(inside) = self.depth(start + (from + s) * along_line, faces) {
-                    visit(Node::point(from + s, share), inside);
-                }
-            });
-        }
+    fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, _: f64, visit: &mut dyn FnMut(Node, Inside)) {
+        let crossings = self.crossings(line.0, line.1, line.2);
+        nodes_between(self, line, crossings, faces, visit);
     }
 
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {

@@ -1,9 +1,10 @@
 //! Cones, wedges and prisms, as triangles.
 
+use super::super::signed_area;
 use super::read::Soup;
 use super::{Mesh, Unfit};
 use earcut::Earcut;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
 /// Sides of a cone: its surface is off by 0.1 % of its radius at most.
@@ -65,6 +66,8 @@ fn wedge(size: DVec3) -> Soup {
 
 fn prism(section: &[[f64; 2]], height: f64) -> Soup {
     let n = section.len() as u32;
+    let corners: Vec<DVec2> = section.iter().map(|&corner| corner.into()).collect();
+    let turn = signed_area(&corners).signum();
     let end = |y: f64| section.iter().map(move |&[x, z]| DVec3::new(x, y, z));
     let vertices: Vec<DVec3> = end(0.0).chain(end(height)).collect();
     let mut flat: Vec<u32> = vec![];
@@ -78,18 +81,12 @@ fn prism(section: &[[f64; 2]], height: f64) -> Soup {
         .collect();
     for t in flat.chunks_exact(3) {
         let [a, b, c] = [t[0], t[1], t[2]];
-        let corner = |k: u32| glam::DVec2::from(section[k as usize]);
-        let along = (corner(b) - corner(a)).perp_dot(corner(c) - corner(a)) * signed_area(section) > 0.0;
+        let corner = |k: u32| corners[k as usize];
+        let along = (corner(b) - corner(a)).perp_dot(corner(c) - corner(a)) * turn > 0.0;
         let [a, b, c] = if along { [a, b, c] } else { [a, c, b] };
         triangles.extend([[a, b, c], [n + a, n + c, n + b]]);
     }
     (vertices, triangles)
-}
-
-/// Area of a section, positive where its inside is on the left [m2].
-fn signed_area(section: &[[f64; 2]]) -> f64 {
-    let corner = |k: usize| glam::DVec2::from(section[k % section.len()]);
-    (0..section.len()).map(|k| 0.5 * corner(k).perp_dot(corner(k + 1))).sum()
 }
 
 #[cfg(test)]
