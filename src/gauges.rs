@@ -1,9 +1,11 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
+mod means;
 pub mod wall_force;
 
-use crate::backend::RowPressure;
+use crate::body::Wrench;
 use crate::case::Case;
+use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::output::table::{Cell, vector_cells, vector_columns};
@@ -12,6 +14,7 @@ use crate::periodic::Periodic;
 use crate::scene::{Groups, Kind, Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
+use means::Means;
 use wall_force::FixedWall;
 
 /// A pressure gauge: wall particles, and the way from each to the gauge's point [m].
@@ -37,6 +40,17 @@ pub struct Gauges {
     pressure: Vec<WallPressure>,
     level: Vec<(String, [f64; 2])>,
     force: Vec<(String, Target)>,
+    /// Where rows have means of the steps since the row before.
+    means: Option<Means>,
+}
+
+/// What the last step says of pressures and forces.
+#[derive(Clone, Debug, Default)]
+struct Readings {
+    /// One a pressure gauge [Pa].
+    pressure: Vec<f64>,
+    /// One a force gauge, on a fixed wall without what the water does along it [N, N m].
+    wrench: Vec<Wrench>,
 }
 
 impl Gauges {
@@ -49,7 +63,7 @@ impl Gauges {
     /// [`Error::Case`] for a pressure gauge that is not on a wall and for a force gauge on nothing.
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
         let reach = 0.5 * case.run.effective_radius * scene.spacing;
-        let mut out = Self::default();
+        let mut out = Self { means: case.gauge.mean.then(Means::default), ..Self::default() };
         // Walls that never move, those of solids of any shape among them.
         let still = scene.solids.iter().filter(|s| s.is_still()).flat_map(|s| s.wall_slots.clone());
         let slots: Vec<usize> = scene.groups.static_wall_range().chain(still).collect();
@@ -112,16 +126,45 @@ impl Gauges {
         header
     }
 
-    /// A row of gauges.csv. Before the first step there is neither pressure nor force: these cells are empty.
-    /// A level gauge and, in a viscous fluid, a force gauge on a fixed wall read all particles back, which costs more
-    /// than the others.
+    /// After a step `dt` [s] long, where rows have means: it counts in the next one.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn follow(&mut self, simulation: &mut Simulation, dt: f64) -> Result<()> {
+        if self.means.is_some() {
+            let readings = self.read(simulation)?;
+            self.means.iter_mut().for_each(|means| means.add(&readings, dt));
+        }
+        Ok(())
+    }
+
+    /// After a row: means begin anew.
+    pub fn begin(&mut self) {
+        self.means.iter_mut().for_each(|means| *means = Means::default());
+    }
+
+    /// Save the sums that the next row's means are made of, or take them over; nothing where there are no means.
+    ///
+    /// # Errors
+    /// As [`Archive::array`].
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        self.means.iter_mut().try_for_each(|means| means.exchange(archive))
+    }
+
+    /// A row of gauges.csv: pressures and forces of the last step, or their means over the steps that the gauges [`Self::follow`]ed. Before the
+    /// first step there is neither pressure nor force: these cells are empty. A level gauge and, in a viscous fluid, a force gauge on a
+    /// fixed wall read all particles back, which costs more than the others; what the water does along a fixed wall is that of the moment.
     ///
     /// # Errors
     /// What the backend says when it is read.
     pub fn row(&self, simulation: &mut Simulation) -> Result<Vec<Cell>> {
         let known = simulation.steps > 0;
+        let Readings { pressure, wrench } = match self.means.as_ref().and_then(Means::value) {
+            Some(mean) => mean,
+            None => self.read(simulation)?,
+        };
         let mut row = vec![Cell::from(simulation.time)];
-        self.pressures(simulation, known, &mut row)?;
+        row.extend(pressure.into_iter().map(|p| Cell::from(if known { p } else { f64::NAN })));
         let Params { viscosity, wall_friction, .. } = simulation.params;
         let viscous = viscosity + wall_friction > 0.0 && self.force.iter().any(|(_, t)| t.is_fixed());
         let fields = if viscous || !self.level.is_empty() { Some(simulation.fields()?) } else { None };
@@ -133,19 +176,15 @@ impl Gauges {
             });
             row.push(Cell::from(level.unwrap_or(f64::NAN)));
         }
-        for (_, target) in &self.force {
-            let (wrench, viscous) = match target {
-                Target::Solid(solid) => (simulation.fluid_force[*solid], None),
+        for ((_, target), mut wrench) in self.force.iter().zip(wrench) {
+            let viscous = match target {
+                Target::Solid(_) => None,
                 Target::Fixed(wall) => {
-                    let pressures = simulation.backend.wall_pressures(&wall.slots)?;
-                    let mut wrench = wall.pressure_force(&pressures, &simulation.params);
-                    let viscous = fields.as_ref().filter(|_| viscous).map_or(DVec3::ZERO, |f| {
-                        wall.viscous_force(f, &simulation.groups, &simulation.params)
-                    });
-                    wrench.force += viscous;
-                    (wrench, Some(viscous))
+                    let along = |f| wall.viscous_force(f, &simulation.groups, params);
+                    Some(fields.as_ref().filter(|_| viscous).map_or(DVec3::ZERO, along))
                 }
             };
+            wrench.force += viscous.unwrap_or_default();
             for vector in [Some(wrench.force), Some(wrench.torque), viscous].into_iter().flatten() {
                 row.extend(vector_cells(if known { vector } else { DVec3::NAN }));
             }
@@ -153,29 +192,46 @@ impl Gauges {
         Ok(row)
     }
 
-    /// Pressures at the gauges' points. That of a wall particle is brought to the point as the force on bodies is
+    /// Pressures at the gauges' points, and forces. The pressure of a wall particle is brought to the point as the force on bodies is
     /// brought to their surface: with the weight of the water between, and what the pressure lacks at
     /// the water's surface. A dry particle has none.
-    fn pressures(&self, simulation: &mut Simulation, known: bool, row: &mut Vec<Cell>) -> Result<()> {
-        let slots: Vec<usize> = self.pressure.iter().flat_map(|g| &g.slots).copied().collect();
+    fn read(&self, simulation: &mut Simulation) -> Result<Readings> {
+        let fixed = self.force.iter().filter_map(|(_, target)| target.fixed());
+        let of_points = self.pressure.iter().map(|gauge| &gauge.slots);
+        let slots: Vec<usize> = of_points.chain(fixed.map(|wall| &wall.slots)).flatten().copied().collect();
         let pressures =
             if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
         let params = &simulation.params;
         let mut rest = pressures.as_slice();
-        for gauge in &self.pressure {
-            let (own, after) = rest.split_at(gauge.slots.len());
+        let mut next = |count: usize| {
+            let (own, after) = rest.split_at(count);
             rest = after;
-            let at_point = |(p, &way): (&RowPressure, &DVec3)| p.on_surface(way, params);
-            let sum: f64 = own.iter().zip(&gauge.to_point).map(at_point).sum();
-            row.push(Cell::from(if known { sum / own.len() as f64 } else { f64::NAN }));
-        }
-        Ok(())
+            own
+        };
+        let at_point = |gauge: &WallPressure| {
+            let own = next(gauge.slots.len());
+            let sum: f64 = own.iter().zip(&gauge.to_point).map(|(p, &way)| p.on_surface(way, params)).sum();
+            sum / own.len() as f64
+        };
+        let pressure = self.pressure.iter().map(at_point).collect();
+        let on = |(_, target): &(String, Target)| match target {
+            Target::Solid(solid) => simulation.fluid_force[*solid],
+            Target::Fixed(wall) => wall.pressure_force(next(wall.slots.len()), params),
+        };
+        Ok(Readings { pressure, wrench: self.force.iter().map(on).collect() })
     }
 }
 
 impl Target {
+    fn fixed(&self) -> Option<&FixedWall> {
+        match self {
+            Self::Fixed(wall) => Some(wall),
+            Self::Solid(_) => None,
+        }
+    }
+
     fn is_fixed(&self) -> bool {
-        matches!(self, Self::Fixed(_))
+        self.fixed().is_some()
     }
 }
 

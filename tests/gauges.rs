@@ -100,6 +100,55 @@ fn a_device_reads_the_same_gauges() {
 }
 
 #[test]
+fn means_are_those_of_every_step_and_begin_anew_after_a_row() {
+    let mut case = still(
+        "[[moving_wall]]\nname = \"lid\"\nmin = [0.08, 0.08, 0.1]\nmax = [0.16, 0.16, 0.3]\n\
+                          motion = [[0, 0, 0, 0], [1, 0, 0, 0.05]]\n[[gauge.force]]\nname = \"lid\"\non = \"lid\"\n",
+    );
+    let fluid = case.fluid.as_mut().expect("water");
+    fluid.block[0].velocity = [-0.5, 0.0, 0.0];
+    // Along fixed walls a force is of the moment.
+    (fluid.viscosity, fluid.wall_friction) = (0.0, Some(0.0));
+    case.run.adaptive = true;
+    let mut mean = case.clone();
+    mean.gauge.mean = true;
+    let mut processors = vec![Processor::Cpu];
+    if gpu::adapters().is_empty() {
+        let text = "NO GPU ADAPTER: means on a device are not tested";
+        assert!(std::env::var_os("CI").is_none(), "{text}");
+        eprintln!("SKIPPED, {text}");
+    } else {
+        processors.push(Processor::Gpu { adapter: None });
+    }
+    for processor in processors {
+        let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
+        let each = Gauges::new(&case, &scene).expect("the gauges find their walls");
+        let mut over = Gauges::new(&mean, &scene).expect("the gauges find their walls");
+        let mut sim = Simulation::on(&case, scene, &processor).expect("the simulation starts");
+        for steps in [7, 1, 4] {
+            let (mut sum, mut seconds) = (BTreeMap::<String, f64>::new(), 0.0);
+            for _ in 0..steps {
+                let dt = sim.step().expect("a step").dt;
+                over.follow(&mut sim, dt).expect("the gauges can be read");
+                row(&each, &mut sim).into_iter().for_each(|(k, v)| *sum.entry(k).or_default() += dt * v);
+                seconds += dt;
+            }
+            let (told, last) = (row(&over, &mut sim), row(&each, &mut sim));
+            over.begin();
+            let mut differ = 0;
+            for (name, sum) in sum.iter().filter(|(name, _)| !name.contains("viscous") && *name != "time [s]")
+            {
+                let wanted = sum / seconds;
+                let apart = (told[name] - wanted).abs();
+                assert!(apart < 1e-9 * (1.0 + wanted.abs()), "{name}: {} for {wanted}", told[name]);
+                differ += usize::from((last[name] - wanted).abs() > 1e-3 * wanted.abs());
+            }
+            assert!(steps == 1 && differ == 0 || steps > 1 && differ > 5, "{differ} in {steps} steps");
+        }
+    }
+}
+
+#[test]
 fn a_wall_under_pressure_feels_it_where_water_can_be() {
     let pillar = "[[obstacle]]\nname = \"pillar\"\nmin = [0.08, 0.08, 0]\nmax = [0.16, 0.16, 0.3]\nopen = [\"z_min\"]\n";
     let mut case = still(pillar);

@@ -141,7 +141,7 @@ fn a_run_in_parts_is_the_run_to_the_last_bit() {
                 "output.series=[{name=\"a\",every=0.003,fields=[]},{name=\"b\",every=1e-9,kinds=[\"body\"]}]",
             ]),
         ),
-        ("tables now and then", more(&["output.table_every=0.007", "gauge.every=0.011"])),
+        ("tables now and then", more(&["output.table_every=0.007", "gauge.every=0.011", "gauge.mean=true"])),
     ] {
         let sets: Vec<&str> = match what {
             // The order matters: the table comes before its keys.

@@ -21,6 +21,7 @@ mod ledger;
 pub mod parts;
 pub mod shader;
 mod solve;
+mod stretches;
 mod traffic;
 mod transfer;
 
@@ -58,6 +59,7 @@ use layout::{
 };
 use parts::Division;
 use std::collections::BTreeMap;
+use stretches::Stretches;
 
 /// Particles in f32 on a device.
 pub struct Gpu {
@@ -614,20 +616,25 @@ impl Backend for Gpu {
     }
 
     fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
-        let parts: Vec<_> = slots.iter().map(|&s| (s, 1)).collect();
-        let pressures = self.context.download_parts(buffers::pressure, &parts)?;
-        let excess = if self.plan.needs(Arrays::Excess) {
-            let parts: Vec<_> = slots.iter().map(|&s| (s - self.groups.fluid, 1)).collect();
-            self.context.download_parts(buffers::excess, &parts)?
-        } else {
-            vec![0.0; slots.len()]
+        let stretches = Stretches::of(slots);
+        let of = |id, size: u64, skip: usize| {
+            stretches
+                .iter()
+                .map(move |(first, count)| (id, (first - skip) as u64 * size, count as u64 * size))
         };
-        let both = pressures.into_iter().zip(excess);
-        let told = |(p, over): (f32, f32)| {
-            let excess = if over < layout::DRY { over.into() } else { 0.0 };
-            RowPressure { pressure: p.into(), excess }
+        let mut parts: Vec<_> = of(buffers::pressure.id(), buffers::pressure.size(), 0).collect();
+        let over = self.plan.needs(Arrays::Excess);
+        if over {
+            parts.extend(of(buffers::excess.id(), buffers::excess.size(), self.groups.fluid));
+        }
+        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.context.download_bytes(&parts, false)?);
+        let (pressure, excess) = values.split_at(stretches.len());
+        let told = |&slot: &usize| {
+            let at = stretches.place(slot);
+            let excess = if over && excess[at] < layout::DRY { excess[at].into() } else { 0.0 };
+            RowPressure { pressure: pressure[at].into(), excess }
         };
-        Ok(both.map(told).collect())
+        Ok(slots.iter().map(told).collect())
     }
 
     fn read(&mut self) -> Result<Fields> {

@@ -683,6 +683,9 @@ pub struct Gauges {
     /// Interval between rows [s]; every step if absent.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<f64>,
+    /// Pressures and forces of a row are means over the steps since the row before, each with its length, and not those of the last step.
+    /// Levels are of the moment.
+    pub mean: bool,
     /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
     pub pressure: Vec<PressureGauge>,
     /// Height of the water surface along a vertical line.

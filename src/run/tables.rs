@@ -132,6 +132,7 @@ impl Tables {
         }
         due.exchange("tables", archive)?;
         gauges_due.exchange("gauges", archive)?;
+        gauges.iter_mut().try_for_each(|(gauges, _)| gauges.exchange(archive))?;
         let mut step = last.unwrap_or(u64::MAX);
         archive.count("tables.last", &mut step)?;
         *last = Some(step).filter(|&s| s != u64::MAX);
@@ -175,6 +176,9 @@ impl Tables {
         since.substeps = since.substeps.max(report.contact.substeps);
         if self.due.reached(simulation.time) {
             self.write(report, simulation, totals)?;
+        }
+        if let Some((gauges, _)) = &mut self.gauges {
+            gauges.follow(simulation, report.dt)?;
         }
         if self.gauges_due.reached(simulation.time) {
             self.write_gauges(simulation)?;
@@ -293,6 +297,7 @@ impl Tables {
     fn write_gauges(&mut self, simulation: &mut Simulation) -> Result<()> {
         if let Some((gauges, table)) = &mut self.gauges {
             table.row(&gauges.row(simulation)?)?;
+            gauges.begin();
             table.flush()?;
         }
         Ok(())

@@ -200,13 +200,16 @@ impl Sampler {
         self.spec.of.contains(&measure)
     }
 
-    /// After a step of `iterations` of the pressure solver; samples if one is due.
+    /// After a step `dt` [s] long with `iterations` of the pressure solver, or at the start with neither; samples if one is due.
     ///
     /// # Errors
     /// What the backend says when it is read.
-    pub fn sample(&mut self, simulation: &mut Simulation, iterations: u32) -> Result<()> {
+    pub fn sample(&mut self, simulation: &mut Simulation, iterations: u32, dt: f64) -> Result<()> {
         self.iterations_max = self.iterations_max.max(iterations);
         let first = simulation.steps == 0;
+        if !first {
+            self.recorder.follow(simulation, dt)?;
+        }
         if !first && !self.due.reached(simulation.time) {
             return Ok(());
         }

@@ -145,7 +145,8 @@ impl Recorder {
     /// [`Error::Checkpoint`] if the state holds none of them.
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         // What is recorded follows from study and case.
-        let Self { gauges: _, bodies: _, fluid: _, spread: _, profiles, curves } = self;
+        let Self { gauges, bodies: _, fluid: _, spread: _, profiles, curves } = self;
+        gauges.iter_mut().try_for_each(|gauges| gauges.exchange(archive))?;
         for Sums { profile, bins } in profiles {
             archive.array(&format!("profile.{}", profile.name), bins, true)?;
         }
@@ -156,6 +157,14 @@ impl Recorder {
             archive.array(&format!("curve.{name}"), curves.entry(name.to_owned()).or_default(), false)?;
         }
         Ok(())
+    }
+
+    /// After a step `dt` [s] long, for gauges that tell means.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn follow(&mut self, simulation: &mut Simulation, dt: f64) -> Result<()> {
+        self.gauges.iter_mut().try_for_each(|gauges| gauges.follow(simulation, dt))
     }
 
     /// The state now; `in_window` adds to the profiles as well.
@@ -170,12 +179,13 @@ impl Recorder {
                 self.curves.entry(name).or_default().push([t, value]);
             }
         };
-        if let Some(gauges) = &self.gauges {
+        if let Some(gauges) = &mut self.gauges {
             for (name, cell) in gauges.header().into_iter().zip(gauges.row(simulation)?).skip(1) {
                 if let Cell::Number(value) = cell {
                     put(name, value);
                 }
             }
+            gauges.begin();
         }
         if self.bodies {
             for (k, pose) in simulation.solids.poses().iter().enumerate() {

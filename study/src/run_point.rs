@@ -171,7 +171,7 @@ fn play(point: &Point, context: &Context, course: &mut Course, state: Option<Arc
         sampler.iter_mut().try_for_each(|s| s.exchange(&mut archive))?;
     } else {
         course.seconds = 0.0;
-        sampler.iter_mut().try_for_each(|s| s.sample(&mut simulation, 0))?;
+        sampler.iter_mut().try_for_each(|s| s.sample(&mut simulation, 0, 0.0))?;
         if sampler.is_some() {
             course.work = Work { particles: scene.groups.total() as u64, ..Work::default() };
         }
@@ -195,7 +195,7 @@ fn play(point: &Point, context: &Context, course: &mut Course, state: Option<Arc
                     if simulation.plan.wet() {
                         course.work.products += products(simulation.plan.preconditioner, iterations);
                     }
-                    sampler.sample(&mut simulation, iterations)?;
+                    sampler.sample(&mut simulation, iterations, report.dt)?;
                 }
             }
             // The state kept last is gone back to by the next attempt.
