@@ -1,10 +1,11 @@
 //! A scene as it fits a device: what is divided, the shaders, the limits to ask for. Nothing is allocated yet.
 
 use super::adapter::{self, AdapterInfo};
+use super::kernels;
 use super::layout::{FLUID_MAX, Memory, Sizes};
 use super::parts::Division;
+use super::set_up::grid;
 use super::shader::{self, Shader};
-use super::{grid, kernels};
 use crate::cells::Grid;
 use crate::compute::Program;
 use crate::error::{GpuError, Result};

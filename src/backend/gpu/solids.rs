@@ -1,0 +1,93 @@
+//! Solids on the device: where they are, what is free to move, and the forces on them.
+
+use super::{Gpu, buffers, groups, kernels, layout};
+use crate::body::slots::SlotRow;
+use crate::body::{FreeBody, Pose, Wrench};
+use crate::error::Result;
+use crate::plan::{Arrays, Stage};
+use glam::{DMat3, DVec3, Vec3};
+
+impl Gpu {
+    /// Free bodies and rows at slots for the next solves.
+    pub(super) fn show_free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
+        let p = &self.params;
+        let factor = p.density / p.spacing.powi(3) / layout::laplacian_coefficient(p);
+        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        let device = |(solid, (body, &(first, count))): (usize, (&FreeBody, &(usize, usize)))| {
+            let inertia = factor * body.inverse_inertia;
+            layout::FreeBody {
+                inverse_mass: four(factor * body.inverse_mass),
+                inertia_x: four(inertia.x_axis),
+                inertia_y: four(inertia.y_axis),
+                inertia_z: four(inertia.z_axis),
+                force: four(body.load.force),
+                torque: four(body.load.torque),
+                first: first as u32,
+                count: count as u32,
+                solid: solid as u32,
+                bodies: 0,
+            }
+        };
+        let of = bodies.iter().zip(&self.wall_layers).enumerate();
+        let free = of.filter(|(_, (b, _))| b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO);
+        let mut free: Vec<_> = free.map(device).collect();
+        let count = free.len() as u32;
+        free.iter_mut().for_each(|body| body.bodies = count);
+        self.coupled = free.len() as u64;
+        if free.is_empty() {
+            return Ok(());
+        }
+        self.context.begin(Some(Stage::ConjugateGradient));
+        self.context.upload(buffers::free_body, &free)?;
+        // Zeros stand for rows at no slot, also before the first upload.
+        if slots.is_empty() && !self.slots_shown {
+            return Ok(());
+        }
+        self.slots_shown = !slots.is_empty();
+        let mut rows = vec![[0.0; 4]; 4 * self.groups.moving_wall];
+        for slot in slots {
+            let k = 4 * (self.wall_layers[slot.solid as usize].0 + slot.row as usize);
+            rows[k] = slot.per_pascal.force.as_vec3().extend(slot.taken as f32).to_array();
+            rows[k + 1] = four(slot.per_pascal.torque);
+            rows[k + 2] = four(slot.head.force);
+            rows[k + 3] = four(slot.head.torque);
+        }
+        self.context.upload(buffers::coupling, &rows)
+    }
+
+    /// Moves the particles of solids to `poses`.
+    pub(super) fn show_poses(&mut self, poses: &[Pose]) -> Result<()> {
+        if !self.plan.needs(Arrays::Solids) {
+            return Ok(());
+        }
+        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        let device = |p: &Pose| layout::Pose {
+            position: four(p.position - self.middle),
+            orientation: p.orientation.as_quat().to_array(),
+            velocity: four(p.velocity),
+            angular_velocity: four(p.angular_velocity),
+        };
+        let poses: Vec<_> = poses.iter().map(device).collect();
+        self.context.begin(Some(Stage::MoveSolids));
+        self.context.upload(buffers::poses, &poses)?;
+        self.context.pass([(kernels::move_solids::move_solids, groups(self.sizes.moving))])
+    }
+
+    /// Force of the water on each solid.
+    pub(super) fn sum_forces(&mut self) -> Result<Vec<Wrench>> {
+        let mut total = vec![Wrench::default(); self.solids];
+        if self.chunk_solid.is_empty() {
+            return Ok(total);
+        }
+        let chunks = self.chunk_solid.len();
+        self.context.begin(Some(Stage::BodyForce));
+        self.context.pass([(kernels::body_force::body_force, chunks as u64)])?;
+        let parts = self.context.download(buffers::wrench, 2 * chunks)?;
+        let vector = |v: &[f32; 4]| Vec3::new(v[0], v[1], v[2]).as_dvec3();
+        for (&solid, part) in self.chunk_solid.iter().zip(parts.chunks_exact(2)) {
+            total[solid].force += vector(&part[0]);
+            total[solid].torque += vector(&part[1]);
+        }
+        Ok(total)
+    }
+}
