@@ -5,19 +5,27 @@ use common::*;
 use glam::DVec3;
 use seixo::Error;
 use seixo::backend::Counters;
-use seixo::case::Case;
+use seixo::case::{Case, OutputField};
 use seixo::checkpoint::Archive;
 use seixo::fields::Fields;
 use seixo::ledger::{Entry, Ledger};
 use seixo::monitor::FluidMonitor;
 use seixo::on_ranks::serve;
+use seixo::output::folder::series_in;
+use seixo::output::particles::Particles;
+use seixo::output::replay::{Frame, frames, particles};
+use seixo::output::result::Status;
 use seixo::params::Params;
 use seixo::plan::Plan;
 use seixo::ranks::Standing;
 use seixo::ranks::threads::team;
+use seixo::run::resume::{Standing as Left, standing};
+use seixo::run::{Finished, Options, Start, run};
 use seixo::scene::Scene;
 use seixo::share::Outlook;
 use seixo::simulation::Simulation;
+use seixo::stop::Stop;
+use std::path::Path;
 use std::sync::Arc;
 
 /// What `of` says of a simulation of `case` on `ranks` threads, and how these stand then.
@@ -84,7 +92,11 @@ fn apart(a: &Fields, b: &Fields) -> [f64; 3] {
 /// A flume round periodic y: viscous water, a sill, a gate that rises, a ball under water, an absorber, a body that floats and one that sinks
 /// across the tank, friction, gauges, and the ledger.
 fn flume(more: &str) -> Case {
-    case(&format!(
+    case(&flume_text(more))
+}
+
+fn flume_text(more: &str) -> String {
+    format!(
         "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0.5, -9.81]\n\
          [fluid]\nviscosity = 1e-3\nsound_speed = 5\njitter = 0.1\n{more}\n\
          [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.6, 0.4]\n\
@@ -99,7 +111,7 @@ fn flume(more: &str) -> Case {
          [gauge]\nevery = 0.01\n[[gauge.force]]\nname = \"sill\"\non = \"sill\"\n\
          [[gauge.level]]\nname = \"level\"\nat = [0.4, 0.3]\n[[gauge.pressure]]\nname = \"floor\"\npoint = [0.3, 0.3, 0]\n\
          [output]\nledger = true\n"
-    ))
+    )
 }
 
 /// What can be seen of a run.
@@ -424,4 +436,152 @@ fn a_program_without_mpi_does_not_compute_a_case_many_times() {
     let said = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(2), "{said}");
     assert!(said.contains("one of 4 processes, but this seixo was built without MPI"), "{said}");
+}
+
+/// A run of the case `text` on `ranks` threads, to step `steps`, from where the folder `out` has it.
+fn run_on(text: &str, ranks: usize, out: &Path, steps: u64) -> Finished {
+    let case = case(text);
+    let start = match standing(out, &case).expect("it stands") {
+        Left::Nothing => Start::New,
+        Left::Stopped(found) => Start::Resume(found),
+        other => panic!("{other:?}"),
+    };
+    let (name, out) = ("flume".into(), out.into());
+    let options = Options { name, out, start, steps: Some(steps), ..Options::default() };
+    let go = |simulation: &mut Simulation| {
+        let scene = simulation.scene.clone();
+        run(simulation, &scene, text, options, &Stop::default(), &mut |_| ()).expect("it begins")
+    };
+    if ranks == 1 { go(&mut simulation(&case)) } else { on_ranks(&case, ranks, go).0 }
+}
+
+/// The water of a frame, and the places of its particles in the order of their numbers.
+fn water(frame: &Frame) -> (Particles, Vec<usize>) {
+    let water = particles(frame.fluid.as_deref().expect("a frame with water")).expect("it is read");
+    let mut order: Vec<usize> = (0..water.len()).collect();
+    order.sort_by_key(|&i| water.id[i]);
+    (water, order)
+}
+
+fn near(a: &[f32], b: &[f32], scale: f32) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-5 * scale)
+}
+
+#[test]
+fn ranks_write_pieces_that_are_read_as_the_frame_of_one() {
+    let text = flume_text("")
+        + "every = 0.005\n[[output.series]]\nname = \"corner\"\nevery = 0.01\nkinds = [\"fluid\"]\nfields = [\"id\", \"pressure\"]\n\
+           region = { min = [0, 0, 0], max = [0.3, 0.3, 1] }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let [one, many] = ["one", "many"].map(|name| folder.path().join(name));
+    for (ranks, out) in [(1, &one), (3, &many)] {
+        let finished = run_on(&text, ranks, out, 12);
+        assert!(finished.error.is_none() && finished.summary.frames == 4, "{:?}", finished.error);
+    }
+    let bytes = |file: &str| [&one, &many].map(|root| std::fs::read(root.join("vtu").join(file)).unwrap());
+    let [a, b] = bytes("walls.vtu");
+    assert_eq!(a, b);
+    for (series, count) in [(None, 4), (Some("corner"), 3)] {
+        let list = |root: &Path| match series {
+            None => frames(root, "flume").unwrap(),
+            Some(name) => frames(&series_in(root, name), name).unwrap(),
+        };
+        let (of_one, of_many) = (list(&one), list(&many));
+        assert_eq!((of_one.len(), of_many.len()), (count, count));
+        for (number, (a, b)) in of_one.iter().zip(&of_many).enumerate() {
+            assert_eq!(a.time, b.time);
+            let path = b.fluid.as_deref().unwrap();
+            assert!(path.ends_with(format!("fluid_{number:04}.pvtu")), "{path:?}");
+            assert!(!path.with_extension("vtu").exists());
+            let stem = path.with_extension("").display().to_string();
+            let pieces =
+                [0, 1, 2].map(|rank| particles(format!("{stem}_{rank}.vtu").as_ref()).unwrap().len());
+            // The corner is the first rank's, and the second one's in part.
+            assert_eq!(pieces.map(|n| n > 0), [true, true, series.is_none()], "{pieces:?}");
+            let ((a, a_order), (b, b_order)) = (water(a), water(b));
+            assert_eq!(a.len(), pieces.iter().sum::<usize>());
+            let ids = |of: &Particles, order: &[usize]| order.iter().map(|&i| of.id[i]).collect::<Vec<_>>();
+            assert_eq!(ids(&a, &a_order), ids(&b, &b_order));
+            let pressure =
+                |of: &Particles, order: &[usize]| order.iter().map(|&i| of.pressure[i]).collect::<Vec<_>>();
+            assert!(near(&pressure(&a, &a_order), &pressure(&b, &b_order), 5e3));
+            assert!(number == 0 || pressure(&a, &a_order).iter().any(|&p| p > 1e3));
+            for (&i, &j) in a_order.iter().zip(&b_order) {
+                assert!(near(&a.position[i], &b.position[j], 1.0), "{i} {j}");
+            }
+            assert_eq!(b.has(OutputField::Velocity), series.is_none());
+            assert_eq!(a.has(OutputField::NumberDensity), b.has(OutputField::NumberDensity));
+        }
+        let both = of_one.iter().zip(&of_many).enumerate();
+        for (number, (a, b)) in both.filter(|_| series.is_none()) {
+            let [a, b] = [a, b].map(|frame| particles(frame.solids.as_deref().unwrap()).unwrap());
+            assert_eq!((&a.id, &a.body), (&b.id, &b.body));
+            assert!(near(&a.pressure, &b.pressure, 5e3) && near(&a.number_density, &b.number_density, 1.0));
+            // On the gate, once there is a step.
+            assert_eq!(b.pressure.iter().any(|&p| p > 1e2), number > 0);
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_with_frames_of_another_number_of_ranks() {
+    let text = flume_text("") + "every = 0.003\n";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let has = |name: &str| out.join("vtu").join(name).exists();
+    run_on(&text, 4, &out, 7);
+    // Of the end, where the next part writes one of its own.
+    assert!(has("fluid_0003.pvtu") && has("fluid_0003_3.vtu") && !has("fluid_0003_4.vtu"));
+    run_on(&text, 1, &out, 13);
+    assert!(
+        has("fluid_0003.vtu")
+            && !has("fluid_0003.pvtu")
+            && !has("fluid_0003_0.vtu")
+            && !has("fluid_0003_3.vtu")
+    );
+    assert!(has("fluid_0002.pvtu") && has("fluid_0005.vtu"));
+    run_on(&text, 3, &out, 16);
+    assert!(has("fluid_0005.pvtu") && !has("fluid_0005.vtu") && has("fluid_0006_2.vtu"));
+    run_on(&text, 2, &out, 20);
+    assert!(has("fluid_0006_1.vtu") && !has("fluid_0006_2.vtu"));
+    let frames = frames(&out, "flume").unwrap();
+    let times: Vec<f64> = frames.iter().map(|f| (f.time * 1e3).round()).collect();
+    assert_eq!(times, [0., 3., 6., 9., 12., 15., 18., 20.]);
+    let all: Vec<_> = frames.iter().map(water).collect();
+    let ids =
+        |(water, order): &(Particles, Vec<usize>)| order.iter().map(|&i| water.id[i]).collect::<Vec<_>>();
+    assert!(!all[0].0.is_empty() && all.iter().all(|frame| ids(frame) == ids(&all[0])));
+    // A new run in their place leaves nothing of them.
+    let options = Options {
+        name: "flume".into(),
+        out: out.clone(),
+        start: Start::Replace,
+        steps: Some(1),
+        ..Options::default()
+    };
+    let mut again = simulation(&case(&text));
+    let scene = again.scene.clone();
+    run(&mut again, &scene, &text, options, &Stop::default(), &mut |_| ()).unwrap();
+    let left =
+        std::fs::read_dir(out.join("vtu")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+    assert!(left.into_iter().all(|name| !name.ends_with(".pvtu") && name.matches('_').count() < 2));
+}
+
+#[test]
+fn a_rank_that_cannot_write_ends_the_run_on_all() {
+    let text = flume_text("") + "every = 0.003\n";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    run_on(&text, 3, &out, 2);
+    // A folder in the place of the piece: a rank that may not write there, also as a superuser.
+    let piece = out.join("vtu/fluid_0002_1.vtu");
+    std::fs::create_dir(&piece).unwrap();
+    let finished = run_on(&text, 3, &out, 10);
+    let error = finished.error.expect("it cannot write");
+    assert_eq!(error.to_string(), format!("{}: Is a directory (os error 21)", piece.display()));
+    assert_eq!((error.exit_code(), finished.summary.status, finished.summary.steps), (5, Status::Failed, 6));
+    assert_eq!(frames(&out, "flume").unwrap().len(), 2, "a frame is listed when it is whole");
+    std::fs::remove_dir(&piece).unwrap();
+    assert!(run_on(&text, 3, &out, 7).error.is_none());
+    assert_eq!(frames(&out, "flume").unwrap().len(), 4);
 }

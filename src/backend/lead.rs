@@ -11,6 +11,7 @@ use crate::fields::Fields;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
+use crate::output::pieces::Pieces;
 use crate::params::Step;
 use crate::plan::ParticleStage;
 use crate::pressure::PressureReport;
@@ -34,6 +35,8 @@ enum Order<'a> {
     Monitor,
     Pressures(Cow<'a, [usize]>),
     Read,
+    ReadWalls,
+    WritePieces(Cow<'a, Pieces>),
     Restore,
     Ranks,
     End,
@@ -43,12 +46,34 @@ enum Order<'a> {
 pub struct Lead {
     team: Arc<dyn Team>,
     cpu: Cpu,
+    /// Whether it was seen that what the others write is where the first rank sees it.
+    seen: bool,
 }
 
 impl Lead {
     /// With its own part of the particles, `cpu`; the others [`follow`].
     pub fn new(team: Arc<dyn Team>, cpu: Cpu) -> Self {
-        Self { team, cpu }
+        Self { team, cpu, seen: false }
+    }
+
+    /// Have all ranks write their water as `pieces` says, and write the file that names these.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] of the first rank that could not.
+    pub fn write_pieces(&mut self, pieces: &Pieces) -> Result<()> {
+        self.order(&Order::WritePieces(Cow::Borrowed(pieces)));
+        let bytes = self.cpu.write_piece(pieces)?;
+        if !self.seen {
+            pieces.are_seen(&bytes)?;
+            self.seen = true;
+        }
+        pieces.write_list(self.team.ranks())
+    }
+
+    /// Pressures [Pa] and number densities [-] of the wall layers, in the order of their slots.
+    pub fn read_walls(&mut self) -> [Vec<f64>; 2] {
+        self.order(&Order::ReadWalls);
+        self.cpu.read_walls()
     }
 
     fn order(&self, order: &Order) {
@@ -146,6 +171,10 @@ impl Backend for Lead {
         self.write(&fields)
     }
 
+    fn lead(&mut self) -> Option<&mut Lead> {
+        (self.team.ranks() > 1).then_some(self)
+    }
+
     fn ranks(&mut self) -> Result<Vec<Standing>> {
         self.order(&Order::Ranks);
         self.cpu.ranks()
@@ -185,6 +214,9 @@ pub fn follow(cpu: &mut Cpu) -> Result<()> {
             Order::Monitor => drop(cpu.monitor()?),
             Order::Pressures(slots) => drop(cpu.wall_pressures(&slots)?),
             Order::Read => drop(cpu.read()?),
+            Order::ReadWalls => drop(cpu.read_walls()),
+            // The first rank hears of what went wrong here, and ends the run.
+            Order::WritePieces(pieces) => drop(cpu.write_piece(&pieces)),
             Order::Ranks => drop(cpu.ranks()?),
             Order::Restore => cpu.restore(None)?,
             Order::End => return Ok(()),

@@ -91,6 +91,23 @@ impl Share {
         Some(out)
     }
 
+    /// Pressures and number densities of the wall layers, in the order of their slots. On the first rank only: the others get none.
+    pub fn gather_walls(&self, fields: &Fields) -> [Vec<f64>; 2] {
+        let walls = self.owned().skip(self.own.len());
+        let part =
+            walls.map(|i| ((i - self.groups.fluid) as u32, [fields.pressure[i], fields.number_density[i]]));
+        let parts = self.collect(encode(&part.collect::<Vec<_>>()));
+        if self.rank() > 0 {
+            return Default::default();
+        }
+        let count = self.all.pressure() - self.all.fluid;
+        let mut out = [vec![0.0; count], vec![0.0; count]];
+        for (k, values) in parts.iter().flat_map(|bytes| decode::<Vec<(u32, [f64; 2])>>(bytes)) {
+            out.iter_mut().zip(values).for_each(|(out, value)| out[k as usize] = value);
+        }
+        out
+    }
+
     /// Fields of all ranks without their water; solids are where they are in `fields`.
     pub fn blank(&self, fields: &Fields) -> Fields {
         let (all, here) = (self.all, self.groups.fluid);

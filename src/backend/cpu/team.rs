@@ -10,10 +10,12 @@ use crate::fields::{Fields, State};
 use crate::kernels::openings::Emission;
 use crate::ledger::Ledger;
 use crate::neighbours::Neighbours;
+use crate::output::particles::Particles;
+use crate::output::pieces::{Pieces, Told};
 use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
-use crate::ranks::{Standing, Team};
+use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::{Kind, Scene};
 use crate::share::Share;
 use glam::DVec3;
@@ -161,6 +163,22 @@ impl Cpu {
             ..e.clone()
         };
         emissions.iter().map(of).collect()
+    }
+
+    /// Write the water of this rank as `pieces` says; returns the bytes of each rank's file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] of the first rank that could not, on all of them.
+    pub(crate) fn write_piece(&self, pieces: &Pieces) -> Result<Vec<u64>> {
+        let Some(share) = &self.share else { return Ok(Vec::new()) };
+        let water = Particles::water(&self.fields, share.own(), |x| self.params.periodic.wrap(x));
+        let told = Told::new(pieces.write(share.rank(), water));
+        share.gather(encode(&told)).iter().map(|bytes| decode::<Told>(bytes).bytes()).collect()
+    }
+
+    /// Pressures and number densities of the wall layers of all ranks; the first one gets them.
+    pub(crate) fn read_walls(&self) -> [Vec<f64>; 2] {
+        self.share.as_ref().map_or_else(Default::default, |share| share.gather_walls(&self.fields))
     }
 
     /// Save the state of all ranks, gathered before, as that of one.
