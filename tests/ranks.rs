@@ -196,6 +196,17 @@ fn many_ranks_compute_what_one_computes() {
         ("flume", flume(""), 60, [2, 4], 1e-11),
         ("flume, multigrid", flume("solver = { preconditioner = \"multigrid\" }"), 60, [3, 5], 1e-7),
         ("full", full(), 20, [2, 3], 1e-9),
+        // The first and the last rank are neighbours: two on both sides, more with a column each at least.
+        ("ring", ring(1.5, "jitter = 0.1", DRIVEN), 60, [2, 5], 1e-11),
+        (
+            "ring, multigrid",
+            ring(1.5, "jitter = 0.1\nsolver = { preconditioner = \"multigrid\" }", DRIVEN),
+            60,
+            [2, 4],
+            1e-7,
+        ),
+        ("ring of bodies", ring(1.5, "jitter = 0.1", FREE), 60, [2, 3], 1e-11),
+        ("ring, narrow", narrow(), 30, [2, 4], 1e-11),
         ("channel", shipped("channel", &["run.spacing=0.04"]), 90, [2, 3], 1e-8),
     ] {
         let (one, one_fields) = Seen::after(&mut simulation(&case), steps);
@@ -219,6 +230,37 @@ fn many_ranks_compute_what_one_computes() {
     }
 }
 
+/// Water round periodic x: viscous, over a sill, with `velocity` [m/s] across the seam, and `more`.
+fn ring(velocity: f64, fluid: &str, more: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0.5, 0, -9.81]\n\
+         [fluid]\nviscosity = 1e-3\nsound_speed = 5\n{fluid}\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [2.0, 0.6, 0.4]\nvelocity = [{velocity}, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [2.0, 0.6, 1.0]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n\
+         [[obstacle]]\nname = \"sill\"\nmin = [1.2, 0, 0]\nmax = [1.3, 0.6, 0.1]\n{more}\
+         [gauge]\nevery = 0.01\n[[gauge.force]]\nname = \"sill\"\non = \"sill\"\n\
+         [[gauge.level]]\nname = \"level\"\nat = [0.0, 0.3]\n[[gauge.pressure]]\nname = \"floor\"\npoint = [2.0, 0.3, 0]\n\
+         [output]\nledger = true\n"
+    ))
+}
+
+/// A block that is driven through the water across the seam. (Free bodies may not come there on any number of ranks.)
+const DRIVEN: &str = "[[moving_wall]]\nname = \"plunger\"\nmin = [0.05, 0.2, 0.1]\nmax = [0.25, 0.4, 0.3]\nmotion = [[0, 0, 0, 0], [1, -3, 0, 0]]\n";
+
+/// A body in the water and one on it, which cross the cut between two ranks in both directions.
+const FREE: &str = "[[body]]\nname = \"floats\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.2, 0.52]\ndensity = 500\nvelocity = [-2, 0, -0.5]\n\
+                    [[body]]\nname = \"sinks\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [0.9, 0.45, 0.2]\ndensity = 3000\nvelocity = [2, 0, 0]\n\
+                    displaces_fluid = true\n[contact]\nspring = 1e5\nfriction = 0.3\n";
+
+/// A ring of four columns of cells.
+fn narrow() -> Case {
+    case(
+        "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\nsound_speed = 5\njitter = 0.2\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.9, 1, 0.5]\nvelocity = [-2, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.9, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n",
+    )
+}
+
 /// A closed tank full of water round a body that is heavier: no free surface.
 fn full() -> Case {
     case(
@@ -231,6 +273,9 @@ fn full() -> Case {
 
 #[test]
 fn a_run_repeats_to_the_last_bit_whatever_the_threads_of_its_ranks() {
+    let around = ring(1.5, "jitter = 0.1\nsolver = { preconditioner = \"multigrid\" }", DRIVEN);
+    let two = || on_ranks(&around, 2, |s| Seen::after(s, 30)).0.0;
+    assert_eq!(two(), two());
     let case = flume("solver = { preconditioner = \"multigrid\" }");
     let run = || on_ranks(&case, 3, |s| Seen::after(s, 30)).0.0;
     let first = run();
@@ -293,8 +338,10 @@ fn plan_tells_what_ranks_have_and_say() {
             3,
         ),
         (shipped("dam_break_2d", &[]), 4),
+        (ring(0.0, "solver = { preconditioner = \"multigrid\" }", FREE), 3),
     ] {
         let scene = Scene::build(&case).expect("it builds");
+        let around = scene.periodic.is_along(0);
         let params = Params::new(&case, &scene).expect("valid");
         let told = Outlook::new(ranks, &scene, &params, &Plan::new(&case, &scene, &params)).expect("told");
         let stand = |steps| {
@@ -311,7 +358,7 @@ fn plan_tells_what_ranks_have_and_say() {
                 (part.columns, part.water, part.copies, part.walls),
                 (a.columns, a.water, a.copies, a.walls)
             );
-            let beside = u64::from(k > 0) + u64::from(k + 1 < ranks);
+            let beside = u64::from(k > 0 || around) + u64::from(k + 1 < ranks || around);
             assert_eq!(
                 b.messages - a.messages,
                 beside * (3 * told.messages[0] + iterations * told.messages[1])
@@ -319,7 +366,7 @@ fn plan_tells_what_ranks_have_and_say() {
             assert_eq!(b.rounds - a.rounds, 3 * told.rounds[0] + iterations * told.rounds[1]);
         }
         let bytes: u64 = second.iter().zip(&first).map(|(b, a)| b.message_bytes - a.message_bytes).sum();
-        let sides = 2 * (ranks as u64 - 1);
+        let sides = 2 * (ranks as u64 - u64::from(!around));
         let most = sides * (3 * told.message_bytes[0] + iterations * told.message_bytes[1])
             + 3 * told.round_bytes[0]
             + iterations * told.round_bytes[1];
@@ -341,9 +388,11 @@ fn memory_is_shared() {
 
 #[test]
 fn a_state_goes_on_on_any_number_of_ranks() {
-    for (case, tolerance) in
-        [(shipped("dam_break_transport", &["run.spacing=0.03"]), 1e-9), (flume(""), 1e-4)]
-    {
+    for (case, tolerance) in [
+        (shipped("dam_break_transport", &["run.spacing=0.03"]), 1e-9),
+        (flume(""), 1e-4),
+        (ring(1.5, "jitter = 0.1", FREE), 1e-4),
+    ] {
         let save = |s: &mut Simulation| {
             let mut archive = Archive::new();
             s.exchange(&mut archive).expect("saved");
@@ -403,8 +452,8 @@ fn refusal(case: &Case, ranks: usize, lacks: Option<usize>) -> String {
 fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
     let dry = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[[body]]\nname = \"cube\"\nsize = [1, 1, 1]\ncenter = [0, 0, 2]\nmass = 1\n\
                [contact]\nspring = 1e5\n[[obstacle]]\nname = \"floor\"\nmin = [-2, -2, -0.5]\nmax = [2, 2, 0]\n";
-    let periodic = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 1, 0.5]\n\
-                    [tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n";
+    let periodic = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.7, 1, 0.5]\n\
+                    [tank]\nmin = [0, 0, 0]\nmax = [0.7, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n";
     let short = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.2]\n\
                  [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\nopen = [\"z_max\"]\n";
     let near = short
@@ -412,7 +461,12 @@ fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
         .replace("[fluid]", "[fluid]\ncollision_distance = 0.9");
     for (text, ranks, words) in [
         (dry, 2, "there is no water"),
-        (periodic, 2, "along which this one is periodic"),
+        (
+            periodic,
+            2,
+            "only 3 columns of cells along x, of which each rank takes two or more where they meet at both ends",
+        ),
+        (periodic, 4, "4 ranks, but only 3 columns"),
         (short, 30, "30 ranks, but only"),
         (&near, 2, "more than half of run.effective_radius"),
     ] {
@@ -518,7 +572,7 @@ fn ranks_write_pieces_that_are_read_as_the_frame_of_one() {
             assert_eq!((&a.id, &a.body), (&b.id, &b.body));
             assert!(near(&a.pressure, &b.pressure, 5e3) && near(&a.number_density, &b.number_density, 1.0));
             // On the gate, once there is a step.
-            assert_eq!(b.pressure.iter().any(|&p| p > 1e2), number > 0);
+            assert_eq!(b.pressure.iter().any(|&p| p > 0.0), number > 0);
         }
     }
 }

@@ -7,7 +7,6 @@ use crate::fields::Fields;
 use crate::scene::Kind;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Particles by cell: those of cell c are `start[c]..start[c + 1]`.
 #[derive(Clone, Default, Debug)]
@@ -131,7 +130,7 @@ fn permute<T: Copy + Send + Sync>(values: &mut [T], order: &[u32], scratch: &mut
 }
 
 /// Mark every cell within one cell of a cell that holds fluid, which all lies in `columns` along x: only walls there can feel or be felt.
-pub fn mark_near_fluid(grid: &Grid, start: &[u32], columns: Range<u32>, near: &mut Vec<bool>) {
+pub fn mark_near_fluid(grid: &Grid, start: &[u32], columns: impl Iterator<Item = u32>, near: &mut Vec<bool>) {
     near.clear();
     near.resize(grid.total(), false);
     let [_, ny, nz] = grid.count;

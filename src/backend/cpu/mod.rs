@@ -242,8 +242,14 @@ impl Cpu {
             }
         }
         if self.active_set {
-            let columns = share.as_ref().map_or(0..grid.count[0], |share| share.columns_seen());
-            cell_list::mark_near_fluid(grid, fluid_start, columns, &mut self.near_fluid);
+            match share {
+                Some(share) => {
+                    cell_list::mark_near_fluid(grid, fluid_start, share.columns_seen(), &mut self.near_fluid);
+                }
+                None => {
+                    cell_list::mark_near_fluid(grid, fluid_start, 0..grid.count[0], &mut self.near_fluid);
+                }
+            }
         } else {
             self.near_fluid.clear();
             self.near_fluid.resize(grid.total(), true);

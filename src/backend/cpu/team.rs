@@ -53,7 +53,7 @@ impl Cpu {
         }
         let grid = Grid::new(params)?;
         let mut share = Share::new(team, params, scene.groups, &grid)?;
-        let own = share.choose(&scene.position, &scene.kind, &grid);
+        let own = share.choose(&scene.position, &scene.kind, &grid, params);
         let slots = room(own.len(), scene.groups.fluid);
         let mut cpu = Self::new(&scene.part(&own, slots, &[]), params, plan, settings)?;
         cpu.fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
@@ -220,7 +220,7 @@ impl Cpu {
         }
         let (whole, dt) = share.tell_fields(fields.map(|fields| (fields, self.dt)));
         self.dt = dt;
-        let own = share.choose(&whole.position, &whole.kind, &self.grid);
+        let own = share.choose(&whole.position, &whole.kind, &self.grid, &self.params);
         self.make_room(own.len());
         let Some(share) = self.share.as_mut() else { return Ok(()) };
         share.take_over(&own, &whole, &mut self.fields);
