@@ -427,6 +427,53 @@ fn a_state_goes_on_on_any_number_of_ranks() {
     }
 }
 
+#[test]
+fn what_ranks_keep_in_memory_is_the_state_of_that_moment() {
+    for case in [flume(""), ring(1.5, "jitter = 0.1", DRIVEN)] {
+        let ((kept, saved, later), _) = on_ranks(&case, 3, |s| {
+            let state = |s: &mut Simulation, mut archive: Archive| {
+                s.exchange(&mut archive).expect("saved");
+                archive
+            };
+            steps(s, 10);
+            // Another one before it, which it takes the place of.
+            state(s, Archive::in_memory());
+            steps(s, 15);
+            let (mut kept, saved) = (state(s, Archive::in_memory()), state(s, Archive::new()));
+            assert!(!kept.sections.contains_key("position") && saved.sections.contains_key("position"));
+            // Cut anew meanwhile, if the water is.
+            steps(s, 20);
+            s.backend.lead().expect("many").complete(&mut kept).expect("gathered");
+            (kept, saved, state(s, Archive::new()))
+        });
+        assert_eq!(kept.numbers, saved.numbers);
+        for (name, section) in &saved.sections {
+            assert!(kept.sections.get(name) == Some(section), "{name}");
+        }
+        assert_eq!(kept.sections.len(), saved.sections.len());
+        assert!(later.sections["position"] != kept.sections["position"]);
+    }
+}
+
+#[test]
+fn ranks_that_diverge_leave_the_last_good_state_and_that_in_which_it_was_found() {
+    let text = flume_text("")
+        .replace("max = [0.8, 0.6, 0.4]", "max = [0.8, 0.6, 0.4]\nvelocity = [0, 0, 400]")
+        + "every = 0.001\n";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let finished = run_on(&text, 3, &out, 1000);
+    let (error, reason) = (finished.error.expect("it diverges"), finished.summary.exit_reason);
+    assert!(finished.summary.status == Status::Diverged && error.exit_code() == 4, "{error}");
+    assert!(reason.contains("is in checkpoint/") && reason.contains("vtu/last_*.vtu"), "{reason}");
+    let last = particles(&out.join("vtu/last_fluid.pvtu")).expect("it is read");
+    assert!(!last.is_empty() && out.join("vtu/last_fluid_2.vtu").exists());
+    let found = seixo::checkpoint::file::newest(&out.join("checkpoint")).expect("read").expect("a state");
+    let mut one = simulation(&case(&text));
+    one.exchange(&mut found.archive.to_restore()).expect("it fits");
+    assert_eq!(one.steps, found.origin.step);
+}
+
 /// What the first of `ranks` that cannot begin says of `case`; one of them, `lacks`, cannot set it up.
 fn refusal(case: &Case, ranks: usize, lacks: Option<usize>) -> String {
     let scene = Arc::new(Scene::build(case).expect("it builds"));

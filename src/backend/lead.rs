@@ -37,6 +37,8 @@ enum Order<'a> {
     Read,
     ReadWalls,
     WritePieces(Cow<'a, Pieces>),
+    Keep,
+    Recall,
     Restore,
     Ranks,
     End,
@@ -48,12 +50,14 @@ pub struct Lead {
     cpu: Cpu,
     /// Whether it was seen that what the others write is where the first rank sees it.
     seen: bool,
+    /// What belongs to the particles that the ranks keep.
+    kept: Option<(Counters, Option<Ledger>, f64)>,
 }
 
 impl Lead {
     /// With its own part of the particles, `cpu`; the others [`follow`].
     pub fn new(team: Arc<dyn Team>, cpu: Cpu) -> Self {
-        Self { team, cpu, seen: false }
+        Self { team, cpu, seen: false, kept: None }
     }
 
     /// Have all ranks write their water as `pieces` says, and write the file that names these.
@@ -74,6 +78,19 @@ impl Lead {
     pub fn read_walls(&mut self) -> [Vec<f64>; 2] {
         self.order(&Order::ReadWalls);
         self.cpu.read_walls()
+    }
+
+    /// Put the particles that the ranks have kept into `archive`, the state in memory that was made last.
+    ///
+    /// # Errors
+    /// What the archive says.
+    pub fn complete(&mut self, archive: &mut Archive) -> Result<()> {
+        let Some((counters, work, dt)) = self.kept.take() else { return Ok(()) };
+        self.order(&Order::Recall);
+        match self.cpu.recall() {
+            Some(fields) => self.cpu.save_all(archive, fields, counters, work, dt),
+            None => Ok(()),
+        }
     }
 
     fn order(&self, order: &Order) {
@@ -163,8 +180,16 @@ impl Backend for Lead {
 
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         if archive.is_saving() {
-            let (counters, work, fields) = (self.counters()?, self.ledger()?, self.read()?);
-            return self.cpu.save_all(archive, fields, counters, work);
+            let (counters, work, dt) = (self.counters()?, self.ledger()?, self.cpu.dt());
+            if !archive.is_lasting() && self.team.ranks() > 1 {
+                // In memory: each rank keeps its own, which is gathered if the state is asked for.
+                self.order(&Order::Keep);
+                self.cpu.keep();
+                self.kept = Some((counters, work, dt));
+                return Ok(());
+            }
+            let fields = self.read()?;
+            return self.cpu.save_all(archive, fields, counters, work, dt);
         }
         // A state that does not fit is refused before the others hear of it.
         let fields = self.cpu.read_all(archive)?;
@@ -215,6 +240,8 @@ pub fn follow(cpu: &mut Cpu) -> Result<()> {
             Order::Pressures(slots) => drop(cpu.wall_pressures(&slots)?),
             Order::Read => drop(cpu.read()?),
             Order::ReadWalls => drop(cpu.read_walls()),
+            Order::Keep => cpu.keep(),
+            Order::Recall => drop(cpu.recall()),
             // The first rank hears of what went wrong here, and ends the run.
             Order::WritePieces(pieces) => drop(cpu.write_piece(&pieces)),
             Order::Ranks => drop(cpu.ranks()?),

@@ -32,6 +32,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
+use whole::Kept;
 
 /// What a rank computes, and what it hands to those beside it.
 pub struct Share {
@@ -59,6 +60,8 @@ pub struct Share {
     /// Positions of the pressure-carrying slots at the search [m], by which they are this rank's.
     searched: Vec<DVec3>,
     steps: u64,
+    /// A state of late, see [`Self::keep`].
+    kept: Option<Kept>,
     /// Messages to the ranks beside this one, their bytes, rounds of all ranks, and nanoseconds in both so far.
     said: [AtomicU64; 4],
 }
@@ -80,6 +83,7 @@ impl Share {
             come_in: Vec::new(),
             searched: Vec::new(),
             steps: 0,
+            kept: None,
             said: Default::default(),
             team,
             corner: params.domain_min,

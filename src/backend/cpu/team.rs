@@ -181,17 +181,40 @@ impl Cpu {
         self.share.as_ref().map_or_else(Default::default, |share| share.gather_walls(&self.fields))
     }
 
+    /// Keep the particles of this rank as they are now, in memory.
+    pub(crate) fn keep(&mut self) {
+        let Self { share, fields, .. } = self;
+        if let Some(share) = share {
+            share.keep(fields);
+        }
+    }
+
+    /// The particles of all ranks as they were when they were kept; the first one gets them.
+    pub(crate) fn recall(&mut self) -> Option<Fields> {
+        let Self { share, fields, params, .. } = self;
+        let share = share.as_mut()?;
+        let mut kept = share.gather_kept(fields)?;
+        kept.wrap(&share.all(), &params.periodic);
+        Some(kept)
+    }
+
+    /// The last time step [s].
+    pub(crate) fn dt(&self) -> f64 {
+        self.dt
+    }
+
     /// Save the state of all ranks, gathered before, as that of one.
     pub(crate) fn save_all(
-        &mut self,
+        &self,
         archive: &mut Archive,
         mut fields: Fields,
         mut counters: Counters,
         mut work: Option<Ledger>,
+        mut dt: f64,
     ) -> Result<()> {
         let fluid = self.share.as_ref().map_or(0, |share| share.all().fluid);
         let (fields, counters) = (&mut fields, &mut counters);
-        let saved = Saved { fluid, fields, counters, work: work.as_mut(), dt: &mut self.dt, lists: None };
+        let saved = Saved { fluid, fields, counters, work: work.as_mut(), dt: &mut dt, lists: None };
         saved.exchange(archive).map(drop)
     }
 
