@@ -5,19 +5,27 @@ use common::*;
 use glam::DVec3;
 use seixo::Error;
 use seixo::backend::Counters;
-use seixo::case::Case;
+use seixo::case::{Case, OutputField};
 use seixo::checkpoint::Archive;
 use seixo::fields::Fields;
 use seixo::ledger::{Entry, Ledger};
 use seixo::monitor::FluidMonitor;
 use seixo::on_ranks::serve;
+use seixo::output::folder::series_in;
+use seixo::output::particles::Particles;
+use seixo::output::replay::{Frame, frames, particles};
+use seixo::output::result::Status;
 use seixo::params::Params;
 use seixo::plan::Plan;
 use seixo::ranks::Standing;
 use seixo::ranks::threads::team;
+use seixo::run::resume::{Standing as Left, standing};
+use seixo::run::{Finished, Options, Start, run};
 use seixo::scene::Scene;
 use seixo::share::Outlook;
 use seixo::simulation::Simulation;
+use seixo::stop::Stop;
+use std::path::Path;
 use std::sync::Arc;
 
 /// What `of` says of a simulation of `case` on `ranks` threads, and how these stand then.
@@ -84,7 +92,11 @@ fn apart(a: &Fields, b: &Fields) -> [f64; 3] {
 /// A flume round periodic y: viscous water, a sill, a gate that rises, a ball under water, an absorber, a body that floats and one that sinks
 /// across the tank, friction, gauges, and the ledger.
 fn flume(more: &str) -> Case {
-    case(&format!(
+    case(&flume_text(more))
+}
+
+fn flume_text(more: &str) -> String {
+    format!(
         "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0.5, -9.81]\n\
          [fluid]\nviscosity = 1e-3\nsound_speed = 5\njitter = 0.1\n{more}\n\
          [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.6, 0.4]\n\
@@ -99,7 +111,7 @@ fn flume(more: &str) -> Case {
          [gauge]\nevery = 0.01\n[[gauge.force]]\nname = \"sill\"\non = \"sill\"\n\
          [[gauge.level]]\nname = \"level\"\nat = [0.4, 0.3]\n[[gauge.pressure]]\nname = \"floor\"\npoint = [0.3, 0.3, 0]\n\
          [output]\nledger = true\n"
-    ))
+    )
 }
 
 /// What can be seen of a run.
@@ -184,6 +196,17 @@ fn many_ranks_compute_what_one_computes() {
         ("flume", flume(""), 60, [2, 4], 1e-11),
         ("flume, multigrid", flume("solver = { preconditioner = \"multigrid\" }"), 60, [3, 5], 1e-7),
         ("full", full(), 20, [2, 3], 1e-9),
+        // The first and the last rank are neighbours: two on both sides, more with a column each at least.
+        ("ring", ring(1.5, "jitter = 0.1", DRIVEN), 60, [2, 5], 1e-11),
+        (
+            "ring, multigrid",
+            ring(1.5, "jitter = 0.1\nsolver = { preconditioner = \"multigrid\" }", DRIVEN),
+            60,
+            [2, 4],
+            1e-7,
+        ),
+        ("ring of bodies", ring(1.5, "jitter = 0.1", FREE), 60, [2, 3], 1e-11),
+        ("ring, narrow", narrow(), 30, [2, 4], 1e-11),
         ("channel", shipped("channel", &["run.spacing=0.04"]), 90, [2, 3], 1e-8),
     ] {
         let (one, one_fields) = Seen::after(&mut simulation(&case), steps);
@@ -207,6 +230,37 @@ fn many_ranks_compute_what_one_computes() {
     }
 }
 
+/// Water round periodic x: viscous, over a sill, with `velocity` [m/s] across the seam, and `more`.
+fn ring(velocity: f64, fluid: &str, more: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0.5, 0, -9.81]\n\
+         [fluid]\nviscosity = 1e-3\nsound_speed = 5\n{fluid}\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [2.0, 0.6, 0.4]\nvelocity = [{velocity}, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [2.0, 0.6, 1.0]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n\
+         [[obstacle]]\nname = \"sill\"\nmin = [1.2, 0, 0]\nmax = [1.3, 0.6, 0.1]\n{more}\
+         [gauge]\nevery = 0.01\n[[gauge.force]]\nname = \"sill\"\non = \"sill\"\n\
+         [[gauge.level]]\nname = \"level\"\nat = [0.0, 0.3]\n[[gauge.pressure]]\nname = \"floor\"\npoint = [2.0, 0.3, 0]\n\
+         [output]\nledger = true\n"
+    ))
+}
+
+/// A block that is driven through the water across the seam. (Free bodies may not come there on any number of ranks.)
+const DRIVEN: &str = "[[moving_wall]]\nname = \"plunger\"\nmin = [0.05, 0.2, 0.1]\nmax = [0.25, 0.4, 0.3]\nmotion = [[0, 0, 0, 0], [1, -3, 0, 0]]\n";
+
+/// A body in the water and one on it, which cross the cut between two ranks in both directions.
+const FREE: &str = "[[body]]\nname = \"floats\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.2, 0.52]\ndensity = 500\nvelocity = [-2, 0, -0.5]\n\
+                    [[body]]\nname = \"sinks\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [0.9, 0.45, 0.2]\ndensity = 3000\nvelocity = [2, 0, 0]\n\
+                    displaces_fluid = true\n[contact]\nspring = 1e5\nfriction = 0.3\n";
+
+/// A ring of four columns of cells.
+fn narrow() -> Case {
+    case(
+        "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\nsound_speed = 5\njitter = 0.2\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.9, 1, 0.5]\nvelocity = [-2, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.9, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n",
+    )
+}
+
 /// A closed tank full of water round a body that is heavier: no free surface.
 fn full() -> Case {
     case(
@@ -219,6 +273,9 @@ fn full() -> Case {
 
 #[test]
 fn a_run_repeats_to_the_last_bit_whatever_the_threads_of_its_ranks() {
+    let around = ring(1.5, "jitter = 0.1\nsolver = { preconditioner = \"multigrid\" }", DRIVEN);
+    let two = || on_ranks(&around, 2, |s| Seen::after(s, 30)).0.0;
+    assert_eq!(two(), two());
     let case = flume("solver = { preconditioner = \"multigrid\" }");
     let run = || on_ranks(&case, 3, |s| Seen::after(s, 30)).0.0;
     let first = run();
@@ -281,8 +338,10 @@ fn plan_tells_what_ranks_have_and_say() {
             3,
         ),
         (shipped("dam_break_2d", &[]), 4),
+        (ring(0.0, "solver = { preconditioner = \"multigrid\" }", FREE), 3),
     ] {
         let scene = Scene::build(&case).expect("it builds");
+        let around = scene.periodic.is_along(0);
         let params = Params::new(&case, &scene).expect("valid");
         let told = Outlook::new(ranks, &scene, &params, &Plan::new(&case, &scene, &params)).expect("told");
         let stand = |steps| {
@@ -299,7 +358,7 @@ fn plan_tells_what_ranks_have_and_say() {
                 (part.columns, part.water, part.copies, part.walls),
                 (a.columns, a.water, a.copies, a.walls)
             );
-            let beside = u64::from(k > 0) + u64::from(k + 1 < ranks);
+            let beside = u64::from(k > 0 || around) + u64::from(k + 1 < ranks || around);
             assert_eq!(
                 b.messages - a.messages,
                 beside * (3 * told.messages[0] + iterations * told.messages[1])
@@ -307,7 +366,7 @@ fn plan_tells_what_ranks_have_and_say() {
             assert_eq!(b.rounds - a.rounds, 3 * told.rounds[0] + iterations * told.rounds[1]);
         }
         let bytes: u64 = second.iter().zip(&first).map(|(b, a)| b.message_bytes - a.message_bytes).sum();
-        let sides = 2 * (ranks as u64 - 1);
+        let sides = 2 * (ranks as u64 - u64::from(!around));
         let most = sides * (3 * told.message_bytes[0] + iterations * told.message_bytes[1])
             + 3 * told.round_bytes[0]
             + iterations * told.round_bytes[1];
@@ -329,9 +388,11 @@ fn memory_is_shared() {
 
 #[test]
 fn a_state_goes_on_on_any_number_of_ranks() {
-    for (case, tolerance) in
-        [(shipped("dam_break_transport", &["run.spacing=0.03"]), 1e-9), (flume(""), 1e-4)]
-    {
+    for (case, tolerance) in [
+        (shipped("dam_break_transport", &["run.spacing=0.03"]), 1e-9),
+        (flume(""), 1e-4),
+        (ring(1.5, "jitter = 0.1", FREE), 1e-4),
+    ] {
         let save = |s: &mut Simulation| {
             let mut archive = Archive::new();
             s.exchange(&mut archive).expect("saved");
@@ -366,6 +427,53 @@ fn a_state_goes_on_on_any_number_of_ranks() {
     }
 }
 
+#[test]
+fn what_ranks_keep_in_memory_is_the_state_of_that_moment() {
+    for case in [flume(""), ring(1.5, "jitter = 0.1", DRIVEN)] {
+        let ((kept, saved, later), _) = on_ranks(&case, 3, |s| {
+            let state = |s: &mut Simulation, mut archive: Archive| {
+                s.exchange(&mut archive).expect("saved");
+                archive
+            };
+            steps(s, 10);
+            // Another one before it, which it takes the place of.
+            state(s, Archive::in_memory());
+            steps(s, 15);
+            let (mut kept, saved) = (state(s, Archive::in_memory()), state(s, Archive::new()));
+            assert!(!kept.sections.contains_key("position") && saved.sections.contains_key("position"));
+            // Cut anew meanwhile, if the water is.
+            steps(s, 20);
+            s.backend.lead().expect("many").complete(&mut kept).expect("gathered");
+            (kept, saved, state(s, Archive::new()))
+        });
+        assert_eq!(kept.numbers, saved.numbers);
+        for (name, section) in &saved.sections {
+            assert!(kept.sections.get(name) == Some(section), "{name}");
+        }
+        assert_eq!(kept.sections.len(), saved.sections.len());
+        assert!(later.sections["position"] != kept.sections["position"]);
+    }
+}
+
+#[test]
+fn ranks_that_diverge_leave_the_last_good_state_and_that_in_which_it_was_found() {
+    let text = flume_text("")
+        .replace("max = [0.8, 0.6, 0.4]", "max = [0.8, 0.6, 0.4]\nvelocity = [0, 0, 400]")
+        + "every = 0.001\n";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let finished = run_on(&text, 3, &out, 1000);
+    let (error, reason) = (finished.error.expect("it diverges"), finished.summary.exit_reason);
+    assert!(finished.summary.status == Status::Diverged && error.exit_code() == 4, "{error}");
+    assert!(reason.contains("is in checkpoint/") && reason.contains("vtu/last_*.vtu"), "{reason}");
+    let last = particles(&out.join("vtu/last_fluid.pvtu")).expect("it is read");
+    assert!(!last.is_empty() && out.join("vtu/last_fluid_2.vtu").exists());
+    let found = seixo::checkpoint::file::newest(&out.join("checkpoint")).expect("read").expect("a state");
+    let mut one = simulation(&case(&text));
+    one.exchange(&mut found.archive.to_restore()).expect("it fits");
+    assert_eq!(one.steps, found.origin.step);
+}
+
 /// What the first of `ranks` that cannot begin says of `case`; one of them, `lacks`, cannot set it up.
 fn refusal(case: &Case, ranks: usize, lacks: Option<usize>) -> String {
     let scene = Arc::new(Scene::build(case).expect("it builds"));
@@ -391,8 +499,8 @@ fn refusal(case: &Case, ranks: usize, lacks: Option<usize>) -> String {
 fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
     let dry = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[[body]]\nname = \"cube\"\nsize = [1, 1, 1]\ncenter = [0, 0, 2]\nmass = 1\n\
                [contact]\nspring = 1e5\n[[obstacle]]\nname = \"floor\"\nmin = [-2, -2, -0.5]\nmax = [2, 2, 0]\n";
-    let periodic = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 1, 0.5]\n\
-                    [tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n";
+    let periodic = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.7, 1, 0.5]\n\
+                    [tank]\nmin = [0, 0, 0]\nmax = [0.7, 1, 1]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n";
     let short = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.2]\n\
                  [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\nopen = [\"z_max\"]\n";
     let near = short
@@ -400,7 +508,12 @@ fn what_ranks_cannot_compute_is_refused_by_all_of_them() {
         .replace("[fluid]", "[fluid]\ncollision_distance = 0.9");
     for (text, ranks, words) in [
         (dry, 2, "there is no water"),
-        (periodic, 2, "along which this one is periodic"),
+        (
+            periodic,
+            2,
+            "only 3 columns of cells along x, of which each rank takes two or more where they meet at both ends",
+        ),
+        (periodic, 4, "4 ranks, but only 3 columns"),
         (short, 30, "30 ranks, but only"),
         (&near, 2, "more than half of run.effective_radius"),
     ] {
@@ -424,4 +537,152 @@ fn a_program_without_mpi_does_not_compute_a_case_many_times() {
     let said = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(2), "{said}");
     assert!(said.contains("one of 4 processes, but this seixo was built without MPI"), "{said}");
+}
+
+/// A run of the case `text` on `ranks` threads, to step `steps`, from where the folder `out` has it.
+fn run_on(text: &str, ranks: usize, out: &Path, steps: u64) -> Finished {
+    let case = case(text);
+    let start = match standing(out, &case).expect("it stands") {
+        Left::Nothing => Start::New,
+        Left::Stopped(found) => Start::Resume(found),
+        other => panic!("{other:?}"),
+    };
+    let (name, out) = ("flume".into(), out.into());
+    let options = Options { name, out, start, steps: Some(steps), ..Options::default() };
+    let go = |simulation: &mut Simulation| {
+        let scene = simulation.scene.clone();
+        run(simulation, &scene, text, options, &Stop::default(), &mut |_| ()).expect("it begins")
+    };
+    if ranks == 1 { go(&mut simulation(&case)) } else { on_ranks(&case, ranks, go).0 }
+}
+
+/// The water of a frame, and the places of its particles in the order of their numbers.
+fn water(frame: &Frame) -> (Particles, Vec<usize>) {
+    let water = particles(frame.fluid.as_deref().expect("a frame with water")).expect("it is read");
+    let mut order: Vec<usize> = (0..water.len()).collect();
+    order.sort_by_key(|&i| water.id[i]);
+    (water, order)
+}
+
+fn near(a: &[f32], b: &[f32], scale: f32) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-5 * scale)
+}
+
+#[test]
+fn ranks_write_pieces_that_are_read_as_the_frame_of_one() {
+    let text = flume_text("")
+        + "every = 0.005\n[[output.series]]\nname = \"corner\"\nevery = 0.01\nkinds = [\"fluid\"]\nfields = [\"id\", \"pressure\"]\n\
+           region = { min = [0, 0, 0], max = [0.3, 0.3, 1] }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let [one, many] = ["one", "many"].map(|name| folder.path().join(name));
+    for (ranks, out) in [(1, &one), (3, &many)] {
+        let finished = run_on(&text, ranks, out, 12);
+        assert!(finished.error.is_none() && finished.summary.frames == 4, "{:?}", finished.error);
+    }
+    let bytes = |file: &str| [&one, &many].map(|root| std::fs::read(root.join("vtu").join(file)).unwrap());
+    let [a, b] = bytes("walls.vtu");
+    assert_eq!(a, b);
+    for (series, count) in [(None, 4), (Some("corner"), 3)] {
+        let list = |root: &Path| match series {
+            None => frames(root, "flume").unwrap(),
+            Some(name) => frames(&series_in(root, name), name).unwrap(),
+        };
+        let (of_one, of_many) = (list(&one), list(&many));
+        assert_eq!((of_one.len(), of_many.len()), (count, count));
+        for (number, (a, b)) in of_one.iter().zip(&of_many).enumerate() {
+            assert_eq!(a.time, b.time);
+            let path = b.fluid.as_deref().unwrap();
+            assert!(path.ends_with(format!("fluid_{number:04}.pvtu")), "{path:?}");
+            assert!(!path.with_extension("vtu").exists());
+            let stem = path.with_extension("").display().to_string();
+            let pieces =
+                [0, 1, 2].map(|rank| particles(format!("{stem}_{rank}.vtu").as_ref()).unwrap().len());
+            // The corner is the first rank's, and the second one's in part.
+            assert_eq!(pieces.map(|n| n > 0), [true, true, series.is_none()], "{pieces:?}");
+            let ((a, a_order), (b, b_order)) = (water(a), water(b));
+            assert_eq!(a.len(), pieces.iter().sum::<usize>());
+            let ids = |of: &Particles, order: &[usize]| order.iter().map(|&i| of.id[i]).collect::<Vec<_>>();
+            assert_eq!(ids(&a, &a_order), ids(&b, &b_order));
+            let pressure =
+                |of: &Particles, order: &[usize]| order.iter().map(|&i| of.pressure[i]).collect::<Vec<_>>();
+            assert!(near(&pressure(&a, &a_order), &pressure(&b, &b_order), 5e3));
+            assert!(number == 0 || pressure(&a, &a_order).iter().any(|&p| p > 1e3));
+            for (&i, &j) in a_order.iter().zip(&b_order) {
+                assert!(near(&a.position[i], &b.position[j], 1.0), "{i} {j}");
+            }
+            assert_eq!(b.has(OutputField::Velocity), series.is_none());
+            assert_eq!(a.has(OutputField::NumberDensity), b.has(OutputField::NumberDensity));
+        }
+        let both = of_one.iter().zip(&of_many).enumerate();
+        for (number, (a, b)) in both.filter(|_| series.is_none()) {
+            let [a, b] = [a, b].map(|frame| particles(frame.solids.as_deref().unwrap()).unwrap());
+            assert_eq!((&a.id, &a.body), (&b.id, &b.body));
+            assert!(near(&a.pressure, &b.pressure, 5e3) && near(&a.number_density, &b.number_density, 1.0));
+            // On the gate, once there is a step.
+            assert_eq!(b.pressure.iter().any(|&p| p > 0.0), number > 0);
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_with_frames_of_another_number_of_ranks() {
+    let text = flume_text("") + "every = 0.003\n";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let has = |name: &str| out.join("vtu").join(name).exists();
+    run_on(&text, 4, &out, 7);
+    // Of the end, where the next part writes one of its own.
+    assert!(has("fluid_0003.pvtu") && has("fluid_0003_3.vtu") && !has("fluid_0003_4.vtu"));
+    run_on(&text, 1, &out, 13);
+    assert!(
+        has("fluid_0003.vtu")
+            && !has("fluid_0003.pvtu")
+            && !has("fluid_0003_0.vtu")
+            && !has("fluid_0003_3.vtu")
+    );
+    assert!(has("fluid_0002.pvtu") && has("fluid_0005.vtu"));
+    run_on(&text, 3, &out, 16);
+    assert!(has("fluid_0005.pvtu") && !has("fluid_0005.vtu") && has("fluid_0006_2.vtu"));
+    run_on(&text, 2, &out, 20);
+    assert!(has("fluid_0006_1.vtu") && !has("fluid_0006_2.vtu"));
+    let frames = frames(&out, "flume").unwrap();
+    let times: Vec<f64> = frames.iter().map(|f| (f.time * 1e3).round()).collect();
+    assert_eq!(times, [0., 3., 6., 9., 12., 15., 18., 20.]);
+    let all: Vec<_> = frames.iter().map(water).collect();
+    let ids =
+        |(water, order): &(Particles, Vec<usize>)| order.iter().map(|&i| water.id[i]).collect::<Vec<_>>();
+    assert!(!all[0].0.is_empty() && all.iter().all(|frame| ids(frame) == ids(&all[0])));
+    // A new run in their place leaves nothing of them.
+    let options = Options {
+        name: "flume".into(),
+        out: out.clone(),
+        start: Start::Replace,
+        steps: Some(1),
+        ..Options::default()
+    };
+    let mut again = simulation(&case(&text));
+    let scene = again.scene.clone();
+    run(&mut again, &scene, &text, options, &Stop::default(), &mut |_| ()).unwrap();
+    let left =
+        std::fs::read_dir(out.join("vtu")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+    assert!(left.into_iter().all(|name| !name.ends_with(".pvtu") && name.matches('_').count() < 2));
+}
+
+#[test]
+fn a_rank_that_cannot_write_ends_the_run_on_all() {
+    let text = flume_text("") + "every = 0.003\n";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    run_on(&text, 3, &out, 2);
+    // A folder in the place of the piece: a rank that may not write there, also as a superuser.
+    let piece = out.join("vtu/fluid_0002_1.vtu");
+    std::fs::create_dir(&piece).unwrap();
+    let finished = run_on(&text, 3, &out, 10);
+    let error = finished.error.expect("it cannot write");
+    assert_eq!(error.to_string(), format!("{}: Is a directory (os error 21)", piece.display()));
+    assert_eq!((error.exit_code(), finished.summary.status, finished.summary.steps), (5, Status::Failed, 6));
+    assert_eq!(frames(&out, "flume").unwrap().len(), 2, "a frame is listed when it is whole");
+    std::fs::remove_dir(&piece).unwrap();
+    assert!(run_on(&text, 3, &out, 7).error.is_none());
+    assert_eq!(frames(&out, "flume").unwrap().len(), 4);
 }

@@ -173,7 +173,7 @@ class Particles:
     def _fields(self) -> dict[str, Array]:
         if not self.path.is_file():
             raise FileNotFoundError(f"{self.path}: not written; `output.kinds` of the case says which particles are")
-        return _vtu(self.path)
+        return _particles(self.path)
 
     def field(self, name: str) -> Array:
         """The field `name` as it is called in the file, e.g. `Velocity`."""
@@ -293,6 +293,23 @@ def _frames(folder: Path) -> list[Frame]:
     return [Frame(time, parts.get("fluid"), parts.get("solids")) for time, parts in found.items()]
 
 
+def _pieces(path: Path) -> list[Path]:
+    """The files of the water that many ranks wrote, of which a PVTU file names one each."""
+    pieces = [Path(item.get("Source", "")) for item in xml.etree.ElementTree.parse(path).iter("Piece")]
+    # A list that somebody changed leads nowhere else.
+    if any(len(piece.parts) != 1 or piece.parts[0] == ".." or piece.suffix != ".vtu" for piece in pieces):
+        raise ValueError(f"{path}: it names a file that is no piece")
+    return [path.parent / piece for piece in pieces]
+
+
+def _particles(path: Path) -> dict[str, Array]:
+    """Points and fields of a VTU file, or of all pieces that a PVTU file names."""
+    if path.suffix != ".pvtu":
+        return _vtu(path)
+    parts = [_vtu(piece) for piece in _pieces(path)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
 def _vtu(path: Path) -> dict[str, Array]:
     """Points and fields of a VTU file, by whichever library is there."""
     try:
@@ -308,8 +325,14 @@ def _vtu(path: Path) -> dict[str, Array]:
         raise ImportError("frames are read by pyvista or meshio: `pip install meshio` or `pip install pyvista`") from None
     with path.open("rb") as file:
         # The head of a file stands before its arrays.
-        if b'<AppendedData encoding="raw">' in file.read(1 << 14):
-            raise ImportError(f'{path}: `output.encoding = "raw"` is read by pyvista alone: `pip install pyvista`')
+        head = file.read(1 << 14).decode("latin-1")
+    if 'NumberOfPoints="0"' in head:
+        # meshio reads no file without points: a region without water, or a rank's piece of it.
+        arrays = re.findall(r'<DataArray type="(\w+)" Name="(\w+)" NumberOfComponents="(\d)" format="appended"', head)
+        empty = {name: np.empty((0, 3) if size == "3" else 0, np.dtype(of.lower())) for of, name, size in arrays}
+        return {name: values for name, values in empty.items() if name not in ("connectivity", "offsets", "types")}
+    if '<AppendedData encoding="raw">' in head:
+        raise ImportError(f'{path}: `output.encoding = "raw"` is read by pyvista alone: `pip install pyvista`')
     mesh = meshio.read(path)
     # It keeps a column of fields with one component.
     fields = {name: values.reshape(-1) if values.shape[1:] == (1,) else values for name, values in mesh.point_data.items()}

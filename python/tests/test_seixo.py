@@ -6,6 +6,7 @@ from __future__ import annotations
 import builtins
 import importlib.util
 import runpy
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -96,6 +97,32 @@ def test_frames_are_read_when_asked_for(run: seixo.Run) -> None:
     assert set(frames[0].solids.body) == {1, 2} and len(run.walls) > 50
     with pytest.raises(KeyError, match="there are: .*Velocity"):
         water.field("Vorticity")
+
+
+def test_pieces_of_many_ranks_are_read_as_one(run: seixo.Run, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(run.path, folder)
+    pieces = ["fluid_0000.vtu", "fluid_0001.vtu"]
+    lines = "".join(f'<Piece Source="{piece}"/>' for piece in pieces)
+    text = f'<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid>{lines}</PUnstructuredGrid></VTKFile>'
+    (folder / "vtu/fluid_0002.pvtu").write_text(text, encoding="utf-8")
+    [listed] = folder.glob("*.pvd")
+    listed.write_text(listed.read_text(encoding="utf-8").replace("fluid_0002.vtu", "fluid_0002.pvtu"), encoding="utf-8")
+    frames = seixo.read(folder).frames
+    parts, water = [frame.fluid for frame in frames[:2]], frames[2].fluid
+    for name in ["position", "velocity", "pressure", "id"]:
+        assert np.array_equal(getattr(water, name), np.concatenate([getattr(part, name) for part in parts]))
+    assert len(water) == 2 * len(parts[0]) and water.velocity.any()
+    (folder / "vtu/fluid_0002.pvtu").write_text(text.replace(pieces[0], "../../fluid_0000.vtu"), encoding="utf-8")
+    with pytest.raises(ValueError, match="no piece"):
+        _ = seixo.read(folder).frames[2].fluid.position
+
+
+def test_a_region_without_water_has_a_frame_of_nothing(tmp_path: Path) -> None:
+    dry = {"min": [1.0, 0.0, 0.5], "max": [1.2, 0.1, 0.9]}
+    out = seixo.run(CASE, tmp_path / "out", backend="cpu", steps=2, set={"output.region": dry})
+    water = out.frames[0].fluid
+    assert (len(water), water.velocity.shape, water.pressure.shape) == (0, (0, 3), (0,))
 
 
 def test_options_change_the_case_and_the_run(tmp_path: Path) -> None:

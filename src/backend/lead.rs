@@ -11,6 +11,7 @@ use crate::fields::Fields;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
+use crate::output::pieces::Pieces;
 use crate::params::Step;
 use crate::plan::ParticleStage;
 use crate::pressure::PressureReport;
@@ -34,6 +35,10 @@ enum Order<'a> {
     Monitor,
     Pressures(Cow<'a, [usize]>),
     Read,
+    ReadWalls,
+    WritePieces(Cow<'a, Pieces>),
+    Keep,
+    Recall,
     Restore,
     Ranks,
     End,
@@ -43,12 +48,49 @@ enum Order<'a> {
 pub struct Lead {
     team: Arc<dyn Team>,
     cpu: Cpu,
+    /// Whether it was seen that what the others write is where the first rank sees it.
+    seen: bool,
+    /// What belongs to the particles that the ranks keep.
+    kept: Option<(Counters, Option<Ledger>, f64)>,
 }
 
 impl Lead {
     /// With its own part of the particles, `cpu`; the others [`follow`].
     pub fn new(team: Arc<dyn Team>, cpu: Cpu) -> Self {
-        Self { team, cpu }
+        Self { team, cpu, seen: false, kept: None }
+    }
+
+    /// Have all ranks write their water as `pieces` says, and write the file that names these.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] of the first rank that could not.
+    pub fn write_pieces(&mut self, pieces: &Pieces) -> Result<()> {
+        self.order(&Order::WritePieces(Cow::Borrowed(pieces)));
+        let bytes = self.cpu.write_piece(pieces)?;
+        if !self.seen {
+            pieces.are_seen(&bytes)?;
+            self.seen = true;
+        }
+        pieces.write_list(self.team.ranks())
+    }
+
+    /// Pressures [Pa] and number densities [-] of the wall layers, in the order of their slots.
+    pub fn read_walls(&mut self) -> [Vec<f64>; 2] {
+        self.order(&Order::ReadWalls);
+        self.cpu.read_walls()
+    }
+
+    /// Put the particles that the ranks have kept into `archive`, the state in memory that was made last.
+    ///
+    /// # Errors
+    /// What the archive says.
+    pub fn complete(&mut self, archive: &mut Archive) -> Result<()> {
+        let Some((counters, work, dt)) = self.kept.take() else { return Ok(()) };
+        self.order(&Order::Recall);
+        match self.cpu.recall() {
+            Some(fields) => self.cpu.save_all(archive, fields, counters, work, dt),
+            None => Ok(()),
+        }
     }
 
     fn order(&self, order: &Order) {
@@ -138,12 +180,24 @@ impl Backend for Lead {
 
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         if archive.is_saving() {
-            let (counters, work, fields) = (self.counters()?, self.ledger()?, self.read()?);
-            return self.cpu.save_all(archive, fields, counters, work);
+            let (counters, work, dt) = (self.counters()?, self.ledger()?, self.cpu.dt());
+            if !archive.is_lasting() && self.team.ranks() > 1 {
+                // In memory: each rank keeps its own, which is gathered if the state is asked for.
+                self.order(&Order::Keep);
+                self.cpu.keep();
+                self.kept = Some((counters, work, dt));
+                return Ok(());
+            }
+            let fields = self.read()?;
+            return self.cpu.save_all(archive, fields, counters, work, dt);
         }
         // A state that does not fit is refused before the others hear of it.
         let fields = self.cpu.read_all(archive)?;
         self.write(&fields)
+    }
+
+    fn lead(&mut self) -> Option<&mut Lead> {
+        (self.team.ranks() > 1).then_some(self)
     }
 
     fn ranks(&mut self) -> Result<Vec<Standing>> {
@@ -185,6 +239,11 @@ pub fn follow(cpu: &mut Cpu) -> Result<()> {
             Order::Monitor => drop(cpu.monitor()?),
             Order::Pressures(slots) => drop(cpu.wall_pressures(&slots)?),
             Order::Read => drop(cpu.read()?),
+            Order::ReadWalls => drop(cpu.read_walls()),
+            Order::Keep => cpu.keep(),
+            Order::Recall => drop(cpu.recall()),
+            // The first rank hears of what went wrong here, and ends the run.
+            Order::WritePieces(pieces) => drop(cpu.write_piece(&pieces)),
             Order::Ranks => drop(cpu.ranks()?),
             Order::Restore => cpu.restore(None)?,
             Order::End => return Ok(()),

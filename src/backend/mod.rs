@@ -6,6 +6,7 @@ pub mod lead;
 mod processor;
 pub mod traffic;
 
+use self::lead::Lead;
 use self::traffic::Traffic;
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
@@ -237,6 +238,10 @@ pub trait Backend: Send {
     fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>>;
     /// All fields, on the host.
     fn read(&mut self) -> Result<Fields>;
+    /// The first of many ranks, each of which can write its own water; nothing where there is one.
+    fn lead(&mut self) -> Option<&mut Lead> {
+        None
+    }
     /// Overwrite all fields (positions, velocities, kinds, ids, pressures).
     fn write(&mut self, fields: &Fields) -> Result<()>;
     /// Save the whole state between two steps, to the last bit, or take it over; on the same kind of backend.

@@ -7,7 +7,6 @@ use crate::fields::Fields;
 use crate::scene::Kind;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Particles by cell: those of cell c are `start[c]..start[c + 1]`.
 #[derive(Clone, Default, Debug)]
@@ -19,24 +18,33 @@ pub struct CellList {
 }
 
 /// Stable counting sort: `start[c]` gets the first place of cell c, `order[p]` the particle that goes to place p.
-/// Particles with cell `cells` (ghosts) come last.
+/// Particles with cell `cells` (ghosts) come last. Only the cells from the first to the last one with a particle are summed: few, of a rank of many.
 pub fn counting_sort(cell: &[u32], cells: usize, start: &mut Vec<u32>, order: &mut Vec<u32>) {
     start.clear();
     start.resize(cells + 2, 0);
+    let (mut first, mut end) = (cells, 0);
     for &c in cell {
-        start[c as usize + 1] += 1;
+        let c = c as usize;
+        start[c + 1] += 1;
+        if c < cells {
+            (first, end) = (first.min(c), end.max(c + 1));
+        }
     }
-    for c in 0..=cells {
+    let first = first.min(end);
+    for c in first..end {
         start[c + 1] += start[c];
     }
+    let live = start[end];
+    start[end..=cells].fill(live);
     order.resize(cell.len(), 0);
-    // `start[c]` serves as the cursor of cell c; afterwards every entry has moved one cell on.
+    // `start[c]` serves as the cursor of cell c; afterwards every entry with particles has moved one cell on.
     for (k, &c) in cell.iter().enumerate() {
         order[start[c as usize] as usize] = k as u32;
         start[c as usize] += 1;
     }
-    start.copy_within(0..=cells, 1);
-    start[0] = 0;
+    start.copy_within(first..end, first + 1);
+    start[first] = 0;
+    start[cells] = live;
     start.truncate(cells + 1);
 }
 
@@ -131,7 +139,7 @@ fn permute<T: Copy + Send + Sync>(values: &mut [T], order: &[u32], scratch: &mut
 }
 
 /// Mark every cell within one cell of a cell that holds fluid, which all lies in `columns` along x: only walls there can feel or be felt.
-pub fn mark_near_fluid(grid: &Grid, start: &[u32], columns: Range<u32>, near: &mut Vec<bool>) {
+pub fn mark_near_fluid(grid: &Grid, start: &[u32], columns: impl Iterator<Item = u32>, near: &mut Vec<bool>) {
     near.clear();
     near.resize(grid.total(), false);
     let [_, ny, nz] = grid.count;
@@ -143,6 +151,35 @@ pub fn mark_near_fluid(grid: &Grid, start: &[u32], columns: Range<u32>, near: &m
                 if start[c] < start[c + 1] {
                     for column in grid.columns([x, y, z]) {
                         near[column.first..=column.last].fill(true);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sort_is_that_of_all_cells_wherever_the_particles_lie() {
+        let random = |k: usize| k * 7919 % 104_729;
+        for cells in [1_usize, 2, 9, 40] {
+            for (low, high) in [(0, cells), (cells / 2, cells), (0, cells.div_ceil(2)), (cells - 1, cells)] {
+                for ghosts in [0, 3] {
+                    for count in [0, 1, 50] {
+                        let live = (0..count).map(|k| (low + random(k) % (high - low)) as u32);
+                        let mut cell: Vec<u32> =
+                            live.chain(std::iter::repeat_n(cells as u32, ghosts)).collect();
+                        cell.rotate_left(ghosts / 2);
+                        let (mut start, mut order) = (vec![7; 3], vec![7; 3]);
+                        counting_sort(&cell, cells, &mut start, &mut order);
+                        let before = |c: usize| cell.iter().filter(|&&own| (own as usize) < c).count() as u32;
+                        assert_eq!(start, (0..=cells).map(before).collect::<Vec<_>>());
+                        let mut plain: Vec<u32> = (0..cell.len() as u32).collect();
+                        plain.sort_by_key(|&k| cell[k as usize]);
+                        assert_eq!(order, plain);
                     }
                 }
             }

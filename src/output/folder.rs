@@ -179,10 +179,20 @@ impl Folder {
             let number = file.strip_prefix(before).and_then(|f| f.strip_suffix(after));
             number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
         };
+        // Of many ranks: `fluid_0007.pvtu` names `fluid_0007_0.vtu` and so on.
+        let piece = |file: &str| {
+            let parts = file.strip_suffix(".vtu").and_then(|stem| stem.rsplit_once('_'));
+            parts.is_some_and(|(stem, rank)| {
+                let of_frame = stem == "last_fluid" || numbered(stem, "fluid_", "");
+                of_frame && !rank.is_empty() && rank.bytes().all(|b| b.is_ascii_digit())
+            })
+        };
         let frame = |file: &str| {
-            ["walls.vtu", "last_fluid.vtu", "last_solids.vtu"].contains(&file)
+            ["walls.vtu", "last_fluid.vtu", "last_fluid.pvtu", "last_solids.vtu"].contains(&file)
                 || numbered(file, "fluid_", ".vtu")
+                || numbered(file, "fluid_", ".pvtu")
                 || numbered(file, "solids_", ".vtu")
+                || piece(file)
                 || file.starts_with(UNFINISHED)
         };
         self.remove(&self.vtu(), frame)?;

@@ -5,6 +5,7 @@
 //! | `case.toml` | at the start | the case with all overrides applied |
 //! | `NAME.pvd` | after every frame | the list of frames, for ParaView |
 //! | `vtu/fluid_0000.vtu`, `vtu/solids_0000.vtu` | every frame | particles |
+//! | `vtu/fluid_0000.pvtu`, `vtu/fluid_0000_0.vtu` ... | every frame on many ranks | the water: the list of its pieces, one a rank |
 //! | `vtu/walls.vtu` | once | particles that never move, at t = 0 |
 //! | `vtu/last_fluid.vtu`, `vtu/last_solids.vtu` | when a run diverges | the state in which it was found |
 //! | `series/NAME/NAME.pvd`, `series/NAME/vtu/` | every frame of it | the same of each `[[output.series]]` |
@@ -21,6 +22,7 @@ pub mod folder;
 pub mod label;
 pub mod particles;
 pub mod picture;
+pub mod pieces;
 pub mod pvd;
 pub mod render;
 pub mod replay;

@@ -6,6 +6,7 @@ use crate::case::{Encoding, OutputField, OutputRegion};
 use crate::fields::Fields;
 use crate::scene::{Kind, Scene};
 use glam::DVec3;
+use std::ops::Range;
 
 /// Particles of a file or of a picture, one entry a particle in each array; an array that a file does not hold is empty.
 #[derive(Clone, Default, Debug)]
@@ -26,6 +27,31 @@ pub struct Particles {
     pub id: Vec<u32>,
 }
 
+/// What the pressure-carrying slots of solids tell.
+#[derive(Clone, Copy, Debug)]
+pub struct Carried<'a> {
+    /// The slot that the first number is of.
+    pub first: usize,
+    /// Pressures [Pa].
+    pub pressure: &'a [f64],
+    /// Particle number densities n, Eq. (4) [-].
+    pub number_density: &'a [f64],
+}
+
+impl<'a> Carried<'a> {
+    /// That of all particles.
+    pub fn of(fields: &'a Fields) -> Self {
+        Self { first: 0, pressure: &fields.pressure, number_density: &fields.number_density }
+    }
+
+    /// Pressure and number density of a slot; dummies carry neither.
+    fn at(&self, slot: usize) -> (f64, f64) {
+        let get =
+            |values: &[f64]| slot.checked_sub(self.first).and_then(|k| values.get(k)).copied().unwrap_or(0.0);
+        (get(self.pressure), get(self.number_density))
+    }
+}
+
 fn single(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
@@ -43,26 +69,31 @@ impl Particles {
 
     /// The water. Particles that were taken out are left out; the others keep their `id`.
     pub fn fluid(scene: &Scene, fields: &Fields) -> Self {
+        Self::water(fields, 0..scene.groups.fluid.min(fields.kind.len()), |x| x)
+    }
+
+    /// The water in `slots`, each particle where `place` has it.
+    pub fn water(fields: &Fields, slots: Range<usize>, place: impl Fn(DVec3) -> DVec3) -> Self {
         let mut out = Self::default();
-        for i in 0..scene.groups.fluid.min(fields.kind.len()) {
+        for i in slots {
             if fields.kind[i] == Kind::Fluid {
                 let of = (fields.pressure[i], fields.number_density[i]);
                 let id = fields.id[i] as usize;
-                out.push((fields.position[i], fields.velocity[i]), of, Kind::Fluid, 0, id);
+                out.push((place(fields.position[i]), fields.velocity[i]), of, Kind::Fluid, 0, id);
             }
         }
         out
     }
 
-    /// Bodies and moving walls in these poses, wall layers first; `inside` adds their dummies. `fields` holds
+    /// Bodies and moving walls in these poses, wall layers first; `inside` adds their dummies. `carried` holds
     /// the pressures, if the scene is wet.
-    pub fn solids(scene: &Scene, poses: &[Pose], fields: Option<&Fields>, inside: bool) -> Self {
+    pub fn solids(scene: &Scene, poses: &[Pose], carried: Option<Carried>, inside: bool) -> Self {
         let mut out = Self::default();
         for (k, (solid, pose)) in scene.solids.iter().zip(poses).enumerate() {
             let mut push = |offset: DVec3, slot: usize| {
                 let arm = pose.orientation * offset;
                 let at = (pose.position + arm, pose.velocity + pose.angular_velocity.cross(arm));
-                let of = fields.map_or((0.0, 0.0), |f| carried(f, slot));
+                let of = carried.map_or((0.0, 0.0), |c| c.at(slot));
                 out.push(at, of, scene.kind[slot], k as u32 + 1, slot);
             };
             solid.wall_slots.clone().zip(&solid.wall_offset).for_each(|(slot, &offset)| push(offset, slot));
@@ -78,12 +109,12 @@ impl Particles {
     }
 
     /// Walls that never move: their wall layer if `wall`, the layers behind it if `dummy`.
-    pub fn walls(scene: &Scene, fields: Option<&Fields>, wall: bool, dummy: bool) -> Self {
+    pub fn walls(scene: &Scene, carried: Option<Carried>, wall: bool, dummy: bool) -> Self {
         let mut out = Self::default();
         let layer = scene.groups.static_wall_range();
         for slot in scene.groups.static_range() {
             if if layer.contains(&slot) { wall } else { dummy } {
-                let of = fields.map_or((0.0, 0.0), |f| carried(f, slot));
+                let of = carried.map_or((0.0, 0.0), |c| c.at(slot));
                 out.push((scene.position[slot], DVec3::ZERO), of, scene.kind[slot], 0, slot);
             }
         }
@@ -117,7 +148,8 @@ impl Particles {
         vtu(&self.position, &arrays, time, encoding)
     }
 
-    fn values(&self, field: OutputField) -> Values<'_> {
+    /// The values of `field`.
+    pub(super) fn values(&self, field: OutputField) -> Values<'_> {
         match field {
             OutputField::Velocity => Values::Vector(&self.velocity),
             OutputField::Pressure => Values::Scalar(&self.pressure),
@@ -131,6 +163,17 @@ impl Particles {
     /// Whether `field` is known of them: a file need not hold it.
     pub fn has(&self, field: OutputField) -> bool {
         self.is_empty() || self.values(field).len() == self.len()
+    }
+
+    /// Puts those of another file behind these.
+    pub(super) fn append(&mut self, other: Self) {
+        self.position.extend(other.position);
+        self.velocity.extend(other.velocity);
+        self.pressure.extend(other.pressure);
+        self.number_density.extend(other.number_density);
+        self.kind.extend(other.kind);
+        self.body.extend(other.body);
+        self.id.extend(other.id);
     }
 
     /// Number of particles.
@@ -154,10 +197,4 @@ pub fn name(field: OutputField) -> &'static str {
         OutputField::Body => "Body",
         OutputField::Id => "Id",
     }
-}
-
-/// Pressure and number density of a slot; dummies carry neither.
-fn carried(fields: &Fields, slot: usize) -> (f64, f64) {
-    let get = |values: &[f64]| values.get(slot).copied().unwrap_or(0.0);
-    (get(&fields.pressure), get(&fields.number_density))
 }

@@ -40,8 +40,7 @@ pub fn frames(root: &Path, name: &str) -> Result<Vec<Frame>> {
             frames.push(Frame { time, ..Frame::default() });
         }
         // A list that somebody changed leads nowhere else.
-        let inside = Path::new(file).components().all(|c| matches!(c, std::path::Component::Normal(_)));
-        if let Some(frame) = frames.last_mut().filter(|_| inside) {
+        if let Some(frame) = frames.last_mut().filter(|_| is_inside(Path::new(file))) {
             match part {
                 "fluid" => frame.fluid = Some(root.join(file)),
                 "solids" => frame.solids = Some(root.join(file)),
@@ -52,14 +51,46 @@ pub fn frames(root: &Path, name: &str) -> Result<Vec<Frame>> {
     Ok(frames)
 }
 
-/// The particles of a file.
+/// The particles of a file, or of all pieces that a PVTU file names.
 ///
 /// # Errors
 /// [`Error::Io`], also for a file that is damaged or that another program wrote.
 pub fn particles(path: &Path) -> Result<Particles> {
     let bytes = std::fs::read(path).map_err(Error::io(path))?;
     let wrong = |why: String| Error::io(path)(std::io::Error::new(std::io::ErrorKind::InvalidData, why));
-    parse(&bytes).map_err(wrong)
+    if path.extension().is_none_or(|end| end != "pvtu") {
+        return parse(&bytes).map_err(wrong);
+    }
+    let text = String::from_utf8(bytes).map_err(|_| wrong("it is no text".into()))?;
+    if !text.trim_end().ends_with("</VTKFile>") {
+        return Err(wrong("it is cut off".into()));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let sources = text.lines().filter(|line| line.contains("<Piece "));
+    let pieces: Vec<Particles> = sources
+        .map(|line| {
+            let source = attribute(line, "Source").map(Path::new);
+            // A list that somebody changed leads nowhere else, and to no other list.
+            let file = source.filter(|file| file.components().count() == 1 && is_inside(file));
+            let file = file.filter(|file| file.extension().is_some_and(|end| end == "vtu"));
+            particles(&folder.join(file.ok_or_else(|| wrong("it names a file that is no piece".into()))?))
+        })
+        .collect::<Result<_>>()?;
+    let fields = |of: &Particles| OutputField::ALL.map(|field| of.has(field));
+    let mut filled = pieces.iter().filter(|piece| !piece.is_empty()).map(fields);
+    if let Some(first) = filled.next()
+        && filled.any(|other| other != first)
+    {
+        return Err(wrong("its pieces hold different fields".into()));
+    }
+    let mut all = Particles::default();
+    pieces.into_iter().for_each(|piece| all.append(piece));
+    Ok(all)
+}
+
+/// Whether a file lies below the folder that its name is relative to.
+fn is_inside(file: &Path) -> bool {
+    file.components().all(|c| matches!(c, std::path::Component::Normal(_)))
 }
 
 fn attribute<'a>(line: &'a str, name: &str) -> Option<&'a str> {
@@ -248,6 +279,37 @@ mod tests {
             );
             assert!(read.velocity.is_empty() && read.kind.is_empty() && !read.has(OutputField::Velocity));
             assert!(read.has(OutputField::Pressure) && Particles::default().has(OutputField::Velocity));
+        }
+    }
+
+    #[test]
+    fn a_list_of_pieces_leads_to_them_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let put =
+            |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).expect("written");
+        let bytes = |n: usize, fields: &[OutputField]| some(n).vtu(0.5, Encoding::Base64, fields);
+        put("a_0.vtu", &bytes(3, &OutputField::ALL));
+        put("a_1.vtu", &bytes(0, &OutputField::ALL));
+        put("a_2.vtu", &bytes(4, &OutputField::ALL));
+        put("a_3.vtu", &bytes(4, &[OutputField::Id]));
+        let read = |sources: &[&str], end: &str| {
+            let lines: String = sources.iter().map(|s| format!("    <Piece Source=\"{s}\"/>\n")).collect();
+            put("a.pvtu", format!("{lines}{end}").as_bytes());
+            particles(&folder.path().join("a.pvtu"))
+        };
+        let all = read(&["a_0.vtu", "a_1.vtu", "a_2.vtu"], "</VTKFile>\n").expect("sound");
+        assert_eq!(all.position, [some(3).position, some(4).position].concat());
+        assert_eq!((all.velocity.len(), all.kind.len(), all.body.len()), (7, 7, 7));
+        for (sources, end, why) in [
+            (&["a_0.vtu"][..], "", "cut off"),
+            (&["a_0.vtu", "../a_2.vtu"], "</VTKFile>", "no piece"),
+            (&["/a_0.vtu"], "</VTKFile>", "no piece"),
+            (&["a.pvtu"], "</VTKFile>", "no piece"),
+            (&["a_0.vtu", "a_3.vtu"], "</VTKFile>", "different fields"),
+            (&["a_0.vtu", "a_4.vtu"], "</VTKFile>", "a_4.vtu: "),
+        ] {
+            let error = read(sources, end).expect_err("refused").to_string();
+            assert!(error.contains(why), "{error}");
         }
     }
 

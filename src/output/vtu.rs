@@ -50,7 +50,8 @@ impl Values<'_> {
         }
     }
 
-    fn type_name(&self) -> &'static str {
+    /// The type of a component, as the format calls it.
+    pub(super) fn type_name(&self) -> &'static str {
         match self {
             Self::Vector(_) | Self::Scalar(_) => "Float32",
             Self::Byte(_) => "UInt8",
@@ -59,7 +60,8 @@ impl Values<'_> {
         }
     }
 
-    fn components(&self) -> usize {
+    /// Components of a value.
+    pub(super) fn components(&self) -> usize {
         if matches!(self, Self::Vector(_)) { 3 } else { 1 }
     }
 }

@@ -28,14 +28,24 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> T {
     postcard::from_bytes(bytes).unwrap_or_else(|e| panic!("ranks of different programs: {e}"))
 }
 
+/// The ranks before and after `rank` of `ranks`, in a `ring` or in a row.
+fn beside(rank: usize, ranks: usize, ring: bool) -> [Option<usize>; 2] {
+    let around = |other: usize| Some(other).filter(|_| ring && ranks > 1);
+    [
+        rank.checked_sub(1).or_else(|| around(ranks - 1)),
+        Some(rank + 1).filter(|&r| r < ranks).or_else(|| around(0)),
+    ]
+}
+
 /// The ranks of a run, as one of them sees them. Every call is made by all of them, in the same order.
 pub trait Team: Send + Sync {
     /// Number of this one, from 0.
     fn rank(&self) -> usize;
     /// How many there are.
     fn ranks(&self) -> usize;
-    /// Hand `left` to the rank before this one and `right` to the one after it; returns what these hand over, nothing at the ends.
-    fn swap(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2];
+    /// Hand `left` to the rank before this one and `right` to the one after it; returns what these hand over, nothing at the ends. In a
+    /// `ring` the first and the last one are neighbours as well, of two each is the other's on both sides.
+    fn swap(&self, left: Vec<u8>, right: Vec<u8>, ring: bool) -> [Vec<u8>; 2];
     /// What each has to say, in the order of the ranks.
     fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>>;
     /// The same, for the first rank alone; the others get nothing.

@@ -1,6 +1,6 @@
 //! Ranks that are processes under MPI.
 
-use super::Team;
+use super::{Team, beside};
 use mpi::Count;
 use mpi::datatype::PartitionMut;
 use mpi::environment::Universe;
@@ -50,18 +50,18 @@ impl Team for Processes {
         self.world.size() as usize
     }
 
-    fn swap(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
-        let rank = self.world.rank();
-        let beside = [rank - 1, rank + 1].map(|r| (0..self.world.size()).contains(&r).then_some(r));
+    fn swap(&self, left: Vec<u8>, right: Vec<u8>, ring: bool) -> [Vec<u8>; 2] {
+        let beside = beside(self.rank(), self.ranks(), ring).map(|rank| rank.map(|r| r as i32));
         let [mut before, mut after] = [Vec::new(), Vec::new()];
         mpi::request::scope(|scope| {
             let a = beside[0].map(|r| self.world.process_at_rank(r).immediate_send(scope, &left[..]));
             let b = beside[1].map(|r| self.world.process_at_rank(r).immediate_send(scope, &right[..]));
-            if let Some(r) = beside[0] {
-                before = self.world.process_at_rank(r).receive_vec::<u8>().0;
-            }
+            // In a ring of two the other's first message is what it hands to its left: to the right of this one. MPI keeps their order.
             if let Some(r) = beside[1] {
                 after = self.world.process_at_rank(r).receive_vec::<u8>().0;
+            }
+            if let Some(r) = beside[0] {
+                before = self.world.process_at_rank(r).receive_vec::<u8>().0;
             }
             [a, b].into_iter().flatten().for_each(|request| {
                 request.wait();

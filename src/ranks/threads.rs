@@ -1,6 +1,6 @@
 //! Ranks that are threads of one process: for tests, and for looking at what ranks say to each other without MPI.
 
-use super::Team;
+use super::{Team, beside};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 
@@ -50,11 +50,14 @@ impl Team for Thread {
         self.to.len()
     }
 
-    fn swap(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
-        let (before, after) = (self.rank.checked_sub(1), Some(self.rank + 1).filter(|&r| r < self.ranks()));
+    fn swap(&self, left: Vec<u8>, right: Vec<u8>, ring: bool) -> [Vec<u8>; 2] {
+        let [before, after] = beside(self.rank, self.ranks(), ring);
         before.into_iter().for_each(|rank| self.give(rank, left.clone()));
         after.into_iter().for_each(|rank| self.give(rank, right.clone()));
-        [before, after].map(|rank| rank.map_or_else(Vec::new, |rank| self.take(rank)))
+        // In a ring of two the other's first message is what it hands to its left: to the right of this one.
+        let [from_after, from_before] =
+            [after, before].map(|rank| rank.map_or_else(Vec::new, |rank| self.take(rank)));
+        [from_before, from_after]
     }
 
     fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>> {

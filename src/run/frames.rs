@@ -6,8 +6,9 @@ use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::output::folder::{Folder, series_in};
-use crate::output::particles::Particles;
+use crate::output::particles::{Carried, Particles};
 use crate::output::picture::{Painter, Style, drops, placed};
+use crate::output::pieces::{self, Pieces};
 use crate::output::pvd::Pvd;
 use crate::output::write_whole;
 use crate::params::Params;
@@ -166,14 +167,15 @@ impl Frames {
         let named: Vec<bool> = self.each().map(|series| now(series) && series.every > 0.0).collect();
         let pictures = self.picture.is_some() && named[0];
         let asked = self.each().zip(&named).any(|(series, now)| *now && series.reads());
+        let carried = self.each().zip(&named).any(|(series, now)| *now && series.carries());
         // Once for all of them; where nothing of it is shown a device is not waited for.
-        let fields = if asked || pictures { read(simulation)? } else { None };
+        let present = Present::new(simulation, asked, carried, pictures)?;
         let number = self.main.written;
         for (series, _) in self.each().zip(&named).filter(|(_, now)| **now) {
-            series.write(simulation, scene, fields.as_ref())?;
+            series.write(simulation, scene, &present)?;
         }
         if let Some(picture) = self.picture.as_ref().filter(|_| pictures) {
-            let png = paint(picture, simulation, scene, fields.as_ref());
+            let png = paint(picture, simulation, scene, present.fields.as_ref());
             write_whole(&self.folder.pictures().join(format!("frame_{number:04}.png")), &png)?;
         }
         Ok(named[0])
@@ -184,11 +186,8 @@ impl Frames {
     /// # Errors
     /// [`Error::Io`], or what the backend says when it is read.
     pub(crate) fn write_last(&self, simulation: &mut Simulation, scene: &Scene) -> Result<()> {
-        let fields = read(simulation)?;
-        for (name, particles) in self.main.moving(simulation, scene, fields.as_ref()) {
-            self.main.put(&format!("vtu/last_{name}.vtu"), &particles, simulation.time)?;
-        }
-        Ok(())
+        let present = Present::new(simulation, true, self.main.carries(), false)?;
+        self.main.put_moving(simulation, scene, &present, |name| format!("last_{name}")).map(drop)
     }
 
     /// Write `final.png`, if there are pictures.
@@ -234,43 +233,62 @@ impl Series {
         self.fluid || carried.iter().any(|field| self.fields.contains(field))
     }
 
+    /// Whether they hold of solids what the scene and their poses do not tell.
+    fn carries(&self) -> bool {
+        let carried = [OutputField::Pressure, OutputField::NumberDensity];
+        let walls = self.walls != (false, false) && self.written == 0;
+        (self.solids || walls) && carried.iter().any(|field| self.fields.contains(field))
+    }
+
     /// Write the next frame.
-    fn write(&mut self, simulation: &Simulation, scene: &Scene, fields: Option<&Fields>) -> Result<()> {
+    fn write(&mut self, simulation: &mut Simulation, scene: &Scene, present: &Present) -> Result<()> {
         let (number, time) = (self.written, simulation.time);
         let mut parts = Vec::new();
         if self.walls != (false, false) {
             let file = "vtu/walls.vtu".to_string();
             if number == 0 {
-                let walls = Particles::walls(scene, fields, self.walls.0, self.walls.1);
+                let walls = Particles::walls(scene, present.carried(), self.walls.0, self.walls.1);
                 self.put(&file, &self.cut(walls, scene), time)?;
             }
             parts.push(("walls", file));
         }
-        for (name, particles) in self.moving(simulation, scene, fields) {
-            let file = format!("vtu/{name}_{number:04}.vtu");
-            self.put(&file, &particles, time)?;
-            parts.push((name, file));
-        }
+        parts.extend(self.put_moving(simulation, scene, present, |name| format!("{name}_{number:04}"))?);
         self.pvd.push(time, &parts)?;
         self.written += 1;
         self.fresh = Some(simulation.steps);
         Ok(())
     }
 
-    fn moving(
+    /// Writes what moves to files that are called as `name` has it, without their ending; returns these files.
+    fn put_moving(
         &self,
-        simulation: &Simulation,
+        simulation: &mut Simulation,
         scene: &Scene,
-        fields: Option<&Fields>,
-    ) -> Vec<(&'static str, Particles)> {
+        present: &Present,
+        name: impl Fn(&str) -> String,
+    ) -> Result<Vec<(&'static str, String)>> {
+        let time = simulation.time;
         let mut parts = Vec::new();
-        if let Some(fields) = fields.filter(|_| self.fluid) {
-            parts.push(("fluid", self.cut(Particles::fluid(scene, fields), scene)));
+        let stem = format!("vtu/{}", name("fluid"));
+        let path = self.root.join(&stem);
+        if let Some(lead) = simulation.backend.lead().filter(|_| self.fluid) {
+            let flat = scene.dimensions == 2;
+            let pieces = Pieces::new(&path, time, self.encoding, &self.fields, self.region, flat);
+            lead.write_pieces(&pieces)?;
+            parts.push(("fluid", format!("{stem}.pvtu")));
+        } else if let Some(fields) = present.fields.as_ref().filter(|_| self.fluid) {
+            let file = format!("{stem}.vtu");
+            self.put(&file, &self.cut(Particles::fluid(scene, fields), scene), time)?;
+            pieces::replace(&path)?;
+            parts.push(("fluid", file));
         }
         if self.solids {
-            parts.push(("solids", Particles::solids(scene, simulation.solids.poses(), fields, true)));
+            let file = format!("vtu/{}.vtu", name("solids"));
+            let particles = Particles::solids(scene, simulation.solids.poses(), present.carried(), true);
+            self.put(&file, &particles, time)?;
+            parts.push(("solids", file));
         }
-        parts
+        Ok(parts)
     }
 
     /// What lies in the region of the output.
@@ -289,6 +307,39 @@ impl Series {
             fields.extend([OutputField::Body, OutputField::Id]);
         }
         write_whole(&path, &particles.vtu(time, self.encoding, &fields))
+    }
+}
+
+/// What is read of a state for its frames.
+#[derive(Default)]
+struct Present {
+    /// All particles, where one rank has them, or a picture shows them.
+    fields: Option<Fields>,
+    /// Else pressures and number densities of the wall layers, if they are shown, and the slot of the first.
+    walls: Option<(usize, [Vec<f64>; 2])>,
+}
+
+impl Present {
+    /// That of `simulation`, of which frames show anything but poses if `asked`, pressures of solids if `carried`, and `pictures` all.
+    fn new(simulation: &mut Simulation, asked: bool, carried: bool, pictures: bool) -> Result<Self> {
+        let first = simulation.groups.fluid;
+        // Many ranks write the water themselves.
+        match simulation.backend.lead() {
+            Some(lead) if !pictures => {
+                let walls = carried.then(|| (first, lead.read_walls()));
+                Ok(Self { fields: None, walls })
+            }
+            _ if asked || pictures => Ok(Self { fields: read(simulation)?, walls: None }),
+            _ => Ok(Self::default()),
+        }
+    }
+
+    fn carried(&self) -> Option<Carried<'_>> {
+        if let Some(fields) = &self.fields {
+            return Some(Carried::of(fields));
+        }
+        let (first, [pressure, number_density]) = self.walls.as_ref()?;
+        Some(Carried { first: *first, pressure, number_density })
     }
 }
 

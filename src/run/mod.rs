@@ -162,6 +162,11 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
+/// A state in memory is without the particles of many ranks, each of which keeps its own until it is wanted.
+fn complete(simulation: &mut Simulation, archive: &mut Archive) -> Result<()> {
+    simulation.backend.lead().map_or(Ok(()), |lead| lead.complete(archive))
+}
+
 enum End {
     Time,
     Steps,
@@ -332,8 +337,9 @@ impl Run {
             Ok(()) => "; the state is in vtu/last_*.vtu".to_owned(),
             Err(e) => format!("; its state could not be written: {e}"),
         };
-        if let Some((step, time, archive)) = self.saving.good.take()
-            && let Err(e) = self.saving.write(step, time, &archive)
+        if let Some((step, time, mut archive)) = self.saving.good.take()
+            && let Err(e) =
+                complete(simulation, &mut archive).and_then(|()| self.saving.write(step, time, &archive))
         {
             said.push_str(&format!("; the last good state could not be written: {e}"));
         } else if let Some(step) = self.saving.step {

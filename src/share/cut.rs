@@ -4,17 +4,28 @@ use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::params::Params;
 
+/// Columns that a rank takes at least. Of two ranks round a tank that is periodic along x each shows the other its first and its last column:
+/// these are to be two, or one and the same would be there twice.
+fn least(ranks: usize, params: &Params) -> usize {
+    if ranks == 2 && params.periodic.is_along(0) { 2 } else { 1 }
+}
+
 /// Cuts `load`, of each column, into shares that are about even: the first column of each rank, and the end of the last one's.
-pub(super) fn cut(load: &[u64], ranks: usize) -> Vec<u32> {
+pub(super) fn cut(load: &[u64], ranks: usize, params: &Params) -> Vec<u32> {
+    shares(load, ranks, least(ranks, params))
+}
+
+fn shares(load: &[u64], ranks: usize, least: usize) -> Vec<u32> {
     let total: u64 = load.iter().sum();
     let mut cuts = vec![0];
     let (mut column, mut sum) = (0, 0);
     for rank in 1..ranks {
         let wanted = total as f64 * rank as f64 / ranks as f64;
-        // Each rank has a column at least, those after this one as well.
-        let most = load.len() - (ranks - rank);
+        // Each rank has so many columns, those after this one as well.
+        let most = load.len() - (ranks - rank) * least;
         while column < most
-            && (column <= *cuts.last().unwrap_or(&0) || sum as f64 + 0.5 * load[column] as f64 <= wanted)
+            && (column < *cuts.last().unwrap_or(&0) + least
+                || sum as f64 + 0.5 * load[column] as f64 <= wanted)
         {
             sum += load[column];
             column += 1;
@@ -28,18 +39,16 @@ pub(super) fn cut(load: &[u64], ranks: usize) -> Vec<u32> {
 /// Refuses ranks that cannot share a tank.
 pub(super) fn check(ranks: usize, params: &Params, grid: &Grid) -> Result<()> {
     let columns = grid.count[0] as usize;
-    if params.periodic.is_along(0) && ranks > 1 {
-        let text = "ranks cut the tank across x, along which this one is periodic: run it on one rank";
-        return Err(Error::usage("ranks", text));
-    }
     if ranks > 1 && 2.0 * params.collision_distance > params.effective_radius {
         let text = "ranks: fluid.collision_distance is more than half of run.effective_radius, and who collides beyond a cut is not \
                     seen: take a larger run.effective_radius, or run it on one rank";
         return Err(Error::usage("ranks", text));
     }
-    if ranks > columns {
+    let least = least(ranks, params);
+    if ranks * least > columns {
+        let takes = if least == 1 { "one or more" } else { "two or more where they meet at both ends" };
         let text = format!(
-            "{ranks} ranks, but only {columns} columns of cells along x, of which each rank takes one or more: use fewer"
+            "{ranks} ranks, but only {columns} columns of cells along x, of which each rank takes {takes}: use fewer"
         );
         return Err(Error::usage("ranks", text));
     }
@@ -60,14 +69,17 @@ mod tests {
 
     #[test]
     fn shares_are_even_and_no_rank_is_without_a_column() {
-        assert_eq!(cut(&[5; 12], 4), [0, 3, 6, 9, 12]);
-        assert_eq!(cut(&[9, 0, 0, 0], 4), [0, 1, 2, 3, 4]);
-        assert_eq!(cut(&[0, 0, 0, 9], 4), [0, 1, 2, 3, 4]);
-        assert_eq!(cut(&[0; 5], 2).len(), 3);
-        assert_eq!(cut(&[4, 4, 4, 0, 0, 0, 0, 0], 2), [0, 2, 8]);
+        assert_eq!(shares(&[5; 12], 4, 1), [0, 3, 6, 9, 12]);
+        assert_eq!(shares(&[9, 0, 0, 0], 4, 1), [0, 1, 2, 3, 4]);
+        assert_eq!(shares(&[0, 0, 0, 9], 4, 1), [0, 1, 2, 3, 4]);
+        assert_eq!(shares(&[0; 5], 2, 1).len(), 3);
+        assert_eq!(shares(&[4, 4, 4, 0, 0, 0, 0, 0], 2, 1), [0, 2, 8]);
+        for load in [[9, 0, 0, 0], [0, 0, 0, 9]] {
+            assert_eq!(shares(&load, 2, 2), [0, 2, 4]);
+        }
         let load: Vec<u64> = (0..50).map(|k| 1000 + 37 * k % 400).collect();
         for ranks in 1..20 {
-            let cuts = cut(&load, ranks);
+            let cuts = shares(&load, ranks, 1);
             assert!(cuts.windows(2).all(|c| c[0] < c[1]) && cuts[0] == 0 && cuts[ranks] == 50, "{cuts:?}");
             // To half a column.
             assert!(unevenness(&load, &cuts) < 1.0 + 0.6 * ranks as f64 / 50.0 * 1.4, "{ranks}: {cuts:?}");

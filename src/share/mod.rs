@@ -3,7 +3,8 @@
 //!
 //! | copies of the last column of the rank before | own | copies of the first column of the rank after |
 //!
-//! and these copies are in the order of their owner, as both sort the same sequence by cell. Solids come behind the water as on a
+//! and these copies are in the order of their owner, as both sort the same sequence by cell. Where the tank is periodic along x the ranks are a
+//! ring: the first one's copies of the last column of all come behind the others, the last one's of the first column in front. Solids come behind the water as on a
 //! single rank: every rank knows where they are, and computes the rows of those in its own columns.
 
 mod border;
@@ -31,6 +32,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
+use whole::Kept;
 
 /// What a rank computes, and what it hands to those beside it.
 pub struct Share {
@@ -43,6 +45,8 @@ pub struct Share {
     corner: DVec3,
     /// Cells of a column: of one number along x.
     per_column: usize,
+    /// Whether the first and the last rank are neighbours: the tank is periodic along x.
+    ring: bool,
     /// First column of each rank, and the end of the last one's.
     cuts: Vec<u32>,
     /// Slots of the water that this rank computes.
@@ -56,6 +60,8 @@ pub struct Share {
     /// Positions of the pressure-carrying slots at the search [m], by which they are this rank's.
     searched: Vec<DVec3>,
     steps: u64,
+    /// A state of late, see [`Self::keep`].
+    kept: Option<Kept>,
     /// Messages to the ranks beside this one, their bytes, rounds of all ranks, and nanoseconds in both so far.
     said: [AtomicU64; 4],
 }
@@ -64,18 +70,20 @@ impl Share {
     /// That of a rank of `team`, in a scene of `all` these particles.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] if there are more ranks than columns of cells, or the tank is periodic along x.
+    /// [`crate::Error::Usage`] if there are more ranks than columns of cells.
     pub fn new(team: Arc<dyn Team>, params: &Params, all: Groups, grid: &Grid) -> Result<Self> {
         check(team.ranks(), params, grid)?;
         Ok(Self {
             sides: [None, None],
             walls: vec![false; all.pressure() - all.fluid],
             per_column: grid.total() / grid.count[0] as usize,
+            ring: params.periodic.is_along(0) && team.ranks() > 1,
             cuts: Vec::new(),
             own: 0..0,
             come_in: Vec::new(),
             searched: Vec::new(),
             steps: 0,
+            kept: None,
             said: Default::default(),
             team,
             corner: params.domain_min,
@@ -148,13 +156,27 @@ impl Share {
     }
 
     /// Columns of cells along x with water that this rank computes or has copies of.
-    pub fn columns_seen(&self) -> Range<u32> {
+    pub fn columns_seen(&self) -> impl Iterator<Item = u32> {
+        self.columns().chain(self.beyond().into_iter().flatten())
+    }
+
+    /// The columns before and after those of this rank, of which it has copies.
+    fn beyond(&self) -> [Option<u32>; 2] {
         let (mine, end) = (self.columns(), self.cuts.last().copied().unwrap_or(0));
-        mine.start.saturating_sub(1)..(mine.end + 1).min(end)
+        [
+            mine.start.checked_sub(1).or(self.ring.then_some(end.saturating_sub(1))),
+            Some(mine.end).filter(|&c| c < end).or(self.ring.then_some(0)),
+        ]
     }
 
     fn columns(&self) -> Range<u32> {
         self.cuts[self.rank()]..self.cuts[self.rank() + 1]
+    }
+
+    /// Its first and its last column.
+    fn ends(&self) -> [u32; 2] {
+        let mine = self.columns();
+        [mine.start, mine.end - 1]
     }
 
     /// What this rank holds, `bytes` of it in all, and said so far.
@@ -189,10 +211,10 @@ impl Share {
     }
 
     fn pass(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
-        let beside = u64::from(self.rank() > 0) + u64::from(self.rank() + 1 < self.ranks());
-        self.said[0].fetch_add(beside, Relaxed);
+        let beside = self.beyond().into_iter().flatten().count();
+        self.said[0].fetch_add(beside as u64, Relaxed);
         self.said[1].fetch_add((left.len() + right.len()) as u64, Relaxed);
-        self.timed(|team| team.swap(left, right))
+        self.timed(|team| team.swap(left, right, self.ring))
     }
 
     /// What every rank has to say, in the order of the ranks.
@@ -274,11 +296,9 @@ impl Share {
 
     /// Borders of what else lies in columns of cells: `of` tells what is in one, in an order that the ranks beside know as well.
     pub fn borders(&self, of: impl Fn(u32) -> Vec<u32>) -> [Option<Side>; 2] {
-        let mine = self.columns();
         let side = |give: u32, take: u32| Side::of(of(give), of(take));
-        [
-            (self.rank() > 0).then(|| side(mine.start, mine.start - 1)),
-            (self.rank() + 1 < self.ranks()).then(|| side(mine.end - 1, mine.end)),
-        ]
+        let [before, after] = self.beyond();
+        let [first, last] = self.ends();
+        [before.map(|beyond| side(first, beyond)), after.map(|beyond| side(last, beyond))]
     }
 }

@@ -29,12 +29,12 @@ pub struct Traveller {
 
 impl Share {
     /// Cuts the tank by all water, and tells which slots of it this rank takes.
-    pub fn choose(&mut self, position: &[DVec3], kind: &[Kind], grid: &Grid) -> Vec<usize> {
+    pub fn choose(&mut self, position: &[DVec3], kind: &[Kind], grid: &Grid, params: &Params) -> Vec<usize> {
         let column = |i: usize| grid.coordinates(position[i])[0];
         let mut load = vec![0; grid.count[0] as usize];
         let water = || (0..self.all.fluid).filter(|&i| kind[i] == Kind::Fluid);
         water().for_each(|i| load[column(i) as usize] += 1);
-        let cuts = cut(&load, self.ranks());
+        let cuts = cut(&load, self.ranks(), params);
         let mine = cuts[self.rank()]..cuts[self.rank() + 1];
         let own = water().filter(|&i| mine.contains(&column(i))).collect();
         self.cuts = cuts;
@@ -46,7 +46,7 @@ impl Share {
         self.groups = groups;
         self.own = 0..own;
         self.come_in.clear();
-        self.sides = [self.rank() > 0, self.rank() + 1 < self.ranks()].map(|there| there.then(Side::default));
+        self.sides = self.beyond().map(|there| there.map(|_| Side::default()));
         let mine = self.columns();
         for (owned, x) in self.walls.iter_mut().zip(&fields.position[groups.fluid..]) {
             *owned = mine.contains(&grid.coordinates(*x)[0]);
@@ -102,7 +102,7 @@ impl Share {
         let mut own: Vec<Traveller> = there.map(traveller).collect();
         come_in.into_iter().for_each(|i| self.park(fields, i..i + 1));
         if self.steps.is_multiple_of(LOOK_EVERY) && self.steps > 0 {
-            self.cut_anew(&own, fields, column);
+            self.cut_anew(&own, fields, column, params);
         }
         self.steps += 1;
         let domain = (params.domain_min, params.domain_max);
@@ -117,7 +117,7 @@ impl Share {
                 let c = column(t.position);
                 let goes = !mine.contains(&c) && !stays(t);
                 if goes {
-                    let to = if c < mine.start { &mut left } else { &mut right };
+                    let to = if self.is_before(c) { &mut left } else { &mut right };
                     to.extend_from_slice(bytemuck::bytes_of(t));
                 }
                 !goes
@@ -132,15 +132,26 @@ impl Share {
                 break;
             }
         }
-        let mine = self.columns();
         let border = |c: u32| {
             let at = own.iter().filter(|t| column(t.position) == c && !stays(t));
             bytemuck::cast_slice(&at.copied().collect::<Vec<_>>()).to_vec()
         };
-        let [before, after] = self.pass(border(mine.start), border(mine.end - 1));
+        let [first, last] = self.ends();
+        let [before, after] = self.pass(border(first), border(last));
         let [before, after] =
             [before, after].map(|bytes| bytemuck::pod_collect_to_vec::<u8, Traveller>(&bytes));
         [before, own, after].concat()
+    }
+
+    /// Whether the way to `column`, of another rank, goes by the rank before this one: in a ring the shorter way.
+    fn is_before(&self, column: u32) -> bool {
+        let mine = self.columns();
+        if !self.ring {
+            return column < mine.start;
+        }
+        let all = self.cuts.last().copied().unwrap_or(0);
+        let (left, right) = ((mine.start + all - column) % all, (column + all - mine.end) % all + 1);
+        left < right
     }
 
     /// Puts what is `here` into the slots of the water, of which the first `live` held some before.
@@ -156,12 +167,18 @@ impl Share {
     }
 
     /// Cuts the tank anew if the shares have become uneven. Walls that change hands take their pressures along.
-    fn cut_anew(&mut self, own: &[Traveller], fields: &mut Fields, column: impl Fn(DVec3) -> u32) {
+    fn cut_anew(
+        &mut self,
+        own: &[Traveller],
+        fields: &mut Fields,
+        column: impl Fn(DVec3) -> u32,
+        params: &Params,
+    ) {
         let mut load = vec![0.0; *self.cuts.last().unwrap_or(&0) as usize];
         own.iter().for_each(|t| load[column(t.position) as usize] += 1.0);
         self.sum(&mut load);
         let load: Vec<u64> = load.into_iter().map(|n| n as u64).collect();
-        let cuts = cut(&load, self.ranks());
+        let cuts = cut(&load, self.ranks(), params);
         if unevenness(&load, &self.cuts) < UNEVEN || unevenness(&load, &cuts) >= unevenness(&load, &self.cuts)
         {
             return;
@@ -200,11 +217,9 @@ impl Share {
         self.own = water(mine.clone());
         let walls = |c: u32| walls_of(c..c + 1);
         let mut sides = self.borders(walls);
-        let ends = [mine.start..mine.start + 1, mine.end - 1..mine.end];
-        for (k, (side, end)) in sides.iter_mut().zip(ends).enumerate() {
-            if let Some(side) = side {
-                let beyond = if k == 0 { end.start - 1..end.start } else { end.end..end.end + 1 };
-                (side.give, side.take) = (water(end), water(beyond));
+        for ((side, end), beyond) in sides.iter_mut().zip(self.ends()).zip(self.beyond()) {
+            if let Some((side, beyond)) = side.as_mut().zip(beyond) {
+                (side.give, side.take) = (water(end..end + 1), water(beyond..beyond + 1));
             }
         }
         self.sides = sides;

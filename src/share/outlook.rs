@@ -57,10 +57,12 @@ impl Outlook {
         let is_water = |i: &usize| scene.kind[*i] == Kind::Fluid;
         (0..groups.fluid).filter(is_water).for_each(|i| water[column(&scene.position[i])] += 1);
         scene.position[groups.fluid..groups.pressure()].iter().for_each(|x| walls[column(x)] += 1);
-        let cuts = cut(&water, ranks);
+        let cuts = cut(&water, ranks, params);
+        let ring = params.periodic.is_along(0) && ranks > 1;
         let parts = cuts.windows(2).map(|c| {
             let [from, to] = [c[0] as usize, c[1] as usize];
-            let beside = [from.checked_sub(1), Some(to).filter(|&c| c < columns)];
+            let before = from.checked_sub(1).or(ring.then_some(columns - 1));
+            let beside = [before, Some(to).filter(|&c| c < columns).or(ring.then_some(0))];
             Taken {
                 columns: [c[0], c[1]],
                 water: water[from..to].iter().sum::<u64>() as usize,
@@ -68,9 +70,9 @@ impl Outlook {
                 walls: walls[from..to].iter().sum::<u64>() as usize,
             }
         });
-        let border = |c: &u32| [*c as usize - 1, *c as usize];
-        let inner = &cuts[1..cuts.len() - 1];
-        let most = |of: &[u64]| inner.iter().flat_map(border).map(|c| of[c]).max().unwrap_or(0);
+        let border = |c: &u32| [(*c as usize + columns - 1) % columns, *c as usize];
+        let meet = if ring { &cuts[..ranks] } else { &cuts[1..ranks] };
+        let most = |of: &[u64]| meet.iter().flat_map(border).map(|c| of[c]).max().unwrap_or(0);
         let (water_at, carriers_at) = (most(&water), most(&water) + most(&walls));
         let count = |stages: &[Stage]| stages.iter().filter(|&&s| plan.has(s)).count() as u64;
         let motions = count(&[Stage::Viscosity, Stage::WallFriction, Stage::Collision]);

@@ -3,7 +3,7 @@
 use super::Share;
 use crate::fields::{Fields, State};
 use crate::ranks::{decode, encode};
-use crate::scene::Kind;
+use crate::scene::{Groups, Kind};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,14 @@ struct Part {
     state: Vec<u8>,
 }
 
+/// What a rank has of the state of an earlier moment.
+pub(super) struct Kept {
+    /// Its [`Part`] of the particles, encoded.
+    part: Vec<u8>,
+    /// On the first rank, positions and velocities of the solids that move; the others stay where they are.
+    moving: Vec<[DVec3; 2]>,
+}
+
 /// All particles, for every rank to take its own from.
 #[derive(Serialize, Deserialize)]
 struct Whole {
@@ -37,10 +45,14 @@ struct Whole {
     dt: f64,
 }
 
+/// Slots of the solids that move.
+fn moving(groups: &Groups) -> impl Iterator<Item = usize> {
+    groups.moving_wall_range().chain(groups.moving_dummy_range())
+}
+
 impl Share {
-    /// The fields of all ranks in one, as a single rank would hold them but for the order within a cell. On the first rank
-    /// only: the others get none.
-    pub fn gather_fields(&self, fields: &Fields) -> Option<Fields> {
+    /// What this rank has of `fields`, encoded.
+    fn part(&self, fields: &Fields) -> Vec<u8> {
         let carriers = |values: &[f64]| -> Vec<f64> { self.owned().map(|i| values[i]).collect() };
         let own = self.own();
         let part = Part {
@@ -61,11 +73,42 @@ impl Share {
                 .collect(),
             state: self.owned().map(|i| fields.state[i] as u8).collect(),
         };
-        let parts = self.collect(encode(&part));
+        encode(&part)
+    }
+
+    /// The fields of all ranks in one, as a single rank would hold them but for the order within a cell. On the first rank
+    /// only: the others get none.
+    pub fn gather_fields(&self, fields: &Fields) -> Option<Fields> {
+        let parts = self.collect(self.part(fields));
+        (self.rank() == 0).then(|| self.join(&parts, self.blank(fields)))
+    }
+
+    /// Keeps what this rank has of the state as it is now, in the place of what it kept before.
+    pub fn keep(&mut self, fields: &Fields) {
+        // Two at a time would be one too many: they may be large.
+        self.kept = None;
+        let first = self.rank() == 0;
+        let moving = moving(&self.groups).filter(|_| first);
+        let moving = moving.map(|i| [fields.position[i], fields.velocity[i]]).collect();
+        self.kept = Some(Kept { part: self.part(fields), moving });
+    }
+
+    /// The fields of all ranks as they were when they were kept, on the first rank; the others get none. They are kept no longer.
+    pub fn gather_kept(&mut self, fields: &Fields) -> Option<Fields> {
+        let kept = self.kept.take()?;
+        let parts = self.collect(kept.part);
         if self.rank() > 0 {
             return None;
         }
         let mut out = self.blank(fields);
+        for (i, [x, v]) in moving(&self.all).zip(kept.moving) {
+            (out.position[i], out.velocity[i]) = (x, v);
+        }
+        Some(self.join(&parts, out))
+    }
+
+    /// `out`, in which the solids are, with what the `parts` of all ranks hold.
+    fn join(&self, parts: &[Vec<u8>], mut out: Fields) -> Fields {
         let mut n = 0;
         for part in parts.iter().map(|bytes| decode::<Part>(bytes)) {
             let water = part.ids.len();
@@ -88,7 +131,24 @@ impl Share {
             n += water;
         }
         self.name_the_rest(&mut out, n);
-        Some(out)
+        out
+    }
+
+    /// Pressures and number densities of the wall layers, in the order of their slots. On the first rank only: the others get none.
+    pub fn gather_walls(&self, fields: &Fields) -> [Vec<f64>; 2] {
+        let walls = self.owned().skip(self.own.len());
+        let part =
+            walls.map(|i| ((i - self.groups.fluid) as u32, [fields.pressure[i], fields.number_density[i]]));
+        let parts = self.collect(encode(&part.collect::<Vec<_>>()));
+        if self.rank() > 0 {
+            return Default::default();
+        }
+        let count = self.all.pressure() - self.all.fluid;
+        let mut out = [vec![0.0; count], vec![0.0; count]];
+        for (k, values) in parts.iter().flat_map(|bytes| decode::<Vec<(u32, [f64; 2])>>(bytes)) {
+            out.iter_mut().zip(values).for_each(|(out, value)| out[k as usize] = value);
+        }
+        out
     }
 
     /// Fields of all ranks without their water; solids are where they are in `fields`.

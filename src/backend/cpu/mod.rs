@@ -242,8 +242,14 @@ impl Cpu {
             }
         }
         if self.active_set {
-            let columns = share.as_ref().map_or(0..grid.count[0], |share| share.columns_seen());
-            cell_list::mark_near_fluid(grid, fluid_start, columns, &mut self.near_fluid);
+            match share {
+                Some(share) => {
+                    cell_list::mark_near_fluid(grid, fluid_start, share.columns_seen(), &mut self.near_fluid);
+                }
+                None => {
+                    cell_list::mark_near_fluid(grid, fluid_start, 0..grid.count[0], &mut self.near_fluid);
+                }
+            }
         } else {
             self.near_fluid.clear();
             self.near_fluid.resize(grid.total(), true);
@@ -355,8 +361,16 @@ impl Cpu {
         let Self { fields, neighbours, params, groups, .. } = self;
         let Fields { position, velocity, state, pressure, surface_pressure, .. } = fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
-        surface_pressure.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(i, p)| {
-            *p = surface_pressure::surface_pressure(i, neighbours.pressure(i), state, on, pressure);
+        let chunks = surface_pressure.par_chunks_mut(CHUNK).zip(&neighbours.chunks).enumerate();
+        chunks.for_each(|(c, (values, chunk))| {
+            if chunk.is_dry() {
+                // Most walls: nothing is beside them.
+                return values.fill(0.0);
+            }
+            for (k, p) in values.iter_mut().enumerate() {
+                let i = c * CHUNK + k;
+                *p = surface_pressure::surface_pressure(i, chunk.pressure(k), state, on, pressure);
+            }
         });
         if let Some(share) = &self.share {
             share.swap(&mut [&mut &mut surface_pressure[..]]);

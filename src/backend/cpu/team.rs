@@ -10,10 +10,12 @@ use crate::fields::{Fields, State};
 use crate::kernels::openings::Emission;
 use crate::ledger::Ledger;
 use crate::neighbours::Neighbours;
+use crate::output::particles::Particles;
+use crate::output::pieces::{Pieces, Told};
 use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
-use crate::ranks::{Standing, Team};
+use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::{Kind, Scene};
 use crate::share::Share;
 use glam::DVec3;
@@ -51,7 +53,7 @@ impl Cpu {
         }
         let grid = Grid::new(params)?;
         let mut share = Share::new(team, params, scene.groups, &grid)?;
-        let own = share.choose(&scene.position, &scene.kind, &grid);
+        let own = share.choose(&scene.position, &scene.kind, &grid, params);
         let slots = room(own.len(), scene.groups.fluid);
         let mut cpu = Self::new(&scene.part(&own, slots, &[]), params, plan, settings)?;
         cpu.fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
@@ -163,17 +165,56 @@ impl Cpu {
         emissions.iter().map(of).collect()
     }
 
+    /// Write the water of this rank as `pieces` says; returns the bytes of each rank's file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] of the first rank that could not, on all of them.
+    pub(crate) fn write_piece(&self, pieces: &Pieces) -> Result<Vec<u64>> {
+        let Some(share) = &self.share else { return Ok(Vec::new()) };
+        let water = Particles::water(&self.fields, share.own(), |x| self.params.periodic.wrap(x));
+        let told = Told::new(pieces.write(share.rank(), water));
+        share.gather(encode(&told)).iter().map(|bytes| decode::<Told>(bytes).bytes()).collect()
+    }
+
+    /// Pressures and number densities of the wall layers of all ranks; the first one gets them.
+    pub(crate) fn read_walls(&self) -> [Vec<f64>; 2] {
+        self.share.as_ref().map_or_else(Default::default, |share| share.gather_walls(&self.fields))
+    }
+
+    /// Keep the particles of this rank as they are now, in memory.
+    pub(crate) fn keep(&mut self) {
+        let Self { share, fields, .. } = self;
+        if let Some(share) = share {
+            share.keep(fields);
+        }
+    }
+
+    /// The particles of all ranks as they were when they were kept; the first one gets them.
+    pub(crate) fn recall(&mut self) -> Option<Fields> {
+        let Self { share, fields, params, .. } = self;
+        let share = share.as_mut()?;
+        let mut kept = share.gather_kept(fields)?;
+        kept.wrap(&share.all(), &params.periodic);
+        Some(kept)
+    }
+
+    /// The last time step [s].
+    pub(crate) fn dt(&self) -> f64 {
+        self.dt
+    }
+
     /// Save the state of all ranks, gathered before, as that of one.
     pub(crate) fn save_all(
-        &mut self,
+        &self,
         archive: &mut Archive,
         mut fields: Fields,
         mut counters: Counters,
         mut work: Option<Ledger>,
+        mut dt: f64,
     ) -> Result<()> {
         let fluid = self.share.as_ref().map_or(0, |share| share.all().fluid);
         let (fields, counters) = (&mut fields, &mut counters);
-        let saved = Saved { fluid, fields, counters, work: work.as_mut(), dt: &mut self.dt, lists: None };
+        let saved = Saved { fluid, fields, counters, work: work.as_mut(), dt: &mut dt, lists: None };
         saved.exchange(archive).map(drop)
     }
 
@@ -202,7 +243,7 @@ impl Cpu {
         }
         let (whole, dt) = share.tell_fields(fields.map(|fields| (fields, self.dt)));
         self.dt = dt;
-        let own = share.choose(&whole.position, &whole.kind, &self.grid);
+        let own = share.choose(&whole.position, &whole.kind, &self.grid, &self.params);
         self.make_room(own.len());
         let Some(share) = self.share.as_mut() else { return Ok(()) };
         share.take_over(&own, &whole, &mut self.fields);
