@@ -1,0 +1,62 @@
+//! Solids: where they are, and the forces on them.
+
+use super::Cpu;
+use super::team::owns;
+use crate::body::slots;
+use crate::body::{Pose, Wrench};
+use crate::fields::State;
+use crate::kernels::{body_force, move_solids};
+use glam::DVec3;
+
+impl Cpu {
+    /// Moves the particles of solids to `poses`.
+    pub(super) fn place_solids(&mut self, poses: &[Pose]) {
+        self.poses.clear();
+        self.poses.extend_from_slice(poses);
+        for (solid, pose) in self.solids.iter().zip(poses) {
+            for (slots, offsets) in
+                [(&solid.wall_slots, &solid.wall_offset), (&solid.dummy_slots, &solid.dummy_offset)]
+            {
+                for (i, &offset) in slots.clone().zip(offsets) {
+                    (self.fields.position[i], self.fields.velocity[i]) =
+                        move_solids::move_solids(pose, offset);
+                }
+            }
+        }
+    }
+
+    /// Force of the water on each solid; what it felt besides pressure is forgotten.
+    pub(super) fn sum_forces(&mut self) -> Vec<Wrench> {
+        let (params, share) = (&self.params, self.share.as_deref());
+        let (fields, fluid) = (&mut self.fields, self.groups.fluid);
+        let wrenches = self.solids.iter().zip(&self.poses).enumerate().map(|(n, (solid, pose))| {
+            let mut slot = slots::of(&self.slots, n);
+            let mut total = Wrench::default();
+            for (k, i) in solid.wall_slots.clone().enumerate() {
+                let own = owns(share, i);
+                let slot = slot(k);
+                let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
+                let to_surface = pose.orientation * solid.wall_to_surface[k];
+                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let mut pressure = 0.0;
+                if own && fields.state[i] == State::Inner {
+                    total.add(fields.pressure[i], &slot.per_pascal);
+                    total += slot.head;
+                    let excess = self.excess.of(i - fluid);
+                    pressure = body_force::surface_pressure(fields.pressure[i], excess, to_surface, params);
+                }
+                let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
+                let force = body_force::body_force(pressure, area, reaction);
+                total.force += force;
+                total.torque += arm.cross(force);
+            }
+            total
+        });
+        let mut wrenches: Vec<Wrench> = wrenches.collect();
+        if let Some(share) = share {
+            share.sum_wrenches(&mut wrenches);
+        }
+        fields.reaction.fill(DVec3::ZERO);
+        wrenches
+    }
+}

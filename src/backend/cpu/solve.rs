@@ -1,0 +1,155 @@
+//! The pressure equation: bodies in it, the solve, and what is cut off after it.
+
+use super::Cpu;
+use super::team::owns;
+use super::wall_excess::{Rows, WallExcess};
+use crate::body::slots;
+use crate::body::{FreeBody, Wrench};
+use crate::fields::{Fields, State};
+use crate::kernels::pressure_source::laplacian_coefficient;
+use crate::kernels::{body_force, coupling, pressure_level};
+use crate::neighbours::CHUNK;
+use crate::params::Step;
+use crate::pressure::PressureReport;
+use crate::pressure::cg::{Among, Jacobi, Precondition, System, solve_or_fall_back};
+use crate::pressure::coupling::CoupledBody;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+impl Cpu {
+    /// The free bodies in the pressure equation; takes the forces that are known off its right side.
+    fn couple(&mut self) -> Vec<CoupledBody> {
+        let (params, fluid, share) = (&self.params, self.groups.fluid, self.share.as_deref());
+        let density_over_volume = params.density / params.spacing.powi(3);
+        let Fields { state, reaction, source, .. } = &mut self.fields;
+        let excess = &self.excess;
+        let answers =
+            |body: &FreeBody| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO;
+        let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies).enumerate();
+        let free: Vec<_> = free.filter(|(_, (_, body))| answers(body)).collect();
+        let mut known: Vec<Wrench> = Vec::with_capacity(free.len());
+        let mut layers = Vec::with_capacity(free.len());
+        for &(k, ((solid, pose), body)) in &free {
+            let mut slot = slots::of(&self.slots, k);
+            // On many ranks the load is added once, after the sum over them.
+            let mut sum = if share.is_some() { Wrench::default() } else { body.load };
+            let wall = |(k, i): (usize, usize)| {
+                let to_surface = pose.orientation * solid.wall_to_surface[k];
+                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
+                let slot = slot(k);
+                if !owns(share, i) || state[i] != State::Inner {
+                    // Of the step's beginning, when it was this rank's.
+                    sum += Wrench { force: reaction, torque: arm.cross(reaction) };
+                    return Wrench::default();
+                }
+                let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
+                // What acts at a pressure of zero.
+                let known = body_force::surface_pressure(0.0, excess.of(i - fluid), to_surface, params);
+                let force = body_force::body_force(known, area, reaction);
+                sum += Wrench { force, torque: arm.cross(force) };
+                sum += slot.head;
+                let mut row = coupling::row(area, arm);
+                row += slot.per_pascal;
+                row
+            };
+            layers.push(solid.wall_slots.clone().enumerate().map(wall).collect::<Vec<_>>());
+            known.push(sum);
+        }
+        if let Some(share) = share {
+            share.sum_wrenches(&mut known);
+            known.iter_mut().zip(&free).for_each(|(known, (_, (_, body)))| *known += body.load);
+        }
+        let mut out = Vec::with_capacity(free.len());
+        for (((_, ((solid, _), body)), known), rows) in free.into_iter().zip(known).zip(layers) {
+            let coupled = CoupledBody::new(*body, density_over_volume, solid.wall_slots.clone(), rows);
+            coupled.subtract_known(known, source);
+            out.push(coupled);
+        }
+        out
+    }
+
+    /// The walls' excess, and what its rows are made of.
+    fn wall_excess(&mut self) -> (&mut WallExcess, Rows<'_>, &mut Fields) {
+        let Self { fields, neighbours, params, groups, excess, share, .. } = self;
+        (excess, Rows { neighbours, params, fluid: groups.fluid, share: share.as_deref() }, fields)
+    }
+
+    /// Solves the pressure equation, and cuts what is beyond its bounds.
+    pub(super) fn conjugate_gradient(&mut self, step: &Step) -> PressureReport {
+        let (excess, rows, fields) = self.wall_excess();
+        excess.before_solve(rows, fields);
+        let bodies = self.couple();
+        let Self { fields, neighbours, params, settings, work, multigrid, grid, share, .. } = self;
+        let share = share.as_deref();
+        let state = match share {
+            Some(share) => Cow::Owned(share.masked(&fields.state)),
+            None => Cow::Borrowed(&fields.state[..]),
+        };
+        if share.is_some() {
+            let foreign = fields.source.iter_mut().zip(&*state).filter(|(_, state)| **state != State::Inner);
+            foreign.for_each(|(b, _)| *b = 0.0);
+        }
+        if params.filled {
+            let mut sums = pressure_level::sum_source(&state, &fields.source);
+            if let Some(share) = share {
+                share.sum(&mut sums);
+            }
+            pressure_level::subtract_mean(&state, &mut fields.source, sums);
+        }
+        let system = System {
+            neighbours,
+            state: &state,
+            diagonal: &fields.diagonal,
+            coefficient: laplacian_coefficient(params),
+            bodies: &bodies,
+            among: share.map(|share| Among { share, state: &fields.state }),
+        };
+        let preconditioner: &mut dyn Precondition = match multigrid {
+            Some(multigrid) => {
+                multigrid.build(&system, grid, share.map_or(&fields.position, |share| share.searched()));
+                multigrid
+            }
+            None => &mut Jacobi,
+        };
+        let report =
+            solve_or_fall_back(&system, &fields.source, &mut fields.pressure, preconditioner, settings, work);
+        // The solve leaves zero where the pressure is no unknown.
+        fields.pressure.iter_mut().zip(&fields.surface_pressure).for_each(|(p, known)| *p += known);
+        if params.filled {
+            let mut least = pressure_level::lowest(&state, &fields.pressure);
+            if let Some(share) = share {
+                least = -share.most(-least);
+            }
+            pressure_level::raise(&state, &mut fields.pressure, least);
+        }
+        if let Some(share) = share {
+            share.swap(&mut [&mut &mut fields.pressure[..]]);
+        }
+        if let Some(ledger) = &mut self.ledger {
+            ledger.solution.clone_from(&fields.pressure);
+        }
+        let (excess, rows, fields) = self.wall_excess();
+        excess.after_solve(rows, fields);
+        let Self { fields, share, .. } = self;
+        let share = share.as_deref();
+        let cut = |(i, p): (usize, &mut f64)| {
+            let (high, low) = (*p > step.pressure_max, *p < 0.0);
+            *p = p.clamp(0.0, step.pressure_max);
+            let counts = owns(share, i);
+            [u64::from(high && counts), u64::from(low && counts)]
+        };
+        let add = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
+        let cuts = |(c, p): (usize, &mut [f64])| {
+            let slots = c * CHUNK..;
+            slots.zip(p).map(cut).fold([0; 2], add)
+        };
+        let [high, low] = fields.pressure.par_chunks_mut(CHUNK).enumerate().map(cuts).reduce(|| [0; 2], add);
+        self.counters.pressure_clamps += high;
+        self.counters.negative_pressures += low;
+        let (excess, rows, fields) = self.wall_excess();
+        excess.after_cut(rows, fields);
+        report
+    }
+}
