@@ -42,7 +42,7 @@ pub(super) fn grid(params: &Params, plan: &Plan) -> Result<Grid> {
 }
 
 impl Gpu {
-    /// Particles of `scene` on `adapter` (a number in [`adapters`] or a part of a name; the best one if
+    /// Particles of `scene` on `adapter` (a number in [`super::adapters`] or a part of a name; the best one if
     /// `None`, which is a software one where there is no other).
     ///
     /// # Errors
