@@ -95,7 +95,7 @@ pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(St
         }
         let (x, y) = match name.as_str() {
             "front scaled" => ("T = t sqrt(2 g / L) [-]", "Z = x / L [-]"),
-            "front" => ("time [s]", "front, 99.9th percentile of x [m]"),
+            "front" => ("time [s]", "front, x of the foremost water [m]"),
             "energy" => ("time [s]", "energy over its start [-]"),
             _ => ("time [s]", name.as_str()),
         };

@@ -26,7 +26,7 @@ pub enum Measure {
     KineticEnergy,
     /// Depth from the centroid, 2 (z_c - floor) / H.
     Volume,
-    /// Front of the water: the 99.9th percentile of x over time, and scaled for comparison with experiments.
+    /// Front of the water: the foremost x that is no spray over time, and scaled for comparison with experiments.
     Front,
     /// Kinetic plus potential energy of the water over its start, over time.
     Energy,
@@ -240,7 +240,7 @@ impl Sampler {
             || in_window && (self.has(Measure::HydrostaticPressure) || self.has(Measure::Draft));
         let fields = if fields_wanted { Some(simulation.backend.read()?) } else { None };
         if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::Front)) {
-            self.front.push([t, front(fields, simulation.groups.fluid)]);
+            self.front.push([t, front(fields, simulation.groups.fluid, simulation.params.spacing)]);
         }
         if !in_window {
             return Ok(());
@@ -376,12 +376,19 @@ impl Sampler {
     }
 }
 
-/// 99.9th percentile of x of the live fluid particles [m].
-pub fn front(fields: &Fields, fluid: usize) -> f64 {
+/// x of the foremost water particle that has company: two others within two and a half spacings `l0` [m]. Spray ahead of it does not count, and a
+/// tongue one particle thick does, which a percentile of all particles cuts off, the more the finer the water.
+pub fn front(fields: &Fields, fluid: usize, l0: f64) -> f64 {
     let live = (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid);
-    let mut x: Vec<f64> = live.map(|i| fields.position[i].x).collect();
-    x.sort_by(f64::total_cmp);
-    x.get((0.999 * x.len() as f64) as usize).copied().unwrap_or(f64::NAN)
+    let mut at: Vec<DVec3> = live.map(|i| fields.position[i]).collect();
+    at.sort_by(|a, b| b.x.total_cmp(&a.x));
+    let reach = 2.5 * l0;
+    let has_company = |&(k, x): &(usize, &DVec3)| {
+        let ahead = at[..k].iter().rev().take_while(|other| other.x - x.x < reach);
+        let behind = at[k + 1..].iter().take_while(|other| x.x - other.x < reach);
+        ahead.chain(behind).filter(|other| other.distance(*x) < reach).nth(1).is_some()
+    };
+    at.iter().enumerate().find(has_company).map_or(f64::NAN, |(_, x)| x.x)
 }
 
 /// Rms of P - rho g (surface - z) [Pa] and slope -dP/dz over rho g [-], over inner fluid particles.
@@ -402,4 +409,25 @@ pub fn hydrostatics(fields: &Fields, fluid: usize, surface: f64, weight: f64) ->
 /// Volume of a solid's shape [m3].
 pub fn volume(shape: &Shape) -> f64 {
     shape.volume()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_front_is_a_tongue_and_no_spray() {
+        let mut fields = Fields::default();
+        let mut put = |x: f64, z: f64, kind| {
+            fields.position.push(DVec3::new(x, 0.0, z));
+            fields.kind.push(kind);
+        };
+        (0..1000).for_each(|k| put(0.1 * f64::from(k % 20), 0.1 * f64::from(k / 20), Kind::Fluid));
+        // A tongue one particle thick, a drop of two ahead of it, and what has left the tank.
+        (20..30).for_each(|k| put(0.11 * f64::from(k), 0.0, Kind::Fluid));
+        [3.9, 4.0].into_iter().for_each(|x| put(x, 0.0, Kind::Fluid));
+        (0..5).for_each(|k| put(5.0 + 0.1 * f64::from(k), 0.0, Kind::Ghost));
+        assert!((front(&fields, fields.kind.len(), 0.1) - 3.19).abs() < 1e-12);
+        assert!(front(&Fields::default(), 0, 0.1).is_nan());
+    }
 }
