@@ -5,10 +5,10 @@ use super::vtu::Values;
 use super::write_whole;
 use crate::case::{Encoding, OutputField, OutputRegion};
 use crate::error::{Error, Result};
+use crate::whole::remove;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fmt::Write as _;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -128,15 +128,6 @@ fn clear(stem: &Path, from: usize) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Removes a file; says whether there was one.
-fn remove(path: &Path) -> Result<bool> {
-    match std::fs::remove_file(path) {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
-        Err(e) => Err(Error::io(path)(e)),
-    }
 }
 
 /// The file that names the pieces of `ranks` ranks with these `fields`.

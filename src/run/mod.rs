@@ -24,11 +24,12 @@ use crate::output::write_whole;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
 use crate::stop::Stop;
+use crate::whole::remove;
 pub use due::Due;
 use frames::Frames;
 use pace::Pace;
 use saving::{Kept, Saving, earlier, fits};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use summary::Totals;
 use tables::Tables;
@@ -153,13 +154,6 @@ pub fn run(
     write_whole(&folder.file("case.toml"), text.as_bytes())?;
     run.parts += 1;
     run.finish(simulation, scene, &options, &folder, stop, observe, resumes)
-}
-
-fn remove(path: &Path) -> Result<()> {
-    match std::fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path)(e)),
-        _ => Ok(()),
-    }
 }
 
 /// A state in memory is without the particles of many ranks, each of which keeps its own until it is wanted.

@@ -126,6 +126,10 @@ impl Groups {
     pub fn moving_dummy_range(&self) -> Range<usize> {
         self.total() - self.moving_dummy..self.total()
     }
+    /// Slots of all that moving solids have.
+    pub fn moving_slots(&self) -> impl Iterator<Item = usize> + Clone + use<> {
+        self.moving_wall_range().chain(self.moving_dummy_range())
+    }
 }
 
 /// Geometry of a fixed wall, for contact and for the checks at t = 0. Surfaces lie where the wall

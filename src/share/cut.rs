@@ -4,10 +4,15 @@ use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::params::Params;
 
+/// Whether the first and the last of so many ranks are neighbours: in a tank that is periodic along x.
+pub(super) fn is_ring(ranks: usize, params: &Params) -> bool {
+    ranks > 1 && params.periodic.is_along(0)
+}
+
 /// Columns that a rank takes at least. Of two ranks round a tank that is periodic along x each shows the other its first and its last column:
 /// these are to be two, or one and the same would be there twice.
 fn least(ranks: usize, params: &Params) -> usize {
-    if ranks == 2 && params.periodic.is_along(0) { 2 } else { 1 }
+    if ranks == 2 && is_ring(ranks, params) { 2 } else { 1 }
 }
 
 /// Cuts `load`, of each column, into shares that are about even: the first column of each rank, and the end of the last one's.

@@ -22,7 +22,7 @@ use crate::params::Params;
 use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::Groups;
 pub use border::{Bordered, OfWalls, Side};
-use cut::check;
+use cut::{check, is_ring};
 use glam::DVec3;
 pub use moves::Traveller;
 pub use outlook::{Outlook, Taken};
@@ -77,7 +77,7 @@ impl Share {
             sides: [None, None],
             walls: vec![false; all.pressure() - all.fluid],
             per_column: grid.total() / grid.count[0] as usize,
-            ring: params.periodic.is_along(0) && team.ranks() > 1,
+            ring: is_ring(team.ranks(), params),
             cuts: Vec::new(),
             own: 0..0,
             come_in: Vec::new(),

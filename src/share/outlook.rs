@@ -1,6 +1,6 @@
 //! What ranks would have and say, before anything is computed.
 
-use super::cut::{check, cut, unevenness};
+use super::cut::{check, cut, is_ring, unevenness};
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::kernels::multigrid::{SWEEPS, visits};
@@ -58,7 +58,7 @@ impl Outlook {
         (0..groups.fluid).filter(is_water).for_each(|i| water[column(&scene.position[i])] += 1);
         scene.position[groups.fluid..groups.pressure()].iter().for_each(|x| walls[column(x)] += 1);
         let cuts = cut(&water, ranks, params);
-        let ring = params.periodic.is_along(0) && ranks > 1;
+        let ring = is_ring(ranks, params);
         let parts = cuts.windows(2).map(|c| {
             let [from, to] = [c[0] as usize, c[1] as usize];
             let before = from.checked_sub(1).or(ring.then_some(columns - 1));

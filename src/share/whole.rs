@@ -3,7 +3,7 @@
 use super::Share;
 use crate::fields::{Fields, State};
 use crate::ranks::{decode, encode};
-use crate::scene::{Groups, Kind};
+use crate::scene::Kind;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -45,11 +45,6 @@ struct Whole {
     dt: f64,
 }
 
-/// Slots of the solids that move.
-fn moving(groups: &Groups) -> impl Iterator<Item = usize> {
-    groups.moving_wall_range().chain(groups.moving_dummy_range())
-}
-
 impl Share {
     /// What this rank has of `fields`, encoded.
     fn part(&self, fields: &Fields) -> Vec<u8> {
@@ -88,7 +83,7 @@ impl Share {
         // Two at a time would be one too many: they may be large.
         self.kept = None;
         let first = self.rank() == 0;
-        let moving = moving(&self.groups).filter(|_| first);
+        let moving = self.groups.moving_slots().filter(|_| first);
         let moving = moving.map(|i| [fields.position[i], fields.velocity[i]]).collect();
         self.kept = Some(Kept { part: self.part(fields), moving });
     }
@@ -101,7 +96,7 @@ impl Share {
             return None;
         }
         let mut out = self.blank(fields);
-        for (i, [x, v]) in moving(&self.all).zip(kept.moving) {
+        for (i, [x, v]) in self.all.moving_slots().zip(kept.moving) {
             (out.position[i], out.velocity[i]) = (x, v);
         }
         Some(self.join(&parts, out))

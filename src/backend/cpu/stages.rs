@@ -92,8 +92,7 @@ impl Cpu {
             cell_list::reorder_fluid(fields, grid, domain, params.dimensions, fluid_start, scratch);
         self.live = fluid_start[grid.total()] as usize;
         if let Some((list, coordinates)) = &mut self.moving {
-            let slots = groups.moving_wall_range().chain(groups.moving_dummy_range());
-            list.index(grid, slots, &fields.position, scratch);
+            list.index(grid, groups.moving_slots(), &fields.position, scratch);
             let place = |&s: &u32| grid.periodic.wrap(fields.position[s as usize]);
             coordinates.set(list.slot.par_iter().map(place));
         }
