@@ -5,7 +5,7 @@
 //! `offset` in shaders/common.wgsl), which is the only one within reach where a side is three effective radii long or more; the
 //! search looks past a seam into the cells at the other side, and `cell_list` brings back the water that has left.
 
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 /// Cells of the search along a periodic axis at least: a cell and its two neighbours are then three.
 pub const CELLS_MIN: u32 = 3;
@@ -82,14 +82,31 @@ impl Periodic {
         x
     }
 
-    /// The axis across whose seam a solid of `half` lengths about `center` reaches, or to which it is closer than `reach`
-    /// [m]; none where it spans the whole length.
-    pub fn crossed(&self, center: DVec3, half: DVec3, reach: f64) -> Option<usize> {
-        (0..3).find(|&k| {
-            let spans = 2.0 * half[k] > self.length[k] - reach;
-            let near = |(low, high)| center[k] - half[k] < low + reach || center[k] + half[k] > high - reach;
-            !spans && self.sides(k).is_some_and(near)
+    /// Whole lengths by which the box from `low` to `high` [m] is moved by its images that reach between the sides, itself included if it
+    /// does.
+    pub fn turns(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = IVec3> + use<> {
+        let along = |k: usize| match self.sides(k) {
+            None => 0..=0,
+            Some((from, to)) => {
+                let turn = |way: f64| way * self.inverse[k];
+                turn(from - high[k]).ceil() as i32..=turn(to - low[k]).floor() as i32
+            }
+        };
+        let [x, y, z] = [0, 1, 2].map(along);
+        x.flat_map(move |i| {
+            let (y, z) = (y.clone(), z.clone());
+            y.flat_map(move |j| z.clone().map(move |k| IVec3::new(i, j, k)))
         })
+    }
+
+    /// Whole lengths from the image of `x` between the sides to `x`; zero for what is no number.
+    pub fn whole(&self, x: DVec3) -> IVec3 {
+        if self.any { ((x - self.wrap(x)) * self.inverse).round().as_ivec3() } else { IVec3::ZERO }
+    }
+
+    /// The way of whole lengths [m].
+    pub fn way(&self, turns: IVec3) -> DVec3 {
+        self.length * turns.as_dvec3()
     }
 
     /// `x`, which lies between the sides, and its images that lie no further than `reach` beyond them [m].
@@ -148,8 +165,16 @@ mod tests {
         assert_eq!(p.images(DVec3::new(0.5, 7.0, 2.25), 0.2).count(), 1);
         assert_eq!(p.images(DVec3::new(-0.9, 7.0, 2.1), 0.2).count(), 4);
         assert_eq!(p.across(DVec3::ONE), DVec3::Y);
-        let at = |x| p.crossed(DVec3::new(x, 7.0, 2.25), DVec3::splat(0.1), 0.05);
-        assert_eq!([-0.86, 0.0, 1.86].map(at), [Some(0), None, Some(0)]);
-        assert_eq!(p.crossed(DVec3::new(0.0, 7.0, 2.25), DVec3::new(0.1, 0.1, 0.24), 0.05), None);
+        let turns = |x: f64, half: f64| {
+            let x = DVec3::new(x, 7.0, 2.25);
+            let half = DVec3::new(half, 0.1, 0.1);
+            p.turns(x - half, x + half).collect::<Vec<_>>()
+        };
+        assert_eq!(turns(0.0, 0.1), [IVec3::ZERO]);
+        assert_eq!(turns(-0.95, 0.1), [IVec3::ZERO, IVec3::X]);
+        assert_eq!(turns(7.93, 0.1), [-3 * IVec3::X, -2 * IVec3::X]);
+        assert_eq!(turns(0.5, 2.0), [-IVec3::X, IVec3::ZERO, IVec3::X]);
+        assert_eq!(p.way(IVec3::new(2, 1, -1)), DVec3::new(6.0, 0.0, -0.5));
+        assert_eq!(p.whole(DVec3::new(5.1, 70.0, 1.9)), IVec3::new(2, 0, -1));
     }
 }

@@ -19,7 +19,7 @@ use crate::settle::settle;
 use crate::slots::Slots;
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, shortened, time_step};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -418,7 +418,6 @@ impl Simulation {
 
     fn check_bodies(&self, step: &Step) -> Result<()> {
         let (min, max) = (self.params.domain_min, self.params.domain_max);
-        self.check_seams(step)?;
         for (k, pose) in self.solids.poses().iter().enumerate() {
             let x = pose.position;
             let name = self.solids.name(k);
@@ -436,31 +435,6 @@ impl Simulation {
                     "{name} left the domain at ({:.4}, {:.4}, {:.4}) m; a wall is missing there, or contact.spring is \
                      too soft for this fall",
                     x.x, x.y, x.z
-                );
-                return Err(self.diverged(step, Stage::Contact, what));
-            }
-        }
-        Ok(())
-    }
-
-    /// Contact looks for no images: an error if a solid that moves has come to a periodic side while a free body is
-    /// there to meet it.
-    fn check_seams(&self, step: &Step) -> Result<()> {
-        let (periodic, l0) = (&self.params.periodic, self.params.spacing);
-        let free = (0..self.scene.solids.len()).any(|k| self.solids.is_free(k));
-        if !periodic.is_any() || !free {
-            return Ok(());
-        }
-        for (solid, pose) in self.scene.solids.iter().zip(self.solids.poses()).filter(|(s, _)| !s.is_still())
-        {
-            let half = solid.shape.extent(DMat3::from_quat(pose.orientation));
-            if let Some(axis) = periodic.crossed(pose.position, half, l0) {
-                let axis = ["x", "y", "z"][axis];
-                let what = format!(
-                    "{} `{}` has come to the periodic side across {axis}: contact of solids is not computed beyond it. \
-                     Keep it away with body.locked, or make the tank longer, or take \"{axis}\" out of tank.periodic",
-                    solid.what(),
-                    solid.name
                 );
                 return Err(self.diverged(step, Stage::Contact, what));
             }

@@ -14,8 +14,9 @@
 
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
-use crate::contact::broad::{Bounds, PointGrid, meeting};
+use crate::contact::broad::{Bounds, PointGrid, fixed_walls, meeting_images};
 use crate::kernels::coupling::row;
+use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -79,14 +80,16 @@ pub struct Slots {
     weight: DVec3,
     fixed: PointGrid,
     layers: Vec<Layer>,
+    periodic: Periodic,
 }
 
 impl Slots {
     /// The slots of the free bodies of `scene`, in water of `density` [kg/m3].
     pub fn new(scene: &Scene, density: f64) -> Self {
         let l0 = scene.spacing;
-        let fixed = scene.position[scene.groups.static_wall_range()].to_vec();
+        let (fixed, _) = fixed_walls(scene);
         Self {
+            periodic: scene.periodic,
             spacing: l0,
             weight: density * scene.gravity,
             fixed: PointGrid::new(fixed, CELL * l0),
@@ -99,10 +102,11 @@ impl Slots {
         let margin = FACING.1 * self.spacing;
         let boxes: Vec<Bounds> =
             self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect();
+        // Solids near each, with the way to the image that is.
         let mut others = vec![vec![]; boxes.len()];
-        for (a, b) in meeting(&boxes) {
-            others[a].push(b);
-            others[b].push(a);
+        for (a, b, turns) in meeting_images(&boxes, &self.periodic) {
+            others[a].push((b, self.periodic.way(turns)));
+            others[b].push((a, self.periodic.way(-turns)));
         }
         let of = |(k, layer): (usize, &Layer)| {
             let at_walls = self.at_walls(layer, &poses[k], margin);
@@ -123,7 +127,7 @@ impl Slots {
     }
 
     /// How much of each row of layer `k` lies in a slot [-], with fixed walls if it is `at_walls` and with `others`.
-    fn shares(&self, k: usize, at_walls: bool, others: &[usize], poses: &[Pose]) -> Vec<f64> {
+    fn shares(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<f64> {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
         let reach = FACING.1 * l0;
         let share = |(&offset, &area): (&DVec3, &DVec3)| {
@@ -139,9 +143,9 @@ impl Slots {
             if at_walls {
                 self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x));
             }
-            for &other in others {
+            for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
-                let local = pose.orientation.inverse() * (x - pose.position);
+                let local = pose.orientation.inverse() * (x - way - pose.position);
                 layer.grid.near(local, reach, |n| see(pose.orientation * (layer.grid.point(n) - local)));
             }
             ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0)

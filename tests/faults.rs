@@ -107,6 +107,26 @@ fn a_result_that_means_nothing_is_no_success() {
     assert_eq!(json(&some.out)["verdict"]["grade"], "degraded");
 }
 
+/// A channel that gravity drives along its periodic axis gains energy without end.
+#[test]
+fn a_driven_channel_is_fine() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(
+        path("channel.toml"),
+        "[run]\nspacing = 0.02\ntime_step = 2e-3\nadaptive = true\nend = 1.0\ngravity = [2, 0, -9.6]\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.3]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n[fluid]\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.1]\n[output]\nevery = 0\n",
+    )
+    .unwrap();
+    let run = ran(&["run", &path("channel.toml"), "-o", &path("out"), "--backend", "cpu", "-q", "--json"]);
+    assert_eq!((run.code, run.err.as_str()), (0, ""));
+    let result = json(&run.out);
+    let gain = |at: &str| result["monitors"][at].as_f64().unwrap();
+    assert_eq!(result["verdict"]["grade"], "fine");
+    assert!(gain("energy_max_J") > 1.5 * gain("energy_start_J"), "it flows: {result}");
+}
+
 /// A gate of 50 m/s would cross 2.5 spacings in a typed step.
 #[test]
 fn adaptive_steps_see_solids() {

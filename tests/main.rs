@@ -43,6 +43,7 @@ mod render;
 mod report;
 mod restart;
 mod scene;
+mod seams;
 mod settle;
 mod shaders;
 mod shaped;

@@ -621,25 +621,6 @@ fn body(center: &str) -> String {
 }
 
 #[test]
-fn a_body_that_comes_to_the_seam_ends_the_run() {
-    let case = case(&format!(
-        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, 0]\n\
-         [tank]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.5]\nperiodic = [\"y\"]\n{}",
-        body("[0.25, 0.2, 0.25]")
-    ));
-    let mut sim = simulation(&case);
-    let why = loop {
-        match sim.step() {
-            Ok(_) => assert!(sim.time < 0.2, "nothing stops it"),
-            Err(why) => break why.to_string(),
-        }
-    };
-    // Its side is a spacing from the seam when its middle is at 0.4 m.
-    assert!((sim.time - 0.1).abs() < 3e-3, "{} s", sim.time);
-    assert!(why.contains("body `cube` has come to the periodic side across y"), "{why}");
-}
-
-#[test]
 fn walls_go_on_over_the_seam() {
     let scene = Scene::build(&flume("")).expect("it builds");
     let p = scene.periodic;

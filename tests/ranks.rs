@@ -206,6 +206,7 @@ fn many_ranks_compute_what_one_computes() {
             1e-7,
         ),
         ("ring of bodies", ring(1.5, "jitter = 0.1", FREE), 60, [2, 3], 1e-11),
+        ("bodies over the seam of a ring", ring(1.5, "jitter = 0.1", &over()), 60, [2, 3], 1e-11),
         ("ring, narrow", narrow(), 30, [2, 4], 1e-11),
         ("channel", shipped("channel", &["run.spacing=0.04"]), 90, [2, 3], 1e-8),
     ] {
@@ -244,13 +245,18 @@ fn ring(velocity: f64, fluid: &str, more: &str) -> Case {
     ))
 }
 
-/// A block that is driven through the water across the seam. (Free bodies may not come there on any number of ranks.)
+/// A block that is driven through the water across the seam.
 const DRIVEN: &str = "[[moving_wall]]\nname = \"plunger\"\nmin = [0.05, 0.2, 0.1]\nmax = [0.25, 0.4, 0.3]\nmotion = [[0, 0, 0, 0], [1, -3, 0, 0]]\n";
 
 /// A body in the water and one on it, which cross the cut between two ranks in both directions.
 const FREE: &str = "[[body]]\nname = \"floats\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.2, 0.52]\ndensity = 500\nvelocity = [-2, 0, -0.5]\n\
                     [[body]]\nname = \"sinks\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [0.9, 0.45, 0.2]\ndensity = 3000\nvelocity = [2, 0, 0]\n\
                     displaces_fluid = true\n[contact]\nspring = 1e5\nfriction = 0.3\n";
+
+/// The same, which cross the side where the first and the last rank are neighbours.
+fn over() -> String {
+    FREE.replace("[1.2, 0.2, 0.52]", "[0.11, 0.2, 0.52]").replace("[0.9, 0.45, 0.2]", "[1.89, 0.45, 0.2]")
+}
 
 /// A ring of four columns of cells.
 fn narrow() -> Case {

@@ -53,6 +53,8 @@ impl Solids {
             load: _,
             bodies,
             contact,
+            turns,
+            periodic,
             candidates,
             planned,
             substep,
@@ -87,7 +89,11 @@ impl Solids {
         archive.array("solids.pose", &mut now, true)?;
         archive.array("solids.momentum", &mut momenta, true)?;
         archive.array("solids.contact", &mut wrenches, true)?;
-        let Candidates { travel, skin: _, valid, generation: _, close: _, made, made_dt } = candidates;
+        if periodic.is_any() {
+            archive.array("solids.turns", turns, true)?;
+        }
+        let Candidates { travel, skin: _, valid, generation: _, close: _, made, made_dt, periodic: _ } =
+            candidates;
         let mut made_numbers: Vec<[f64; POSE]> = made.iter().map(numbers).collect();
         archive.array("solids.listed_pose", &mut made_numbers, true)?;
         archive.array("solids.travel", travel, true)?;

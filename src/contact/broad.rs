@@ -1,5 +1,7 @@
 //! Broad phase: which bounding boxes meet, and which fixed particles lie near a point.
 
+use crate::periodic::Periodic;
+use crate::scene::Scene;
 use glam::{DVec3, IVec3};
 use std::collections::HashMap;
 
@@ -64,6 +66,38 @@ pub(crate) fn meeting(boxes: &[Bounds]) -> Vec<(usize, usize)> {
     }
     pairs.sort_unstable();
     pairs
+}
+
+/// As [`meeting`], with the images of boxes over periodic sides: of each pair also the whole lengths by which the second box
+/// is moved to the image that meets the first. Two boxes may meet at both ends.
+pub(crate) fn meeting_images(boxes: &[Bounds], periodic: &Periodic) -> Vec<(usize, usize, IVec3)> {
+    if !periodic.is_any() {
+        return meeting(boxes).into_iter().map(|(i, j)| (i, j, IVec3::ZERO)).collect();
+    }
+    // Where two meet, one of the places at which they do lies between the sides.
+    let images = |(k, b): (usize, &Bounds)| {
+        let of = |turns| ((b.0 + periodic.way(turns), b.1 + periodic.way(turns)), k, turns);
+        periodic.turns(b.0, b.1).map(of).collect::<Vec<_>>()
+    };
+    let all: Vec<(Bounds, usize, IVec3)> = boxes.iter().enumerate().flat_map(images).collect();
+    let boxes: Vec<Bounds> = all.iter().map(|image| image.0).collect();
+    let between = |(i, j): (usize, usize)| {
+        let ((_, i, own), (_, j, their)) = (all[i], all[j]);
+        if i < j { (i, j, their - own) } else { (j, i, own - their) }
+    };
+    let mut pairs: Vec<(usize, usize, IVec3)> = meeting(&boxes).into_iter().map(between).collect();
+    pairs.retain(|(i, j, _)| i != j);
+    pairs.sort_unstable_by_key(|(i, j, turns)| (*i, *j, turns.to_array()));
+    pairs.dedup();
+    pairs
+}
+
+/// Places of the particles of fixed walls [m], with their images up to half a length beyond periodic sides, and which of the walls' particles
+/// each is.
+pub(crate) fn fixed_walls(scene: &Scene) -> (Vec<DVec3>, Vec<usize>) {
+    let (periodic, reach) = (&scene.periodic, 0.5 * scene.periodic.length().max_element());
+    let own = scene.position[scene.groups.static_wall_range()].iter().enumerate();
+    own.flat_map(|(k, &x)| periodic.images(periodic.wrap(x), reach).map(move |x| (x, k))).unzip()
 }
 
 /// Fixed points in cells.
@@ -144,6 +178,33 @@ mod tests {
         all.sort_unstable();
         assert!(all.len() > 500, "{}", all.len());
         assert_eq!(meeting(&boxes), all);
+    }
+
+    #[test]
+    fn pairs_over_a_seam_are_those_of_all_images() {
+        let periodic = Periodic::new([true, true, false], DVec3::ZERO, DVec3::new(2.0, 1.5, 1.0));
+        let place = |k: usize, n: f64| (k as f64 * n).fract();
+        let boxes: Vec<Bounds> = (0..60)
+            .map(|k| {
+                let x = DVec3::new(2.0 * place(k, 0.618), 1.5 * place(k, 0.755), place(k, 0.57));
+                let half = 0.05 + 0.2 * DVec3::new(place(k, 0.31), place(k, 0.27), place(k, 0.43));
+                (x - half, x + half)
+            })
+            .collect();
+        let mut all = vec![];
+        for j in 0..boxes.len() {
+            for i in 0..j {
+                for turns in (-1..=1).flat_map(|x| (-1..=1).map(move |y| IVec3::new(x, y, 0))) {
+                    let way = periodic.way(turns);
+                    if meet(&boxes[i], &(boxes[j].0 + way, boxes[j].1 + way)) {
+                        all.push((i, j, turns));
+                    }
+                }
+            }
+        }
+        all.sort_unstable_by_key(|(i, j, turns)| (*i, *j, turns.to_array()));
+        assert!(all.iter().filter(|p| p.2 != IVec3::ZERO).count() > 50);
+        assert_eq!(meeting_images(&boxes, &periodic), all);
     }
 
     #[test]

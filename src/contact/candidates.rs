@@ -3,13 +3,26 @@
 //! Lists are made with a skin and kept until some body has travelled through its share of it, so a
 //! body at rest costs only its contacts.
 
-use super::broad::{Bounds, meeting};
+use super::broad::{Bounds, meeting_images};
 use crate::body::{Body, Pose};
+use crate::periodic::Periodic;
+use glam::DVec3;
 
 /// Pairs from which the evaluation is spread over threads.
 pub(crate) const MANY_PAIRS: usize = 64;
 /// Steps that the lists of a body in steady flight should last.
 const STEPS_AHEAD: f64 = 6.0;
+
+/// Two solids whose bounding boxes meet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Close {
+    /// A free solid.
+    pub a: usize,
+    /// The other one.
+    pub b: usize,
+    /// The way from it to its image beside the first, over a periodic side [m].
+    pub image: DVec3,
+}
 
 /// The lists' validity, and the pairs of solids that are close.
 pub(crate) struct Candidates {
@@ -23,12 +36,13 @@ pub(crate) struct Candidates {
     /// Poses that the lists were made in, and the step that they were made for [s].
     pub(super) made: Vec<Pose>,
     pub(super) made_dt: f64,
-    /// Pairs of solids (a free one first) whose bounding boxes meet, sorted.
-    pub close: Vec<(usize, usize)>,
+    /// Pairs of solids whose bounding boxes meet, sorted.
+    pub close: Vec<Close>,
+    pub(super) periodic: Periodic,
 }
 
 impl Candidates {
-    pub fn new(poses: &[Pose]) -> Self {
+    pub fn new(poses: &[Pose], periodic: Periodic) -> Self {
         let solids = poses.len();
         Self {
             made: poses.to_vec(),
@@ -38,6 +52,7 @@ impl Candidates {
             valid: false,
             generation: 0,
             close: vec![],
+            periodic,
         }
     }
 
@@ -90,14 +105,23 @@ impl Candidates {
                 (b.pose.position - reach, b.pose.position + reach)
             })
             .collect();
-        self.close = meeting(&bounds)
+        let way = |turns| self.periodic.way(turns);
+        self.close = meeting_images(&bounds, &self.periodic)
             .into_iter()
-            .filter(|&(i, j)| bodies[i].is_free() || bodies[j].is_free())
-            .map(|(i, j)| if bodies[i].is_free() { (i, j) } else { (j, i) })
+            .filter(|&(i, j, _)| bodies[i].is_free() || bodies[j].is_free())
+            .map(|(i, j, turns)| match bodies[i].is_free() {
+                true => Close { a: i, b: j, image: way(turns) },
+                false => Close { a: j, b: i, image: way(-turns) },
+            })
             .collect();
         self.valid = true;
         self.generation += 1;
     }
+}
+
+/// Pose of `body` moved to its image `way` [m] from it.
+pub(crate) fn image(body: &Body, way: DVec3) -> Pose {
+    Pose { position: body.pose.position + way, ..body.pose }
 }
 
 /// Mass of the relative motion of two solids [kg]; `None` is a wall.

@@ -94,6 +94,9 @@ pub(crate) trait Law: Send {
     /// The solids have been put elsewhere, where the lists still hold: what was deep before says nothing.
     fn moved(&mut self) {}
 
+    /// Bodies have been brought back over periodic sides: the pairs are made anew, and what was deep before says nothing.
+    fn brought_back(&mut self) {}
+
     /// Energy stored at the poses of `now` [J], by the host alone.
     fn energy(&mut self, now: Now) -> f64;
 

@@ -28,10 +28,11 @@ use crate::body::{Body, FreeBody, Pose, Wrench};
 use crate::case;
 use crate::compute::Compute;
 use crate::error::{Error, Result};
+use crate::periodic::Periodic;
 use crate::scene::Scene;
 use candidates::Candidates;
 use device::{Link, Traffic};
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 use law::{Fault, Kind, Law, Now};
 use substeps::{Cut, Limits};
 
@@ -57,6 +58,9 @@ pub struct Solids {
     poses: Vec<Pose>,
     predicted: Vec<Pose>,
     contact: Vec<Wrench>,
+    /// Whole lengths that each has gone over periodic sides.
+    turns: Vec<IVec3>,
+    periodic: Periodic,
     gravity: DVec3,
     spacing: f64,
     candidates: Candidates,
@@ -94,7 +98,9 @@ impl Solids {
         Ok(Self {
             names: scene.solids.iter().map(|s| s.name.clone()).collect(),
             predicted: poses.clone(),
-            candidates: Candidates::new(&poses),
+            candidates: Candidates::new(&poses, scene.periodic),
+            turns: vec![IVec3::ZERO; bodies.len()],
+            periodic: scene.periodic,
             poses,
             contact: vec![Wrench::default(); bodies.len()],
             load: vec![Wrench::default(); bodies.len()],
@@ -109,9 +115,14 @@ impl Solids {
         })
     }
 
-    /// Poses now, one per `scene.solids`.
+    /// Poses now, one per `scene.solids`. What forces move lies between periodic sides.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
+    }
+
+    /// Where solid `k` has come to [m], on beyond the periodic sides that it has crossed.
+    pub fn path(&self, k: usize) -> DVec3 {
+        self.poses[k].position + self.periodic.way(self.turns[k])
     }
 
     /// Poses that [`Solids::predict`] gave last.
@@ -236,6 +247,7 @@ impl Solids {
             }
         }
         report.penetration_max_over_l0 /= self.spacing;
+        self.bring_back();
         for (k, body) in self.bodies.iter_mut().enumerate() {
             self.poses[k] = body.pose;
             if !body.is_free() {
@@ -252,6 +264,21 @@ impl Solids {
             };
         }
         Ok(report)
+    }
+
+    /// Brings bodies that have left through a periodic side in through the opposite one.
+    fn bring_back(&mut self) {
+        for (body, turns) in self.bodies.iter_mut().zip(&mut self.turns).filter(|(b, _)| b.is_free()) {
+            let gone = self.periodic.whole(body.pose.position);
+            if gone != IVec3::ZERO {
+                body.pose.position = self.periodic.wrap(body.pose.position);
+                *turns += gone;
+                self.candidates.forget();
+                if let Some(law) = &mut self.law {
+                    law.brought_back();
+                }
+            }
+        }
     }
 
     /// What contact has asked of a device so far.

@@ -1,7 +1,7 @@
 //! What contact tells its callers.
 
 use crate::body::{Pose, Wrench};
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 /// What a step of contact did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,6 +43,8 @@ impl Energy {
 pub struct SolidState {
     /// Pose and velocity.
     pub pose: Pose,
+    /// Whole lengths that it has gone over periodic sides.
+    pub turns: IVec3,
     /// Angular momentum about the centre of mass [kg m2/s].
     pub angular_momentum: DVec3,
     /// Mean contact wrench of the last step.

@@ -2,17 +2,18 @@
 
 use super::law::Now;
 use super::{Energy, SolidState, Solids};
-use crate::body::Wrench;
+use crate::body::{Body, Wrench};
 use crate::error::{Error, Result};
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 impl Solids {
     /// Energy of the free bodies now.
     pub fn energy(&mut self) -> Energy {
         let mut energy = Energy::default();
-        for body in self.bodies.iter().filter(|b| b.is_free()) {
+        for (body, turns) in self.bodies.iter().zip(&self.turns).filter(|(b, _)| b.is_free()) {
             energy.kinetic += body.kinetic_energy();
-            energy.gravity -= body.mass * self.gravity.dot(body.pose.position);
+            let path = body.pose.position + self.periodic.way(*turns);
+            energy.gravity -= body.mass * self.gravity.dot(path);
         }
         self.candidates.refresh(&self.bodies, self.spacing, 0.0);
         if let Some(law) = &mut self.law {
@@ -50,8 +51,14 @@ impl Solids {
 
     /// State for a checkpoint, one per solid.
     pub fn states(&self) -> Vec<SolidState> {
-        let both = self.bodies.iter().zip(&self.contact);
-        both.map(|(b, c)| SolidState { pose: b.pose, angular_momentum: b.momentum, contact: *c }).collect()
+        let all = self.bodies.iter().zip(&self.contact).zip(&self.turns);
+        let of = |((b, c), turns): ((&Body, &Wrench), &IVec3)| SolidState {
+            pose: b.pose,
+            turns: *turns,
+            angular_momentum: b.momentum,
+            contact: *c,
+        };
+        all.map(of).collect()
     }
 
     /// Continues from the states of a checkpoint.
@@ -67,6 +74,7 @@ impl Solids {
             self.bodies[k].restore(state.pose, state.angular_momentum);
             self.poses[k] = self.bodies[k].pose;
             self.contact[k] = state.contact;
+            self.turns[k] = state.turns;
         }
         self.candidates.forget();
         if let Some(law) = &mut self.law {

@@ -235,7 +235,7 @@ fn bodies(simulation: &Simulation) -> Vec<Body> {
             let q = pose.orientation;
             Body {
                 name: simulation.solids.name(k).to_string(),
-                position_m: pose.position.to_array(),
+                position_m: simulation.solids.path(k).to_array(),
                 orientation_wxyz: [q.w, q.x, q.y, q.z],
                 velocity_m_s: pose.velocity.to_array(),
                 angular_velocity_rad_s: pose.angular_velocity.to_array(),

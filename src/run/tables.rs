@@ -229,7 +229,7 @@ impl Tables {
                 let q = pose.orientation;
                 let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
                 let mut row = vec![Cell::from(simulation.time), Cell::from(simulation.solids.name(k))];
-                row.extend(vector_cells(pose.position));
+                row.extend(vector_cells(simulation.solids.path(k)));
                 row.extend([q.w, q.x, q.y, q.z].map(Cell::Number));
                 for vector in [pose.velocity, pose.angular_velocity] {
                     row.extend(vector_cells(vector));

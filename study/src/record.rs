@@ -191,7 +191,7 @@ impl Recorder {
             for (k, pose) in simulation.solids.poses().iter().enumerate() {
                 let name = simulation.solids.name(k);
                 for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-                    put(format!("{name} {letter} [m]"), pose.position[axis]);
+                    put(format!("{name} {letter} [m]"), simulation.solids.path(k)[axis]);
                     put(format!("{name} v{letter} [m/s]"), pose.velocity[axis]);
                 }
                 let up = pose.orientation * DVec3::Z;

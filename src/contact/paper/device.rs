@@ -3,7 +3,7 @@
 use super::{Constants, Layer, Lists, Pair};
 use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
-use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::contact::candidates::{Candidates, MANY_PAIRS, image};
 use crate::contact::device::{Link, four, place, vector};
 use crate::error::Result;
 use bytemuck::{Pod, Zeroable};
@@ -118,6 +118,8 @@ fn words(offset: DVec3, normal: DVec3, step: f64) -> [[f32; 4]; 3] {
 struct Entry {
     a: usize,
     b: Option<usize>,
+    /// The way from B to its image beside A [m].
+    image: DVec3,
     /// Distance of the search [m].
     reach: f64,
     /// Origin of B's particles, if those are fixed, world [m].
@@ -198,7 +200,15 @@ impl Pairs {
             }
             let record =
                 PaperPair { first: [own.0, theirs.0], count: [own.1, theirs.1], ..Default::default() };
-            self.entries.push(Entry { a: pair.a, b: pair.b, reach, origin, walls, record });
+            self.entries.push(Entry {
+                a: pair.a,
+                b: pair.b,
+                image: pair.image,
+                reach,
+                origin,
+                walls,
+                record,
+            });
         }
         self.entries.retain(|e| e.record.count[1] > 0);
         self.generation = candidates.generation();
@@ -227,7 +237,7 @@ impl Pairs {
                 link.run(&[(contact_paper::fill, self.entries.len() as u64)])?;
             }
         }
-        self.pairs = self.entries.iter().map(|e| Pair::new(e.a, e.b)).collect();
+        self.pairs = self.entries.iter().map(|e| Pair::new(e.a, e.b, e.image)).collect();
         Ok(())
     }
 
@@ -286,8 +296,8 @@ fn pose(entry: &Entry, size: f64, bodies: &[Body]) -> PaperPose {
     let center = a.pose.position;
     let (turn, origin, velocity, spin) = match entry.b {
         Some(b) => {
-            let Body { pose, rotation, .. } = &bodies[b];
-            (still * *rotation, pose.position, pose.velocity_at(center), pose.angular_velocity)
+            let pose = image(&bodies[b], entry.image);
+            (still * bodies[b].rotation, pose.position, pose.velocity_at(center), pose.angular_velocity)
         }
         None => (still, entry.origin, DVec3::ZERO, DVec3::ZERO),
     };
@@ -312,7 +322,7 @@ fn pose(entry: &Entry, size: f64, bodies: &[Body]) -> PaperPose {
 fn take(pair: &mut Pair, sum: &[[f32; 4]; 3], law: &Constants, bodies: &[Body]) {
     let a = &bodies[pair.a];
     let (force, torque) = (a.rotation * vector(sum[0]), a.rotation * vector(sum[1]));
-    let arm = pair.b.map_or(DVec3::ZERO, |b| a.pose.position - bodies[b].pose.position);
+    let arm = pair.b.map_or(DVec3::ZERO, |b| a.pose.position - image(&bodies[b], pair.image).position);
     let [count, deepest, ..] = sum[2];
     let share = 1.0 / f64::from(count).max(1.0);
     let on_b = match pair.b {

@@ -2,9 +2,10 @@
 
 use super::pair::{Layer, Pair, Walls};
 use crate::body::Body;
-use crate::contact::broad::PointGrid;
-use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::contact::broad::{PointGrid, fixed_walls};
+use crate::contact::candidates::{Candidates, Close, MANY_PAIRS};
 use crate::scene::Scene;
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Wall layers and lists of the pairs that may touch; the baseline has the same.
@@ -21,12 +22,12 @@ impl Lists {
             offsets: s.wall_offset.clone(),
             normals: s.wall_area.iter().map(|a| a.normalize_or_zero()).collect(),
         });
-        let positions = scene.position[scene.groups.static_wall_range()].to_vec();
+        let (positions, of) = fixed_walls(scene);
         Self {
             layers: layers.collect(),
             walls: Walls {
                 grid: PointGrid::new(positions, 2.0 * scene.spacing),
-                normals: scene.static_wall_normal.clone(),
+                normals: of.iter().map(|&k| scene.static_wall_normal[k]).collect(),
             },
             pairs: vec![],
             generation: 0,
@@ -44,12 +45,12 @@ impl Lists {
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             let reach = body.extent() + candidates.skin(a) + distance;
             if self.walls.grid.meets(&(body.pose.position - reach, body.pose.position + reach)) {
-                pairs.push((Pair::new(a, None), distance + candidates.skin(a)));
+                pairs.push((Pair::new(a, None, DVec3::ZERO), distance + candidates.skin(a)));
             }
         }
-        for &(a, b) in &candidates.close {
+        for &Close { a, b, image } in &candidates.close {
             let reach = distance + candidates.skin(a) + candidates.skin(b);
-            pairs.push((Pair::new(a, Some(b)), reach));
+            pairs.push((Pair::new(a, Some(b), image), reach));
         }
         pairs
     }

@@ -2,6 +2,7 @@
 
 use crate::body::{Body, Wrench};
 use crate::contact::broad::PointGrid;
+use crate::contact::candidates::image;
 use glam::DVec3;
 
 /// Constants of the law.
@@ -41,6 +42,8 @@ pub(crate) struct Pair {
     pub a: usize,
     /// Another solid, or the fixed walls.
     pub b: Option<usize>,
+    /// The way from it to its image beside `a` [m].
+    pub image: DVec3,
     /// Candidates: particle of `a`, particle of `b`.
     pub candidates: Vec<(u32, u32)>,
     /// Wrench on `a` and on `b`, of the last evaluation.
@@ -56,10 +59,11 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
-    pub fn new(a: usize, b: Option<usize>) -> Self {
+    pub fn new(a: usize, b: Option<usize>, image: DVec3) -> Self {
         Self {
             a,
             b,
+            image,
             candidates: vec![],
             wrench: Default::default(),
             count: 0,
@@ -73,26 +77,29 @@ impl Pair {
     pub fn collect(&mut self, bodies: &[Body], layers: &[Layer], walls: &Walls, reach: f64) {
         self.candidates.clear();
         let body = &bodies[self.a];
-        let at = |body: &Body, offset: DVec3| body.pose.position + body.rotation * offset;
+        let at = |body: &Body, way: DVec3, offset: DVec3| body.pose.position + way + body.rotation * offset;
+        let still = DVec3::ZERO;
         let offsets = layers[self.a].offsets.iter().enumerate();
         match self.b {
             None => {
                 for (i, o) in offsets {
-                    walls.grid.near(at(body, *o), reach, |j| self.candidates.push((i as u32, j)));
+                    walls.grid.near(at(body, still, *o), reach, |j| self.candidates.push((i as u32, j)));
                 }
             }
             Some(b) => {
                 // only what lies inside the other's box, widened by the reach
-                let near = |own: &Body, layer: &Layer, other: &Body| {
+                let near = |own: (&Body, DVec3), layer: &Layer, other: (&Body, DVec3)| {
                     let inside = |x: &DVec3| {
-                        let q = other.rotation.transpose() * (*x - other.pose.position);
-                        other.shape.outside(q) < reach
+                        let q = other.0.rotation.transpose() * (*x - (other.0.pose.position + other.1));
+                        other.0.shape.outside(q) < reach
                     };
-                    let points = layer.offsets.iter().enumerate().map(|(k, o)| (k as u32, at(own, *o)));
+                    let points = layer.offsets.iter().enumerate();
+                    let points = points.map(|(k, o)| (k as u32, at(own.0, own.1, *o)));
                     points.filter(|(_, x)| inside(x)).collect::<Vec<_>>()
                 };
-                let theirs = near(&bodies[b], &layers[b], body);
-                for (i, x) in near(body, &layers[self.a], &bodies[b]) {
+                let (own, other) = ((body, still), (&bodies[b], self.image));
+                let theirs = near(other, &layers[b], own);
+                for (i, x) in near(own, &layers[self.a], other) {
                     let close = theirs.iter().filter(|(_, y)| y.distance_squared(x) < reach * reach);
                     self.candidates.extend(close.map(|(j, _)| (i, *j)));
                 }
@@ -106,6 +113,7 @@ impl Pair {
         let mut sum = [Wrench::default(); 2];
         let (mut count, mut energy, mut closest, mut normal_force) = (0, 0.0, f64::INFINITY, 0.0);
         let mut last = u32::MAX;
+        let b = self.b.map(|b| (image(&bodies[b], self.image), bodies[b].rotation, &layers[b]));
         let (mut x_i, mut v_i) = (DVec3::ZERO, DVec3::ZERO);
         for &(i, j) in &self.candidates {
             if i != last {
@@ -113,19 +121,19 @@ impl Pair {
                 v_i = a.pose.velocity_at(x_i);
                 last = i;
             }
-            let x_j = match self.b {
+            let x_j = match &b {
                 None => walls.grid.point(j),
-                Some(b) => bodies[b].pose.position + bodies[b].rotation * layers[b].offsets[j as usize],
+                Some((pose, rotation, layer)) => pose.position + *rotation * layer.offsets[j as usize],
             };
             let r = x_j - x_i;
             let squared = r.length_squared();
             if squared >= law.distance * law.distance || squared == 0.0 {
                 continue;
             }
-            let (v_j, normal) = match self.b {
+            let (v_j, normal) = match &b {
                 None => (DVec3::ZERO, walls.normals[j as usize]),
-                Some(b) => {
-                    (bodies[b].pose.velocity_at(x_j), bodies[b].rotation * layers[b].normals[j as usize])
+                Some((pose, rotation, layer)) => {
+                    (pose.velocity_at(x_j), *rotation * layer.normals[j as usize])
                 }
             };
             let d = squared.sqrt();
@@ -138,8 +146,8 @@ impl Pair {
             energy += 0.5 * law.spring * (law.distance - d).powi(2);
             closest = closest.min(d);
             sum[0] += Wrench { force, torque: (x_i - a.pose.position).cross(force) };
-            if let Some(b) = self.b {
-                let arm = x_i - bodies[b].pose.position;
+            if let Some((pose, ..)) = &b {
+                let arm = x_i - pose.position;
                 sum[1] += Wrench { force: -force, torque: -arm.cross(force) };
             }
         }

@@ -16,10 +16,11 @@ pub(crate) fn collide(
 ) -> usize {
     let mut count = 0;
     for &(i, j) in &pair.candidates {
-        let at =
-            |k: usize, n: u32| bodies[k].pose.position + bodies[k].rotation * layers[k].offsets[n as usize];
-        let x_i = at(pair.a, i);
-        let x_j = pair.b.map_or_else(|| walls.grid.point(j), |b| at(b, j));
+        let at = |k: usize, way: DVec3, n: u32| {
+            bodies[k].pose.position + way + bodies[k].rotation * layers[k].offsets[n as usize]
+        };
+        let x_i = at(pair.a, DVec3::ZERO, i);
+        let x_j = pair.b.map_or_else(|| walls.grid.point(j), |b| at(b, pair.image, j));
         let r = x_j - x_i;
         let d = r.length();
         if d >= distance || d == 0.0 {
@@ -27,28 +28,30 @@ pub(crate) fn collide(
         }
         let e = r / d;
         let middle = x_i + 0.5 * r;
-        let velocity_b = pair.b.map_or(DVec3::ZERO, |b| bodies[b].pose.velocity_at(middle));
+        // As the second solid has it.
+        let middle_b = middle - pair.image;
+        let velocity_b = pair.b.map_or(DVec3::ZERO, |b| bodies[b].pose.velocity_at(middle_b));
         let approach = (bodies[pair.a].pose.velocity_at(middle) - velocity_b).dot(e);
         if approach <= 0.0 {
             continue;
         }
         count += 1;
-        let give = |body: &Body| {
+        let give = |body: &Body, middle: DVec3| {
             let turning = (middle - body.pose.position).cross(e);
             e.dot(body.inverse_mass * e) + turning.dot(body.inverse_inertia * turning)
         };
-        let response = give(&bodies[pair.a]) + pair.b.map_or(0.0, |b| give(&bodies[b]));
+        let response = give(&bodies[pair.a], middle) + pair.b.map_or(0.0, |b| give(&bodies[b], middle_b));
         if response <= 0.0 {
             continue;
         }
         let impulse = -(1.0 + restitution) * approach / response * e;
-        let kick = |body: &mut Body, impulse: DVec3| {
+        let kick = |body: &mut Body, middle: DVec3, impulse: DVec3| {
             let angular = (middle - body.pose.position).cross(impulse);
             body.kick(impulse, angular);
         };
-        kick(&mut bodies[pair.a], impulse);
+        kick(&mut bodies[pair.a], middle, impulse);
         if let Some(b) = pair.b {
-            kick(&mut bodies[b], -impulse);
+            kick(&mut bodies[b], middle_b, -impulse);
         }
     }
     count

@@ -4,7 +4,7 @@ use super::Smooth;
 use super::pair::{Contact, DeviceSums, Other, Pair, Patch};
 use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
-use crate::contact::candidates::{Candidates, MANY_PAIRS};
+use crate::contact::candidates::{Candidates, MANY_PAIRS, image};
 use crate::contact::device::{Link, four, place, three, vector};
 use crate::contact::substeps::Limits;
 use crate::error::Result;
@@ -161,6 +161,11 @@ impl Pairs {
     /// Whether the lists are those of `candidates`.
     pub fn is_current(&self, candidates: &Candidates) -> bool {
         self.generation == candidates.generation()
+    }
+
+    /// What was before says nothing.
+    pub fn forget(&mut self) {
+        self.generation = 0;
     }
 
     /// Searches the pairs anew.
@@ -331,7 +336,8 @@ impl Pairs {
                 let from = record.list + if side == 1 { record.count[0] } else { 0 };
                 for &k in &list[from as usize..(from + record.near[side]) as usize] {
                     let point = surfaces[solid].points[(k - record.first[side]) as usize];
-                    let at = bodies[solid].pose.position + bodies[solid].rotation * point;
+                    let way = if side == 1 { pair.image } else { DVec3::ZERO };
+                    let at = bodies[solid].pose.position + way + bodies[solid].rotation * point;
                     out.push((pair.a, pair.b, side as u8, at));
                 }
             }
@@ -379,7 +385,7 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> Smoot
     let still = a.rotation.transpose();
     let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
-            let Body { pose, rotation, shape, .. } = &bodies[b];
+            let (pose, Body { rotation, shape, .. }) = (image(&bodies[b], pair.image), &bodies[b]);
             let half = shape.extent(DMat3::IDENTITY);
             (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
         }
@@ -432,7 +438,7 @@ fn read(pair: &Pair, record: &SmoothPair, sums: &[[f32; 4]], bodies: &[Body]) ->
     let patches = patches.collect();
     // The same forces at the same points act on B, so their moment about its centre follows.
     let on_b = pair.b.solid().map_or(Wrench::default(), |b| {
-        let between = a.pose.position - bodies[b].pose.position;
+        let between = a.pose.position - image(&bodies[b], pair.image).position;
         Wrench { force: -on_a.force, torque: -(on_a.torque + between.cross(on_a.force)) }
     });
     DeviceSums {

@@ -110,7 +110,7 @@ impl Friction {
             for pair in pairs {
                 let all: f64 = pair.patches.iter().map(|p| p.force).sum();
                 for patch in &pair.patches {
-                    let slip = Slip::new(pair.a, pair.b.solid(), patch, bodies, 0.0);
+                    let slip = Slip::new(pair, patch, bodies, 0.0);
                     slip.drag(bodies, eta * h * patch.force / all);
                 }
             }
@@ -121,7 +121,7 @@ impl Friction {
         }
         for pair in pairs {
             for patch in &pair.patches {
-                self.slips.push(Slip::new(pair.a, pair.b.solid(), patch, bodies, mu * patch.force * h));
+                self.slips.push(Slip::new(pair, patch, bodies, mu * patch.force * h));
             }
         }
         let sweeps = if self.slips.len() == 1 { 1 } else { SWEEPS };
@@ -138,14 +138,15 @@ impl Friction {
 }
 
 impl Slip {
-    fn new(a: usize, b: Option<usize>, patch: &Patch, bodies: &[Body], cap: f64) -> Self {
+    fn new(pair: &Pair, patch: &Patch, bodies: &[Body], cap: f64) -> Self {
+        let (a, b) = (pair.a, pair.b.solid());
         let first = patch.normal.any_orthonormal_vector();
         let tangent = [first, patch.normal.cross(first)];
         let moved = tangent.map(|t| patch.spread * t);
         let [xx, xy, yy] = [moved[0].dot(tangent[0]), moved[0].dot(tangent[1]), moved[1].dot(tangent[1])];
         let size = (xx + yy).sqrt();
         let arm_a = patch.at - bodies[a].pose.position;
-        let arm_b = b.map_or(DVec3::ZERO, |b| patch.at - bodies[b].pose.position);
+        let arm_b = pair.pose_b(bodies).map_or(DVec3::ZERO, |b| patch.at - b.position);
         // what turns against next to nothing is small
         let give = |k: Option<usize>, arm: DVec3| {
             let Some(body) = k.map(|k| &bodies[k]) else { return (0.0, 0.0) };

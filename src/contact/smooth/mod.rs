@@ -28,7 +28,7 @@ mod round;
 mod stability;
 mod walls;
 
-use super::candidates::{Candidates, MANY_PAIRS, reduced_mass};
+use super::candidates::{Candidates, Close, MANY_PAIRS, reduced_mass};
 use super::device::Link;
 use super::law::{Fault, Kind, Law, Now, Summary};
 use super::probe::Probe;
@@ -39,6 +39,7 @@ use crate::scene::{Scene, Solid};
 use crate::shape::{Cuboid, Geometry, Surface};
 use fault::Middles;
 use friction::Friction;
+use glam::DVec3;
 use pair::{Constants, LEAST, Other, Pair};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -147,13 +148,13 @@ impl Smooth {
                 let q = wall.axes.transpose() * (body.pose.position - wall.center);
                 let extent = body.shape.extent(wall.axes.transpose() * body.rotation);
                 if (Cuboid { half: wall.half + extent }).outside(q) < candidates.skin(a) {
-                    pairs.push((Pair::new(a, Other::Wall(w)), candidates.skin(a)));
+                    pairs.push((Pair::new(a, Other::Wall(w), DVec3::ZERO), candidates.skin(a)));
                 }
             }
         }
-        for &(a, b) in &candidates.close {
+        for &Close { a, b, image } in &candidates.close {
             let skin = candidates.skin(a) + candidates.skin(b);
-            pairs.push((Pair::new(a, Other::Solid(b)), skin));
+            pairs.push((Pair::new(a, Other::Solid(b), image), skin));
         }
         pairs
     }
@@ -164,9 +165,10 @@ impl Smooth {
             return;
         }
         let deep = before.iter().filter(|p| p.depth > 0.0);
-        let depths: HashMap<(usize, Other), f64> = deep.map(|p| ((p.a, p.b), p.depth)).collect();
+        let key = |p: &Pair| (p.a, p.b, p.image.to_array().map(f64::to_bits));
+        let depths: HashMap<_, f64> = deep.map(|p| (key(p), p.depth)).collect();
         for pair in pairs {
-            pair.depth = depths.get(&(pair.a, pair.b)).copied().unwrap_or(0.0);
+            pair.depth = depths.get(&key(pair)).copied().unwrap_or(0.0);
         }
     }
 
@@ -300,6 +302,12 @@ impl Law for Smooth {
     fn forget(&mut self) {
         self.generation = 0;
         self.device = None;
+    }
+
+    fn brought_back(&mut self) {
+        // the first lists know of none before
+        self.generation = 0;
+        self.device.iter_mut().for_each(|device| device.forget());
     }
 
     fn moved(&mut self) {

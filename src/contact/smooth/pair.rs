@@ -2,7 +2,8 @@
 
 use super::round;
 use super::walls::WallBox;
-use crate::body::{Body, Wrench};
+use crate::body::{Body, Pose, Wrench};
+use crate::contact::candidates::image;
 use crate::shape::{Faces, Inside, Line, Shape, Surface};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -261,6 +262,8 @@ pub(crate) struct Pair {
     pub a: usize,
     /// The other one.
     pub b: Other,
+    /// The way from it to its image beside `a`, over a periodic side [m].
+    pub image: DVec3,
     /// Points of `a` near `b`.
     pub points_a: Vec<u32>,
     /// Points of solid `b` near `a`.
@@ -295,10 +298,11 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
-    pub fn new(a: usize, b: Other) -> Self {
+    pub fn new(a: usize, b: Other, image: DVec3) -> Self {
         Self {
             a,
             b,
+            image,
             points_a: vec![],
             points_b: vec![],
             samples: vec![],
@@ -449,22 +453,25 @@ impl Pair {
     /// The second solid.
     pub(super) fn other(&self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) -> Frame {
         match self.b {
-            Other::Solid(b) => Frame::body(&bodies[b], surfaces[b].all_faces),
+            Other::Solid(b) => {
+                let own = Frame::body(&bodies[b], surfaces[b].all_faces);
+                Frame { center: own.center + self.image, ..own }
+            }
             Other::Wall(w) => Frame::wall(&walls[w]),
         }
     }
 
-    /// Velocity [m/s] of the second solid at the world point `at` [m].
-    fn velocity_b(&self, bodies: &[Body], at: DVec3) -> DVec3 {
-        self.b.solid().map_or(DVec3::ZERO, |b| bodies[b].pose.velocity_at(at))
+    /// How the second solid lies and moves, if it can, at its image beside the first.
+    pub(super) fn pose_b(&self, bodies: &[Body]) -> Option<Pose> {
+        self.b.solid().map(|b| image(&bodies[b], self.image))
     }
 
     /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's shape.
     pub fn collect(&mut self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox], skin: f64) {
         let body = &bodies[self.a];
-        let near = |surface: &Surface, own: &Body, to: Frame| {
-            let turn = to.axes.transpose() * own.rotation;
-            let shift = to.local(own.pose.position);
+        let near = |surface: &Surface, own: Frame, to: Frame| {
+            let turn = to.axes.transpose() * own.axes;
+            let shift = to.local(own.center);
             let points = surface.points.iter().enumerate();
             let points = points.filter(|(_, p)| to.shape.outside(turn * **p + shift) < skin);
             points.map(|(k, _)| k as u32).collect::<Vec<u32>>()
@@ -478,9 +485,9 @@ impl Pair {
         if surfaces[self.a].ball.is_some() || theirs.is_some_and(|s| s.ball.is_some()) {
             return;
         }
-        self.points_a = near(&surfaces[self.a], body, other);
+        self.points_a = near(&surfaces[self.a], own, other);
         if let Other::Solid(b) = self.b {
-            self.points_b = near(&surfaces[b], &bodies[b], own);
+            self.points_b = near(&surfaces[b], other, own);
         }
         self.collect_edges(bodies, surfaces, walls, skin);
     }
@@ -555,8 +562,8 @@ impl Pair {
         let still = a.rotation.transpose();
         let turn = other.axes.transpose() * a.rotation;
         let shift = other.axes.transpose() * (a.pose.position - other.center);
-        let b = self.b.solid().map(|b| &bodies[b]);
-        let velocity_b = |at: DVec3| b.map_or(DVec3::ZERO, |b| b.pose.velocity_at(at));
+        let b = self.pose_b(bodies);
+        let velocity_b = |at: DVec3| b.map_or(DVec3::ZERO, |b| b.velocity_at(at));
         for &k in &self.points_a {
             let p = surfaces[self.a].points[k as usize];
             if let Some(Inside { depth, outward, face }) = other.shape.depth(turn * p + shift, other.faces) {
@@ -577,7 +584,7 @@ impl Pair {
         };
         if let Other::Solid(b) = self.b {
             for &k in &self.points_b {
-                let at = bodies[b].pose.position + bodies[b].rotation * surfaces[b].points[k as usize];
+                let at = other.center + other.axes * surfaces[b].points[k as usize];
                 pushed(at, share * surfaces[b].weights[k as usize]);
             }
         }
@@ -632,9 +639,11 @@ impl Pair {
         let other = self.other(bodies, surfaces, walls);
         let theirs = self.b.solid().map(|b| &surfaces[b]);
         let mut contacts = std::mem::take(&mut self.contacts);
+        let b = self.pose_b(bodies);
         let mut add = |sign: f64, p: round::Pressed| {
             let normal = sign * p.normal;
-            let speed = (bodies[self.a].pose.velocity_at(p.at) - self.velocity_b(bodies, p.at)).dot(normal);
+            let velocity_b = b.map_or(DVec3::ZERO, |b| b.velocity_at(p.at));
+            let speed = (bodies[self.a].pose.velocity_at(p.at) - velocity_b).dot(normal);
             let patch = if sign > 0.0 { p.face } else { 8 + p.face };
             contacts.push(Contact::new(p.at, normal, p.depth, p.weight, speed, patch));
         };
@@ -668,7 +677,7 @@ impl Pair {
         let (origin, direction) = (other.center + other.axes * start, other.axes * along);
         let a = &bodies[self.a].pose;
         let (mut slip, mut spin) = (a.velocity_at(origin), a.angular_velocity);
-        if let Some(b) = self.b.solid().map(|b| &bodies[b].pose) {
+        if let Some(b) = self.pose_b(bodies) {
             slip -= b.velocity_at(origin);
             spin -= b.angular_velocity;
         }
@@ -735,10 +744,7 @@ impl Pair {
     /// momentum are exchanged to round-off.
     fn sum(&mut self, bodies: &[Body]) {
         let center_a = bodies[self.a].pose.position;
-        let center_b = match self.b {
-            Other::Solid(b) => bodies[b].pose.position,
-            Other::Wall(_) => DVec3::ZERO,
-        };
+        let center_b = self.pose_b(bodies).map_or(DVec3::ZERO, |b| b.position);
         let mut all = Wrench::default();
         let mut known = 0;
         for c in self.contacts.iter().filter(|c| c.force > 0.0) {

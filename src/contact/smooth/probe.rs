@@ -49,14 +49,14 @@ pub(super) fn fill(law: &Smooth, bodies: &[Body], device: Option<Link>, probe: &
             probe.candidates.extend(listed.into_iter().map(|(a, b, s, x)| side(a, b, s, x)));
         }
         _ => {
-            let place = |s: usize, k: u32| {
-                bodies[s].pose.position + bodies[s].rotation * law.surfaces[s].points[k as usize]
+            let place = |s: usize, way: DVec3, k: u32| {
+                bodies[s].pose.position + way + bodies[s].rotation * law.surfaces[s].points[k as usize]
             };
             let of = |p: &Pair| {
                 let mut all: Vec<[u64; 4]> =
-                    p.points_a.iter().map(|&k| side(p.a, p.b, 0, place(p.a, k))).collect();
+                    p.points_a.iter().map(|&k| side(p.a, p.b, 0, place(p.a, DVec3::ZERO, k))).collect();
                 if let Other::Solid(b) = p.b {
-                    all.extend(p.points_b.iter().map(|&k| side(p.a, p.b, 1, place(b, k))));
+                    all.extend(p.points_b.iter().map(|&k| side(p.a, p.b, 1, place(b, p.image, k))));
                 }
                 all.extend(p.samples.iter().map(|&x| side(p.a, p.b, 1, x)));
                 all

@@ -4,6 +4,7 @@
 //! A face that counts for nothing although a body can reach it would give the distance to another face to
 //! whatever comes in through it, and a force to match.
 
+use crate::periodic::Periodic;
 use crate::scene::Scene;
 use crate::shape::{ALL_FACES, Cuboid, Faces, Geometry, Line, PLANE_FACES, Shape, face_normal};
 use glam::{DMat3, DVec3};
@@ -47,19 +48,16 @@ const MOST_LOOKS: f64 = 40.0;
 /// The walls of a scene.
 pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
     let (spacing, flat) = (scene.spacing, scene.dimensions == 2);
-    let mut walls: Vec<WallBox> = scene
-        .walls
-        .iter()
-        .map(|wall| WallBox {
-            name: wall.name.clone(),
-            center: wall.center,
-            axes: wall.axes,
-            half: wall.half,
-            faces: 0,
-            edges: vec![],
-            corners: vec![],
-        })
-        .collect();
+    let boxes = scene.walls.iter().map(|wall| WallBox {
+        name: wall.name.clone(),
+        center: wall.center,
+        axes: wall.axes,
+        half: wall.half,
+        faces: 0,
+        edges: vec![],
+        corners: vec![],
+    });
+    let mut walls: Vec<WallBox> = boxes.flat_map(|wall| images(wall, &scene.periodic, spacing)).collect();
     for k in 0..walls.len() {
         let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
         let open = |face: u8| all & 1 << face != 0 && !face_is_covered(&walls, k, face, spacing, flat);
@@ -70,6 +68,22 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
         (walls[k].edges, walls[k].corners) = (edges, corners);
     }
     walls
+}
+
+/// `wall` and its images over periodic sides that lie up to half a length beyond them: bodies are brought back between the sides. A wall that
+/// spans an axis goes on by a length instead.
+fn images(mut wall: WallBox, periodic: &Periodic, spacing: f64) -> Vec<WallBox> {
+    let (center, length) = (wall.center, periodic.length());
+    let rows = wall.axes.transpose();
+    let half = DVec3::from_array(DVec3::AXES.map(|axis| (rows * axis).abs().dot(wall.half)));
+    let spans = [0, 1, 2].map(|k| periodic.is_along(k) && 2.0 * half[k] > length[k] - COVERED * spacing);
+    for k in (0..3).filter(|&k| spans[k]) {
+        // what ends at both sides lies along the axes
+        wall.half += length[k] * (rows * DVec3::AXES[k]).abs();
+    }
+    let reach = DVec3::from_array([0, 1, 2].map(|k| if spans[k] { 0.0 } else { half[k] + 0.5 * length[k] }));
+    let turns = periodic.turns(center - reach, center + reach);
+    turns.map(|turns| WallBox { center: center + periodic.way(turns), ..wall.clone() }).collect()
 }
 
 /// Whether another wall than `k` holds the point `q` of its frame or is next to it.
