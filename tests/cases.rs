@@ -62,6 +62,7 @@ cases! {
     falling_cube None, 200;
     floating_cube None, 40;
     hydrostatic None, 60;
+    pebble None, 30;
     resting_cube None, 200;
     sliding_block None, 200;
 }

@@ -1,7 +1,8 @@
 //! The smooth law on a device: what shaders/contact_smooth.wgsl is given, and what becomes of its answers.
 
 use super::Smooth;
-use super::pair::{Contact, DeviceSums, Other, Pair, Patch};
+use super::pair::{Other, Pair};
+use super::patch::{Contact, DeviceSums, Patch};
 use crate::body::{Body, Wrench};
 use crate::compute::{Program, buffers, kernels, shader_structs};
 use crate::contact::candidates::{Candidates, MANY_PAIRS, image};

@@ -15,7 +15,8 @@
 //! The viscous friction of the paper's Eq. (12) is at hand as well: -eta times the slip, shared among the
 //! patches of two solids by their normal forces.
 
-use super::pair::{Pair, Patch};
+use super::pair::Pair;
+use super::patch::Patch;
 use crate::body::Body;
 use glam::{DMat2, DMat3, DVec2, DVec3};
 use std::sync::LazyLock;

@@ -19,10 +19,13 @@
 //! within half a spacing more; it is never reached with a sensible K, and it is conservative too. In solids of
 //! less than two spacings both lengths shrink with their thickness: they must not be pressed to their middle.
 
+mod constants;
 pub mod device;
 mod fault;
+mod frame;
 mod friction;
 mod pair;
+mod patch;
 mod probe;
 mod round;
 mod stability;
@@ -37,10 +40,11 @@ use crate::body::{Body, Wrench};
 use crate::error::Result;
 use crate::scene::{Scene, Solid};
 use crate::shape::{Cuboid, Geometry, Surface};
+use constants::Constants;
 use fault::Middles;
 use friction::Friction;
 use glam::DVec3;
-use pair::{Constants, LEAST, Other, Pair};
+use pair::{LEAST, Other, Pair};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;

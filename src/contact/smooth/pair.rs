@@ -1,10 +1,13 @@
 //! A pair of solids under the smooth law: what of each lies in the other, forces, friction patches.
 
+use super::constants::{Constants, felt};
+use super::frame::{Frame, View};
+use super::patch::{Contact, DeviceSums, Patch, place, square};
 use super::round;
 use super::walls::WallBox;
 use crate::body::{Body, Pose, Wrench};
 use crate::contact::candidates::image;
-use crate::shape::{Faces, Inside, Line, Shape, Surface};
+use crate::shape::{Inside, Line, Surface};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
@@ -27,233 +30,11 @@ impl Other {
     }
 }
 
-/// Constants of a pair for one length of sub-step.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Constants {
-    /// Stiffness of the whole contact [N/m].
-    pub spring: f64,
-    /// Stiffness beyond `stop_depth` [N/m]; not below `spring`.
-    pub stop: f64,
-    /// Depth at which the second spring joins [m].
-    pub stop_depth: f64,
-    /// Damping of the whole contact [kg/s].
-    pub damping: f64,
-    /// Length of a sub-step [s].
-    pub step: f64,
-}
-
-impl Constants {
-    /// Secant stiffness [N/m] and energy [J] of a contact of effective depth `depth` [m].
-    pub fn stored(&self, depth: f64) -> (f64, f64) {
-        let beyond = (depth - self.stop_depth).max(0.0);
-        let more = self.stop - self.spring;
-        let energy = 0.5 * self.spring * depth * depth + 0.5 * more * beyond * beyond;
-        (self.spring + more * beyond / depth, energy)
-    }
-
-    /// Constants that make sub-steps of `h` [s] follow the damped oscillator of mass `mass` [kg].
-    ///
-    /// The explicit dashpot takes C h / m of the speed where the exact one takes 1 - exp(-C h / m); it is
-    /// set to the latter. With `frequency` the spring too is set to that of the exact oscillator (the
-    /// step sees a damped spring up to exp(C h / 2 m) too stiff): right for a restitution, but K is then
-    /// no longer the K of a body at rest.
-    pub fn discretise(&mut self, mass: f64, h: f64, frequency: bool) {
-        self.step = h;
-        let a = 0.5 * self.damping * h / mass;
-        self.damping = -mass / h * (-2.0 * a).exp_m1();
-        if frequency {
-            let square = self.spring * h * h / mass;
-            let turn = square - a * a;
-            let cosine = if turn >= 0.0 { turn.sqrt().cos() } else { (-turn).sqrt().cosh() };
-            let ratio = 2.0 * (-a).exp() * (a.cosh() - cosine) / square;
-            self.spring *= ratio;
-            self.stop *= ratio;
-        }
-    }
-}
-
-/// Share of the dashpot that a point feels which entered `steps` sub-steps ago, at its speed.
-///
-/// A force acts from the middle of the last sub-step to the middle of this one, so a point that entered
-/// s < 1 sub-steps ago is due s + 1/2 of it, spread over two sub-steps: s/h + 3/2 is the sum of both
-/// values of this hat, whatever the phase, and the hat is continuous. Without it a restitution scatters
-/// by C h / 2 m with the phase of the impact.
-fn felt(steps: f64) -> f64 {
-    if steps < 1.0 { 1.5 * steps } else { (2.0 - 0.5 * steps).max(1.0) }
-}
-
 /// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
 const ALONG_NORMAL: f64 = 0.95;
 
 /// Share of the sum of w d^8 below which an edge is left out: the end of an upright one adds nothing to a face.
 pub(super) const LEAST: f64 = 1e-6;
-
-/// Where a shape stands.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
-    pub center: DVec3,
-    pub axes: DMat3,
-    pub shape: Shape,
-    /// Faces that can be reached.
-    pub faces: Faces,
-}
-
-impl Frame {
-    pub fn body(body: &Body, faces: Faces) -> Self {
-        Self { center: body.pose.position, axes: body.rotation, shape: body.shape, faces }
-    }
-
-    pub fn wall(wall: &WallBox) -> Self {
-        Self { center: wall.center, axes: wall.axes, shape: wall.shape(), faces: wall.faces }
-    }
-
-    /// Largest coordinate of its points along the unit vector `n` of the world [m], from its centre.
-    fn reach(&self, n: DVec3) -> f64 {
-        let own = self.axes.transpose() * n;
-        match self.shape {
-            Shape::Box(cuboid) => own.abs().dot(cuboid.half),
-            shape => shape.reach(own),
-        }
-    }
-
-    /// A lower bound of its distance from `other` [m]: the widest gap across an axis of either, or the line of centres.
-    fn gap(&self, other: &Self) -> f64 {
-        let between = other.center - self.center;
-        let axes =
-            [self.axes, other.axes].into_iter().flat_map(|axes| [axes.x_axis, axes.y_axis, axes.z_axis]);
-        let gap = |n: DVec3| {
-            let n = if n.dot(between) < 0.0 { -n } else { n };
-            n.dot(between) - self.reach(n) - other.reach(-n)
-        };
-        axes.chain(between.try_normalize()).map(gap).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// `x` [m] of the world in its own frame.
-    pub fn local(&self, x: DVec3) -> DVec3 {
-        self.axes.transpose() * (x - self.center)
-    }
-}
-
-/// A shape as the edges of another frame see it.
-#[derive(Clone, Copy, Debug)]
-struct View {
-    other: Frame,
-    /// Turns the edges' frame into the shape's.
-    turn: DMat3,
-    /// The edges' frame in the shape's.
-    shift: DVec3,
-    /// Weight times depth^8 below which an edge is left out [m8].
-    least: f64,
-}
-
-impl View {
-    /// `other` as seen from the frame of `axes` about `center`.
-    fn new(center: DVec3, axes: DMat3, other: Frame, least: f64) -> Self {
-        let still = other.axes.transpose();
-        Self { other, turn: still * axes, shift: still * (center - other.center), least }
-    }
-}
-
-/// One point in contact.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Contact {
-    /// Where, world [m].
-    pub at: DVec3,
-    /// Direction of the force on the pair's first solid: minus the gradient of the depth, of length 1
-    /// except near edges.
-    pub normal: DVec3,
-    pub depth: f64,
-    pub weight: f64,
-    /// Minus the rate of change of the depth [m/s].
-    pub speed: f64,
-    /// Deviation of the place of the force that it stands for, along an edge, world [m].
-    stretch: DVec3,
-    force: f64,
-    patch: u8,
-}
-
-impl Contact {
-    /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
-    pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
-        Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, patch }
-    }
-
-    /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
-    /// cross.
-    pub fn face(&self) -> Option<u8> {
-        match self.patch {
-            patch @ 0..6 => Some(patch),
-            patch @ 8..14 => Some(patch - 2),
-            _ => None,
-        }
-    }
-
-    /// s_i of a point in a contact of effective depth `depth` [m].
-    #[inline]
-    fn share(&self, depth: f64) -> f64 {
-        let x = self.depth * depth.recip();
-        self.weight * (x * x) * (x * x) * (x * x)
-    }
-}
-
-/// What a device sums over the points of a pair and the contacts given to it, world frame.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct DeviceSums {
-    /// Points and given ones in contact.
-    pub count: usize,
-    /// Effective depth D of all contacts [m].
-    pub depth: f64,
-    /// Deepest of all contacts [m].
-    pub deepest: f64,
-    /// Sum of the s_i of all contacts.
-    pub shares: f64,
-    /// Wrenches on the two solids, of these.
-    pub wrench: [Wrench; 2],
-    /// Patches of these.
-    pub patches: Vec<Patch>,
-}
-
-/// All points pressed by one face: where friction acts.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Patch {
-    /// Which face, of which of the two solids.
-    key: u8,
-    /// Direction of the normal force on the first solid.
-    pub normal: DVec3,
-    /// Centre of the normal force [m].
-    pub at: DVec3,
-    /// Normal force [N].
-    pub force: f64,
-    /// Sum of the points' forces [N].
-    pressing: f64,
-    /// Second moments of the normal force about its centre [m2], world axes.
-    pub spread: DMat3,
-}
-
-impl Patch {
-    /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
-    /// second moments about it [m2].
-    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
-        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, spread }
-    }
-}
-
-/// Place of the patch `key`. Contacts of one mostly follow each other: that at `last` is looked at first.
-fn place(patches: &[Patch], key: u8, last: usize) -> Option<usize> {
-    let same = patches.get(last).is_some_and(|p| p.key == key);
-    if same { Some(last) } else { patches.iter().position(|p| p.key == key) }
-}
-
-/// `share` times the products of the parts of `arm` [m].
-fn square(arm: DVec3, share: f64) -> DMat3 {
-    let weighed = share * arm;
-    let (xy, xz, yz) = (weighed.x * arm.y, weighed.x * arm.z, weighed.y * arm.z);
-    DMat3::from_cols(
-        DVec3::new(weighed.x * arm.x, xy, xz),
-        DVec3::new(xy, weighed.y * arm.y, yz),
-        DVec3::new(xz, yz, weighed.z * arm.z),
-    )
-}
 
 /// A pair of solids close to each other.
 #[derive(Clone, Debug)]
@@ -780,52 +561,5 @@ impl Pair {
                 patch.spread += square(c.stretch, share);
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::shape::{ALL_FACES, Cylinder, Sphere};
-    use glam::DQuat;
-
-    #[test]
-    fn the_gap_is_no_more_than_the_distance_and_finds_most_neighbours() {
-        let shapes = [
-            Shape::cuboid(DVec3::new(0.4, 0.2, 0.6)),
-            Shape::Sphere(Sphere { radius: 0.3 }),
-            Shape::Cylinder(Cylinder { radius: 0.2, half_height: 0.25 }),
-        ];
-        let (mut apart, mut found) = (0, 0);
-        for k in 1..600_u32 {
-            let f = |n: f64| (f64::from(k) * n).fract() - 0.5;
-            let frame = |shape: Shape, at: f64, turn: [f64; 3]| Frame {
-                center: at * DVec3::from(turn.map(f)),
-                axes: DMat3::from_quat(
-                    DQuat::from_xyzw(f(turn[0] * 3.1), f(turn[1] * 3.1), f(turn[2] * 3.1), 0.4).normalize(),
-                ),
-                shape,
-                faces: ALL_FACES,
-            };
-            let a = frame(shapes[k as usize % 3], 1.6, [0.618_034, 0.754_877, 0.569_84]);
-            let b = frame(shapes[k as usize / 3 % 3], 0.0, [0.819_17, 0.671_04, 0.549_7]);
-            let gap = a.gap(&b);
-            assert!((gap - b.gap(&a)).abs() < 1e-12);
-            // from places on the one to the other
-            let mut nearest = f64::INFINITY;
-            for n in 0..2000_u32 {
-                let z = 1.0 - (2.0 * f64::from(n) + 1.0) / 2e3;
-                let (sin, cos) = (2.399_963_2 * f64::from(n)).sin_cos();
-                let out = DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
-                // in its frame, from outside onto its surface
-                let (distance, gradient) = a.shape.distance(2.0 * out);
-                let on = a.center + a.axes * (2.0 * out - distance * gradient);
-                nearest = nearest.min(b.shape.distance(b.local(on)).0);
-            }
-            assert!(gap < nearest + 1e-9, "{k}: {gap} {nearest}");
-            apart += u32::from(nearest > 0.05);
-            found += u32::from(gap > 0.0 && nearest > 0.05);
-        }
-        assert!(apart > 300 && f64::from(found) > 0.8 * f64::from(apart), "{found} of {apart}");
     }
 }

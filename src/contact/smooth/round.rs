@@ -5,7 +5,7 @@
 //! integrated. At a deepest point the depth does not change with the place on the body, so the force, the
 //! gradient of the depth at that point, is still minus the derivative of the energy.
 
-use super::pair::Frame;
+use super::frame::Frame;
 use crate::shape::{Inside, Ring, Side, Surface, along, around, root};
 use glam::{DMat3, DVec3};
 

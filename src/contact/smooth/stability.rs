@@ -1,6 +1,6 @@
 //! How stiff the smooth law's contacts are, and what of a case's numbers the sub-steps carry.
 
-use super::pair::Constants;
+use super::constants::Constants;
 use super::{EXPONENT, STOP_DEPTH, Smooth};
 use crate::body::Body;
 use crate::contact::candidates::reduced_mass;
