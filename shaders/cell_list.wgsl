@@ -51,7 +51,11 @@ fn count(@builtin(global_invocation_id) id: vec3u) {
     var key = params.cell_total + k / GHOST_BLOCK;
     if k >= params.fluid {
         key = moving_key() + cell_index(cell_coordinates(x.xyz));
+//#if RANKS
+    } else if x.w == FLUID || x.w == FOREIGN {
+//#else
     } else if x.w == FLUID {
+//#endif
         if in_domain(wrapped(x.xyz), velocity[k].xyz) {
             key = cell_index(cell_coordinates(x.xyz));
         } else {

@@ -95,6 +95,11 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
     }
 //#if REACTION
     else {
+//#if RANKS
+        if position[i].w == FOREIGN {
+            return;
+        }
+//#endif
         reaction[i - params.fluid] += vec4f(params.particle_mass / now.dt * change, 0.0);
     }
 //#endif

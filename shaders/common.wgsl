@@ -12,6 +12,10 @@ const GHOST_BLOCK: u32 = 64u;
 // Kind of a particle, in position.w; as crate::scene::Kind.
 const FLUID: f32 = 0.0;
 const GHOST: f32 = 5.0;
+//#if RANKS
+// Of a copy of what another rank computes, water or wall: a neighbour, of which nothing is computed here. No kind of the scene.
+const FOREIGN: f32 = 6.0;
+//#endif
 
 // Part in the PPE, as crate::fields::State.
 const INACTIVE: u32 = 0u;

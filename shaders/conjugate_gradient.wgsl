@@ -438,7 +438,14 @@ fn end(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index
         // shaders/pressure_level.wgsl bounds it when it has its level.
         pressure[i] = p;
 //#else
+//#if RANKS
+        // Counted where it is computed.
+        if position[i].w != FOREIGN {
+            cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
+        }
+//#else
         cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
+//#endif
         pressure[i] = clamp(p, 0.0, now.pressure_max);
 //#endif
     }

@@ -113,6 +113,25 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     known.force += free_body[b].force.xyz;
     known.torque += free_body[b].torque.xyz;
     let y = respond_to(b, known);
+//#if RANKS
+    // Of this rank's part of them; `subtract` follows when those of all ranks are added.
+    if t == 0u {
+        let answer = coupled_row(params.moving_wall + b);
+        coupling[answer] = vec4f(y.force, 0.0);
+        coupling[answer + 1u] = vec4f(y.torque, 0.0);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn subtract(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let b = group_number(group);
+    if b >= free_body[0].bodies {
+        return;
+    }
+    let end = free_body[b].first + free_body[b].count;
+    let place = coupled_row(params.moving_wall + b);
+    let y = Wrench(coupling[place].xyz, coupling[place + 1u].xyz);
+//#endif
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
         let row = Wrench(coupling[coupled_row(k)].xyz, coupling[coupled_row(k) + 1u].xyz);
         source_diagonal[params.fluid + k].x -= product(row, y);

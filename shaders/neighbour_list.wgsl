@@ -101,6 +101,9 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     let low = lowest_around(cell);
     let high = highest_around(cell);
     var searched = me.w == FLUID;
+//#if RANKS
+    searched = searched || me.w == FOREIGN;
+//#endif
     if i >= params.fluid {
         searched = near_fluid(low, high);
     }

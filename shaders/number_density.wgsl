@@ -37,6 +37,10 @@ fn number_density_main(@builtin(global_invocation_id) id: vec3u) {
         n += w;
         centroid += w * r;
     }
+//#if RANKS
+    // Walls of other ranks take no part; of their water they tell.
+    wet = wet && me.w != FOREIGN;
+//#endif
 //#if THRESHOLD_OFFSET
     let surface = n < 0.8 * params.surface_below
         || (n < params.surface_below && length(centroid) > OFFSET * params.spacing * n);

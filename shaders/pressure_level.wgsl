@@ -63,7 +63,11 @@ fn sum_source(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocatio
               @builtin(workgroup_id) group: vec3u) {
     var sum = vec2f(0.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
+//#if RANKS
+        sum += select(vec2f(0.0), vec2f(source_diagonal[i].x, 1.0), source_diagonal[i].y > 0.0);
+//#else
         sum += select(vec2f(0.0), vec2f(source_diagonal[i].x, 1.0), state[i] == INNER);
+//#endif
     }
     sum = total(sum, t);
     if t == 0u {
@@ -80,7 +84,11 @@ fn subtract_mean(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
     sum = total(sum, t);
     let mean = sum.x / max(sum.y, 1.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
+//#if RANKS
+        if source_diagonal[i].y > 0.0 {
+//#else
         if state[i] == INNER {
+//#endif
             source_diagonal[i].x -= mean;
         }
     }
@@ -91,7 +99,11 @@ fn find_lowest(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocati
                @builtin(workgroup_id) group: vec3u) {
     var least = NONE;
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
+//#if RANKS
+        least = min(least, select(NONE, pressure[i], source_diagonal[i].y > 0.0));
+//#else
         least = min(least, select(NONE, pressure[i], state[i] == INNER));
+//#endif
     }
     least = lowest(least, t);
     if t == 0u {
@@ -108,7 +120,11 @@ fn raise(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
     least = lowest(least, t);
     var cut = 0u;
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
+//#if RANKS
+        if source_diagonal[i].y > 0.0 {
+//#else
         if state[i] == INNER {
+//#endif
             let p = pressure[i] - least;
             cut += u32(p > now.pressure_max);
             pressure[i] = min(p, now.pressure_max);

@@ -71,7 +71,12 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     if i >= params.pressure_slots {
         return;
     }
+//#if RANKS
+    // A row is its rank's.
+    if state[i] != INNER || position[i].w == FOREIGN {
+//#else
     if state[i] != INNER {
+//#endif
         source_diagonal[i] = vec2f(0.0);
         return;
     }

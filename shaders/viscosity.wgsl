@@ -38,6 +38,11 @@ fn viscosity(@builtin(global_invocation_id) id: vec3u) {
 //#if REACTION
     else if i < params.fluid + params.moving_wall {
         reaction[i - params.fluid] = vec4f(params.particle_mass * shear(i, params.fluid), 0.0);
+//#if RANKS
+        if position[i].w == FOREIGN {
+            reaction[i - params.fluid] = vec4f(0.0);
+        }
+//#endif
     }
 //#endif
 }

@@ -52,6 +52,11 @@ fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
     }
 //#if REACTION
     else if i < params.fluid + params.moving_wall {
+//#if RANKS
+        if position[i].w == FOREIGN {
+            return;
+        }
+//#endif
         let x = position[i].xyz;
         let neighbours = near_of(neighbour_count[i]);
         var taken = vec3f(0.0);

@@ -173,6 +173,8 @@ macro_rules! buffers {
         #[allow(non_upper_case_globals, missing_docs)]
         /// Buffers of the program.
         pub mod buffer {
+            // Plain elements need none of it.
+            #[allow(unused_imports)]
             use super::*;
             use $crate::compute::{Buffer, Host, Spec};
             $($(#[$doc])* pub const $name: Buffer<$element> = Buffer::new(stringify!($name), Host::$host);)*

@@ -27,6 +27,11 @@ impl State {
     }
 }
 
+/// `more` times `value` from place `at` on.
+pub(crate) fn insert<T: Clone>(values: &mut Vec<T>, at: usize, more: usize, value: T) {
+    values.splice(at..at, std::iter::repeat_n(value, more));
+}
+
 /// State of all particles. Arrays marked P hold the pressure-carrying slots only, F the fluid slots only.
 #[derive(Clone, Default, Debug)]
 pub struct Fields {
@@ -80,6 +85,39 @@ impl Fields {
             reaction: Vec::new(),
             inertia_head: Vec::new(),
         }
+    }
+
+    /// More slots of water, parked at `corner`, from slot `at` on, the first of the solids: these move up.
+    pub(crate) fn widen(&mut self, at: usize, more: usize, corner: DVec3) {
+        let Self {
+            position,
+            velocity,
+            kind,
+            id,
+            pressure,
+            number_density,
+            surface_pressure,
+            state,
+            source,
+            diagonal,
+            acceleration,
+            // Of solids alone.
+            reaction: _,
+            inertia_head: _,
+        } = self;
+        insert(position, at, more, corner);
+        insert(velocity, at, more, DVec3::ZERO);
+        insert(kind, at, more, Kind::Ghost);
+        insert(id, at, more, 0);
+        for values in [pressure, number_density, source] {
+            insert(values, at, more, 0.0);
+        }
+        if !surface_pressure.is_empty() {
+            insert(surface_pressure, at, more, 0.0);
+        }
+        insert(diagonal, at, more, 1.0);
+        insert(state, at, more, State::Inactive);
+        insert(acceleration, at, more, DVec3::ZERO);
     }
 
     /// Bring the fluid back between the sides where these are periodic: since the last search it may have left them.

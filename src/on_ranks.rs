@@ -1,8 +1,7 @@
 //! A simulation on many ranks: the first one opens it, the others serve.
 
-use crate::backend::Backend;
-use crate::backend::cpu::Cpu;
 use crate::backend::lead::{Lead, follow};
+use crate::backend::{Backend, Processor, Ranked};
 use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::params::Params;
@@ -14,7 +13,7 @@ use crate::simulation::{Simulation, settings};
 use std::sync::Arc;
 
 /// What a rank makes of its start: nothing wrong, or why it cannot compute. All ranks tell each other once.
-fn agree(team: &dyn Team, own: &Result<Cpu>) -> Result<()> {
+fn agree<T>(team: &dyn Team, own: &Result<T>) -> Result<()> {
     let wrong = own.as_ref().err().map(ToString::to_string);
     let all = team.gather(encode(&wrong));
     let first =
@@ -37,24 +36,37 @@ pub fn hear_case(team: &dyn Team) -> Option<String> {
 }
 
 impl Simulation {
-    /// Set up a `scene` that was built from `case` on the ranks of `team`, of which this is the first. The others [`serve`].
+    /// Set up a `scene` that was built from `case` on the ranks of `team`, of which this is the first, on CPUs. The others [`serve`].
     ///
     /// # Errors
     /// As [`Simulation::open`], and [`Error::Usage`] for what ranks do not compute, or what one of them could not set up.
     pub fn on_ranks(case: &Case, scene: impl Into<Arc<Scene>>, team: &Arc<dyn Team>) -> Result<Self> {
-        let mut agreed = false;
+        Self::on_ranks_of(case, scene, team, &Processor::Cpu)
+    }
+
+    /// [`Simulation::on_ranks`], each on its `processor`: its own GPU, or its threads. The others [`serve_on`] the same.
+    ///
+    /// # Errors
+    /// As [`Simulation::on_ranks`].
+    pub fn on_ranks_of(
+        case: &Case,
+        scene: impl Into<Arc<Scene>>,
+        team: &Arc<dyn Team>,
+        processor: &Processor,
+    ) -> Result<Self> {
+        let (mut agreed, k) = (false, team.on_machine());
         let set_up = Self::with_backend(case, scene, |scene, params, plan, settings| {
             agreed = true;
-            let cpu = Cpu::of_team(team.clone(), scene, params, plan, settings);
-            let together = agree(&**team, &cpu);
-            let cpu = cpu?;
+            let own = processor.of_team((team, k), scene, params, plan, settings);
+            let together = agree(&**team, &own);
+            let own = own?;
             together?;
-            Ok(Box::new(Lead::new(team.clone(), cpu)) as Box<dyn Backend>)
+            Ok(Box::new(Lead::new(team.clone(), own)) as Box<dyn Backend>)
         });
         if !agreed {
             let why = set_up.as_ref().err().map(ToString::to_string).unwrap_or_default();
             // The others are told; here the error is known already.
-            let _ = agree(&**team, &Err(Error::usage("ranks", why)));
+            let _ = agree::<()>(&**team, &Err(Error::usage("ranks", why)));
         }
         set_up
     }
@@ -68,16 +80,29 @@ impl Simulation {
 pub fn serve(
     team: &Arc<dyn Team>,
     set_up: impl FnOnce() -> Result<(Case, Arc<Scene>)>,
-) -> Result<Option<Cpu>> {
-    let cpu = set_up().and_then(|(case, scene)| {
+) -> Result<Option<Box<dyn Ranked>>> {
+    serve_on(team, &Processor::Cpu, set_up)
+}
+
+/// [`serve`] on a `processor`, with the first rank's [`Simulation::on_ranks_of`].
+///
+/// # Errors
+/// What a stage says.
+pub fn serve_on(
+    team: &Arc<dyn Team>,
+    processor: &Processor,
+    set_up: impl FnOnce() -> Result<(Case, Arc<Scene>)>,
+) -> Result<Option<Box<dyn Ranked>>> {
+    let k = team.on_machine();
+    let own = set_up().and_then(|(case, scene)| {
         let params = Params::new(&case, &scene)?;
         let (plan, settings) = (Plan::new(&case, &scene, &params), settings(&case));
         // Every rank finds the same places: it is little work, and bits repeat.
         let scene = settle(scene, &params, &plan, settings)?;
-        Cpu::of_team(team.clone(), &scene, &params, &plan, settings)
+        processor.of_team((team, k), &scene, &params, &plan, settings)
     });
-    let together = agree(&**team, &cpu);
-    let (Ok(mut cpu), Ok(())) = (cpu, together) else { return Ok(None) };
-    follow(&mut cpu)?;
-    Ok(Some(cpu))
+    let together = agree(&**team, &own);
+    let (Ok(mut own), Ok(())) = (own, together) else { return Ok(None) };
+    follow(&mut *own)?;
+    Ok(Some(own))
 }

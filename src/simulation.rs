@@ -123,9 +123,14 @@ impl Simulation {
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);
         if device == ContactDevice::Gpu && plan.contact.program.is_some() && backend.compute().is_none() {
-            let message = "contact.device = \"gpu\": this run is on the CPU";
-            let remedy =
-                "use --backend gpu (`seixo adapters` lists what there is) or leave contact.device out";
+            let (message, remedy) = if backend.precision() == "f32" {
+                ("contact.device = \"gpu\": on many ranks contact is on the host", "leave contact.device out")
+            } else {
+                (
+                    "contact.device = \"gpu\": this run is on the CPU",
+                    "use --backend gpu (`seixo adapters` lists what there is) or leave contact.device out",
+                )
+            };
             return Err(Error::key("contact.device", message, remedy));
         }
         Ok(Self {

@@ -243,7 +243,7 @@ pages! {
     how_to_let_water_in "howto-inflow.md" 3 0;
     how_to_restart "howto-restart.md" 1 5;
     how_to_sweep "howto-cluster.md" 1 5;
-    how_to_use_ranks "howto-ranks.md" 0 4;
+    how_to_use_ranks "howto-ranks.md" 0 8;
     how_to_look "howto-look.md" 1 6;
     from_dualsphysics "dualsphysics.md" 1 0;
     the_shapes "shapes.md" 1 0;

@@ -39,6 +39,7 @@ mod packages;
 mod periodic;
 mod prisms;
 mod ranks;
+mod ranks_gpu;
 mod render;
 mod report;
 mod restart;

@@ -4,13 +4,13 @@ use crate::common;
 use common::*;
 use glam::DVec3;
 use seixo::Error;
-use seixo::backend::Counters;
+use seixo::backend::{Counters, Processor};
 use seixo::case::{Case, OutputField};
 use seixo::checkpoint::Archive;
 use seixo::fields::Fields;
 use seixo::ledger::{Entry, Ledger};
 use seixo::monitor::FluidMonitor;
-use seixo::on_ranks::serve;
+use seixo::on_ranks::{serve, serve_on};
 use seixo::output::folder::series_in;
 use seixo::output::particles::Particles;
 use seixo::output::replay::{Frame, frames, particles};
@@ -34,6 +34,16 @@ fn on_ranks<T: Send>(
     ranks: usize,
     of: impl FnOnce(&mut Simulation) -> T + Send,
 ) -> (T, Vec<Standing>) {
+    on_ranks_of(case, ranks, &Processor::Cpu, of)
+}
+
+/// The same, each on its `processor`.
+pub(crate) fn on_ranks_of<T: Send>(
+    case: &Case,
+    ranks: usize,
+    processor: &Processor,
+    of: impl FnOnce(&mut Simulation) -> T + Send,
+) -> (T, Vec<Standing>) {
     let scene = Arc::new(Scene::build(case).expect("the scene builds"));
     let mut team = team(ranks).into_iter();
     let first = team.next().expect("a rank");
@@ -42,12 +52,13 @@ fn on_ranks<T: Send>(
             let scene = scene.clone();
             scope.spawn(move || {
                 alone();
-                serve(&rank, || Ok((case.clone(), scene))).expect("it serves").expect("they begin");
+                let set_up = || Ok((case.clone(), scene));
+                serve_on(&rank, processor, set_up).expect("it serves").expect("they begin");
             });
         }
         let lead = scope.spawn(move || {
             alone();
-            let mut simulation = Simulation::on_ranks(case, scene, &first).expect("it starts");
+            let mut simulation = Simulation::on_ranks_of(case, scene, &first, processor).expect("it starts");
             let out = of(&mut simulation);
             (out, simulation.backend.ranks().expect("they stand"))
         });
@@ -55,13 +66,13 @@ fn on_ranks<T: Send>(
     })
 }
 
-fn shipped(name: &str, changes: &[&str]) -> Case {
+pub(crate) fn shipped(name: &str, changes: &[&str]) -> Case {
     let sets: Vec<String> = changes.iter().map(|s| (*s).to_string()).collect();
     let path = format!("{ROOT}/cases/{name}.toml");
     seixo::case::file::load(path.as_ref(), None, &sets).expect("it loads").case
 }
 
-fn steps(simulation: &mut Simulation, n: u64) -> Fields {
+pub(crate) fn steps(simulation: &mut Simulation, n: u64) -> Fields {
     for _ in 0..n {
         simulation.step().expect("a step");
     }
@@ -69,7 +80,7 @@ fn steps(simulation: &mut Simulation, n: u64) -> Fields {
 }
 
 /// Largest differences of the water's positions [m], velocities [m/s] and pressures [Pa], particle by particle.
-fn apart(a: &Fields, b: &Fields) -> [f64; 3] {
+pub(crate) fn apart(a: &Fields, b: &Fields) -> [f64; 3] {
     let place = |f: &Fields| {
         let mut at = vec![usize::MAX; f.id.len()];
         f.id.iter().enumerate().for_each(|(i, &id)| at[id as usize] = i);
@@ -91,11 +102,11 @@ fn apart(a: &Fields, b: &Fields) -> [f64; 3] {
 
 /// A flume round periodic y: viscous water, a sill, a gate that rises, a ball under water, an absorber, a body that floats and one that sinks
 /// across the tank, friction, gauges, and the ledger.
-fn flume(more: &str) -> Case {
+pub(crate) fn flume(more: &str) -> Case {
     case(&flume_text(more))
 }
 
-fn flume_text(more: &str) -> String {
+pub(crate) fn flume_text(more: &str) -> String {
     format!(
         "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0.5, -9.81]\n\
          [fluid]\nviscosity = 1e-3\nsound_speed = 5\njitter = 0.1\n{more}\n\
@@ -116,19 +127,19 @@ fn flume_text(more: &str) -> String {
 
 /// What can be seen of a run.
 #[derive(Clone, Debug, PartialEq)]
-struct Seen {
+pub(crate) struct Seen {
     fields: Vec<u8>,
-    water: FluidMonitor,
-    counters: Counters,
-    ledger: Option<Ledger>,
-    gauges: Vec<(String, u64)>,
-    solids: Vec<[DVec3; 3]>,
-    iterations: Vec<u32>,
+    pub(crate) water: FluidMonitor,
+    pub(crate) counters: Counters,
+    pub(crate) ledger: Option<Ledger>,
+    pub(crate) gauges: Vec<(String, u64)>,
+    pub(crate) solids: Vec<[DVec3; 3]>,
+    pub(crate) iterations: Vec<u32>,
 }
 
 impl Seen {
     /// After `n` steps more.
-    fn after(simulation: &mut Simulation, n: u64) -> (Self, Fields) {
+    pub(crate) fn after(simulation: &mut Simulation, n: u64) -> (Self, Fields) {
         let iterations = (0..n).map(|_| simulation.step().expect("a step").pressure.iterations).collect();
         let (water, counters) = simulation.observe().expect("seen");
         let ledger = simulation.ledger().expect("kept");
@@ -232,7 +243,7 @@ fn many_ranks_compute_what_one_computes() {
 }
 
 /// Water round periodic x: viscous, over a sill, with `velocity` [m/s] across the seam, and `more`.
-fn ring(velocity: f64, fluid: &str, more: &str) -> Case {
+pub(crate) fn ring(velocity: f64, fluid: &str, more: &str) -> Case {
     case(&format!(
         "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0.5, 0, -9.81]\n\
          [fluid]\nviscosity = 1e-3\nsound_speed = 5\n{fluid}\n\
@@ -246,15 +257,15 @@ fn ring(velocity: f64, fluid: &str, more: &str) -> Case {
 }
 
 /// A block that is driven through the water across the seam.
-const DRIVEN: &str = "[[moving_wall]]\nname = \"plunger\"\nmin = [0.05, 0.2, 0.1]\nmax = [0.25, 0.4, 0.3]\nmotion = [[0, 0, 0, 0], [1, -3, 0, 0]]\n";
+pub(crate) const DRIVEN: &str = "[[moving_wall]]\nname = \"plunger\"\nmin = [0.05, 0.2, 0.1]\nmax = [0.25, 0.4, 0.3]\nmotion = [[0, 0, 0, 0], [1, -3, 0, 0]]\n";
 
 /// A body in the water and one on it, which cross the cut between two ranks in both directions.
-const FREE: &str = "[[body]]\nname = \"floats\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.2, 0.52]\ndensity = 500\nvelocity = [-2, 0, -0.5]\n\
+pub(crate) const FREE: &str = "[[body]]\nname = \"floats\"\nsize = [0.2, 0.2, 0.2]\ncenter = [1.2, 0.2, 0.52]\ndensity = 500\nvelocity = [-2, 0, -0.5]\n\
                     [[body]]\nname = \"sinks\"\nshape = \"sphere\"\nradius = 0.1\ncenter = [0.9, 0.45, 0.2]\ndensity = 3000\nvelocity = [2, 0, 0]\n\
                     displaces_fluid = true\n[contact]\nspring = 1e5\nfriction = 0.3\n";
 
 /// The same, which cross the side where the first and the last rank are neighbours.
-fn over() -> String {
+pub(crate) fn over() -> String {
     FREE.replace("[1.2, 0.2, 0.52]", "[0.11, 0.2, 0.52]").replace("[0.9, 0.45, 0.2]", "[1.89, 0.45, 0.2]")
 }
 
@@ -268,7 +279,7 @@ fn narrow() -> Case {
 }
 
 /// A closed tank full of water round a body that is heavier: no free surface.
-fn full() -> Case {
+pub(crate) fn full() -> Case {
     case(
         "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -10]\n\
          [fluid]\nsound_speed = 5\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.5]\n\

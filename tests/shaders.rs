@@ -35,10 +35,11 @@ fn every_shader_has_a_twin_and_every_twin_a_shader() {
     // The twins of contact's shaders are the laws themselves.
     let twin = |name: &str| match name.strip_prefix("contact_") {
         Some(law) => format!("src/contact/{law}/mod.rs"),
+        None if name == "halo" => "src/share/border.rs".into(),
         None => format!("src/kernels/{name}.rs"),
     };
     let of_particles: BTreeSet<String> =
-        shaders.iter().filter(|s| !s.starts_with("contact_")).cloned().collect();
+        shaders.iter().filter(|s| !s.starts_with("contact_") && *s != "halo").cloned().collect();
     assert_eq!(of_particles, files("src/kernels", ".rs", "mod"));
     let listed: BTreeSet<String> = kernels::programs().map(|p| p.name.to_owned()).collect();
     assert_eq!(shaders, listed);
@@ -418,6 +419,10 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(common("GHOST_BLOCK"), GHOST_BLOCK as f64);
     assert_eq!(common("FLUID"), f64::from(Kind::Fluid as u8));
     assert_eq!(common("GHOST"), f64::from(Kind::Ghost as u8));
+    // No kind of the scene, and the same in both files.
+    assert!(common("FOREIGN") > f64::from(Kind::Ghost as u8));
+    assert_eq!(common("FOREIGN"), constant(text("halo"), "COPY"));
+    assert_eq!(constant(text("halo"), "WALL"), f64::from(Kind::Wall as u8));
     assert_eq!(common("INACTIVE"), f64::from(State::Inactive as u8));
     assert_eq!(common("SURFACE"), f64::from(State::Surface as u8));
     assert_eq!(common("INNER"), f64::from(State::Inner as u8));

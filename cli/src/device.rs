@@ -22,6 +22,17 @@ pub fn processor(args: &DeviceArgs) -> Result<Processor> {
     }
 }
 
+/// The processor that `args` ask for on each of many ranks: a CPU unless a GPU is asked for.
+///
+/// # Errors
+/// As [`processor`].
+pub fn of_ranks(args: &DeviceArgs) -> Result<Processor> {
+    Ok(match processor(args)? {
+        Processor::Auto => Processor::Cpu,
+        asked => asked,
+    })
+}
+
 /// `seixo adapters`.
 pub fn list(json: bool) -> Exit {
     let adapters = adapters();

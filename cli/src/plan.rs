@@ -547,6 +547,24 @@ fn of_ranks(ranks: &Outlook) -> Vec<String> {
             bytes(ranks.round_bytes[1] as f64)
         ),
     ]);
+    let gpu = &ranks.on_devices;
+    lines.extend([
+        format!("  with --backend gpu, a device for each: preconditioner {}", gpu.preconditioner),
+        format!(
+            "    messages to each rank beside: {} a step and {} an iteration, {} and {} at most; rounds of all ranks: {} and {}",
+            gpu.messages[0],
+            gpu.messages[1],
+            bytes(gpu.message_bytes[0] as f64),
+            bytes(gpu.message_bytes[1] as f64),
+            gpu.rounds[0],
+            gpu.rounds[1]
+        ),
+        format!(
+            "    between host and device of a rank: about {} a step and {} an iteration",
+            bytes(gpu.staged_bytes[0] as f64),
+            bytes(gpu.staged_bytes[1] as f64)
+        ),
+    ]);
     lines
 }
 

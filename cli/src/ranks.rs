@@ -1,5 +1,6 @@
 //! `seixo run` as one of many processes that `mpirun` or `srun` started.
 
+use seixo::Processor;
 use seixo::error::{Error, Result};
 use seixo::on_ranks::tell_case;
 use seixo::ranks::Team;
@@ -118,13 +119,24 @@ impl Drop for Call<'_> {
 
 /// The part of a rank that is not the first; there is none without MPI.
 #[cfg(not(feature = "mpi"))]
-pub fn serve(_: &Arc<dyn Team>, _: u16) -> super::Exit {
+pub fn serve(_: &Arc<dyn Team>, _: u16, _: &Processor) -> super::Exit {
     Ok(0)
+}
+
+/// Ends all ranks; there are no others without MPI.
+#[cfg(not(feature = "mpi"))]
+pub fn end_all(_: &Error) {}
+
+/// Ends all ranks, as the first one's device is lost.
+#[cfg(feature = "mpi")]
+pub fn end_all(error: &Error) {
+    seixo::console::remark(&format!("error: {error}"));
+    seixo::ranks::mpi::abort(error.exit_code());
 }
 
 /// The part of a rank that is not the first.
 #[cfg(feature = "mpi")]
-pub fn serve(team: &Arc<dyn Team>, threads: u16) -> super::Exit {
+pub fn serve(team: &Arc<dyn Team>, threads: u16, processor: &Processor) -> super::Exit {
     use seixo::on_ranks::hear_case;
     use seixo::scene::Scene;
     let Some(text) = hear_case(&**team) else { return Ok(0) };
@@ -136,7 +148,7 @@ pub fn serve(team: &Arc<dyn Team>, threads: u16) -> super::Exit {
         let scene = Scene::build(&case)?;
         Ok((case, Arc::new(scene)))
     };
-    if let Err(error) = seixo::on_ranks::serve(team, set_up) {
+    if let Err(error) = seixo::on_ranks::serve_on(team, processor, set_up) {
         seixo::console::remark(&format!("rank {}: {error}", team.rank()));
         seixo::ranks::mpi::abort(5);
     }

@@ -1,11 +1,13 @@
 //! `seixo run`.
 
+use super::device;
 use super::plan::step_warnings;
 use super::progress::{Display, clock};
 use super::ranks::{self, Call, Place};
 use super::setup::{self, Setup};
 use super::signals::{self, RESUME};
 use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
+use seixo::Processor;
 use seixo::backend::gpu::Gpu;
 use seixo::case::Case;
 use seixo::console::{remark, say};
@@ -198,24 +200,25 @@ impl Asked {
 
 pub fn run(args: &RunArgs) -> Exit {
     let Some(team) = ranks::team()? else { return lead(args, None, None) };
-    if args.device.backend == BackendName::Gpu || args.device.adapter.is_some() {
-        return Err(Error::usage(
-            "--backend",
-            "many ranks compute on the CPU: leave --backend gpu and --adapter out",
-        ));
-    }
+    let processor = device::of_ranks(&args.device)?;
     let place = ranks::place(&team, args.device.threads);
     if team.rank() > 0 {
-        return ranks::serve(&team, place.threads);
+        return ranks::serve(&team, place.threads, &processor);
     }
     let mut args = args.clone();
-    args.device = DeviceArgs { backend: BackendName::Cpu, threads: Some(place.threads), ..args.device };
-    lead(&args, Some(&team), Some(place))
+    let backend = if processor == Processor::Cpu { BackendName::Cpu } else { BackendName::Gpu };
+    args.device = DeviceArgs { backend, threads: Some(place.threads), ..args.device };
+    let ended = lead(&args, Some((&team, &processor)), Some(place));
+    if let Err(error @ Error::Gpu(_)) = &ended {
+        // The others may wait for this one wherever they are.
+        ranks::end_all(error);
+    }
+    ended
 }
 
-/// The run, by the first rank of `team`, at its `place`, where there are many.
-fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>, place: Option<Place>) -> Exit {
-    let call = Call::new(team);
+/// The run, by the first rank of a team, on its processor and at its `place`, where there are many.
+fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Option<Place>) -> Exit {
+    let call = Call::new(team.map(|(team, _)| team));
     let deadline = args.max_wall.map(|wall| Instant::now() + wall);
     let stop = signals::watch(args.quiet)?;
     seixo::threads::start(args.device.threads)?;
@@ -252,7 +255,9 @@ fn lead(args: &RunArgs, team: Option<&Arc<dyn Team>>, place: Option<Place>) -> E
     let setup = Setup::build(loaded, asked.name, args.quiet)?;
     call.tell(&setup.loaded.text);
     let mut simulation = match team {
-        Some(team) => Simulation::on_ranks(&setup.loaded.case, setup.scene.clone(), team)?,
+        Some((team, processor)) => {
+            Simulation::on_ranks_of(&setup.loaded.case, setup.scene.clone(), team, processor)?
+        }
         None => setup.simulation(&args.device)?,
     };
     let options = Options {

@@ -20,6 +20,7 @@ pub mod layout;
 mod ledger;
 mod observe;
 pub mod parts;
+mod rank;
 mod set_up;
 pub mod shader;
 mod solids;
@@ -30,6 +31,7 @@ mod transfer;
 
 pub use adapter::{AdapterInfo, Caps, adapters};
 pub use bandwidth::bandwidth;
+pub use rank::GpuRank;
 pub use set_up::{memory, sizes};
 
 use super::traffic::Traffic;

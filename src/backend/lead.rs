@@ -1,24 +1,24 @@
 //! The backend of the first of many ranks: it does what it is asked and has the others do the same, each on its own particles.
 
-use super::cpu::Cpu;
 use super::traffic::Traffic;
-use super::{Backend, Counters, RowPressure};
+use super::{Backend, Commands, Counters, Ranked, RowPressure, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::checkpoint::Archive;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::output::pieces::Pieces;
 use crate::params::Step;
-use crate::plan::ParticleStage;
+use crate::plan::{ParticleStage, Stage};
 use crate::pressure::PressureReport;
 use crate::ranks::{Standing, Team, decode, encode};
 use crate::stop::Stop;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What the first rank has the others do: a call of [`Backend`].
@@ -47,7 +47,9 @@ enum Order<'a> {
 /// The backend of the first rank.
 pub struct Lead {
     team: Arc<dyn Team>,
-    cpu: Cpu,
+    own: Box<dyn Ranked>,
+    /// Its device is lost: the others wait for it somewhere, and hear nothing more.
+    lost: bool,
     /// Whether it was seen that what the others write is where the first rank sees it.
     seen: bool,
     /// What belongs to the particles that the ranks keep.
@@ -55,9 +57,17 @@ pub struct Lead {
 }
 
 impl Lead {
-    /// With its own part of the particles, `cpu`; the others [`follow`].
-    pub fn new(team: Arc<dyn Team>, cpu: Cpu) -> Self {
-        Self { team, cpu, seen: false, kept: None }
+    /// With its own part of the particles, `own`; the others [`follow`].
+    pub fn new(team: Arc<dyn Team>, own: Box<dyn Ranked>) -> Self {
+        Self { team, own, lost: false, seen: false, kept: None }
+    }
+
+    /// Have all ranks do `order`, this one by `own`.
+    fn all<T>(&mut self, order: &Order, own: impl FnOnce(&mut dyn Ranked) -> Result<T>) -> Result<T> {
+        self.order(order);
+        let done = own(&mut *self.own);
+        self.lost |= matches!(done, Err(Error::Gpu(_)));
+        done
     }
 
     /// Have all ranks write their water as `pieces` says, and write the file that names these.
@@ -65,8 +75,7 @@ impl Lead {
     /// # Errors
     /// [`crate::Error::Io`] of the first rank that could not.
     pub fn write_pieces(&mut self, pieces: &Pieces) -> Result<()> {
-        self.order(&Order::WritePieces(Cow::Borrowed(pieces)));
-        let bytes = self.cpu.write_piece(pieces)?;
+        let bytes = self.all(&Order::WritePieces(Cow::Borrowed(pieces)), |own| own.write_piece(pieces))?;
         if !self.seen {
             pieces.are_seen(&bytes)?;
             self.seen = true;
@@ -75,9 +84,11 @@ impl Lead {
     }
 
     /// Pressures [Pa] and number densities [-] of the wall layers, in the order of their slots.
-    pub fn read_walls(&mut self) -> [Vec<f64>; 2] {
-        self.order(&Order::ReadWalls);
-        self.cpu.read_walls()
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn read_walls(&mut self) -> Result<[Vec<f64>; 2]> {
+        self.all(&Order::ReadWalls, |own| own.read_walls())
     }
 
     /// Put the particles that the ranks have kept into `archive`, the state in memory that was made last.
@@ -86,9 +97,8 @@ impl Lead {
     /// What the archive says.
     pub fn complete(&mut self, archive: &mut Archive) -> Result<()> {
         let Some((counters, work, dt)) = self.kept.take() else { return Ok(()) };
-        self.order(&Order::Recall);
-        match self.cpu.recall() {
-            Some(fields) => self.cpu.save_all(archive, fields, counters, work, dt),
+        match self.all(&Order::Recall, |own| own.recall())? {
+            Some(fields) => self.own.save_all(archive, fields, counters, work, dt),
             None => Ok(()),
         }
     }
@@ -101,7 +111,7 @@ impl Lead {
 impl Drop for Lead {
     fn drop(&mut self) {
         // In a panic the others are not where they could hear it.
-        if !std::thread::panicking() {
+        if !std::thread::panicking() && !self.lost {
             self.order(&Order::End);
         }
     }
@@ -109,91 +119,94 @@ impl Drop for Lead {
 
 impl Backend for Lead {
     fn description(&self) -> String {
-        let (ranks, one) = (self.team.ranks(), self.cpu.description());
-        let threads = one.strip_prefix("CPU, ").unwrap_or(&one);
-        format!("CPU, {ranks} rank{} of {threads}", if ranks == 1 { "" } else { "s" })
+        self.own.team_description()
     }
 
     fn precision(&self) -> &'static str {
-        self.cpu.precision()
+        self.own.precision()
     }
 
     fn run(&mut self, stage: ParticleStage, step: &Step) -> Result<()> {
-        self.order(&Order::Run(stage, *step));
-        self.cpu.run(stage, step)
+        self.all(&Order::Run(stage, *step), |own| own.run(stage, step))
     }
 
     fn pass_openings(&mut self, emissions: &[Emission], outlets: &[Outlet]) -> Result<()> {
-        self.order(&Order::PassOpenings(emissions.into(), outlets.into()));
-        self.cpu.pass_openings(emissions, outlets)
+        self.all(&Order::PassOpenings(emissions.into(), outlets.into()), |own| {
+            own.pass_openings(emissions, outlets)
+        })
     }
 
     fn free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
-        self.order(&Order::FreeBodies(bodies.into(), slots.into()));
-        self.cpu.free_bodies(bodies, slots)
+        self.all(&Order::FreeBodies(bodies.into(), slots.into()), |own| own.free_bodies(bodies, slots))
     }
 
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
-        self.order(&Order::SolvePressure(*step));
-        self.cpu.solve_pressure(step)
+        self.all(&Order::SolvePressure(*step), |own| own.solve_pressure(step))
     }
 
     fn move_solids(&mut self, poses: &[Pose]) -> Result<()> {
-        self.order(&Order::MoveSolids(poses.into()));
-        self.cpu.move_solids(poses)
+        self.all(&Order::MoveSolids(poses.into()), |own| own.move_solids(poses))
     }
 
     fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        self.order(&Order::BodyForce);
-        self.cpu.body_force()
+        self.all(&Order::BodyForce, |own| own.body_force())
     }
 
     fn counters(&mut self) -> Result<Counters> {
-        self.order(&Order::Counters);
-        self.cpu.counters()
+        self.all(&Order::Counters, |own| own.counters())
     }
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {
-        self.order(&Order::Ledger);
-        self.cpu.ledger()
+        self.all(&Order::Ledger, |own| own.ledger())
     }
 
     fn monitor(&mut self) -> Result<FluidMonitor> {
-        self.order(&Order::Monitor);
-        self.cpu.monitor()
+        self.all(&Order::Monitor, |own| own.monitor())
     }
 
     fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
-        self.order(&Order::Pressures(slots.into()));
-        self.cpu.wall_pressures(slots)
+        self.all(&Order::Pressures(slots.into()), |own| own.wall_pressures(slots))
     }
 
     fn read(&mut self) -> Result<Fields> {
-        self.order(&Order::Read);
-        self.cpu.read()
+        self.all(&Order::Read, |own| own.read())
     }
 
     fn write(&mut self, fields: &Fields) -> Result<()> {
-        self.order(&Order::Restore);
-        self.cpu.restore(Some(fields.clone()))
+        self.all(&Order::Restore, |own| own.restore(Some(fields.clone())))
     }
 
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         if archive.is_saving() {
-            let (counters, work, dt) = (self.counters()?, self.ledger()?, self.cpu.dt());
+            let (counters, work, dt) = (self.counters()?, self.ledger()?, self.own.dt());
             if !archive.is_lasting() && self.team.ranks() > 1 {
                 // In memory: each rank keeps its own, which is gathered if the state is asked for.
-                self.order(&Order::Keep);
-                self.cpu.keep();
+                self.all(&Order::Keep, |own| own.keep())?;
                 self.kept = Some((counters, work, dt));
                 return Ok(());
             }
             let fields = self.read()?;
-            return self.cpu.save_all(archive, fields, counters, work, dt);
+            return self.own.save_all(archive, fields, counters, work, dt);
         }
         // A state that does not fit is refused before the others hear of it.
-        let fields = self.cpu.read_all(archive)?;
+        let fields = self.own.read_all(archive)?;
         self.write(&fields)
+    }
+
+    fn timing(&self) -> Timing {
+        self.own.timing()
+    }
+
+    fn stage_seconds(&self) -> BTreeMap<Stage, f64> {
+        self.own.stage_seconds()
+    }
+
+    fn wait(&mut self) -> Result<()> {
+        self.own.wait()
+    }
+
+    fn commands(&self) -> Commands {
+        self.own.commands()
     }
 
     fn lead(&mut self) -> Option<&mut Lead> {
@@ -201,8 +214,11 @@ impl Backend for Lead {
     }
 
     fn ranks(&mut self) -> Result<Vec<Standing>> {
-        self.order(&Order::Ranks);
-        self.cpu.ranks()
+        self.all(&Order::Ranks, |own| own.ranks())
+    }
+
+    fn preconditions_apart(&self) -> bool {
+        self.own.preconditions_apart()
     }
 
     fn gives_up(&self) -> bool {
@@ -213,11 +229,11 @@ impl Backend for Lead {
     fn stop_with(&mut self, _: &Stop) {}
 
     fn bytes(&self) -> u64 {
-        self.cpu.bytes()
+        self.own.bytes()
     }
 
     fn traffic(&mut self) -> Result<Traffic> {
-        self.cpu.traffic()
+        self.own.traffic()
     }
 }
 
@@ -225,27 +241,31 @@ impl Backend for Lead {
 ///
 /// # Errors
 /// What a stage says.
-pub fn follow(cpu: &mut Cpu) -> Result<()> {
-    while let Some(order) = cpu.share().map(|share| share.hear()) {
+pub fn follow(own: &mut dyn Ranked) -> Result<()> {
+    while let Some(order) = own.share().map(|share| share.hear()) {
         match decode::<Order>(&order) {
-            Order::Run(stage, step) => cpu.run(stage, &step)?,
-            Order::PassOpenings(emissions, outlets) => cpu.pass_openings(&emissions, &outlets)?,
-            Order::FreeBodies(bodies, slots) => cpu.free_bodies(&bodies, &slots)?,
-            Order::SolvePressure(step) => drop(cpu.solve_pressure(&step)?),
-            Order::MoveSolids(poses) => cpu.move_solids(&poses)?,
-            Order::BodyForce => drop(cpu.body_force()?),
-            Order::Counters => drop(cpu.counters()?),
-            Order::Ledger => drop(cpu.ledger()?),
-            Order::Monitor => drop(cpu.monitor()?),
-            Order::Pressures(slots) => drop(cpu.wall_pressures(&slots)?),
-            Order::Read => drop(cpu.read()?),
-            Order::ReadWalls => drop(cpu.read_walls()),
-            Order::Keep => cpu.keep(),
-            Order::Recall => drop(cpu.recall()),
+            Order::Run(stage, step) => own.run(stage, &step)?,
+            Order::PassOpenings(emissions, outlets) => own.pass_openings(&emissions, &outlets)?,
+            Order::FreeBodies(bodies, slots) => own.free_bodies(&bodies, &slots)?,
+            Order::SolvePressure(step) => drop(own.solve_pressure(&step)?),
+            Order::MoveSolids(poses) => own.move_solids(&poses)?,
+            Order::BodyForce => drop(own.body_force()?),
+            Order::Counters => drop(own.counters()?),
+            Order::Ledger => drop(own.ledger()?),
+            Order::Monitor => drop(own.monitor()?),
+            Order::Pressures(slots) => drop(own.wall_pressures(&slots)?),
+            Order::Read => drop(own.read()?),
+            Order::ReadWalls => drop(own.read_walls()?),
+            Order::Keep => own.keep()?,
+            Order::Recall => drop(own.recall()?),
             // The first rank hears of what went wrong here, and ends the run.
-            Order::WritePieces(pieces) => drop(cpu.write_piece(&pieces)),
-            Order::Ranks => drop(cpu.ranks()?),
-            Order::Restore => cpu.restore(None)?,
+            Order::WritePieces(pieces) => {
+                if let Err(lost @ Error::Gpu(_)) = own.write_piece(&pieces) {
+                    return Err(lost);
+                }
+            }
+            Order::Ranks => drop(own.ranks()?),
+            Order::Restore => own.restore(None)?,
             Order::End => return Ok(()),
         }
     }

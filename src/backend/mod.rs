@@ -4,6 +4,7 @@ pub mod cpu;
 pub mod gpu;
 pub mod lead;
 mod processor;
+mod ranked;
 pub mod traffic;
 
 use self::lead::Lead;
@@ -26,6 +27,7 @@ use crate::scene::Scene;
 use crate::stop::Stop;
 use glam::DVec3;
 pub use processor::Processor;
+pub use ranked::Ranked;
 use std::collections::BTreeMap;
 
 /// The fields of `scene` at t = 0, with the arrays that `plan` asks for.
@@ -264,6 +266,10 @@ pub trait Backend: Send {
     }
     /// Bytes that a step like the last one must move.
     fn traffic(&mut self) -> Result<Traffic>;
+    /// Whether multigrid, where it is planned, is of the rows of each rank by itself: of many ranks with a device each.
+    fn preconditions_apart(&self) -> bool {
+        false
+    }
     /// What each rank holds and said; nothing where there is one.
     fn ranks(&mut self) -> Result<Vec<Standing>> {
         Ok(Vec::new())

@@ -1,13 +1,15 @@
 //! The choice of a processor for the particle stages.
 
-use super::Backend;
 use super::cpu::Cpu;
-use super::gpu::{AdapterInfo, Gpu, adapters};
+use super::gpu::{AdapterInfo, Gpu, GpuRank, adapters};
+use super::{Backend, Ranked};
 use crate::error::Result;
 use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
+use crate::ranks::Team;
 use crate::scene::Scene;
+use std::sync::Arc;
 
 /// What computes the particle stages.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -49,5 +51,29 @@ impl Processor {
             }
         };
         Ok(Box::new(Gpu::new(scene, params, plan, settings, adapter.as_deref())?))
+    }
+
+    /// The part of the particles of `scene` that a rank of `team` computes, the `k`-th on its machine ([`Team::on_machine`]): on a GPU if one is asked for, else on the
+    /// CPU.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for what ranks do not compute; as [`Self::open`].
+    pub fn of_team(
+        &self,
+        (team, k): (&Arc<dyn Team>, usize),
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+    ) -> Result<Box<dyn Ranked>> {
+        match self {
+            Self::Gpu { adapter } => {
+                let asked = adapter.as_deref();
+                Ok(Box::new(GpuRank::of_team((team.clone(), k), scene, params, plan, settings, asked)?))
+            }
+            Self::Auto | Self::Cpu => {
+                Ok(Box::new(Cpu::of_team(team.clone(), scene, params, plan, settings)?))
+            }
+        }
     }
 }

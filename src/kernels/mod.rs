@@ -90,7 +90,7 @@ pub mod device {
         conjugate_gradient[super::WORKGROUP] Stage(ConjugateGradient), Own:
             pack start_residual start descend ascend multiply advance end_pack end_residual end;
         correct[super::WORKGROUP] Stage(Correct), Fluid: correct kick;
-        coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare respond;
+        coupling[super::WORKGROUP] Arrays(Coupling), Own: prepare subtract respond;
         ledger[super::WORKGROUP] Arrays(Ledger), Own:
             absorber_work predict_work lost_work friction_work collision_work pressure_work shift_work as_solved as_clipped;
         monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
@@ -113,6 +113,26 @@ pub mod device {
         wall_friction[super::WORKGROUP] Stage(WallFriction), FluidAndReaction: wall_friction;
     }
 
+    crate::compute::kernels!(halo[super::WORKGROUP]:
+        columns column_starts mark_walls give_motion take_motion give_state take_state give_pressure take_pressure give_search take_search drop_search
+        give_surface_pressure take_surface_pressure give_head take_head);
+
+    /// Buffers of [`HALO`].
+    pub mod of_halo {
+        crate::compute::buffers! {
+            /// Four lists of slots, and where they begin.
+            halo_slot: u32, Writes;
+            /// What the slots of a list hold.
+            halo: f32, Both;
+            /// Where the water of each column of cells begins.
+            column_start: u32, Reads;
+        }
+    }
+
+    /// What the devices of many ranks show each other; no part of a run on one.
+    pub const HALO: Program =
+        Program { name: "halo", text: halo::TEXT, kernels: halo::ALL, buffers: of_halo::buffer::ALL };
+
     /// The shaders that `plan` needs.
     pub fn planned(plan: &Plan) -> impl Iterator<Item = &'static Program> {
         let serves = |file: &&File| match file.serves {
@@ -125,7 +145,7 @@ pub mod device {
 
     /// All shaders, those of contact as well.
     pub fn programs() -> impl Iterator<Item = &'static Program> {
-        FILES.iter().map(|f| &f.program).chain(crate::contact::device::PROGRAMS)
+        FILES.iter().map(|f| &f.program).chain([&HALO]).chain(crate::contact::device::PROGRAMS)
     }
 
     /// Kernel of a stage that is one kernel over particles, and what it runs over; nothing for one with more.

@@ -2,7 +2,7 @@
 //!
 //! The tank is cut across x into slabs of whole columns of cells ([`crate::share`]). As x runs slowest in the order of the cells, the water
 //! of a slab is one range of slots, and what its neighbours need of it are two: its first and its last column, one effective radius
-//! wide. Each rank runs the stages of the CPU path over its own particles and over copies of these columns of the ranks beside
+//! wide. Each rank runs the stages, on its threads or a device of its own, over its own particles and over copies of these columns of the ranks beside
 //! it, which are made new after every stage that changes what the next one reads there.
 //!
 //! The first rank leads ([`crate::backend::lead`], [`crate::on_ranks`]): it alone moves solids and has clock, tables and files, and tells the others
@@ -14,6 +14,7 @@
 pub mod mpi;
 pub mod threads;
 
+use crate::machine;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,12 @@ pub trait Team: Send + Sync {
     fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
         let all = self.gather(bytemuck::cast_slice(own).to_vec());
         all.iter().flat_map(|bytes| bytemuck::pod_collect_to_vec::<u8, f64>(bytes)).collect()
+    }
+    /// Number of this one among those on its machine, from 0.
+    fn on_machine(&self) -> usize {
+        let own = machine::name().into_bytes();
+        let all = self.gather(own.clone());
+        all[..self.rank()].iter().filter(|other| **other == own).count()
     }
     /// What the first one says.
     fn hear(&self, said: Vec<u8>) -> Vec<u8>;

@@ -326,7 +326,7 @@ impl Present {
         // Many ranks write the water themselves.
         match simulation.backend.lead() {
             Some(lead) if !pictures => {
-                let walls = carried.then(|| (first, lead.read_walls()));
+                let walls = if carried { Some((first, lead.read_walls()?)) } else { None };
                 Ok(Self { fields: None, walls })
             }
             _ if asked || pictures => Ok(Self { fields: read(simulation)?, walls: None }),

@@ -45,16 +45,23 @@ fn take<T, U: Pod>(
 }
 
 impl Side {
+    /// Slots of water that are shown to the other rank, and those that it shows.
+    pub(crate) fn water(&self) -> [Range<usize>; 2] {
+        [self.give.clone(), self.take.clone()]
+    }
+
     /// Of the places `give` and `take` of an array.
     pub(super) fn of(give: Vec<u32>, take: Vec<u32>) -> Self {
         Self { give: 0..0, take: 0..0, give_walls: give, take_walls: take }
     }
 
-    fn given(&self) -> impl Iterator<Item = usize> + '_ {
+    /// Places that are shown to the other rank: water, then single ones.
+    pub(crate) fn given(&self) -> impl Iterator<Item = usize> + '_ {
         self.give.clone().chain(self.give_walls.iter().map(|&s| s as usize))
     }
 
-    pub(super) fn taken(&self) -> impl Iterator<Item = usize> + '_ {
+    /// Places that it shows.
+    pub(crate) fn taken(&self) -> impl Iterator<Item = usize> + '_ {
         self.take.clone().chain(self.take_walls.iter().map(|&s| s as usize))
     }
 }

@@ -161,7 +161,7 @@ impl Share {
     }
 
     /// The columns before and after those of this rank, of which it has copies.
-    fn beyond(&self) -> [Option<u32>; 2] {
+    pub(crate) fn beyond(&self) -> [Option<u32>; 2] {
         let (mine, end) = (self.columns(), self.cuts.last().copied().unwrap_or(0));
         [
             mine.start.checked_sub(1).or(self.ring.then_some(end.saturating_sub(1))),
@@ -169,12 +169,23 @@ impl Share {
         ]
     }
 
-    fn columns(&self) -> Range<u32> {
+    /// The columns of this rank.
+    pub(crate) fn columns(&self) -> Range<u32> {
         self.cuts[self.rank()]..self.cuts[self.rank() + 1]
     }
 
+    /// Columns of all ranks.
+    pub(crate) fn all_columns(&self) -> usize {
+        self.cuts.last().copied().unwrap_or(0) as usize
+    }
+
+    /// Borders to the rank before and to that after this one.
+    pub(crate) fn sides(&self) -> &[Option<Side>; 2] {
+        &self.sides
+    }
+
     /// Its first and its last column.
-    fn ends(&self) -> [u32; 2] {
+    pub(crate) fn ends(&self) -> [u32; 2] {
         let mine = self.columns();
         [mine.start, mine.end - 1]
     }
@@ -210,7 +221,8 @@ impl Share {
         self.timed(|team| team.hear(Vec::new()))
     }
 
-    fn pass(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
+    /// Hand `left` to the rank before this one and `right` to the one after it; returns what these hand over.
+    pub(crate) fn pass(&self, left: Vec<u8>, right: Vec<u8>) -> [Vec<u8>; 2] {
         let beside = self.beyond().into_iter().flatten().count();
         self.said[0].fetch_add(beside as u64, Relaxed);
         self.said[1].fetch_add((left.len() + right.len()) as u64, Relaxed);
@@ -232,7 +244,7 @@ impl Share {
     }
 
     /// As many numbers of every rank.
-    fn numbers(&self, own: &[f64]) -> Vec<f64> {
+    pub(crate) fn numbers(&self, own: &[f64]) -> Vec<f64> {
         self.said[1].fetch_add(size_of_val(own) as u64, Relaxed);
         self.said[2].fetch_add(1, Relaxed);
         self.timed(|team| team.gather_numbers(own))

@@ -101,46 +101,64 @@ impl Share {
             self.own.clone().chain(come_in.iter().copied()).filter(|&i| fields.kind[i] == Kind::Fluid);
         let mut own: Vec<Traveller> = there.map(traveller).collect();
         come_in.into_iter().for_each(|i| self.park(fields, i..i + 1));
-        if self.steps.is_multiple_of(LOOK_EVERY) && self.steps > 0 {
-            self.cut_anew(&own, fields, column, params);
+        if self.is_look_due() {
+            let mut load = vec![0.0; self.all_columns()];
+            own.iter().for_each(|t| load[column(t.position) as usize] += 1.0);
+            if self.cut_anew(load, params) {
+                let fluid = self.groups.fluid;
+                self.tell_walls(&mut fields.pressure[fluid..]);
+            }
         }
-        self.steps += 1;
         let domain = (params.domain_min, params.domain_max);
         // What is about to be taken out stays where it is counted.
         let stays = |t: &Traveller| {
             !inside(grid.periodic.wrap(t.position), t.velocity, domain.0, domain.1, params.dimensions)
         };
+        let [before, after] = self.migrate(&mut own, |t| (!stays(t)).then(|| column(t.position)));
+        [before, own, after].concat()
+    }
+
+    /// Whether it is time to see how even the shares are; counts the steps.
+    pub(crate) fn is_look_due(&mut self) -> bool {
+        let due = self.steps.is_multiple_of(LOOK_EVERY) && self.steps > 0;
+        self.steps += 1;
+        due
+    }
+
+    /// Hands those of `own` that are in the columns of other ranks on to these, and takes in what comes; `column` says where a particle is, and
+    /// nothing of one that stays whatever its place. Returns copies of what the ranks before and after have at their borders.
+    pub(crate) fn migrate<T: Pod>(
+        &self,
+        own: &mut Vec<T>,
+        column: impl Fn(&T) -> Option<u32>,
+    ) -> [Vec<T>; 2] {
+        let mine = self.columns();
+        let astray = |t: &T| column(t).filter(|c| !mine.contains(c));
         loop {
-            let mine = self.columns();
             let (mut left, mut right) = (Vec::new(), Vec::new());
             own.retain(|t| {
-                let c = column(t.position);
-                let goes = !mine.contains(&c) && !stays(t);
-                if goes {
+                let goes = astray(t);
+                if let Some(c) = goes {
                     let to = if self.is_before(c) { &mut left } else { &mut right };
                     to.extend_from_slice(bytemuck::bytes_of(t));
                 }
-                !goes
+                goes.is_none()
             });
             let come = self.pass(left, right);
-            come.iter().for_each(|bytes| own.extend(bytemuck::pod_collect_to_vec::<u8, Traveller>(bytes)));
+            come.iter().for_each(|bytes| own.extend(bytemuck::pod_collect_to_vec::<u8, T>(bytes)));
             // One round does it unless the tank was cut anew.
-            let mut astray =
-                [own.iter().filter(|t| !mine.contains(&column(t.position)) && !stays(t)).count() as f64];
-            self.sum(&mut astray);
-            if astray[0] == 0.0 {
+            let mut count = [own.iter().filter(|t| astray(t).is_some()).count() as f64];
+            self.sum(&mut count);
+            if count[0] == 0.0 {
                 break;
             }
         }
         let border = |c: u32| {
-            let at = own.iter().filter(|t| column(t.position) == c && !stays(t));
+            let at = own.iter().filter(|t| column(t) == Some(c));
             bytemuck::cast_slice(&at.copied().collect::<Vec<_>>()).to_vec()
         };
         let [first, last] = self.ends();
-        let [before, after] = self.pass(border(first), border(last));
-        let [before, after] =
-            [before, after].map(|bytes| bytemuck::pod_collect_to_vec::<u8, Traveller>(&bytes));
-        [before, own, after].concat()
+        self.pass(border(first), border(last)).map(|bytes| bytemuck::pod_collect_to_vec::<u8, T>(&bytes))
     }
 
     /// Whether the way to `column`, of another rank, goes by the rank before this one: in a ring the shorter way.
@@ -166,46 +184,38 @@ impl Share {
         self.park(fields, here.len()..live.max(here.len()));
     }
 
-    /// Cuts the tank anew if the shares have become uneven. Walls that change hands take their pressures along.
-    fn cut_anew(
-        &mut self,
-        own: &[Traveller],
-        fields: &mut Fields,
-        column: impl Fn(DVec3) -> u32,
-        params: &Params,
-    ) {
-        let mut load = vec![0.0; *self.cuts.last().unwrap_or(&0) as usize];
-        own.iter().for_each(|t| load[column(t.position) as usize] += 1.0);
+    /// Cuts the tank anew if the shares have become uneven, as the `load` of each column on this rank tells; whether it did.
+    pub(crate) fn cut_anew(&mut self, mut load: Vec<f64>, params: &Params) -> bool {
         self.sum(&mut load);
         let load: Vec<u64> = load.into_iter().map(|n| n as u64).collect();
         let cuts = cut(&load, self.ranks(), params);
-        if unevenness(&load, &self.cuts) < UNEVEN || unevenness(&load, &cuts) >= unevenness(&load, &self.cuts)
-        {
-            return;
+        let now = unevenness(&load, &self.cuts);
+        let better = now >= UNEVEN && unevenness(&load, &cuts) < now;
+        if better {
+            self.cuts = cuts;
         }
-        let fluid = self.groups.fluid;
-        let owned = (fluid..self.groups.pressure()).filter(|&i| self.owns(i));
-        let pressures: Vec<[f64; 2]> = owned.map(|i| [(i - fluid) as f64, fields.pressure[i]]).collect();
-        for bytes in self.gather(bytemuck::cast_slice(&pressures).to_vec()) {
-            for [k, p] in bytemuck::pod_collect_to_vec::<u8, [f64; 2]>(&bytes) {
-                fields.pressure[fluid + k as usize] = p;
+        better
+    }
+
+    /// Tells all ranks the `values` of the wall layers that this one has: walls that change hands take what they have along.
+    pub(crate) fn tell_walls(&self, values: &mut [f64]) {
+        let owned = self.walls.iter().enumerate().filter(|(k, owned)| **owned && *k < values.len());
+        let own: Vec<[f64; 2]> = owned.map(|(k, _)| [k as f64, values[k]]).collect();
+        for bytes in self.gather(bytemuck::cast_slice(&own).to_vec()) {
+            for [k, value] in bytemuck::pod_collect_to_vec::<u8, [f64; 2]>(&bytes) {
+                values[k as usize] = value;
             }
         }
-        self.cuts = cuts;
     }
 
     /// Finds the borders in the cells of this rank's water, which begin at `start`, and of solids.
     pub fn find_borders(&mut self, start: &[u32], solids: [Option<&CellList>; 2]) {
-        let (mine, per_column) = (self.columns(), self.per_column);
-        let water = |c: Range<u32>| {
-            start[c.start as usize * per_column] as usize..start[c.end as usize * per_column] as usize
-        };
-        let (fluid, pressure) = (self.groups.fluid, self.groups.pressure());
-        let walls_of = |c: Range<u32>| -> Vec<u32> {
+        let per_column = self.per_column;
+        let pressure = self.groups.pressure();
+        let walls_of = |c: u32| -> Vec<u32> {
             let lists = solids.into_iter().flatten();
             let of = |list: &'_ CellList| -> Vec<u32> {
-                let (a, b) =
-                    (list.start[c.start as usize * per_column], list.start[c.end as usize * per_column]);
+                let (a, b) = (list.start[c as usize * per_column], list.start[(c as usize + 1) * per_column]);
                 list.slot[a as usize..b as usize]
                     .iter()
                     .copied()
@@ -214,9 +224,16 @@ impl Share {
             };
             lists.flat_map(of).collect()
         };
+        self.set_borders(|c| start[c as usize * per_column] as usize, walls_of);
+    }
+
+    /// Takes over the borders: the water of a column begins at the slot `start` of it, and its wall layers have the slots `walls`, in an order
+    /// that the ranks beside know as well.
+    pub(crate) fn set_borders(&mut self, start: impl Fn(u32) -> usize, walls: impl Fn(u32) -> Vec<u32>) {
+        let (mine, fluid) = (self.columns(), self.groups.fluid);
+        let water = |c: Range<u32>| start(c.start)..start(c.end);
         self.own = water(mine.clone());
-        let walls = |c: u32| walls_of(c..c + 1);
-        let mut sides = self.borders(walls);
+        let mut sides = self.borders(&walls);
         for ((side, end), beyond) in sides.iter_mut().zip(self.ends()).zip(self.beyond()) {
             if let Some((side, beyond)) = side.as_mut().zip(beyond) {
                 (side.give, side.take) = (water(end..end + 1), water(beyond..beyond + 1));
@@ -224,6 +241,6 @@ impl Share {
         }
         self.sides = sides;
         self.walls.fill(false);
-        walls_of(mine.clone()).into_iter().for_each(|s| self.walls[s as usize - fluid] = true);
+        mine.flat_map(walls).for_each(|s| self.walls[s as usize - fluid] = true);
     }
 }

@@ -26,6 +26,22 @@ pub struct Taken {
     pub walls: usize,
 }
 
+/// What ranks with a device each would say at t = 0.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OnDevices {
+    /// Preconditioner of the pressure solver.
+    pub preconditioner: &'static str,
+    /// Messages to each rank beside in a step, and in each iteration of the pressure solver.
+    pub messages: [u64; 2],
+    /// Bytes of these, from the rank that says most to the one beside it.
+    pub message_bytes: [u64; 2],
+    /// Rounds in which all ranks gather something, in a step and in each iteration.
+    pub rounds: [u64; 2],
+    /// Bytes between the host and the device of a rank with others on both sides, there and back, in a step and in each iteration: borders, and
+    /// the water of outer columns that may go.
+    pub staged_bytes: [u64; 2],
+}
+
 /// What ranks would have and say at t = 0, before anything is computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outlook {
@@ -41,6 +57,8 @@ pub struct Outlook {
     pub rounds: [u64; 2],
     /// Bytes that all ranks together gather in them, for cells of the multigrid.
     pub round_bytes: [u64; 2],
+    /// The same of ranks with a device each.
+    pub on_devices: OnDevices,
 }
 
 impl Outlook {
@@ -104,7 +122,34 @@ impl Outlook {
             ],
             rounds: [5 + bodies + joins + 2 * filled, 3 + multigrid + visited],
             round_bytes: [4 * cells + (4 + 27 * 8) * parents, 4 * visited * parents],
+            on_devices: on_devices(plan, water_at, carriers_at),
         })
+    }
+}
+
+/// What devices say of borders with so much water, and with so much that carries pressure.
+fn on_devices(plan: &Plan, water: u64, carriers: u64) -> OnDevices {
+    let count = |stages: &[Stage]| stages.iter().filter(|&&s| plan.has(s)).count() as u64;
+    let motions = count(&[Stage::Viscosity, Stage::WallFriction, Stage::Collision]);
+    let (surface, coupled) = (count(&[Stage::SurfacePressure]), u64::from(plan.coupled));
+    let (multigrid, filled) =
+        (u64::from(plan.preconditioner == Preconditioner::Multigrid), u64::from(plan.filled));
+    // A particle of water travels with 40 bytes; its motion is six numbers, all else is one.
+    let (travels, motion, number) = (40, 24, 4);
+    // Of what carries pressure: the first guess, the vector that finds the end, and the answer to be judged; then the pressure that is left.
+    let shown = surface + 3 + 1 + coupled;
+    let border = (motion * motions + number) * water + number * shown * carriers;
+    // The two outer columns of a slab come to the host and go back, and copies with them.
+    // (With the lists of slots at the borders.)
+    let lists = 2 * number * (carriers + water);
+    let outer = 2 * (2 * travels - number) * water + (travels - number) * water;
+    OnDevices {
+        preconditioner: plan.preconditioner.name_apart(),
+        messages: [3 + motions + shown, 1],
+        message_bytes: [travels * water + border, number * carriers],
+        rounds: [7 + coupled + count(&[Stage::BodyForce]) + 2 * filled, 2 + multigrid],
+        // On both sides, given and taken.
+        staged_bytes: [2 * (outer + 2 * border + lists), 4 * number * carriers],
     }
 }
 

@@ -1,7 +1,11 @@
 //! The particles of all ranks in one place: gathered by the first rank, or told by it.
 
 use super::Share;
+use crate::error::Result;
 use crate::fields::{Fields, State};
+use crate::output::particles::Particles;
+use crate::output::pieces::{Pieces, Told};
+use crate::periodic::Periodic;
 use crate::ranks::{decode, encode};
 use crate::scene::Kind;
 use glam::DVec3;
@@ -144,6 +148,21 @@ impl Share {
             out.iter_mut().zip(values).for_each(|(out, value)| out[k as usize] = value);
         }
         out
+    }
+
+    /// Writes the water of this rank as `pieces` says; returns the bytes of each rank's file.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] of the first rank that could not, on all of them.
+    pub(crate) fn write_piece(
+        &self,
+        pieces: &Pieces,
+        fields: &Fields,
+        periodic: &Periodic,
+    ) -> Result<Vec<u64>> {
+        let water = Particles::water(fields, self.own(), |x| periodic.wrap(x));
+        let told = Told::new(pieces.write(self.rank(), water));
+        self.gather(encode(&told)).iter().map(|bytes| decode::<Told>(bytes).bytes()).collect()
     }
 
     /// Fields of all ranks without their water; solids are where they are in `fields`.

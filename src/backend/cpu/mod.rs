@@ -19,6 +19,7 @@ mod wide;
 
 use self::ledger::WaterLedger;
 use self::search::Coordinates;
+pub(crate) use self::team::room;
 use self::wall_excess::WallExcess;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters, RowPressure};

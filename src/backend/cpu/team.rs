@@ -2,21 +2,20 @@
 
 use super::Cpu;
 use super::archive::Saved;
-use crate::backend::{Backend, Counters};
+use crate::backend::{Backend, Counters, Ranked};
 use crate::cells::Grid;
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
-use crate::fields::{Fields, State};
+use crate::fields::{Fields, insert};
 use crate::kernels::openings::Emission;
 use crate::ledger::Ledger;
 use crate::neighbours::Neighbours;
-use crate::output::particles::Particles;
-use crate::output::pieces::{Pieces, Told};
+use crate::output::pieces::Pieces;
 use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
-use crate::ranks::{Standing, Team, decode, encode};
-use crate::scene::{Kind, Scene};
+use crate::ranks::{Standing, Team};
+use crate::scene::Scene;
 use crate::share::Share;
 use glam::DVec3;
 use std::borrow::Cow;
@@ -32,7 +31,7 @@ pub(super) fn owns(share: Option<&Share>, i: usize) -> bool {
 }
 
 /// Slots for `water` particles of water and some more, `all` at most where that is enough.
-fn room(water: usize, all: usize) -> usize {
+pub(crate) fn room(water: usize, all: usize) -> usize {
     (water + water / SPARE.0 + SPARE.1).min(all).max(water)
 }
 
@@ -60,11 +59,6 @@ impl Cpu {
         share.begin(cpu.groups, own.len(), &cpu.fields, &cpu.grid);
         cpu.share = Some(Box::new(share));
         Ok(cpu)
-    }
-
-    /// What this rank computes, where there are others.
-    pub fn share(&self) -> Option<&Share> {
-        self.share.as_deref()
     }
 
     /// What each rank holds and said.
@@ -104,38 +98,7 @@ impl Cpu {
             return;
         }
         let more = room(water, share.all().fluid) - slots;
-        fn insert<T: Clone>(values: &mut Vec<T>, at: usize, more: usize, value: T) {
-            values.splice(at..at, std::iter::repeat_n(value, more));
-        }
-        let Fields {
-            position,
-            velocity,
-            kind,
-            id,
-            pressure,
-            number_density,
-            surface_pressure,
-            state,
-            source,
-            diagonal,
-            acceleration,
-            // Of solids alone.
-            reaction: _,
-            inertia_head: _,
-        } = &mut self.fields;
-        insert(position, slots, more, self.params.domain_min);
-        insert(velocity, slots, more, DVec3::ZERO);
-        insert(kind, slots, more, Kind::Ghost);
-        insert(id, slots, more, 0);
-        for values in [pressure, number_density, source] {
-            insert(values, slots, more, 0.0);
-        }
-        if !surface_pressure.is_empty() {
-            insert(surface_pressure, slots, more, 0.0);
-        }
-        insert(diagonal, slots, more, 1.0);
-        insert(state, slots, more, State::Inactive);
-        insert(acceleration, slots, more, DVec3::ZERO);
+        self.fields.widen(slots, more, self.params.domain_min);
         if !self.imbalance.is_empty() {
             insert(&mut self.imbalance, slots, more, DVec3::ZERO);
         }
@@ -164,47 +127,49 @@ impl Cpu {
         };
         emissions.iter().map(of).collect()
     }
+}
 
-    /// Write the water of this rank as `pieces` says; returns the bytes of each rank's file.
-    ///
-    /// # Errors
-    /// [`Error::Io`] of the first rank that could not, on all of them.
-    pub(crate) fn write_piece(&self, pieces: &Pieces) -> Result<Vec<u64>> {
+impl Ranked for Cpu {
+    fn share(&self) -> Option<&Share> {
+        self.share.as_deref()
+    }
+
+    fn team_description(&self) -> String {
+        let (ranks, one) = (self.share.as_ref().map_or(1, |share| share.ranks()), self.description());
+        let threads = one.strip_prefix("CPU, ").unwrap_or(&one);
+        format!("CPU, {ranks} rank{} of {threads}", if ranks == 1 { "" } else { "s" })
+    }
+
+    fn write_piece(&mut self, pieces: &Pieces) -> Result<Vec<u64>> {
         let Some(share) = &self.share else { return Ok(Vec::new()) };
-        let water = Particles::water(&self.fields, share.own(), |x| self.params.periodic.wrap(x));
-        let told = Told::new(pieces.write(share.rank(), water));
-        share.gather(encode(&told)).iter().map(|bytes| decode::<Told>(bytes).bytes()).collect()
+        share.write_piece(pieces, &self.fields, &self.params.periodic)
     }
 
-    /// Pressures and number densities of the wall layers of all ranks; the first one gets them.
-    pub(crate) fn read_walls(&self) -> [Vec<f64>; 2] {
-        self.share.as_ref().map_or_else(Default::default, |share| share.gather_walls(&self.fields))
+    fn read_walls(&mut self) -> Result<[Vec<f64>; 2]> {
+        Ok(self.share.as_ref().map_or_else(Default::default, |share| share.gather_walls(&self.fields)))
     }
 
-    /// Keep the particles of this rank as they are now, in memory.
-    pub(crate) fn keep(&mut self) {
+    fn keep(&mut self) -> Result<()> {
         let Self { share, fields, .. } = self;
         if let Some(share) = share {
             share.keep(fields);
         }
+        Ok(())
     }
 
-    /// The particles of all ranks as they were when they were kept; the first one gets them.
-    pub(crate) fn recall(&mut self) -> Option<Fields> {
+    fn recall(&mut self) -> Result<Option<Fields>> {
         let Self { share, fields, params, .. } = self;
-        let share = share.as_mut()?;
-        let mut kept = share.gather_kept(fields)?;
+        let Some(share) = share.as_mut() else { return Ok(None) };
+        let Some(mut kept) = share.gather_kept(fields) else { return Ok(None) };
         kept.wrap(&share.all(), &params.periodic);
-        Some(kept)
+        Ok(Some(kept))
     }
 
-    /// The last time step [s].
-    pub(crate) fn dt(&self) -> f64 {
+    fn dt(&self) -> f64 {
         self.dt
     }
 
-    /// Save the state of all ranks, gathered before, as that of one.
-    pub(crate) fn save_all(
+    fn save_all(
         &self,
         archive: &mut Archive,
         mut fields: Fields,
@@ -218,8 +183,7 @@ impl Cpu {
         saved.exchange(archive).map(drop)
     }
 
-    /// The particles of all ranks in `archive`, for [`Cpu::restore`]; the rest of the state is taken over by the first rank, this one.
-    pub(crate) fn read_all(&mut self, archive: &mut Archive) -> Result<Fields> {
+    fn read_all(&mut self, archive: &mut Archive) -> Result<Fields> {
         let (mut fields, fluid) = match &self.share {
             Some(share) => (share.blank(&self.fields), share.all().fluid),
             None => (self.fields.clone(), self.groups.fluid),
@@ -231,8 +195,7 @@ impl Cpu {
         Ok(fields)
     }
 
-    /// Take over the state that the first rank gives: all particles, of which each rank keeps its own.
-    pub(crate) fn restore(&mut self, fields: Option<Fields>) -> Result<()> {
+    fn restore(&mut self, fields: Option<Fields>) -> Result<()> {
         let Some(share) = self.share.as_mut() else { return Ok(()) };
         if share.rank() > 0 {
             // Those of the first rank are of all since the start of the run.

@@ -75,29 +75,54 @@ pub fn adapters() -> Vec<AdapterInfo> {
     enumerate().into_iter().map(|(_, info)| info).collect()
 }
 
+/// Numbers of the adapters that `asked` names among those that are `found`: a number in [`adapters`], or all with this part of a name.
+fn named(asked: &str, found: &[AdapterInfo]) -> Result<Vec<usize>> {
+    if let Some(number) = asked.parse().ok().filter(|&k: &usize| k < found.len()) {
+        return Ok(vec![number]);
+    }
+    let part = asked.to_lowercase();
+    let named = |(_, info): &(usize, &AdapterInfo)| info.name.to_lowercase().contains(&part);
+    let numbers: Vec<usize> = found.iter().enumerate().filter(named).map(|(k, _)| k).collect();
+    if numbers.is_empty() {
+        let names: Vec<_> = found.iter().enumerate().map(|(k, i)| format!("{k}: {}", i.name)).collect();
+        let text = format!("no adapter is called \"{asked}\"; there is {}", names.join(", "));
+        return Err(GpuError::NoAdapter(text).into());
+    }
+    Ok(numbers)
+}
+
+/// Number of the adapter of the `k`-th rank on a machine where these are `found`: of those `asked` for the k-th, of all hardware if none is asked
+/// for; beyond their number from the first on again. Where there is software only, all ranks share it.
+fn of_rank(k: usize, asked: Option<&str>, found: &[AdapterInfo]) -> Result<usize> {
+    let numbers = match asked {
+        Some(asked) => named(asked, found)?,
+        None => (0..found.len()).filter(|&k| found[k].is_hardware()).collect(),
+    };
+    // A device that is there by two programming interfaces is one.
+    let first = numbers.first().copied().unwrap_or(0);
+    let devices: Vec<usize> =
+        numbers.into_iter().filter(|&k| found[k].backend == found[first].backend).collect();
+    Ok(if devices.is_empty() { first } else { devices[k % devices.len()] })
+}
+
 /// The adapter that `asked` names: a number in [`adapters`] or a part of a name; the first one if `None`.
 pub(super) fn choose(asked: Option<&str>) -> Result<(wgpu::Adapter, AdapterInfo)> {
+    taken(|infos| asked.map_or(Ok(0), |asked| named(asked, infos).map(|numbers| numbers[0])))
+}
+
+/// The adapter of the `k`-th rank on this machine, see [`of_rank`].
+pub(super) fn choose_of_rank(k: usize, asked: Option<&str>) -> Result<(wgpu::Adapter, AdapterInfo)> {
+    taken(|infos| of_rank(k, asked, infos))
+}
+
+/// The adapter of the number that `choice` makes among all of them, one at least.
+fn taken(choice: impl FnOnce(&[AdapterInfo]) -> Result<usize>) -> Result<(wgpu::Adapter, AdapterInfo)> {
     let mut found = enumerate();
     if found.is_empty() {
         return Err(GpuError::NoAdapter(NO_ADAPTER.into()).into());
     }
-    let k = match asked {
-        None => 0,
-        Some(asked) => {
-            let number = asked.parse().ok().filter(|&k: &usize| k < found.len());
-            let part = asked.to_lowercase();
-            let named = || found.iter().position(|(_, info)| info.name.to_lowercase().contains(&part));
-            number.or_else(named).ok_or_else(|| {
-                let names: Vec<_> =
-                    found.iter().enumerate().map(|(k, (_, i))| format!("{k}: {}", i.name)).collect();
-                GpuError::NoAdapter(format!(
-                    "no adapter is called \"{asked}\"; there is {}",
-                    names.join(", ")
-                ))
-            })?
-        }
-    };
-    Ok(found.swap_remove(k))
+    let infos: Vec<AdapterInfo> = found.iter().map(|(_, info)| info.clone()).collect();
+    Ok(found.swap_remove(choice(&infos)?))
 }
 
 fn megabytes(bytes: u64) -> String {
@@ -253,6 +278,30 @@ mod tests {
         let asked = limits(&memory(1 << 20, 1), 8, &have, "large").expect("fits");
         let usual = wgpu::Limits::default();
         assert_eq!(asked.max_storage_buffer_binding_size, usual.max_storage_buffer_binding_size);
+    }
+
+    #[test]
+    fn each_rank_of_a_machine_takes_a_device_of_its_own() {
+        let info = |name: &str, backend: &str, t: &str| AdapterInfo {
+            name: name.into(),
+            backend: backend.into(),
+            device_type: t.into(),
+            driver: String::new(),
+        };
+        let node = [
+            info("NVIDIA H100", "vulkan", "discrete"),
+            info("NVIDIA H100", "vulkan", "discrete"),
+            info("Radeon", "vulkan", "integrated"),
+            info("NVIDIA H100", "dx12", "discrete"),
+            info("llvmpipe", "vulkan", "cpu"),
+        ];
+        let all = |asked: Option<&str>| [0, 1, 2, 3].map(|k| of_rank(k, asked, &node).expect("there is one"));
+        assert_eq!(all(None), [0, 1, 2, 0]);
+        assert_eq!(all(Some("h100")), [0, 1, 0, 1]);
+        assert_eq!(all(Some("llvm")), [4; 4]);
+        assert_eq!(all(Some("2")), [2; 4]);
+        assert_eq!([0, 1, 2].map(|k| of_rank(k, None, &node[4..]).expect("software")), [0; 3]);
+        assert!(of_rank(0, Some("none"), &node).is_err_and(|e| e.to_string().contains("2: Radeon")));
     }
 
     #[test]

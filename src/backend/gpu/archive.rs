@@ -7,6 +7,8 @@ use crate::error::{Error, Result};
 use crate::plan::Arrays;
 use bytemuck::Pod;
 
+/// What holds the neighbour lists of a state.
+const LISTED: &str = "neighbour_count";
 /// Bytes of neighbour lists that are on the host at a time, unless a plane takes more.
 const PLANES_BYTES: usize = 64 << 20;
 
@@ -94,8 +96,9 @@ impl Gpu {
             if self.plan.needs(Arrays::Coupling) {
                 self.buffer(archive, buffers::inertia_head, g.moving_wall)?;
             }
-            // The lists of the last step serve viscosity, at the start of the next one.
-            if self.params.viscosity > 0.0 {
+            // The lists of the last step serve viscosity, at the start of the next one. A state of many ranks has none.
+            let listed = archive.is_saving() || archive.sections.contains_key(LISTED);
+            if self.params.viscosity > 0.0 && listed {
                 self.lists(archive)?;
             }
             if self.plan.needs(Arrays::Ledger) {
@@ -104,6 +107,11 @@ impl Gpu {
             if archive.is_saving() {
                 let seen = self.context.download(buffers::counters, super::layout::counter::WORDS)?;
                 self.take_counters(&seen)?;
+            }
+            if self.params.viscosity > 0.0 && !listed {
+                self.cell_list()?;
+                let rows = super::groups(self.sizes.pressure);
+                self.context.pass([(super::kernels::neighbour_list::neighbour_list_main, rows)])?;
             }
         }
         self.counters.exchange(archive)?;
@@ -124,13 +132,7 @@ impl Gpu {
             let mut values = self.context.download(buffer, count)?;
             return archive.array(name, &mut values, false);
         }
-        let mut values: Vec<T> = Vec::new();
-        archive.array(name, &mut values, false)?;
-        if values.len() != count {
-            let have = values.len();
-            return Err(Error::misfit(format!("the checkpoint holds {have} of `{name}`, the case {count}")));
-        }
-        self.context.upload(buffer, &values)
+        self.context.upload(buffer, &read(archive, buffer, count)?)
     }
 
     /// The neighbours that carry pressure, row by row without gaps. The dummies, at the other end of the rows, are
@@ -178,6 +180,24 @@ impl Gpu {
         }
         Ok(())
     }
+}
+
+/// The `count` elements of `buffer` that a state holds, unless it is none.
+pub(super) fn read<T: Element + Pod>(
+    archive: &mut Archive,
+    buffer: Buffer<T>,
+    count: usize,
+) -> Result<Vec<T>> {
+    let (name, mut values) = (buffer.id().name(), Vec::new());
+    if count == 0 {
+        return Ok(values);
+    }
+    archive.array(name, &mut values, false)?;
+    if values.len() != count {
+        let have = values.len();
+        return Err(Error::misfit(format!("the checkpoint holds {have} of `{name}`, the case {count}")));
+    }
+    Ok(values)
 }
 
 #[cfg(test)]

@@ -86,7 +86,7 @@ table! {
         preconditioned: [f32; 4], Reads, Fluid, |s, _| s.pressure;
         residual: f32, None, Fluid, |s, _| s.pressure;
         search: [f32; 2], None, Fluid, |s, _| s.pressure;
-        partial_sum: [f32; 4], None, Fluid, |s, _| 2 * s.reduction_groups();
+        partial_sum: [f32; 4], Both, Fluid, |s, _| 2 * s.reduction_groups();
         solve: Solve, Both, Fluid, |_, _| 1;
     }
     "pressure on walls" {
@@ -118,7 +118,7 @@ table! {
         cell_count: u32, Writes, Fluid, |s, _| s.keys(), Split::Ranges;
         cell_start: u32, Reads, Fluid, |s, _| s.keys() + 1, Split::Ranges;
         block_sum: u32, None, Fluid, |s, _| s.keys().div_ceil(SCAN_BLOCK);
-        unsorted: u32, None, Fluid, |s, _| s.sorted();
+        unsorted: u32, Reads, Fluid, |s, _| s.sorted();
         /// Positions, velocities and pressures of the fluid, one after the other.
         sorted: f32, Reads, Fluid, |s, _| (4 + 4 + 1) * s.fluid, Split::Ranges;
         moving_slot: u32, None, Solids, |s, _| s.moving;
@@ -137,7 +137,7 @@ table! {
         wrench: [f32; 4], Reads, Force, |s, _| 2 * s.force_chunks();
         free_body: FreeBody, Writes, Coupling, |s, _| s.solids;
         /// What the moving-wall slots have of slots between solids, four numbers each; their rows; what each body answers.
-        coupling: [f32; 4], Writes, Coupling, |s, _| 6 * s.moving_wall + 2 * s.solids;
+        coupling: [f32; 4], Both, Coupling, |s, _| 6 * s.moving_wall + 2 * s.solids;
         absorber_zone: AbsorberZone, Writes, Absorber, |s, _| s.absorbers;
         emission: Emission, Writes, Openings, |s, _| s.openings;
         outlet: Outlet, Writes, Openings, |s, _| s.openings;

@@ -27,13 +27,14 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// `scene` on a device `info` with limits `have`.
+    /// `scene` on a device `info` with limits `have`; of one of many `ranks`, or alone.
     pub fn new(
         scene: &Scene,
         params: &Params,
         plan: &Plan,
         info: &AdapterInfo,
         have: &wgpu::Limits,
+        ranks: bool,
     ) -> Result<Self> {
         let fluid = scene.groups.fluid;
         if fluid > FLUID_MAX {
@@ -49,16 +50,21 @@ impl Fitted {
         if info.device_type == "cpu" {
             sizes.rows_per_thread = 4;
         }
-        let memory = Memory::new(&sizes, plan);
+        let mut memory = Memory::new(&sizes, plan);
+        if ranks {
+            memory = memory.with(&kernels::HALO);
+        }
         let most = adapter::buffer_most(have);
         let width = adapter::width(have);
         let division = Division::new(&memory, most, width);
-        let switches = shader::switches(params, plan);
+        let mut switches = shader::switches(params, plan);
+        switches.extend(ranks.then_some("RANKS"));
         // The pairs of solids that come close may become any number.
         let of_pairs = Division { fold: Some(width), ..division.clone() };
         let of_contact = |p: &&Program| plan.contact.program.is_some_and(|c| c.name == p.name);
         let particles = kernels::planned(plan).filter(|p| !of_contact(p));
         let mut shaders = Shader::all(particles, &switches, &division)?;
+        shaders.extend(Shader::all(ranks.then_some(&kernels::HALO).into_iter(), &switches, &division)?);
         shaders.extend(Shader::all(plan.contact.program.into_iter(), &switches, &of_pairs)?);
         let limits = adapter::limits(&memory, Shader::bindings(&shaders), have, &info.name)?;
         Ok(Self { grid, sizes, memory, division, shaders, most, limits })

@@ -4,7 +4,7 @@ use super::buffers::{Row, TABLE};
 use super::hierarchy::Levels;
 use super::parts::{Grain, Split};
 use crate::cells::Grid;
-use crate::compute::{Host, Id, Spec};
+use crate::compute::{Host, Id, Program, Spec};
 pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
 use crate::kernels::body_force::missing_head;
 use crate::kernels::openings;
@@ -474,8 +474,8 @@ impl Allocation {
     }
 }
 
-/// Bytes that the buffers of contact start with; they grow with the pairs of solids that come close.
-const CONTACT_START: u64 = 4096;
+/// Bytes that buffers start with which grow: those of contact with the pairs of solids that come close.
+const GROWING_START: u64 = 4096;
 
 /// What a scene takes on a device.
 #[derive(Clone, Debug, Default)]
@@ -495,7 +495,7 @@ impl Memory {
         let of_contact = plan.contact.program.map_or(&[][..], |p| p.buffers).iter();
         let contact = of_contact.map(|&Spec { id, host, .. }| {
             let purpose = "contact, to begin with";
-            Allocation { id, bytes: CONTACT_START, host, purpose, grain: Grain::Whole }
+            Allocation { id, bytes: GROWING_START, host, purpose, grain: Grain::Whole }
         });
         if !plan.wet() {
             return Self { buffers: contact.collect(), workgroups: 0, strided: 0 };
@@ -510,6 +510,17 @@ impl Memory {
         let workgroups = workgroups.max().unwrap_or(1);
         let strided = s.reduction_groups().max(s.monitor_groups());
         Self { buffers: of_particles.chain(contact).collect(), workgroups, strided }
+    }
+
+    /// With the buffers of `program`, which start small and grow with what they are to hold.
+    #[must_use]
+    pub(super) fn with(mut self, program: &Program) -> Self {
+        let of = |&Spec { id, host, .. }: &Spec| {
+            let purpose = "borders of a rank, to begin with";
+            Allocation { id, bytes: GROWING_START, host, purpose, grain: Grain::Whole }
+        };
+        self.buffers.extend(program.buffers.iter().map(of));
+        self
     }
 
     /// All bytes.

@@ -36,7 +36,7 @@ impl Gpu {
     }
 
     /// The workgroups' sums and the histogram, put together in f64.
-    fn finish_monitor(&self, sums: &[MonitorSum], bins: &[u32]) -> FluidMonitor {
+    pub(super) fn finish_monitor(&self, sums: &[MonitorSum], bins: &[u32]) -> FluidMonitor {
         let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let mass = self.params.particle_mass();
         let mut out = FluidMonitor::default();
@@ -71,6 +71,12 @@ impl Gpu {
         if !self.plan.wet() {
             return Ok(Default::default());
         }
+        let (sums, bins, counters) = self.look_at_water()?;
+        Ok((self.finish_monitor(&sums, &bins), counters))
+    }
+
+    /// The workgroups' sums over the water, the histogram of speeds and the counters, in one wait.
+    pub(super) fn look_at_water(&mut self) -> Result<(Vec<MonitorSum>, Vec<u32>, Counters)> {
         let groups = self.sizes.monitor_groups();
         self.context.begin(None);
         self.context.clear(buffers::speed_bin)?;
@@ -86,8 +92,7 @@ impl Gpu {
         let (sums, rest) = bytes.split_at(sums as usize);
         let (bins, seen) = rest.split_at(bins as usize);
         let counters = self.take_counters(&bytemuck::pod_collect_to_vec::<u8, u32>(seen))?;
-        let sums: Vec<MonitorSum> = bytemuck::pod_collect_to_vec(sums);
-        Ok((self.finish_monitor(&sums, &bytemuck::pod_collect_to_vec::<u8, u32>(bins)), counters))
+        Ok((bytemuck::pod_collect_to_vec(sums), bytemuck::pod_collect_to_vec(bins), counters))
     }
 
     /// Pressures of wall particles, in one wait.

@@ -67,8 +67,20 @@ impl Gpu {
         adapter: Option<&str>,
         caps: Caps,
     ) -> Result<Self> {
-        let (adapter, info) = adapter::choose(adapter)?;
-        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(adapter.limits()))?;
+        Self::open(scene, params, plan, settings, adapter::choose(adapter)?, caps, false)
+    }
+
+    /// Particles of `scene` on a device of `adapter`, for one of many `ranks` or alone.
+    pub(super) fn open(
+        scene: &Scene,
+        params: &Params,
+        plan: &Plan,
+        settings: Settings,
+        (adapter, info): (wgpu::Adapter, AdapterInfo),
+        caps: Caps,
+        ranks: bool,
+    ) -> Result<Self> {
+        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(adapter.limits()), ranks)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("seixo"),
             required_limits: fitted.limits.clone(),
@@ -107,7 +119,7 @@ impl Gpu {
             device_type: text("other"),
             driver: text(""),
         };
-        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(have))?;
+        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(have), false)?;
         let descriptor =
             wgpu::DeviceDescriptor { required_limits: fitted.limits.clone(), ..Default::default() };
         Self::on(wgpu::Device::noop(&descriptor), info, fitted, scene, params, plan, settings)

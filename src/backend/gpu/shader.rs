@@ -12,7 +12,7 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 15] = [
+pub const SWITCHES: [&str; 16] = [
     "ABSORBER",
     "CONSISTENT",
     "COUPLED",
@@ -21,6 +21,7 @@ pub const SWITCHES: [&str; 15] = [
     "MOVING",
     "MULTIGRID",
     "PERIODIC",
+    "RANKS",
     "REACTION",
     "SHARED_COLLISIONS",
     "STATIC",
@@ -41,6 +42,8 @@ pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),
         params.periodic.is_any(),
+        // Of a device that is one of many ranks'; see `rank`.
+        false,
         plan.needs(Arrays::Reaction),
         params.collision == Collision::Shared,
         plan.needs(Arrays::FixedWalls),

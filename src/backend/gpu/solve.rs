@@ -130,7 +130,7 @@ impl Gpu {
     }
 
     /// Make the levels of the multigrid preconditioner for the system at hand.
-    fn build_levels(&mut self) -> Result<()> {
+    pub(super) fn build_levels(&mut self) -> Result<()> {
         let Some(levels) = &self.levels else { return Ok(()) };
         self.context.clear(buffers::cell_mark)?;
         self.context.clear(buffers::aggregate)?;
@@ -138,7 +138,7 @@ impl Gpu {
     }
 }
 
-fn report(solve: &Solve) -> PressureReport {
+pub(super) fn report(solve: &Solve) -> PressureReport {
     let outcome = match solve.outcome {
         0 => Outcome::Converged,
         1 => Outcome::ZeroSource,

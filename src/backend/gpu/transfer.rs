@@ -11,7 +11,7 @@ use crate::scene::Kind;
 use glam::{DVec3, Vec3};
 
 /// Vectors with a fourth component.
-fn packed(values: &[DVec3], offset: DVec3, fourth: impl Fn(usize) -> f32) -> Vec<[f32; 4]> {
+pub(super) fn packed(values: &[DVec3], offset: DVec3, fourth: impl Fn(usize) -> f32) -> Vec<[f32; 4]> {
     values
         .iter()
         .enumerate()
@@ -22,11 +22,11 @@ fn packed(values: &[DVec3], offset: DVec3, fourth: impl Fn(usize) -> f32) -> Vec
         .collect()
 }
 
-fn vector(v: &[f32; 4]) -> DVec3 {
+pub(super) fn vector(v: &[f32; 4]) -> DVec3 {
     DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }
 
-fn kind(code: f32) -> Kind {
+pub(super) fn kind(code: f32) -> Kind {
     match code as u8 {
         0 => Kind::Fluid,
         1 => Kind::Wall,
