@@ -20,6 +20,15 @@ fn stride() -> u32 {
     return params.reduction_groups * WORKGROUP;
 }
 
+// Whether slot `i` is a row of the pressure equation that is computed here.
+fn is_row(i: u32) -> bool {
+//#if RANKS
+    return source_diagonal[i].y > 0.0;
+//#else
+    return state[i] == INNER;
+//#endif
+}
+
 // Sum over the workgroup, the same on every thread and in a fixed order.
 fn total(value: vec2f, t: u32) -> vec2f {
     lane[t] = value;
@@ -63,11 +72,7 @@ fn sum_source(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocatio
               @builtin(workgroup_id) group: vec3u) {
     var sum = vec2f(0.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
-//#if RANKS
-        sum += select(vec2f(0.0), vec2f(source_diagonal[i].x, 1.0), source_diagonal[i].y > 0.0);
-//#else
-        sum += select(vec2f(0.0), vec2f(source_diagonal[i].x, 1.0), state[i] == INNER);
-//#endif
+        sum += select(vec2f(0.0), vec2f(source_diagonal[i].x, 1.0), is_row(i));
     }
     sum = total(sum, t);
     if t == 0u {
@@ -84,11 +89,7 @@ fn subtract_mean(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
     sum = total(sum, t);
     let mean = sum.x / max(sum.y, 1.0);
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
-//#if RANKS
-        if source_diagonal[i].y > 0.0 {
-//#else
-        if state[i] == INNER {
-//#endif
+        if is_row(i) {
             source_diagonal[i].x -= mean;
         }
     }
@@ -99,11 +100,7 @@ fn find_lowest(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocati
                @builtin(workgroup_id) group: vec3u) {
     var least = NONE;
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
-//#if RANKS
-        least = min(least, select(NONE, pressure[i], source_diagonal[i].y > 0.0));
-//#else
-        least = min(least, select(NONE, pressure[i], state[i] == INNER));
-//#endif
+        least = min(least, select(NONE, pressure[i], is_row(i)));
     }
     least = lowest(least, t);
     if t == 0u {
@@ -120,11 +117,7 @@ fn raise(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
     least = lowest(least, t);
     var cut = 0u;
     for (var i = id.x; i < params.pressure_slots; i += stride()) {
-//#if RANKS
-        if source_diagonal[i].y > 0.0 {
-//#else
-        if state[i] == INNER {
-//#endif
+        if is_row(i) {
             let p = pressure[i] - least;
             cut += u32(p > now.pressure_max);
             pressure[i] = min(p, now.pressure_max);

@@ -1,6 +1,5 @@
 //! The library's own comparison of device and CPU, as `seixo compare` runs it.
 
-use seixo::backend::gpu;
 use seixo::case::file::load;
 use seixo::case::{Absorber, Case, Face};
 use seixo::plan::Stage;
@@ -19,12 +18,7 @@ fn transport(more: &[&str]) -> (Case, std::sync::Arc<Scene>) {
 }
 
 fn device() -> bool {
-    let found = !gpu::adapters().is_empty();
-    assert!(found || std::env::var_os("CI").is_none(), "NO GPU ADAPTER");
-    if !found {
-        eprintln!("SKIPPED, NO GPU ADAPTER: device and CPU are not compared");
-    }
-    found
+    crate::common::there_is_a_device("device and CPU are not compared")
 }
 
 #[test]

@@ -14,10 +14,7 @@ use std::time::Instant;
 
 /// A simulation on a device; loud if there is none, and a failure where one is expected.
 fn on_device(case: &Case) -> Option<Simulation> {
-    if gpu::adapters().is_empty() {
-        let text = "NO GPU ADAPTER: what a step asks of a device is not tested";
-        assert!(std::env::var_os("CI").is_none(), "{text}");
-        eprintln!("SKIPPED, {text}");
+    if !crate::common::there_is_a_device("what a step asks of a device is not tested") {
         return None;
     }
     let scene = Scene::build(case).expect("the scene builds");
@@ -140,8 +137,7 @@ fn the_clock_tells(case: &Case) {
 /// Every buffer that the plan counts is allocated, and nothing else that grows with the scene.
 #[test]
 fn planned_bytes_are_allocated_bytes() {
-    if gpu::adapters().is_empty() {
-        assert!(std::env::var_os("CI").is_none(), "NO GPU ADAPTER: memory is not tested");
+    if !crate::common::there_is_a_device("memory is not tested") {
         return;
     }
     for case in [still(false, "jacobi"), still(true, "multigrid"), pressed()] {

@@ -3,7 +3,7 @@
 use crate::common;
 use common::*;
 use glam::DVec3;
-use seixo::backend::{Processor, RowPressure, gpu};
+use seixo::backend::{Processor, RowPressure};
 use seixo::case::Case;
 use seixo::gauges::Gauges;
 use seixo::gauges::wall_force::FixedWall;
@@ -79,10 +79,7 @@ fn walls_of_still_water_carry_what_statics_say() {
 
 #[test]
 fn a_device_reads_the_same_gauges() {
-    if gpu::adapters().is_empty() {
-        let text = "NO GPU ADAPTER: gauges on a device are not tested";
-        assert!(std::env::var_os("CI").is_none(), "{text}");
-        eprintln!("SKIPPED, {text}");
+    if !crate::common::there_is_a_device("gauges on a device are not tested") {
         return;
     }
     let mut thrown = still("");
@@ -113,11 +110,7 @@ fn means_are_those_of_every_step_and_begin_anew_after_a_row() {
     let mut mean = case.clone();
     mean.gauge.mean = true;
     let mut processors = vec![Processor::Cpu];
-    if gpu::adapters().is_empty() {
-        let text = "NO GPU ADAPTER: means on a device are not tested";
-        assert!(std::env::var_os("CI").is_none(), "{text}");
-        eprintln!("SKIPPED, {text}");
-    } else {
+    if crate::common::there_is_a_device("means on a device are not tested") {
         processors.push(Processor::Gpu { adapter: None });
     }
     for processor in processors {

@@ -4,7 +4,7 @@
 use crate::common;
 
 use seixo::backend::gpu::parts::{Division, Split};
-use seixo::backend::gpu::{self, Caps, Gpu, buffers};
+use seixo::backend::gpu::{Caps, Gpu, buffers};
 use seixo::case::Case;
 use seixo::checkpoint::Archive;
 use seixo::error::{Error, GpuError};
@@ -61,13 +61,7 @@ fn capped(case: &Case, scene: &Arc<Scene>, caps: Caps) -> (Simulation, Division)
 
 /// Whether there is a device to test; loud if not, and a failure where one is expected.
 fn device() -> bool {
-    if !gpu::adapters().is_empty() {
-        return true;
-    }
-    let text = "NO GPU ADAPTER: divided buffers are not tested";
-    assert!(std::env::var_os("CI").is_none(), "{text}");
-    eprintln!("SKIPPED, {text}");
-    false
+    crate::common::there_is_a_device("divided buffers are not tested")
 }
 
 /// The state as it is saved: positions, velocities, pressures, lists, poses, all to the last bit.

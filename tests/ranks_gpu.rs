@@ -3,7 +3,6 @@
 use crate::common::{case, simulation};
 use crate::ranks::*;
 use seixo::backend::Processor;
-use seixo::backend::gpu::adapters;
 use seixo::case::Case;
 use seixo::cells::Grid;
 use seixo::checkpoint::Archive;
@@ -24,14 +23,8 @@ use std::sync::Arc;
 const DEVICE: Processor = Processor::Gpu { adapter: None };
 
 /// Whether there is a device; loud if there is none, and a failure where one is expected.
-fn there_is_a_device() -> bool {
-    let there = !adapters().is_empty();
-    if !there {
-        let text = "NO GPU ADAPTER: ranks that have a device each are not tested";
-        assert!(std::env::var_os("CI").is_none(), "{text}");
-        eprintln!("SKIPPED, {text}");
-    }
-    there
+fn device() -> bool {
+    crate::common::there_is_a_device("ranks that have a device each are not tested")
 }
 
 fn on_device(case: &Case) -> Simulation {
@@ -85,7 +78,7 @@ fn many_devices_compute_what_one_device_computes_round_a_tank_and_in_a_full_one(
 
 /// Holds devices of ranks against one device and a CPU.
 fn compare<'a>(tried: impl IntoIterator<Item = Tried<'a>>) {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     for (name, case, steps, ranks, bound) in tried {
@@ -141,7 +134,7 @@ fn compare<'a>(tried: impl IntoIterator<Item = Tried<'a>>) {
 
 #[test]
 fn devices_of_ranks_leave_the_same_bits_twice() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     let case = flume("solver = { preconditioner = \"multigrid\" }");
@@ -160,7 +153,7 @@ fn bore() -> Case {
 
 #[test]
 fn the_cuts_between_devices_follow_the_water() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     let case = bore();
@@ -181,7 +174,7 @@ fn the_cuts_between_devices_follow_the_water() {
 
 #[test]
 fn plan_tells_what_devices_of_ranks_say() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     for case in [shipped("dam_break_2d", &[]), ring(0.0, "solver = { preconditioner = \"multigrid\" }", FREE)]
@@ -219,7 +212,7 @@ fn save(s: &mut Simulation) -> Archive {
 
 #[test]
 fn a_state_goes_on_on_any_number_of_devices() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     let case = flume("");
@@ -268,7 +261,7 @@ fn run_on(text: &str, ranks: usize, out: &Path, steps: u64) -> Finished {
 
 #[test]
 fn devices_of_ranks_write_pieces_and_say_what_solved_the_pressure() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     let text = flume_text("solver = { preconditioner = \"multigrid\" }") + "every = 0.002\n";
@@ -293,7 +286,7 @@ fn devices_of_ranks_write_pieces_and_say_what_solved_the_pressure() {
 
 #[test]
 fn what_devices_of_ranks_do_not_compute_is_refused() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     let refusal = |case: &Case, processor: &Processor| {
@@ -310,7 +303,7 @@ fn what_devices_of_ranks_do_not_compute_is_refused() {
 
 #[test]
 fn water_comes_in_and_goes_out_over_devices() {
-    if !there_is_a_device() {
+    if !device() {
         return;
     }
     let case = shipped("channel", &["run.spacing=0.05"]);

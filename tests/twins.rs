@@ -47,14 +47,10 @@ struct Pair {
 
 /// Whether there is a device to test; loud if not, and a failure where one is expected.
 fn device() -> bool {
-    if !gpu::adapters().is_empty() {
-        return true;
-    }
-    let text = "NO GPU ADAPTER: the shaders are not compared with their twins (libvulkan1 and mesa-vulkan-drivers \
-                give a software one)";
-    assert!(std::env::var_os("CI").is_none(), "{text}");
-    eprintln!("SKIPPED, {text}");
-    false
+    crate::common::there_is_a_device(
+        "the shaders are not compared with their twins (libvulkan1 and mesa-vulkan-drivers \
+                give a software one)",
+    )
 }
 
 impl Pair {

@@ -122,7 +122,7 @@ impl Solids {
 
     /// Where solid `k` has come to [m], on beyond the periodic sides that it has crossed.
     pub fn path(&self, k: usize) -> DVec3 {
-        self.poses[k].position + self.periodic.way(self.turns[k])
+        self.bodies[k].pose.position + self.periodic.way(self.turns[k])
     }
 
     /// Poses that [`Solids::predict`] gave last.

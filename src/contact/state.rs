@@ -10,10 +10,9 @@ impl Solids {
     /// Energy of the free bodies now.
     pub fn energy(&mut self) -> Energy {
         let mut energy = Energy::default();
-        for (body, turns) in self.bodies.iter().zip(&self.turns).filter(|(b, _)| b.is_free()) {
+        for (k, body) in self.bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             energy.kinetic += body.kinetic_energy();
-            let path = body.pose.position + self.periodic.way(*turns);
-            energy.gravity -= body.mass * self.gravity.dot(path);
+            energy.gravity -= body.mass * self.gravity.dot(self.path(k));
         }
         self.candidates.refresh(&self.bodies, self.spacing, 0.0);
         if let Some(law) = &mut self.law {

@@ -140,7 +140,7 @@ fn on_devices(plan: &Plan, water: u64, carriers: u64) -> OnDevices {
     let shown = surface + 3 + 1 + coupled;
     let border = (motion * motions + number) * water + number * shown * carriers;
     // The two outer columns of a slab come to the host and go back, and copies with them.
-    // (With the lists of slots at the borders.)
+    // The slots at the borders are listed for the device.
     let lists = 2 * number * (carriers + water);
     let outer = 2 * (2 * travels - number) * water + (travels - number) * water;
     OnDevices {

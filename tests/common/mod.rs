@@ -4,7 +4,7 @@ pub mod dry;
 pub mod moving;
 
 use glam::DVec3;
-use seixo::backend::Processor;
+use seixo::backend::{Processor, gpu};
 use seixo::case::Case;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
@@ -38,6 +38,16 @@ thread_local! {
 /// work to others as on the work. That threads change no bit has tests of its own.
 pub fn alone() {
     ALONE.with(|()| ());
+}
+
+/// Whether there is a device to test; loud if not, and a failure where one is expected: `untested` is what is left out.
+pub fn there_is_a_device(untested: &str) -> bool {
+    let there = !gpu::adapters().is_empty();
+    if !there {
+        assert!(std::env::var_os("CI").is_none(), "NO GPU ADAPTER: {untested}");
+        eprintln!("SKIPPED, NO GPU ADAPTER: {untested}");
+    }
+    there
 }
 
 pub fn case(text: &str) -> Case {

@@ -74,12 +74,11 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
 /// spans an axis goes on by a length instead.
 fn images(mut wall: WallBox, periodic: &Periodic, spacing: f64) -> Vec<WallBox> {
     let (center, length) = (wall.center, periodic.length());
-    let rows = wall.axes.transpose();
-    let half = DVec3::from_array(DVec3::AXES.map(|axis| (rows * axis).abs().dot(wall.half)));
+    let half = wall.shape().extent(wall.axes);
     let spans = [0, 1, 2].map(|k| periodic.is_along(k) && 2.0 * half[k] > length[k] - COVERED * spacing);
     for k in (0..3).filter(|&k| spans[k]) {
         // what ends at both sides lies along the axes
-        wall.half += length[k] * (rows * DVec3::AXES[k]).abs();
+        wall.half += length[k] * (wall.axes.transpose() * DVec3::AXES[k]).abs();
     }
     let reach = DVec3::from_array([0, 1, 2].map(|k| if spans[k] { 0.0 } else { half[k] + 0.5 * length[k] }));
     let turns = periodic.turns(center - reach, center + reach);
