@@ -42,7 +42,7 @@ struct PaperPose {
     low_z: vec4f,
     velocity: vec4f, // of A against B at A's centre
     spin: vec4f,     // of A against B; w: reach of the search
-    spin_b: vec4f,   // of B
+    spin_b: vec4f,   // of B; w: 0.0, which no compiler knows: see `as_rounded`
 }
 
 struct PaperLaw {
@@ -71,6 +71,13 @@ struct PaperLaw {
 // Set in `first.y` where B is the walls.
 const ON_WALL: u32 = 0x80000000u;
 
+// x as it was rounded. A compiler for a device may be free to reckon with sums as if they were exact: to add what was
+// meant to be taken apart, and so to lose the second number of a coordinate. What has passed through here it knows
+// nothing of.
+fn as_rounded(n: u32, x: vec3f) -> vec3f {
+    return bitcast<vec3f>(bitcast<vec3u>(x) ^ vec3u(bitcast<u32>(paper_pose[n].spin_b.w)));
+}
+
 fn of_b(n: u32, j: u32, word: u32) -> vec3f {
     let first = paper_pair[n].first.y;
     if (first & ON_WALL) != 0u {
@@ -94,7 +101,7 @@ fn apart(n: u32, i: u32, j: u32) -> Split {
     let sh = vec3f(paper_pose[n].high_x.w, paper_pose[n].high_y.w, paper_pose[n].high_z.w);
     let sl = vec3f(paper_pose[n].low_x.w, paper_pose[n].low_y.w, paper_pose[n].low_z.w);
     var r: Split;
-    r.high = th * high + sh - contact_layer[a].xyz;
+    r.high = as_rounded(n, th * high + sh - contact_layer[a].xyz);
     r.low = tl * (high + low) + th * low + sl - contact_layer[a + 1u].xyz;
     return r;
 }
@@ -204,10 +211,12 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         let at = contact_list[block.first + m];
         let r = apart(n, at.x, at.y);
         let whole = r.high + r.low;
-        let high = round(whole * law.scale);
-        let low = (r.high * law.scale - high) + r.low * law.scale;
+        let high = as_rounded(n, round(whole * law.scale));
+        let low = as_rounded(n, r.high * law.scale - high) + r.low * law.scale;
         // (d_c^2 - d^2) scale^2: the first bracket is a whole number.
-        let gap = (law.whole - dot(high, high)) + (law.fraction - 2.0 * dot(high, low) - dot(low, low));
+        let parts = vec3f(law.whole - dot(high, high), law.fraction - 2.0 * dot(high, low) - dot(low, low), 0.0);
+        let exact = as_rounded(n, parts);
+        let gap = exact.x + exact.y;
         let squared = dot(whole, whole);
         if gap <= 0.0 || squared == 0.0 {
             continue;

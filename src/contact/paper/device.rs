@@ -335,6 +335,7 @@ fn pose(entry: &Entry, size: f64, bodies: &[Body]) -> PaperPose {
         low_z,
         velocity: four(still * (a.pose.velocity - velocity), 0.0),
         spin: four(still * (a.pose.angular_velocity - spin), entry.reach),
+        // Always 0.0: `as_rounded` in the shader takes its bits.
         spin_b: four(still * spin, 0.0),
     }
 }
