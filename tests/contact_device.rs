@@ -166,7 +166,8 @@ fn large_bodies_are_searched_and_pressed_in_many_blocks_as_on_the_host() {
         let (host, device) = both(&scene, &contact(law));
         let e = error(&host, &device, 0.5);
         println!("{law:?}: {} candidates, {} touching, error {e:.1e}", host.candidates.len(), host.touching);
-        // The paper's law has blocks of 64 particles in the search, and of this many candidates for its forces.
+        // The paper's law has blocks of 64 particles in the search, and of this many candidates for its forces; the smooth
+        // law a wider workgroup from as many points on.
         assert!(host.candidates.len() > 2048 && host.touching > 256, "{law:?}");
         let missing = host.candidates.iter().filter(|c| device.candidates.binary_search(c).is_err());
         assert_eq!(missing.count(), 0, "{law:?}");

@@ -465,6 +465,8 @@ fn constants_are_the_same_on_both_sides() {
     assert!(shader::COMMON.contains(&first_word));
     let on_wall = format!("const ON_WALL: u32 = {:#x}u;", seixo::contact::device::paper::ON_WALL);
     assert!(text("contact_paper").contains(&on_wall));
+    let many_points = constant(text("contact_smooth"), "MANY_POINTS");
+    assert_eq!(many_points, f64::from(seixo::contact::device::smooth::MANY_POINTS));
     use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};
     // Written alike, hence read alike.
     let short = |x: f32| x.to_string().parse::<f64>().expect("a number");
