@@ -6,11 +6,12 @@
 // Edges are integrated on the host. What they bring to a face is taken in as more points; where two edges cross, only
 // into D and the sum of shares.
 //
-// One workgroup a pair, of four times as many threads where many points are near (`force_wide`). All in the frame of the pair's first solid A. The clearance of a point to a face is affine in
-// the point. The host gives it in f64 where it is largest: at a corner of the bounding box of the points; from there
-// every term only takes away. What is in contact has lost less than it keeps or little more, so a depth comes out to
-// the last digits of its own size, wherever in the tank the solids are. Depths from positions would keep those of the
-// position's size.
+// One workgroup a pair, of four times as many threads where many points are near (`force_wide`).
+//
+// All in the frame of the pair's first solid A. The clearance of a point to a face is affine in the point. The host gives
+// it in f64 where it is largest: at a corner of the bounding box of the points; from there every term only takes away.
+// What is in contact has lost less than it keeps or little more, so a depth comes out to the last digits of its own size,
+// wherever in the tank the solids are. Depths from positions would keep those of the position's size.
 
 const GROUP: u32 = 64u;
 const FAR: f32 = 3.0e38;
@@ -220,7 +221,7 @@ fn felt(depth: f32, speed: f32, step: f32) -> f32 {
     return select(1.0, select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0), speed < 0.0);
 }
 
-// Threads that share the sums of a face at most; of `force_wide` so many for each turn of its threads, in each turn.
+// Threads that share the sums of a face at most, for each GROUP of them that a workgroup has.
 const SHARING: u32 = 16u;
 // Listed points from which a pair has a workgroup of WIDE threads: with fewer most of them would have little to do. As
 // MANY_POINTS in src/contact/smooth/device.rs.
@@ -245,7 +246,7 @@ fn near_points(n: u32) -> u32 {
     return smooth_pair[n].near.x + smooth_pair[n].near.y;
 }
 
-// Of every pair with fewer points than MANY_POINTS, and of the others.
+// `press` of every pair with fewer points than MANY_POINTS, and of the others.
 @compute @workgroup_size(GROUP)
 fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
     let n = group_number(group);
