@@ -4,21 +4,31 @@
 // The host divides by n_c.
 // Twin: src/contact/paper/mod.rs
 //
-// One workgroup a pair of solids. All in the frame of the first solid A. Coordinates are two numbers: `high` of at most
-// 12 bits and the rest, `low`. Products of two high parts and their sums have at most 24 bits: they are exact, in any
-// order and with or without fused operations, and only low parts get rounded. A position so keeps what f32 loses, and
-// the square of a distance, split in the same way, gives d_c - d to some 1e-12 m for a body of 5 cm.
+// A workgroup has a block: of the search 64 particles of A and all of B that may be near, of the forces a part of a
+// pair's candidates. A pair has one block or few, and two large bodies keep the whole of a device busy. The host leaves
+// out what cannot be near, places the blocks' candidates one behind the other, and adds up what the blocks find.
+//
+// All in the frame of the first solid A. Coordinates are two numbers: `high` of at most 12 bits and the rest, `low`.
+// Products of two high parts and their sums have at most 24 bits: they are exact, in any order and with or without fused
+// operations, and only low parts get rounded. A position so keeps what f32 loses, and the square of a distance, split in
+// the same way, gives d_c - d to some 1e-12 m for a body of 5 cm.
 
 const GROUP: u32 = 64u;
 
 // Of a pair, for as long as its lists hold.
 struct PaperPair {
     first: vec2u, // particles of A, and of B or of the walls, three words each in `contact_layer`
-    count: vec2u,
-    row: u32,     // place in `contact_row`
-    list: u32,    // place of the candidates
-    candidates: u32,
-    pairs: u32,   // how many there are
+    near: u32,    // place in `contact_near` of the particles of B that may be near A; not used for walls
+    count: u32,   // of B's or the walls' that may be near
+}
+
+// What a workgroup does.
+struct PaperBlock {
+    pair: u32,
+    first: u32,  // search: place of its particles of A in `contact_near`; forces: place of its candidates
+    count: u32,  // of these
+    list: u32,   // search: place of the candidates it finds
+    blocks: u32, // how many there are
 }
 
 // Where the two are now: B's frame in A's, in two parts.
@@ -32,7 +42,7 @@ struct PaperPose {
     low_z: vec4f,
     velocity: vec4f, // of A against B at A's centre
     spin: vec4f,     // of A against B; w: reach of the search
-    spin_b: vec4f,   // of B
+    spin_b: vec4f,   // of B; w: 0.0, which no compiler knows: see `as_rounded`
 }
 
 struct PaperLaw {
@@ -55,9 +65,18 @@ struct PaperLaw {
 @group(0) @binding(7) var<storage, read_write> contact_row: array<u32>;
 @group(0) @binding(8) var<storage, read_write> contact_list: array<vec2u>;
 @group(0) @binding(9) var<storage, read_write> contact_sum: array<vec4f>;
+@group(0) @binding(10) var<storage, read> paper_block: array<PaperBlock>;
+@group(0) @binding(11) var<storage, read> contact_near: array<u32>;
 
 // Set in `first.y` where B is the walls.
 const ON_WALL: u32 = 0x80000000u;
+
+// x as it was rounded. A compiler for a device may be free to reckon with sums as if they were exact: to add what was
+// meant to be taken apart, and so to lose the second number of a coordinate. What has passed through here it knows
+// nothing of.
+fn as_rounded(n: u32, x: vec3f) -> vec3f {
+    return bitcast<vec3f>(bitcast<vec3u>(x) ^ vec3u(bitcast<u32>(paper_pose[n].spin_b.w)));
+}
 
 fn of_b(n: u32, j: u32, word: u32) -> vec3f {
     let first = paper_pair[n].first.y;
@@ -82,7 +101,7 @@ fn apart(n: u32, i: u32, j: u32) -> Split {
     let sh = vec3f(paper_pose[n].high_x.w, paper_pose[n].high_y.w, paper_pose[n].high_z.w);
     let sl = vec3f(paper_pose[n].low_x.w, paper_pose[n].low_y.w, paper_pose[n].low_z.w);
     var r: Split;
-    r.high = th * high + sh - contact_layer[a].xyz;
+    r.high = as_rounded(n, th * high + sh - contact_layer[a].xyz);
     r.low = tl * (high + low) + th * low + sl - contact_layer[a + 1u].xyz;
     return r;
 }
@@ -94,26 +113,34 @@ fn is_near(n: u32, i: u32, j: u32) -> bool {
     return dot(whole, whole) < reach * reach;
 }
 
+// The k-th of B's particles, or of the walls', that may be near A.
+fn number_in_b(n: u32, k: u32) -> u32 {
+    if (paper_pair[n].first.y & ON_WALL) != 0u {
+        return k;
+    }
+    return contact_near[paper_pair[n].near + k];
+}
+
 var<workgroup> scan: array<u32, GROUP>;
 
-// Candidates of each particle of A in the pair's rows of `contact_row`, and of all of them at the start of it.
+// Candidates of each block at the start of `contact_row`, and of each of its particles of A behind them.
 @compute @workgroup_size(GROUP)
 fn count(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group_number(group);
-    if n >= paper_pair[0].pairs {
+    let number = group_number(group);
+    if number >= paper_block[0].blocks {
         return;
     }
-    let size = paper_pair[n].count;
-    var own = 0u;
-    for (var i = t; i < size.x; i += GROUP) {
-        var found = 0u;
-        for (var j = 0u; j < size.y; j++) {
-            found += u32(is_near(n, i, j));
+    let block = paper_block[number];
+    let n = block.pair;
+    var found = 0u;
+    if t < block.count {
+        let i = contact_near[block.first + t];
+        for (var k = 0u; k < paper_pair[n].count; k++) {
+            found += u32(is_near(n, i, number_in_b(n, k)));
         }
-        contact_row[paper_pair[n].row + i] = found;
-        own += found;
     }
-    scan[t] = own;
+    contact_row[block.blocks + GROUP * number + t] = found;
+    scan[t] = found;
     for (var s = GROUP / 2u; s > 0u; s /= 2u) {
         workgroupBarrier();
         if t < s {
@@ -121,44 +148,38 @@ fn count(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         }
     }
     if t == 0u {
-        contact_row[n] = scan[0];
+        contact_row[number] = scan[0];
     }
 }
 
 // The candidates, ordered by i and j.
 @compute @workgroup_size(GROUP)
 fn fill(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group_number(group);
-    if n >= paper_pair[0].pairs {
+    let number = group_number(group);
+    if number >= paper_block[0].blocks {
         return;
     }
-    let size = paper_pair[n].count;
-    var place = paper_pair[n].list;
-    for (var start = 0u; start < size.x; start += GROUP) {
-        let i = start + t;
-        var own = 0u;
-        if i < size.x {
-            own = contact_row[paper_pair[n].row + i];
-        }
-        scan[t] = own;
-        for (var s = 1u; s < GROUP; s *= 2u) {
-            workgroupBarrier();
-            let before = select(0u, scan[max(t, s) - s], t >= s);
-            workgroupBarrier();
-            scan[t] += before;
-        }
+    let block = paper_block[number];
+    let n = block.pair;
+    let own = contact_row[block.blocks + GROUP * number + t];
+    scan[t] = own;
+    for (var s = 1u; s < GROUP; s *= 2u) {
         workgroupBarrier();
-        var next = place + scan[t] - own;
-        place += scan[GROUP - 1u];
-        if own > 0u {
-            for (var j = 0u; j < size.y; j++) {
-                if is_near(n, i, j) {
-                    contact_list[next] = vec2u(i, j);
-                    next += 1u;
-                }
-            }
-        }
+        let before = select(0u, scan[max(t, s) - s], t >= s);
         workgroupBarrier();
+        scan[t] += before;
+    }
+    if own == 0u {
+        return;
+    }
+    var next = block.list + scan[t] - own;
+    let i = contact_near[block.first + t];
+    for (var k = 0u; k < paper_pair[n].count; k++) {
+        let j = number_in_b(n, k);
+        if is_near(n, i, j) {
+            contact_list[next] = vec2u(i, j);
+            next += 1u;
+        }
     }
 }
 
@@ -166,14 +187,16 @@ var<workgroup> part_x: array<vec4f, GROUP>;
 var<workgroup> part_y: array<vec4f, GROUP>;
 var<workgroup> part_z: array<vec4f, GROUP>;
 
-// Of each pair: sum of forces on A and of those along the normals; sum of moments about A's centre and energy; pairs
+// Of each block: sum of forces on A and of those along the normals; sum of moments about A's centre and energy; pairs
 // and largest d_c - d.
 @compute @workgroup_size(GROUP)
 fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
-    let n = group_number(group);
-    if n >= paper_pair[0].pairs {
+    let number = group_number(group);
+    if number >= paper_block[0].blocks {
         return;
     }
+    let block = paper_block[number];
+    let n = block.pair;
     let law = paper_law[0];
     let turn = mat3x3f(
         paper_pose[n].high_x.xyz + paper_pose[n].low_x.xyz,
@@ -184,14 +207,16 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     var moment = vec4f(0.0);
     var pairs = 0.0;
     var deepest = 0.0;
-    for (var m = t; m < paper_pair[n].candidates; m += GROUP) {
-        let at = contact_list[paper_pair[n].list + m];
+    for (var m = t; m < block.count; m += GROUP) {
+        let at = contact_list[block.first + m];
         let r = apart(n, at.x, at.y);
         let whole = r.high + r.low;
-        let high = round(whole * law.scale);
-        let low = (r.high * law.scale - high) + r.low * law.scale;
+        let high = as_rounded(n, round(whole * law.scale));
+        let low = as_rounded(n, r.high * law.scale - high) + r.low * law.scale;
         // (d_c^2 - d^2) scale^2: the first bracket is a whole number.
-        let gap = (law.whole - dot(high, high)) + (law.fraction - 2.0 * dot(high, low) - dot(low, low));
+        let parts = vec3f(law.whole - dot(high, high), law.fraction - 2.0 * dot(high, low) - dot(low, low), 0.0);
+        let exact = as_rounded(n, parts);
+        let gap = exact.x + exact.y;
         let squared = dot(whole, whole);
         if gap <= 0.0 || squared == 0.0 {
             continue;
@@ -222,8 +247,8 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         }
     }
     if t == 0u {
-        contact_sum[3u * n] = part_x[0];
-        contact_sum[3u * n + 1u] = part_y[0];
-        contact_sum[3u * n + 2u] = part_z[0];
+        contact_sum[3u * number] = part_x[0];
+        contact_sum[3u * number + 1u] = part_y[0];
+        contact_sum[3u * number + 2u] = part_z[0];
     }
 }

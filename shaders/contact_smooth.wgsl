@@ -6,11 +6,12 @@
 // Edges are integrated on the host. What they bring to a face is taken in as more points; where two edges cross, only
 // into D and the sum of shares.
 //
-// One workgroup a pair. All in the frame of the pair's first solid A. The clearance of a point to a face is affine in
-// the point. The host gives it in f64 where it is largest: at a corner of the bounding box of the points; from there
-// every term only takes away. What is in contact has lost less than it keeps or little more, so a depth comes out to
-// the last digits of its own size, wherever in the tank the solids are. Depths from positions would keep those of the
-// position's size.
+// One workgroup a pair, of four times as many threads where many points are near (`force_wide`).
+//
+// All in the frame of the pair's first solid A. The clearance of a point to a face is affine in the point. The host gives
+// it in f64 where it is largest: at a corner of the bounding box of the points; from there every term only takes away.
+// What is in contact has lost less than it keeps or little more, so a depth comes out to the last digits of its own size,
+// wherever in the tank the solids are. Depths from positions would keep those of the position's size.
 
 const GROUP: u32 = 64u;
 const FAR: f32 = 3.0e38;
@@ -220,8 +221,12 @@ fn felt(depth: f32, speed: f32, step: f32) -> f32 {
     return select(1.0, select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0), speed < 0.0);
 }
 
-// Threads that share the sums of a face at most.
+// Threads that share the sums of a face at most, for each GROUP of them that a workgroup has.
 const SHARING: u32 = 16u;
+// Listed points from which a pair has a workgroup of WIDE threads: with fewer most of them would have little to do. As
+// MANY_POINTS in src/contact/smooth/device.rs.
+const MANY_POINTS: u32 = 2048u;
+const WIDE: u32 = 256u;
 
 var<workgroup> part_x: array<vec4f, GROUP>;
 var<workgroup> part_y: array<vec4f, GROUP>;
@@ -229,15 +234,47 @@ var<workgroup> part_z: array<vec4f, GROUP>;
 var<workgroup> used_faces: array<u32, GROUP>;
 var<workgroup> seen: vec2u;
 
-// Result of a pair, zeros if nothing touches but crossings: D, the deepest depth, contacts without crossings, sum of
-// shares. Then of each face of B, and of A, that is open: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
-// of the force; that centre, seen from A's.
+// The sum of the turns before with the next one; `before` is nothing in the first turn.
+fn joined(before: vec4f, next: vec4f, turn: u32) -> vec4f {
+    if turn == 0u {
+        return next;
+    }
+    return before + next;
+}
+
+fn near_points(n: u32) -> u32 {
+    return smooth_pair[n].near.x + smooth_pair[n].near.y;
+}
+
+// `press` of every pair with fewer points than MANY_POINTS, and of the others.
 @compute @workgroup_size(GROUP)
 fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
     let n = group_number(group);
-    if n >= smooth_pair[0].pairs {
+    if n >= smooth_pair[0].pairs || near_points(n) >= MANY_POINTS {
         return;
     }
+    press(n, t, GROUP);
+}
+
+@compute @workgroup_size(WIDE)
+fn force_wide(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32) {
+    let n = group_number(group);
+    if n >= smooth_pair[0].pairs || near_points(n) < MANY_POINTS {
+        return;
+    }
+    press(n, t, WIDE);
+}
+
+// Result of a pair, zeros if nothing touches but crossings: D, the deepest depth, contacts without crossings, sum of
+// shares. Then of each face of B, and of A, that is open: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
+// of the force; that centre, seen from A's.
+//
+// The threads' sums meet in GROUP places. Where there are more threads they bring them by turns, GROUP at a time: the
+// order of sums is fixed, and small pairs take no more of a device's memory for workgroups than they did.
+fn press(n: u32, t: u32, width: u32) {
+    let turns = width / GROUP;
+    let turn = t / GROUP;
+    let seat = t % GROUP;
     let list = smooth_pair[n].list;
     let near = smooth_pair[n].near;
     let points = near.x + near.y;
@@ -251,7 +288,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let state = given.z;
     var own_deepest = 0.0;
     var own_used = 0u;
-    for (var m = t; m < total; m += GROUP) {
+    for (var m = t; m < total; m += width) {
         if m >= points {
             let read_at = 3u * (given.x + m - points);
             let place = state + 3u * m;
@@ -285,9 +322,13 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             own_used |= 1u << (found.face + 6u * side);
         }
     }
-    part_x[t].x = own_deepest;
-    used_faces[t] = own_used;
-    workgroupBarrier();
+    for (var k = 0u; k < turns; k++) {
+        if turn == k {
+            part_x[seat].x = max(own_deepest, select(part_x[seat].x, 0.0, k == 0u));
+            used_faces[seat] = own_used | select(used_faces[seat], 0u, k == 0u);
+        }
+        workgroupBarrier();
+    }
     if t < 8u {
         for (var k = t + 8u; k < GROUP; k += 8u) {
             part_x[t].x = max(part_x[t].x, part_x[k].x);
@@ -308,7 +349,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let used = both.y;
 
     let open = smooth_pair[n].open;
-    for (var k = t; k < 1u + 4u * countOneBits(open); k += GROUP) {
+    for (var k = t; k < 1u + 4u * countOneBits(open); k += width) {
         contact_sum[sum + k] = vec4f(0.0);
     }
     if used == 0u {
@@ -318,7 +359,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     var eighth = 0.0;
     var sixth = 0.0;
     var touching = 0.0;
-    for (var m = t; m < total; m += GROUP) {
+    for (var m = t; m < total; m += width) {
         let depth = contact_state[state + 3u * m].w;
         if depth > 0.0 {
             let x = depth / deepest;
@@ -329,8 +370,12 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             touching += 1.0;
         }
     }
-    part_y[t] = vec4f(eighth, sixth, touching, 0.0);
-    workgroupBarrier();
+    for (var k = 0u; k < turns; k++) {
+        if turn == k {
+            part_y[seat] = joined(part_y[seat], vec4f(eighth, sixth, touching, 0.0), k);
+        }
+        workgroupBarrier();
+    }
     if t < 8u {
         for (var k = t + 8u; k < GROUP; k += 8u) {
             part_y[t] += part_y[k];
@@ -356,7 +401,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     let step = smooth_pair[n].step;
     // The second spring's dashpot.
     let stopping = select(0.0, sqrt(smooth_pair[n].stop / spring) - 1.0, beyond > 0.0);
-    for (var m = t; m < total; m += GROUP) {
+    for (var m = t; m < total; m += width) {
         let place = state + 3u * m;
         let own = contact_state[place].w;
         let speed = contact_state[place + 1u].w;
@@ -373,8 +418,8 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     // A few threads for each face that is pressed.
     storageBarrier();
     let pressed = countOneBits(used);
-    let sharing = min(GROUP / pressed, SHARING);
-    let face = t / sharing;
+    let sharing = min(GROUP / pressed, SHARING * turns);
+    let face = seat / sharing;
     let first = face * sharing;
     var key = 12u;
     var m_first = total;
@@ -384,12 +429,12 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             rest &= rest - 1u;
         }
         key = firstTrailingBit(rest);
-        m_first = t - first;
+        m_first = seat - first + sharing * turn;
     }
     var push = vec4f(0.0);
     var moment = vec3f(0.0);
     var at = vec3f(0.0);
-    for (var m = m_first; m < total; m += sharing) {
+    for (var m = m_first; m < total; m += sharing * turns) {
         let place = state + 3u * m;
         let f = contact_state[place + 2u].z;
         if f > 0.0 && u32(contact_state[place + 2u].y) == key {
@@ -400,10 +445,22 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
             at += f * arm;
         }
     }
-    part_x[t] = push;
-    part_z[t] = vec4f(at, 0.0);
-    workgroupBarrier();
-    part_y[t] = vec4f(moment, 0.0);
+    // `part_y` is still read for `parts`.
+    for (var k = 0u; k < turns; k++) {
+        if turn == k {
+            part_x[seat] = joined(part_x[seat], push, k);
+            part_z[seat] = joined(part_z[seat], vec4f(at, 0.0), k);
+        }
+        workgroupBarrier();
+    }
+    for (var k = 0u; k < turns; k++) {
+        if turn == k {
+            part_y[seat] = joined(part_y[seat], vec4f(moment, 0.0), k);
+        }
+        if k + 1u < turns {
+            workgroupBarrier();
+        }
+    }
     if face < pressed && t == first {
         for (var k = 1u; k < sharing; k++) {
             part_x[t] += part_x[t + k];
@@ -418,7 +475,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
     var square = vec3f(0.0);
     var product = vec3f(0.0);
     if face < pressed {
-        for (var m = m_first; m < total; m += sharing) {
+        for (var m = m_first; m < total; m += sharing * turns) {
             let place = state + 3u * m;
             if u32(contact_state[place + 2u].y) == key {
                 let arm = contact_state[place + 1u].xyz - center;

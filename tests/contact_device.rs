@@ -6,7 +6,7 @@ use seixo::backend::gpu::{self, Gpu};
 use seixo::backend::{Backend, Processor};
 use seixo::body::Wrench;
 use seixo::case::{Case, Contact, Law};
-use seixo::contact::{Probe, Solids};
+use seixo::contact::{Probe, Solids, standing_gap};
 use seixo::params::Params;
 use seixo::plan::{Plan, Stage};
 use seixo::scene::Scene;
@@ -142,6 +142,42 @@ fn contact_smooth() {
 #[test]
 fn contact_paper() {
     agree(Law::Paper, 2e-6);
+}
+
+/// Two cubes of 9128 surface points, one upon the other, a little turned.
+fn large(law: Law) -> Scene {
+    let (l0, wide) = (0.02, 40.0);
+    let size = DVec3::splat(wide * l0);
+    let mut below = FreeBox::new(size, 800.0, DVec3::ZERO);
+    below.velocity = DVec3::new(0.1, 0.2, -0.3);
+    let height = size.z + standing_gap(law, l0) - 0.05 * l0;
+    let mut above = FreeBox::new(size, 800.0, DVec3::new(0.31 * l0, 0.12 * l0, height));
+    above.orientation = DQuat::from_rotation_z(0.2) * DQuat::from_rotation_x(1e-3);
+    DryScene::new(l0, DVec3::splat(-1.0), DVec3::splat(2.0)).body(&below).body(&above).build()
+}
+
+#[test]
+fn large_bodies_are_searched_and_pressed_in_many_blocks_as_on_the_host() {
+    if !device() {
+        return;
+    }
+    for law in [Law::Smooth, Law::Paper] {
+        let scene = large(law);
+        let (host, device) = both(&scene, &contact(law));
+        let e = error(&host, &device, 0.5);
+        println!("{law:?}: {} candidates, {} touching, error {e:.1e}", host.candidates.len(), host.touching);
+        // The paper's law has blocks of 64 particles in the search, and of this many candidates for its forces; the smooth
+        // law a wider workgroup from as many points on.
+        assert!(host.candidates.len() > 2048 && host.touching > 256, "{law:?}");
+        let missing = host.candidates.iter().filter(|c| device.candidates.binary_search(c).is_err());
+        assert_eq!(missing.count(), 0, "{law:?}");
+        assert!(device.candidates.len() <= host.candidates.len() + 2, "{law:?}");
+        assert_eq!(host.touching, device.touching);
+        assert!(e < 2e-6, "{law:?}: {e:e}");
+        assert!((device.energy / host.energy - 1.0).abs() < 2e-6, "{law:?}");
+        let (_, again) = both(&scene, &contact(law));
+        assert_eq!(device.wrenches, again.wrenches, "{law:?}");
+    }
 }
 
 /// The dam-break cube of the paper at rest on a floor at `height`, turned by `turn` about z and a little about x: as

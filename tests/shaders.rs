@@ -10,7 +10,7 @@ use seixo::backend::gpu::layout::{
 use seixo::backend::gpu::parts::{Division, Parts, Split};
 use seixo::backend::gpu::{Gpu, buffers, kernels, shader};
 use seixo::compute::{Host, Program};
-use seixo::contact::device::paper::{self, PaperLaw, PaperPair, PaperPose};
+use seixo::contact::device::paper::{self, PaperBlock, PaperLaw, PaperPair, PaperPose};
 use seixo::contact::device::smooth::{self, SmoothPair, SmoothPose};
 use seixo::params::Params;
 use seixo::plan::{ContactPlan, Plan};
@@ -371,7 +371,8 @@ fn structs_lie_the_same_on_both_sides() {
         "contact_smooth",
         SmoothPose { row_x, row_y, row_z, spin, below_b, above_b, below_a, above_a, found, given }
     );
-    same_layout!("contact_paper", PaperPair { first, count, row, list, candidates, pairs });
+    same_layout!("contact_paper", PaperPair { first, near, count });
+    same_layout!("contact_paper", PaperBlock { pair, first, count, list, blocks });
     same_layout!(
         "contact_paper",
         PaperPose { high_x, high_y, high_z, low_x, low_y, low_z, velocity, spin, spin_b }
@@ -464,6 +465,8 @@ fn constants_are_the_same_on_both_sides() {
     assert!(shader::COMMON.contains(&first_word));
     let on_wall = format!("const ON_WALL: u32 = {:#x}u;", seixo::contact::device::paper::ON_WALL);
     assert!(text("contact_paper").contains(&on_wall));
+    let many_points = constant(text("contact_smooth"), "MANY_POINTS");
+    assert_eq!(many_points, f64::from(seixo::contact::device::smooth::MANY_POINTS));
     use seixo::kernels::multigrid::{DAMPING, OVER_CORRECTION};
     // Written alike, hence read alike.
     let short = |x: f32| x.to_string().parse::<f64>().expect("a number");

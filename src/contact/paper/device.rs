@@ -1,66 +1,26 @@
 //! The paper's law on a device: what shaders/contact_paper.wgsl is given, and what becomes of its answers.
 
+pub use super::words::{ON_WALL, PaperBlock, PaperLaw, PaperPair, PaperPose};
+
+use super::near::{Near, bounds, near};
+use super::words::{PARTS, Sum, power_of_two, split, take, words};
 use super::{Constants, Layer, Lists, Pair};
-use crate::body::{Body, Wrench};
-use crate::compute::{Program, buffers, kernels, shader_structs};
+use crate::body::Body;
+use crate::compute::{Program, buffers, kernels};
+use crate::contact::broad::Bounds;
 use crate::contact::candidates::{Candidates, MANY_PAIRS, image};
-use crate::contact::device::{Link, four, place, vector};
+use crate::contact::device::{Link, four, place};
 use crate::error::Result;
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Set in the place of the particles of fixed walls; `ON_WALL` in the shaders.
-pub const ON_WALL: u32 = 0x8000_0000;
-/// Bits of a high part: 1 / 2^11 of the largest, so that a product of two has at most 24 bits.
-const PARTS: f64 = 2048.0;
+/// Particles of a block of the search: one for each thread.
+const GROUP: usize = 64;
+/// Candidates of a block of the forces at most, 32 for each thread. Those of a body of a thousand points at rest are one
+/// block; of a hundred thousand candidates one workgroup would make more than a round trip to the device takes.
+const MANY_CANDIDATES: usize = 2048;
 
-/// See `PaperPair` in shaders/contact_paper.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[allow(missing_docs)]
-pub struct PaperPair {
-    pub first: [u32; 2],
-    pub count: [u32; 2],
-    pub row: u32,
-    pub list: u32,
-    pub candidates: u32,
-    pub pairs: u32,
-}
-
-/// See `PaperPose` in shaders/contact_paper.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[allow(missing_docs)]
-pub struct PaperPose {
-    pub high_x: [f32; 4],
-    pub high_y: [f32; 4],
-    pub high_z: [f32; 4],
-    pub low_x: [f32; 4],
-    pub low_y: [f32; 4],
-    pub low_z: [f32; 4],
-    pub velocity: [f32; 4],
-    pub spin: [f32; 4],
-    pub spin_b: [f32; 4],
-}
-
-/// See `PaperLaw` in shaders/contact_paper.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[allow(missing_docs)]
-pub struct PaperLaw {
-    pub spring: f32,
-    pub damping: f32,
-    pub viscous_friction: f32,
-    pub distance: f32,
-    pub scale: f32,
-    pub whole: f32,
-    pub fraction: f32,
-    pub pad: f32,
-}
-
-shader_structs!(PaperPair, PaperPose, PaperLaw);
-kernels!(contact_paper[64]: count fill force);
+kernels!(contact_paper[super::GROUP]: count fill force);
 buffers! {
     contact_layer: [f32; 4], Writes;
     contact_wall: [f32; 4], Writes;
@@ -70,6 +30,8 @@ buffers! {
     contact_row: u32, Reads;
     contact_list: [u32; 2], Reads;
     contact_sum: [f32; 4], Reads;
+    paper_block: PaperBlock, Writes;
+    contact_near: u32, Writes;
 }
 
 /// The law on a device.
@@ -79,40 +41,6 @@ pub const PROGRAM: Program = Program {
     kernels: contact_paper::ALL,
     buffers: buffer::ALL,
 };
-
-impl PaperLaw {
-    fn new(law: &Constants) -> Self {
-        let scale = PARTS / power_of_two(law.distance);
-        let square = (law.distance * scale).powi(2);
-        Self {
-            spring: law.spring as f32,
-            damping: law.damping as f32,
-            viscous_friction: law.viscous_friction as f32,
-            distance: law.distance as f32,
-            scale: scale as f32,
-            whole: square.round() as f32,
-            fraction: (square - square.round()) as f32,
-            pad: 0.0,
-        }
-    }
-}
-
-/// The power of two at or above `x`.
-fn power_of_two(x: f64) -> f64 {
-    x.max(f64::from(f32::MIN_POSITIVE)).log2().ceil().exp2()
-}
-
-/// `x` as a multiple of `step` and the rest.
-fn split(x: DVec3, step: f64) -> [DVec3; 2] {
-    let high = (x / step).round() * step;
-    [high, x - high]
-}
-
-/// Words of a particle.
-fn words(offset: DVec3, normal: DVec3, step: f64) -> [[f32; 4]; 3] {
-    let [high, low] = split(offset, step);
-    [four(high, 0.0), four(low, 0.0), four(normal, 0.0)]
-}
 
 /// A pair close to each other.
 struct Entry {
@@ -124,21 +52,35 @@ struct Entry {
     reach: f64,
     /// Origin of B's particles, if those are fixed, world [m].
     origin: DVec3,
-    /// Numbers of the fixed particles.
-    walls: Vec<u32>,
+    /// What may be near; of walls the numbers among all fixed particles.
+    near: Near,
     record: PaperPair,
+    /// Candidates, and the place of the first.
+    candidates: usize,
+    list: usize,
+}
+
+impl Entry {
+    /// Blocks of its forces.
+    fn blocks(&self) -> usize {
+        self.candidates.div_ceil(MANY_CANDIDATES)
+    }
 }
 
 /// The paper's law's pairs on a device.
 pub(crate) struct Pairs {
     generation: u64,
-    first: Vec<(u32, u32)>,
+    first: Vec<u32>,
+    /// Boxes around each solid's particles, in its frame [m].
+    bounds: Vec<Bounds>,
     /// Power of two above each solid's size [m]: the largest coordinate of its particles.
     size: Vec<f64>,
     entries: Vec<Entry>,
     /// Pairs with particles near each other; evaluated on the device.
     pub pairs: Vec<Pair>,
     poses: Vec<PaperPose>,
+    /// Blocks of all pairs' forces.
+    blocks: usize,
 }
 
 impl Pairs {
@@ -157,13 +99,15 @@ impl Pairs {
         let mut all: Vec<[[f32; 4]; 3]> = vec![];
         let mut first = vec![];
         for (layer, size) in layers.iter().zip(&size) {
-            first.push((place(all.len())?, layer.offsets.len() as u32));
+            first.push(place(all.len())?);
             let both = layer.offsets.iter().zip(&layer.normals);
             all.extend(both.map(|(o, n)| words(*o, *n, size / PARTS)));
         }
         link.write(buffer::contact_layer, all.as_flattened())?;
         link.write(buffer::paper_law, &[PaperLaw::new(law)])?;
-        Ok(Self { generation: 0, first, size, entries: vec![], pairs: vec![], poses: vec![] })
+        let bounds = layers.iter().map(|l| bounds(l.offsets.iter().copied())).collect();
+        let (entries, pairs, poses) = (vec![], vec![], vec![]);
+        Ok(Self { generation: 0, first, bounds, size, entries, pairs, poses, blocks: 0 })
     }
 
     /// Whether the lists are those of `candidates`.
@@ -180,71 +124,147 @@ impl Pairs {
         law: &Constants,
         link: &mut Link,
     ) -> Result<()> {
-        let mut fixed: Vec<[[f32; 4]; 3]> = vec![];
-        self.entries.clear();
-        for (pair, reach) in model.close(candidates, bodies, law.distance) {
-            let (body, own) = (&bodies[pair.a], self.first[pair.a]);
-            let origin = body.pose.position;
-            let (mut theirs, mut walls) = ((ON_WALL | place(fixed.len())?, 0), vec![]);
-            match pair.b {
-                Some(b) => theirs = self.first[b],
-                None => {
-                    model.walls.grid.near(origin, body.radius() + reach, |j| walls.push(j));
-                    theirs.1 = walls.len() as u32;
-                    let of = |&j: &u32| {
-                        let offset = model.walls.grid.point(j) - origin;
-                        words(offset, model.walls.normals[j as usize], self.size[pair.a] / PARTS)
-                    };
-                    fixed.extend(walls.iter().map(of));
-                }
-            }
-            let record =
-                PaperPair { first: [own.0, theirs.0], count: [own.1, theirs.1], ..Default::default() };
-            self.entries.push(Entry {
-                a: pair.a,
-                b: pair.b,
-                image: pair.image,
-                reach,
-                origin,
-                walls,
-                record,
-            });
-        }
-        self.entries.retain(|e| e.record.count[1] > 0);
+        self.close(model, candidates, bodies, law);
         self.generation = candidates.generation();
+        self.blocks = 0;
         if !self.entries.is_empty() {
-            let mut row = self.entries.len();
-            for e in &mut self.entries {
-                e.record.row = place(row)?;
-                row += e.record.count[0] as usize;
-            }
-            link.write(buffer::contact_wall, fixed.as_flattened())?;
-            link.reserve(buffer::contact_row, row)?;
-            self.send(bodies, link)?;
-            link.run(&[(contact_paper::count, self.entries.len() as u64)])?;
-            let found = link.read(buffer::contact_row, self.entries.len())?;
-            let (mut found, mut list) = (found.into_iter(), 0);
-            for e in &mut self.entries {
-                e.record.candidates = found.next().unwrap_or(0);
-                e.record.list = place(list)?;
-                list += e.record.candidates as usize;
-            }
-            self.entries.retain(|e| e.record.candidates > 0);
+            let mut blocks = self.send_near(model, bodies, link)?;
+            let all = blocks.len();
+            link.reserve(buffer::contact_row, (1 + GROUP) * all)?;
+            link.run(&[(contact_paper::count, all as u64)])?;
+            let found = link.read(buffer::contact_row, all)?;
+            let list = self.place_candidates(&mut blocks, &found)?;
             link.reserve(buffer::contact_list, list)?;
-            link.reserve(buffer::contact_sum, 3 * self.entries.len())?;
+            link.reserve(buffer::contact_sum, 3 * self.blocks)?;
             if !self.entries.is_empty() {
                 self.send(bodies, link)?;
-                link.run(&[(contact_paper::fill, self.entries.len() as u64)])?;
+                link.write(buffer::paper_block, &blocks)?;
+                link.run(&[(contact_paper::fill, all as u64)])?;
+                link.write(buffer::paper_block, &self.force_blocks()?)?;
             }
         }
         self.pairs = self.entries.iter().map(|e| Pair::new(e.a, e.b, e.image)).collect();
         Ok(())
     }
 
+    /// Makes the entries: solids that are close, with what may be near.
+    fn close(&mut self, model: &Lists, candidates: &Candidates, bodies: &[Body], law: &Constants) {
+        let entry = |(pair, reach): (Pair, f64)| {
+            let Pair { a, b, image: way, .. } = pair;
+            let (body, own, around) = (&bodies[a], &model.layers[a].offsets, &self.bounds[a]);
+            let origin = body.pose.position;
+            let still = body.rotation.transpose();
+            let near = match b {
+                Some(b) => {
+                    let shift = still * (image(&bodies[b], way).position - origin);
+                    let turn = still * bodies[b].rotation;
+                    let theirs = model.layers[b].offsets.iter().enumerate();
+                    near(own, around, theirs.map(|(k, o)| (k as u32, turn * *o + shift)), reach)
+                }
+                None => {
+                    let mut walls = vec![];
+                    let grid = &model.walls.grid;
+                    grid.near(origin, body.radius() + reach, |j| {
+                        walls.push((j, still * (grid.point(j) - origin)))
+                    });
+                    near(own, around, walls.into_iter(), reach)
+                }
+            };
+            let record = PaperPair::default();
+            Some(Entry { a, b, image: way, reach, origin, near: near?, record, candidates: 0, list: 0 })
+        };
+        let pairs = model.close(candidates, bodies, law.distance);
+        self.entries = if pairs.len() >= MANY_PAIRS {
+            pairs.into_par_iter().filter_map(entry).collect()
+        } else {
+            pairs.into_iter().filter_map(entry).collect()
+        };
+    }
+
+    /// Gives the device what may be near; the blocks of the search.
+    fn send_near(&mut self, model: &Lists, bodies: &[Body], link: &mut Link) -> Result<Vec<PaperBlock>> {
+        let (mut fixed, mut numbers): (Vec<[[f32; 4]; 3]>, Vec<u32>) = (vec![], vec![]);
+        let mut blocks = vec![];
+        for (k, e) in self.entries.iter_mut().enumerate() {
+            let own = &e.near.own;
+            for start in (0..own.len()).step_by(GROUP) {
+                let (first, count) = (place(numbers.len() + start)?, GROUP.min(own.len() - start) as u32);
+                blocks.push(PaperBlock { pair: place(k)?, first, count, ..Default::default() });
+            }
+            numbers.extend(own);
+            let theirs = &e.near.theirs;
+            let mut first = 0;
+            match e.b {
+                Some(b) => {
+                    first = self.first[b];
+                    e.record.near = place(numbers.len())?;
+                    numbers.extend(theirs);
+                }
+                None => {
+                    let step = self.size[e.a] / PARTS;
+                    let wall = |&j: &u32| {
+                        words(model.walls.grid.point(j) - e.origin, model.walls.normals[j as usize], step)
+                    };
+                    first |= ON_WALL | place(fixed.len())?;
+                    fixed.extend(theirs.iter().map(wall));
+                }
+            }
+            e.record.first = [self.first[e.a], first];
+            e.record.count = theirs.len() as u32;
+        }
+        place((1 + GROUP) * blocks.len())?;
+        let all = blocks.len() as u32;
+        blocks.iter_mut().for_each(|b| b.blocks = all);
+        link.write(buffer::contact_wall, fixed.as_flattened())?;
+        link.write(buffer::contact_near, &numbers)?;
+        link.write(buffer::paper_block, &blocks)?;
+        self.send(bodies, link)?;
+        Ok(blocks)
+    }
+
+    /// Keeps the pairs with candidates, of which each of `blocks` has `found` some, and gives these their places, one
+    /// block's behind those of the block before; how many there are.
+    fn place_candidates(&mut self, blocks: &mut [PaperBlock], found: &[u32]) -> Result<usize> {
+        let mut list = 0;
+        for (block, &found) in blocks.iter_mut().zip(found) {
+            let entry = &mut self.entries[block.pair as usize];
+            if entry.candidates == 0 {
+                entry.list = list;
+            }
+            block.list = place(list)?;
+            entry.candidates += found as usize;
+            list += found as usize;
+        }
+        place(list)?;
+        // Numbers among those that stay; blocks of the others find nothing wherever they look.
+        let mut stay = 0;
+        let kept = self.entries.iter().map(|e| {
+            stay += u32::from(e.candidates > 0);
+            stay.max(1) - 1
+        });
+        let kept: Vec<u32> = kept.collect();
+        blocks.iter_mut().for_each(|b| b.pair = kept[b.pair as usize]);
+        self.entries.retain(|e| e.candidates > 0);
+        self.blocks = self.entries.iter().map(Entry::blocks).sum();
+        Ok(list)
+    }
+
+    /// The blocks of the forces.
+    fn force_blocks(&self) -> Result<Vec<PaperBlock>> {
+        let (mut out, blocks) = (Vec::with_capacity(self.blocks), place(self.blocks)?);
+        for (pair, e) in self.entries.iter().enumerate() {
+            for start in (0..e.candidates).step_by(MANY_CANDIDATES) {
+                let (first, count) =
+                    (place(e.list + start)?, MANY_CANDIDATES.min(e.candidates - start) as u32);
+                out.push(PaperBlock { pair: place(pair)?, first, count, list: 0, blocks });
+            }
+        }
+        Ok(out)
+    }
+
     /// Records and poses of the pairs.
     fn send(&mut self, bodies: &[Body], link: &mut Link) -> Result<()> {
-        let pairs = place(self.entries.len())?;
-        let records: Vec<PaperPair> = self.entries.iter().map(|e| PaperPair { pairs, ..e.record }).collect();
+        let records: Vec<PaperPair> = self.entries.iter().map(|e| e.record).collect();
         link.write(buffer::paper_pair, &records)?;
         self.send_poses(bodies, link)
     }
@@ -266,24 +286,25 @@ impl Pairs {
             return Ok(());
         }
         self.send_poses(bodies, link)?;
-        link.run(&[(contact_paper::force, self.entries.len() as u64)])?;
-        let sums = link.read(buffer::contact_sum, 3 * self.entries.len())?;
-        for (pair, sum) in self.pairs.iter_mut().zip(sums.as_chunks().0) {
-            take(pair, sum, law, bodies);
+        link.run(&[(contact_paper::force, self.blocks as u64)])?;
+        let sums = link.read(buffer::contact_sum, 3 * self.blocks)?;
+        let mut sums = sums.as_chunks().0.iter();
+        for (pair, e) in self.pairs.iter_mut().zip(&self.entries) {
+            let blocks = sums.by_ref().take(e.blocks()).map(Sum::of_block);
+            take(pair, &blocks.reduce(Sum::with).unwrap_or_default(), law, bodies);
         }
         Ok(())
     }
 
     /// Candidates: the two solids (walls last) and the numbers of the two particles.
     pub fn listed(&self, link: &mut Link) -> Result<Vec<[u64; 4]>> {
-        let end = self.entries.iter().map(|e| e.record.list + e.record.candidates).max().unwrap_or(0);
-        let list = link.read(buffer::contact_list, end as usize)?;
+        let end = self.entries.iter().map(|e| e.list + e.candidates).max().unwrap_or(0);
+        let list = link.read(buffer::contact_list, end)?;
         let of = |e: &Entry| {
-            let PaperPair { list: first, candidates, .. } = e.record;
-            let number = |j: u32| e.walls.get(j as usize).copied().unwrap_or(j);
-            let range = first as usize..(first + candidates) as usize;
+            let number = |j: u32| if e.b.is_some() { j } else { e.near.theirs[j as usize] };
             let (a, b) = (e.a as u64, e.b.map_or(u64::MAX, |b| b as u64));
-            list[range].iter().map(|&[i, j]| [a, b, i.into(), number(j).into()]).collect::<Vec<_>>()
+            let own = &list[e.list..e.list + e.candidates];
+            own.iter().map(|&[i, j]| [a, b, i.into(), number(j).into()]).collect::<Vec<_>>()
         };
         Ok(self.entries.iter().flat_map(of).collect())
     }
@@ -314,27 +335,7 @@ fn pose(entry: &Entry, size: f64, bodies: &[Body]) -> PaperPose {
         low_z,
         velocity: four(still * (a.pose.velocity - velocity), 0.0),
         spin: four(still * (a.pose.angular_velocity - spin), entry.reach),
+        // Always 0.0: `as_rounded` in the shader takes its bits.
         spin_b: four(still * spin, 0.0),
     }
-}
-
-/// Turns the sums of a pair, which are in A's frame and about A's centre, to the world, and divides by n_c.
-fn take(pair: &mut Pair, sum: &[[f32; 4]; 3], law: &Constants, bodies: &[Body]) {
-    let a = &bodies[pair.a];
-    let (force, torque) = (a.rotation * vector(sum[0]), a.rotation * vector(sum[1]));
-    let arm = pair.b.map_or(DVec3::ZERO, |b| a.pose.position - image(&bodies[b], pair.image).position);
-    let [count, deepest, ..] = sum[2];
-    let share = 1.0 / f64::from(count).max(1.0);
-    let on_b = match pair.b {
-        Some(_) => Wrench { force: -force, torque: -(torque + arm.cross(force)) },
-        None => Wrench::default(),
-    };
-    pair.wrench = [Wrench { force, torque }, on_b].map(|w| Wrench {
-        force: share * w.force,
-        torque: if law.torque { share * w.torque } else { DVec3::ZERO },
-    });
-    pair.count = count as usize;
-    pair.energy = share * f64::from(sum[1][3]);
-    pair.closest = if count > 0.0 { law.distance - f64::from(deepest) } else { f64::INFINITY };
-    pair.normal_force = share * f64::from(sum[0][3]);
 }

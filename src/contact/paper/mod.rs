@@ -15,7 +15,9 @@
 
 pub mod device;
 mod lists;
+mod near;
 mod pair;
+mod words;
 
 pub(crate) use lists::Lists;
 pub(crate) use pair::{Constants, Layer, Pair, Walls};

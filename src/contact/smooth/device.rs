@@ -4,7 +4,7 @@ use super::Smooth;
 use super::pair::{Other, Pair};
 use super::patch::{Contact, DeviceSums, Patch};
 use crate::body::{Body, Wrench};
-use crate::compute::{Program, buffers, kernels, shader_structs};
+use crate::compute::{Kernel, Program, buffers, kernels, shader_structs};
 use crate::contact::candidates::{Candidates, MANY_PAIRS, image};
 use crate::contact::device::{Link, four, place, three, vector};
 use crate::contact::substeps::Limits;
@@ -20,6 +20,8 @@ use std::sync::Arc;
 const SNAP: f64 = 1e-9;
 /// The search takes in what f32 cannot tell from the skin, over the size of the solids.
 const ROUNDING: f64 = 1e-6;
+/// Listed points from which a pair has a wider workgroup; as in the shader.
+pub const MANY_POINTS: u32 = 2048;
 
 /// See `SmoothPair` in shaders/contact_smooth.wgsl.
 #[repr(C)]
@@ -68,6 +70,8 @@ pub struct SmoothPose {
 
 shader_structs!(SmoothPair, SmoothPose);
 kernels!(contact_smooth[64]: search force);
+/// `force` of pairs of [`MANY_POINTS`] or more.
+const FORCE_WIDE: Kernel = Kernel { file: "contact_smooth", entry: "force_wide", width: 256 };
 buffers! {
     contact_point: [f32; 4], Writes;
     smooth_pair: SmoothPair, Writes;
@@ -84,7 +88,7 @@ buffers! {
 pub const PROGRAM: Program = Program {
     name: "contact_smooth",
     text: contact_smooth::TEXT,
-    kernels: contact_smooth::ALL,
+    kernels: &[contact_smooth::search, contact_smooth::force, FORCE_WIDE],
     buffers: buffer::ALL,
 };
 
@@ -307,7 +311,12 @@ impl Pairs {
         }
         link.write(buffer::smooth_pose, &self.poses)?;
         link.write(buffer::contact_given, self.given.as_flattened())?;
-        link.run(&[(contact_smooth::force, self.pairs.len() as u64)])?;
+        // Each passes over the pairs of the other; most scenes have none of the second.
+        let groups = self.pairs.len() as u64;
+        let large = |r: &SmoothPair| r.near.iter().sum::<u32>() >= MANY_POINTS;
+        let wide = self.records.iter().any(large).then_some((FORCE_WIDE, groups));
+        let narrow = (!self.records.iter().all(large)).then_some((contact_smooth::force, groups));
+        link.run(&narrow.into_iter().chain(wide).collect::<Vec<_>>())?;
         let sums = link.read(buffer::contact_sum, self.sums)?;
         let take = |(pair, record): (&mut Pair, &SmoothPair)| {
             let sums = read(pair, record, &sums[record.sum as usize..], bodies);
