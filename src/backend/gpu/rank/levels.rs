@@ -136,3 +136,137 @@ impl GpuRank {
         Ok(solve)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::Backend;
+    use crate::backend::gpu::adapters;
+    use crate::body::Pose;
+    use crate::case::Case;
+    use crate::params::Params;
+    use crate::plan::{Plan, Stage};
+    use crate::pressure::Settings;
+    use crate::ranks::Team;
+    use crate::ranks::threads::team;
+    use crate::scene::Scene;
+    use glam::DVec3;
+    use std::sync::Arc;
+
+    /// Walls on borders of cells, a gate that moves along x, and a slab of water with a step in it.
+    fn case(more: &str) -> Case {
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\n\
+             [fluid]\nsound_speed = 5\njitter = 0.1\nsolver = {{ preconditioner = \"multigrid\" }}\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [1.0, 0.4, 0.5]\n[[fluid.block]]\nmin = [1.2, 0, 0]\nmax = [1.6, 0.4, 0.3]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [1.6, 0.4, 0.8]\nopen = [\"z_max\"]\n{more}\
+             [[moving_wall]]\nname = \"gate\"\nmin = [1.05, 0, 0]\nmax = [1.15, 0.4, 0.6]\nmotion = [[0, 0, 0, 0], [1, 1, 0, 0]]\n"
+        );
+        toml::from_str(&text).expect("a valid case")
+    }
+
+    /// The levels as a device has them: rows, their cells and parents, columns and values.
+    #[derive(PartialEq)]
+    struct Seen {
+        rows: Vec<usize>,
+        cells: Vec<[u32; 2]>,
+        entries: Vec<[u32; 2]>,
+    }
+
+    /// Those of the third step on this rank.
+    fn of_third_step(one: Arc<dyn Team>, case: &Case) -> Seen {
+        let scene = Scene::build(case).expect("a valid scene");
+        let params = Params::new(case, &scene).expect("valid constants");
+        let plan = Plan::new(case, &scene, &params);
+        let settings = Settings { tolerance: 1e-5, max_iterations: 100, warm_start: true };
+        let mut rank =
+            GpuRank::of_team((one, 0), &scene, &params, &plan, settings, None).expect("it can be built");
+        let solid = &scene.solids[0];
+        let mut pose = Pose {
+            position: solid.position,
+            orientation: solid.orientation,
+            velocity: DVec3::X,
+            angular_velocity: DVec3::ZERO,
+        };
+        for n in 0..3 {
+            let step = params.step(0.001 * f64::from(n), 1e-3, 1.0);
+            pose.position.x += 0.001;
+            for stage in Stage::ALL.into_iter().filter(|s| plan.has(*s)) {
+                match stage {
+                    Stage::MoveSolids => rank.move_solids(&[pose]).expect("it moves"),
+                    Stage::ConjugateGradient if n == 2 => break,
+                    Stage::ConjugateGradient => drop(rank.solve_pressure(&step).expect("it is solved")),
+                    Stage::BodyForce => drop(rank.body_force().expect("it is summed")),
+                    other => other.over_particles().map_or((), |s| rank.run(s, &step).expect("it runs")),
+                }
+            }
+        }
+        rank.build_levels().expect("they are made");
+        let levels = rank.gpu.levels.clone().expect("it is planned");
+        let (capacity, count) = (levels.capacity as usize, levels.count.len());
+        let context = &mut rank.gpu.context;
+        let row_cell = context.download(buffers::row_cell, capacity + 1 + count).expect("read");
+        let all = row_cell[capacity][0] as usize;
+        let entry = context.download(buffers::entry, 27 * capacity).expect("read");
+        let of_row = |row: usize| (0..27).map(move |k| k * capacity + row);
+        Seen {
+            rows: row_cell[capacity..].iter().map(|word| word[0] as usize).collect(),
+            cells: row_cell[..all].iter().map(|row| [row[0], row[1]]).collect(),
+            entries: (0..all).flat_map(of_row).map(|at| entry[at]).collect(),
+        }
+    }
+
+    #[test]
+    fn levels_of_many_devices_are_those_of_one() {
+        if adapters().is_empty() {
+            assert!(std::env::var_os("CI").is_none(), "no GPU adapter");
+            return eprintln!("SKIPPED, NO GPU ADAPTER: the levels of ranks are not tested");
+        }
+        for (name, case) in [("tank", case("")), ("ring", case("periodic = [\"x\"]\n"))] {
+            let of = |ranks: usize| -> Vec<Seen> {
+                std::thread::scope(|scope| {
+                    let ranks = team(ranks).into_iter().map(|one| scope.spawn(|| of_third_step(one, &case)));
+                    let ranks: Vec<_> = ranks.collect();
+                    ranks.into_iter().map(|rank| rank.join().expect("it ends")).collect()
+                })
+            };
+            let one = of(1).remove(0);
+            assert!(one.rows.len() > 4 && one.cells.len() > 200, "{name}: {:?}", one.rows);
+            let value = |e: &[u32; 2]| f32::from_bits(e[1]);
+            let largest = one.entries.iter().map(value).fold(0.0, f32::max);
+            for ranks in [2, 3, 4] {
+                let many = of(ranks);
+                assert!(
+                    many.iter().all(|seen| *seen == many[0]),
+                    "{name}: devices have the same to the last bit"
+                );
+                let many = &many[0];
+                assert_eq!((&many.rows, &many.cells), (&one.rows, &one.cells), "{name} on {ranks}");
+                for (a, b) in one.entries.iter().zip(&many.entries) {
+                    assert!((value(a) - value(b)).abs() < 1e-5 * largest, "{name} on {ranks}: {a:?} {b:?}");
+                    assert!(
+                        a[0] == b[0] || value(a).abs().max(value(b).abs()) < 1e-5 * largest,
+                        "{name} on {ranks}"
+                    );
+                }
+                // Of the finest level what is told makes both halves.
+                let row = |row: usize| &many.entries[27 * row..27 * row + 27];
+                for i in many.rows[1]..many.rows[0] {
+                    for (k, e) in row(i).iter().enumerate().filter(|(k, e)| *k != 13 && value(e) != 0.0) {
+                        let mirrored = &row(e[0] as usize)[26 - k];
+                        assert_eq!((mirrored[0] as usize, mirrored[1]), (i, e[1]), "{name} on {ranks}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_counted_within_words() {
+        let words = [0x8000_0001, 0b101];
+        assert_eq!(
+            [0..64, 0..31, 31..33, 33..64, 40..40].map(|range| bits_in(&words, range)),
+            [4, 1, 2, 1, 0]
+        );
+    }
+}

@@ -283,10 +283,6 @@ impl Backend for GpuRank {
         self.gpu.traffic()
     }
 
-    fn preconditions_apart(&self) -> bool {
-        self.share.ranks() > 1
-    }
-
     fn ranks(&mut self) -> Result<Vec<Standing>> {
         Ok(self.standings())
     }
