@@ -15,7 +15,7 @@ const LARGE_MAX: usize = 2;
 /// Operations of the small levels at most.
 const OPERATIONS_MAX: usize = 256;
 /// Workgroups of a kernel over cells or rows at most; threads then take several.
-const GROUPS_MAX: u64 = 1024;
+pub(super) const GROUPS_MAX: u64 = 1024;
 
 /// A step of the cycle over a level; as in shaders/multigrid.wgsl.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

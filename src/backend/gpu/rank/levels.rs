@@ -7,7 +7,7 @@
 use super::GpuRank;
 use super::halo::Shown;
 use crate::backend::gpu::buffers;
-use crate::backend::gpu::hierarchy::Levels;
+use crate::backend::gpu::hierarchy::{GROUPS_MAX, Levels};
 use crate::backend::gpu::layout::Solve;
 use crate::error::Result;
 use crate::kernels::device::halo as kernel;
@@ -19,8 +19,6 @@ use std::ops::Range;
 const HALF: usize = 14;
 /// Cells of which a word tells.
 const WORD: usize = u32::BITS as usize;
-/// Workgroups of the kernels over cells or rows at most; threads then take several.
-const GROUPS_MAX: u64 = 1024;
 
 /// Rows of the finest level.
 #[derive(Clone, Debug, Default)]
@@ -35,7 +33,7 @@ impl Rows {
     }
 }
 
-/// Workgroups for `threads` that may stride.
+/// Workgroups for as many threads, or for fewer that take several cells or rows each.
 fn groups(threads: usize) -> u64 {
     super::groups(threads).min(GROUPS_MAX)
 }
