@@ -76,7 +76,7 @@ struct Constants {
     inverse_period: vec3f, // 1 / period, 0 along other axes
     body_wall: u32,        // wall-layer particles of bodies, the first of the moving solids
     cell_width: vec3f,
-    pad_width: f32,
+    zero: f32,             // 0.0, which no compiler knows: see `exactly`
     drive: vec3f,          // what of gravity lies along periodic axes; `gravity` is the rest
     pad_drive: f32,
 }
@@ -179,9 +179,15 @@ fn group_count(groups: vec3u) -> u32 {
 @group(0) @binding(0) var<uniform> params: Constants;
 @group(0) @binding(1) var<uniform> now: Coefficients;
 
+// x as it was rounded. Compilers for devices may reckon with a sum as if it were exact, and drop what it has rounded off, or that it may be
+// no number; what has passed through here they know nothing of.
+fn exactly(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) ^ bitcast<u32>(params.zero));
+}
+
 // By bits: a compiler may assume that there are no NaNs and drop a comparison.
 fn finite(x: f32) -> bool {
-    return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
+    return (bitcast<u32>(exactly(x)) & 0x7f800000u) != 0x7f800000u;
 }
 
 fn finite_vector(v: vec3f) -> bool {

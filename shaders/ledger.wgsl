@@ -58,7 +58,7 @@ fn book(entries: vec4u, value: vec4f, t: u32, group: u32) {
             let place = group * LEDGER_WIDTH + entries[k];
             let old = ledger_sum[place];
             let part = lane[0][k] + old.y;
-            let grown = old.x + part;
+            let grown = exactly(old.x + part);
             ledger_sum[place] = vec2f(grown, part - (grown - old.x));
         }
     }

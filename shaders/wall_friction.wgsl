@@ -44,33 +44,42 @@ fn friction(i: u32) -> vec4f {
     return vec4f(-rate / (1.0 + now.dt * rate) * along, sum);
 }
 
+// The sum of the weights stands beside the acceleration, for `react`.
 @compute @workgroup_size(WORKGROUP)
 fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
     let i = thread(id);
     if i < params.fluid {
-        acceleration[i] = vec4f(friction(i).xyz, 0.0);
+        acceleration[i] = friction(i);
     }
+}
+
+// What the water loses to the wall layers of moving solids.
+@compute @workgroup_size(WORKGROUP)
+fn react(@builtin(global_invocation_id) id: vec3u) {
 //#if REACTION
-    else if i < params.fluid + params.moving_wall {
+    let k = thread(id);
+    let i = params.fluid + k;
+    if k >= params.moving_wall {
+        return;
+    }
 //#if RANKS
-        if position[i].w == FOREIGN {
-            return;
-        }
+    if position[i].w == FOREIGN {
+        return;
+    }
 //#endif
-        let x = position[i].xyz;
-        let neighbours = near_of(neighbour_count[i]);
-        var taken = vec3f(0.0);
-        for (var k = 0u; k < neighbours; k++) {
-            let j = neighbour_list_at(k, i);
-            if j < params.fluid {
-                let other = friction(j);
-                if other.w > 0.0 {
-                    let r = offset(x, position[j].xyz);
-                    taken += weight(dot(r, r)) / other.w * other.xyz;
-                }
+    let x = position[i].xyz;
+    let neighbours = near_of(neighbour_count[i]);
+    var taken = vec3f(0.0);
+    for (var n = 0u; n < neighbours; n++) {
+        let j = neighbour_list_at(n, i);
+        if j < params.fluid {
+            let other = acceleration[j];
+            if other.w > 0.0 {
+                let r = offset(x, position[j].xyz);
+                taken += weight(dot(r, r)) / other.w * other.xyz;
             }
         }
-        reaction[i - params.fluid] -= vec4f(params.particle_mass * taken, 0.0);
     }
+    reaction[k] -= vec4f(params.particle_mass * taken, 0.0);
 //#endif
 }

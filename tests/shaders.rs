@@ -287,7 +287,7 @@ fn structs_lie_the_same_on_both_sides() {
             inverse_period,
             body_wall,
             cell_width,
-            pad_width,
+            zero,
             drive,
             pad_drive,
         }

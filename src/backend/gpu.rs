@@ -173,6 +173,9 @@ impl Backend for Gpu {
             Over::Rows => s.pressure,
         };
         self.context.pass([(kernel, groups(threads))])?;
+        if stage == ParticleStage::WallFriction && self.felt() > 0 {
+            self.context.pass([(kernels::wall_friction::react, groups(self.felt()))])?;
+        }
         if matches!(stage, ParticleStage::WallFriction | ParticleStage::Collision) {
             self.book_kick(stage)?;
             // What they found is applied as any acceleration is.

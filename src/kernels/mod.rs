@@ -110,7 +110,7 @@ pub mod device {
         surface_pressure[super::WORKGROUP] Stage(SurfacePressure), Rows: surface_pressure_main;
         viscosity[super::WORKGROUP] Stage(Viscosity), FluidAndReaction: viscosity;
         wall_excess[super::WORKGROUP] Arrays(Excess), Own: before_solve after_solve;
-        wall_friction[super::WORKGROUP] Stage(WallFriction), FluidAndReaction: wall_friction;
+        wall_friction[super::WORKGROUP] Stage(WallFriction), Fluid: wall_friction react;
     }
 
     crate::compute::kernels!(halo[super::WORKGROUP]:

@@ -1,5 +1,6 @@
 //! Adapters: what the machine has, which one a run takes, what is asked of it.
 
+use super::forecast::BINDING_MAX;
 use super::layout::Memory;
 use crate::error::{GpuError, Result};
 use serde::Serialize;
@@ -34,9 +35,9 @@ impl AdapterInfo {
         }
     }
 
-    /// `true` for a GPU, `false` for software that acts as one: that is slower than the CPU backend.
+    /// `true` for a GPU, one lent to a virtual machine as well, `false` for software that acts as one: that is slower than the CPU backend.
     pub fn is_hardware(&self) -> bool {
-        matches!(self.device_type.as_str(), "discrete" | "integrated")
+        matches!(self.device_type.as_str(), "discrete" | "integrated" | "virtual")
     }
 
     /// Place in the order in which adapters are offered: discrete GPUs first, software last.
@@ -153,9 +154,10 @@ impl Caps {
     }
 }
 
-/// Bytes of a buffer at most on a device with limits `have`: what is larger is made as several.
+/// Bytes of a buffer at most on a device with limits `have`: what is larger is made as several. Metal names more than the 32 bits
+/// in which a shader is told how long its arrays are.
 pub(super) fn buffer_most(have: &wgpu::Limits) -> u64 {
-    have.max_storage_buffer_binding_size.min(have.max_buffer_size)
+    have.max_storage_buffer_binding_size.min(have.max_buffer_size).min(BINDING_MAX)
 }
 
 /// Workgroups along one dimension of a dispatch at most that are asked of a device with limits `have`.
@@ -314,6 +316,8 @@ mod tests {
         };
         let ranks = ["discrete", "integrated", "virtual", "other", "cpu"].map(|t| info(t).rank());
         assert!(ranks.is_sorted());
-        assert!(info("discrete").is_hardware() && !info("cpu").is_hardware());
+        assert!(
+            info("discrete").is_hardware() && info("virtual").is_hardware() && !info("cpu").is_hardware()
+        );
     }
 }

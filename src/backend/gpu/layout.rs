@@ -108,7 +108,7 @@ pub struct Constants {
     pub inverse_period: [f32; 3],
     pub body_wall: u32,
     pub cell_width: [f32; 3],
-    pub pad_width: f32,
+    pub zero: f32,
     pub drive: [f32; 3],
     pub pad_drive: f32,
 }
@@ -316,7 +316,7 @@ impl Constants {
             drive: params.drive.as_vec3().to_array(),
             wall_contact: params.wall_contact as f32,
             body_wall: params.body_wall as u32,
-            pad_width: 0.0,
+            zero: 0.0,
             pad_drive: 0.0,
         }
     }

@@ -4,7 +4,7 @@ use super::kernels::{conjugate_gradient as kernel, coupling, pressure_level as l
 use super::layout::Solve;
 use super::{Gpu, buffers};
 use crate::compute::Kernel;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::kernels::multigrid_levels::LevelSums;
 use crate::pressure::{Outcome, PressureReport};
 
@@ -86,6 +86,7 @@ impl Gpu {
         context.pass(around(kernel::pack, [kernel::start_residual, kernel::start]))?;
         // An iteration too many costs empty dispatches, one too few a round trip to the device.
         let mut chunk = (expected + if cycle { 1 } else { expected / 8 + 2 }).min(MOST[usize::from(cycle)]);
+        let mut queued = 0;
         loop {
             let iterations = (0..chunk).flat_map(|_| iteration.iter().copied());
             context.pass(iterations.chain(judge).chain(end.clone()))?;
@@ -93,6 +94,8 @@ impl Gpu {
             if solve.done != 0 {
                 return Ok(solve);
             }
+            queued += chunk;
+            makes_progress(queued, self.settings.max_iterations)?;
             if self.stop.is_overdue() {
                 return Ok(Solve { outcome: ITERATIONS_RAN_OUT, ..solve });
             }
@@ -138,6 +141,19 @@ impl Gpu {
     }
 }
 
+/// The device ends a solve at `most` iterations; one that says nothing after so many `queued` has dropped what it was given, as some do when a
+/// submission takes them too long.
+pub(super) fn makes_progress(queued: u32, most: u32) -> Result<()> {
+    if queued <= most.max(1) {
+        return Ok(());
+    }
+    let text = format!(
+        "the device makes no progress: its solve of the pressure should have ended at {most} iterations; see whether the \
+                        system's log has it reset, and go on from the last checkpoint with --resume"
+    );
+    Err(Error::gpu(text))
+}
+
 pub(super) fn report(solve: &Solve) -> PressureReport {
     let outcome = match solve.outcome {
         0 => Outcome::Converged,
@@ -149,4 +165,15 @@ pub(super) fn report(solve: &Solve) -> PressureReport {
     let source = f64::from(solve.source_squared);
     let residual = if source > 0.0 { (f64::from(solve.true_residual_squared) / source).sqrt() } else { 0.0 };
     PressureReport { unknowns: solve.unknowns as usize, iterations: solve.iterations, residual, outcome }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::makes_progress;
+
+    #[test]
+    fn a_device_that_says_nothing_ends_a_solve() {
+        assert!(makes_progress(200, 200).is_ok());
+        assert!(makes_progress(201, 200).is_err_and(|e| e.to_string().contains("no progress")));
+    }
 }

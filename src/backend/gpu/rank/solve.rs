@@ -13,7 +13,7 @@ use crate::backend::gpu::kernels::{
     conjugate_gradient as kernel, coupling, pressure_level as level, wall_excess,
 };
 use crate::backend::gpu::layout::Solve;
-use crate::backend::gpu::solve::report;
+use crate::backend::gpu::solve::{makes_progress, report};
 use crate::compute::Kernel;
 use crate::error::{Error, Result};
 use crate::kernels::device::of_halo::buffer;
@@ -122,6 +122,7 @@ impl GpuRank {
         self.over_rows([kernel::start_residual])?;
         let started = self.meet(Meeting { sums: of_rows, ..Meeting::default() })?;
         self.over_rows([kernel::start])?;
+        let mut queued = 0;
         let mut solve = loop {
             let mut met = None;
             if let Some(levels) = self.gpu.levels.clone() {
@@ -154,6 +155,8 @@ impl GpuRank {
                 break met.solve;
             }
             self.over_rows([kernel::advance])?;
+            queued += 1;
+            makes_progress(queued, self.gpu.settings.max_iterations)?;
         };
         self.over_rows([kernel::end_pack])?;
         self.multiplied(None)?;

@@ -1,0 +1,57 @@
+//! What is measured over time.
+
+use super::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Measurements over time; all go to gauges.csv.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Gauges {
+    /// Interval between rows [s]; every step if absent.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub every: Option<f64>,
+    /// Pressures and forces of a row are means over the steps since the row before, each with its length, and not those of the last step.
+    /// Levels are of the moment.
+    pub mean: bool,
+    /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
+    pub pressure: Vec<PressureGauge>,
+    /// Height of the water surface along a vertical line.
+    pub level: Vec<LevelGauge>,
+    /// Force and torque of the fluid on a body or wall.
+    pub force: Vec<ForceGauge>,
+}
+
+/// Pressure at a point on a wall.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressureGauge {
+    /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
+    pub name: String,
+    /// Point on a wall [m].
+    pub point: Vector,
+}
+
+/// Water level on a line along z.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LevelGauge {
+    /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
+    pub name: String,
+    /// x, y of the line [m].
+    pub at: [f64; 2],
+}
+
+/// Force on a solid.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForceGauge {
+    /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
+    pub name: String,
+    /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
+    /// the centre of mass, or the middle of a fixed wall.
+    pub on: String,
+}
