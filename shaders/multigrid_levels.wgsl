@@ -29,7 +29,7 @@
 // As crate::backend::gpu::hierarchy::Hierarchy; the cycle is in shaders/multigrid.wgsl.
 struct Hierarchy {
     level: array<vec4u, 16>, // cells along x, y, z, first cell
-    operation: array<vec4u, 256>, // kind, level
+    operation: array<vec4u, 256>, // kind, level; of the first two, where ranks share the levels, what is whose
     levels: u32,
     capacity: u32,
     cells: u32,
@@ -148,10 +148,24 @@ fn diagonal_of(slot: u32) -> f32 {
     return diagonal;
 }
 
+//#if RANKS
+// Whether a cell of the finest level is this rank's. The others' have no unknowns here: their ranks tell which have some (shaders/halo.wgsl), and a
+// wall at a border of cells that its host has in another column than the device goes uncorrected.
+fn is_own(cell: u32) -> bool {
+    let own = hierarchy.operation[0].zw;
+    return cell >= own.x && cell < own.y;
+}
+
+//#endif
 // Count the unknowns of each cell and mark the cells above.
 @compute @workgroup_size(WORKGROUP)
 fn mark(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var cell = thread(id); cell < params.cell_total; cell += group_count(groups) * WORKGROUP) {
+//#if RANKS
+        if !is_own(cell) {
+            continue;
+        }
+//#endif
         let l = listed(cell);
         let all = l.count.x + l.count.y + l.count.z;
         var unknowns = 0u;
@@ -291,6 +305,11 @@ fn number_rows(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
 fn members(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var cell = thread(id); cell < params.cell_total; cell += group_count(groups) * WORKGROUP) {
         let row = cell_row_at(hierarchy.level[0].w + cell);
+//#if RANKS
+        if !is_own(cell) {
+            continue;
+        }
+//#endif
         if row.x > 0u {
 //#if PERIODIC
             let place = cell;
@@ -313,6 +332,40 @@ fn members(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gr
     }
 }
 
+//#if RANKS
+// No column of cells.
+const NOWHERE: u32 = 0xffffffffu;
+// Of the copy of an unknown, without a row so far.
+const UNKNOWN: vec2u = vec2u(0u, 1u);
+
+// Copies of other ranks' unknowns, which take_unknown of shaders/halo.wgsl has named, learn the row of their cell.
+@compute @workgroup_size(WORKGROUP)
+fn place_copies(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let column = hierarchy.level[0].y * hierarchy.level[0].z;
+    for (var c = thread(id); c < 2u * column; c += group_count(groups) * WORKGROUP) {
+        let beside = select(hierarchy.operation[1].z, hierarchy.operation[1].w, c >= column);
+        if beside == NOWHERE {
+            continue;
+        }
+        let cell = beside + c % column;
+        let row = cell_row_at(hierarchy.level[0].w + cell).x;
+//#if PERIODIC
+        let place = cell;
+//#else
+        let place = bitcast<u32>(place_of(vec3i(coordinates_of(0u, cell))));
+//#endif
+        let l = listed(cell);
+        let particles = l.count.x + l.count.y + l.count.z;
+        for (var k = 0u; k < particles; k++) {
+            let slot = slot_of(l, k);
+            if slot < params.pressure_slots && all(aggregate[slot] == UNKNOWN) {
+                aggregate[slot] = vec2u(row, place);
+            }
+        }
+    }
+}
+
+//#endif
 var<private> value: array<f32, 27>;
 var<private> column: array<u32, 27>;
 

@@ -61,12 +61,4 @@ impl Preconditioner {
             Self::Multigrid => "multigrid",
         }
     }
-
-    /// Its name where each of many ranks has it over its own rows alone.
-    pub fn name_apart(self) -> &'static str {
-        match self {
-            Self::Jacobi => "jacobi",
-            Self::Multigrid => "multigrid of each rank's rows",
-        }
-    }
 }

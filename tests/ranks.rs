@@ -206,7 +206,7 @@ fn many_ranks_compute_what_one_computes() {
         ("plane", shipped("dam_break_2d", &["fluid.solver.tolerance=1e-9"]), 20, [2, 4], 1e-11),
         ("flume", flume(""), 60, [2, 4], 1e-11),
         ("flume, multigrid", flume("solver = { preconditioner = \"multigrid\" }"), 60, [3, 5], 1e-7),
-        ("full", full(), 20, [2, 3], 1e-9),
+        ("full", full(""), 20, [2, 3], 1e-9),
         // The first and the last rank are neighbours: two on both sides, more with a column each at least.
         ("ring", ring(1.5, "jitter = 0.1", DRIVEN), 60, [2, 5], 1e-11),
         (
@@ -279,13 +279,13 @@ fn narrow() -> Case {
 }
 
 /// A closed tank full of water round a body that is heavier: no free surface.
-pub(crate) fn full() -> Case {
-    case(
+pub(crate) fn full(more: &str) -> Case {
+    case(&format!(
         "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -10]\n\
-         [fluid]\nsound_speed = 5\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.5]\n\
+         [fluid]\nsound_speed = 5\n{more}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.5]\n\
          [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.5]\nopen = []\n\
-         [[body]]\nname = \"cube\"\nsize = [0.15, 0.15, 0.15]\ncenter = [0.4, 0.2, 0.3]\ndensity = 2000\nvelocity = [1, 0, 0]\ndisplaces_fluid = true\n[contact]\nspring = 1e5\n",
-    )
+         [[body]]\nname = \"cube\"\nsize = [0.15, 0.15, 0.15]\ncenter = [0.4, 0.2, 0.3]\ndensity = 2000\nvelocity = [1, 0, 0]\ndisplaces_fluid = true\n[contact]\nspring = 1e5\n"
+    ))
 }
 
 #[test]

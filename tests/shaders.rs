@@ -307,6 +307,7 @@ fn structs_lie_the_same_on_both_sides() {
     );
     same_layout!("multigrid_levels", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
+    same_layout!("halo", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
     same_layout!("body_force", WallParticle { area, arm, to_surface });
     same_layout!("openings", Emission { wall, count, to, pad, shift, velocity });
@@ -471,6 +472,7 @@ fn constants_are_the_same_on_both_sides() {
     // Written alike, hence read alike.
     let short = |x: f32| x.to_string().parse::<f64>().expect("a number");
     assert_eq!(constant(text("multigrid"), "DAMPING"), short(DAMPING));
+    assert_eq!(constant(text("halo"), "DAMPING"), short(DAMPING));
     assert_eq!(constant(text("multigrid"), "OVER_CORRECTION"), short(OVER_CORRECTION));
     let with_multigrid = shader::source(text("conjugate_gradient"), &["MULTIGRID"]);
     assert_eq!(constant(&with_multigrid, "DAMPING"), short(DAMPING));

@@ -549,15 +549,20 @@ fn of_ranks(ranks: &Outlook) -> Vec<String> {
     ]);
     let gpu = &ranks.on_devices;
     lines.extend([
-        format!("  with --backend gpu, a device for each: preconditioner {}", gpu.preconditioner),
+        "  with --backend gpu, a device for each:".to_string(),
         format!(
-            "    messages to each rank beside: {} a step and {} an iteration, {} and {} at most; rounds of all ranks: {} and {}",
+            "    messages to each rank beside: {} a step and {} an iteration, {} and {} at most",
             gpu.messages[0],
             gpu.messages[1],
             bytes(gpu.message_bytes[0] as f64),
-            bytes(gpu.message_bytes[1] as f64),
+            bytes(gpu.message_bytes[1] as f64)
+        ),
+        format!(
+            "    rounds of all ranks: {} a step and {} an iteration, {} and {} in all",
             gpu.rounds[0],
-            gpu.rounds[1]
+            gpu.rounds[1],
+            bytes(gpu.round_bytes[0] as f64),
+            bytes(gpu.round_bytes[1] as f64)
         ),
         format!(
             "    between host and device of a rank: about {} a step and {} an iteration",

@@ -217,10 +217,6 @@ impl Backend for Lead {
         self.all(&Order::Ranks, |own| own.ranks())
     }
 
-    fn preconditions_apart(&self) -> bool {
-        self.own.preconditions_apart()
-    }
-
     fn gives_up(&self) -> bool {
         // Steps over ranks are short, and the state of all of them is long in the making.
         false

@@ -266,10 +266,6 @@ pub trait Backend: Send {
     }
     /// Bytes that a step like the last one must move.
     fn traffic(&mut self) -> Result<Traffic>;
-    /// Whether multigrid, where it is planned, is of the rows of each rank by itself: of many ranks with a device each.
-    fn preconditions_apart(&self) -> bool {
-        false
-    }
     /// What each rank holds and said; nothing where there is one.
     fn ranks(&mut self) -> Result<Vec<Standing>> {
         Ok(Vec::new())

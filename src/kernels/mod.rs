@@ -98,7 +98,7 @@ pub mod device {
         multigrid[super::WORKGROUP] Arrays(Multigrid), Own:
             gather down_first down_second up_first up_second back_first small spread;
         multigrid_levels[super::WORKGROUP] Arrays(Multigrid), Own:
-            mark scan_blocks scan_sums number_rows members galerkin coarsen_second coarsen_rest;
+            mark scan_blocks scan_sums number_rows members place_copies galerkin coarsen_second coarsen_rest;
         neighbour_list[super::WORKGROUP] Stage(NeighbourList), Rows: neighbour_list_main;
         number_density[super::WORKGROUP] Stage(NumberDensity), Rows: number_density_main;
         openings[super::WORKGROUP] Stage(Openings), Own: emit swallow;
@@ -114,18 +114,21 @@ pub mod device {
     }
 
     crate::compute::kernels!(halo[super::WORKGROUP]:
-        columns column_starts mark_walls give_motion take_motion give_state take_state give_pressure take_pressure give_search take_search drop_search
-        give_surface_pressure take_surface_pressure give_head take_head);
+        columns column_starts mark_walls give_motion take_motion give_state take_state give_pressure take_pressure give_search take_search
+        give_surface_pressure take_surface_pressure give_head take_head
+        give_unknown take_unknown give_wet_cells take_wet_cells give_entries take_entries give_coarse take_coarse);
 
     /// Buffers of [`HALO`].
     pub mod of_halo {
         crate::compute::buffers! {
-            /// Four lists of slots, and where they begin.
+            /// Four lists of slots, where they begin, and how many rows of the finest level of multigrid are whose.
             halo_slot: u32, Writes;
             /// What the slots of a list hold.
             halo: f32, Both;
             /// Where the water of each column of cells begins.
             column_start: u32, Reads;
+            /// A bit for each cell of the finest level of multigrid: whether it holds unknowns.
+            wet_cell: u32, Both;
         }
     }
 

@@ -73,8 +73,7 @@ pub struct Particles {
 /// The pressure Poisson equation over all steps.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Pressure {
-    /// Preconditioner that ran: `jacobi` or `multigrid`, of all rows or, on GPUs of many ranks, `multigrid of each rank's rows`; nothing for a
-    /// scene without fluid.
+    /// Preconditioner that ran: `jacobi` or `multigrid`; nothing for a scene without fluid.
     pub preconditioner: Option<&'static str>,
     /// Mean number of unknowns.
     pub unknowns_mean: f64,

@@ -156,12 +156,8 @@ impl Totals {
     pub fn summary(&self, simulation: &Simulation, scene: &Scene) -> Summary {
         let per = |sum: u64, of: u64| sum as f64 / of.max(1) as f64;
         let mut pressure = self.pressure;
-        let preconditioner = simulation.plan.preconditioner;
-        let name = match simulation.backend.preconditions_apart() {
-            true => preconditioner.name_apart(),
-            false => preconditioner.name(),
-        };
-        pressure.preconditioner = simulation.plan.wet().then_some(name);
+        let preconditioner = simulation.plan.preconditioner.name();
+        pressure.preconditioner = simulation.plan.wet().then_some(preconditioner);
         pressure.unknowns_mean = per(self.unknowns, self.solves);
         pressure.iterations_mean = per(self.iterations, self.solves);
         let mut monitors = self.monitors;

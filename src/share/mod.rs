@@ -171,7 +171,12 @@ impl Share {
 
     /// The columns of this rank.
     pub(crate) fn columns(&self) -> Range<u32> {
-        self.cuts[self.rank()]..self.cuts[self.rank() + 1]
+        self.columns_of(self.rank())
+    }
+
+    /// The columns of `rank`.
+    pub(crate) fn columns_of(&self, rank: usize) -> Range<u32> {
+        self.cuts[rank]..self.cuts[rank + 1]
     }
 
     /// Columns of all ranks.

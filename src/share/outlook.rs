@@ -29,16 +29,16 @@ pub struct Taken {
 /// What ranks with a device each would say at t = 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OnDevices {
-    /// Preconditioner of the pressure solver.
-    pub preconditioner: &'static str,
     /// Messages to each rank beside in a step, and in each iteration of the pressure solver.
     pub messages: [u64; 2],
     /// Bytes of these, from the rank that says most to the one beside it.
     pub message_bytes: [u64; 2],
     /// Rounds in which all ranks gather something, in a step and in each iteration.
     pub rounds: [u64; 2],
-    /// Bytes between the host and the device of a rank with others on both sides, there and back, in a step and in each iteration: borders, and
-    /// the water of outer columns that may go.
+    /// Bytes that all ranks together gather in them, for cells of the multigrid.
+    pub round_bytes: [u64; 2],
+    /// Bytes between the host and the device of a rank with others on both sides, there and back, in a step and in each iteration: borders, the
+    /// water of outer columns that may go, and the finest level of the multigrid.
     pub staged_bytes: [u64; 2],
 }
 
@@ -122,13 +122,13 @@ impl Outlook {
             ],
             rounds: [5 + bodies + joins + 2 * filled, 3 + multigrid + visited],
             round_bytes: [4 * cells + (4 + 27 * 8) * parents, 4 * visited * parents],
-            on_devices: on_devices(plan, water_at, carriers_at),
+            on_devices: on_devices(plan, [water_at, carriers_at], [grid.total() as u64, cells], ranks as u64),
         })
     }
 }
 
-/// What devices say of borders with so much water, and with so much that carries pressure.
-fn on_devices(plan: &Plan, water: u64, carriers: u64) -> OnDevices {
+/// What devices say of borders with so much water, and with so much that carries pressure; of all cells, and of those with water.
+fn on_devices(plan: &Plan, [water, carriers]: [u64; 2], [cells, wet]: [u64; 2], ranks: u64) -> OnDevices {
     let count = |stages: &[Stage]| stages.iter().filter(|&&s| plan.has(s)).count() as u64;
     let motions = count(&[Stage::Viscosity, Stage::WallFriction, Stage::Collision]);
     let (surface, coupled) = (count(&[Stage::SurfacePressure]), u64::from(plan.coupled));
@@ -136,20 +136,29 @@ fn on_devices(plan: &Plan, water: u64, carriers: u64) -> OnDevices {
         (u64::from(plan.preconditioner == Preconditioner::Multigrid), u64::from(plan.filled));
     // A particle of water travels with 40 bytes; its motion is six numbers, all else is one.
     let (travels, motion, number) = (40, 24, 4);
-    // Of what carries pressure: the first guess, the vector that finds the end, and the answer to be judged; then the pressure that is left.
-    let shown = surface + 3 + 1 + coupled;
+    // Of what carries pressure: the first guess, the vector that finds the end, and the answer to be judged; then the pressure that is left. Of
+    // the multigrid which of it is unknown; in each iteration the first sweep beside the vector that is multiplied.
+    let shown = surface + 3 + 1 + coupled + multigrid;
+    let in_iteration = 1 + multigrid;
     let border = (motion * motions + number) * water + number * shown * carriers;
     // The two outer columns of a slab come to the host and go back, and copies with them.
     // The slots at the borders are listed for the device.
     let lists = 2 * number * (carriers + water);
     let outer = 2 * (2 * travels - number) * water + (travels - number) * water;
+    // A bit of each cell, half of a row of 27 entries, in each iteration a residual.
+    let round_bytes = [multigrid * (cells / 8 + 14 * number * wet), multigrid * number * wet];
+    // A part of it is given, all is taken.
+    let levels = round_bytes.map(|bytes| bytes + bytes / ranks);
     OnDevices {
-        preconditioner: plan.preconditioner.name_apart(),
-        messages: [3 + motions + shown, 1],
-        message_bytes: [travels * water + border, number * carriers],
-        rounds: [7 + coupled + count(&[Stage::BodyForce]) + 2 * filled, 2 + multigrid],
+        messages: [3 + motions + shown, in_iteration],
+        message_bytes: [travels * water + border, number * in_iteration * carriers],
+        rounds: [7 + coupled + count(&[Stage::BodyForce]) + 2 * filled + 2 * multigrid, 2 + 2 * multigrid],
+        round_bytes,
         // On both sides, given and taken.
-        staged_bytes: [2 * (outer + 2 * border + lists), 4 * number * carriers],
+        staged_bytes: [
+            2 * (outer + 2 * border + lists) + levels[0],
+            4 * number * in_iteration * carriers + levels[1],
+        ],
     }
 }
 

@@ -11,7 +11,7 @@ use crate::compute::Program;
 use crate::error::{GpuError, Result};
 use crate::params::Params;
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::scene::{Groups, Scene};
 
 /// A scene as it fits a device.
 pub(super) struct Fitted {
@@ -27,15 +27,16 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// `scene` on a device `info` with limits `have`; of one of many `ranks`, or alone.
+    /// `scene` on a device `info` with limits `have`; of one of many ranks, which have `all` these particles together, or alone.
     pub fn new(
         scene: &Scene,
         params: &Params,
         plan: &Plan,
         info: &AdapterInfo,
         have: &wgpu::Limits,
-        ranks: bool,
+        all: Option<Groups>,
     ) -> Result<Self> {
+        let ranks = all.is_some();
         let fluid = scene.groups.fluid;
         if fluid > FLUID_MAX {
             let text = format!(
@@ -47,6 +48,7 @@ impl Fitted {
         }
         let grid = grid(params, plan)?;
         let mut sizes = Sizes::new(scene, params, &grid);
+        sizes.pressure_of_all = all.map_or(0, |all| all.pressure() as u64);
         if info.device_type == "cpu" {
             sizes.rows_per_thread = 4;
         }

@@ -159,6 +159,7 @@ mod tests {
             moving: 9_000,
             fixed: 357_000,
             pressure: 333_000,
+            pressure_of_all: 0,
             cells: 500_000,
             grid: [225, 36, 62],
             solids: 2,

@@ -15,7 +15,7 @@ const LARGE_MAX: usize = 2;
 /// Operations of the small levels at most.
 const OPERATIONS_MAX: usize = 256;
 /// Workgroups of a kernel over cells or rows at most; threads then take several.
-const GROUPS_MAX: u64 = 1024;
+pub(super) const GROUPS_MAX: u64 = 1024;
 
 /// A step of the cycle over a level; as in shaders/multigrid.wgsl.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -37,11 +37,21 @@ pub enum Operation {
 #[allow(missing_docs)]
 pub struct Hierarchy {
     pub level: [[u32; 4]; LEVELS_MAX],
+    /// Kind and level; beside the first two, where ranks share the levels, what [`Hierarchy::set_own`] says.
     pub operation: [[u32; 4]; OPERATIONS_MAX],
     pub levels: u32,
     pub capacity: u32,
     pub cells: u32,
     pub operations: u32,
+}
+
+impl Hierarchy {
+    /// Cells of the first level that are this rank's, and the first of each column of cells beside them, `u32::MAX` where there is none.
+    pub(crate) fn set_own(&mut self, cells: [u32; 2], beside: [u32; 2]) {
+        for (operation, pair) in self.operation.iter_mut().zip([cells, beside]) {
+            operation[2..].copy_from_slice(&pair);
+        }
+    }
 }
 
 /// The levels of a scene.
@@ -69,11 +79,11 @@ impl Levels {
         // A cell holds 9 particles (4 in two dimensions) where it is full, and a third of the slots are dry
         // walls. More cells than that go without correction, which costs iterations and nothing else.
         let (per_row, expected_per_row, shrink) = if flat { (1, 3, 2) } else { (3, 6, 3) };
+        let carriers = sizes.carriers();
         let expected: Vec<u64> = (count.iter().enumerate())
-            .map(|(l, c)| product(c).min((sizes.pressure / expected_per_row) >> (shrink * l)).max(1))
+            .map(|(l, c)| product(c).min((carriers / expected_per_row) >> (shrink * l)).max(1))
             .collect();
-        let mut out =
-            Self { capacity: cells.min(sizes.pressure / per_row + 64), count, cells, large: 0, expected };
+        let mut out = Self { capacity: cells.min(carriers / per_row + 64), count, cells, large: 0, expected };
         out.large = out.expected.iter().take(out.large_max()).filter(|&&n| n > SMALL).count();
         out
     }
@@ -135,19 +145,45 @@ impl Levels {
         self.build().iter().map(|(_, groups)| *groups).chain(of_levels).max().unwrap_or(1)
     }
 
+    /// Cells of the first level.
+    pub(crate) fn first_cells(&self) -> u64 {
+        self.count[0].map(u64::from).iter().product()
+    }
+
+    /// Workgroups of a kernel over the cells of the first level.
+    fn cell_groups(&self) -> u64 {
+        self.first_cells().div_ceil(WORKGROUP).min(GROUPS_MAX)
+    }
+
     /// Dispatches that build the levels.
     pub fn build(&self) -> Vec<(Kernel, u64)> {
-        let [x, y, z] = self.count[0].map(u64::from);
-        let cells = (x * y * z).div_ceil(WORKGROUP).min(GROUPS_MAX);
+        [self.mark(), self.number(), self.galerkin(), self.coarsen()].concat()
+    }
+
+    /// Those that mark the cells with unknowns.
+    pub(crate) fn mark(&self) -> Vec<(Kernel, u64)> {
+        vec![(multigrid_levels::mark, self.cell_groups())]
+    }
+
+    /// Those that number the marked cells, and tell the unknowns.
+    pub(crate) fn number(&self) -> Vec<(Kernel, u64)> {
         let scan = self.blocks().min(SCAN_GROUPS_MAX);
-        let mut out = vec![
-            (multigrid_levels::mark, cells),
+        vec![
             (multigrid_levels::scan_blocks, scan),
             (multigrid_levels::scan_sums, 1),
             (multigrid_levels::number_rows, scan),
-            (multigrid_levels::members, cells),
-            (multigrid_levels::galerkin, self.groups(0, 1)),
-        ];
+            (multigrid_levels::members, self.cell_groups()),
+        ]
+    }
+
+    /// That which makes the operator of the first level.
+    pub(crate) fn galerkin(&self) -> Vec<(Kernel, u64)> {
+        vec![(multigrid_levels::galerkin, self.groups(0, 1))]
+    }
+
+    /// Those that make the others from it.
+    pub(crate) fn coarsen(&self) -> Vec<(Kernel, u64)> {
+        let mut out = Vec::new();
         if self.count.len() > 1 {
             out.push((multigrid_levels::coarsen_second, self.groups(1, 1)));
         }
@@ -159,7 +195,19 @@ impl Levels {
 
     /// Dispatches between the sweeps over the particles, which takes `rows` workgroups to read.
     pub fn cycle(&self, rows: u64) -> Vec<(Kernel, u64)> {
-        let mut out = vec![(multigrid::gather, self.groups(0, 1))];
+        let mut out = self.gather();
+        out.extend(self.correct(rows));
+        out
+    }
+
+    /// The first of them, which brings the residuals to the cells.
+    pub(crate) fn gather(&self) -> Vec<(Kernel, u64)> {
+        vec![(multigrid::gather, self.groups(0, 1))]
+    }
+
+    /// The others.
+    pub(crate) fn correct(&self, rows: u64) -> Vec<(Kernel, u64)> {
+        let mut out = Vec::new();
         self.push_cycle(0, &mut out);
         out.push((multigrid::spread, rows));
         out

@@ -357,6 +357,8 @@ pub struct Sizes {
     pub fixed: u64,
     /// Particles that carry pressure.
     pub pressure: u64,
+    /// Those of all ranks together; 0 where there is one.
+    pub pressure_of_all: u64,
     /// Cells of the grid.
     pub cells: u64,
     /// Cells of the grid along x, y, z.
@@ -385,6 +387,7 @@ impl Sizes {
             moving: (g.moving_wall + g.moving_dummy) as u64,
             fixed: g.static_range().len() as u64,
             pressure: g.pressure() as u64,
+            pressure_of_all: 0,
             cells: grid.total() as u64,
             grid: grid.count,
             solids: scene.solids.len() as u64,
@@ -422,6 +425,11 @@ impl Sizes {
     /// Particles that the counting sort takes.
     pub fn sorted(&self) -> u64 {
         self.fluid + self.moving
+    }
+
+    /// Particles that carry pressure, of which the levels of multigrid are: those of all ranks, which have them in common.
+    pub(crate) fn carriers(&self) -> u64 {
+        if self.pressure_of_all > 0 { self.pressure_of_all } else { self.pressure }
     }
 
     /// Keys of the counting sort.
@@ -550,6 +558,7 @@ mod tests {
             moving: 9_000 * k,
             fixed: 357_000 * k,
             pressure: 340_000 * k,
+            pressure_of_all: 0,
             cells: 500_000 * k,
             grid: [250, 20 * k as u32, 100],
             solids: 2,

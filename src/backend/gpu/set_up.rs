@@ -14,7 +14,7 @@ use crate::kernels::wall_excess::cut_share;
 use crate::params::Params;
 use crate::plan::{Arrays, Plan};
 use crate::pressure::Settings;
-use crate::scene::{Scene, Solid};
+use crate::scene::{Groups, Scene, Solid};
 use crate::stop::Stop;
 use glam::{DVec3, Vec3};
 
@@ -67,10 +67,10 @@ impl Gpu {
         adapter: Option<&str>,
         caps: Caps,
     ) -> Result<Self> {
-        Self::open(scene, params, plan, settings, adapter::choose(adapter)?, caps, false)
+        Self::open(scene, params, plan, settings, adapter::choose(adapter)?, caps, None)
     }
 
-    /// Particles of `scene` on a device of `adapter`, for one of many `ranks` or alone.
+    /// Particles of `scene` on a device of `adapter`, for one of many ranks that have `all` particles together, or alone.
     pub(super) fn open(
         scene: &Scene,
         params: &Params,
@@ -78,9 +78,9 @@ impl Gpu {
         settings: Settings,
         (adapter, info): (wgpu::Adapter, AdapterInfo),
         caps: Caps,
-        ranks: bool,
+        all: Option<Groups>,
     ) -> Result<Self> {
-        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(adapter.limits()), ranks)?;
+        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(adapter.limits()), all)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("seixo"),
             required_limits: fitted.limits.clone(),
@@ -119,7 +119,7 @@ impl Gpu {
             device_type: text("other"),
             driver: text(""),
         };
-        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(have), false)?;
+        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(have), None)?;
         let descriptor =
             wgpu::DeviceDescriptor { required_limits: fitted.limits.clone(), ..Default::default() };
         Self::on(wgpu::Device::noop(&descriptor), info, fitted, scene, params, plan, settings)

@@ -11,8 +11,10 @@ use crate::kernels::device::halo as kernel;
 use crate::kernels::device::of_halo::buffer;
 use crate::share::Side;
 
-/// Words in front of the lists of slots: first place and length of each.
-const HEAD: usize = 8;
+/// Words in front of the lists of slots: first place and length of each, and what [`ROWS`] begins.
+const HEAD: usize = 10;
+/// First of the words with the rows of the finest level of multigrid: those of ranks before, and own ones.
+const ROWS: u64 = 8;
 
 /// An array of which ranks show each other the border.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +29,8 @@ pub(super) enum Shown {
     Search,
     /// Of free bodies' wall layers.
     Head,
+    /// Whether its pressure is an unknown.
+    Unknown,
 }
 
 impl Shown {
@@ -39,6 +43,7 @@ impl Shown {
             Self::Pressure => [kernel::give_pressure, kernel::take_pressure],
             Self::Search => [kernel::give_search, kernel::take_search],
             Self::Head => [kernel::give_head, kernel::take_head],
+            Self::Unknown => [kernel::give_unknown, kernel::take_unknown],
         }
     }
 
@@ -147,12 +152,9 @@ impl GpuRank {
         self.swap(what, packed)
     }
 
-    /// Records that nothing is known of the rows of other ranks.
-    pub(super) fn drop_search(&mut self) -> Result<()> {
-        let taken = self.lists.carriers.all_taken();
-        if taken > 0 {
-            self.gpu.context.pass([(kernel::drop_search, groups(taken))])?;
-        }
-        Ok(())
+    /// Tells the device how many rows of the finest level of multigrid are those of ranks before this one, and how many its own.
+    pub(super) fn set_rows(&mut self, rows: [u32; 2]) -> Result<()> {
+        let slot = buffer::halo_slot;
+        self.gpu.context.upload_to(slot.id(), slot.size() * ROWS, bytemuck::cast_slice(&rows))
     }
 }

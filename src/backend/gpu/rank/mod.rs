@@ -7,6 +7,7 @@
 
 mod halo;
 mod inflow;
+mod levels;
 mod settle;
 mod solve;
 mod state;
@@ -30,14 +31,25 @@ use crate::params::{Params, Step};
 use crate::plan::{ContactPlan, ParticleStage, Plan, Stage};
 use crate::pressure::{PressureReport, Settings};
 use crate::ranks::{Standing, Team};
-use crate::scene::{Kind, Scene};
+use crate::scene::{Groups, Kind, Scene};
 use crate::share::Share;
 use crate::stop::Stop;
 use halo::{Lists, Shown};
+use levels::Rows;
 use settle::{Came, Walls};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Which device a rank takes, and how large the whole is of which it has a part.
+struct Place {
+    /// Number of this rank among those of its machine.
+    k: usize,
+    /// The adapters asked for.
+    asked: Option<String>,
+    /// Particles of all ranks.
+    all: Groups,
+}
 
 /// Particles of a rank, in f32 on a device.
 pub struct GpuRank {
@@ -45,8 +57,7 @@ pub struct GpuRank {
     share: Share,
     /// The solids of the scene, without its water: from it a device with more room is set up.
     stem: Scene,
-    /// Number of this rank among those of its machine, and the adapters asked for.
-    place: (usize, Option<String>),
+    place: Place,
     poses: Vec<Pose>,
     walls: Walls,
     /// Where the water of each column of cells begins, as the last sort left it; empty before there was one.
@@ -58,6 +69,7 @@ pub struct GpuRank {
     /// What came from the ranks beside this one in the last settlement.
     came: Came,
     lists: Lists,
+    rows: Rows,
 }
 
 /// Refuses what devices of many ranks do not compute.
@@ -95,7 +107,7 @@ impl GpuRank {
         let part = scene.part(&own, room(own.len() + copies, scene.groups.fluid), &[]);
         // Contact is the first rank's, and its host's.
         let plan = Plan { contact: ContactPlan::default(), ..plan.clone() };
-        let place = (k, asked.map(str::to_owned));
+        let place = Place { k, asked: asked.map(str::to_owned), all: scene.groups };
         let mut gpu = open(&part, params, &plan, settings, &place)?;
         let mut fields = backend::start(&part, &plan);
         fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
@@ -103,7 +115,7 @@ impl GpuRank {
         share.begin(gpu.groups, own.len(), &fields, &grid);
         let stem = scene.part(&[], 0, &[]);
         Ok(Self {
-            walls: Walls::new(&stem, &grid),
+            walls: Walls::new(&stem, &grid, gpu.middle),
             stem,
             place,
             poses: Vec::new(),
@@ -112,6 +124,7 @@ impl GpuRank {
             came_in: 0..0,
             came: Came::default(),
             lists: Lists::default(),
+            rows: Rows::default(),
             share,
             gpu,
         })
@@ -124,15 +137,9 @@ impl GpuRank {
 }
 
 /// A device for `part`, with as many slots as it has.
-fn open(
-    part: &Scene,
-    params: &Params,
-    plan: &Plan,
-    settings: Settings,
-    (k, asked): &(usize, Option<String>),
-) -> Result<Gpu> {
-    let adapter = adapter::choose_of_rank(*k, asked.as_deref())?;
-    Gpu::open(part, params, plan, settings, adapter, Caps::default(), true)
+fn open(part: &Scene, params: &Params, plan: &Plan, settings: Settings, place: &Place) -> Result<Gpu> {
+    let adapter = adapter::choose_of_rank(place.k, place.asked.as_deref())?;
+    Gpu::open(part, params, plan, settings, adapter, Caps::default(), Some(place.all))
 }
 
 impl Backend for GpuRank {
@@ -274,10 +281,6 @@ impl Backend for GpuRank {
 
     fn traffic(&mut self) -> Result<Traffic> {
         self.gpu.traffic()
-    }
-
-    fn preconditions_apart(&self) -> bool {
-        self.share.ranks() > 1
     }
 
     fn ranks(&mut self) -> Result<Vec<Standing>> {

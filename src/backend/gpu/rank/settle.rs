@@ -59,20 +59,30 @@ pub(super) struct Came {
 pub(super) struct Walls {
     column: Vec<u32>,
     marks: Vec<f32>,
+    grid: Grid,
+    /// Of the domain [m].
+    middle: DVec3,
 }
 
 impl Walls {
     /// Those of `stem`, the solids of a scene.
-    pub fn new(stem: &Scene, grid: &Grid) -> Self {
-        let mut walls = Self { column: Vec::new(), marks: Vec::new() };
-        walls.are_at(&stem.position[..stem.groups.pressure()], grid);
+    pub fn new(stem: &Scene, grid: &Grid, middle: DVec3) -> Self {
+        let mut walls = Self { column: Vec::new(), marks: Vec::new(), grid: *grid, middle };
+        walls.are_at(&stem.position[..stem.groups.pressure()]);
         walls
     }
 
     /// They are at `position`; the device knows nothing of it yet.
-    pub fn are_at(&mut self, position: &[DVec3], grid: &Grid) {
-        self.column = position.iter().map(|&x| grid.coordinates(x)[0]).collect();
+    pub fn are_at(&mut self, position: &[DVec3]) {
+        self.column = position.iter().map(|&x| self.column(x)).collect();
         self.marks.clear();
+    }
+
+    /// The column of cells at `x`, in f32 as devices find it: a layer may stand on a border of cells, all of it.
+    fn column(&self, x: DVec3) -> u32 {
+        let Grid { origin, width, count, periodic } = &self.grid;
+        let [x, lower] = [periodic.wrap(x), *origin].map(|at| (at - self.middle).x as f32);
+        (((x - lower) / width.x as f32).max(0.0) as u32).min(count[0] - 1)
     }
 }
 
@@ -201,10 +211,9 @@ impl GpuRank {
 
     /// Columns of the wall layers that move.
     fn find_walls(&mut self) {
-        let grid = self.gpu.grid;
         for (solid, pose) in self.stem.solids.iter().zip(&self.poses) {
             for (k, &offset) in solid.wall_slots.clone().zip(&solid.wall_offset) {
-                self.walls.column[k] = grid.coordinates(move_solids(pose, offset).0)[0];
+                self.walls.column[k] = self.walls.column(move_solids(pose, offset).0);
             }
         }
     }

@@ -3,8 +3,8 @@
 //!
 //! A device sums in f32 over its workgroups and leaves the sums where its next kernel adds them up; the host puts the sum over all ranks in
 //! their place, added in f64 in the order of the ranks. So every device comes to the same numbers and the same verdict, and the kernels are those of a
-//! run on one. With multigrid each rank has a cycle over its own rows alone, as if nothing were known beyond the cuts: a block of the
-//! preconditioner, symmetric and positive as the whole then is. It costs iterations, and no message.
+//! run on one. Multigrid is that of all rows, see [`super::levels`]: the first sweep is shown across the cuts, and what the cells make of
+//! its residual is the same on every device, which so corrects its copies as their owners do.
 
 use super::GpuRank;
 use super::halo::Shown;
@@ -23,6 +23,14 @@ use crate::pressure::{Outcome, PressureReport};
 
 /// Numbers of a workgroup's sum.
 const WIDE: usize = 4;
+
+/// Devices have come to different verdicts.
+pub(super) fn differ() -> Error {
+    Error::gpu(
+        "the devices of the ranks have come to different verdicts of one solve: ranks need devices that compute alike, of \
+         one make and with one driver",
+    )
+}
 
 /// What devices meet for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,7 +100,7 @@ impl GpuRank {
 
     /// The iteration with the planned preconditioner; where multigrid breaks it down, again with the diagonal alone, from where it stopped.
     fn preconditioned(&mut self) -> Result<PressureReport> {
-        self.gpu.build_levels()?;
+        self.build_levels()?;
         let multigrid = self.gpu.levels.is_some();
         let first = self.iterate(multigrid, self.gpu.settings.warm_start)?;
         if !(multigrid && first.outcome == Outcome::Breakdown) {
@@ -117,19 +125,21 @@ impl GpuRank {
         let mut queued = 0;
         let mut solve = loop {
             let mut met = None;
-            if let Some(levels) = &self.gpu.levels {
+            if let Some(levels) = self.gpu.levels.clone() {
                 // `descend` judges the residual; without a cycle it is there for that alone.
-                let groups = self.gpu.sizes.reduction_groups();
-                let between = if cycle { levels.cycle(groups) } else { Vec::new() };
                 if cycle {
-                    self.meet(Meeting { sums: of_residual, ..Meeting::default() })?;
-                    self.drop_search()?;
+                    self.meet(Meeting { sums: of_residual, search: true, ..Meeting::default() })?;
                 } else {
                     met = Some(self.multiplied(of_residual)?);
                 }
                 self.over_rows([kernel::descend])?;
-                self.gpu.context.pass(between)?;
                 if cycle {
+                    self.gpu.context.pass(levels.gather())?;
+                    let judged = self.tell_coarse()?;
+                    if judged.done != 0 {
+                        break judged;
+                    }
+                    self.gpu.context.pass(levels.correct(self.gpu.sizes.reduction_groups()))?;
                     self.over_rows([kernel::ascend])?;
                     met = Some(self.multiplied(of_residual)?);
                 }
@@ -196,9 +206,7 @@ impl GpuRank {
         own.extend(answers.iter().map(|&y| f64::from(y)));
         let all = self.share.numbers(&own);
         if all.chunks_exact(own.len()).any(|part| part[0] != own[0]) {
-            let text = "the devices of the ranks have come to different verdicts of one solve: ranks need devices that compute alike, of \
-                        one make and with one driver";
-            return Err(Error::gpu(text));
+            return Err(differ());
         }
         let mut total = vec![0.0; own.len()];
         for part in all.chunks_exact(own.len()) {

@@ -198,7 +198,7 @@ impl Ranked for GpuRank {
         local.reaction.fill(DVec3::ZERO);
         self.gpu.write_fields(&local)?;
         self.share.begin(self.gpu.groups, own.len(), &local, &grid);
-        self.walls.are_at(&local.position[super::wall_slots(&self.gpu)], &grid);
+        self.walls.are_at(&local.position[super::wall_slots(&self.gpu)]);
         self.starts.clear();
         self.live = self.gpu.groups.fluid;
         (self.came_in, self.came) = (0..0, Came::default());
