@@ -37,7 +37,7 @@ pub enum Operation {
 #[allow(missing_docs)]
 pub struct Hierarchy {
     pub level: [[u32; 4]; LEVELS_MAX],
-    /// Kind and level; beside the first two, where ranks share the levels, what [`Hierarchy::set_own`] says.
+    /// Kind and level; beside the first two, where ranks share the levels, which cells are whose: `set_own`.
     pub operation: [[u32; 4]; OPERATIONS_MAX],
     pub levels: u32,
     pub capacity: u32,
