@@ -200,6 +200,40 @@ fn up_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) 
     up(1u, thread(id), group_count(groups) * WORKGROUP);
 }
 
+@compute @workgroup_size(WORKGROUP)
+fn down_third(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
+              @builtin(num_workgroups) groups: vec3u) {
+    if stopped() {
+        return;
+    }
+    down(2u, group_number(group), group_count(groups), t);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn up_third(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    if stopped() {
+        return;
+    }
+    up(2u, thread(id), group_count(groups) * WORKGROUP);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn down_fourth(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
+              @builtin(num_workgroups) groups: vec3u) {
+    if stopped() {
+        return;
+    }
+    down(3u, group_number(group), group_count(groups), t);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn up_fourth(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    if stopped() {
+        return;
+    }
+    up(3u, thread(id), group_count(groups) * WORKGROUP);
+}
+
 // The cycle over the small levels.
 @compute @workgroup_size(WORKGROUP)
 fn small(@builtin(local_invocation_index) t: u32) {

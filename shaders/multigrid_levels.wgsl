@@ -462,10 +462,27 @@ fn coarsen_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgro
     }
 }
 
-// All further levels, one after the other, by one workgroup: they are small.
+@compute @workgroup_size(WORKGROUP)
+fn coarsen_third(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let end = end_row(2u);
+    for (var row = first_row(2u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
+        coarsen(2u, row);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn coarsen_fourth(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let end = end_row(3u);
+    for (var row = first_row(3u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
+        coarsen(3u, row);
+    }
+}
+
+// All further levels, one after the other, by one workgroup: they are small. The first of them is that of the cycle's first operation over
+// small levels, or the third.
 @compute @workgroup_size(WORKGROUP)
 fn coarsen_rest(@builtin(local_invocation_index) t: u32) {
-    for (var level = 2u; level < hierarchy.levels; level++) {
+    for (var level = max(2u, hierarchy.operation[0].y); level < hierarchy.levels; level++) {
         let end = end_row(level);
         for (var row = first_row(level) + t; row < end; row += WORKGROUP) {
             coarsen(level, row);

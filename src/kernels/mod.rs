@@ -96,9 +96,10 @@ pub mod device {
         monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
         move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids;
         multigrid[super::WORKGROUP] Arrays(Multigrid), Own:
-            gather down_first down_second up_first up_second back_first small spread;
+            gather down_first down_second down_third down_fourth up_first up_second up_third up_fourth back_first small spread;
         multigrid_levels[super::WORKGROUP] Arrays(Multigrid), Own:
-            mark scan_blocks scan_sums number_rows members place_copies galerkin coarsen_second coarsen_rest;
+            mark scan_blocks scan_sums number_rows members place_copies galerkin
+            coarsen_second coarsen_third coarsen_fourth coarsen_rest;
         neighbour_list[super::WORKGROUP] Stage(NeighbourList), Rows: neighbour_list_main;
         number_density[super::WORKGROUP] Stage(NumberDensity), Rows: number_density_main;
         openings[super::WORKGROUP] Stage(Openings), Own: emit swallow;

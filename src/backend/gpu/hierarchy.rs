@@ -10,8 +10,9 @@ use bytemuck::{Pod, Zeroable};
 
 /// Rows up to which a level is worked by one workgroup.
 const SMALL: u64 = 4096;
-/// Levels with dispatches of their own; see `down_first`, `down_second` in shaders/multigrid.wgsl.
-const LARGE_MAX: usize = 2;
+/// Levels with dispatches of their own at most; see `down_first` to `down_fourth` in shaders/multigrid.wgsl. The fifth is small with as many
+/// particles as a device holds.
+const LARGE_MAX: usize = 4;
 /// Operations of the small levels at most.
 const OPERATIONS_MAX: usize = 256;
 /// Workgroups of a kernel over cells or rows at most; threads then take several.
@@ -187,7 +188,9 @@ impl Levels {
         if self.count.len() > 1 {
             out.push((multigrid_levels::coarsen_second, self.groups(1, 1)));
         }
-        if self.count.len() > 2 {
+        let large = [multigrid_levels::coarsen_third, multigrid_levels::coarsen_fourth].into_iter();
+        out.extend(large.zip(2..self.large).map(|(kernel, level)| (kernel, self.groups(level, 1))));
+        if self.count.len() > self.large.max(2) {
             out.push((multigrid_levels::coarsen_rest, 1));
         }
         out
@@ -214,8 +217,10 @@ impl Levels {
     }
 
     fn push_cycle(&self, level: usize, out: &mut Vec<(Kernel, u64)>) {
-        const DOWN: [Kernel; LARGE_MAX] = [multigrid::down_first, multigrid::down_second];
-        const UP: [Kernel; LARGE_MAX] = [multigrid::up_first, multigrid::up_second];
+        const DOWN: [Kernel; LARGE_MAX] =
+            [multigrid::down_first, multigrid::down_second, multigrid::down_third, multigrid::down_fourth];
+        const UP: [Kernel; LARGE_MAX] =
+            [multigrid::up_first, multigrid::up_second, multigrid::up_third, multigrid::up_fourth];
         if level == self.large {
             return out.push((multigrid::small, 1));
         }
@@ -273,5 +278,9 @@ mod tests {
         let l = levels([222, 33, 60], 340_000);
         assert_eq!((l.build().len(), l.cycle(100).len()), (8, 13));
         assert_eq!(levels([60, 20, 20], 10_000).cycle(100).len(), 3);
+        // A hundred million particles: four levels take all of a device, and what is left is small.
+        let l = levels([2000, 300, 600], 60_000_000);
+        assert_eq!((l.large, l.build().len(), l.cycle(100).len()), (4, 10, 21));
+        assert!(l.expected[4] <= SMALL, "{:?}", l.expected);
     }
 }

@@ -103,7 +103,7 @@ impl Gpu {
         }
     }
 
-    /// Give the finest `large` levels of multigrid dispatches of their own (at most two) and leave the others to
+    /// Give the finest `large` levels of multigrid dispatches of their own (at most four) and leave the others to
     /// one workgroup. It is the time that depends on that, not the result.
     pub fn split_levels(&mut self, large: usize) -> Result<()> {
         let Some(levels) = &mut self.levels else { return Ok(()) };
