@@ -176,6 +176,16 @@ fn group_count(groups: vec3u) -> u32 {
 }
 //#endif
 
+// As crate::backend::gpu::hierarchy::Hierarchy; made by shaders/multigrid_levels.wgsl, used by shaders/multigrid.wgsl, told by shaders/halo.wgsl.
+struct Hierarchy {
+    level: array<vec4u, 16>, // cells along x, y, z, first cell
+    operation: array<vec4u, 256>, // kind, level; of the first two, where ranks share the levels, what is whose
+    levels: u32,
+    capacity: u32,
+    cells: u32,
+    operations: u32,
+}
+
 @group(0) @binding(0) var<uniform> params: Constants;
 @group(0) @binding(1) var<uniform> now: Coefficients;
 

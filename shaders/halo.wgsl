@@ -37,16 +37,6 @@
 @group(0) @binding(22) var<storage, read_write> wet_cell: array<u32>;
 //#endif
 
-// As in shaders/multigrid_levels.wgsl.
-struct Hierarchy {
-    level: array<vec4u, 16>,
-    operation: array<vec4u, 256>,
-    levels: u32,
-    capacity: u32,
-    cells: u32,
-    operations: u32,
-}
-
 const GIVEN: u32 = 0u;
 const TAKEN: u32 = 1u;
 const WATER_GIVEN: u32 = 2u;

@@ -24,16 +24,6 @@ struct Solve {
     done: u32,
 }
 
-// As in shaders/multigrid_levels.wgsl.
-struct Hierarchy {
-    level: array<vec4u, 16>,
-    operation: array<vec4u, 256>,
-    levels: u32,
-    capacity: u32,
-    cells: u32,
-    operations: u32,
-}
-
 // As crate::kernels::multigrid.
 const DAMPING: f32 = 0.9;
 const OVER_CORRECTION: f32 = 1.4;
@@ -141,6 +131,21 @@ fn stopped() -> bool {
     return solve.done != 0u;
 }
 
+// `down` and `up` of a large level, by all workgroups of a dispatch.
+fn down_over(level: u32, group: vec3u, groups: vec3u, t: u32) {
+    if stopped() {
+        return;
+    }
+    down(level, group_number(group), group_count(groups), t);
+}
+
+fn up_over(level: u32, id: vec3u, groups: vec3u) {
+    if stopped() {
+        return;
+    }
+    up(level, thread(id), group_count(groups) * WORKGROUP);
+}
+
 // Residuals of the particles onto the finest level.
 @compute @workgroup_size(WORKGROUP)
 fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
@@ -161,18 +166,12 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gro
 @compute @workgroup_size(WORKGROUP)
 fn down_first(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
               @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    down(0u, group_number(group), group_count(groups), t);
+    down_over(0u, group, groups, t);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn up_first(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    up(0u, thread(id), group_count(groups) * WORKGROUP);
+    up_over(0u, id, groups);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -186,52 +185,34 @@ fn back_first(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups)
 @compute @workgroup_size(WORKGROUP)
 fn down_second(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
                @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    down(1u, group_number(group), group_count(groups), t);
+    down_over(1u, group, groups, t);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn up_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    up(1u, thread(id), group_count(groups) * WORKGROUP);
+    up_over(1u, id, groups);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn down_third(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
               @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    down(2u, group_number(group), group_count(groups), t);
+    down_over(2u, group, groups, t);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn up_third(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    up(2u, thread(id), group_count(groups) * WORKGROUP);
+    up_over(2u, id, groups);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn down_fourth(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t: u32,
               @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    down(3u, group_number(group), group_count(groups), t);
+    down_over(3u, group, groups, t);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn up_fourth(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    if stopped() {
-        return;
-    }
-    up(3u, thread(id), group_count(groups) * WORKGROUP);
+    up_over(3u, id, groups);
 }
 
 // The cycle over the small levels.

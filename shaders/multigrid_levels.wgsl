@@ -26,16 +26,6 @@
 @group(0) @binding(16) var<storage, read_write> aggregate: array<vec2u>; // of a slot: row + 1 or 0, place_of its cell or, where sides are periodic, the cell
 @group(0) @binding(17) var<storage, read_write> entry: array<vec2u>; // column, bits of the value; entry after entry
 
-// As crate::backend::gpu::hierarchy::Hierarchy; the cycle is in shaders/multigrid.wgsl.
-struct Hierarchy {
-    level: array<vec4u, 16>, // cells along x, y, z, first cell
-    operation: array<vec4u, 256>, // kind, level; of the first two, where ranks share the levels, what is whose
-    levels: u32,
-    capacity: u32,
-    cells: u32,
-    operations: u32,
-}
-
 const ABOVE: u32 = 0x80000000u;
 
 fn cell_at(level: u32, c: vec3u) -> u32 {
@@ -454,28 +444,27 @@ fn coarsen(level: u32, row: u32) {
     keep_stencil(level, row, p);
 }
 
+// The rows of a level, from row `id` of it on, by so many threads.
+fn coarsen_over(level: u32, id: u32, threads: u32) {
+    let end = end_row(level);
+    for (var row = first_row(level) + id; row < end; row += threads) {
+        coarsen(level, row);
+    }
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn coarsen_second(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let end = end_row(1u);
-    for (var row = first_row(1u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
-        coarsen(1u, row);
-    }
+    coarsen_over(1u, thread(id), group_count(groups) * WORKGROUP);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn coarsen_third(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let end = end_row(2u);
-    for (var row = first_row(2u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
-        coarsen(2u, row);
-    }
+    coarsen_over(2u, thread(id), group_count(groups) * WORKGROUP);
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn coarsen_fourth(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let end = end_row(3u);
-    for (var row = first_row(3u) + thread(id); row < end; row += group_count(groups) * WORKGROUP) {
-        coarsen(3u, row);
-    }
+    coarsen_over(3u, thread(id), group_count(groups) * WORKGROUP);
 }
 
 // All further levels, one after the other, by one workgroup: they are small. The first of them is that of the cycle's first operation over
@@ -483,10 +472,7 @@ fn coarsen_fourth(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgro
 @compute @workgroup_size(WORKGROUP)
 fn coarsen_rest(@builtin(local_invocation_index) t: u32) {
     for (var level = max(2u, hierarchy.operation[0].y); level < hierarchy.levels; level++) {
-        let end = end_row(level);
-        for (var row = first_row(level) + t; row < end; row += WORKGROUP) {
-            coarsen(level, row);
-        }
+        coarsen_over(level, t, WORKGROUP);
         storageBarrier();
     }
 }

@@ -32,7 +32,7 @@ pub enum Operation {
     Back = 3,
 }
 
-/// Constants of the levels; see `Hierarchy` in shaders/multigrid_levels.wgsl.
+/// Constants of the levels; see `Hierarchy` in shaders/common.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[allow(missing_docs)]
