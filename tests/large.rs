@@ -85,7 +85,7 @@ fn assert_same(one: &Archive, other: &Archive) {
 }
 
 /// Limits at which all that can be divided of [`dam`] is.
-const CAPS: Caps = Caps { binding: Some(1_900_000), workgroups: Some(128) };
+const CAPS: Caps = Caps { binding: Some(1_900_000), workgroups: Some(128), large_levels: None };
 
 #[test]
 fn divided_buffers_and_folded_dispatches_change_no_bit() {
@@ -167,7 +167,7 @@ fn what_cannot_be_divided_so_far_is_refused_and_the_rest_is_built_with_no_driver
     let plan = Plan::new(&case, &scene, &params);
     let settings = Settings { tolerance: 1e-3, max_iterations: 10, warm_start: true };
     let dry = |binding, workgroups| {
-        let caps = Caps { binding: Some(binding), workgroups: Some(workgroups) };
+        let caps = Caps { binding: Some(binding), workgroups: Some(workgroups), large_levels: None };
         Gpu::dry_run_capped(&scene, &params, &plan, settings, caps)
     };
     let gpu = dry(1_900_000, 512).expect("it can be built");

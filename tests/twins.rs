@@ -8,7 +8,7 @@ use crate::common::moving as common;
 
 use glam::{DMat3, DVec3};
 use seixo::backend::cpu::Cpu;
-use seixo::backend::gpu::{self, Gpu};
+use seixo::backend::gpu::{self, Caps, Gpu};
 use seixo::backend::{Backend, Processor};
 use seixo::body::slots::SlotRow;
 use seixo::body::{FreeBody, Pose, Wrench};
@@ -525,9 +525,10 @@ fn multigrid() {
             let mut fields = before.clone();
             // Small enough for no bound; both signs, as negative pressures are cut.
             fields.source.iter_mut().for_each(|b| *b *= 1e-4 * sign);
-            let mut gpu = Gpu::new(&pair.scene, &pair.params, &pair.plan, one, None).expect("the device can");
+            let caps = Caps { large_levels: Some(large), ..Caps::default() };
+            let mut gpu =
+                Gpu::capped(&pair.scene, &pair.params, &pair.plan, one, None, caps).expect("the device can");
             gpu.write(&fields).expect("writable");
-            gpu.split_levels(large).expect("the device can");
             gpu.run(ParticleStage::CellList, &pair.step).expect("runs");
             gpu.run(ParticleStage::NeighbourList, &pair.step).expect("runs");
             let report = gpu.solve_pressure(&pair.step).expect("solves");

@@ -138,6 +138,8 @@ pub struct Caps {
     pub binding: Option<u64>,
     /// Workgroups along one dimension of a dispatch at most.
     pub workgroups: Option<u32>,
+    /// So many of the finest levels of multigrid have dispatches of their own, as far as there are levels, instead of those with many rows.
+    pub large_levels: Option<usize>,
 }
 
 impl Caps {
@@ -262,7 +264,8 @@ mod tests {
         {
             assert!(bound.contains(part), "{bound}");
         }
-        let low = Caps { binding: Some(1 << 20), workgroups: Some(100) }.lower(have.clone());
+        let low =
+            Caps { binding: Some(1 << 20), workgroups: Some(100), ..Caps::default() }.lower(have.clone());
         let asked = limits(&memory(1 << 20, 100), 8, &low, "small").expect("fits");
         assert_eq!((asked.max_storage_buffer_binding_size, asked.max_buffer_size), (1 << 20, 1 << 20));
         assert_eq!(asked.max_compute_workgroups_per_dimension, 100);

@@ -1,6 +1,7 @@
 //! A scene as it fits a device: what is divided, the shaders, the limits to ask for. Nothing is allocated yet.
 
-use super::adapter::{self, AdapterInfo};
+use super::adapter::{self, AdapterInfo, Caps};
+use super::hierarchy::Levels;
 use super::kernels;
 use super::layout::{FLUID_MAX, Memory, Sizes};
 use super::parts::Division;
@@ -10,7 +11,7 @@ use crate::cells::Grid;
 use crate::compute::Program;
 use crate::error::{GpuError, Result};
 use crate::params::Params;
-use crate::plan::Plan;
+use crate::plan::{Arrays, Plan};
 use crate::scene::{Groups, Scene};
 
 /// A scene as it fits a device.
@@ -20,6 +21,8 @@ pub(super) struct Fitted {
     pub memory: Memory,
     pub division: Division,
     pub shaders: Vec<Shader>,
+    /// Of multigrid, where it is planned.
+    pub levels: Option<Levels>,
     /// Bytes of a buffer at most.
     pub most: u64,
     /// To ask for.
@@ -27,13 +30,14 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// `scene` on a device `info` with limits `have`; of one of many ranks, which have `all` these particles together, or alone.
+    /// `scene` on a device `info` with limits `have`, lowered to `caps`; of one of many ranks, which have `all` these particles together, or alone.
     pub fn new(
         scene: &Scene,
         params: &Params,
         plan: &Plan,
         info: &AdapterInfo,
-        have: &wgpu::Limits,
+        have: wgpu::Limits,
+        caps: Caps,
         all: Option<Groups>,
     ) -> Result<Self> {
         let ranks = all.is_some();
@@ -56,8 +60,9 @@ impl Fitted {
         if ranks {
             memory = memory.with(&kernels::HALO);
         }
-        let most = adapter::buffer_most(have);
-        let width = adapter::width(have);
+        let have = caps.lower(have);
+        let most = adapter::buffer_most(&have);
+        let width = adapter::width(&have);
         let division = Division::new(&memory, most, width);
         let mut switches = shader::switches(params, plan);
         switches.extend(ranks.then_some("RANKS"));
@@ -68,7 +73,11 @@ impl Fitted {
         let mut shaders = Shader::all(particles, &switches, &division)?;
         shaders.extend(Shader::all(ranks.then_some(&kernels::HALO).into_iter(), &switches, &division)?);
         shaders.extend(Shader::all(plan.contact.program.into_iter(), &switches, &of_pairs)?);
-        let limits = adapter::limits(&memory, Shader::bindings(&shaders), have, &info.name)?;
-        Ok(Self { grid, sizes, memory, division, shaders, most, limits })
+        let levels = plan.needs(Arrays::Multigrid).then(|| Levels::new(&sizes).split(caps.large_levels));
+        if let Some(levels) = &levels {
+            shaders.iter_mut().for_each(|shader| shader.leave_out(&levels.idle()));
+        }
+        let limits = adapter::limits(&memory, Shader::bindings(&shaders), &have, &info.name)?;
+        Ok(Self { grid, sizes, memory, division, shaders, levels, most, limits })
     }
 }

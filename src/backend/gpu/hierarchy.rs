@@ -13,6 +13,13 @@ const SMALL: u64 = 4096;
 /// Levels with dispatches of their own at most; see `down_first` to `down_fourth` in shaders/multigrid.wgsl. The fifth is small with as many
 /// particles as a device holds.
 const LARGE_MAX: usize = 4;
+/// Their kernels.
+const DOWN: [Kernel; LARGE_MAX] =
+    [multigrid::down_first, multigrid::down_second, multigrid::down_third, multigrid::down_fourth];
+const UP: [Kernel; LARGE_MAX] =
+    [multigrid::up_first, multigrid::up_second, multigrid::up_third, multigrid::up_fourth];
+/// Those that make the third and the fourth of them; the second has its own dispatch in any scene.
+const COARSEN: [Kernel; 2] = [multigrid_levels::coarsen_third, multigrid_levels::coarsen_fourth];
 /// Operations of the small levels at most.
 const OPERATIONS_MAX: usize = 256;
 /// Workgroups of a kernel over cells or rows at most; threads then take several.
@@ -89,8 +96,20 @@ impl Levels {
         out
     }
 
+    /// These, with `large` of them large instead of those with many rows, if it is given. It is the time that depends on that, not the result.
+    pub(super) fn split(mut self, large: Option<usize>) -> Self {
+        self.large = large.map_or(self.large, |large| large.min(self.large_max()));
+        self
+    }
+
+    /// Kernels of large levels that these have not.
+    pub(super) fn idle(&self) -> Vec<Kernel> {
+        let [down, up] = [DOWN, UP].map(|kernels| kernels[self.large..].to_vec());
+        [down, up, COARSEN[self.large.saturating_sub(2)..].to_vec()].concat()
+    }
+
     /// Levels that can have dispatches of their own.
-    pub(crate) fn large_max(&self) -> usize {
+    fn large_max(&self) -> usize {
         LARGE_MAX.min(self.count.len() - 1)
     }
 
@@ -188,8 +207,9 @@ impl Levels {
         if self.count.len() > 1 {
             out.push((multigrid_levels::coarsen_second, self.groups(1, 1)));
         }
-        let large = [multigrid_levels::coarsen_third, multigrid_levels::coarsen_fourth].into_iter();
-        out.extend(large.zip(2..self.large).map(|(kernel, level)| (kernel, self.groups(level, 1))));
+        out.extend(
+            COARSEN.into_iter().zip(2..self.large).map(|(kernel, level)| (kernel, self.groups(level, 1))),
+        );
         if self.count.len() > self.large.max(2) {
             out.push((multigrid_levels::coarsen_rest, 1));
         }
@@ -217,10 +237,6 @@ impl Levels {
     }
 
     fn push_cycle(&self, level: usize, out: &mut Vec<(Kernel, u64)>) {
-        const DOWN: [Kernel; LARGE_MAX] =
-            [multigrid::down_first, multigrid::down_second, multigrid::down_third, multigrid::down_fourth];
-        const UP: [Kernel; LARGE_MAX] =
-            [multigrid::up_first, multigrid::up_second, multigrid::up_third, multigrid::up_fourth];
         if level == self.large {
             return out.push((multigrid::small, 1));
         }

@@ -3,7 +3,6 @@
 use super::adapter::{self, AdapterInfo, Caps};
 use super::context::Context;
 use super::fitted::Fitted;
-use super::hierarchy::Levels;
 use super::layout::{self, Coefficients, Constants, Memory, Sizes, WORKGROUP, WallParticle};
 use super::{Gpu, buffers, clock};
 use crate::backend::{self, Counters};
@@ -80,7 +79,7 @@ impl Gpu {
         caps: Caps,
         all: Option<Groups>,
     ) -> Result<Self> {
-        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(adapter.limits()), all)?;
+        let fitted = Fitted::new(scene, params, plan, &info, adapter.limits(), caps, all)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("seixo"),
             required_limits: fitted.limits.clone(),
@@ -119,7 +118,7 @@ impl Gpu {
             device_type: text("other"),
             driver: text(""),
         };
-        let fitted = Fitted::new(scene, params, plan, &info, &caps.lower(have), None)?;
+        let fitted = Fitted::new(scene, params, plan, &info, have, caps, None)?;
         let descriptor =
             wgpu::DeviceDescriptor { required_limits: fitted.limits.clone(), ..Default::default() };
         Self::on(wgpu::Device::noop(&descriptor), info, fitted, scene, params, plan, settings)
@@ -135,10 +134,9 @@ impl Gpu {
         settings: Settings,
     ) -> Result<Self> {
         let groups = scene.groups;
-        let Fitted { grid, sizes, memory, division, shaders, most, .. } = fitted;
+        let Fitted { grid, sizes, memory, division, shaders, levels, most, .. } = fitted;
         let layer = |s: &Solid| (s.wall_slots.start.saturating_sub(groups.fluid), s.wall_slots.len());
         let wall_layers = scene.solids.iter().map(layer);
-        let levels = plan.needs(Arrays::Multigrid).then(|| Levels::new(&sizes));
         let mut gpu = Self {
             context: Context::new(device, info, &memory, most, &shaders)?,
             division,

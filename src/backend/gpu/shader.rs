@@ -2,7 +2,7 @@
 
 use super::access::{self, PART};
 use super::parts::Division;
-use crate::compute::Program;
+use crate::compute::{Kernel, Program};
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::{Arrays, Plan, Stage};
@@ -192,6 +192,12 @@ impl Shader {
             Ok(Self { program, source, entries })
         };
         programs.map(of).collect()
+    }
+
+    /// Leave out the entry points of `kernels`.
+    pub fn leave_out(&mut self, kernels: &[Kernel]) {
+        let file = self.program.name;
+        self.entries.retain(|entry| !kernels.iter().any(|k| k.file == file && k.entry == entry.name));
     }
 
     /// Storage buffers that a kernel of `shaders` binds at most.

@@ -103,14 +103,6 @@ impl Gpu {
         }
     }
 
-    /// Give the finest `large` levels of multigrid dispatches of their own (at most four) and leave the others to
-    /// one workgroup. It is the time that depends on that, not the result.
-    pub fn split_levels(&mut self, large: usize) -> Result<()> {
-        let Some(levels) = &mut self.levels else { return Ok(()) };
-        levels.large = large.min(levels.large_max());
-        self.context.upload(buffers::hierarchy, &[levels.hierarchy()])
-    }
-
     /// Make the levels of multigrid for the system at hand; sums over their operators, finest first. None with the
     /// diagonal as preconditioner.
     pub fn level_sums(&mut self) -> Result<Vec<LevelSums>> {
