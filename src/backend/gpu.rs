@@ -18,6 +18,7 @@ pub mod forecast;
 pub mod hierarchy;
 pub mod layout;
 mod ledger;
+pub mod memory;
 mod observe;
 pub mod parts;
 mod rank;
@@ -55,7 +56,8 @@ use crate::stop::Stop;
 use context::Context;
 use glam::DVec3;
 use hierarchy::Levels;
-use layout::{Coefficients, SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP, counter};
+use layout::{Coefficients, WORKGROUP, counter};
+use memory::{SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes};
 use parts::Division;
 use std::collections::BTreeMap;
 

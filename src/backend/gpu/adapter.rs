@@ -1,7 +1,7 @@
 //! Adapters: what the machine has, which one a run takes, what is asked of it.
 
 use super::forecast::BINDING_MAX;
-use super::layout::Memory;
+use super::memory::Memory;
 use crate::error::{GpuError, Result};
 use serde::Serialize;
 
@@ -228,7 +228,7 @@ pub(super) fn limits(
 #[cfg(test)]
 mod tests {
     use super::super::buffers;
-    use super::super::layout::Allocation;
+    use super::super::memory::Allocation;
     use super::*;
     use crate::backend::gpu::parts::Grain;
     use crate::compute::Host;

@@ -3,9 +3,10 @@
 
 use super::hierarchy::{Hierarchy, Levels};
 use super::layout::{
-    AbsorberZone, Coefficients, Constants, Emission, FreeBody, LEDGER_WIDTH, MonitorSum, Outlet, Pose,
-    SCAN_BLOCK, Sizes, Solve, WallParticle, counter,
+    AbsorberZone, Coefficients, Constants, Emission, FreeBody, LEDGER_WIDTH, MonitorSum, Outlet, Pose, Solve,
+    WallParticle, counter,
 };
+use super::memory::{SCAN_BLOCK, Sizes};
 use super::parts::Split;
 use crate::compute::{Buffer, Host, Spec, shader_structs};
 use crate::monitor::SPEED_BINS;

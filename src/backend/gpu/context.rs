@@ -2,7 +2,7 @@
 
 use super::adapter::AdapterInfo;
 use super::clock::Clock;
-use super::layout::{Allocation, Memory};
+use super::memory::{Allocation, Memory};
 use super::parts::Buffers;
 use super::shader::Shader;
 use crate::backend::Commands;

@@ -3,7 +3,8 @@
 use super::adapter::{self, AdapterInfo, Caps};
 use super::hierarchy::Levels;
 use super::kernels;
-use super::layout::{FLUID_MAX, Memory, Sizes};
+use super::layout::FLUID_MAX;
+use super::memory::{Memory, Sizes};
 use super::parts::Division;
 use super::set_up::grid;
 use super::shader::{self, Shader};

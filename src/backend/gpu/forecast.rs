@@ -2,7 +2,8 @@
 //! comes first.
 
 use super::kernels;
-use super::layout::{Allocation, FLUID_MAX, Memory, Sizes};
+use super::layout::FLUID_MAX;
+use super::memory::{Allocation, Memory, Sizes};
 use super::parts::Division;
 use super::shader::Shader;
 use crate::error::Result;

@@ -2,7 +2,8 @@
 //! order of operations of the cycle.
 
 use super::kernels::{multigrid, multigrid_levels};
-use super::layout::{SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes, WORKGROUP};
+use super::layout::WORKGROUP;
+use super::memory::{SCAN_BLOCK, SCAN_GROUPS_MAX, Sizes};
 use crate::compute::Kernel;
 use crate::kernels::multigrid::{SWEEPS, visits};
 use crate::kernels::multigrid_levels::{LEVELS_MAX, level_cells};

@@ -5,7 +5,7 @@
 //! `access` writes; where there is one part those are the plain indices.
 
 use super::hierarchy::Levels;
-use super::layout::{Allocation, Memory, Sizes};
+use super::memory::{Allocation, Memory, Sizes};
 
 /// How a buffer of the table may be divided.
 #[derive(Clone, Copy)]

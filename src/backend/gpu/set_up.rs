@@ -3,7 +3,8 @@
 use super::adapter::{self, AdapterInfo, Caps};
 use super::context::Context;
 use super::fitted::Fitted;
-use super::layout::{self, Coefficients, Constants, Memory, Sizes, WORKGROUP, WallParticle};
+use super::layout::{self, Coefficients, Constants, WORKGROUP, WallParticle};
+use super::memory::{Memory, Sizes};
 use super::{Gpu, buffers, clock};
 use crate::backend::{self, Counters};
 use crate::cells::Grid;

@@ -137,17 +137,12 @@ impl GpuRank {
 
 #[cfg(test)]
 mod tests {
+    use super::super::rig::{Rig, there_is_a_device};
     use super::*;
-    use crate::backend::Backend;
-    use crate::backend::gpu::adapters;
-    use crate::body::Pose;
     use crate::case::Case;
-    use crate::params::Params;
-    use crate::plan::{Plan, Stage};
-    use crate::pressure::Settings;
+    use crate::plan::Stage;
     use crate::ranks::Team;
     use crate::ranks::threads::team;
-    use crate::scene::Scene;
     use glam::DVec3;
     use std::sync::Arc;
 
@@ -173,32 +168,11 @@ mod tests {
 
     /// Those of the third step on this rank.
     fn of_third_step(one: Arc<dyn Team>, case: &Case) -> Seen {
-        let scene = Scene::build(case).expect("a valid scene");
-        let params = Params::new(case, &scene).expect("valid constants");
-        let plan = Plan::new(case, &scene, &params);
-        let settings = Settings { tolerance: 1e-5, max_iterations: 100, warm_start: true };
-        let mut rank =
-            GpuRank::of_team((one, 0), &scene, &params, &plan, settings, None).expect("it can be built");
-        let solid = &scene.solids[0];
-        let mut pose = Pose {
-            position: solid.position,
-            orientation: solid.orientation,
-            velocity: DVec3::X,
-            angular_velocity: DVec3::ZERO,
-        };
+        let mut rig = Rig::new(one, case, DVec3::X);
         for n in 0..3 {
-            let step = params.step(0.001 * f64::from(n), 1e-3, 1.0);
-            pose.position.x += 0.001;
-            for stage in Stage::ALL.into_iter().filter(|s| plan.has(*s)) {
-                match stage {
-                    Stage::MoveSolids => rank.move_solids(&[pose]).expect("it moves"),
-                    Stage::ConjugateGradient if n == 2 => break,
-                    Stage::ConjugateGradient => drop(rank.solve_pressure(&step).expect("it is solved")),
-                    Stage::BodyForce => drop(rank.body_force().expect("it is summed")),
-                    other => other.over_particles().map_or((), |s| rank.run(s, &step).expect("it runs")),
-                }
-            }
+            rig.step(|_, stage| n < 2 || stage != Stage::ConjugateGradient);
         }
+        let rank = &mut rig.rank;
         rank.build_levels().expect("they are made");
         let levels = rank.gpu.levels.clone().expect("it is planned");
         let (capacity, count) = (levels.capacity as usize, levels.count.len());
@@ -216,9 +190,8 @@ mod tests {
 
     #[test]
     fn levels_of_many_devices_are_those_of_one() {
-        if adapters().is_empty() {
-            assert!(std::env::var_os("CI").is_none(), "no GPU adapter");
-            return eprintln!("SKIPPED, NO GPU ADAPTER: the levels of ranks are not tested");
+        if !there_is_a_device("the levels of ranks are") {
+            return;
         }
         for (name, case) in [("tank", case("")), ("ring", case("periodic = [\"x\"]\n"))] {
             let of = |ranks: usize| -> Vec<Seen> {

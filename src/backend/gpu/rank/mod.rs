@@ -8,6 +8,8 @@
 mod halo;
 mod inflow;
 mod levels;
+#[cfg(test)]
+mod rig;
 mod settle;
 mod solve;
 mod state;

@@ -2,7 +2,8 @@
 
 use super::{Came, GpuRank, Lists};
 use crate::backend::cpu::room;
-use crate::backend::gpu::layout::{self, LEDGER_WIDTH, Sizes, counter, word_of};
+use crate::backend::gpu::layout::{self, LEDGER_WIDTH, counter, word_of};
+use crate::backend::gpu::memory::Sizes;
 use crate::backend::gpu::transfer::{kind, packed, vector};
 use crate::backend::gpu::{archive, buffers};
 use crate::backend::{Backend, Counters, Ranked};
