@@ -2,75 +2,17 @@
 //! [`crate::kernels::multigrid_levels`] says, the cycle as [`crate::kernels::multigrid`] does, here in
 //! compressed rows. It is computed in f32: it need only be an approximation, and half the bytes move.
 
+mod level;
+
+use self::level::{Joined, Level, Scratch, coarsen, compress, gather};
 use super::cg::{Among, Precondition, System};
 use crate::cells::Grid;
 use crate::fields::State;
 use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
-use crate::kernels::multigrid_levels::{LevelSums, level_cells, offset_of, place_of, step};
+use crate::kernels::multigrid_levels::{LevelSums, level_cells, place_of, step};
 use crate::neighbours::{CHUNK, Chunk};
-use crate::share::Side;
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::ops::Range;
-
-/// Rows below which a level is not worth threads.
-const PARALLEL: usize = 4096;
-
-/// A coarse operator in compressed rows.
-#[derive(Default, Debug)]
-struct Level {
-    coordinates: Vec<[i32; 3]>,
-    /// Cells along periodic axes, 0 along the others.
-    around: [i32; 3],
-    /// Its rows that are computed here: all of them, or of the first level those of this rank.
-    own: Range<usize>,
-    /// Starts of these rows.
-    start: Vec<u32>,
-    column: Vec<u32>,
-    value: Vec<f32>,
-    diagonal: Vec<f32>,
-    /// Unknown of the next level that each row belongs to.
-    parent: Vec<u32>,
-    x: Vec<f32>,
-    b: Vec<f32>,
-    r: Vec<f32>,
-}
-
-impl Level {
-    fn rows(&self) -> usize {
-        self.coordinates.len()
-    }
-
-    /// out_i <- f(i, b_i - (A x)_i).
-    fn residual(&mut self, update: impl Fn(usize, f32) -> f32 + Sync) {
-        let Self { own, start, column, value, diagonal, x, b, r, .. } = self;
-        let (r, b, own_x) = (&mut r[own.clone()], &b[own.clone()], &x[own.clone()]);
-        let row = |(i, r): (usize, &mut f32)| {
-            let (a, e) = (start[i] as usize, start[i + 1] as usize);
-            let sum = gather(&column[a..e], &value[a..e], x);
-            *r = update(i, b[i] - diagonal[i] * own_x[i] - sum);
-        };
-        if diagonal.len() < PARALLEL {
-            r.iter_mut().enumerate().for_each(row);
-        } else {
-            r.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(row);
-        }
-    }
-
-    /// One damped Jacobi sweep.
-    fn smooth(&mut self) {
-        self.residual(|_, r| r);
-        let (x, r, d) = (&mut self.x[self.own.clone()], &self.r[self.own.clone()], &self.diagonal);
-        x.iter_mut().zip(r).zip(d).for_each(|((x, r), d)| *x = sweep(*x, *r, *d));
-    }
-
-    /// The first sweep, from zero.
-    fn first_smooth(&mut self) {
-        let (x, b, d) = (&mut self.x[self.own.clone()], &self.b[self.own.clone()], &self.diagonal);
-        x.iter_mut().zip(b).zip(d).for_each(|((x, b), d)| *x = first_sweep(*b, *d));
-    }
-}
 
 /// The hierarchy; buffers are kept between steps.
 #[derive(Default, Debug)]
@@ -93,52 +35,6 @@ pub struct Multigrid {
     used: usize,
     joined: Joined,
     scratch: Scratch,
-}
-
-/// Where the first coarse level, of which each rank has a part, meets those of the others, and the next, which all compute.
-#[derive(Default, Debug)]
-struct Joined {
-    /// Its borders.
-    sides: [Option<Side>; 2],
-    /// Rows of the next level to which each rank's cells belong.
-    parents: Vec<Vec<u32>>,
-}
-
-impl Joined {
-    /// Shows the ranks beside this one the border of `level`'s x.
-    fn show(&self, among: Option<Among>, level: &mut Level) {
-        if let Some(among) = among {
-            among.share.swap_at(&self.sides, &mut [&mut &mut level.x[..]]);
-        }
-    }
-
-    /// Sums `values` of the next level's rows over the ranks, each of which has added what its own cells bring.
-    fn sum<T: Pod + Default>(&self, among: Among, values: &mut [T], add: impl Fn(&mut T, T)) {
-        let own = self.parents[among.share.rank()].iter();
-        let own: Vec<T> = own.map(|&p| std::mem::take(&mut values[p as usize])).collect();
-        let all = among.share.gather(bytemuck::cast_slice(&own).to_vec());
-        for (parents, bytes) in self.parents.iter().zip(&all) {
-            let part = bytemuck::pod_collect_to_vec::<u8, T>(bytes);
-            parents.iter().zip(part).for_each(|(&p, v)| add(&mut values[p as usize], v));
-        }
-    }
-}
-
-/// Buffers of the construction.
-#[derive(Default, Debug)]
-struct Scratch {
-    stencil: Vec<[f64; 27]>,
-    map: Vec<u32>,
-    cursor: Vec<u32>,
-}
-
-impl Scratch {
-    /// Zero stencils for `rows` cells.
-    fn stencils(&mut self, rows: usize) -> &mut Vec<[f64; 27]> {
-        self.stencil.clear();
-        self.stencil.resize(rows, [0.0; 27]);
-        &mut self.stencil
-    }
 }
 
 /// Marks a slot without an unknown.
@@ -383,132 +279,6 @@ impl Multigrid {
                     *t = if state == State::Inner { row } else { 0.0 };
                 }
             });
-    }
-}
-
-/// sum w_k x_j(k), in four sums side by side.
-#[inline(always)]
-fn gather(index: &[u32], weight: &[f32], x: &[f32]) -> f32 {
-    let mut sums = [0.0; 4];
-    let (indices, weights) = (index.chunks_exact(4), weight.chunks_exact(4));
-    let rest: f32 =
-        indices.remainder().iter().zip(weights.remainder()).map(|(&j, w)| w * x[j as usize]).sum();
-    for (j, w) in indices.zip(weights) {
-        for k in 0..4 {
-            sums[k] += w[k] * x[j[k] as usize];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
-}
-
-/// Entries of a row.
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-#[repr(transparent)]
-struct Stencil([f64; 27]);
-
-/// Next coarser level of `fine`.
-fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch, join: Option<(Among, &mut Joined)>) {
-    let mut low = [i32::MAX; 3];
-    let mut high = [i32::MIN; 3];
-    for c in &fine.coordinates {
-        for k in 0..3 {
-            low[k] = low[k].min(c[k] >> 1);
-            high[k] = high[k].max(c[k] >> 1);
-        }
-    }
-    let size = [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize);
-    let map = &mut scratch.map;
-    map.clear();
-    map.resize(size.iter().product(), u32::MAX);
-    coarse.coordinates.clear();
-    fine.parent.clear();
-    for c in &fine.coordinates {
-        let p = c.map(|k| k >> 1);
-        let at = [0, 1, 2].map(|k| (p[k] - low[k]) as usize);
-        let slot = &mut map[(at[0] * size[1] + at[1]) * size[2] + at[2]];
-        if *slot == u32::MAX {
-            *slot = coarse.coordinates.len() as u32;
-            coarse.coordinates.push(p);
-        }
-        fine.parent.push(*slot);
-    }
-    let stencil = scratch.stencils(coarse.coordinates.len());
-    for (row, i) in fine.own.clone().enumerate() {
-        let p = fine.parent[i] as usize;
-        let s = &mut stencil[p];
-        s[13] += f64::from(fine.diagonal[row]);
-        for k in fine.start[row] as usize..fine.start[row + 1] as usize {
-            let q = fine.parent[fine.column[k] as usize] as usize;
-            let way = step(coarse.coordinates[p], coarse.coordinates[q], coarse.around);
-            s[(place_of(way) + 13) as usize] += f64::from(fine.value[k]);
-        }
-    }
-    if let Some((among, joined)) = join {
-        let mut own: Vec<u32> = fine.parent[fine.own.clone()].to_vec();
-        own.sort_unstable();
-        own.dedup();
-        let all = among.share.gather(bytemuck::cast_slice(&own).to_vec());
-        joined.parents = all.iter().map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
-        let add = |sum: &mut Stencil, part: Stencil| sum.0.iter_mut().zip(part.0).for_each(|(a, b)| *a += b);
-        joined.sum(among, bytemuck::cast_slice_mut(stencil), add);
-    }
-    coarse.own = 0..coarse.coordinates.len();
-    compress(coarse, scratch);
-}
-
-/// Rows of `level` from the stencils of its cells.
-fn compress(level: &mut Level, scratch: &mut Scratch) {
-    let Scratch { stencil, map, .. } = scratch;
-    let n = level.coordinates.len();
-    let mut low = [i32::MAX; 3];
-    let mut high = [i32::MIN; 3];
-    for c in &level.coordinates {
-        for k in 0..3 {
-            low[k] = low[k].min(c[k] - 1);
-            high[k] = high[k].max(c[k] + 1);
-        }
-    }
-    let size = [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize);
-    let place = |c: [i32; 3]| {
-        let at = [0, 1, 2].map(|k| (c[k] - low[k]) as usize);
-        (at[0] * size[1] + at[1]) * size[2] + at[2]
-    };
-    map.clear();
-    map.resize(size.iter().product(), u32::MAX);
-    for (i, &c) in level.coordinates.iter().enumerate() {
-        map[place(c)] = i as u32;
-    }
-    level.start.clear();
-    level.column.clear();
-    level.value.clear();
-    level.diagonal.clear();
-    level.start.push(0);
-    let way: [isize; 27] = std::array::from_fn(|k| {
-        let d = offset_of(k).map(|d| d as isize);
-        (d[0] * size[1] as isize + d[1]) * size[2] as isize + d[2]
-    });
-    for (&c, s) in level.coordinates[level.own.clone()].iter().zip(&*stencil) {
-        let own = place(c);
-        for (k, &v) in s.iter().enumerate() {
-            if k != 13 && v != 0.0 {
-                let mut at = own.wrapping_add_signed(way[k]);
-                if level.around != [0; 3] {
-                    let (d, around) = (offset_of(k), level.around);
-                    let beyond = |k: usize| {
-                        if around[k] > 0 { (c[k] + d[k]).rem_euclid(around[k]) } else { c[k] + d[k] }
-                    };
-                    at = place([0, 1, 2].map(beyond));
-                }
-                level.column.push(map[at]);
-                level.value.push(v as f32);
-            }
-        }
-        level.start.push(level.column.len() as u32);
-        level.diagonal.push(s[13] as f32);
-    }
-    for v in [&mut level.x, &mut level.b, &mut level.r] {
-        v.clear();
-        v.resize(n, 0.0);
     }
 }
 
