@@ -1,6 +1,6 @@
 // Force and torque of the fluid on a moving solid: F = sum (-P A + reaction), T = sum arm x F over its wall layer. P is
 // the pressure on the true surface, half a spacing outside of the particles' centres: without the excess of the particle's row
-// (wall_excess.wgsl), with the weight of the water between. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
+// (wall_excess.wgsl), with the weight of the water between; beside it the viscous stress on a solid that turns, -rho nu omega x A. A workgroup sums up to 256 particles of one solid; the host finishes in f64.
 // Twin: src/kernels/body_force.rs
 
 @group(0) @binding(2) var<storage, read> pressure: array<f32>;
@@ -46,7 +46,8 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         on_surface = max(on_surface, 0.0);
 //#endif
         if under_water {
-            force = -on_surface * rotate(pose.orientation, wall.area.xyz);
+            let area = rotate(pose.orientation, wall.area.xyz);
+            force = -on_surface * area - params.dynamic_viscosity * cross(pose.angular_velocity.xyz, area);
 //#if COUPLED
             force *= 1.0 - coupling[4u * k].w;
 //#endif

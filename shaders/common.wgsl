@@ -78,7 +78,7 @@ struct Constants {
     cell_width: vec3f,
     zero: f32,             // 0.0, which no compiler knows: see `exactly`
     drive: vec3f,          // what of gravity lies along periodic axes; `gravity` is the rest
-    pad_drive: f32,
+    dynamic_viscosity: f32, // rho nu, Pa s
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the

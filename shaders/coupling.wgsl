@@ -95,7 +95,8 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
             let slot = coupling[4u * k];
             row.force = (slot.w - 1.0) * rotate(pose.orientation, wall.area.xyz);
             row.torque = cross(arm, row.force);
-            force = (surface_head(pose, wall) - excess[k]) * row.force;
+            force = (surface_head(pose, wall) - excess[k]) * row.force
+                + params.dynamic_viscosity * cross(pose.angular_velocity.xyz, row.force);
             row.force += slot.xyz;
             row.torque += coupling[4u * k + 1u].xyz;
             known.force += coupling[4u * k + 2u].xyz;

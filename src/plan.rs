@@ -230,6 +230,8 @@ impl Plan {
         let moving = !scene.solids.is_empty();
         let free = scene.solids.iter().any(Solid::is_free);
         let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| s.name == g.on));
+        // Of a body that is driven the tables tell the force as of one that is free.
+        let told = free || gauged || !case.body.is_empty();
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
@@ -256,8 +258,8 @@ impl Plan {
                 Stage::SurfacePressure if params.filled => Err("the water fills all its room"),
                 Stage::SurfacePressure => wet("P = 0 lies half a spacing outside the surface's particles"),
                 Stage::BodyForce if !moving => Err("nothing solid moves"),
-                Stage::BodyForce if !free && !gauged && !case.output.ledger => {
-                    Err("no body is free and no gauge asks for the force on one that moves")
+                Stage::BodyForce if !told && !case.output.ledger => {
+                    Err("there is no body and no gauge asks for the force on a wall that moves")
                 }
                 Stage::BodyForce => wet("the fluid acts on solids"),
                 Stage::Contact if !moving => Err("nothing solid moves"),
@@ -281,7 +283,7 @@ impl Plan {
         let ledger = case.output.ledger;
         let filled = params.filled;
         let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
-        let pressed = fluid && moving && (free || gauged || ledger);
+        let pressed = fluid && moving && (told || ledger);
         let excess = match params.source {
             Source::Mixed if gauges => Excess::All,
             Source::Mixed if pressed => Excess::Moving,

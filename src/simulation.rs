@@ -348,17 +348,29 @@ impl Simulation {
         })
     }
 
+    /// Whether [`Self::fluid_force`] is what acts: it is left at zero where nothing asks for the force on walls that move.
+    pub fn knows_fluid_force(&self) -> bool {
+        !self.plan.wet() || self.plan.has(Stage::BodyForce)
+    }
+
     /// Rows of free bodies at slots, in the poses that [`Solids::predict`] gave last; none where no free body stands in the
     /// pressure equation.
-    pub fn slot_rows(&self) -> Vec<SlotRow> {
-        self.slots.as_ref().map(|slots| slots.rows(self.solids.predicted())).unwrap_or_default()
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn slot_rows(&mut self) -> Result<Vec<SlotRow>> {
+        let Some(found) = &self.slots else { return Ok(vec![]) };
+        let backend = &mut self.backend;
+        found.rows(self.solids.predicted(), |slots| {
+            Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
+        })
     }
 
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let report = self.timed(Stage::ConjugateGradient, |s| {
             if s.plan.needs(Arrays::Coupling) {
                 let rest = s.params.balanced_gravity();
-                let slots = s.slot_rows();
+                let slots = s.slot_rows()?;
                 s.backend.free_bodies(&s.solids.free_bodies(rest), &slots)?;
             }
             s.backend.solve_pressure(step)

@@ -11,15 +11,21 @@
 //!
 //! and a row of S in [`crate::kernels::coupling`] becomes S_r + sum_f h_fr S_f: as P does work on the body there, the
 //! body's motion sucks water in at the rim, and the equation stays symmetric.
+//!
+//! A slot that stands up, between a float and a wall, has its upper rim in the air, where no water would come out: rows of the rim above the
+//! level P / rho g of all that are under water are none of it, and where P_f is negative there is air. Which rows that are the last
+//! step's pressures say. Slots that do not hang together have a field each.
 
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::{Bounds, PointGrid, fixed_walls, meeting_images};
+use crate::error::Result;
 use crate::kernels::coupling::row;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
 /// at all: gaps of a half and of 1.1 spacings. Water comes in between.
@@ -36,6 +42,8 @@ const STIFFENING: f64 = 0.1;
 /// A solid's wall layer, in its frame.
 struct Layer {
     free: bool,
+    /// Slot of its first row.
+    first: usize,
     offset: Vec<DVec3>,
     area: Vec<DVec3>,
     to_surface: Vec<DVec3>,
@@ -58,6 +66,7 @@ impl Layer {
         let adjacent = if free { offset.iter().enumerate().map(near).collect() } else { Vec::new() };
         Self {
             free,
+            first: solid.wall_slots.start,
             radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
             area: solid.wall_area.clone(),
             to_surface: solid.wall_to_surface.clone(),
@@ -67,10 +76,46 @@ impl Layer {
         }
     }
 
+    /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them. One without either is none.
+    fn slots(&self, shares: &[f64]) -> Vec<(Vec<usize>, Vec<usize>)> {
+        let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
+        let mut out = vec![];
+        for first in 0..shares.len() {
+            if std::mem::replace(&mut seen[first], true) {
+                continue;
+            }
+            let (mut rows, mut at) = (vec![first], 0);
+            while at < rows.len() {
+                for &m in &self.adjacent[rows[at]] {
+                    if !std::mem::replace(&mut seen[m as usize], true) {
+                        rows.push(m as usize);
+                    }
+                }
+                at += 1;
+            }
+            rows.sort_unstable();
+            let is_rim = |&n: &usize| self.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
+            let (rim, deep): (Vec<usize>, Vec<usize>) = rows.into_iter().partition(is_rim);
+            if !rim.is_empty() && !deep.is_empty() {
+                out.push((rim, deep));
+            }
+        }
+        out
+    }
+
     fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {
         let reach = DVec3::splat(self.radius + margin);
         (pose.position - reach, pose.position + reach)
     }
+}
+
+/// A slot between a free body and other solids: rows of the body's layer.
+struct Slot {
+    solid: usize,
+    /// How much of each row of the layer lies in a slot [-].
+    shares: Arc<[f64]>,
+    rim: Vec<usize>,
+    deep: Vec<usize>,
 }
 
 /// Finds the slots of the free bodies of a scene.
@@ -97,8 +142,16 @@ impl Slots {
         }
     }
 
-    /// Rows at slots or in them with the solids at `poses`, in the order of solids and rows.
-    pub fn rows(&self, poses: &[Pose]) -> Vec<SlotRow> {
+    /// Rows at slots or in them with the solids at `poses`, in the order of solids and rows. `read` tells the pressures of the last step [Pa] in
+    /// slots of particles; 0 where it is dry.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn rows(
+        &self,
+        poses: &[Pose],
+        read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
+    ) -> Result<Vec<SlotRow>> {
         let margin = FACING.1 * self.spacing;
         let boxes: Vec<Bounds> =
             self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect();
@@ -113,10 +166,30 @@ impl Slots {
             if !at_walls && others[k].is_empty() {
                 return vec![];
             }
-            let shares = self.shares(k, at_walls, &others[k], poses);
-            self.passed_on(k, &poses[k], &shares)
+            let shares: Arc<[f64]> = self.shares(k, at_walls, &others[k], poses).into();
+            layer
+                .slots(&shares)
+                .into_iter()
+                .map(|(rim, deep)| Slot { solid: k, shares: shares.clone(), rim, deep })
+                .collect()
         };
-        self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect()
+        let found: Vec<Slot> =
+            self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect();
+        if found.is_empty() {
+            return Ok(vec![]);
+        }
+        let places =
+            |slot: &Slot| slot.rim.iter().map(|&n| self.layers[slot.solid].first + n).collect::<Vec<_>>();
+        let pressure = read(&found.iter().flat_map(places).collect::<Vec<_>>())?;
+        let mut before = 0;
+        let of_slot = |slot: Slot| {
+            let pressure = &pressure[before..before + slot.rim.len()];
+            before += slot.rim.len();
+            self.passed_on(&slot, &poses[slot.solid], pressure)
+        };
+        let mut out: Vec<SlotRow> = found.into_iter().flat_map(of_slot).collect();
+        out.sort_unstable_by_key(|slot| (slot.solid, slot.row));
+        Ok(out)
     }
 
     /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
@@ -153,33 +226,38 @@ impl Slots {
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }
 
-    /// The rows of layer `k` that lie deep in slots by `shares`, and those at the rim with what they pass on.
-    fn passed_on(&self, k: usize, pose: &Pose, shares: &[f64]) -> Vec<SlotRow> {
-        let layer = &self.layers[k];
-        let is_rim = |&n: &usize| layer.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
-        let (rim, deep): (Vec<usize>, Vec<usize>) =
-            (0..shares.len()).filter(|&n| shares[n] > 0.0).partition(is_rim);
-        if rim.is_empty() || deep.is_empty() {
-            return vec![];
-        }
+    /// The rows that lie deep in `slot`, and those at its rim with what they pass on; their `pressure` in the last step.
+    fn passed_on(&self, slot: &Slot, pose: &Pose, pressure: &[f64]) -> Vec<SlotRow> {
+        let layer = &self.layers[slot.solid];
         // Relative to the centre of mass, world axes.
         let place = |n: usize| pose.orientation * layer.offset[n];
-        let count = rim.len() as f64;
-        let middle = rim.iter().map(|&n| place(n)).sum::<DVec3>() / count;
+        let on_surface = |n: usize| place(n) + pose.orientation * layer.to_surface[n];
+        let passing = self.passing(slot, pressure, place);
+        let count = passing.len() as f64;
+        let middle = passing.iter().map(|&(n, _)| place(n)).sum::<DVec3>() / count;
         let xi = |n: usize| (place(n) - middle) / self.spacing;
         let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
-        let spread = rim.iter().map(|&n| outer(xi(n))).fold(DMat3::ZERO, |sum, m| sum + m);
+        let spread = passing.iter().map(|&(n, _)| outer(xi(n))).fold(DMat3::ZERO, |sum, m| sum + m);
         let inverse = (spread + DMat3::from_diagonal(DVec3::splat(STIFFENING * count))).inverse();
+        // P + rho g . (middle - x) over the rim: its mean and its slope along xi.
+        let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n) - middle);
+        let mean_level = passing.iter().map(level).sum::<f64>() / count;
+        let slope_level = inverse * passing.iter().map(|row| level(row) * xi(row.0)).sum::<DVec3>();
+        let any_wet = passing.iter().any(|&(_, p)| p > 0.0);
+        let under_water = |n: usize| {
+            let p = mean_level + slope_level.dot(xi(n)) + self.weight.dot(on_surface(n) - middle);
+            !any_wet || p > 0.0
+        };
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
-        for &n in &deep {
-            let to_surface = pose.orientation * layer.to_surface[n];
-            let row = row(pose.orientation * layer.area[n], place(n) + to_surface);
-            let head = self.weight.dot(place(n) + to_surface - middle);
+        for &n in slot.deep.iter().filter(|&&n| under_water(n)) {
+            let share = slot.shares[n];
+            let row = row(pose.orientation * layer.area[n], on_surface(n));
+            let head = self.weight.dot(on_surface(n) - middle);
             let along = xi(n).to_array();
             for (factor, (mean, slope)) in [1.0, head].into_iter().zip(mean.iter_mut().zip(&mut slope)) {
-                mean.add(shares[n] * factor, &row);
-                slope.iter_mut().zip(along).for_each(|(s, along)| s.add(shares[n] * factor * along, &row));
+                mean.add(share * factor, &row);
+                slope.iter_mut().zip(along).for_each(|(s, along)| s.add(share * factor * along, &row));
             }
         }
         let passed = |n: usize| {
@@ -194,14 +272,37 @@ impl Slots {
             head.add(-self.weight.dot(place(n) - middle), &per_pascal);
             (per_pascal, head)
         };
-        let solid = k as u32;
-        let at_rim = |&n: &usize| {
-            let (per_pascal, head) = passed(n);
+        // A row of the rim in the air presses nothing, but its height tells where P = 0 is: its part goes with those under water.
+        let (wet, dry): (Vec<_>, Vec<_>) =
+            passing.iter().map(|&(n, p)| (n, p > 0.0 || !any_wet, passed(n))).partition(|row| row.1);
+        let mut of_dry = Wrench::default();
+        dry.iter().for_each(|(.., (_, head))| of_dry += *head);
+        let solid = slot.solid as u32;
+        let (wet_count, dry_rows) = (wet.len() as f64, dry.into_iter());
+        let at_rim = |(n, is_wet, (per_pascal, mut head)): (usize, bool, (Wrench, Wrench))| {
+            if is_wet {
+                head.add(1.0 / wet_count, &of_dry);
+            } else {
+                head = Wrench::default();
+            }
             SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head }
         };
-        let inside = |&n: &usize| SlotRow { solid, row: n as u32, taken: shares[n], ..SlotRow::default() };
-        let mut out: Vec<SlotRow> = rim.iter().map(at_rim).chain(deep.iter().map(inside)).collect();
-        out.sort_unstable_by_key(|slot| slot.row);
-        out
+        let inside =
+            |&n: &usize| SlotRow { solid, row: n as u32, taken: slot.shares[n], ..SlotRow::default() };
+        wet.into_iter().chain(dry_rows).map(at_rim).chain(slot.deep.iter().map(inside)).collect()
+    }
+
+    /// Rows of the rim of `slot` that pass their `pressure` on, with it: all but those in the air above the water's level; all of them where
+    /// none is under water.
+    fn passing(&self, slot: &Slot, pressure: &[f64], place: impl Fn(usize) -> DVec3) -> Vec<(usize, f64)> {
+        let rows: Vec<(usize, f64)> = slot.rim.iter().copied().zip(pressure.iter().copied()).collect();
+        // Pressure that the row's height and the water above it make: P at the height of the centre of mass.
+        let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n));
+        let wet = rows.iter().filter(|(_, p)| *p > 0.0);
+        let highest = wet.map(level).fold(f64::NEG_INFINITY, f64::max);
+        if highest == f64::NEG_INFINITY {
+            return rows;
+        }
+        rows.into_iter().filter(|row| row.1 > 0.0 || level(row) <= highest).collect()
     }
 }

@@ -127,6 +127,37 @@ fn a_driven_channel_is_fine() {
     assert!(gain("energy_max_J") > 1.5 * gain("energy_start_J"), "it flows: {result}");
 }
 
+/// A bucket of walls that is lifted takes its water along.
+#[test]
+fn a_bucket_that_is_lifted_is_fine() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let wall = |name: &str, [x0, x1]: [f64; 2], [z0, z1]: [f64; 2]| {
+        format!(
+            "[[moving_wall]]\nname = \"{name}\"\nmin = [{x0}, 0, {z0}]\nmax = [{x1}, 0, {z1}]\n\
+             motion = [[0, 0, 0, 0], [0.1, 0, 0, 0], [0.9, 0, 0, 0.8], [1, 0, 0, 0.8]]\n"
+        )
+    };
+    let text = format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n[fluid]\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.2]\n[output]\nevery = 0\n{}{}{}",
+        wall("floor", [-0.08, 0.48], [-0.08, 0.0]),
+        wall("left", [-0.08, 0.0], [0.0, 0.4]),
+        wall("right", [0.4, 0.48], [0.0, 0.4])
+    );
+    std::fs::write(path("bucket.toml"), text).unwrap();
+    let run = ran(&["run", &path("bucket.toml"), "-o", &path("out"), "--backend", "cpu", "-q", "--json"]);
+    assert_eq!((run.code, run.err.as_str()), (0, ""));
+    let result = json(&run.out);
+    let at = |at: &str| result["monitors"][at].as_f64().unwrap();
+    assert_eq!(result["verdict"]["grade"], "fine");
+    assert!(at("energy_max_J") > 3.0 * at("energy_start_J"), "it is lifted: {result}");
+    // Of walls without a gauge nobody knows the force: no zeros are told.
+    assert!(result["bodies"][0].get("fluid_force_n").is_none());
+    let table = std::fs::read_to_string(folder.path().join("out/bodies.csv")).unwrap();
+    assert!(table.lines().nth(1).unwrap().contains(",,,,,,"), "{table:.600}");
+}
+
 /// A gate of 50 m/s would cross 2.5 spacings in a typed step.
 #[test]
 fn adaptive_steps_see_solids() {

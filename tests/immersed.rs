@@ -2,7 +2,11 @@
 
 use crate::common;
 use common::*;
+use glam::DVec3;
 use seixo::case::Case;
+use seixo::kernels::body_force;
+use seixo::params::Params;
+use seixo::scene::Scene;
 
 /// A cube of 0.1 m and relative density `s` in a tank of 0.4 m, its centre at `z`.
 fn tank_with_cube(s: f64, z: f64, fluid: &str) -> Case {
@@ -301,4 +305,28 @@ fn a_sphere_under_water_is_carried_by_its_volume_and_slowed_by_half_of_it() {
     let expected = 9.81 * (1.0 - s) / (s + 0.5);
     println!("ratio {s}: {mean:.3} m/s2 for {expected:.3}");
     assert!((mean / expected - 1.0).abs() < 0.15, "{s}: {mean} for {expected}");
+}
+
+#[test]
+fn a_body_that_turns_feels_the_stress_that_shear_leaves_out() {
+    // Over a closed surface: no force, and -2 rho nu V omega.
+    let case = case(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, 0]\n[fluid]\nviscosity = 0.01\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n\
+         [contact]\nspring = 1e5\n[[body]]\nname = \"box\"\nsize = [0.2, 0.3, 0.1]\ncenter = [0.5, 0.5, 0.5]\ndensity = 900\n\
+         displaces_fluid = true\n",
+    );
+    let scene = Scene::build(&case).expect("builds");
+    let params = Params::new(&case, &scene).expect("valid");
+    let solid = &scene.solids[0];
+    let omega = DVec3::new(1.0, -2.0, 3.0);
+    let rows = solid.wall_offset.iter().zip(&solid.wall_to_surface).zip(&solid.wall_area);
+    let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+    for ((&offset, &to_surface), &area) in rows {
+        let f = body_force::turning(omega, area, &params);
+        force += f;
+        torque += (offset + to_surface).cross(f);
+    }
+    let expected = -2.0 * 1000.0 * 0.01 * 0.2 * 0.3 * 0.1 * omega;
+    println!("{force} N, {torque} for {expected} N m");
+    assert!(force.length() < 1e-9 && (torque - expected).length() < 0.03 * expected.length(), "{torque}");
 }

@@ -289,7 +289,7 @@ fn structs_lie_the_same_on_both_sides() {
             cell_width,
             zero,
             drive,
-            pad_drive,
+            dynamic_viscosity,
         }
     );
     same_layout!(

@@ -202,6 +202,19 @@ fn a_case_says_what_a_shape_needs() {
         ("size = [1, 1, 1]\naxis = [0, 0, 1]", "", "it has no `axis`"),
         ("shape = \"sphere\"\nradius = 0.1", "dimensions = 2", "no spheres in two dimensions"),
         ("shape = \"cone\"", "", "cone"),
+        ("size = [1, 1, 1]\nvelocity = [0, 1, 0]", "dimensions = 2", "1 along y: in two dimensions"),
+        ("size = [1, 1, 1]\nangular_velocity = [1, 0, 0]", "dimensions = 2", "turns about y alone"),
+        (
+            "size = [1, 1, 1]\norientation = { axis = [1, 0, 0], angle_deg = 30 }",
+            "dimensions = 2",
+            "turns about y alone",
+        ),
+        (
+            "size = [1, 1, 1]\nmotion = [[0, 0, 0, 0], [1, 0, 1, 0]]",
+            "dimensions = 2",
+            "1 along y: in two dimensions",
+        ),
+        ("size = [1, 1, 1]", "dimensions = 2\ngravity = [0, -9.81, 0]", "run.gravity"),
     ] {
         let error = refused(keys, head);
         assert!(error.contains(says), "{keys}: {error}");

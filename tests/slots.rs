@@ -1,6 +1,6 @@
 //! Water in slots too narrow for a particle: under a body that stands on the floor, between bodies.
 
-use crate::common::{case, simulation};
+use crate::common::{case, simulation, there_is_a_device};
 use glam::DVec3;
 use seixo::backend::{Processor, gpu};
 use seixo::body::{Pose, Wrench};
@@ -37,7 +37,8 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
     let at = |position: DVec3| [Pose { position, ..start }];
     let slots = Slots::new(&scene, 1000.0);
     let solid = &scene.solids[0];
-    let rows = slots.rows(&at(solid.position));
+    let still = |slots: &[usize]| Ok(vec![0.0; slots.len()]);
+    let rows = slots.rows(&at(solid.position), still).expect("nothing is read");
     // Eight an edge: six by six deep under it.
     let deep = rows.iter().filter(|slot| slot.taken == 1.0).count();
     assert_eq!((deep, rows.len()), (36, 64));
@@ -62,7 +63,8 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
     }
     // As the body rises the slot fades.
     let part = |gap: f64| {
-        let rows = slots.rows(&at(solid.position + gap * scene.spacing * DVec3::Z));
+        let rows =
+            slots.rows(&at(solid.position + gap * scene.spacing * DVec3::Z), still).expect("nothing is read");
         rows.iter().map(|slot| slot.taken).fold(0.0, f64::max)
     };
     let faded = [0.0, 0.4, 0.8, 1.2].map(part);
@@ -114,4 +116,76 @@ fn a_dry_slot_carries_nothing() {
         simulation.step().expect("the block stands");
         assert_eq!(simulation.fluid_force[0], Wrench::default());
     }
+}
+
+/// A box in the plane, held where it is, in water 0.2 m deep: 0.1 m wide, from `low` to `high`, its right side at `right`.
+fn held([low, high]: [f64; 2], right: f64, more: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 4e-4\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.5]\nopen = [\"z_max\"]\n[contact]\nspring = 1e6\n\
+         [[body]]\nname = \"box\"\nsize = [0.1, 0.1, {}]\ncenter = [{}, 0, {}]\ndensity = 2000\ndisplaces_fluid = true\n\
+         standing = true\nlocked = [\"x\", \"z\", \"rotation_y\"]\n{more}",
+        high - low,
+        right - 0.05,
+        0.5 * (low + high)
+    ))
+}
+
+/// Mean force along x and z on the first body from 0.05 s to 0.1 s [N].
+fn pressed(mut simulation: Simulation) -> [f64; 2] {
+    let (mut sum, mut steps) = (DVec3::ZERO, 0.0);
+    while simulation.time < 0.1 {
+        simulation.step().expect("it is held");
+        if simulation.time > 0.05 {
+            (sum, steps) = (sum + simulation.fluid_force[0].force, steps + 1.0);
+        }
+    }
+    [sum.x / steps, sum.z / steps]
+}
+
+#[test]
+fn water_stands_in_a_slot_up_to_the_level_outside() {
+    // Linear down to P = 0 at its upper rim, in the air, it pressed a box at a wall towards it by a quarter of what acts on a side.
+    let g = 9.81 * 1000.0 * 0.01;
+    let at = |low: f64, high: f64, right: f64| (held([low, high], right, ""), [0.0, g * 0.1 * (0.2 - low)]);
+    for (name, (case, expected)) in [
+        ("a float at a wall", at(0.15, 0.25, 0.4)),
+        ("one deeper", at(0.12, 0.22, 0.4)),
+        ("a block in a corner that looks out", at(0.0, 0.25, 0.4)),
+        ("a block in a corner under water", (held([0.0, 0.1], 0.4, ""), [0.0, g * 0.01])),
+    ] {
+        let found = pressed(simulation(&case));
+        println!("{name}: {found:.4?} N for {expected:.4?}");
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 0.02 * expected.max(0.005 * g), "{name}");
+        }
+    }
+}
+
+#[test]
+fn floats_that_part_are_not_drawn_back_by_the_air_above_their_slot() {
+    let mut case = held([0.15, 0.25], 0.4, "velocity = [-0.05, 0, 0]\n");
+    let body = &mut case.body[0];
+    (body.density, body.standing) = (Some(500.0), false);
+    body.locked.drain(..2);
+    let mut simulation = simulation(&case);
+    while simulation.time < 0.3 {
+        simulation.step().expect("it floats");
+    }
+    let way = 0.35 - simulation.solids.poses()[0].position.x;
+    println!("{way:.4} m from the wall");
+    assert!(way > 0.003, "{way} m: it was back at the wall after 0.1 s");
+}
+
+#[test]
+fn a_body_that_is_held_has_its_slots_on_the_device_too() {
+    if !there_is_a_device("slots of a body that is held on a device") {
+        return;
+    }
+    let gpu = Processor::Gpu { adapter: None };
+    let case = held([0.0, 0.1], 0.2, "");
+    let found = pressed(Simulation::on(&case, Scene::build(&case).expect("builds"), &gpu).expect("starts"));
+    println!("on the device {found:.4?} N");
+    assert!(found[0].abs() < 0.01 && (found[1] / 0.981 - 1.0).abs() < 0.01, "{found:?}");
 }

@@ -665,7 +665,7 @@ fn coupling() {
         // A body brings outliers into the spectrum, the lighter the farther out; conjugate gradients in f32 find those
         // again and again, one iteration each time.
         for (ratio, apart, least, standing) in
-            [(1.0, 2, 0.01, false), (0.05, 4, 0.04, false), (0.05, 4, 0.04, true), (1.0, 2, 0.01, false)]
+            [(1.0, 2, 0.01, false), (0.05, 5, 0.04, false), (0.05, 5, 0.04, true), (1.0, 2, 0.01, false)]
         {
             // Pressed and turned by something else as well.
             let mass = ratio * pair.params.density * volume;
@@ -916,7 +916,9 @@ fn body_force() {
                     body_force::surface_pressure(row.pressure, row.excess, to_surface, &pair.params);
                 let area = pose.orientation * solid.wall_area[k];
                 let reaction = fields.reaction[i - pair.scene.groups.fluid];
-                let force = body_force::body_force(if wet { pressed } else { 0.0 }, area, reaction);
+                let turning = body_force::turning(pose.angular_velocity, area, &pair.params);
+                let (pressed, turning) = if wet { (pressed, turning) } else { (0.0, DVec3::ZERO) };
+                let force = body_force::body_force(pressed, area, reaction + turning);
                 sum += Wrench { force, torque: arm.cross(force) };
                 size += force.length();
                 torques += arm.length() * force.length();

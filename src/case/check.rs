@@ -86,6 +86,23 @@ impl Checker<'_> {
         }
         names.len()
     }
+    /// In two dimensions nothing moves along y, or turns about another axis.
+    pub(super) fn in_plane(&mut self, path: &str, along: &Vector) {
+        if self.flat() && along[1] != 0.0 {
+            let message = format!("{} along y: in two dimensions there are x and z alone", along[1]);
+            self.add(path, message, "set the second number to 0 (z is up), or run.dimensions = 3");
+        }
+    }
+    /// See [`Self::in_plane`].
+    pub(super) fn about_y(&mut self, path: &str, axis: &Vector) {
+        if self.flat() && (axis[0] != 0.0 || axis[2] != 0.0) {
+            self.add(
+                path,
+                "in two dimensions a solid turns about y alone",
+                "set the first and the third number to 0",
+            );
+        }
+    }
     pub(super) fn flat(&self) -> bool {
         self.case.run.dimensions == 2
     }
@@ -111,6 +128,7 @@ impl Checker<'_> {
         self.positive("run.spacing", run.spacing, "m");
         self.positive("run.time_step", run.time_step, "s");
         self.positive("run.end", run.end, "s");
+        self.in_plane("run.gravity", &run.gravity);
         let re = run.effective_radius;
         self.range("run.effective_radius", re, (1.5..=4.1).contains(&re), "1.5 to 4.1 (2.1 in the paper)");
         if !matches!(run.dimensions, 2 | 3) {
@@ -205,6 +223,7 @@ impl Checker<'_> {
         for (k, block) in fluid.block.iter().enumerate() {
             let path = format!("fluid.block.{k}");
             self.gradient(&path, block.velocity_gradient.as_ref());
+            self.in_plane(&format!("{path}.velocity"), &block.velocity);
             if self.box_edges(&path, &format!("{path}.max"), &block.min, &block.max) {
                 self.fits(&path, "the block", &block.min, &block.max);
             }

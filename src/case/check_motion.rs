@@ -45,16 +45,14 @@ impl Checker<'_> {
         self.rotation(path, guide.rotation, (pivot, middle), reach);
         if let Some(sine) = guide.sine {
             let times = [sine.period, sine.phase_deg, sine.ramp];
+            self.in_plane(&key("sine.axis"), &sine.axis);
             if self.sine(&key("sine"), &sine.axis, times) && sine.amplitude.is_finite() {
                 self.steady(&key("sine"), sine.formula().fastest(0.0, f64::INFINITY));
             }
         }
         if let Some(swing) = guide.swing {
             let times = [swing.period, swing.phase_deg, swing.ramp];
-            if self.flat() && (swing.axis[0] != 0.0 || swing.axis[2] != 0.0) {
-                let message = "in two dimensions a solid turns about y alone";
-                self.add(key("swing.axis"), message, "set it to [0, 1, 0]");
-            }
+            self.about_y(&key("swing.axis"), &swing.axis);
             if let Some(pivot) = &guide.pivot {
                 self.place(&key("pivot"), pivot);
             }
@@ -238,6 +236,9 @@ impl Checker<'_> {
         if !rows.is_empty() && rows.iter().flatten().all(|x| x.is_finite()) {
             rows.iter().enumerate().for_each(|(k, row)| self.place(&format!("{path}.{k}"), &row[1..]));
             self.motion_start(path, rows);
+            rows.iter()
+                .enumerate()
+                .for_each(|(k, row)| self.in_plane(&format!("{path}.{k}"), &[row[1], row[2], row[3]]));
             let flat = self.flat();
             let way = |a: &[f64; 4], b: &[f64; 4]| {
                 length(&[b[1] - a[1], if flat { 0.0 } else { b[2] - a[2] }, b[3] - a[3]])

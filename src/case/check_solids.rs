@@ -76,6 +76,8 @@ impl Checker<'_> {
                 }
             }
         }
+        self.in_plane(&path("velocity"), &body.velocity);
+        self.about_y(&path("angular_velocity"), &body.angular_velocity);
         if body.standing && length(&self.case.run.gravity) == 0.0 {
             self.add(
                 path("standing"),
@@ -186,10 +188,15 @@ impl Checker<'_> {
                 self.add(path("axis"), message, "set axis = [0, 1, 0], or leave it out");
             }
         }
-        if let Some(turn) = form.orientation
-            && length(&turn.axis) == 0.0
-        {
-            self.add(path("orientation.axis"), "the axis has no length", "give a direction, e.g. [0, 1, 0]");
+        if let Some(turn) = form.orientation {
+            if length(&turn.axis) == 0.0 {
+                self.add(
+                    path("orientation.axis"),
+                    "the axis has no length",
+                    "give a direction, e.g. [0, 1, 0]",
+                );
+            }
+            self.about_y(&path("orientation.axis"), &turn.axis);
         }
         if let Some(scale) = form.scale {
             self.positive(&path("scale"), scale, "m");

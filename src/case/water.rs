@@ -91,6 +91,7 @@ impl Checker<'_> {
         for (k, water) in shapes.iter().enumerate() {
             let path = format!("fluid.shape.{k}");
             self.gradient(&path, water.velocity_gradient.as_ref());
+            self.in_plane(&format!("{path}.velocity"), &water.velocity);
             if water.shape == BodyShape::Terrain {
                 let message = "a terrain is ground and has no end";
                 self.add(format!("{path}.shape"), message, "use a [[fluid.fill]], or set shape = \"mesh\"");

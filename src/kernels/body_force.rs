@@ -29,6 +29,14 @@ pub fn missing_head(params: &Params) -> f64 {
     params.density * params.gravity.length() * params.zero_pressure_depth()
 }
 
+/// What the stress of viscosity holds beside the shear that [`super::viscosity::reaction`] sums, rho nu du/dn: rho nu (grad u)^T n, on the surface of
+/// a solid that turns -rho nu omega x A [N]. Over a body that is wholly under water it is no force, but a torque of -2 rho nu V omega in the plane
+/// and in space.
+#[inline(always)]
+pub fn turning(angular_velocity: DVec3, area: DVec3, params: &Params) -> DVec3 {
+    -params.density * params.viscosity * angular_velocity.cross(area)
+}
+
 /// Force of one wall-layer particle [N]: -P A + reaction, with `area` in world axes [m2].
 #[inline(always)]
 pub fn body_force(surface_pressure: f64, area: DVec3, reaction: DVec3) -> DVec3 {

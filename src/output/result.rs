@@ -135,8 +135,9 @@ pub struct Body {
     pub velocity_m_s: [f64; 3],
     /// Angular velocity, world axes [rad/s].
     pub angular_velocity_rad_s: [f64; 3],
-    /// Force of the fluid in the last step [N].
-    pub fluid_force_n: [f64; 3],
+    /// Force of the fluid in the last step [N]; none where it is not computed: on walls that move, without a gauge for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fluid_force_n: Option<[f64; 3]>,
 }
 
 /// Water that an opening has let through.

@@ -231,6 +231,7 @@ fn works(ledger: &Ledger, change: f64) -> BTreeMap<&'static str, f64> {
 fn bodies(simulation: &Simulation) -> Vec<Body> {
     let poses = simulation.solids.poses().iter().zip(&simulation.fluid_force).enumerate();
     let poses = poses.take(simulation.scene.followed());
+    let known = simulation.knows_fluid_force();
     poses
         .map(|(k, (pose, wrench))| {
             let q = pose.orientation;
@@ -240,7 +241,7 @@ fn bodies(simulation: &Simulation) -> Vec<Body> {
                 orientation_wxyz: [q.w, q.x, q.y, q.z],
                 velocity_m_s: pose.velocity.to_array(),
                 angular_velocity_rad_s: pose.angular_velocity.to_array(),
-                fluid_force_n: wrench.force.to_array(),
+                fluid_force_n: known.then(|| wrench.force.to_array()),
             }
         })
         .collect()

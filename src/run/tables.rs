@@ -3,6 +3,7 @@
 use super::due::Due;
 use super::summary::Totals;
 use crate::backend::{Counters, Timing};
+use crate::body::Wrench;
 use crate::checkpoint::Archive;
 use crate::contact::Energy;
 use crate::error::Result;
@@ -15,6 +16,7 @@ use crate::plan::Stage;
 use crate::pressure::Outcome;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// The tables of a run.
@@ -225,9 +227,12 @@ impl Tables {
         self.monitors.flush()?;
         if let Some(table) = &mut self.bodies {
             let followed = simulation.scene.followed();
+            let known = simulation.knows_fluid_force();
             for (k, pose) in simulation.solids.poses().iter().enumerate().take(followed) {
                 let q = pose.orientation;
                 let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
+                let nothing = Wrench { force: DVec3::NAN, torque: DVec3::NAN };
+                let fluid = if known { fluid } else { nothing };
                 let mut row = vec![Cell::from(simulation.time), Cell::from(simulation.solids.name(k))];
                 row.extend(vector_cells(simulation.solids.path(k)));
                 row.extend([q.w, q.x, q.y, q.z].map(Cell::Number));

@@ -4,6 +4,7 @@ use crate::output::result::{Grade, Summary, Verdict};
 use crate::scene::{Drive, Scene};
 use crate::simulation::Simulation;
 use crate::time_step::collapse_speed;
+use glam::DQuat;
 
 /// Part of the solves that may fail, of the particles that may get lost, in a fine result and in one that means
 /// anything [-].
@@ -29,7 +30,7 @@ pub struct Scale {
     speed: f64,
     /// Energy [J].
     energy: f64,
-    /// Energy that gravity along periodic axes may give it [J].
+    /// Energy that gravity along periodic axes and walls that go up may give it [J].
     given: f64,
 }
 
@@ -51,6 +52,18 @@ impl Scale {
             Drive::Free(_) => None,
         });
         let driven = driven.fold(simulation.openings.fastest(0.0, end), f64::max);
+        // What goes up takes the water on it along: as high, and as fast. What turns may.
+        let up = -params.gravity.normalize_or_zero();
+        let (mut risen, mut tilted) = (0.0_f64, 0.0_f64);
+        for solid in &scene.solids {
+            if let Drive::Prescribed(motion) = &solid.drive {
+                for (way, turn) in motion.poses() {
+                    risen = risen.max(way.dot(up));
+                    tilted = tilted
+                        .max(2.0 * solid.shape.radius() * (0.5 * turn.angle_between(DQuat::IDENTITY)).sin());
+                }
+            }
+        }
         let (mut bodies, mut turning) = (0.0, 0.0);
         for solid in &scene.solids {
             if let Drive::Free(body) = &solid.drive {
@@ -71,11 +84,13 @@ impl Scale {
                 .max(collapse_speed(params))
                 .max(noise)
                 .max(thrown),
-            energy: g * (water * params.depth + bodies * height)
+            energy: g * (water * params.depth + bodies * height + (water + bodies) * (risen + tilted))
                 + (water + bodies) * speed * speed
                 + turning
                 + water * noise * noise,
-            given: 0.5 * (water + bodies) * (speed * speed - moved * moved),
+            given: (water + bodies)
+                * (0.5 * (speed * speed - moved * moved)
+                    + if risen > 0.0 { g * risen + 0.5 * driven * driven } else { 0.0 }),
         }
     }
 }

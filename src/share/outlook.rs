@@ -1,14 +1,16 @@
 //! What ranks would have and say, before anything is computed.
 
 use super::cut::{check, cut, is_ring, unevenness};
+use crate::body::Pose;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::kernels::multigrid::{SWEEPS, visits};
 use crate::kernels::multigrid_levels::level_cells;
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
-use crate::scene::{Kind, Scene};
+use crate::scene::{Kind, Scene, Solid};
 use crate::scheme::Preconditioner;
+use crate::slots::Slots;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -112,6 +114,8 @@ impl Outlook {
         };
         let [cells, parents, border_cells] = if multigrid > 0 { wet_cells(scene, &grid) } else { [0; 3] };
         let joins = multigrid * (1 + 2 * u64::from(levels > 1));
+        // Pressures at the rims of slots are a round of their own.
+        let slots = u64::from(plan.coupled && has_slots(scene, params)?);
         Ok(Self {
             unevenness: unevenness(&water, &cuts),
             parts: parts.collect(),
@@ -120,15 +124,40 @@ impl Outlook {
                 a_water * water_at + a_carrier * carriers_at,
                 (8 + 4 * multigrid) * carriers_at + 4 * shown * border_cells,
             ],
-            rounds: [5 + bodies + joins + 2 * filled, 3 + multigrid + visited],
+            rounds: [5 + bodies + slots + joins + 2 * filled, 3 + multigrid + visited],
             round_bytes: [4 * cells + (4 + 27 * 8) * parents, 4 * visited * parents],
-            on_devices: on_devices(plan, [water_at, carriers_at], [grid.total() as u64, cells], ranks as u64),
+            on_devices: on_devices(
+                plan,
+                [water_at, carriers_at],
+                [grid.total() as u64, cells],
+                ranks as u64,
+                slots,
+            ),
         })
     }
 }
 
+/// Whether a body stands so near another solid that the pressure at the rim of their slot is read.
+fn has_slots(scene: &Scene, params: &Params) -> Result<bool> {
+    let pose = |solid: &Solid| Pose {
+        position: solid.position,
+        orientation: solid.orientation,
+        velocity: DVec3::ZERO,
+        angular_velocity: DVec3::ZERO,
+    };
+    let poses: Vec<Pose> = scene.solids.iter().map(pose).collect();
+    let rows = Slots::new(scene, params.density).rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
+    Ok(!rows.is_empty())
+}
+
 /// What devices say of borders with so much water, and with so much that carries pressure; of all cells, and of those with water.
-fn on_devices(plan: &Plan, [water, carriers]: [u64; 2], [cells, wet]: [u64; 2], ranks: u64) -> OnDevices {
+fn on_devices(
+    plan: &Plan,
+    [water, carriers]: [u64; 2],
+    [cells, wet]: [u64; 2],
+    ranks: u64,
+    slots: u64,
+) -> OnDevices {
     let count = |stages: &[Stage]| stages.iter().filter(|&&s| plan.has(s)).count() as u64;
     let motions = count(&[Stage::Viscosity, Stage::WallFriction, Stage::Collision]);
     let (surface, coupled) = (count(&[Stage::SurfacePressure]), u64::from(plan.coupled));
@@ -152,7 +181,10 @@ fn on_devices(plan: &Plan, [water, carriers]: [u64; 2], [cells, wet]: [u64; 2], 
     OnDevices {
         messages: [3 + motions + shown, in_iteration],
         message_bytes: [travels * water + border, number * in_iteration * carriers],
-        rounds: [7 + coupled + count(&[Stage::BodyForce]) + 2 * filled + 2 * multigrid, 2 + 2 * multigrid],
+        rounds: [
+            7 + coupled + slots + count(&[Stage::BodyForce]) + 2 * filled + 2 * multigrid,
+            2 + 2 * multigrid,
+        ],
         round_bytes,
         // On both sides, given and taken.
         staged_bytes: [

@@ -291,7 +291,7 @@ pub fn compare_stages(
             }
             Stage::ConjugateGradient => {
                 if plan.coupled {
-                    let slots = simulation.slot_rows();
+                    let slots = simulation.slot_rows()?;
                     let bodies = simulation.solids.free_bodies(pair.params.balanced_gravity());
                     pair.cpu.free_bodies(&bodies, &slots)?;
                     pair.gpu.free_bodies(&bodies, &slots)?;

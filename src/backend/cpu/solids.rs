@@ -39,13 +39,14 @@ impl Cpu {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
                 let mut pressure = 0.0;
+                let mut reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 if own && fields.state[i] == State::Inner {
                     total.add(fields.pressure[i], &slot.per_pascal);
                     total += slot.head;
                     let excess = self.excess.of(i - fluid);
                     pressure = body_force::surface_pressure(fields.pressure[i], excess, to_surface, params);
+                    reaction += body_force::turning(pose.angular_velocity, area, params);
                 }
-                let reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
                 let force = body_force::body_force(pressure, area, reaction);
                 total.force += force;
                 total.torque += arm.cross(force);

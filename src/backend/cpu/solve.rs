@@ -47,7 +47,8 @@ impl Cpu {
                 let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
                 // What acts at a pressure of zero.
                 let known = body_force::surface_pressure(0.0, excess.of(i - fluid), to_surface, params);
-                let force = body_force::body_force(known, area, reaction);
+                let turning = body_force::turning(pose.angular_velocity, area, params);
+                let force = body_force::body_force(known, area, reaction + turning);
                 sum += Wrench { force, torque: arm.cross(force) };
                 sum += slot.head;
                 let mut row = coupling::row(area, arm);

@@ -99,7 +99,7 @@ pub struct Constants {
     pub cell_width: [f32; 3],
     pub zero: f32,
     pub drive: [f32; 3],
-    pub pad_drive: f32,
+    pub dynamic_viscosity: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -306,7 +306,7 @@ impl Constants {
             wall_contact: params.wall_contact as f32,
             body_wall: params.body_wall as u32,
             zero: 0.0,
-            pad_drive: 0.0,
+            dynamic_viscosity: (params.density * params.viscosity) as f32,
         }
     }
 }

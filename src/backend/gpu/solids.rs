@@ -34,11 +34,11 @@ impl Gpu {
         let count = free.len() as u32;
         free.iter_mut().for_each(|body| body.bodies = count);
         self.coupled = free.len() as u64;
-        if free.is_empty() {
-            return Ok(());
-        }
         self.context.begin(Some(Stage::ConjugateGradient));
-        self.context.upload(buffers::free_body, &free)?;
+        if !free.is_empty() {
+            self.context.upload(buffers::free_body, &free)?;
+        }
+        // Water in slots presses on a body that is held as well.
         // Zeros stand for rows at no slot, also before the first upload.
         if slots.is_empty() && !self.slots_shown {
             return Ok(());
