@@ -25,7 +25,6 @@ use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
 /// at all: gaps of a half and of 1.1 spacings. Water comes in between.
@@ -77,7 +76,7 @@ impl Layer {
     }
 
     /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them. One without either is none.
-    fn slots(&self, shares: &[f64]) -> Vec<(Vec<usize>, Vec<usize>)> {
+    fn slots(&self, solid: usize, shares: &[f64]) -> Vec<Slot> {
         let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
         let mut out = vec![];
         for first in 0..shares.len() {
@@ -97,7 +96,8 @@ impl Layer {
             let is_rim = |&n: &usize| self.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
             let (rim, deep): (Vec<usize>, Vec<usize>) = rows.into_iter().partition(is_rim);
             if !rim.is_empty() && !deep.is_empty() {
-                out.push((rim, deep));
+                let deep = deep.into_iter().map(|n| (n, shares[n])).collect();
+                out.push(Slot { solid, rim, deep });
             }
         }
         out
@@ -112,10 +112,9 @@ impl Layer {
 /// A slot between a free body and other solids: rows of the body's layer.
 struct Slot {
     solid: usize,
-    /// How much of each row of the layer lies in a slot [-].
-    shares: Arc<[f64]>,
     rim: Vec<usize>,
-    deep: Vec<usize>,
+    /// Rows deep in it, and how much of each [-].
+    deep: Vec<(usize, f64)>,
 }
 
 /// Finds the slots of the free bodies of a scene.
@@ -166,12 +165,7 @@ impl Slots {
             if !at_walls && others[k].is_empty() {
                 return vec![];
             }
-            let shares: Arc<[f64]> = self.shares(k, at_walls, &others[k], poses).into();
-            layer
-                .slots(&shares)
-                .into_iter()
-                .map(|(rim, deep)| Slot { solid: k, shares: shares.clone(), rim, deep })
-                .collect()
+            layer.slots(k, &self.shares(k, at_walls, &others[k], poses))
         };
         let found: Vec<Slot> =
             self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect();
@@ -181,13 +175,10 @@ impl Slots {
         let places =
             |slot: &Slot| slot.rim.iter().map(|&n| self.layers[slot.solid].first + n).collect::<Vec<_>>();
         let pressure = read(&found.iter().flat_map(places).collect::<Vec<_>>())?;
-        let mut before = 0;
-        let of_slot = |slot: Slot| {
-            let pressure = &pressure[before..before + slot.rim.len()];
-            before += slot.rim.len();
-            self.passed_on(&slot, &poses[slot.solid], pressure)
-        };
-        let mut out: Vec<SlotRow> = found.into_iter().flat_map(of_slot).collect();
+        let mut rest = &pressure[..];
+        let told: Vec<&[f64]> = found.iter().filter_map(|slot| rest.split_off(..slot.rim.len())).collect();
+        let of_slot = |(slot, told): (&Slot, &[f64])| self.passed_on(slot, &poses[slot.solid], told);
+        let mut out: Vec<SlotRow> = found.par_iter().zip(told).flat_map_iter(of_slot).collect();
         out.sort_unstable_by_key(|slot| (slot.solid, slot.row));
         Ok(out)
     }
@@ -250,8 +241,7 @@ impl Slots {
         };
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
-        for &n in slot.deep.iter().filter(|&&n| under_water(n)) {
-            let share = slot.shares[n];
+        for &(n, share) in slot.deep.iter().filter(|row| under_water(row.0)) {
             let row = row(pose.orientation * layer.area[n], on_surface(n));
             let head = self.weight.dot(on_surface(n) - middle);
             let along = xi(n).to_array();
@@ -288,7 +278,7 @@ impl Slots {
             SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head }
         };
         let inside =
-            |&n: &usize| SlotRow { solid, row: n as u32, taken: slot.shares[n], ..SlotRow::default() };
+            |&(n, taken): &(usize, f64)| SlotRow { solid, row: n as u32, taken, ..SlotRow::default() };
         wet.into_iter().chain(dry_rows).map(at_rim).chain(slot.deep.iter().map(inside)).collect()
     }
 

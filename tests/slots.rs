@@ -2,7 +2,7 @@
 
 use crate::common::{case, simulation, there_is_a_device};
 use glam::DVec3;
-use seixo::backend::{Processor, gpu};
+use seixo::backend::Processor;
 use seixo::body::{Pose, Wrench};
 use seixo::case::Case;
 use seixo::contact::Solids;
@@ -22,11 +22,6 @@ fn standing(spacing: f64) -> Case {
          displaces_fluid = true\nstanding = true\n",
         spacing * 0.05
     ))
-}
-
-/// The first adapter, if there is one.
-fn device() -> Option<Processor> {
-    (!gpu::adapters().is_empty()).then_some(Processor::Gpu { adapter: None })
 }
 
 #[test]
@@ -94,7 +89,8 @@ fn water_under_a_block_on_the_floor_carries_it_at_any_resolution() {
         println!("l0 {spacing}: {force:.3} N for 9.81 N");
         assert!((force / 9.81 - 1.0).abs() < 0.01, "l0 {spacing}: {force} N");
     }
-    if let Some(gpu) = device() {
+    if there_is_a_device("water under a block on a device") {
+        let gpu = Processor::Gpu { adapter: None };
         // The device has the same rows (twins::coupling): the coarsest tells whether they are used.
         let case = standing(0.02);
         let force = lift(Simulation::on(&case, Scene::build(&case).expect("builds"), &gpu).expect("starts"));
