@@ -167,6 +167,15 @@ pub enum FolderError {
     /// A result would take the place of this input.
     #[error("{} would be overwritten by the results: choose another folder with --out", .0.display())]
     Input(PathBuf),
+    /// A run would begin with a state of the run in it, and take its place.
+    #[error(
+        "run.from: {} is where the results go, too, which would replace the state that the run begins with: choose \
+         another folder with --out", .0.display()
+    )]
+    State(PathBuf),
+    /// What is asked for would take the place of a file of a run.
+    #[error("{} is a file of the run in that folder: choose another name with --out", .0.display())]
+    Result(PathBuf),
     /// The run in it is one of another case.
     #[error(
         "the case is another one than that of the run in {}: {}{}; run it as it was, or start a new run from that state \

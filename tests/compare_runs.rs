@@ -157,6 +157,20 @@ fn what_does_not_fit_together_is_said() {
         told.err
     };
     assert!(wrong(&[&a], &[]).contains("2 values required"));
+    // A table of that name that is not of differences stays.
+    let table = folder.path().join("page.csv");
+    std::fs::write(&table, "time,level\n0,1\n").unwrap();
+    assert!(wrong(&[&a, &b], &[]).contains("page.csv is there already"));
+    assert_eq!(std::fs::read_to_string(&table).unwrap(), "time,level\n0,1\n");
+    std::fs::remove_file(&table).unwrap();
+    let own = ran(&[
+        "compare-runs",
+        "-o",
+        &a.join("gauges.html").display().to_string(),
+        &a.display().to_string(),
+        &b.display().to_string(),
+    ]);
+    assert!(own.code == 2 && own.err.contains("gauges.csv"), "{}", own.err);
     assert!(wrong(&[&a, &a], &[]).contains("named twice"));
     assert!(wrong(&[&a, folder.path()], &[]).contains("holds no run"));
     let err = wrong(&[&a, &b], &["--only", "enrgy"]);

@@ -35,6 +35,33 @@ fn rows(table: &str) -> Vec<Vec<Option<f64>>> {
 }
 
 #[test]
+fn no_reader_writes_over_what_a_run_wrote() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("still.toml"), STILL).unwrap();
+    let run = ["run", "still.toml", "-o", "out", "--backend", "cpu", "-q"];
+    for more in [&[][..], &["--set", "gauge.level=[{name=\"h\",at=[0.5,0]}]", "--force"]] {
+        seixo().current_dir(folder.path()).args(run).args(more).assert().success();
+    }
+    let line = ["measure", "out", "--line", "0.5,0,0,0.5,0,0.7", "--count", "2", "-o"];
+    for (args, target) in [
+        (&line[..], "out/monitors.csv"),
+        (&line, "out/gauges.csv"),
+        (&line, "out/case.toml"),
+        (&line, "out/still.pvd"),
+        (&["report", "out", "--pictures", "0", "-o"], "out/result.json"),
+    ] {
+        let before = std::fs::read(folder.path().join(target)).unwrap();
+        let output = seixo().current_dir(folder.path()).args(args).arg(target).output().unwrap();
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && err.contains(target), "{target}: {err}");
+        assert_eq!(std::fs::read(folder.path().join(target)).unwrap(), before, "{target}");
+    }
+    for target in ["out/line.csv", "line.csv", "gauges.csv"] {
+        seixo().current_dir(folder.path()).args(line).arg(target).assert().success();
+    }
+}
+
+#[test]
 fn pressures_along_a_line_are_those_of_water_at_rest() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("still.toml"), STILL).unwrap();

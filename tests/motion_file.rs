@@ -35,12 +35,39 @@ fn a_wall_follows_its_file_as_it_follows_rows() {
     assert!(file.1.contains("[0.02, 0.0, 0.0, 0.004]") && file.1.contains("# up"), "{}", file.1);
     let set = ["--set", "moving_wall.0.motion=curves/gate.csv"];
     assert_eq!(run("set", "motion = [[0, 0, 0, 0], [1, 0, 0, 0.1]]", &set).0, rows.0);
+    // What is overridden need not be there.
+    assert_eq!(run("instead", "motion = \"curves/gone.csv\"", &set).0, rows.0);
+    // Spreadsheets begin a file with a byte order mark; without names, too.
+    std::fs::write(
+        folder.path().join("curves/marked.csv"),
+        format!("\u{feff}{}", &ROWS[ROWS.find("0, 0").unwrap()..]),
+    )
+    .unwrap();
+    assert_eq!(run("marked", "motion = \"curves/marked.csv\"", &[]).0, rows.0);
     // A file that has changed since is another case.
     std::fs::write(folder.path().join("curves/gate.csv"), ROWS.replace("0.004", "0.003")).unwrap();
     let path = case(folder.path(), "motion = \"curves/gate.csv\"");
     let shown = folder.path().join("file").display().to_string();
     let changed = ran(&["run", &path, "-o", &shown, "--resume", "--backend", "cpu"]);
     assert!(changed.code == 2 && changed.err.contains("moving_wall.0.motion"), "{}", changed.err);
+}
+
+#[test]
+fn a_file_is_named_in_a_table_on_one_line_and_by_an_override_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gate.csv"), ROWS).unwrap();
+    let path = folder.path().join("line.toml");
+    let text = "run = {spacing = 0.1, time_step = 1e-3, end = 1, dimensions = 2}\n\
+                tank = {min = [0, 0, 0], max = [1, 0, 1]}\n\
+                moving_wall = [{name = \"gate\", min = [0.4, 0, 0], max = [0.6, 0, 0.5], motion = \"gate.csv\"}]\n";
+    std::fs::write(&path, text).unwrap();
+    let rows = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
+        seixo::case::file::load(&path, None, &sets).unwrap().case.moving_wall[0].motion.clone()
+    };
+    assert_eq!(rows(&[])[1], [0.02, 0.0, 0.0, 0.004]);
+    let wall = "moving_wall=[{name=\"gate\",min=[0.4,0,0],max=[0.6,0,0.5],motion=\"gate.csv\"}]";
+    assert_eq!(rows(&[wall]), rows(&[]));
 }
 
 #[test]

@@ -316,8 +316,37 @@ fn a_state_starts_another_case() {
     let gauges = std::fs::read_to_string(case.root("second").join("gauges.csv")).unwrap();
     assert!(gauges.lines().nth(1).unwrap().starts_with("0.05"), "{gauges}");
     let other = case.run("third", &["--until", "0.08", "--set", &from, "--spacing", "0.04"]);
-    assert!(other.code == 2 && other.err.contains("particles of water, the case"), "{}", other.err);
-    assert!(!case.root("third").exists());
+    assert!(other.code == 2 && other.err.contains("run.spacing was 0.05, is 0.04"), "{}", other.err);
+    for (sets, words) in [
+        (&["--until", "0.05"][..], "run.end: the state of run.from is of t = 0.0500"),
+        (&["--until", "0.08", "--set", "moving_wall.0.max=[0.8,0,0.7]"], "moving_wall.0.max"),
+        (&["--until", "0.08", "--set", "fluid.block.0.max=[0.5,0,0.4]"], "fluid.block.0.max"),
+        // The gate is 25 mm up; it would be 5 mm higher at once.
+        (
+            &["--until", "0.08", "--set", "moving_wall.0.motion=[[0,0,0,0],[1,0,0,0.6]]"],
+            "`gate` stands 5.000e-3 m from where its motion has it at t = 0.0500",
+        ),
+    ] {
+        let wrong = case.run("third", &[&["--set", &from][..], sets].concat());
+        assert!(wrong.code == 2 && wrong.err.contains(words), "{words}: {}", wrong.err);
+        assert!(!case.root("third").exists(), "{words}");
+    }
+    // What happens from then on may change, where the wall goes included.
+    let free = [
+        "--set",
+        "moving_wall.0.motion=[[0,0,0,0],[0.05,0,0,0.025],[1,0,0,0.9]]",
+        "--set",
+        "fluid.viscosity=1e-4",
+        "--set",
+        "gauge.level=[]",
+        "--until",
+        "0.06",
+    ];
+    let freed = case.run("free", &[&["--set", &from][..], &free].concat());
+    assert_eq!(freed.code, 0, "{}", freed.err);
+    // The state is not cleared away by the run that begins with it.
+    let onto = case.run("first", &[&["--set", &from, "--force"][..], &["--until", "0.08"]].concat());
+    assert!(onto.code == 2 && case.root("first").join("checkpoint").exists(), "{}", onto.err);
     let nowhere = case.run("third", &["--set", "run.from=\"nowhere\""]);
     assert!(nowhere.code == 2 && nowhere.err.contains("holds no checkpoint"), "{}", nowhere.err);
 }

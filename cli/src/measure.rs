@@ -8,6 +8,7 @@ use seixo::case::OutputField;
 use seixo::case::file::read_text;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
+use seixo::output::folder::spare_results;
 use seixo::output::particles::Particles;
 use seixo::output::replay::particles;
 use seixo::output::write_whole;
@@ -69,6 +70,7 @@ const HEADER: [&str; 8] = [
 pub fn measure(args: &MeasureArgs) -> Exit {
     seixo::threads::start(None)?;
     let points = points(args)?;
+    args.out.iter().try_for_each(|path| spare_results(path))?;
     let (case, frames) = series_of(&args.dir, args.series.as_deref())?;
     let held = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
     if held == [false; 2] {

@@ -155,6 +155,13 @@ impl Body {
         self.motion.is_none()
     }
 
+    /// How far [m] a prescribed solid's pose is, at most and anywhere on it, from where its motion has it at time `t` [s].
+    pub(crate) fn off_motion(&self, t: f64) -> Option<f64> {
+        let (position, orientation, motion) = self.motion.as_ref()?;
+        let turned = (motion.turn(t) * *orientation).angle_between(self.pose.orientation);
+        Some((*position + motion.displacement(t) - self.pose.position).length() + turned * self.radius())
+    }
+
     /// Radius of the sphere about the centre that holds the body [m].
     pub fn radius(&self) -> f64 {
         self.shape.radius()

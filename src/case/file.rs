@@ -1,7 +1,7 @@
 //! Reading a case file: text, overrides, parsing, checking; errors that point at file, line and key.
 
 use super::check::check;
-use super::motion_file::{allow_files, inline, inline_set};
+use super::motion_file::{allow_files, inline};
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
 use super::{Case, overrides};
@@ -76,6 +76,7 @@ fn and_more(problems: usize) -> String {
 pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded> {
     let read = std::fs::File::open(path).and_then(read_text);
     let text = read.map_err(|source| match source.kind() {
+        std::io::ErrorKind::IsADirectory => Error::file(path.display().to_string(), "", folder(path)),
         std::io::ErrorKind::NotFound => Error::file(path.display().to_string(), "", missing(path)),
         std::io::ErrorKind::InvalidData => {
             let name = path.display().to_string();
@@ -97,6 +98,10 @@ const LONGEST: u64 = 64 << 20;
 pub fn read_text(source: impl std::io::Read) -> std::io::Result<String> {
     let mut text = String::new();
     let length = std::io::Read::read_to_string(&mut source.take(LONGEST + 1), &mut text)?;
+    // Some editors and spreadsheets put a byte order mark in front.
+    if text.starts_with('\u{feff}') {
+        text.remove(0);
+    }
     if length as u64 > LONGEST {
         let why = "longer than 64 MB, which no case is";
         return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, why));
@@ -113,22 +118,13 @@ pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String
     if let Some(l0) = spacing {
         all.push(format!("run.spacing={}", toml_edit::Value::from(l0)));
     }
-    for set in sets {
-        all.push(inline_set(path, set)?);
-    }
-    let text = inline(path, text)?;
+    all.extend_from_slice(sets);
     let name = path.display().to_string();
-    let (mut case, mut text, warnings) = parse(&name, text, &all)?;
+    let text = inline(path, with_sets(&name, text, &all)?)?;
+    let (mut case, mut text, warnings) = read(&name, text, !all.is_empty())?;
     // What a case says of its place holds no more for its copy beside the results.
     let mut places = vec![("run.from".to_owned(), case.run.from.clone())];
-    let mut files = |table: &str, all: &mut dyn Iterator<Item = &Option<String>>| {
-        places.extend(all.enumerate().map(|(k, file)| (format!("{table}.{k}.file"), file.clone())));
-    };
-    files("obstacle", &mut case.obstacle.iter().map(|o| &o.file));
-    files("moving_wall", &mut case.moving_wall.iter().map(|w| &w.file));
-    let water = case.fluid.iter().flat_map(|f| &f.shape);
-    files("fluid.shape", &mut water.map(|w| &w.file));
-    files("body", &mut case.body.iter().map(|b| &b.file));
+    places.extend(case.files().into_iter().map(|(key, file)| (key, Some(file.clone()))));
     let mut absolute = Vec::new();
     for (key, place) in places {
         if let Some(place) = place.map(PathBuf::from).filter(|p| p.is_relative()) {
@@ -148,6 +144,11 @@ pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String
 /// # Errors
 /// [`Error::Case`] with everything that is wrong.
 pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String, Vec<String>)> {
+    read(name, with_sets(name, text, sets)?, !sets.is_empty())
+}
+
+/// `text` with overrides applied.
+fn with_sets(name: &str, text: String, sets: &[String]) -> Result<String> {
     let text = text.replace("\r\n", "\n");
     // Broken TOML is reported on the text as it stands in the file.
     if let Err(error) = DeTable::parse(&text) {
@@ -155,10 +156,14 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
         let problem = message.problem(name, &text);
         return Err(CaseError::new(vec![problem], render(name, &text, &[message])).into());
     }
-    let text = if sets.is_empty() { text } else { overrides::apply(&text, sets)? };
+    if sets.is_empty() { Ok(text) } else { overrides::apply(&text, sets) }
+}
+
+/// [`parse`], of a text that is `overridden` already, or not.
+fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec<String>)> {
     let wrong = |messages: &[Message]| {
         let mut report = render(name, &text, messages);
-        if !sets.is_empty() {
+        if overridden {
             report.push_str(OVERRIDDEN);
         }
         report
@@ -195,6 +200,18 @@ pub fn parse(name: &str, text: String, sets: &[String]) -> Result<(Case, String,
     Ok((case, text, warnings))
 }
 
+/// A folder instead of a file: says so, and what to do with one of results.
+fn folder(path: &Path) -> String {
+    let shown = path.display();
+    let copy = path.join("case.toml");
+    let more = if copy.exists() {
+        format!(", and in results it is {}; `seixo run --resume {shown}` goes on with them", copy.display())
+    } else {
+        String::new()
+    };
+    format!("{shown} is a folder: a case is a file{more}")
+}
+
 /// No such file: says so, and which file of the folder has a name like it.
 fn missing(path: &Path) -> String {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -211,6 +228,21 @@ fn missing(path: &Path) -> String {
 }
 
 impl Case {
+    /// The files of its meshes and the keys that name them.
+    pub(crate) fn files(&mut self) -> Vec<(String, &mut String)> {
+        let obstacles = self.obstacle.iter_mut().map(|o| ("obstacle", &mut o.file));
+        let walls = self.moving_wall.iter_mut().map(|w| ("moving_wall", &mut w.file));
+        let water = self.fluid.iter_mut().flat_map(|f| &mut f.shape).map(|w| ("fluid.shape", &mut w.file));
+        let bodies = self.body.iter_mut().map(|b| ("body", &mut b.file));
+        let mut numbered = Vec::new();
+        for (k, (table, file)) in
+            obstacles.enumerate().chain(walls.enumerate()).chain(water.enumerate()).chain(bodies.enumerate())
+        {
+            numbered.extend(file.as_mut().map(|file| (format!("{table}.{k}.file"), file)));
+        }
+        numbered
+    }
+
     /// The case in the file `path`.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use super::file::read_text;
 use crate::error::{Error, Result};
 use std::path::Path;
-use toml_edit::{Array, DocumentMut, Item, Value};
+use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 /// Tables of a case, those of their keys that may be the name of a file, and its rows.
 const TABLES: [(&str, &[&str], &Form); 4] = [
@@ -33,44 +33,26 @@ pub(super) fn inline(path: &Path, text: String) -> Result<String> {
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text) };
     let mut found = false;
     for (table, keys, form) in TABLES {
-        let tables = match document.get_mut(table) {
-            Some(Item::ArrayOfTables(tables)) => tables,
+        let tables: Vec<&mut dyn TableLike> = match document.get_mut(table) {
+            Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|t| t as _).collect(),
+            Some(Item::Value(Value::Array(tables))) => {
+                tables.iter_mut().filter_map(Value::as_inline_table_mut).map(|t| t as _).collect()
+            }
             _ => continue,
         };
-        for one in tables.iter_mut() {
+        for one in tables {
             for &key in keys {
-                let Some(file) = one.get(key).and_then(Item::as_str).map(str::to_owned) else { continue };
-                let mut rows = Value::Array(rows(path, &file, key, form)?);
+                let Some(Item::Value(value)) = one.get_mut(key) else { continue };
+                let Some(file) = value.as_str() else { continue };
+                let mut rows = Value::Array(rows(path, file, key, form)?);
                 // What stands around the name, a comment say, stays around the rows.
-                if let Some(old) = one.get(key).and_then(Item::as_value) {
-                    *rows.decor_mut() = old.decor().clone();
-                }
-                one[key] = Item::Value(rows);
+                *rows.decor_mut() = value.decor().clone();
+                *value = rows;
                 found = true;
             }
         }
     }
     Ok(if found { document.to_string() } else { text })
-}
-
-/// `set` as it is, or with the rows of the file that it names.
-///
-/// # Errors
-/// As [`inline`].
-pub(super) fn inline_set(path: &Path, set: &str) -> Result<String> {
-    let Some((path_of, value)) = set.split_once('=') else { return Ok(set.to_owned()) };
-    let (table, key) = match (path_of.trim().split('.').next(), path_of.trim().rsplit('.').next()) {
-        (Some(table), Some(key)) if table != key => (table, key),
-        _ => return Ok(set.to_owned()),
-    };
-    let Some((.., form)) = TABLES.iter().find(|(name, keys, _)| *name == table && keys.contains(&key)) else {
-        return Ok(set.to_owned());
-    };
-    let file = value.trim().trim_matches(|c| c == '"' || c == '\'');
-    if file.starts_with('[') || file.parse::<f64>().is_ok() {
-        return Ok(set.to_owned());
-    }
-    Ok(format!("{path_of}={}", rows(path, file, key, form)?))
 }
 
 /// Lets a schema of cases have the name of a file where such rows stand.

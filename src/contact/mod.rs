@@ -130,6 +130,11 @@ impl Solids {
         &self.predicted
     }
 
+    /// How far [m] solid `k` is from where its motion has it at time `t` [s]; nothing of a free one.
+    pub(crate) fn off_motion(&self, k: usize, t: f64) -> Option<f64> {
+        self.bodies[k].off_motion(t)
+    }
+
     /// Whether forces move solid `k`.
     pub fn is_free(&self, k: usize) -> bool {
         self.bodies[k].is_free()

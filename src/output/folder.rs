@@ -18,17 +18,11 @@ const MARKER: &str = ".seixo";
 const RESERVE: &str = ".reserve";
 /// Bytes of it.
 const RESERVED: usize = 32 << 10;
+/// The page of `seixo report`.
+const REPORT: &str = "report.html";
 /// Files of a run in the folder itself, beside `NAME.pvd`.
-const FILES: [&str; 8] = [
-    "case.toml",
-    "result.json",
-    "monitors.csv",
-    "bodies.csv",
-    "gauges.csv",
-    "final.png",
-    "report.html",
-    RESERVE,
-];
+const FILES: [&str; 8] =
+    ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", REPORT, RESERVE];
 
 /// The folder of the checkpoints of a run in `root`.
 pub fn checkpoints(root: &Path) -> PathBuf {
@@ -38,6 +32,28 @@ pub fn checkpoints(root: &Path) -> PathBuf {
 /// The folder of the frames of the series `name` (`[[output.series]]`) of a run in `root`: the list `name.pvd`, and `vtu/`.
 pub fn series_in(root: &Path, name: &str) -> PathBuf {
     root.join("series").join(name)
+}
+
+/// The folder, within that of a run, of copies of the meshes of its case.
+pub(crate) const MESHES: &str = "meshes";
+
+/// Whether such a copy may be called so: as its file, with the CRC-32 of what it holds, `hull-1f3a9c02.stl`.
+pub(crate) fn is_mesh(name: &str) -> bool {
+    let sum = name.rsplit_once('.').and_then(|(stem, _)| stem.rsplit_once('-')).map(|(_, sum)| sum);
+    sum.is_some_and(|s| s.len() == 8 && s.bytes().all(|b| b.is_ascii_hexdigit()))
+}
+
+/// Refuses to write the table or page of a reader to `path` if that is where the run in the same folder has a file of its
+/// own; `report.html` is nobody else's.
+///
+/// # Errors
+/// [`Error::Folder`] with the path.
+pub fn spare_results(path: &Path) -> Result<()> {
+    let root = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+    let list = case_name(root)?.map(|name| format!("{name}.pvd"));
+    let taken = FILES.contains(&file) && file != REPORT || list.as_deref() == Some(file) || file == MARKER;
+    if list.is_some() && taken { Err(FolderError::Result(path.to_path_buf()).into()) } else { Ok(()) }
 }
 
 /// Name of the case whose run `root` holds; nothing if it is no folder of seixo's.
@@ -80,7 +96,7 @@ pub struct Folder {
 
 impl Folder {
     /// Make or take over `root` for a run of the case `name`, as `mode` says, and lock it. `inputs` are files that
-    /// the run was made from: none of them is ever overwritten or removed.
+    /// the run is made from, and folders of runs whose states it is: none of them is ever overwritten or removed.
     ///
     /// # Errors
     /// [`Error::Folder`] if the folder is not empty, is no folder of seixo's, is in use by another run, or if a
@@ -115,6 +131,9 @@ impl Folder {
     fn spare(&self, inputs: &[PathBuf]) -> Result<()> {
         let Ok(root) = self.root.canonicalize() else { return Ok(()) };
         for input in inputs.iter().filter_map(|p| p.canonicalize().ok()) {
+            if input == root {
+                return Err(FolderError::State(input).into());
+            }
             let name = input.file_name().and_then(|n| n.to_str()).unwrap_or_default();
             if input.parent() == Some(&root) && self.is_ours(name, &self.name) {
                 return Err(FolderError::Input(input).into());
@@ -208,7 +227,10 @@ impl Folder {
             numbered(file, "frame_", ".png") || file.starts_with(UNFINISHED)
         })?;
         self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(UNFINISHED))?;
-        for folder in [self.vtu(), self.pictures(), self.checkpoints(), self.root.join("series")] {
+        self.remove(&self.file(MESHES), |file| is_mesh(file) || file.starts_with(UNFINISHED))?;
+        let folders =
+            [self.vtu(), self.pictures(), self.checkpoints(), self.file(MESHES), self.file("series")];
+        for folder in folders {
             // Somebody else's files keep their folder.
             let _ = std::fs::remove_dir(folder);
         }
@@ -218,7 +240,7 @@ impl Folder {
     /// Removes what a run that was killed had not written to the end. The lock says that nobody writes there; pictures
     /// may be drawn beside a run and are left alone.
     fn clear_unfinished(&self) -> Result<()> {
-        let mut folders = vec![self.root.clone(), self.vtu(), self.checkpoints()];
+        let mut folders = vec![self.root.clone(), self.vtu(), self.checkpoints(), self.file(MESHES)];
         folders.extend(self.series()?.into_iter().flat_map(|(series, _)| [series.join("vtu"), series]));
         folders.iter().try_for_each(|folder| self.remove(folder, |file| file.starts_with(UNFINISHED)))
     }

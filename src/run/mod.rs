@@ -7,6 +7,8 @@
 
 mod due;
 pub mod frames;
+mod from;
+mod meshes;
 mod pace;
 pub mod resume;
 mod saving;
@@ -27,8 +29,10 @@ use crate::stop::Stop;
 use crate::whole::remove;
 pub use due::Due;
 use frames::Frames;
+use from::{earlier, fits, stands};
+use meshes::Meshes;
 use pace::Pace;
-use saving::{Kept, Saving, earlier, fits};
+use saving::{Kept, Saving};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use summary::Totals;
@@ -127,11 +131,17 @@ pub fn run(
         }
     };
     let resumes = archive.is_some();
-    let from = if resumes { None } else { earlier(simulation)? };
-    if let Some(archive) = archive.as_mut().or(from.map(|f| f.archive).as_mut()) {
+    let mut inputs = options.inputs.clone();
+    if let Some(archive) = &mut archive {
         simulation.exchange(archive)?;
+    } else if let Some(mut found) = earlier(simulation)? {
+        simulation.exchange(&mut found.archive)?;
+        stands(simulation)?;
+        inputs.extend(simulation.case.run.from.as_ref().map(PathBuf::from));
     }
-    let folder = Folder::open(&options.out, &options.name, mode, &options.inputs)?;
+    let meshes = Meshes::read(&simulation.case, text)?;
+    let text = &meshes.text;
+    let folder = Folder::open(&options.out, &options.name, mode, &inputs)?;
     let mut run = Run {
         start: Instant::now(),
         frames: Frames::new(&folder, &simulation.case.output, scene, &simulation.params, options.pictures)?,
@@ -151,6 +161,7 @@ pub fn run(
     }
     // What the run said of its end holds no more.
     remove(&folder.file("result.json"))?;
+    meshes.write(&folder)?;
     write_whole(&folder.file("case.toml"), text.as_bytes())?;
     run.parts += 1;
     run.finish(simulation, scene, &options, &folder, stop, observe, resumes)

@@ -1,5 +1,6 @@
 //! What an earlier run left in a folder, and whether another one may go on with it.
 
+use super::meshes::by_content;
 use crate::case::Case;
 use crate::case::file::parse;
 use crate::checkpoint::Found;
@@ -69,10 +70,10 @@ fn same(root: &Path, old: &Case, new: &Case) -> Result<()> {
 }
 
 /// Keys with other values, each with both of them.
-fn changed(old: &Case, new: &Case) -> Vec<String> {
+pub(super) fn changed(old: &Case, new: &Case) -> Vec<String> {
     let plain = |case: &Case| {
         // When states are saved changes nothing about them.
-        let mut case = case.clone();
+        let mut case = by_content(case.clone());
         case.run.checkpoint = Default::default();
         case.run.from = None;
         toml::Value::try_from(case).ok()

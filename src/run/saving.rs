@@ -1,11 +1,10 @@
-//! When and where the state of a run is saved, and which states it may begin with.
+//! When and where the state of a run is saved.
 
 use super::due::Due;
-use crate::checkpoint::{Archive, Found, Origin, file};
-use crate::error::{Error, Result};
-use crate::output::folder::checkpoints;
+use crate::checkpoint::{Archive, Origin, file};
+use crate::error::Result;
 use crate::simulation::Simulation;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// When and where the state is saved.
@@ -74,27 +73,4 @@ impl Saving {
         (self.last, self.step, self.good) = (Instant::now(), Some(step), None);
         Ok(())
     }
-}
-
-/// The state that `run.from` names.
-pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
-    let Some(from) = &simulation.case.run.from else { return Ok(None) };
-    let found = file::newest(&checkpoints(Path::new(from)))?;
-    let found =
-        found.ok_or_else(|| Error::key("run.from", format!("run.from: `{from}` holds no checkpoint"), ""))?;
-    fits(simulation, &found).map_err(|e| Error::misfit(format!("run.from: {e}")))?;
-    Ok(Some(Found { archive: found.archive.to_restore(), ..found }))
-}
-
-/// Refuses a state of another kind of processor.
-pub(super) fn fits(simulation: &Simulation, found: &Found) -> Result<()> {
-    let (had, have) = (&found.origin.precision, simulation.backend.precision());
-    if had == have {
-        return Ok(());
-    }
-    let name = |precision: &str| if precision == "f64" { "cpu" } else { "gpu" };
-    let (path, had, have) = (found.path.display(), name(had), name(have));
-    Err(Error::misfit(format!(
-        "{path} was saved by a run on the {had}, this one is on the {have}: use --backend {had}"
-    )))
 }

@@ -3,7 +3,7 @@
 use crate::report::table::Table;
 use glam::DQuat;
 use seixo::case::file::load;
-use seixo::error::{FolderError, Result};
+use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
 use serde_json::Value;
 use std::path::Path;
@@ -41,7 +41,10 @@ impl Run {
     /// A folder without a run, or a table that cannot be read.
     pub fn read(root: &Path, name: String) -> Result<Self> {
         case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(|| FolderError::NoRun(root.to_path_buf()))?;
-        let text = load(&root.join("case.toml"), None, &[])?.text;
+        let path = root.join("case.toml");
+        load(&path, None, &[])?;
+        // As it stands there: a mesh is named by what it holds.
+        let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
         let mut keys = Vec::new();
         if let Ok(case) = text.parse::<toml::Table>() {
             flatten("", &toml::Value::Table(case), &mut keys);

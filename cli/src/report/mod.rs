@@ -16,7 +16,7 @@ use seixo::case::file::load;
 use seixo::case::{Case, OutputField};
 use seixo::console::say;
 use seixo::error::{Error, FolderError, Result};
-use seixo::output::folder::case_name;
+use seixo::output::folder::{case_name, spare_results};
 use seixo::output::replay::Frame;
 use seixo::output::write_whole;
 use seixo::params::Params;
@@ -84,6 +84,7 @@ pub fn report(args: &ReportArgs) -> Exit {
     let pictures = pictures(args, &run)?;
     let page = page(&run, &pictures)?;
     let path = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
+    spare_results(&path)?;
     write_whole(&path, page.as_bytes())?;
     if !args.quiet {
         say(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));

@@ -1,0 +1,131 @@
+//! `run.from`: a run that begins with the last state of another one.
+
+use super::resume::changed;
+use crate::case::file::parse;
+use crate::checkpoint::{Found, file};
+use crate::error::{Error, Result};
+use crate::output::folder::checkpoints;
+use crate::simulation::Simulation;
+use std::path::Path;
+
+/// The state that `run.from` names.
+///
+/// # Errors
+/// [`Error::Case`] if there is none, or if it is of a later time than the end of the run; [`Error::Checkpoint`] if it is of
+/// another scene or kind of processor.
+pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
+    let run = &simulation.case.run;
+    let Some(from) = &run.from else { return Ok(None) };
+    let found = file::newest(&checkpoints(Path::new(from)))?;
+    let found =
+        found.ok_or_else(|| Error::key("run.from", format!("run.from: `{from}` holds no checkpoint"), ""))?;
+    fits(simulation, &found).map_err(|e| Error::misfit(format!("run.from: {e}")))?;
+    let time = found.origin.time;
+    if time >= run.end {
+        let text = format!(
+            "run.end: the state of run.from is of t = {time} s, and the run is to end at {} s",
+            run.end
+        );
+        return Err(Error::key("run.end", text, "give a later end, with --until say"));
+    }
+    let (old, ..) = parse("checkpoint", found.origin.case.clone(), &[])?;
+    let scene: Vec<String> = changed(&old, &simulation.case).into_iter().filter(|c| is_of_scene(c)).collect();
+    if scene.is_empty() {
+        return Ok(Some(Found { archive: found.archive.to_restore(), ..found }));
+    }
+    let more = if scene.len() > TOLD { format!(" and {} more", scene.len() - TOLD) } else { String::new() };
+    Err(Error::misfit(format!(
+        "run.from: the state in {from} is of another scene: {}{more}; leave as they were what says where things are at t = 0 \
+         and how they begin to move, for the state says it now",
+        scene[..scene.len().min(TOLD)].join(", "),
+    )))
+}
+
+/// Keys of a scene that differ and are told.
+const TOLD: usize = 6;
+
+/// Whether the value at `path`, a dotted key or the table of it, is part of what a state is the state of. Laws,
+/// constants, motions, gauges, names and what is written may change.
+fn is_of_scene(path: &str) -> bool {
+    let mut parts = path.split([' ', '.']).filter(|p| p.parse::<usize>().is_err());
+    let table = parts.next().unwrap_or_default();
+    let free = match table {
+        "run" => {
+            return ["spacing", "dimensions", "effective_radius"].contains(&parts.next().unwrap_or_default());
+        }
+        "fluid" => {
+            return ["block", "fill", "shape", "jitter", "seed"].contains(&parts.next().unwrap_or_default());
+        }
+        "tank" | "obstacle" | "plane" => &["name"][..],
+        "moving_wall" => &["name", "motion", "rotation", "sine", "swing", "wave", "pivot"],
+        "body" => {
+            &["name", "motion", "rotation", "sine", "swing", "pivot", "density", "mass", "inertia", "locked"]
+        }
+        "inflow" | "outflow" => &["name", "velocity", "discharge"],
+        _ => return false,
+    };
+    // A table as a whole: there are more of them, or fewer.
+    parts.next().is_none_or(|key| !free.contains(&key))
+}
+
+/// Refuses a state of another kind of processor.
+pub(super) fn fits(simulation: &Simulation, found: &Found) -> Result<()> {
+    let (had, have) = (&found.origin.precision, simulation.backend.precision());
+    if had == have {
+        return Ok(());
+    }
+    let name = |precision: &str| if precision == "f64" { "cpu" } else { "gpu" };
+    let (path, had, have) = (found.path.display(), name(had), name(have));
+    Err(Error::misfit(format!(
+        "{path} was saved by a run on the {had}, this one is on the {have}: use --backend {had}"
+    )))
+}
+
+/// Refuses a state in which a driven solid stands elsewhere than where its motion has it then: it would jump there.
+pub(super) fn stands(simulation: &Simulation) -> Result<()> {
+    let (time, spacing) = (simulation.time, simulation.case.run.spacing);
+    let solids = &simulation.solids;
+    for k in 0..solids.poses().len() {
+        let Some(off) = solids.off_motion(k, time).filter(|off| *off > JUMP * spacing) else { continue };
+        let name = solids.name(k);
+        return Err(Error::misfit(format!(
+            "run.from: `{name}` stands {off:.3e} m from where its motion has it at t = {time} s: let its motion go on from \
+             where the state left it (it may change from then on)"
+        )));
+    }
+    Ok(())
+}
+
+/// A jump that is none, over the spacing.
+const JUMP: f64 = 1e-3;
+
+#[cfg(test)]
+mod tests {
+    use super::is_of_scene;
+
+    #[test]
+    fn where_things_stand_is_of_the_scene_and_what_acts_on_them_is_not() {
+        for scene in [
+            "run.spacing was 0.1, is 0.2",
+            "obstacle.0.min.2 was 0, is 1",
+            "obstacle was absent, is other",
+            "body.1.velocity.0 was 0, is 1",
+            "body.0.center was other, is other",
+            "fluid.block.0.max.1 was 1, is 2",
+            "tank.open was other, is absent",
+        ] {
+            assert!(is_of_scene(scene), "{scene}");
+        }
+        for free in [
+            "run.end was 1, is 2",
+            "body.0.density was 800, is 900",
+            "moving_wall.2.motion was other, is other",
+            "gauge.level.0.at.0 was 1, is 2",
+            "fluid.viscosity was 0, is 1",
+            "output was absent, is other",
+            "contact.friction was 0.1, is 0.2",
+        ] {
+            assert!(!is_of_scene(free), "{free}");
+        }
+    }
+}
