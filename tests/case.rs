@@ -217,6 +217,11 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     // names and gauges
     ("name = \"cube\"", "name = \"gate\"", &["body.0.name: the name `gate` is taken by moving_wall.0"]),
     ("name = \"cube\"", "name = \"=cmd|x\"", &["body.0.name: the name `=cmd|x` begins like a formula"]),
+    (
+        "name = \"cube\"",
+        "name = \"tank.x_min\"",
+        &["body.0.name: the name `tank.x_min` is that of a face of the tank"],
+    ),
     ("name = \"force\"", "name = \"\\u001b[2J\"", &["the name `\\u{1b}[2J` holds control characters"]),
     ("name = \"force\"", "name = \"a\\nb\"", &["the name `a\\nb` holds control characters"]),
     (
@@ -277,6 +282,47 @@ fn large_relaxation_warns() {
         "{}",
         warnings[0]
     );
+}
+
+#[test]
+fn in_two_dimensions_water_does_not_move_along_y() {
+    let text = |gradient: &str| {
+        SOUND.replace("end = 1.0", "end = 1.0\ndimensions = 2").replace(
+            "max = [0.5, 1.0, 0.5]",
+            &format!("max = [0.5, 1.0, 0.5]\nvelocity_gradient = {gradient}"),
+        )
+    };
+    for wrong in ["[[1, 0, 0], [0, -1, 0], [0, 0, 0]]", "[[0, 1, 0], [0, 0, 0], [0, 0, 0]]"] {
+        let said = file::parse("test.toml", text(wrong), &[]).unwrap_err().to_string();
+        assert!(said.contains("velocity_gradient: in two dimensions there are x and z alone"), "{said}");
+    }
+    let sound = file::parse("test.toml", text("[[1, 0, 0.5], [0, 0, 0], [0, 0, -1]]"), &[]);
+    sound.unwrap_or_else(|e| panic!("{e}"));
+}
+
+#[test]
+fn what_lies_where_no_water_comes_is_warned_of() {
+    let gauge = |x: f64| format!("{SOUND}[[gauge.level]]\nname = \"h\"\nat = [{x}, 0.5]\n");
+    let absorber = |x: f64| {
+        format!(
+            "{SOUND}[[absorber]]\nmin = [{x}, 0, 0]\nmax = [{}, 1, 1]\ntowards = \"x_max\"\nrate = 1\n",
+            x + 0.3
+        )
+    };
+    for (text, words) in [
+        (gauge(1.2), "gauge.level.0.at: the line lies behind the wall `tank.x_max`"),
+        (gauge(-0.2), "the line lies behind the wall `tank.x_min`"),
+        (absorber(1.5), "absorber.0: the absorber lies behind the wall `tank.x_max`"),
+    ] {
+        let (_, _, warnings) = file::parse("test.toml", text.clone(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert!(warnings.len() == 1 && warnings[0].contains(words), "{words}: {warnings:?}");
+    }
+    for text in
+        [gauge(0.7), absorber(0.8), gauge(1.2).replace("open = [\"z_max\"]", "open = [\"z_max\", \"x_max\"]")]
+    {
+        let (_, _, warnings) = file::parse("test.toml", text, &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert!(warnings.is_empty(), "{warnings:?}");
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Bodies from STL and OBJ files: against the analytic shapes, apart from each other, afloat; what a file must be.
 
+use crate::cli::ran;
 use crate::common::case;
 use crate::common::dry::{Dry, G};
 use glam::{DQuat, DVec3, EulerRot};
@@ -444,6 +445,104 @@ fn what_is_wrong_with_a_file_is_said_with_the_key_and_the_place() {
     );
     let why = Scene::build(&missing).expect_err("refused").to_string();
     assert!(why.contains("/no/such/hull.stl"), "{why}");
+}
+
+#[test]
+fn an_stl_file_may_be_written_in_any_of_the_usual_ways() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let solid = cuboid(DVec3::splat(0.2));
+    let whole = stl(&solid);
+    // Each face a solid of its own, as CAD programs write named faces.
+    let faces: String = solid.chunks(2).map(|face| stl(&face.to_vec())).collect();
+    let nameless: String = whole
+        .lines()
+        .map(|l| if l.contains("solid") { l.split_whitespace().next().unwrap_or(l) } else { l })
+        .flat_map(|l| [l, "\n"])
+        .collect();
+    let binary = |header: &[u8]| {
+        let mut bytes = header.to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend((solid.len() as u32).to_le_bytes());
+        for triangle in &solid {
+            bytes.extend([0; 12]);
+            bytes.extend(triangle.iter().flat_map(|v| v.as_vec3().to_array()).flat_map(f32::to_le_bytes));
+            bytes.extend([0; 2]);
+        }
+        bytes
+    };
+    for (name, bytes) in [
+        ("whole.stl", whole.clone().into_bytes()),
+        ("faces.stl", faces.into_bytes()),
+        ("nameless.stl", nameless.into_bytes()),
+        ("marked.stl", format!("\u{feff}{whole}").into_bytes()),
+        ("shouted.stl", whole.to_uppercase().into_bytes()),
+        ("windows.stl", whole.replace('\n', "\r\n").into_bytes()),
+        ("binary.stl", binary(b"made by hand")),
+        ("binary-solid.stl", binary(b"solid made by a program that does not know better")),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("a file");
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"{}\"\n\
+             center = [0, 0, 0]\ndensity = 500\n[contact]\nspring = 1e5\n",
+            path.display()
+        );
+        let scene = Scene::build(&case(&text)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let mass = body(&scene).1;
+        assert!((mass / (500.0 * 0.008) - 1.0).abs() < 1e-6, "{name}: {mass} kg");
+    }
+}
+
+#[test]
+fn results_keep_the_meshes_that_they_are_of() {
+    let folder = tempfile::tempdir().expect("a folder");
+    file(&folder, "box.stl", &stl(&cuboid(DVec3::splat(0.2))));
+    let path = file(
+        &folder,
+        "my.toml",
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 0.02\n[[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"box.stl\"\n\
+         center = [0, 0, 0]\ndensity = 500\n[contact]\nspring = 1e5\n[output]\nevery = 0.01\n",
+    );
+    let root = folder.path().join("results");
+    let shown = root.display().to_string();
+    let run = ["run", &path, "-o", &shown, "--backend", "cpu", "-q"];
+    let first = ran(&[&run[..], &["--steps", "10"]].concat());
+    assert_eq!((first.code, first.err.as_str()), (0, ""));
+    let copies = || {
+        let found = std::fs::read_dir(root.join("meshes")).into_iter().flatten();
+        let mut names: Vec<String> =
+            found.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    };
+    let copy = copies();
+    assert_eq!(copy.len(), 1);
+    assert!(copy[0].starts_with("box-") && copy[0].ends_with(".stl"), "{copy:?}");
+    // The results are all there is: elsewhere, and with the mesh gone.
+    let moved = folder.path().join("elsewhere/results");
+    std::fs::create_dir(folder.path().join("elsewhere")).expect("a folder");
+    std::fs::rename(folder.path().join("box.stl"), folder.path().join("gone.stl")).expect("moved");
+    std::fs::rename(&root, &moved).expect("moved");
+    let at = moved.display().to_string();
+    for args in [
+        vec!["run", "--resume", &at, "--backend", "cpu", "-q"],
+        vec!["render", &at, "--size", "64x48"],
+        vec!["report", &at],
+    ] {
+        let done = ran(&args);
+        assert_eq!(done.code, 0, "{args:?}: {}", done.err);
+    }
+    std::fs::rename(&moved, &root).expect("moved");
+    std::fs::rename(folder.path().join("gone.stl"), folder.path().join("box.stl")).expect("moved");
+    assert_eq!(copies(), copy);
+    // The same case goes on with it; one whose mesh has changed is another case.
+    let again = ran(&[&run[..], &["--resume"]].concat());
+    assert_eq!((again.code, again.err.as_str()), (0, ""));
+    file(&folder, "box.stl", &stl(&cuboid(DVec3::splat(0.25))));
+    let other = ran(&[&run[..], &["--resume"]].concat());
+    assert!(other.code == 2 && other.err.contains("body.0.file"), "{}", other.err);
+    assert_eq!(ran(&[&run[..], &["--force"]].concat()).code, 0);
+    assert!(copies().len() == 1 && copies() != copy, "{:?} after {copy:?}", copies());
 }
 
 #[test]

@@ -60,6 +60,29 @@ fn counts_of_the_dam_break_at_the_papers_spacing() {
     assert!(scene.velocity[gate.wall_slots.start].distance(DVec3::new(0.0, 0.0, 0.11)) < 1e-12);
 }
 
+#[test]
+fn a_driven_body_that_is_taken_through_a_wall_is_told_of() {
+    let text = |motion: &str, open: &str| {
+        format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n{open}\n\
+             [[body]]\nname = \"ram\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.5, 0.5, 0.5]\n{motion}\n[contact]\nspring = 1e4\n"
+        )
+    };
+    let told = |motion: &str, open: &str| {
+        let scene = build(&text(motion, open)).unwrap_or_else(|e| panic!("{e}"));
+        scene.notes.into_iter().filter(|n| n.contains("`ram`")).collect::<Vec<_>>()
+    };
+    let ahead = "motion = [[0, 0, 0, 0], [1, 0.6, 0, 0]]";
+    assert_eq!(
+        told(ahead, ""),
+        ["body `ram`: its motion takes it 0.2000 m into the wall `tank.x_max`, which does not stop it"]
+    );
+    assert!(told(ahead, "open = [\"x_max\"]").is_empty());
+    assert!(told("motion = [[0, 0, 0, 0], [1, 0.4, 0, 0]]", "").is_empty());
+    let turned = "rotation = [[0, 0, 0, 0], [1, 90, 0, 0]]\nmotion = [[0, 0, 0, 0], [1, 0, 0, 0.39]]";
+    assert!(told(turned, "").is_empty());
+}
+
 /// Groups, slots and offsets agree with each other.
 #[test]
 fn slots_hold_their_solids() {

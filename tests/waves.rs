@@ -118,6 +118,11 @@ fn what_cannot_be_made_is_told_with_line_and_remedy() {
         assert_eq!(plan.code, 2, "{piston}: {}", plan.out);
         assert!(plan.err.contains(words) && plan.err.contains("flume.toml:"), "{piston}: {}", plan.err);
     }
+    // Another depth than that of the water there is odd, and may be meant.
+    std::fs::write(&path, flume(&regular("height = 0.02, period = 1.5, depth = 0.1"), "")).unwrap();
+    let plan = ran(&["plan", &path.display().to_string()]);
+    let odd = "the wave is made for water 0.1 m deep, and that at the piston is";
+    assert!(plan.code == 0 && plan.err.contains(odd), "{}", plan.err);
     // Water elsewhere: the depth has to be said.
     let text = flume(&regular("height = 0.08, period = 1.5"), "")
         .replace("[[fluid.block]]\nmin = [0,", "[[fluid.block]]\nmin = [1,");

@@ -62,6 +62,8 @@ impl Checker<'_> {
             }
             if self.box_edges(&path, &format!("{path}.max"), &absorber.min, &absorber.max) {
                 self.fits(&path, "the absorber", &absorber.min, &absorber.max);
+                let flat = |v: &Vector| [v[0], v[1]];
+                self.in_tank(&path, [&absorber.min, &absorber.max].map(flat), "the absorber");
             }
         }
     }

@@ -148,7 +148,7 @@ impl Checker<'_> {
             self.place("run.domain", max);
         }
         if run.spacing > 0.0 && run.time_step > 0.0 && run.end.is_finite() && run.end / run.time_step > 1e9 {
-            let message = format!("{:.1e} steps of {} s", run.end / run.time_step, run.time_step);
+            let message = format!("{:.1e} steps of {:e} s", run.end / run.time_step, run.time_step);
             self.add("run.time_step", message, "shorten run.end or use a larger run.time_step");
         }
         // The flow shortens an adaptive step; nothing else does.
@@ -332,6 +332,9 @@ impl Checker<'_> {
             let walls = super::TANK_FACES.iter().filter(|(face, _)| !bare.contains(face));
             solid.extend(walls.map(|(_, name)| *name));
         }
+        for (k, gauge) in gauges.level.iter().enumerate() {
+            self.in_tank(&format!("gauge.level.{k}.at"), [gauge.at, gauge.at], "the line");
+        }
         for (k, gauge) in gauges.force.iter().enumerate() {
             if !solid.contains(&gauge.on.as_str()) {
                 let message = format!("nothing solid is called `{}`", gauge.on);
@@ -342,6 +345,21 @@ impl Checker<'_> {
                 };
                 self.add(format!("gauge.force.{k}.on"), message, remedy);
             }
+        }
+    }
+
+    /// Warns of what lies wholly behind a wall of the tank, from `low` to `high` along x and y [m].
+    pub(super) fn in_tank(&mut self, path: &str, [low, high]: [[f64; 2]; 2], what: &str) {
+        let Some(tank) = &self.case.tank else { return };
+        let bare = tank.without_wall();
+        let axes = self.axes().filter(|&k| k < 2);
+        let behind = axes.flat_map(|k| [(2 * k, high[k] < tank.min[k]), (2 * k + 1, low[k] > tank.max[k])]);
+        let walled = |side: &usize| !bare.contains(&super::TANK_FACES[*side].0);
+        let sides: Vec<usize> = behind.filter(|b| b.1).map(|b| b.0).filter(walled).collect();
+        for side in sides {
+            let message =
+                format!("{what} lies behind the wall `{}`, where no water comes", super::TANK_FACES[side].1);
+            self.warn(path, message, "move it into the tank");
         }
     }
 

@@ -325,6 +325,11 @@ impl Checker<'_> {
             .chain(case.openings().map(|o| (format!("{}.name", o.path()), o.name.to_owned())))
             .collect();
         self.unique(&names, "solid");
+        let walls = super::TANK_FACES.map(|(_, name)| name);
+        for (path, name) in names.iter().filter(|(_, name)| walls.contains(&name.as_str())) {
+            let message = format!("the name `{name}` is that of a face of the tank");
+            self.add(path.clone(), message, "choose another name");
+        }
     }
 
     /// Names given as (path, name) must be there and differ.

@@ -74,6 +74,13 @@ impl Checker<'_> {
     /// A flow that keeps its volume; the pressure would take the rest away in the first step.
     pub(super) fn gradient(&mut self, path: &str, gradient: Option<&Matrix>) {
         let Some(gradient) = gradient else { return };
+        if self.flat() && (gradient[1] != [0.0; 3] || gradient.iter().any(|row| row[1] != 0.0)) {
+            self.add(
+                format!("{path}.velocity_gradient"),
+                "in two dimensions there are x and z alone",
+                "set the second row and the second number of each row to 0, or run.dimensions = 3",
+            );
+        }
         let divergence: f64 = self.axes().map(|k| gradient[k][k]).sum();
         let largest = gradient.as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         if divergence.abs() > 1e-6 * largest {

@@ -193,7 +193,7 @@ impl MovingWall {
     }
 
     /// Depth of the water that stands before its face at the start [m], from the blocks and fills there and the tank's floor.
-    fn still_depth(&self, case: &Case) -> Option<f64> {
+    pub(super) fn still_depth(&self, case: &Case) -> Option<f64> {
         let (axis, sign, face) = self.face()?;
         let (lo, hi) = self.straight_box()?;
         let (across, near) = (1 - axis, 1.5 * case.run.spacing);

@@ -3,6 +3,7 @@
 use super::Drive;
 use super::build::{AXES, Builder};
 use super::oriented::Placed;
+use crate::case::TANK_FACES;
 use crate::error::Problem;
 use glam::{DMat3, DVec3, IVec3};
 
@@ -14,7 +15,7 @@ impl Builder<'_> {
     /// The case's domain, or one with room around everything; complains of what lies outside.
     pub(super) fn domain(&mut self) -> (DVec3, DVec3) {
         let l0 = self.lattice.spacing;
-        let mut bounds = Bounds::default();
+        let (mut bounds, mut notes) = (Bounds::default(), vec![]);
         for wall in &self.fixed.shapes {
             let reach = Placed::from(wall).bounds();
             bounds.add(&format!("wall `{}`", wall.name), wall.center - reach, wall.center + reach);
@@ -32,14 +33,20 @@ impl Builder<'_> {
             let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
             bounds.add(&label, lo, hi);
             if let Drive::Prescribed(motion) = &solid.drive {
+                let (mut low, mut high) = (lo, hi);
                 for (way, turn) in motion.poses() {
                     let center = shape.center + way;
                     let axes = DMat3::from_quat(turn) * shape.axes;
                     let reach = Placed { center, axes, ..shape }.bounds();
-                    bounds.add(&label, center - reach, center + reach);
+                    (low, high) = (low.min(center - reach), high.max(center + reach));
+                }
+                bounds.add(&label, low, high);
+                if solid.is_body {
+                    notes.extend(self.through_walls(&label, low, high));
                 }
             }
         }
+        self.notes.append(&mut notes);
         if !self.water.cell.is_empty() {
             let (lo, hi) =
                 self.water.cell.iter().fold((IVec3::MAX, IVec3::MIN), |(a, b), &c| (a.min(c), b.max(c)));
@@ -87,6 +94,26 @@ impl Builder<'_> {
             hi += head.max(DVec3::ZERO);
         }
         self.in_plane(lo, hi)
+    }
+
+    /// What there is to say of a driven solid that reaches from `low` to `high` [m]: walls that it is taken through.
+    fn through_walls(&self, label: &str, low: DVec3, high: DVec3) -> Vec<String> {
+        let Some(tank) = &self.case.tank else { return vec![] };
+        let bare = tank.without_wall();
+        let held = |k: &usize| !(self.lattice.plane && *k / 2 == 1) && !bare.contains(&TANK_FACES[*k].0);
+        let beyond = |k: usize| {
+            let axis = k / 2;
+            if k.is_multiple_of(2) { tank.min[axis] - low[axis] } else { high[axis] - tank.max[axis] }
+        };
+        let through = (0..6).filter(held).filter(|&k| beyond(k) > 0.5 * self.lattice.spacing);
+        let note = |k: usize| {
+            format!(
+                "{label}: its motion takes it {:.4} m into the wall `{}`, which does not stop it",
+                beyond(k),
+                TANK_FACES[k].1
+            )
+        };
+        through.map(note).collect()
     }
 
     /// How far water and bodies fly with their velocity at t = 0 until the end, against and along each axis [m].

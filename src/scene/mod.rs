@@ -242,6 +242,15 @@ impl Scene {
         self.velocity[..self.water()].iter().map(|v| v.length()).fold(0.0, f64::max)
     }
 
+    /// Speed of the fastest thing that drives the water between the times `from` and `to` [m/s]: a solid with a motion, an opening.
+    pub fn driven(&self, from: f64, to: f64) -> f64 {
+        let solids = self.solids.iter().map(|s| match &s.drive {
+            Drive::Prescribed(motion) => motion.fastest(from, to, s.shape.radius()),
+            Drive::Free(_) => 0.0,
+        });
+        solids.chain(self.openings.iter().map(|o| o.fastest(from, to))).fold(0.0, f64::max)
+    }
+
     /// Solids that tables follow: all but the walls in openings, which come last.
     pub fn followed(&self) -> usize {
         self.solids.len() - self.openings.iter().filter(|o| o.solid.is_some()).count()

@@ -41,16 +41,44 @@ pub(super) fn soup(path: &str, bytes: &[u8]) -> Result<Soup, Unfit> {
 fn stl(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
     let repair = "save it again as binary STL";
     let wrong = |e: std::io::Error| Unfit::new(format!("{path}: no STL file: {e}"), repair);
-    let mut cursor = Cursor::new(bytes);
-    let reader = stl_io::create_stl_reader(&mut cursor).map_err(wrong)?;
     let mut out = vec![];
-    for (k, triangle) in reader.enumerate() {
-        let triangle =
-            triangle.map_err(|e| Unfit::new(format!("{path}: triangle {}: {e}", k + 1), repair))?;
-        let corners = triangle.vertices.map(|v| DVec3::from_array(v.0.map(f64::from)));
-        out.push(finite(path, k, corners)?);
+    for solid in solids(bytes) {
+        let mut cursor = Cursor::new(solid);
+        for triangle in stl_io::create_stl_reader(&mut cursor).map_err(wrong)? {
+            let number = out.len();
+            let triangle =
+                triangle.map_err(|e| Unfit::new(format!("{path}: triangle {}: {e}", number + 1), repair))?;
+            let corners = triangle.vertices.map(|v| DVec3::from_array(v.0.map(f64::from)));
+            out.push(finite(path, number, corners)?);
+        }
     }
     Ok(out)
+}
+
+/// The parts of an STL file that are read each by itself: the whole of a binary one, without a header that looks like text;
+/// each solid of one in text, of which there may be many, with or without names and a byte order mark, in small letters
+/// or large ones.
+fn solids(bytes: &[u8]) -> Vec<Vec<u8>> {
+    const HEADER: usize = 84;
+    const TRIANGLE: usize = 50;
+    let count =
+        bytes.get(HEADER - 4..HEADER).map(|n| n.iter().rev().fold(0, |n, &b| n << 8 | usize::from(b)));
+    let text = std::str::from_utf8(bytes).map(|t| t.trim_start_matches('\u{feff}').trim_start());
+    let (Ok(text), false) = (text, count.is_some_and(|n| bytes.len() == HEADER + n * TRIANGLE)) else {
+        let mut binary = bytes.to_vec();
+        binary.iter_mut().take(5).for_each(|b| *b = 0);
+        return vec![binary];
+    };
+    let mut solids: Vec<Vec<u8>> = vec![];
+    for line in text.lines().map(str::trim) {
+        if line.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("solid")) {
+            solids.push(b"solid of-many\n".to_vec());
+        } else if let Some(solid) = solids.last_mut() {
+            solid.extend(line.to_ascii_lowercase().bytes().chain(*b"\n"));
+        }
+    }
+    // No STL file: to be told by whoever reads it.
+    if solids.is_empty() { vec![bytes.to_vec()] } else { solids }
 }
 
 fn obj(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
