@@ -109,6 +109,14 @@ fn a_killed_sweep_goes_on_and_shards_join_to_the_same_table() {
     assert!(table(&folder.join("one")).len() < whole.len());
     assert_eq!(run(folder, &["collect", "one", "two", "-o", "joined"]).0, 0);
     assert_eq!(table(&folder.join("joined")), whole);
+    // What does not belong together is not joined, and neither is half of it.
+    std::fs::write(folder.join("other.toml"), STUDY.replace("end = 0.3", "end = 0.2")).expect("a file");
+    assert_eq!(run(folder, &["other.toml", "-o", "three", "--shard", "2/2"]).0, 0);
+    for (second, words) in [("three", "parts of different studies"), ("nowhere", "`nowhere` holds no study")]
+    {
+        let (code, text) = run(folder, &["collect", "one", second, "-o", "mixed"]);
+        assert!(code == 2 && text.contains(words), "{second}: {text}");
+    }
     for file in ["report.md", "results.json", "small-pressure_error-time.svg"] {
         assert!(folder.join("joined").join(file).exists(), "{file}");
     }
@@ -127,12 +135,20 @@ fn a_wanted_error_is_answered_in_words() {
 fn mistakes_are_told_before_anything_runs() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("bad.toml"), STUDY.replace("finest", "nowhere.csv")).expect("a file");
+    let mistake = |name: &str, old: &str, new: &str| {
+        assert!(STUDY.contains(old));
+        std::fs::write(folder.path().join(name), STUDY.replace(old, new)).expect("a file");
+    };
+    mistake("key.toml", "run.spacing", "run.spacings");
+    mistake("method.toml", "{preset}", "{nope}");
     for (arguments, expected) in [
         (&["hydrostatik"][..], "did you mean `hydrostatic`"),
         (&["none.toml"][..], "no study file"),
         (&["bad.toml"][..], "nowhere.csv"),
         (&["collect"][..], "name the folders"),
         (&["collect", "."][..], "holds no study"),
+        (&["key.toml"][..], "the case of every point is refused"),
+        (&["method.toml"][..], "method: there is no axis `nope`"),
         (&["gallery", "--set", "run.end=1"][..], "--set does not apply"),
     ] {
         let (code, text) = run(folder.path(), arguments);

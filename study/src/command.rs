@@ -84,6 +84,15 @@ impl Manifest {
         })
     }
 
+    /// Whether both are parts of one study: of a file with the same text, wherever it lay, or of the same built-in one.
+    fn is_of(&self, other: &Self) -> bool {
+        match (&self.file, &other.file) {
+            (Some((a, _)), Some((b, _))) => a == b,
+            (None, None) => self.what == other.what,
+            _ => false,
+        }
+    }
+
     fn read(folder: &Path) -> Result<Self> {
         let path = folder.join("study.json");
         let text = std::fs::read_to_string(&path).map_err(|_| {
@@ -132,7 +141,18 @@ pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
                 "collect: name the folders to join, e.g. seixo study collect part-1 part-2",
             )
         })?;
-        (Manifest::read(first)?, args.folders.clone())
+        let manifest = Manifest::read(first)?;
+        for other in &args.folders[1..] {
+            if !Manifest::read(other)?.is_of(&manifest) {
+                let text = format!(
+                    "collect: {} and {} hold parts of different studies",
+                    first.display(),
+                    other.display()
+                );
+                return Err(Error::usage("collect", text));
+            }
+        }
+        (manifest, args.folders.clone())
     } else if let Some(extra) = args.folders.first() {
         return Err(Error::usage("study", format!("`{}`: only `collect` takes folders", extra.display())));
     } else {

@@ -61,6 +61,13 @@ pub fn finest<'a>(rows: &'a [Row], curve: &str) -> Option<&'a Row> {
     rows.iter().filter(usable).max_by_key(|r| key(r))
 }
 
+/// Points of a reference of the curve `name` that a run with `curve` could come to: an experiment's tank may be longer than
+/// that of a case, whose front ends at its last wall. Of every other curve all of them.
+pub fn within(name: &str, reference: &[[f64; 2]], curve: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let most = curve.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+    reference.iter().copied().filter(|r| !name.starts_with("front") || r[1] <= most).collect()
+}
+
 /// A chart of the curves themselves for each one that is compared, with everything it is compared with.
 ///
 /// # Errors
@@ -86,10 +93,9 @@ pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(St
         for (k, (error, against)) in references.enumerate() {
             let most =
                 with.iter().flat_map(|r| r.measured.curves[name].last()).map(|p| p[0]).fold(0.0, f64::max);
-            let all = with.iter().flat_map(|r| &r.measured.curves[name]);
-            let high = all.map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
-            let reached = |p: &[f64; 2]| p[0] <= most && p[1] <= high;
-            let points = table(against, &files(against)?)?.into_iter().filter(reached).collect();
+            let all: Vec<[f64; 2]> = with.iter().flat_map(|r| r.measured.curves[name].clone()).collect();
+            let mut points = within(name, &table(against, &files(against)?)?, &all);
+            points.retain(|p| p[0] <= most);
             let label = error.name().replace("front against ", "experiment: ").replace(" [-]", "");
             series.push(Series::marks(&label, "#000000", marks[k % marks.len()], 4.5, points));
         }
@@ -131,10 +137,7 @@ pub fn curves(study: &Definition, rows: &mut [Row], files: &Files) -> Result<()>
         let range = reference.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
         for row in rows.iter_mut().filter(|r| Some(r.index) != own) {
             let Some(points) = row.measured.curves.get(curve) else { continue };
-            // The experiment's tank may be longer: what lies beyond the run's last wall is not compared.
-            let most = points.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
-            let inside: Vec<[f64; 2]> =
-                reference.iter().copied().filter(|r| own.is_some() || r[1] <= most).collect();
+            let inside = if own.is_some() { reference.clone() } else { within(curve, &reference, points) };
             if let Some(rms) = difference(points, &inside) {
                 row.measured.put(&name, rms / range);
             }
@@ -145,7 +148,7 @@ pub fn curves(study: &Definition, rows: &mut [Row], files: &Files) -> Result<()>
 
 #[cfg(test)]
 mod tests {
-    use super::{difference, table};
+    use super::{difference, table, within};
 
     #[test]
     fn curves_are_compared_where_both_are_known() {
@@ -153,6 +156,13 @@ mod tests {
         assert_eq!(difference(&curve, &[[0.5, 1.0], [1.0, 2.0], [9.0, 100.0]]), Some(0.0));
         assert_eq!(difference(&curve, &[[0.0, 1.0], [1.0, 3.0]]), Some(1.0));
         assert_eq!(difference(&curve, &[[5.0, 1.0], [1.0, 3.0]]), None);
+    }
+
+    #[test]
+    fn a_peak_that_a_run_does_not_reach_is_compared_but_a_front_beyond_its_tank_is_not() {
+        let (run, reference) = ([[0.0, 0.0], [2.0, 1.0]], [[0.0, 0.0], [1.0, 3.0], [2.0, 1.0]]);
+        assert_eq!(within("H2 [m]", &reference, &run), reference);
+        assert_eq!(within("front scaled", &reference, &run), [[0.0, 0.0], [2.0, 1.0]]);
     }
 
     #[test]

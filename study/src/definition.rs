@@ -144,7 +144,7 @@ pub struct Choice {
 pub struct ErrorMeasure {
     /// A measured value that is an error by itself (against an analytic solution).
     pub value: Option<String>,
-    /// A curve to compare, instead of `value`.
+    /// A curve to compare, instead of `value`: the rms of the differences over the largest size that the reference has.
     pub curve: Option<String>,
     /// With what: `finest` (the row with the most particles, and of those the most steps), or a CSV file
     /// of two columns, relative to the study file.
@@ -281,20 +281,22 @@ impl Definition {
     /// point whose case is refused is a point that fails.
     ///
     /// # Errors
-    /// [`Error::Case`] for a case that cannot be read, or an axis without values.
+    /// [`Error::Case`] for a case that cannot be read, an axis without values, a method that names what is no axis, and if
+    /// every point is refused: that is a mistake in the study, and not a finding.
     pub fn jobs(&self, files: &Files, setup: &Setup) -> Result<Vec<Job>> {
         let full = setup.full;
         let text = self.case_text(files)?;
         // A dry scene has nothing to jitter.
         let wet = parse(&self.name, text.clone(), &self.set).is_ok_and(|(case, _, _)| case.fluid.is_some());
         let runs = if wet { setup.runs } else { 0 };
-        let mut jobs: Vec<Job> = Vec::new();
+        let mut jobs: Vec<(Job, Option<Error>)> = Vec::new();
         let main = Grid { method: None, full: false, axis: self.axis.clone() };
         for grid in std::iter::once(&main).chain(&self.grid).filter(|g| full || !g.full) {
             if grid.axis.is_empty() {
                 continue;
             }
             let method = grid.method.as_ref().unwrap_or(&self.method);
+            self.names_axes(method, &grid.axis)?;
             let mut points: Vec<Vec<Pick>> = vec![Vec::new()];
             for axis in &grid.axis {
                 let picks = axis.picks(full)?;
@@ -319,10 +321,34 @@ impl Definition {
                 }
             }
         }
-        Ok(jobs)
+        if let Some((_, Some(_))) = jobs.first()
+            && jobs.iter().all(|(_, refused)| refused.is_some())
+        {
+            let first = jobs.swap_remove(0).1.map_or(String::new(), |e| e.to_string());
+            let text = format!(
+                "study `{}`: the case of every point is refused; that of the first:\n{first}",
+                self.name
+            );
+            return Err(Error::key("axis", text, ""));
+        }
+        Ok(jobs.into_iter().map(|(job, _)| job).collect())
     }
 
-    fn job(&self, text: &str, method: &str, picks: &[Pick], setup: &Setup) -> Job {
+    /// Refuses a `method` with a name in braces that is none of `axes`.
+    fn names_axes(&self, method: &str, axes: &[Axis]) -> Result<()> {
+        let named = method.split('{').skip(1).filter_map(|rest| rest.split_once('}')).map(|(name, _)| name);
+        let names: Vec<&str> = axes.iter().map(|a| a.name.as_str()).collect();
+        match named.into_iter().find(|name| !names.contains(name)) {
+            None => Ok(()),
+            Some(name) => {
+                let text = format!("method: there is no axis `{name}`; there are {}", names.join(", "));
+                Err(Error::key("method", text, ""))
+            }
+        }
+    }
+
+    /// A point, and why its case is refused, if it is.
+    fn job(&self, text: &str, method: &str, picks: &[Pick], setup: &Setup) -> (Job, Option<Error>) {
         let all = self.set.iter().chain(&setup.sets).chain(picks.iter().flat_map(|p| &p.set));
         let all: Vec<String> = all.cloned().collect();
         let mut method = method.to_owned();
@@ -337,14 +363,17 @@ impl Definition {
             let steps = run.end / run.time_step;
             steps * run.spacing.powi(-(run.dimensions as i32))
         });
-        let effective = parsed.map(|(_, text, _)| text).map_err(|e| e.to_string());
+        let (effective, refused) = match parsed {
+            Ok((_, text, _)) => (Ok(text), None),
+            Err(e) => (Err(e.to_string()), Some(e)),
+        };
         let parameters = picks.iter().map(|p| (p.axis.clone(), p.name.clone())).collect();
         let identity = match &effective {
             Ok(text) => format!("{text}\n{:?} {processor:?} {:?}", self.measure, self.limit),
             Err(error) => format!("{error} {all:?}"),
         };
         let (spec, limits, repetitions) = (self.measure.clone(), self.limit.clone(), self.repetitions);
-        Job {
+        let job = Job {
             method,
             parameters,
             identity,
@@ -358,7 +387,8 @@ impl Definition {
                 limits.iter().for_each(|(name, most)| out.limit(name, *most));
                 Ok(out)
             }),
-        }
+        };
+        (job, refused)
     }
 }
 

@@ -4,6 +4,7 @@ use super::pareto::{Candidate, Recommendation, front, recommend};
 use super::report::{Report, short};
 use super::row::{Class, Row};
 use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
+use std::collections::BTreeSet;
 
 /// What is on the horizontal axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,7 +149,14 @@ pub fn words(rows: &[Row], error: &str, wanted: f64) -> String {
         Recommendation::Closest(c) => {
             format!("No setting tried reaches a {error} of {}. The closest is {}.", short(wanted), tell(&c))
         }
-        Recommendation::Nothing => format!("No point of this study has a {error} and a run time."),
+        Recommendation::Nothing => {
+            let values = rows.iter().flat_map(|r| r.measured.values.keys());
+            let curves = rows.iter().flat_map(|r| r.measured.curves.keys());
+            let measured: BTreeSet<&String> = values.chain(curves).collect();
+            let measured: Vec<&str> = measured.into_iter().map(String::as_str).collect();
+            let measured = if measured.is_empty() { "nothing".to_owned() } else { measured.join(", ") };
+            format!("No point of this study has a {error} and a run time; measured is {measured}.")
+        }
     }
 }
 

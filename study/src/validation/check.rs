@@ -14,7 +14,9 @@
 //! ```
 
 use super::reduce::{Curve, Take, cut, distance, lag, reduce, since_moved, smooth};
+use crate::compare::within;
 use crate::definition::Files;
+use crate::engine::first_line;
 use crate::row::{Class, Measured};
 use seixo::error::{Error, Result};
 use serde::Deserialize;
@@ -135,12 +137,21 @@ pub fn columns(file: &str, text: &str, names: Option<&[String; 2]>) -> Result<Cu
         }),
     };
     let (x, y) = (place(0)?, place(1)?);
-    let curve: Curve = lines
-        .filter_map(|l| {
-            let cells: Vec<&str> = l.split(',').map(str::trim).collect();
-            Some([cells.get(x)?.parse().ok()?, cells.get(y)?.parse().ok()?])
-        })
-        .collect();
+    let mut curve = Curve::new();
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        // Other columns may have rows of their own.
+        let [Some(a), Some(b)] = [x, y].map(|k| cells.get(k).copied().filter(|c| !c.is_empty())) else {
+            continue;
+        };
+        let number = |cell: &str| cell.parse::<f64>().ok().filter(|v| v.is_finite());
+        let (Some(a), Some(b)) = (number(a), number(b)) else {
+            let text =
+                format!("{file}: expected two numbers in columns `{}` and `{}`: `{line}`", head[x], head[y]);
+            return Err(Error::file(file, "", text));
+        };
+        curve.push([a, b]);
+    }
     if curve.len() < 2 {
         return Err(Error::file(file, "", format!("{file}: expected two rows of numbers or more")));
     }
@@ -148,6 +159,30 @@ pub fn columns(file: &str, text: &str, names: Option<&[String; 2]>) -> Result<Cu
 }
 
 impl Check {
+    /// Why a run has no number for it.
+    pub fn missing(&self, measured: &Measured) -> String {
+        if measured.class > Class::Degraded {
+            return first_line(&measured.reason).to_owned();
+        }
+        let listed = |names: Vec<&String>| {
+            let names: Vec<&str> = names.into_iter().map(String::as_str).collect();
+            if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
+        };
+        if let Some(value) = &self.value {
+            return format!(
+                "there is no value `{value}`; measured are {}",
+                listed(measured.values.keys().collect())
+            );
+        }
+        let curves = self.curve.iter().chain(&self.behind);
+        match curves.into_iter().find(|c| !measured.curves.contains_key(*c)) {
+            Some(curve) => {
+                format!("there is no curve `{curve}`; there are {}", listed(measured.curves.keys().collect()))
+            }
+            None => "the curve has no such point: see `take`, `window`, `level` and `since_moved`".into(),
+        }
+    }
+
     /// What is wrong with it, if anything.
     ///
     /// # Errors
@@ -214,9 +249,7 @@ impl Check {
     fn of_curve(&self, curve: &[[f64; 2]], reference: &Reference) -> Option<Verdict> {
         let expected = reference.curve.as_ref().map(|c| cut(c, self.window));
         if self.take == Take::Distance {
-            // The experiment's tank may be longer: what lies beyond the run's range is not compared.
-            let most = curve.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
-            let reached: Curve = expected?.into_iter().filter(|r| r[1] <= most).collect();
+            let reached = within(self.curve.as_deref().unwrap_or_default(), &expected?, curve);
             let (rms, _) = distance(curve, &reached)?;
             let size = reached.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
             return Some(Verdict {

@@ -89,7 +89,9 @@ pub fn lines(validation: &Validation, rows: &[Row]) -> Vec<String> {
     let of = |check: &Check, group: &Group| {
         let error = group.error(&check.name);
         let sign = if within(error, check) == "yes" { "ok    " } else { "BEYOND" };
-        let (error, most) = (percent(error), short(100.0 * check.tolerance));
+        let missing = || group.rows.first().map_or(String::new(), |r| check.missing(&r.measured));
+        let error = if error.is_some() { percent(error) } else { format!("none ({})", missing()) };
+        let most = short(100.0 * check.tolerance);
         let who = format!("{} {}", group.method, group.setting);
         format!("{sign} {}: {}, {}: error {error}, tolerance {most} %", d.name, check.name, who.trim())
     };
