@@ -13,7 +13,13 @@ pub(crate) const UNFINISHED: &str = ".writing-";
 /// [`Error::Io`] with the path (folder missing, disk full ...).
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = beside(folder).map_err(Error::io(path))?;
+    let mut file = beside(folder).map_err(|e| {
+        // Not the name of the file beside it, which nobody asked for.
+        let gone = e.kind() == std::io::ErrorKind::NotFound;
+        let gone =
+            gone.then(|| std::io::Error::new(e.kind(), format!("there is no folder {}", folder.display())));
+        Error::io(path)(gone.unwrap_or(e))
+    })?;
     file.write_all(bytes).map_err(Error::io(path))?;
     file.persist(path).map_err(|e| Error::io(path)(e.error))?;
     Ok(())

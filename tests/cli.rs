@@ -195,6 +195,15 @@ fn wrong_input_is_named_with_exit_code_2() {
         (vec!["run", &case, "--backend", "cpu", "--adapter", "0"], vec!["--adapter"]),
         (vec!["run", &case, "--backend", "tpu"], vec!["tpu", "cpu"]),
         (vec!["plan", "no/such.toml"], vec!["no/such.toml"]),
+        (
+            vec!["run", &case, "--spacing", "0.1", "--set", "run.spacing=0.2"],
+            vec!["--spacing and --set run.spacing=0.2"],
+        ),
+        (
+            vec!["plan", &case, "--until", "0.1", "--set", "run.end = 2"],
+            vec!["--until and --set run.end = 2"],
+        ),
+        (vec!["run", &folder.path().display().to_string()], vec!["is a folder: a case is a file"]),
     ] {
         let rest: &[&str] = if args[0] == "run" { &["--out", &out] } else { &[] };
         let run = ran(&[&args[..], rest].concat());

@@ -305,6 +305,24 @@ fn a_body_does_not_leave_through_an_opening() {
 }
 
 #[test]
+fn plan_knows_how_fast_water_will_come_in() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("channel.toml");
+    let inflow = "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\n";
+    let planned = |rate: &str| {
+        std::fs::write(&path, tank(0.1, &format!("{inflow}{rate}\n"))).expect("a file");
+        let told = ran(&["plan", &path.display().to_string(), "--json"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        json(&told.out)["time_step_s"].as_f64().expect("a number")
+    };
+    // 0.35 l0 over the speed; without it 2 sqrt(g H) is the fastest.
+    let slow = planned("velocity = 0.01");
+    assert!(slow > 1.7e-3, "{slow}");
+    let fast = planned("velocity = [[0, 0], [1, 20]]");
+    assert!(fast > 0.0 && fast <= 0.35 * 0.01 / 20.0, "{fast}");
+}
+
+#[test]
 fn a_hydrograph_comes_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tank.toml");

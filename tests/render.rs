@@ -111,5 +111,15 @@ fn what_cannot_be_drawn_is_refused_in_words() {
         "--json",
     ]);
     assert_eq!(json(&none.out)["frames"], 0);
-    assert!(ran(&["render", &shown]).code != 0);
+    let drawn = ran(&["render", &shown]);
+    assert!(drawn.code == 2 && drawn.err.contains("the case has output.every = 0"), "{}", drawn.err);
+    // A list of frames that is gone, or no list.
+    let again = ran(&["run", &case, "-o", &shown, "--backend", "cpu", "-q", "--force", "--steps", "1"]);
+    assert_eq!(again.code, 0, "{}", again.err);
+    for text in [Some("<VTKFile>"), None] {
+        let list = root.join("small.pvd");
+        text.map_or_else(|| std::fs::remove_file(&list), |text| std::fs::write(&list, text)).unwrap();
+        let drawn = ran(&["measure", &shown, "--point", "0.1,0,0.1"]);
+        assert!(drawn.code == 2 && drawn.err.contains("small.pvd, is gone or names none"), "{}", drawn.err);
+    }
 }

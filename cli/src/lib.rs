@@ -118,9 +118,22 @@ struct Changes {
 
 impl Changes {
     /// All changes of values, those with an option of their own as well.
-    fn all_sets(&self) -> Vec<String> {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for two values of one key: nobody knows which one is meant.
+    fn all_sets(&self) -> seixo::error::Result<Vec<String>> {
+        for (option, key, given) in
+            [("--spacing", "run.spacing", self.spacing), ("--until", "run.end", self.until)]
+        {
+            let other = |(k, value): (&str, &str)| k.trim() == key && value.trim().parse().ok() != given;
+            let set = |s: &&String| given.is_some() && s.split_once('=').is_some_and(other);
+            if let Some(set) = self.sets.iter().find(set) {
+                let text = format!("{option} and --set {set} both say what {key} is: leave one of them out");
+                return Err(Error::usage(option, text));
+            }
+        }
         let end = self.until.map(|end| format!("run.end={end:?}"));
-        self.sets.iter().cloned().chain(end).collect()
+        Ok(self.sets.iter().cloned().chain(end).collect())
     }
 }
 

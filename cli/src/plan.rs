@@ -24,7 +24,7 @@ use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
 use seixo::run::summary::particles;
-use seixo::scene::{Drive, Solid};
+use seixo::scene::{Drive, Scene, Solid};
 use seixo::share::Outlook;
 use seixo::time_step::{Bounds, expected_speed, time_step};
 use seixo::waves::WaveKind;
@@ -187,8 +187,12 @@ impl Seen {
         let mut loaded = setup::read(args)?;
         let case = loaded.case.clone();
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
-        let fluid = Estimate::new(&case).water;
+        let estimate = Estimate::new(&case);
+        let fluid = estimate.water;
         let coarser = if fluid > WHOLE { (fluid / COARSER).powf(1.0 / d) } else { 1.0 };
+        // What this machine has no room for is not built either.
+        let room = machine::memory().map_or(f64::INFINITY, |n| n as f64 / 2.0);
+        let coarser = (estimate.memory_beside_device / room).powf(1.0 / d).max(coarser);
         if coarser > 1.0 {
             // From its text: standard input is read once.
             loaded = load_text(&loaded.path.clone(), loaded.text, Some(coarser * l0), &[])?;
@@ -214,9 +218,9 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let (case, scene, built) = (&seen.case, &seen.setup.scene, seen.coarser == 1.0);
     let params = Params::new(case, scene)?;
     let plan = Plan::new(case, scene, &params);
-    let dt = time_step(&params, case.run.time_step, case.run.adaptive && plan.wet(), expected_speed(&params));
-    let mut advice =
-        if plan.wet() { step_advice(&params, case.run.time_step, case.run.adaptive).0 } else { vec![] };
+    let speed = fastest(case, scene, &params);
+    let dt = time_step(&params, case.run.time_step, case.run.adaptive && plan.wet(), speed);
+    let mut advice = if plan.wet() { step_advice(&params, case, speed).0 } else { vec![] };
     let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
     if built {
         // What `run` refuses.
@@ -321,14 +325,19 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
 }
 
 /// What `run` says of the time step: nothing, unless there is something to change.
-pub fn step_warnings(params: &Params, typed: f64, adaptive: bool) -> Vec<String> {
-    let (words, matters) = step_advice(params, typed, adaptive);
+pub fn step_warnings(case: &Case, scene: &Scene, params: &Params) -> Vec<String> {
+    let (words, matters) = step_advice(params, case, fastest(case, scene, params));
     if matters { words } else { Vec::new() }
 }
 
+/// Largest speed to be ready for [m/s]: of the water's collapse or start, or of what drives it at any time of the run.
+fn fastest(case: &Case, scene: &Scene, params: &Params) -> f64 {
+    expected_speed(params).max(scene.driven(0.0, case.run.end))
+}
+
 /// What there is to say of the time step, and whether there is something to change.
-fn step_advice(params: &Params, typed: f64, adaptive: bool) -> (Vec<String>, bool) {
-    let speed = expected_speed(params);
+fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) {
+    let (typed, adaptive) = (case.run.time_step, case.run.adaptive);
     let bounds = Bounds::new(params, speed);
     let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous)];
     let further = further.iter().filter(|(_, dt)| dt.is_finite());
@@ -341,7 +350,7 @@ fn step_advice(params: &Params, typed: f64, adaptive: bool) -> (Vec<String>, boo
     let mut matters = typed > bound && !adaptive;
     if typed > bound {
         advice.push(if adaptive {
-            format!("the adaptive time step starts at {bound:.3e} s")
+            format!("the adaptive time step goes down to {bound:.3e} s")
         } else {
             format!(
                 "the fixed time step is above that; set run.time_step = {bound:.1e} or run.adaptive = true"

@@ -4,8 +4,8 @@ use super::Exit;
 use clap::ValueEnum;
 use glam::DVec3;
 use rayon::prelude::*;
-use seixo::case::Case;
 use seixo::case::file::load;
+use seixo::case::{Case, OutputKind};
 use seixo::console::{remark, say};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::{case_name, series_in};
@@ -201,7 +201,10 @@ impl LookArgs {
             }
             (Some(asked), _) => asked.field(),
             (None, Some(first)) => first.field(),
-            (None, None) if case.fluid.is_none() => Field::Speed,
+            // No water, nothing to colour.
+            (None, None) if !case.output.kinds.contains(&OutputKind::Fluid) || case.fluid.is_none() => {
+                Field::Speed
+            }
             (None, None) => return Err(Error::usage("--field", NO_COLOUR)),
         };
         (style.range, style.slice, style.labels) = (self.range, self.slice, !self.no_labels);
@@ -306,9 +309,21 @@ pub fn series_of(root: &Path, series: Option<&str>) -> Result<(Case, Vec<Frame>)
 pub fn without(frames: &str, root: &Path, case: &Case, series: Option<&str>) -> Error {
     let others = case.output.series.first().filter(|_| series.is_none());
     let others = others.map_or(String::new(), |s| format!("; its series has its own: --series {}", s.name));
-    let why =
-        if case.output.every > 0.0 { "output.kinds leaves it out" } else { "the case has output.every = 0" };
+    let output = &case.output;
+    let why = if output.every == 0.0 {
+        "the case has output.every = 0".to_owned()
+    } else if !output.kinds.contains(&OutputKind::Fluid) {
+        "output.kinds leaves it out".to_owned()
+    } else {
+        format!("the list of them, {}, is gone or names none", list_of(root, series).display())
+    };
     Error::usage("DIR", format!("{} holds no {frames}: {why}{others}", root.display()))
+}
+
+/// The list of the frames of the run in `root`, or of a series of it.
+fn list_of(root: &Path, series: Option<&str>) -> PathBuf {
+    let name = series.map(str::to_owned).or_else(|| case_name(root).ok().flatten()).unwrap_or_default();
+    place(root, series).join(format!("{name}.pvd"))
 }
 
 /// The frames nearest to each of `times`, or every `every`th, with their numbers.

@@ -282,8 +282,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
             setup.scene.water()
         ));
         if simulation.plan.wet() {
-            let run = &simulation.case.run;
-            let words = step_warnings(&simulation.params, run.time_step, run.adaptive);
+            let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
             words.iter().for_each(|line| remark(line));
         }
         let advice = simulation.solids.advice(simulation.case.run.time_step);

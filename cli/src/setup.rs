@@ -77,7 +77,7 @@ fn few(notes: &[String]) -> impl Iterator<Item = String> {
 /// # Errors
 /// What is wrong with it.
 pub fn read(args: &CaseArgs) -> Result<Loaded> {
-    let (spacing, sets) = (args.changes.spacing, args.changes.all_sets());
+    let (spacing, sets) = (args.changes.spacing, args.changes.all_sets()?);
     if !is_stdin(&args.case) {
         return load(&args.case, spacing, &sets);
     }

@@ -24,10 +24,13 @@ pub struct Frame {
 /// The frames that the run in the folder `root` wrote for the case `name`, in the order of time.
 ///
 /// # Errors
-/// [`Error::Io`] if there is no list of them.
+/// [`Error::Io`] if the list of them cannot be read. Where there is no list, there are no frames.
 pub fn frames(root: &Path, name: &str) -> Result<Vec<Frame>> {
     let path = root.join(format!("{name}.pvd"));
-    let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+    let text = match std::fs::read_to_string(&path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        read => read.map_err(Error::io(&path))?,
+    };
     let mut frames: Vec<Frame> = Vec::new();
     for line in text.lines().filter(|line| line.contains("<DataSet ")) {
         let (Some(time), Some(part), Some(file)) =
