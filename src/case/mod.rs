@@ -126,7 +126,8 @@ pub struct Run {
     #[serde(default)]
     pub checkpoint: Checkpoint,
     /// Folder of an earlier run whose last state is the start of this one, instead of t = 0; a relative one counts
-    /// from the case file. Scene and processor must be the same; time, gauges, output and constants may differ.
+    /// from the case file. Scene and processor must be the same; a later end, gauges, output, constants, and
+    /// from then on motions may differ.
     pub from: Option<String>,
 }
 

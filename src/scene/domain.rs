@@ -100,12 +100,12 @@ impl Builder<'_> {
     fn through_walls(&self, label: &str, low: DVec3, high: DVec3) -> Vec<String> {
         let Some(tank) = &self.case.tank else { return vec![] };
         let bare = tank.without_wall();
-        let held = |k: &usize| !(self.lattice.plane && *k / 2 == 1) && !bare.contains(&TANK_FACES[*k].0);
+        let walled = |k: &usize| !(bare.contains(&TANK_FACES[*k].0) || self.lattice.plane && *k / 2 == 1);
         let beyond = |k: usize| {
             let axis = k / 2;
             if k.is_multiple_of(2) { tank.min[axis] - low[axis] } else { high[axis] - tank.max[axis] }
         };
-        let through = (0..6).filter(held).filter(|&k| beyond(k) > 0.5 * self.lattice.spacing);
+        let through = (0..6).filter(walled).filter(|&k| beyond(k) > 0.5 * self.lattice.spacing);
         let note = |k: usize| {
             format!(
                 "{label}: its motion takes it {:.4} m into the wall `{}`, which does not stop it",
