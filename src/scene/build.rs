@@ -29,6 +29,7 @@ impl Scene {
         builder.walls();
         builder.water();
         builder.bodies();
+        builder.room();
         builder.gauges();
         let domain = builder.domain();
         let reserve = builder.reserve(domain);
@@ -258,13 +259,7 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        // A wall that moves or an opening may make room; a body among the water only changes places with it.
-        let shut =
-            self.case.moving_wall.is_empty() && self.case.inflow.is_empty() && self.case.outflow.is_empty();
-        self.filled = shut && self.water.fills(&self.lattice, &self.grid);
-        if self.filled {
-            self.notes.push("the water fills all its room: the smallest pressure is 0".into());
-        }
+        self.filled = self.water.fills(&self.lattice, &self.grid);
         // What of gravity lies along a periodic axis presses on nothing.
         let gravity = self.periodic.across(self.gravity());
         self.depth = self.water.depth(gravity, &self.lattice);

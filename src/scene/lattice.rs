@@ -93,6 +93,12 @@ impl Lattice {
     pub fn step(&self, by: i32) -> IVec3 {
         IVec3::new(by, if self.plane { 0 } else { by }, by)
     }
+    /// Steps from a cell to those beside it.
+    pub fn ways(&self) -> impl Iterator<Item = IVec3> + Clone + use<> {
+        let along = [IVec3::X, IVec3::Y, IVec3::Z].into_iter();
+        let plane = self.plane;
+        along.filter(move |way| !(plane && way.y == 1)).flat_map(|way| [way, -way])
+    }
     fn flat(&self, mut cells: Cells) -> Cells {
         if self.plane {
             (cells.lo.y, cells.hi.y) = (0, 1);
@@ -183,6 +189,30 @@ impl Grid {
     fn index(&self, c: IVec3) -> usize {
         let d = c - self.cells.lo;
         (d.x as usize * self.n[1] + d.y as usize) * self.n[2] + d.z as usize
+    }
+    /// How many open cells there are to which steps of `ways` lead from the open ones of some `seeds`; more than `most` are not
+    /// counted on.
+    pub fn reach(
+        &self,
+        seeds: &[IVec3],
+        ways: impl Iterator<Item = IVec3> + Clone,
+        open: impl Fn(IVec3) -> bool,
+        most: usize,
+    ) -> usize {
+        let mut seen = vec![false; self.state.len()];
+        let mut queue = Vec::with_capacity(seeds.len());
+        let mut look = |c: IVec3, queue: &mut Vec<IVec3>| {
+            if self.cells.contains(c) && !std::mem::replace(&mut seen[self.index(c)], true) && open(c) {
+                queue.push(c);
+            }
+        };
+        seeds.iter().for_each(|&c| look(c, &mut queue));
+        let mut next = 0;
+        while next < queue.len() && queue.len() <= most {
+            ways.clone().for_each(|way| look(self.wrap(queue[next] + way), &mut queue));
+            next += 1;
+        }
+        queue.len()
     }
     /// State of a cell; free outside of the grid.
     pub fn get(&self, c: IVec3) -> u8 {

@@ -23,6 +23,7 @@ mod opening;
 mod oriented;
 mod part;
 mod placement;
+mod room;
 mod shaped;
 mod support;
 mod walls;
@@ -297,7 +298,8 @@ pub struct Scene {
     pub periodic: Periodic,
     /// Largest depth of water at the start, along gravity [m].
     pub depth: f64,
-    /// Whether the water leaves no room free at the start, nor any wall that moves could: it has no free surface.
+    /// Whether the water leaves no room free at the start, nor anything that lets in or out or is driven could: it has no free
+    /// surface.
     pub filled: bool,
     /// What a user should know that is no error (rounded lengths, removed particles ...).
     pub notes: Vec<String>,

@@ -226,9 +226,7 @@ impl Water {
 
     /// Whether there is water and no cell beside it is free.
     pub fn fills(&self, lattice: &Lattice, grid: &Grid) -> bool {
-        let ways = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().filter(|way| !(lattice.plane && way.y == 1));
-        let ways: Vec<IVec3> = ways.flat_map(|way| [way, -way]).collect();
-        let enclosed = |&c: &IVec3| ways.iter().all(|&way| grid.get(grid.wrap(c + way)) != FREE);
+        let enclosed = |&c: &IVec3| lattice.ways().all(|way| grid.get(grid.wrap(c + way)) != FREE);
         !self.cell.is_empty() && self.cell.iter().all(enclosed)
     }
 

@@ -1,0 +1,84 @@
+//! Whether the room of water that fills it keeps its size while solids are driven through it.
+
+use super::build::Builder;
+use super::lattice::{FACE, FLUID, FREE};
+use super::oriented::Placed;
+use super::{Drive, Solid};
+use glam::{DMat3, DVec3, IVec3};
+use rayon::prelude::*;
+
+/// Part of a room by which it may grow or shrink and counts as of one size: the water's density bears it.
+const SAME_ROOM: f64 = 0.01;
+/// Instants of the run at which the room is looked at.
+const LOOKS: u32 = 64;
+
+/// A solid in the way of the flood, and the corners of the box around it [m].
+struct Barrier {
+    shape: Placed,
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Barrier {
+    fn new(shape: Placed) -> Self {
+        let reach = shape.bounds();
+        Self { low: shape.center - reach, high: shape.center + reach, shape }
+    }
+
+    /// A driven solid where it stands at time `t` [s].
+    fn driven(solid: &Solid, t: f64) -> Option<Self> {
+        let Drive::Prescribed(motion) = &solid.drive else { return None };
+        let start = solid.placed();
+        let axes = DMat3::from_quat(motion.turn(t)) * start.axes;
+        Some(Self::new(Placed { center: start.center + motion.displacement(t), axes, ..start }))
+    }
+
+    fn holds(&self, p: DVec3) -> bool {
+        p.cmpge(self.low).all() && p.cmple(self.high).all() && self.shape.holds(p, 0.0)
+    }
+}
+
+impl Builder<'_> {
+    /// Judges whether water that fills its room does so for all of the run, and notes it: nothing may let in or out, and driven
+    /// solids may neither make room nor take it.
+    pub(super) fn room(&mut self) {
+        let shut = self.case.inflow.is_empty() && self.case.outflow.is_empty();
+        self.filled = self.filled && shut && self.keeps_room();
+        if self.filled {
+            self.notes.push("the water fills all its room: the smallest pressure is 0".into());
+        }
+    }
+
+    /// Whether the cells that water could reach stay as many, within [`SAME_ROOM`], wherever solids are driven until the end.
+    fn keeps_room(&self) -> bool {
+        let (still, solids): (Vec<&Solid>, Vec<&Solid>) =
+            self.moving_walls.iter().chain(&self.bodies).partition(|s| s.is_still());
+        let at = |t: f64| -> Vec<Barrier> { solids.iter().filter_map(|s| Barrier::driven(s, t)).collect() };
+        let start = at(0.0);
+        if start.is_empty() {
+            return true;
+        }
+        let fixed = self.fixed.shapes.iter().map(Placed::from).chain(still.iter().map(|s| s.placed()));
+        let fixed: Vec<Barrier> = fixed.map(Barrier::new).collect();
+        let room = |t: f64, most: usize| {
+            let now = at(t);
+            let within = |all: &[Barrier], p: DVec3| all.iter().any(|b| b.holds(p));
+            let open = |c: IVec3| {
+                let p = self.lattice.center(c);
+                let left = match self.grid.get(c) {
+                    FREE | FLUID => true,
+                    FACE => !within(&fixed, p),
+                    _ => within(&start, p) && !within(&fixed, p),
+                };
+                left && !within(&now, p)
+            };
+            self.grid.reach(&self.water.cell, self.lattice.ways(), open, most)
+        };
+        let whole = room(0.0, usize::MAX);
+        let slack = (SAME_ROOM * whole as f64) as usize;
+        // Instants that keep step with no period.
+        let times = (1..=LOOKS).map(|k| self.case.run.end * (f64::from(k) * 0.618_033_988_75).fract());
+        let times: Vec<f64> = times.chain([self.case.run.end]).collect();
+        times.into_par_iter().all(|t| whole.abs_diff(room(t, whole + slack + 1)) <= slack)
+    }
+}
