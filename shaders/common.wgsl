@@ -62,7 +62,7 @@ struct Constants {
     number_density: f32,   // n0
     surface_below: f32,    // beta n0
     restitution: f32,      // b of Eq. (18)
-    viscosity: f32,        // nu 2 d / (lambda n0)
+    viscosity: f32,        // nu 2 d / sum w r^2, with the weight of viscosity.wgsl
     particle_mass: f32,
     gradient_scale: f32,   // d / n0
     density: f32,

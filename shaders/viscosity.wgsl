@@ -1,5 +1,5 @@
-// Viscous acceleration, Eqs. (2) and (6), a_i = nu 2 d / (lambda n0) sum w_ij (v_j - v_i), and its reaction on the wall
-// layers of moving solids. Pairs of fluid and wall weigh params.wall_shear. Positions and neighbours are those of the last step.
+// Viscous acceleration, Eqs. (2) and (6), a_i = nu 2 d / (sum w r^2) sum w_ij (v_j - v_i), and its reaction on the wall
+// layers of moving solids. w is that of Eq. (3) in the paper's scheme, else 1 / q - 1 + 32 (1 - q)^4. Pairs of fluid and wall weigh params.wall_shear. Positions and neighbours are those of the last step.
 // Twin: src/kernels/viscosity.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -22,7 +22,14 @@ fn shear(i: u32, below: u32) -> vec3f {
         if j < below && distance_squared > 0.0
             && distance_squared < params.effective_radius * params.effective_radius {
             let share = select(1.0, params.wall_shear, (i < params.fluid) != (j < params.fluid));
+//#if MIXED
+            let q = sqrt(distance_squared) / params.effective_radius;
+            let rest = 1.0 - q;
+            let square = rest * rest;
+            let w = rest / q + 32.0 * square * square;
+//#else
             let w = params.effective_radius * inverseSqrt(distance_squared) - 1.0;
+//#endif
             sum += share * w * (velocity[j].xyz - v);
         }
     }

@@ -1,8 +1,8 @@
 //! Constants of a run: the scheme's switches, what follows from the initial lattice, the step's coefficients.
 
-use crate::case::{self, Case, Preset};
+use crate::case::{self, Case, Fluid, Preset};
 use crate::error::{Error, Result};
-use crate::lattice::Lattice;
+use crate::lattice::{Lattice, Shear};
 use crate::periodic::Periodic;
 use crate::scene::Scene;
 use crate::scheme::{Collision, FreeSurface, Gradient, Source};
@@ -23,6 +23,11 @@ pub enum Relaxation {
 const SOUND_OVER_FLOW: f64 = 2.5;
 /// Least part of the derived c_s that a calm flow has.
 const CALM: f64 = 0.5;
+
+/// c_s^2 of creeping flow over nu v / l0, at least: as long as the step can be, a fifth of l0^2 / nu, a density error is undone at
+/// 1.5 v / l0 then, as fast as the flow makes one. Steps as short as viscosity asks for would leave c_s of the flow alone next to
+/// nothing of it.
+const CREEPING: f64 = 3.0;
 
 /// Reach of the pressure within a step over the water's depth: what is missing at the floor of still water,
 /// 1 - tanh(1 / 5) 5 = 1.3 %, the density has to make up for.
@@ -97,9 +102,8 @@ pub struct Params {
     pub density: f64,
     /// Kinematic viscosity [m2/s].
     pub viscosity: f64,
-    /// Weight of a pair of fluid and wall in the viscous sum [-]: 1 in the paper's scheme, else that of
-    /// [`Lattice::wall_shear`].
-    pub wall_shear: f64,
+    /// Weight of explicit viscosity: its sums over the lattice.
+    pub shear: Shear,
     /// [`Lattice::wall_contact`].
     pub wall_contact: f64,
     /// Wall-layer particles of bodies; their slots follow those of the fluid.
@@ -183,7 +187,8 @@ impl Params {
     /// Constants of `case` as built into `scene`.
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
         let run = &case.run;
-        let lattice = Lattice::new(run.dimensions, run.effective_radius);
+        let (d, re) = (run.dimensions, run.effective_radius);
+        let lattice = Lattice::new(d, re);
         if lattice.number_density == 0.0 {
             let message =
                 format!("run.effective_radius = {}: no lattice neighbour lies inside", run.effective_radius);
@@ -192,10 +197,10 @@ impl Params {
         let l0 = run.spacing;
         let fluid = case.fluid.as_ref();
         let paper = fluid.is_some_and(|f| f.preset == Preset::Paper);
-        let (source, gradient, free_surface) = if paper {
-            (Source::NumberDensity, Gradient::Minimum, FreeSurface::Threshold)
+        let (gradient, free_surface) = if paper {
+            (Gradient::Minimum, FreeSurface::Threshold)
         } else {
-            (Source::Mixed, Gradient::Consistent, FreeSurface::ThresholdOffset)
+            (Gradient::Consistent, FreeSurface::ThresholdOffset)
         };
         let (gravity, periodic) = (scene.periodic.across(scene.gravity), scene.periodic);
         let g = gravity.length();
@@ -206,7 +211,7 @@ impl Params {
             Some((None, Some(c))) => Relaxation::Speed(c),
             _ => Relaxation::Speed(derived_speed),
         };
-        let source = fluid.and_then(|f| f.source).unwrap_or(source);
+        let source = fluid.map_or(Source::Mixed, Fluid::source);
         let typed = fluid.is_some_and(|f| f.relaxation.is_some() || f.sound_speed.is_some());
         // Without weight the flow alone tells how fast, whatever the source.
         let follows_flow = (source == Source::Mixed || g == 0.0) && !typed;
@@ -216,7 +221,7 @@ impl Params {
         Ok(Self {
             dimensions: run.dimensions,
             spacing: l0,
-            effective_radius: run.effective_radius * l0,
+            effective_radius: re * l0,
             number_density: lattice.number_density,
             laplacian: lattice.laplacian * l0 * l0,
             smooth_density: lattice.smooth_density,
@@ -225,7 +230,7 @@ impl Params {
             drive: scene.gravity - gravity,
             density: fluid.map_or(1000.0, |f| f.density),
             viscosity: fluid.map_or(0.0, |f| f.viscosity),
-            wall_shear: if paper { 1.0 } else { lattice.wall_shear },
+            shear: fluid.map_or_else(|| Shear::paper(d, re), |f| f.shear(d, re)),
             wall_contact: lattice.wall_contact,
             body_wall: scene.solids.iter().filter(|s| s.is_body).map(|s| s.wall_slots.len()).sum(),
             wall_friction: friction / (l0 * lattice.wall_contact),
@@ -306,13 +311,20 @@ impl Params {
                 // has taken its speed.
                 let most = if self.gravity == DVec3::ZERO { f64::INFINITY } else { c };
                 let c = if self.follows_flow {
-                    (SOUND_OVER_FLOW * flow).clamp(CALM * c, most).max(SOUND_OVER_FLOW * driven)
+                    let creeping = (CREEPING * self.viscosity * flow.max(driven) / self.spacing).sqrt();
+                    let c = (SOUND_OVER_FLOW * flow).clamp(CALM * c, most).max(SOUND_OVER_FLOW * driven);
+                    c.max(creeping)
                 } else {
                     c
                 };
                 (c * dt / self.spacing).powi(2).min(RELAXATION_MAX)
             }
         }
+    }
+
+    /// Largest extent of the domain [m].
+    fn extent(&self) -> f64 {
+        (self.domain_max - self.domain_min).max_element()
     }
 
     /// Mass of a fluid particle [kg]; in two dimensions of a slice l0 wide.
@@ -362,7 +374,14 @@ impl Params {
             dt
         };
         let c = self.sound_speed(dt);
-        let pressure_max = 5.0 * self.density * (c * c).max(speed * speed).max(head);
+        let pressure_max = if head > 0.0 {
+            // Viscosity: over the length of the domain in gaps of a spacing.
+            let viscous = self.viscosity * speed * self.extent() / self.spacing.powi(2);
+            5.0 * self.density * (c * c).max(speed * speed).max(head).max(viscous)
+        } else {
+            // Without weight a jolt makes the pressure, rho v L / dt, or what drives the flow along a periodic axis.
+            5.0 * self.density * self.extent() * (speed / dt + self.drive.length())
+        };
         let fastest = if self.filled { speed } else { 0.0 };
         let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
         Step { time, dt, ahead, relaxation, compressibility, pressure_max, shift_speed }

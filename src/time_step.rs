@@ -1,6 +1,5 @@
 //! How long a time step may be: one rule for a run and for what is said of it before.
 
-use crate::lattice::Lattice;
 use crate::params::{Params, Relaxation};
 use glam::DVec3;
 
@@ -38,9 +37,7 @@ impl Bounds {
             Relaxation::Fixed(_) => f64::INFINITY,
         };
         let viscous = if params.viscosity > 0.0 {
-            let lattice = Lattice::new(params.dimensions, params.effective_radius / l0);
-            VISCOUS_MAX * lattice.viscous_limit(params.dimensions, params.wall_shear) * l0 * l0
-                / params.viscosity
+            VISCOUS_MAX * params.shear.limit * l0 * l0 / params.viscosity
         } else {
             f64::INFINITY
         };

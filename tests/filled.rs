@@ -36,11 +36,11 @@ fn taylor_green(cells: usize, processor: &Processor) -> (f64, f64) {
 
 #[test]
 fn a_taylor_green_vortex_decays_as_viscosity_says() {
-    let (coarse, fine) = (taylor_green(40, &Processor::Cpu), taylor_green(80, &Processor::Cpu));
+    let (coarse, fine) = (taylor_green(40, &Processor::Cpu), taylor_green(120, &Processor::Cpu));
     println!(
-        "rate over the exact one, rms of the velocity: {coarse:.3?} at 40 spacings a side, {fine:.3?} at 80"
+        "rate over the exact one, rms of the velocity: {coarse:.3?} at 40 spacings a side, {fine:.3?} at 120"
     );
-    assert!((fine.0 - 1.0).abs() < 0.07 && fine.1 < 0.045, "{fine:?}");
+    assert!((fine.0 - 1.0).abs() < 0.05 && fine.1 < 0.03, "{fine:?}");
     assert!(fine.1 < 0.5 * coarse.1, "{coarse:?}, {fine:?}");
     if let Some(processor) = device() {
         let found = taylor_green(40, &processor);
@@ -140,5 +140,65 @@ fn a_light_and_a_heavy_cube_move_in_a_full_tank_as_added_mass_says() {
     if let Some(processor) = device() {
         let there = cube(0.3, &processor);
         assert!((there - light).abs() < 2e-3, "{there}, {light}");
+    }
+}
+
+/// A full tank of 2 dimensions without weight, and a body in it.
+fn weightless(size: [f64; 2], spacing: f64, dt: f64, fluid: &str, body: &str) -> Case {
+    let [x, z] = size;
+    case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = {dt}\nadaptive = true\nend = 10.0\ngravity = [0, 0, 0]\ndimensions = 2\n\
+         [fluid]\nwall_friction = 0\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{x}, 0, {z}]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [{x}, 0, {z}]\nopen = []\n\
+         [[body]]\nname = \"body\"\ndensity = 1000\ndisplaces_fluid = true\n{body}"
+    ))
+}
+
+#[test]
+fn a_disc_in_creeping_flow_between_walls_is_held_back_as_faxen_says() {
+    // Radius over half the gap: .3. Nothing but viscosity says how stiff the water has to be, and how high pressures may be.
+    let (gap, radius, speed, nu, l0) = (0.2, 0.03, 0.01, 0.006, 0.01);
+    let body = format!(
+        "shape = \"cylinder\"\nradius = {radius}\nheight = 0.1\naxis = [0, 1, 0]\ncenter = [0.3, 0, {}]\n\
+         motion = [[0, 0, 0, 0], [20, {}, 0, 0]]",
+        0.5 * gap,
+        20.0 * speed
+    );
+    let case = weightless([0.8, gap], l0, 1e-2, &format!("viscosity = {nu}"), &body);
+    let k = 2.0 * radius / gap;
+    let series = [-0.9157, 1.7244, -1.7302, 2.4056, -4.5913];
+    let series: f64 = series.iter().zip([0, 2, 4, 6, 8]).map(|(c, n)| c * k.powi(n)).sum();
+    let exact = 4.0 * PI * 1000.0 * nu * speed / (series - k.ln()) * l0;
+    let mut sim = simulation(&case);
+    let (mut sum, mut time) = (0.0, 0.0);
+    while sim.time < 6.0 {
+        let before = sim.time;
+        sim.step().expect("a step");
+        if sim.time > 2.0 {
+            let dt = sim.time - before;
+            (sum, time) = (sum - dt * sim.fluid_force[0].force.x, time + dt);
+        }
+    }
+    let ratio = sum / time / exact;
+    println!("drag over Faxen's: {ratio:.3}");
+    assert!((ratio - 1.0).abs() < 0.04, "{ratio}");
+}
+
+#[test]
+fn a_body_that_is_set_off_in_weightless_water_takes_it_along() {
+    // Momentum of body and dragged water is that of the body before: v = v0 / (1 + C), C some 1.25 for a square between walls so near.
+    let body = "size = [0.2, 1, 0.2]\ncenter = [0.5, 0, 0.5]\nvelocity = [0.2, 0, 0]";
+    for processor in [Some(Processor::Cpu), device()].into_iter().flatten() {
+        let case = weightless([1.0, 1.0], 0.02, 1e-3, "viscosity = 0", body);
+        let scene = Scene::build(&case).expect("it builds");
+        let mut sim = Simulation::on(&case, scene, &processor).expect("it starts");
+        let mut speeds = Vec::new();
+        while sim.steps < 20 {
+            sim.step().expect("a step");
+            speeds.push(sim.solids.body[0].pose.velocity.x);
+        }
+        println!("{processor:?}: {speeds:.4?}");
+        assert!((speeds[4] - 0.089).abs() < 0.005 && (speeds[19] - 0.089).abs() < 0.005, "{speeds:?}");
+        assert_eq!(sim.backend.counters().expect("counted").pressure_clamps, 0);
     }
 }

@@ -2,9 +2,8 @@
 //!
 //! Everything is listed at once; `file` adds line and column from the dotted path of each problem.
 
-use super::{Case, Choice, Face, Gauges, Vector};
+use super::{Case, Choice, Face, Fluid, Gauges, Vector};
 use crate::error::{CaseError, Problem, Result};
-use crate::lattice::Lattice;
 
 /// Most iterations of a solve: beyond, a step would not come to its end.
 const MOST_ITERATIONS: u32 = 1_000_000;
@@ -164,7 +163,7 @@ impl Checker<'_> {
         let Some(fluid) = &self.case.fluid else { return };
         self.positive("fluid.density", fluid.density, "kg/m3");
         self.not_negative("fluid.viscosity", fluid.viscosity, "m2/s");
-        self.viscosity(fluid.viscosity);
+        self.viscosity(fluid);
         if let Some(friction) = fluid.wall_friction {
             let what = "0 to 1 (0.0025 for smooth walls, 0 for none)";
             self.range("fluid.wall_friction", friction, (0.0..=1.0).contains(&friction), what);
@@ -244,18 +243,16 @@ impl Checker<'_> {
     }
 
     /// Viscosity is explicit: beyond a number of diffusion it grows instead of damping. An adaptive step keeps off.
-    fn viscosity(&mut self, viscosity: f64) {
+    fn viscosity(&mut self, fluid: &Fluid) {
         let run = &self.case.run;
         let fits = matches!(run.dimensions, 2 | 3) && (1.5..=4.1).contains(&run.effective_radius);
         let Some(l0) = self.spacing().filter(|_| fits && !run.adaptive && run.time_step > 0.0) else {
             return;
         };
-        let lattice = Lattice::new(run.dimensions, run.effective_radius);
-        let paper = self.case.fluid.as_ref().is_some_and(|f| f.preset == super::Preset::Paper);
-        let limit = lattice.viscous_limit(run.dimensions, if paper { 1.0 } else { lattice.wall_shear });
-        let number = viscosity * run.time_step / (l0 * l0);
+        let limit = fluid.shear(run.dimensions, run.effective_radius).limit;
+        let number = fluid.viscosity * run.time_step / (l0 * l0);
         if number > limit {
-            let dt = 0.5 * limit * l0 * l0 / viscosity;
+            let dt = 0.5 * limit * l0 * l0 / fluid.viscosity;
             self.add(
                 "fluid.viscosity",
                 format!("nu dt / l0^2 = {number:.3e} is unstable, the limit is {limit:.3}"),

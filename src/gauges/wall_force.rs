@@ -7,6 +7,7 @@ use crate::backend::RowPressure;
 use crate::body::Wrench;
 use crate::fields::Fields;
 use crate::kernels::number_density::pair_weight;
+use crate::kernels::viscosity;
 use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene};
@@ -77,7 +78,7 @@ impl FixedWall {
         sum
     }
 
-    /// Force of the water that flows along [N]: of viscosity, m 2 d nu / (lambda n0) sum w v over the water near its
+    /// Force of the water that flows along [N]: of viscosity, m 2 d nu / (sum w r^2) sum w v over the water near its
     /// particles, and of friction, m C_f / l0 |u_t| u_t with the share of its particles in a flat wall's weights.
     pub(crate) fn viscous_force(&self, fields: &Fields, groups: &Groups, params: &Params) -> DVec3 {
         let re = params.effective_radius;
@@ -91,21 +92,21 @@ impl FixedWall {
         let (mut viscous, mut friction) = (DVec3::ZERO, DVec3::ZERO);
         for i in (0..groups.fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
             let (x, at) = (fields.position[i], cell(fields.position[i]));
-            let (mut weights, mut normal) = (0.0, DVec3::ZERO);
+            let (mut shear, mut weights, mut normal) = (0.0, 0.0, DVec3::ZERO);
             let around = (0..27).map(|k| at + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
             for &k in around.filter_map(|c| cells.get(&c)).flatten() {
                 let r = images[k].0 - x;
                 let w = pair_weight(r.length_squared(), params);
+                shear += viscosity::pair_weight(r.length_squared(), params);
                 weights += w;
                 normal += weight_over_square(w, re) * r;
             }
             let (v, normal) = (fields.velocity[i], normal.normalize_or_zero());
             let along = v - v.dot(normal) * normal;
-            viscous += weights * v;
+            viscous += shear * v;
             friction += weights * along.length() * along;
         }
-        let coefficient = params.viscosity * 2.0 * f64::from(params.dimensions)
-            / (params.laplacian * params.number_density);
-        params.particle_mass() * (coefficient * params.wall_shear * viscous + params.wall_friction * friction)
+        let coefficient = viscosity::coefficient(params) * params.shear.wall;
+        params.particle_mass() * (coefficient * viscous + params.wall_friction * friction)
     }
 }

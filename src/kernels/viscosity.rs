@@ -1,17 +1,34 @@
 //! Viscous acceleration, Eqs. (2) and (6), with the positions and neighbours of the last step.
 //! GPU twin: shaders/viscosity.wgsl
 //!
+//! The paper's scheme weighs pairs by Eq. (3) and takes lambda n0 of the lattice. The accurate one has a
+//! weight whose second moments keep to the lattice's on other arrangements ([`crate::lattice::viscous_weight`]).
+//!
 //! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction. A pair of
-//! fluid and wall weighs `params.wall_shear`: the wall's velocity holds on its surface, half a spacing before its layer.
+//! fluid and wall weighs `params.shear.wall`: the wall's velocity holds on its surface, half a spacing before its layer.
 
 use super::Particles;
-use crate::lattice::weight;
+use crate::lattice::{viscous_weight, weight};
 use crate::params::Params;
+use crate::scheme::Source;
 use glam::DVec3;
 
-/// 2 d nu / (lambda n0) [1/s], Eq. (6).
+/// 2 d nu / sum w r^2 over the lattice [1/s], Eq. (6).
 pub fn coefficient(params: &Params) -> f64 {
-    params.viscosity * 2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density)
+    params.viscosity * 2.0 * f64::from(params.dimensions) / (params.shear.moment * params.spacing.powi(2))
+}
+
+/// Weight of a pair whose distance has the square `r2` [m2] in the viscous sum [-].
+#[inline(always)]
+pub fn pair_weight(r2: f64, params: &Params) -> f64 {
+    let re = params.effective_radius;
+    if r2 <= 0.0 || r2 >= re * re {
+        return 0.0;
+    }
+    match params.source {
+        Source::NumberDensity => weight(r2.sqrt(), re),
+        Source::Mixed => viscous_weight(r2.sqrt() / re),
+    }
 }
 
 /// nu lap v at slot `i` [m/s2], Eq. (6); `carriers` are its neighbours that carry pressure.
@@ -30,12 +47,11 @@ pub fn reaction(i: usize, carriers: &[u32], on: Particles) -> DVec3 {
 /// Share of the pair of slots `i` and `j` in the sum [-].
 #[inline(always)]
 pub fn share(i: usize, j: usize, on: Particles) -> f64 {
-    if (i < on.fluid) == (j < on.fluid) { 1.0 } else { on.params.wall_shear }
+    if (i < on.fluid) == (j < on.fluid) { 1.0 } else { on.params.shear.wall }
 }
 
 /// w_ij (v_j - v_i), with its share [m/s].
 fn exchange(i: usize, j: usize, on: Particles) -> DVec3 {
-    let (r, re) = (on.offset(i, j).length(), on.params.effective_radius);
-    let w = if r > 0.0 && r < re { weight(r, re) } else { 0.0 };
+    let w = pair_weight(on.offset(i, j).length_squared(), on.params);
     share(i, j, on) * w * (on.velocity[j] - on.velocity[i])
 }

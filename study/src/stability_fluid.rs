@@ -7,7 +7,7 @@ use super::row::Measured;
 use super::stability::{Map, bisect, horizontal, vertical};
 use seixo::case::file::parse;
 use seixo::error::{Error, Result};
-use seixo::lattice::Lattice;
+use seixo::lattice::Shear;
 use seixo::params::{Params, Relaxation};
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
@@ -166,8 +166,7 @@ fn viscous_limit(dimensions: u32, context: &Context) -> Result<Measured> {
         Ok(true)
     })?;
     out.put("limit [-]", limit);
-    let lattice = Lattice::new(dimensions, 2.1);
-    out.put("theory [-]", lattice.viscous_limit(dimensions, lattice.wall_shear));
+    out.put("theory [-]", Shear::smooth(dimensions, 2.1).limit);
     Ok(out)
 }
 

@@ -3,8 +3,7 @@
 use super::row_arrays::RowArrays;
 use super::wide::wide;
 use crate::kernels::Particles;
-use crate::kernels::viscosity::{coefficient, share};
-use crate::lattice::weight;
+use crate::kernels::viscosity::{coefficient, pair_weight, share};
 use crate::neighbours::Chunk;
 use glam::DVec3;
 
@@ -42,14 +41,10 @@ fn laplacian_sum(
     on: Particles,
     arrays: &mut RowArrays,
 ) -> DVec3 {
-    let re = on.params.effective_radius;
     let RowArrays { r, w, .. } = arrays;
     r.offsets(i, neighbour, on);
     let w = &mut w[..neighbour.len()];
-    r.map_squares(w, |r2| {
-        let r = r2.sqrt();
-        if r > 0.0 && r < re { weight(r, re) } else { 0.0 }
-    });
+    r.map_squares(w, |r2| pair_weight(r2, on.params));
     let mut sum = DVec3::ZERO;
     for (&w, &j) in w.iter().zip(neighbour) {
         let j = j as usize;

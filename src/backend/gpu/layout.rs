@@ -267,7 +267,6 @@ impl Constants {
     /// In f64 as far as possible, rounded once.
     pub fn new(params: &Params, groups: &Groups, grid: &Grid, settings: &Settings, sizes: &Sizes) -> Self {
         let middle = middle(params);
-        let laplacian = laplacian_coefficient(params);
         let period = params.periodic.length();
         let inverse = DVec3::from_array(period.to_array().map(|l| if l > 0.0 { 1.0 / l } else { 0.0 }));
         Self {
@@ -290,14 +289,14 @@ impl Constants {
             number_density: params.number_density as f32,
             surface_below: (params.free_surface_threshold * params.number_density) as f32,
             restitution: params.collision_restitution as f32,
-            viscosity: (params.viscosity * laplacian) as f32,
+            viscosity: crate::kernels::viscosity::coefficient(params) as f32,
             particle_mass: params.particle_mass() as f32,
             gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
             density: params.density as f32,
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
             smooth_density: params.smooth_density as f32,
             surface_head: missing_head(params) as f32,
-            wall_shear: params.wall_shear as f32,
+            wall_shear: params.shear.wall as f32,
             wall_friction: params.wall_friction as f32,
             period: period.as_vec3().to_array(),
             inverse_period: inverse.as_vec3().to_array(),
