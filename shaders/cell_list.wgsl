@@ -17,7 +17,7 @@
 // Positions, velocities and pressures of the fluid in the new order, one after the other; copied back afterwards.
 // By numbers: four invocations that each write a component of one vector would race.
 @group(0) @binding(10) var<storage, read_write> sorted: array<f32>;
-@group(0) @binding(11) var<storage, read_write> moving_slot: array<u32>;
+@group(0) @binding(11) var<storage, read_write> moving_slot: array<vec2u>; // slot, and where it faces
 @group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
 
 fn particles() -> u32 {
@@ -191,7 +191,8 @@ fn place(@builtin(global_invocation_id) id: vec3u) {
     let to = first + rank;
 //#if MOVING
     if me >= params.fluid {
-        moving_slot[to - params.fluid] = slot_of(me);
+        let slot = slot_of(me);
+        moving_slot[to - params.fluid] = vec2u(slot, bitcast<u32>(velocity[slot].w));
         return;
     }
 //#endif

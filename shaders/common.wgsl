@@ -147,6 +147,18 @@ fn number_of(word: f32) -> u32 {
     return max(bitcast<u32>(word), FIRST_WORD) - FIRST_WORD;
 }
 
+// A direction as such a word, to a thousandth; and back, where 0.0 stands for none.
+fn direction_word(n: vec3f) -> f32 {
+    let parts = vec3u(round((n + 1.0) * 511.0));
+    return word_of(parts.x | (parts.y << 10u) | (parts.z << 20u));
+}
+
+fn direction_of(word: f32) -> vec3f {
+    let parts = number_of(word);
+    let n = vec3f(vec3u(parts, parts >> 10u, parts >> 20u) & vec3u(1023u)) / 511.0 - 1.0;
+    return select(n, vec3f(0.0), parts == 0u);
+}
+
 // Numbers of a thread and of a workgroup, and how many workgroups there are. Where a dispatch has more than a device starts along
 // one dimension it is folded into rows of DISPATCH_WIDTH, a constant that src/backend/gpu/shader.rs adds; the last row may be more
 // than was asked for. Kernels that stride over all particles by fixed numbers of workgroups have few and are never folded.

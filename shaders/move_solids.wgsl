@@ -1,10 +1,14 @@
-// Particles of moving solids follow the pose of their solid: r = r_c + R o, v = v_c + w x R o.
+// Particles of moving solids follow the pose of their solid: r = r_c + R o, v = v_c + w x R o. Those of the wall layer
+// carry the direction outwards beside their velocity.
 // Twin: src/kernels/move_solids.rs
 
 @group(0) @binding(2) var<storage, read> solid_offset: array<vec4f>; // xyz in the solid's frame, w its number
 @group(0) @binding(3) var<storage, read> poses: array<Pose>;
 @group(0) @binding(4) var<storage, read_write> position: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> velocity: array<vec4f>;
+//#if MIXED
+@group(0) @binding(6) var<storage, read> facing: array<f32>; // the same in the solid's frame
+//#endif
 
 @compute @workgroup_size(WORKGROUP)
 fn move_solids(@builtin(global_invocation_id) id: vec3u) {
@@ -17,5 +21,14 @@ fn move_solids(@builtin(global_invocation_id) id: vec3u) {
     let arm = rotate(pose.orientation, offset.xyz);
     let i = moving_slot_of(k);
     position[i] = vec4f(pose.position.xyz + arm, position[i].w);
-    velocity[i] = vec4f(pose.velocity.xyz + cross(pose.angular_velocity.xyz, arm), 0.0);
+    var outward = 0.0;
+//#if MIXED
+    if k < params.moving_wall {
+        let own = direction_of(facing[k]);
+        if dot(own, own) > 0.0 {
+            outward = direction_word(rotate(pose.orientation, own));
+        }
+    }
+//#endif
+    velocity[i] = vec4f(pose.velocity.xyz + cross(pose.angular_velocity.xyz, arm), outward);
 }

@@ -12,7 +12,7 @@
 @group(0) @binding(5) var<storage, read> neighbour_count: array<u32>;
 @group(0) @binding(6) var<storage, read> source_diagonal: array<vec2f>;
 @group(0) @binding(7) var<storage, read> cell_start: array<u32>;
-@group(0) @binding(8) var<storage, read> moving_slot: array<u32>;
+@group(0) @binding(8) var<storage, read> moving_slot: array<vec2u>;
 @group(0) @binding(9) var<storage, read> static_start: array<u32>;
 @group(0) @binding(10) var<storage, read> static_particle: array<vec4u>;
 // Unknowns in a cell of the finest level, ABOVE for a coarser cell that holds some, 0 for the rest.
@@ -119,7 +119,7 @@ fn slot_of(l: Listed, k: u32) -> u32 {
     }
 //#if MOVING
     if k < l.count.x + l.count.y {
-        return moving_slot[l.first.y + k - l.count.x];
+        return moving_slot[l.first.y + k - l.count.x].x;
     }
 //#endif
 //#if STATIC

@@ -1,13 +1,14 @@
 // Neighbour list: all particles within the effective radius.
 // Twin: src/kernels/neighbour_list.rs
 //
-// A thread finds the row of one pressure-carrying particle. With the balanced source no wall carries pressure to a wall.
+// A thread finds the row of one pressure-carrying particle. With the balanced source no wall carries pressure to a wall, and none
+// to water behind a moving solid.
 // Rows of ghosts, and of walls with no fluid within one cell, stay empty. A row that is full counts on and reports itself;
 // nothing is dropped unseen. Where sides are periodic the cells around go on at the other side.
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
 @group(0) @binding(3) var<storage, read> cell_start: array<u32>;
-@group(0) @binding(4) var<storage, read> moving_slot: array<u32>;
+@group(0) @binding(4) var<storage, read> moving_slot: array<vec2u>; // slot, and where it faces
 @group(0) @binding(5) var<storage, read> static_start: array<u32>;
 // Bits of x, y, z, and the slot, in cell order: one load a candidate.
 @group(0) @binding(6) var<storage, read> static_particle: array<vec4u>;
@@ -20,15 +21,28 @@ var<private> dummies: u32;
 var<private> smallest: f32;
 var<private> wall: bool;
 var<private> carriers: u32;
+//#if MOVING
+// Where the row's own particle faces, if it is of a moving solid's wall layer.
+var<private> outward: vec3f;
+//#endif
 
-fn see(i: u32, j: u32, r: vec3f) {
+// As crate::kernels::neighbour_list::BEHIND.
+const BEHIND: f32 = 0.54;
+
+// Whether water at r from a wall particle that faces n lies behind it.
+fn behind(r: vec3f, n: vec3f) -> bool {
+    return dot(r, n) < -BEHIND * length(r);
+}
+
+// What is `hidden` counts and carries no pressure.
+fn see(i: u32, j: u32, r: vec3f, hidden: bool) {
     let distance_squared = dot(r, r);
     if distance_squared >= params.effective_radius * params.effective_radius || j == i {
         return;
     }
     smallest = min(smallest, distance_squared);
     let room = near + dummies < params.capacity;
-    if j < carriers {
+    if j < carriers && !hidden {
         if room {
             set_neighbour_list(near, i, j);
         }
@@ -71,21 +85,27 @@ fn near_fluid(low: vec3u, high: vec3u) -> bool {
 fn see_cells(i: u32, me: vec3f, first: u32, last: u32) {
     let fluid_end = cell_start_at(last);
     for (var j = cell_start_at(first); j < fluid_end; j++) {
-        see(i, j, offset(me, position[j].xyz));
+        let r = offset(me, position[j].xyz);
+//#if MOVING
+        see(i, j, r, behind(r, outward));
+//#else
+        see(i, j, r, false);
+//#endif
     }
 //#if MOVING
     let moving = moving_key();
     let moving_end = cell_start_at(moving + last) - params.fluid;
     for (var k = cell_start_at(moving + first) - params.fluid; k < moving_end; k++) {
-        let j = moving_slot[k];
-        see(i, j, offset(me, position[j].xyz));
+        let other = moving_slot[k];
+        let r = offset(me, position[other.x].xyz);
+        see(i, other.x, r, i < params.fluid && behind(-r, direction_of(bitcast<f32>(other.y))));
     }
 //#endif
 //#if STATIC
     let static_end = static_start_at(last);
     for (var k = static_start_at(first); k < static_end; k++) {
         let other = static_particle[k];
-        see(i, other.w, offset(me, bitcast<vec3f>(other.xyz)));
+        see(i, other.w, offset(me, bitcast<vec3f>(other.xyz)), false);
     }
 //#endif
 }
@@ -117,6 +137,18 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     carriers = params.pressure_slots;
 //#if MIXED
     carriers = select(params.fluid, params.pressure_slots, i < params.fluid);
+//#endif
+//#if MOVING
+    outward = vec3f(0.0);
+    if i >= params.fluid && i < params.fluid + params.moving_wall {
+        let own = moving_key() + cell_index(cell);
+        let end = cell_start_at(own + 1u) - params.fluid;
+        for (var k = cell_start_at(own) - params.fluid; k < end; k++) {
+            if moving_slot[k].x == i {
+                outward = direction_of(bitcast<f32>(moving_slot[k].y));
+            }
+        }
+    }
 //#endif
     smallest = params.effective_radius * params.effective_radius;
     for (var x = low.x; x <= high.x; x++) {

@@ -167,7 +167,7 @@ impl Simulation {
             case: _,
             scene: _,
             params: _,
-            plan: _,
+            plan,
             groups,
             wait_for_stages: _,
             threads: _,
@@ -210,8 +210,12 @@ impl Simulation {
             archive.number("ledger.energy", energy)?;
         }
         openings.exchange(archive)?;
-        backend.exchange(archive)?;
-        solids.exchange(archive, backend.compute())
+        solids.exchange(archive, backend.compute())?;
+        // Lists that are made anew ask where solids face.
+        if !archive.is_saving() && plan.has(Stage::MoveSolids) {
+            backend.move_solids(&openings.place(solids.poses()))?;
+        }
+        backend.exchange(archive)
     }
 
     /// Give up a step in progress with [`Error::Interrupted`] when `stop` has become overdue. The state is that of no

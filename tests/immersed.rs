@@ -330,3 +330,33 @@ fn a_body_that_turns_feels_the_stress_that_shear_leaves_out() {
     println!("{force} N, {torque} for {expected} N m");
     assert!(force.length() < 1e-9 && (torque - expected).length() < 0.03 * expected.length(), "{torque}");
 }
+
+#[test]
+fn a_raft_of_two_spacings_bears_a_block() {
+    // Its top, dry under a block that comes near, is less than the effective radius from the water below.
+    for spacings in [1.8, 2.0, 2.2] {
+        let (l0, level) = (0.02, 0.3);
+        let thick = spacings * l0;
+        // Raft and block weigh as much as what it displaces half under.
+        let (density, block) = (300.0, 0.16 * 0.06 * 625.0);
+        let weight = 0.4 * thick * density + block;
+        let z = level + 0.5 * thick - weight / 400.0;
+        let case = case(&format!(
+            "[run]\nspacing = {l0}\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\n[tank]\nmin = [0, 0, 0]\nmax = [1, 0, 0.6]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, {level}]\n[contact]\nspring = 1e5\ndamping_ratio = 0.3\n\
+             [[body]]\nname = \"raft\"\nsize = [0.4, 0.4, {thick}]\ncenter = [0.5, 0, {z}]\ndensity = {density}\ndisplaces_fluid = true\n\
+             [[body]]\nname = \"block\"\nsize = [0.16, 0.4, 0.06]\ncenter = [0.5, 0, {}]\ndensity = 625\n",
+            z + 0.5 * thick + 0.031
+        ));
+        let mut sim = simulation(&case);
+        let (mut sum, mut fastest) = (0.0, 0.0_f64);
+        for k in 0..300 {
+            sim.step().expect("a step");
+            fastest = fastest.max(sim.solids.poses()[0].velocity.length());
+            sum += if k >= 200 { sim.fluid_force[0].force.z / 100.0 } else { 0.0 };
+        }
+        let ratio = sum / (9.81 * weight * l0);
+        println!("{spacings} spacings: force over weight {ratio:.3}, fastest {fastest:.3} m/s");
+        assert!((ratio - 1.0).abs() < 0.1 && fastest < 0.15, "{spacings}: {ratio}, {fastest} m/s");
+    }
+}

@@ -9,7 +9,7 @@ use seixo::backend::cpu::Cpu;
 use seixo::cells::Grid;
 use seixo::fields::State;
 use seixo::kernels::cell_list::{CellList, Scratch};
-use seixo::kernels::neighbour_list::{Candidates, neighbour_list};
+use seixo::kernels::neighbour_list::{Candidates, Outward, neighbour_list};
 use seixo::kernels::{
     Particles, correct, number_density, predict, pressure_gradient, pressure_source, shift, viscosity,
     wall_friction,
@@ -18,7 +18,7 @@ use seixo::params::{Params, Step};
 use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::scene::{Groups, Scene};
-use seixo::scheme::Gradient;
+use seixo::scheme::{Gradient, Source};
 
 /// Sums in another order.
 const ROUND_OFF: f64 = 1e-11;
@@ -126,6 +126,12 @@ fn the_fast_search_finds_the_plain_rows() {
         assert!(fluid.slot.is_sorted(), "the fluid is in cell order");
         let moving = index(&mut g.moving_wall_range().chain(g.moving_dummy_range()));
         let fixed = index(&mut g.static_range());
+        let turned = s.scene.solids.iter().zip(common::poses(&s.scene, 0.01));
+        let turned = turned.flat_map(|(solid, pose)| solid.wall_slots.clone().map(move |_| pose.orientation));
+        let outward: Vec<DVec3> = match s.params.source {
+            Source::Mixed => s.scene.facing().into_iter().zip(turned).map(|(n, turn)| turn * n).collect(),
+            Source::NumberDensity => vec![],
+        };
         let from = Candidates {
             grid: &grid,
             fluid_start: &fluid.start,
@@ -133,6 +139,7 @@ fn the_fast_search_finds_the_plain_rows() {
             fixed: Some(&fixed),
             pressure_slots: g.pressure() as u32,
             wall_carriers: s.params.wall_carriers(g.fluid, g.pressure()) as u32,
+            outward: Outward { first: g.fluid, of: &outward },
         };
         let mut pairs = 0;
         for i in 0..g.pressure() {
@@ -261,7 +268,8 @@ fn the_fast_number_density_is_the_plain_one() {
         let f = s.cpu.fields();
         for i in 0..s.groups().pressure() {
             let row = s.cpu.neighbours().all(i);
-            let (n, state) = number_density::number_density(i, row.neighbour, s.particles());
+            let carry = s.cpu.neighbours().pressure(i).neighbour.len();
+            let (n, state) = number_density::number_density(i, row.neighbour, carry, s.particles());
             assert!((f.number_density[i] - n).abs() < ROUND_OFF * s.params.number_density);
             assert_eq!(f.state[i], state, "slot {i}");
             for (j, w) in row.iter() {

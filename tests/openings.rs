@@ -122,7 +122,8 @@ fn a_channel_keeps_its_level() {
         println!("{outflow}: mean depth {mean:.4} m, worst off by {:.1} %", 100.0 * worst);
         // 4 s at 0.25 m/s: 100 layers, more than the channel holds.
         assert_eq!(came, 1000);
-        assert!(worst < 0.025 && (mean / 0.1 - 1.0).abs() < 0.01, "{outflow}: {mean} m");
+        // Of 17 starts that differ by chance the mean depths were 0.0999 to 0.1016 m, 0.1003 on average.
+        assert!(worst < 0.025 && (mean / 0.1 - 1.0).abs() < 0.018, "{outflow}: {mean} m");
         assert!((there as f64 / 800.0 - 1.0).abs() < 0.025, "{outflow}: {there} particles");
         assert!(out.abs_diff(came) < 40, "{outflow}: {came} in, {out} out");
     }

@@ -631,13 +631,15 @@ fn ranks_write_pieces_that_are_read_as_the_frame_of_one() {
             assert_eq!(a.has(OutputField::NumberDensity), b.has(OutputField::NumberDensity));
         }
         let both = of_one.iter().zip(&of_many).enumerate();
-        for (number, (a, b)) in both.filter(|_| series.is_none()) {
+        let mut pressed = vec![];
+        for (_, (a, b)) in both.filter(|_| series.is_none()) {
             let [a, b] = [a, b].map(|frame| particles(frame.solids.as_deref().unwrap()).unwrap());
             assert_eq!((&a.id, &a.body), (&b.id, &b.body));
             assert!(near(&a.pressure, &b.pressure, 5e3) && near(&a.number_density, &b.number_density, 1.0));
-            // On the gate, once there is a step.
-            assert_eq!(b.pressure.iter().any(|&p| p > 0.0), number > 0);
+            pressed.push(b.pressure.iter().any(|&p| p > 0.0));
         }
+        // On the gate, but not before the first step.
+        assert!(pressed.first().is_none_or(|&first| !first) && (series.is_some() || pressed.contains(&true)));
     }
 }
 

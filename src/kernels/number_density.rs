@@ -22,13 +22,14 @@ pub fn pair_weight(r2: f64, params: &Params) -> f64 {
     weight(r2.sqrt().max(CLOSEST * params.spacing), params.effective_radius).max(0.0)
 }
 
-/// Number density of slot `i`, Eq. (4) [-], and its part in the PPE.
-pub fn number_density(i: usize, neighbour: &[u32], on: Particles) -> (f64, State) {
+/// Number density of slot `i`, Eq. (4) [-], and its part in the PPE; the first `carry` of its neighbours carry pressure.
+pub fn number_density(i: usize, neighbour: &[u32], carry: usize, on: Particles) -> (f64, State) {
     let offset = |j: u32| on.offset(i, j as usize);
     let w = |j: u32| pair_weight(offset(j).length_squared(), on.params);
     let n: f64 = neighbour.iter().map(|&j| w(j)).sum();
-    // A wall particle without fluid in reach is dry.
-    let wet = i < on.fluid || neighbour.iter().any(|&j| (j as usize) < on.fluid && w(j) > 0.0);
+    // A wall particle without fluid before it is dry.
+    let mut carriers = neighbour[..carry].iter();
+    let wet = i < on.fluid || carriers.any(|&j| (j as usize) < on.fluid && w(j) > 0.0);
     let centroid = || neighbour.iter().map(|&j| w(j) * offset(j)).sum();
     (n, if wet { free_surface(n, centroid, on.params) } else { State::Inactive })
 }

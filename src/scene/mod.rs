@@ -252,6 +252,17 @@ impl Scene {
         solids.chain(self.openings.iter().map(|o| o.fastest(from, to))).fold(0.0, f64::max)
     }
 
+    /// Direction outwards of each wall-layer particle of moving solids, in its solid's frame and of length 1; 0 where it has none, and of
+    /// the walls in openings, through which the water comes and goes.
+    pub fn facing(&self) -> Vec<DVec3> {
+        let walls = self.solids.iter().enumerate();
+        let of = |(k, solid): (usize, &Solid)| {
+            let closed = if k < self.followed() { 1.0 } else { 0.0 };
+            solid.wall_area.iter().map(move |area| closed * area.normalize_or_zero()).collect::<Vec<_>>()
+        };
+        walls.flat_map(of).collect()
+    }
+
     /// Solids that tables follow: all but the walls in openings, which come last.
     pub fn followed(&self) -> usize {
         self.solids.len() - self.openings.iter().filter(|o| o.solid.is_some()).count()

@@ -31,6 +31,8 @@ impl Cpu {
             // Found by every solve.
             excess: _,
             lightness: _,
+            facing: _,
+            outward: _,
             groups,
             solids: _,
             grid: _,

@@ -41,7 +41,7 @@ use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
 use crate::ranks::Standing;
 use crate::scene::{Groups, Kind, Scene, Solid};
-use crate::scheme::Preconditioner;
+use crate::scheme::{Preconditioner, Source};
 use crate::share::Share;
 use crate::stop::Stop;
 use glam::DVec3;
@@ -58,6 +58,10 @@ pub struct Cpu {
     free_bodies: Vec<FreeBody>,
     /// Rows at slots, in the order of solids and rows.
     slots: Vec<SlotRow>,
+    /// [`Scene::facing`], in the accurate scheme.
+    facing: Vec<DVec3>,
+    /// The same where the solids are now, world axes.
+    outward: Vec<DVec3>,
     /// [`collision::lightness`] of each wall-layer slot of the moving solids.
     lightness: Vec<f64>,
     fields: Fields,
@@ -108,6 +112,11 @@ impl Cpu {
             poses: Vec::new(),
             free_bodies: Vec::new(),
             slots: Vec::new(),
+            facing: match params.source {
+                Source::NumberDensity => Vec::new(),
+                Source::Mixed => scene.facing(),
+            },
+            outward: Vec::new(),
             lightness: scene.solids.iter().flat_map(|s| s.wall_slots.clone().map(|_| lightness(s))).collect(),
             fields: if wet { super::start(scene, plan) } else { Fields::default() },
             grid,

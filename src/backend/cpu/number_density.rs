@@ -25,22 +25,30 @@ wide! {
                 continue;
             }
             let neighbour = &chunk.neighbour[range.clone()];
-            (density[k], state[k]) = number_density(i, neighbour, on, arrays);
+            let carry = chunk.dummies[k] as usize - range.start;
+            (density[k], state[k]) = number_density(i, neighbour, carry, on, arrays);
             chunk.weight[range].copy_from_slice(&arrays.w[..neighbour.len()]);
         }
     }
 }
 
-/// Number density and state of slot `i`; `arrays` gets distances and weights of its neighbours.
+/// Number density and state of slot `i`, the first `carry` of whose neighbours carry pressure; `arrays` gets distances and weights of its neighbours.
 #[inline(always)]
-fn number_density(i: usize, neighbour: &[u32], on: Particles, arrays: &mut RowArrays) -> (f64, State) {
+fn number_density(
+    i: usize,
+    neighbour: &[u32],
+    carry: usize,
+    on: Particles,
+    arrays: &mut RowArrays,
+) -> (f64, State) {
     let RowArrays { r, w, .. } = arrays;
     let (n, filled) = (neighbour.len(), r.offsets(i, neighbour, on));
     let w = &mut w[..filled];
     r.map_squares(w, |r2| pair_weight(r2, on.params));
     w[n..].fill(0.0);
     let density = sum(w);
-    let wet = i < on.fluid || neighbour.iter().zip(&*w).any(|(&j, &w)| (j as usize) < on.fluid && w > 0.0);
+    let wet =
+        i < on.fluid || neighbour[..carry].iter().zip(&*w).any(|(&j, &w)| (j as usize) < on.fluid && w > 0.0);
     let state = if wet { free_surface(density, || r.weighted_sum(w), on.params) } else { State::Inactive };
     (density, state)
 }

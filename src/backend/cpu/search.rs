@@ -2,6 +2,7 @@
 
 use crate::cells::{Column, Grid};
 use crate::kernels::cell_list::CellList;
+use crate::kernels::neighbour_list::{Outward, in_front};
 use crate::neighbours::{CAPACITY, CHUNK, Chunk};
 use crate::params::Params;
 use glam::DVec3;
@@ -30,6 +31,13 @@ impl Coordinates {
             .into_par_iter()
             .with_min_len(CHUNK)
             .for_each(|(x, y, z, p)| (*x, *y, *z) = (p.x, p.y, p.z));
+    }
+
+    /// The particle in place `k`.
+    #[inline(always)]
+    fn at(&self, k: u32) -> DVec3 {
+        let k = k as usize;
+        DVec3::new(self.x[k], self.y[k], self.z[k])
     }
 
     /// Squared distances to `c` from `k` on.
@@ -132,6 +140,21 @@ impl Found {
         self.count += 1;
     }
 
+    /// Hand those that `go` over to `other`.
+    fn move_to(&mut self, other: &mut Self, go: impl Fn(u32) -> bool) {
+        let (kept, mut to) = (self.kept().len(), 0);
+        for at in 0..kept {
+            let j = self.index[at];
+            if go(j) {
+                other.push(j);
+                self.count -= 1;
+            } else {
+                self.index[to] = j;
+                to += 1;
+            }
+        }
+    }
+
     /// Take `j` out, if it is there.
     #[inline(always)]
     fn remove(&mut self, j: u32) {
@@ -162,6 +185,8 @@ pub struct Candidates<'a> {
     pub pressure_slots: u32,
     /// Slots below this carry pressure to walls.
     pub wall_carriers: u32,
+    /// Where moving solids face.
+    pub outward: Outward<'a>,
 }
 
 /// One row under construction.
@@ -212,13 +237,20 @@ impl Search {
         for &run in &*fluid {
             from.fluid.within(run, x, reach, below, near);
         }
+        if let Some(outward) = from.outward.get(i) {
+            let r = |j: u32| from.grid.periodic.nearest(from.fluid.at(j) - x);
+            near.move_to(dummy, |j| !in_front(r(j), outward));
+        }
         for &(run, moves) in &*solid {
             let Some((list, coordinates)) = (if moves { from.moving } else { from.fixed }) else { continue };
             hits.clear();
             coordinates.within(run, x, reach, below, hits);
             for &k in hits.kept() {
                 let j = list.slot[k as usize];
-                if j < carriers { near.push(j) } else { dummy.push(j) }
+                let before = |outward| in_front(x - run.shift - coordinates.at(k), outward);
+                let carries =
+                    j < carriers && (!moves || !is_water || from.outward.get(j as usize).is_none_or(before));
+                if carries { near.push(j) } else { dummy.push(j) }
             }
             // What had no place counts, so that the guard sees it.
             near.count += hits.count - hits.kept().len();

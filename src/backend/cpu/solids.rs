@@ -13,6 +13,13 @@ impl Cpu {
     pub(super) fn place_solids(&mut self, poses: &[Pose]) {
         self.poses.clear();
         self.poses.extend_from_slice(poses);
+        self.outward.clear();
+        let turned = self
+            .solids
+            .iter()
+            .zip(poses)
+            .flat_map(|(s, pose)| s.wall_slots.clone().map(|_| pose.orientation));
+        self.outward.extend(self.facing.iter().zip(turned).map(|(&facing, turn)| turn * facing));
         for (solid, pose) in self.solids.iter().zip(poses) {
             for (slots, offsets) in
                 [(&solid.wall_slots, &solid.wall_offset), (&solid.dummy_slots, &solid.dummy_offset)]

@@ -9,6 +9,7 @@ use super::search::{Candidates, Search, neighbour_list};
 use super::team::owns;
 use super::viscosity::{self, viscosity_rows};
 use crate::fields::Fields;
+use crate::kernels::neighbour_list::Outward;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::kernels::{
     Particles, absorber, cell_list, collision, correct, openings, predict, shift, surface_pressure,
@@ -130,6 +131,7 @@ impl Cpu {
             fixed: self.fixed.as_ref().map(|(list, x)| (list, x)),
             pressure_slots: groups.pressure() as u32,
             wall_carriers: params.wall_carriers(groups.fluid, groups.pressure()) as u32,
+            outward: Outward { first: groups.fluid, of: &self.outward },
         };
         let (largest, slot) = self
             .neighbours

@@ -30,7 +30,7 @@ const SAVED: [&str; 11] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 46] = [
+const MADE_ANEW: [&str; 47] = [
     "unclipped",
     "clipped",
     "surface_pressure",
@@ -68,6 +68,7 @@ const MADE_ANEW: [&str; 46] = [
     "now",
     "counters",
     "solid_offset",
+    "facing",
     "poses",
     "wall_layer",
     "force_chunk",
@@ -109,6 +110,11 @@ impl Gpu {
                 self.take_counters(&seen)?;
             }
             if self.params.viscosity > 0.0 && !listed {
+                if self.plan.needs(Arrays::Solids) {
+                    // Such a state does not say where solids face; the poses were shown before.
+                    let moving = super::groups(self.sizes.moving);
+                    self.context.pass([(super::kernels::move_solids::move_solids, moving)])?;
+                }
                 self.cell_list()?;
                 let rows = super::groups(self.sizes.pressure);
                 self.context.pass([(super::kernels::neighbour_list::neighbour_list_main, rows)])?;

@@ -69,7 +69,7 @@ table! {
     "particles" {
         /// x, y, z and kind.
         position: [f32; 4], Both, Fluid, |s, _| s.total;
-        /// u, v, w and, of the fluid, the word of its number.
+        /// u, v, w and, of the fluid, the word of its number, of moving wall layers where they face.
         velocity: [f32; 4], Both, Fluid, |s, _| s.total;
         pressure: f32, Both, Fluid, |s, _| s.pressure;
         number_density: f32, Both, Fluid, |s, _| s.pressure;
@@ -122,7 +122,8 @@ table! {
         unsorted: u32, Reads, Fluid, |s, _| s.sorted();
         /// Positions, velocities and pressures of the fluid, one after the other.
         sorted: f32, Reads, Fluid, |s, _| (4 + 4 + 1) * s.fluid, Split::Ranges;
-        moving_slot: u32, None, Solids, |s, _| s.moving;
+        /// Slot, and where it faces.
+        moving_slot: [u32; 2], None, Solids, |s, _| s.moving;
         static_start: u32, Writes, FixedWalls, |s, _| s.cells + 1, Split::Ranges;
         static_particle: [u32; 4], Writes, FixedWalls, |s, _| s.fixed;
     }
@@ -132,6 +133,8 @@ table! {
         counters: u32, Both, Fluid, |_, _| counter::WORDS as u64;
         reaction: [f32; 4], Both, Reaction, |s, _| s.moving_wall;
         solid_offset: [f32; 4], Writes, Solids, |s, _| s.moving;
+        /// Where the wall layer faces, in the solid's frame.
+        facing: f32, Writes, Solids, |s, _| s.moving_wall;
         poses: Pose, Writes, Solids, |s, _| s.solids;
         wall_layer: WallParticle, Writes, Force, |s, _| s.moving_wall;
         force_chunk: [u32; 4], Writes, Force, |s, _| s.force_chunks();

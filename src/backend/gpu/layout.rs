@@ -31,6 +31,12 @@ pub(crate) fn number_of(word: f32) -> u32 {
     word.to_bits().max(FIRST_WORD) - FIRST_WORD
 }
 
+/// A direction of length 1 as such a word, to a thousandth, or that of no length; `direction_word` in shaders/common.wgsl.
+pub(crate) fn direction_word(n: DVec3) -> f32 {
+    let part = |c: f64| ((c + 1.0) * 511.0).round() as u32;
+    word_of(part(n.x) | (part(n.y) << 10) | (part(n.z) << 20))
+}
+
 /// Places in the buffer of counters.
 pub mod counter {
     /// Particles lost since the last look.

@@ -196,6 +196,8 @@ impl Gpu {
                 }
             }
             self.context.upload(buffers::solid_offset, &offset)?;
+            let facing: Vec<f32> = scene.facing().into_iter().map(layout::direction_word).collect();
+            self.context.upload(buffers::facing, &facing)?;
         }
         if self.plan.needs(Arrays::Force) {
             let mut layer = vec![WallParticle::default(); g.moving_wall];

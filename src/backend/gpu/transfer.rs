@@ -69,7 +69,17 @@ impl Gpu {
             return Err(Error::gpu("the fields are those of another scene"));
         }
         let position = packed(&fields.position, self.middle, |i| f32::from(fields.kind[i] as u8));
-        let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| word_of(id));
+        // Moving solids stay where they are, and face there.
+        let moving = g.moving_wall_range();
+        let facing = if self.plan.needs(Arrays::Solids) {
+            self.context.download(buffers::velocity, moving.end)?[moving.clone()].to_vec()
+        } else {
+            vec![]
+        };
+        let number = |i: usize| match fields.id.get(i) {
+            Some(&id) => word_of(id),
+            None => facing.get(i - moving.start).map_or(0.0, |v| v[3]),
+        };
         let velocity = packed(&fields.velocity, DVec3::ZERO, number);
         let c = laplacian_coefficient(&self.params);
         let equation = |i: usize| {
