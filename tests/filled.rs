@@ -202,3 +202,33 @@ fn a_body_that_is_set_off_in_weightless_water_takes_it_along() {
         assert_eq!(sim.backend.counters().expect("counted").pressure_clamps, 0);
     }
 }
+
+/// A full closed cavity of 2 dimensions, 0.4 m wide and high, with a wall that moves in it.
+fn cavity(wall: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nadaptive = true\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.4]\n[tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, 0.4]\nopen = []\n\
+         [[moving_wall]]\nname = \"wall\"\n{wall}"
+    ))
+}
+
+#[test]
+fn a_cavity_in_which_a_paddle_turns_stays_full_and_one_that_a_piston_narrows_does_not() {
+    let piston = "min = [0, 0, 0]\nmax = [0.05, 0.1, 0.4]\nmotion = [[0, 0, 0, 0], [1, 0.1, 0, 0]]";
+    assert!(!Scene::build(&cavity(piston)).expect("it builds").filled);
+    let paddle =
+        cavity("min = [0.1, 0, 0.19]\nmax = [0.3, 0.1, 0.21]\nrotation = [[0, 0, 0, 0], [4, 0, 360, 0]]");
+    let scene = Scene::build(&paddle).expect("it builds");
+    assert!(scene.filled);
+    let mut sim = simulation(&paddle);
+    while sim.time < 1.0 {
+        sim.step().expect("a step");
+    }
+    let monitor = sim.backend.monitor().expect("measured");
+    println!(
+        "density off by {:.4} on average, at most {:.3}",
+        monitor.density_error_mean, monitor.density_error_max
+    );
+    assert!(monitor.density_error_mean.abs() < 0.02 && monitor.density_error_max < 0.15, "{monitor:?}");
+    assert_eq!(sim.backend.counters().expect("counted").lost, 0);
+}
