@@ -24,9 +24,8 @@ const SOUND_OVER_FLOW: f64 = 2.5;
 /// Least part of the derived c_s that a calm flow has.
 const CALM: f64 = 0.5;
 
-/// c_s^2 of creeping flow over nu v / l0, at least: as long as the step can be, a fifth of l0^2 / nu, a density error is undone at
-/// 1.5 v / l0 then, as fast as the flow makes one. Steps as short as viscosity asks for would leave c_s of the flow alone next to
-/// nothing of it.
+/// c_s^2 of creeping flow over nu v / l0, at least: in steps as long as viscosity allows, 0.16 l0^2 / nu, a density error is undone at half of
+/// v / l0 then, about as fast as the flow makes one. c_s of the flow alone would leave next to nothing of it in such short steps.
 const CREEPING: f64 = 3.0;
 
 /// Reach of the pressure within a step over the water's depth: what is missing at the floor of still water,
