@@ -174,8 +174,17 @@ pub enum FolderError {
     )]
     State(PathBuf),
     /// What is asked for would take the place of a file of a run.
-    #[error("{} is a file of the run in that folder: choose another name with --out", .0.display())]
+    #[error("{} belongs to the run in that folder: choose another place with --out", .0.display())]
     Result(PathBuf),
+    /// What is asked for would take the place of a file of another kind.
+    #[error(
+        "{} is there already, and nothing that this command has written: choose another name with --out, or move it away",
+        .0.display()
+    )]
+    Taken(PathBuf),
+    /// Results of many runs would lie among those of one.
+    #[error("{} is the folder of a run: choose another one with --out", .0.display())]
+    Run(PathBuf),
     /// The run in it is one of another case.
     #[error(
         "the case is another one than that of the run in {}: {}{}; run it as it was, or start a new run from that state \

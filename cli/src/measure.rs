@@ -8,9 +8,9 @@ use seixo::case::OutputField;
 use seixo::case::file::read_text;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
-use seixo::output::folder::spare_results;
 use seixo::output::particles::Particles;
 use seixo::output::replay::particles;
+use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use std::path::{Path, PathBuf};
 
@@ -70,7 +70,7 @@ const HEADER: [&str; 8] = [
 pub fn measure(args: &MeasureArgs) -> Exit {
     seixo::threads::start(None)?;
     let points = points(args)?;
-    args.out.iter().try_for_each(|path| spare_results(path))?;
+    args.out.iter().try_for_each(|path| spare(path, &(HEADER.join(",") + "\n")))?;
     let (case, frames) = series_of(&args.dir, args.series.as_deref())?;
     let held = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
     if held == [false; 2] {

@@ -13,6 +13,7 @@ use seixo::output::label::{Picture, animation, sheet};
 use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
 use seixo::output::replay::{Frame, frames, particles};
+use seixo::output::spare::spare_folder;
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::scene::Scene;
@@ -350,7 +351,9 @@ pub fn render(args: &RenderArgs) -> Exit {
     }
     let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
     let show = Show::open(&case, &args.look, &seen)?;
-    let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("pictures"));
+    let pictures = place(&args.dir, series).join("pictures");
+    let out = args.out.clone().unwrap_or_else(|| pictures.clone());
+    spare_folder(&out, &pictures)?;
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let joined = args.sheet.is_some() || args.animation.is_some();
     let one = |(number, frame): &(usize, Frame)| -> Result<Option<Picture>> {

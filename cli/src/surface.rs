@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
 use seixo::output::replay::{Frame, particles};
+use seixo::output::spare::spare_folder;
 use seixo::output::surface::surface;
 use seixo::output::write_whole;
 use std::path::PathBuf;
@@ -65,7 +66,9 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
         return Err(without("frames with water", &args.dir, &case, series));
     }
-    let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("surface"));
+    let own = place(&args.dir, series).join("surface");
+    let out = args.out.clone().unwrap_or_else(|| own.clone());
+    spare_folder(&out, &own)?;
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let one = |(number, frame): &(usize, Frame)| -> Result<usize> {
         let Some(path) = &frame.fluid else { return Ok(0) };

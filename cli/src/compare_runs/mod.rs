@@ -4,13 +4,13 @@ mod curves;
 mod difference;
 
 use super::report::chart::{Chart, Curve};
-use super::report::page::{charts, html, section, table};
+use super::report::page::{MARK, charts, html, section, table};
 use super::{Exit, finite};
 use curves::{Quantity, Run};
 use difference::Difference;
 use seixo::console::{remark, say, say_json};
 use seixo::error::{Error, Result};
-use seixo::output::folder::spare_results;
+use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -64,8 +64,8 @@ pub fn compare_runs(args: &CompareRunsArgs) -> Exit {
     if csv == args.out {
         return Err(Error::usage("--out", "--out names the page: give it another extension than .csv"));
     }
-    own(&csv)?;
-    [&args.out, &csv].into_iter().try_for_each(|path| spare_results(path))?;
+    spare(&args.out, MARK)?;
+    spare(&csv, &(COLUMNS.join(",") + "\n"))?;
     let window = [args.from.unwrap_or(f64::NEG_INFINITY), args.until.unwrap_or(f64::INFINITY)];
     if window[0] > window[1] {
         return Err(Error::usage("--from", "--from is after --until: nothing lies between"));
@@ -92,21 +92,6 @@ pub fn compare_runs(args: &CompareRunsArgs) -> Exit {
         say(&words(&answer));
     }
     Ok(0)
-}
-
-/// Refuses to write the table where there is another one: nobody has asked for a file of this name.
-fn own(csv: &Path) -> Result<()> {
-    let Ok(file) = std::fs::File::open(csv) else { return Ok(()) };
-    let mut first =
-        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(file).into_records();
-    if first.next().is_none_or(|row| row.is_ok_and(|row| row.iter().eq(COLUMNS))) {
-        return Ok(());
-    }
-    let text = format!(
-        "{} is there already and no table of differences: give another name with --out",
-        csv.display()
-    );
-    Err(Error::usage("--out", text))
 }
 
 /// The runs, each called by the last part of its folder, or by the whole path where two would be called the same.

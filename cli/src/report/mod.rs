@@ -10,14 +10,15 @@ use super::render::{LookArgs, Show, frames_of};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
-use page::{charts, escape, html, section, table};
+use page::{MARK, charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputField};
 use seixo::console::say;
 use seixo::error::{Error, FolderError, Result};
-use seixo::output::folder::{case_name, spare_results};
+use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
+use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::scene::Scene;
@@ -81,10 +82,10 @@ impl Run {
 pub fn report(args: &ReportArgs) -> Exit {
     seixo::threads::start(None)?;
     let run = Run::read(&args.dir)?;
+    let path = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
+    spare(&path, MARK)?;
     let pictures = pictures(args, &run)?;
     let page = page(&run, &pictures)?;
-    let path = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
-    spare_results(&path)?;
     write_whole(&path, page.as_bytes())?;
     if !args.quiet {
         say(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
