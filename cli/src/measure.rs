@@ -130,7 +130,14 @@ fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
         points.extend((0..args.count).map(|k| a.lerp(*b, f64::from(k) / f64::from(args.count - 1))));
     }
     if let Some(path) = &args.file {
-        points.extend(listed(path)?);
+        let listed = listed(path)?;
+        if listed.is_empty() {
+            let name = path.display().to_string();
+            let text =
+                format!("{name}: it holds no points: write x, y, z [m] with commas between, a line each");
+            return Err(Error::file(name, "", text));
+        }
+        points.extend(listed);
     }
     if points.is_empty() {
         return Err(Error::usage("--line", "say where: --point X,Y,Z, --line X,Y,Z,X,Y,Z or --file FILE"));

@@ -338,7 +338,17 @@ pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     } else {
         times.iter().filter_map(nearest).collect()
     };
-    picked.into_iter().map(|k| (k, all[k].clone())).collect()
+    let there = picked.into_iter().filter(|&k| is_there(k, &all[k]));
+    there.map(|k| (k, all[k].clone())).collect()
+}
+
+/// Whether the files of frame number `k` are there; says so if one is gone.
+pub fn is_there(k: usize, frame: &Frame) -> bool {
+    let gone = [&frame.fluid, &frame.solids].into_iter().flatten().find(|path| !path.exists());
+    if let Some(path) = gone {
+        remark(&format!("warning: frame {k} is left out: {} is gone", path.display()));
+    }
+    gone.is_none()
 }
 
 pub fn render(args: &RenderArgs) -> Exit {

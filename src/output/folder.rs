@@ -96,12 +96,12 @@ impl Folder {
             Err(e) if e.kind() == ErrorKind::NotFound => false,
             Err(e) => return Err(Error::io(root)(e)),
         };
-        if filled && mode == Mode::New {
-            return Err(FolderError::NotEmpty(root.to_path_buf()).into());
-        }
         let earlier = folder.marker()?;
         if filled && earlier.is_none() {
             return Err(FolderError::Foreign { folder: root.to_path_buf(), marker: MARKER }.into());
+        }
+        if filled && mode == Mode::New {
+            return Err(FolderError::NotEmpty(root.to_path_buf()).into());
         }
         std::fs::create_dir_all(root).map_err(Error::io(root))?;
         folder.lock = Arc::new(folder.take()?);
@@ -119,7 +119,8 @@ impl Folder {
         let Ok(root) = self.root.canonicalize() else { return Ok(()) };
         for input in inputs.iter().filter_map(|p| p.canonicalize().ok()) {
             if input == root {
-                return Err(FolderError::State(input).into());
+                let of = if root.is_dir() { FolderError::State } else { FolderError::Input };
+                return Err(of(input).into());
             }
             let name = input.file_name().and_then(|n| n.to_str()).unwrap_or_default();
             if input.parent() == Some(&root) && self.is_ours(name, &self.name) {

@@ -6,7 +6,7 @@ pub mod table;
 
 use super::Exit;
 use super::progress::clock;
-use super::render::{LookArgs, Show, frames_of};
+use super::render::{LookArgs, Show, frames_of, is_there};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
@@ -73,9 +73,15 @@ impl Run {
             bodies: Table::read_by(&root.join("bodies.csv"), "body")?,
             gauges: Table::read(&root.join("gauges.csv"))?,
             // A run may have been told to write none.
-            frames: if root.join("vtu").exists() { frames_of(root).unwrap_or_default() } else { Vec::new() },
+            frames: if root.join("vtu").exists() { whole_frames(root) } else { Vec::new() },
         })
     }
+}
+
+/// The frames of the run in `root` whose files are there.
+fn whole_frames(root: &Path) -> Vec<Frame> {
+    let all = frames_of(root).unwrap_or_default().into_iter().enumerate();
+    all.filter(|(k, frame)| is_there(*k, frame)).map(|(_, frame)| frame).collect()
 }
 
 /// `seixo report`.

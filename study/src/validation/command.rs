@@ -75,7 +75,7 @@ pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
         suite.points().for_each(|point| say(&point));
         return Ok(());
     }
-    for folder in args.join.iter().filter(|folder| !folder.join("points").is_dir()) {
+    if let Some(folder) = args.join.iter().find(|folder| !folder.join("points").is_dir()) {
         let text = format!("--join {}: it holds no points of a validation (no points/)", folder.display());
         return Err(Error::usage("--join", text));
     }
