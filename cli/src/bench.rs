@@ -18,7 +18,7 @@ pub struct BenchArgs {
     #[arg(default_value = "cases/dam_break_transport.toml")]
     case: PathBuf,
     /// Spacings l0 [m] to time.
-    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.01, 0.0075, 0.006])]
+    #[arg(long, value_delimiter = ',', default_value = "0.03,0.02,0.015,0.01,0.0075,0.006")]
     spacings: Vec<f64>,
     /// Change a value of the case; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]

@@ -18,6 +18,7 @@ mod setup;
 mod shell;
 mod signals;
 mod surface;
+mod width;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use seixo::console::{lost, remark, say};
@@ -150,6 +151,11 @@ impl Changes {
         let end = self.until.map(|end| format!("run.end={end:?}"));
         Ok(self.sets.iter().cloned().chain(end).collect())
     }
+}
+
+/// So many of a thing that takes an s where they are many.
+fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// A number that is one.

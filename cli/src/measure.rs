@@ -1,7 +1,7 @@
 //! `seixo measure`: velocity and pressure at points of one's choice, from the frames that a run has written.
 
 use super::render::{chosen, numbers, series_of, without};
-use super::{Exit, finite};
+use super::{Exit, counted, finite};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use seixo::case::OutputField;
@@ -116,7 +116,7 @@ pub fn measure(args: &MeasureArgs) -> Exit {
     match &args.out {
         Some(path) => {
             write_whole(path, &bytes)?;
-            say(&format!("{} rows in {}", points.len() * chosen.len(), path.display()));
+            say(&format!("{} in {}", counted(points.len() * chosen.len(), "row"), path.display()));
         }
         None => say(String::from_utf8_lossy(&bytes).trim_end()),
     }

@@ -3,7 +3,7 @@
 mod words;
 
 use super::setup::{self, Setup};
-use super::{CaseArgs, Exit};
+use super::{CaseArgs, Exit, width};
 use glam::DMat3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -210,7 +210,8 @@ pub fn plan(args: &PlanArgs) -> Exit {
     if args.json {
         say_json(&report);
     } else {
-        say(&report.words());
+        let words = report.words();
+        say(&width::of_stdout().map_or(words.clone(), |columns| width::wrapped(&words, columns)));
     }
     Ok(0)
 }

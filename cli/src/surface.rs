@@ -1,7 +1,7 @@
 //! `seixo surface`: the surface of the water as meshes, from the frames that a run has written.
 
 use super::render::{chosen, place, series_of, without};
-use super::{Exit, finite};
+use super::{Exit, counted, finite};
 use clap::ValueEnum;
 use rayon::prelude::*;
 use seixo::console::{remark, say};
@@ -89,7 +89,7 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     let written: Result<Vec<usize>> = chosen.par_iter().map(one).collect();
     let count: usize = written?.into_iter().sum();
     if !args.quiet {
-        say(&format!("{count} surfaces in {}", out.display()));
+        say(&format!("{} in {}", counted(count, "surface"), out.display()));
     }
     Ok(0)
 }

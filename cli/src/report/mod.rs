@@ -14,7 +14,7 @@ use page::{MARK, charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputField};
-use seixo::console::say;
+use seixo::console::{remark, say};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
@@ -112,6 +112,7 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
     let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
     let seen: Vec<&Frame> = (0..count).map(|k| &run.frames[pick(k)]).collect();
     let show = Show::open(&run.case, &args.look, &seen)?;
+    show.unseen(&args.look).iter().for_each(|note| remark(note));
     let draw = |k: usize| {
         let frame = seen[k];
         Ok((frame.time, STANDARD.encode(show.picture(frame)?.png())))
@@ -252,7 +253,15 @@ fn bodies(run: &Run) -> Vec<Chart> {
 const MOST_GAUGES: usize = 36;
 
 fn gauges(run: &Run) -> Vec<Chart> {
-    let columns = run.gauges.columns().iter().skip(1).take(MOST_GAUGES);
+    let flat = run.case.run.dimensions == 2;
+    // In two dimensions nothing acts along y, or turns about another axis.
+    let still = |c: &&String| {
+        let name = c.split(" [").next().unwrap_or_default();
+        let across = ["_y", "torque_x", "torque_z"].iter().any(|end| name.ends_with(end));
+        let points = run.gauges.curve(c).unwrap_or_default();
+        flat && across && points.iter().all(|p| p[1] == 0.0 || !p[1].is_finite())
+    };
+    let columns = run.gauges.columns().iter().skip(1).filter(|c| !still(c)).take(MOST_GAUGES);
     columns.map(|c| chart(c.clone(), &run.gauges, &[(c, c)])).collect()
 }
 
