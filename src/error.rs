@@ -81,7 +81,13 @@ pub struct Problem {
 impl Problem {
     /// A problem with `key` that no place in a file is known of.
     pub fn new(key: impl Into<String>, message: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { key: key.into(), message: message.into(), remedy: remedy.into(), ..Self::default() }
+        let tidy = |text: String| tidy(&text);
+        Self {
+            key: key.into(),
+            message: tidy(message.into()),
+            remedy: tidy(remedy.into()),
+            ..Self::default()
+        }
     }
 }
 
@@ -89,6 +95,33 @@ impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}: {}", self.key, self.message, self.remedy)
     }
+}
+
+/// Digits of a number that somebody may want to read, and letters of a value that somebody has written.
+const MOST_DIGITS: usize = 22;
+const MOST_LETTERS: usize = 120;
+
+/// `text` for people: numbers of hundreds of digits with an exponent, long words in backticks up to where one knows them.
+pub(crate) fn tidy(text: &str) -> String {
+    let of_number = |c: char| c.is_ascii_digit() || c == '.';
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find(of_number) {
+        let (before, from) = rest.split_at(start);
+        let (digits, after) = from.split_at(from.find(|c| !of_number(c)).unwrap_or(from.len()));
+        out.push_str(before);
+        match digits.parse::<f64>() {
+            Ok(number) if digits.len() > MOST_DIGITS => out.push_str(&format!("{number:e}")),
+            _ => out.push_str(digits),
+        }
+        rest = after;
+    }
+    out.push_str(rest);
+    let part = |(k, part): (usize, &str)| match part.char_indices().nth(MOST_LETTERS) {
+        Some((cut, _)) if k % 2 == 1 => format!("{} ...", &part[..cut]),
+        _ => part.to_owned(),
+    };
+    out.split('`').enumerate().map(part).collect::<Vec<_>>().join("`")
 }
 
 /// What is wrong with a case, or with a file of a study.
@@ -174,8 +207,17 @@ pub enum FolderError {
     )]
     State(PathBuf),
     /// What is asked for would take the place of a file of a run.
-    #[error("{} is a file of the run in that folder: choose another name with --out", .0.display())]
+    #[error("{} belongs to the run in that folder: choose another place with --out", .0.display())]
     Result(PathBuf),
+    /// What is asked for would take the place of a file of another kind.
+    #[error(
+        "{} is there already, and nothing that this command has written: choose another name with --out, or move it away",
+        .0.display()
+    )]
+    Taken(PathBuf),
+    /// Results of many runs would lie among those of one.
+    #[error("{} is the folder of a run: choose another one with --out", .0.display())]
+    Run(PathBuf),
     /// The run in it is one of another case.
     #[error(
         "the case is another one than that of the run in {}: {}{}; run it as it was, or start a new run from that state \
@@ -188,7 +230,7 @@ pub enum FolderError {
         changed: Vec<String>,
     },
     /// There is no run in it to go on with.
-    #[error("{} holds no run of seixo to go on with", .0.display())]
+    #[error("{} holds no run of seixo: there is no `.seixo` in it that names one", .0.display())]
     NoRun(PathBuf),
     /// A file of it is shorter than when the run stopped.
     #[error("{}: it is shorter than when the run stopped", .0.display())]

@@ -183,6 +183,7 @@ impl Estimate {
         let comes: f64 = case.openings().filter(|o| o.is_inflow()).map(comes).sum();
         let most = case.fluid.as_ref().and_then(|f| f.max_volume);
         let most = most.map(|v| v / if flat { l0 * l0 } else { l0.powi(3) });
+        let slots = most.filter(|_| case.openings().any(|o| o.is_inflow()));
         let most = most.or_else(|| tank.map(|t| 2.0 * cells(&|k| span(&t.min, &t.max, k))));
         let water =
             if comes > 0.0 { (water + comes).min(most.unwrap_or(f64::INFINITY)).max(water) } else { water };
@@ -248,13 +249,16 @@ impl Estimate {
             // Room for splashes, as the scene leaves it.
             domain.hi[2] += axes().map(|k| domain.size(k)).fold(0.0, f64::max);
         }
+        // Room for water that may come in is kept from the start on, as much as the case says and the domain holds.
+        let slots = slots.map_or(water, |n| n.min(cells(&|k| domain.size(k))).max(water));
         let reach = run.effective_radius * l0;
         let wet = water > 0.0;
         let searched = axes().map(|k| (domain.size(k) / reach).ceil() + 8.0).product::<f64>();
         let searched = if wet { searched } else { 0.0 };
         let ground = (cells(&|k| lattice.size(k)) * LATTICE_CELL).max(0.0);
         let particles = water + solids;
-        let base = PROGRAM + particles * PARTICLE + searched * SEARCH_CELL + ground;
+        let kept = slots + solids;
+        let base = PROGRAM + kept * PARTICLE + searched * SEARCH_CELL + ground;
 
         let output = &case.output;
         let frames = |every: f64| if every > 0.0 { (run.end / every).floor() + 2.0 } else { 0.0 };
@@ -281,18 +285,25 @@ impl Estimate {
             water,
             particles,
             cells: searched,
-            memory_cpu: base + water * WATER,
-            memory_beside_device: base + water * WATER_ON_DEVICE,
+            memory_cpu: base + slots * WATER,
+            memory_beside_device: base + slots * WATER_ON_DEVICE,
             frames: frames(output.every),
             frame_bytes: frame(output.choice()),
             series: output.series.iter().map(series).collect(),
             row_bytes: ROW + moving * ROW_OF_SOLID,
             table_bytes: rows * (ROW + moving * ROW_OF_SOLID),
-            checkpoint_bytes: if saves { 3.0 * CHECKPOINT * particles } else { 0.0 },
+            checkpoint_bytes: if saves { 3.0 * CHECKPOINT * kept } else { 0.0 },
         }
     }
 
-    /// Of a run that stops after `steps`, if any.
+    /// Of a run of `case` whose steps are `dt` [s] long: those that its scene allows.
+    pub fn at_step(self, case: &Case, dt: f64) -> Self {
+        let rows = case.run.end / case.output.table_every.unwrap_or(dt).max(dt);
+        let steps = (case.run.end / dt).ceil();
+        Self { table_bytes: rows * self.row_bytes, ..self }.at_most(Some(steps as u64))
+    }
+
+    /// Of a run that stops after `steps`, if any: no step has two frames.
     pub fn at_most(self, steps: Option<u64>) -> Self {
         let Some(steps) = steps.map(|n| n as f64) else { return self };
         let frames = self.frames.min(steps + 2.0);

@@ -182,6 +182,12 @@ impl Step {
     }
 }
 
+/// c_s where none is typed [m/s], for gravity `g` [m/s2], spacing `l0` and depth [m].
+fn derived_speed(g: f64, l0: f64, depth: f64) -> f64 {
+    // 1 % compression of the wall layer in hydrostatics, and well above the speed of the collapse.
+    (100.0 * g * l0).sqrt().max(2.5 * (g * depth).sqrt()).max(1e-6)
+}
+
 impl Params {
     /// Constants of `case` as built into `scene`.
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
@@ -203,8 +209,7 @@ impl Params {
         };
         let (gravity, periodic) = (scene.periodic.across(scene.gravity), scene.periodic);
         let g = gravity.length();
-        // 1 % compression of the wall layer in hydrostatics, and well above the speed of the collapse.
-        let derived_speed = (100.0 * g * l0).sqrt().max(2.5 * (g * scene.depth).sqrt()).max(1e-6);
+        let derived_speed = derived_speed(g, l0, scene.depth);
         let relaxation = match fluid.map(|f| (f.relaxation, f.sound_speed)) {
             Some((Some(gamma), _)) => Relaxation::Fixed(gamma),
             Some((None, Some(c))) => Relaxation::Speed(c),
@@ -289,6 +294,15 @@ impl Params {
         match self.source {
             Source::NumberDensity => DVec3::ZERO,
             Source::Mixed => self.gravity,
+        }
+    }
+
+    /// c_s over the one that is derived if none is typed [-]; 1 without weight, which derives none.
+    pub fn sound_over_derived(&self) -> f64 {
+        let g = self.gravity.length();
+        match self.relaxation {
+            Relaxation::Speed(c) if g > 0.0 => c / derived_speed(g, self.spacing, self.depth),
+            _ => 1.0,
         }
     }
 

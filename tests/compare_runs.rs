@@ -142,6 +142,30 @@ fn other_time_steps_and_cases_are_interpolated_and_told() {
 }
 
 #[test]
+fn slices_of_other_widths_are_held_against_each_other_a_metre_across() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = run(folder.path(), "a", &[]);
+    let b = run(folder.path(), "b", &["--spacing", "0.025", "--set", "run.time_step=5e-4"]);
+    let (answer, page) = compared(folder.path(), &[&a, &b], &[]);
+    // 1000 kg/m3, 0.5 m x 0.5 m: 613 J a metre across, at either spacing.
+    let energy = of(&answer, "potential [J/m]");
+    assert!(energy["largest"].as_f64().unwrap() < 0.05 * 613.0, "{energy}");
+    assert!(!answer.to_string().contains("[J]") && !answer.to_string().contains("[N]"), "{answer}");
+    of(&answer, "h [m]");
+    assert!(answer["remarks"].to_string().contains("given for each metre across"), "{answer}");
+    assert!(page.contains("b against a (spacing 0.025 m against 0.05 m)") && page.contains("Spacing [m]"));
+    // The key shows the dashes of its curve.
+    assert!(
+        page.contains("class=\"key\"><svg")
+            && page.contains("class=\"key\"><i")
+            && page.matches("stroke-dasharray").count() > 2
+    );
+    let plain = run(folder.path(), "c", &["--set", "fluid.viscosity=1e-4"]);
+    let (answer, _) = compared(folder.path(), &[&a, &plain], &[]);
+    of(&answer, "potential [J]");
+}
+
+#[test]
 fn what_does_not_fit_together_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let a = run(folder.path(), "a", &[]);

@@ -49,6 +49,7 @@ mod settle;
 mod shaders;
 mod shaped;
 mod shapes;
+mod slips;
 mod slots;
 mod stability;
 mod study;

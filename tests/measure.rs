@@ -42,6 +42,9 @@ fn no_reader_writes_over_what_a_run_wrote() {
     for more in [&[][..], &["--set", "gauge.level=[{name=\"h\",at=[0.5,0]}]", "--force"]] {
         seixo().current_dir(folder.path()).args(run).args(more).assert().success();
     }
+    let again = ["run", "still.toml", "-o", "again", "--backend", "cpu", "-q"];
+    seixo().current_dir(folder.path()).args(again).assert().success();
+    std::fs::write(folder.path().join("mine.html"), "<html>mine</html>\n").unwrap();
     let line = ["measure", "out", "--line", "0.5,0,0,0.5,0,0.7", "--count", "2", "-o"];
     for (args, target) in [
         (&line[..], "out/monitors.csv"),
@@ -49,16 +52,48 @@ fn no_reader_writes_over_what_a_run_wrote() {
         (&line, "out/case.toml"),
         (&line, "out/still.pvd"),
         (&["report", "out", "--pictures", "0", "-o"], "out/result.json"),
+        // What is in the folders of a run, of another one, too.
+        (&line, "out/vtu/fluid_0001.vtu"),
+        (&["report", "out", "--pictures", "0", "-o"], "out/vtu/fluid_0000.vtu"),
+        (&line, "out/checkpoint/new.csv"),
+        // Files of somebody else: no case, mesh or page is a table.
+        (&line, "still.toml"),
+        (&["report", "out", "--pictures", "0", "-o"], "still.toml"),
+        (&["report", "out", "--pictures", "0", "-o"], "mine.html"),
+        (&["compare-runs", "out", "again", "-o"], "mine.html"),
+        (&["bench", "still.toml", "-o"], "still.toml"),
+        (&["bench", "still.toml", "-o"], "out/case.toml"),
     ] {
-        let before = std::fs::read(folder.path().join(target)).unwrap();
+        let before = std::fs::read(folder.path().join(target)).ok();
         let output = seixo().current_dir(folder.path()).args(args).arg(target).output().unwrap();
         let err = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && err.contains(target), "{target}: {err}");
-        assert_eq!(std::fs::read(folder.path().join(target)).unwrap(), before, "{target}");
+        assert_eq!(std::fs::read(folder.path().join(target)).ok(), before, "{target}");
     }
-    for target in ["out/line.csv", "line.csv", "gauges.csv"] {
+    // What the command itself has written it writes again, and an empty file is nobody's.
+    std::fs::write(folder.path().join("empty.csv"), "").unwrap();
+    for target in ["out/line.csv", "line.csv", "line.csv", "gauges.csv", "empty.csv"] {
         seixo().current_dir(folder.path()).args(line).arg(target).assert().success();
     }
+    for _ in 0..2 {
+        seixo()
+            .current_dir(folder.path())
+            .args(["compare-runs", "out", "again", "-o", "page.html"])
+            .assert()
+            .success();
+        seixo().current_dir(folder.path()).args(["report", "out", "--pictures", "0"]).assert().success();
+    }
+    // Nor do pictures go where a run keeps its frames, or many runs where one is.
+    for (args, why) in [
+        (&["render", "out", "-o", "again/pictures"][..], "belongs to the run"),
+        (&["validate", "front", "-o", "out"], "folder of a run"),
+        (&["validate", "front", "-o", "v", "--join", "none"], "--join none: it holds no points"),
+    ] {
+        let output = seixo().current_dir(folder.path()).args(args).output().unwrap();
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && err.contains(why), "{args:?}: {err}");
+    }
+    assert!(!folder.path().join("out/points").exists() && !folder.path().join("v").exists());
 }
 
 #[test]

@@ -524,6 +524,9 @@ fn results_keep_the_meshes_that_they_are_of() {
     std::fs::rename(folder.path().join("box.stl"), folder.path().join("gone.stl")).expect("moved");
     std::fs::rename(&root, &moved).expect("moved");
     let at = moved.display().to_string();
+    // The case itself has no mesh any more; its results have.
+    let gone = ran(&["run", &path, "-o", &at, "--resume", "--backend", "cpu"]);
+    assert!(gone.code == 2 && gone.err.contains("the results have a copy: go on with"), "{}", gone.err);
     for args in [
         vec!["run", "--resume", &at, "--backend", "cpu", "-q"],
         vec!["render", &at, "--size", "64x48"],

@@ -83,6 +83,11 @@ fn what_is_wrong_with_a_file_is_told_with_its_line() {
     for (text, words) in [
         (&b"0,0,0,0\n1,0,0\n"[..], "gate.csv:2: expected time [s] and displacement x, y, z [m]"),
         (b"t,x,y,z\n0,0,0,0\n1,0,0,a\n", "gate.csv:3: expected time"),
+        // Only names have letters.
+        (b"0;0;0;0\n0,0,0,0\n", "gate.csv:1: expected time"),
+        (b"--,--,--,--\n0,0,0,0\n", "gate.csv:1: expected time"),
+        (b"time[ms],x[m],y[m],z[m]\n0,0,0,0\n", "gate.csv:1: `time` is in [ms]: write time [s]"),
+        (b"t,x [mm],y,z\n0,0,0,0\n", "gate.csv:1: `x` is in [mm]"),
         (b"0,0,0,0\n1,0,0,nan\n", "gate.csv:2: expected time"),
         (b"0,0,0,0\n1,0,0,1\n1,0,0,2\n", "gate.csv:3: time 1 does not come after 1"),
         (b"# nothing\n", "gate.csv: it holds no rows"),

@@ -202,7 +202,10 @@ fn series_count_on_the_disk() {
     assert!(told.out.contains("series `corner`: 12 frames of"), "{}", told.out);
     let far = SERIES.replace("every=0.01", "every=1e-14").replace("\"body\"", "\"fluid\"");
     let out = folder.path().join("far").display().to_string();
-    let refused = ran(&["run", &case, "-o", &out, "--backend", "cpu", "-q", "--set", &far]);
+    // A frame a step, of many steps.
+    let steps = ["--set", "run.time_step=1e-10", "--spacing", "0.005"];
+    let run = ["run", &case, "-o", &out, "--backend", "cpu", "-q", "--set", &far];
+    let refused = ran(&[&run[..], &steps].concat());
     assert!(
         refused.code == 2 && refused.err.contains("raise output.every (or that of a series)"),
         "{}",

@@ -41,6 +41,8 @@ fn a_report_holds_everything_and_fetches_nothing() {
     ] {
         assert!(text.contains(word), "{word}");
     }
+    // In two dimensions nothing acts along y.
+    assert!(!text.contains("on gate_force_y [N]") && !text.contains("on gate_torque_x"));
     // Any three letters may stand next to each other in a picture.
     let words: String =
         text.split("base64,").map(|part| part.split_once('"').map_or(part, |(_, rest)| rest)).collect();

@@ -6,6 +6,8 @@ use seixo::backend::gpu::{AdapterInfo, adapters, bandwidth};
 use seixo::backend::traffic::Solve;
 use seixo::console::{remark, say, say_json};
 use seixo::error::{Error, Result};
+use seixo::output::spare::spare;
+use seixo::output::write_whole;
 use seixo_study::bench::{Growth, Row, host_bandwidth, measure};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,7 +18,7 @@ pub struct BenchArgs {
     #[arg(default_value = "cases/dam_break_transport.toml")]
     case: PathBuf,
     /// Spacings l0 [m] to time.
-    #[arg(long, value_delimiter = ',', default_values_t = [0.03, 0.02, 0.015, 0.01, 0.0075, 0.006])]
+    #[arg(long, value_delimiter = ',', default_value = "0.03,0.02,0.015,0.01,0.0075,0.006")]
     spacings: Vec<f64>,
     /// Change a value of the case; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -40,8 +42,12 @@ pub struct BenchArgs {
     json: bool,
 }
 
+/// How a file of results begins, and nobody else's.
+const MARK: &str = "{\n  \"made_by\": \"seixo bench\",\n";
+
 #[derive(Serialize)]
 struct Report {
+    made_by: &'static str,
     version: &'static str,
     commit: Option<String>,
     cores: usize,
@@ -98,6 +104,7 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
 
 pub fn bench(args: &BenchArgs) -> Exit {
     seixo::threads::start(args.device.threads)?;
+    args.out.iter().try_for_each(|path| spare(path, MARK))?;
     let host = host_bandwidth();
     let (mut rows, mut growth) = (Vec::new(), Vec::new());
     for backend in choices(&args.device) {
@@ -114,6 +121,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
         rows.append(&mut own);
     }
     let report = Report {
+        made_by: "seixo bench",
         version: env!("CARGO_PKG_VERSION"),
         commit: commit(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
@@ -125,7 +133,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
     };
     if let Some(path) = &args.out {
         let text = serde_json::to_string_pretty(&report).unwrap_or_default() + "\n";
-        std::fs::write(path, text).map_err(Error::io(path))?;
+        write_whole(path, text.as_bytes())?;
     }
     if args.json {
         say_json(&report);

@@ -18,6 +18,7 @@ mod setup;
 mod shell;
 mod signals;
 mod surface;
+mod width;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use seixo::console::{lost, remark, say};
@@ -132,9 +133,29 @@ impl Changes {
                 return Err(Error::usage(option, text));
             }
         }
+        let keys: Vec<(&str, &String)> =
+            self.sets.iter().filter_map(|s| Some((s.split_once('=')?.0.trim(), s))).collect();
+        for (k, (key, set)) in keys.iter().enumerate() {
+            // A list may be given and a value of it changed then, but not the other way round.
+            let lost = |(before, other): &&(&str, &String)| {
+                let within =
+                    before.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+                within && other != set
+            };
+            if let Some((_, other)) = keys[..k].iter().find(lost) {
+                let text =
+                    format!("--set {set} takes the place of what --set {other} says: leave one of them out");
+                return Err(Error::usage("--set", text));
+            }
+        }
         let end = self.until.map(|end| format!("run.end={end:?}"));
         Ok(self.sets.iter().cloned().chain(end).collect())
     }
+}
+
+/// So many of a thing that takes an s where they are many.
+fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// A number that is one.

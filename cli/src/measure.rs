@@ -1,16 +1,16 @@
 //! `seixo measure`: velocity and pressure at points of one's choice, from the frames that a run has written.
 
 use super::render::{chosen, numbers, series_of, without};
-use super::{Exit, finite};
+use super::{Exit, counted, finite};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use seixo::case::OutputField;
 use seixo::case::file::read_text;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
-use seixo::output::folder::spare_results;
 use seixo::output::particles::Particles;
 use seixo::output::replay::particles;
+use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use std::path::{Path, PathBuf};
 
@@ -70,7 +70,7 @@ const HEADER: [&str; 8] = [
 pub fn measure(args: &MeasureArgs) -> Exit {
     seixo::threads::start(None)?;
     let points = points(args)?;
-    args.out.iter().try_for_each(|path| spare_results(path))?;
+    args.out.iter().try_for_each(|path| spare(path, &(HEADER.join(",") + "\n")))?;
     let (case, frames) = series_of(&args.dir, args.series.as_deref())?;
     let held = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
     if held == [false; 2] {
@@ -116,7 +116,7 @@ pub fn measure(args: &MeasureArgs) -> Exit {
     match &args.out {
         Some(path) => {
             write_whole(path, &bytes)?;
-            say(&format!("{} rows in {}", points.len() * chosen.len(), path.display()));
+            say(&format!("{} in {}", counted(points.len() * chosen.len(), "row"), path.display()));
         }
         None => say(String::from_utf8_lossy(&bytes).trim_end()),
     }
@@ -130,7 +130,14 @@ fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
         points.extend((0..args.count).map(|k| a.lerp(*b, f64::from(k) / f64::from(args.count - 1))));
     }
     if let Some(path) = &args.file {
-        points.extend(listed(path)?);
+        let listed = listed(path)?;
+        if listed.is_empty() {
+            let name = path.display().to_string();
+            let text =
+                format!("{name}: it holds no points: write x, y, z [m] with commas between, a line each");
+            return Err(Error::file(name, "", text));
+        }
+        points.extend(listed);
     }
     if points.is_empty() {
         return Err(Error::usage("--line", "say where: --point X,Y,Z, --line X,Y,Z,X,Y,Z or --file FILE"));

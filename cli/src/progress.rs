@@ -1,5 +1,6 @@
 //! How far a run is: a bar on a terminal; in a log a line a frame, but no more than one a second.
 
+use super::width;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use seixo::console::remark;
 use seixo::run::Progress;
@@ -10,6 +11,8 @@ use std::time::{Duration, Instant};
 const LINE_AFTER: Duration = Duration::from_secs(1);
 const LINE_EVERY: Duration = Duration::from_secs(30);
 const BAR_LENGTH: u64 = 10_000;
+/// Columns before the message: `[==========] 100 %  `.
+const BEFORE: usize = 20;
 
 /// Shows progress on stderr.
 pub struct Display {
@@ -38,13 +41,14 @@ impl Display {
             if self.last.elapsed() > Duration::from_millis(100) {
                 self.last = Instant::now();
                 bar.set_position((progress.done * BAR_LENGTH as f64) as u64);
-                bar.set_message(self.line(progress));
+                let room = width::of_stderr().unwrap_or(80).saturating_sub(BEFORE);
+                bar.set_message(width::fitting(&self.fields(progress), room));
             }
         } else if !self.quiet {
             let silence = self.last.elapsed();
             if silence > LINE_EVERY || progress.frame && silence > LINE_AFTER {
                 self.last = Instant::now();
-                remark(&self.line(progress));
+                remark(&self.fields(progress).join("  "));
             }
         }
     }
@@ -56,21 +60,21 @@ impl Display {
         }
     }
 
-    fn line(&self, progress: &Progress) -> String {
+    /// What there is to tell; what is waited for comes first.
+    fn fields(&self, progress: &Progress) -> Vec<String> {
         let report = &progress.report;
-        // What is waited for comes first: a terminal of 80 columns cuts the rest.
-        let mut line = format!(
-            "ETA {}  t={:.3} s  step {}  dt {:.1e}",
-            clock(progress.remaining),
-            progress.time,
-            report.step + 1,
-            report.dt
-        );
+        let mut fields = vec![
+            format!("ETA {}", clock(progress.remaining)),
+            format!("t={:.3} s", progress.time),
+            format!("step {}", report.step + 1),
+            format!("dt {:.1e}", report.dt),
+        ];
         if self.wet {
-            let (iterations, speed) = (report.pressure.iterations, progress.speed_max);
-            line += &format!("  CG {iterations}  |v| {speed:.2}");
+            fields.push(format!("CG {}", report.pressure.iterations));
+            fields.push(format!("|v| {:.2}", progress.speed_max));
         }
-        line + &format!("  wall {}", clock(progress.wall))
+        fields.push(format!("wall {}", clock(progress.wall)));
+        fields
     }
 }
 

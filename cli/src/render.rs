@@ -1,6 +1,6 @@
 //! `seixo render`: pictures of the frames that a run wrote.
 
-use super::Exit;
+use super::{Exit, counted};
 use clap::ValueEnum;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,6 +13,7 @@ use seixo::output::label::{Picture, animation, sheet};
 use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
 use seixo::output::replay::{Frame, frames, particles};
+use seixo::output::spare::spare_folder;
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::scene::Scene;
@@ -233,6 +234,26 @@ impl Show {
         Ok(Self { painter: Painter::new(&scene, &style, &params), scene })
     }
 
+    /// What `look` asks for that shows nothing: places beside the scene.
+    pub fn unseen(&self, look: &LookArgs) -> Vec<String> {
+        let (low, high) = self.scene.domain;
+        let mut notes = Vec::new();
+        if let Some((axis, at)) = look.slice.filter(|&(k, at)| at < low[k] || at > high[k]) {
+            let (name, low, high) = (["x", "y", "z"][axis], low[axis], high[axis]);
+            notes.push(format!(
+                "note: --slice {name}={at:e} shows no water: the scene reaches from {name} = {low:.4} to {high:.4} m"
+            ));
+        }
+        let far = (high - low).length() / look.zoom.min(1.0);
+        if let Some(target) = look.target.filter(|t| (*t - 0.5 * (low + high)).length() > far) {
+            notes.push(format!(
+                "note: --target {:e},{:e},{:e} is so far from the scene (from {low:.2} to {high:.2} m) that nothing may be seen",
+                target.x, target.y, target.z
+            ));
+        }
+        notes
+    }
+
     /// The picture of a frame.
     ///
     /// # Errors
@@ -337,7 +358,17 @@ pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     } else {
         times.iter().filter_map(nearest).collect()
     };
-    picked.into_iter().map(|k| (k, all[k].clone())).collect()
+    let there = picked.into_iter().filter(|&k| is_there(k, &all[k]));
+    there.map(|k| (k, all[k].clone())).collect()
+}
+
+/// Whether the files of frame number `k` are there; says so if one is gone.
+pub fn is_there(k: usize, frame: &Frame) -> bool {
+    let gone = [&frame.fluid, &frame.solids].into_iter().flatten().find(|path| !path.exists());
+    if let Some(path) = gone {
+        remark(&format!("warning: frame {k} is left out: {} is gone", path.display()));
+    }
+    gone.is_none()
 }
 
 pub fn render(args: &RenderArgs) -> Exit {
@@ -350,7 +381,10 @@ pub fn render(args: &RenderArgs) -> Exit {
     }
     let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
     let show = Show::open(&case, &args.look, &seen)?;
-    let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("pictures"));
+    show.unseen(&args.look).iter().for_each(|note| remark(note));
+    let pictures = place(&args.dir, series).join("pictures");
+    let out = args.out.clone().unwrap_or_else(|| pictures.clone());
+    spare_folder(&out, &pictures)?;
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let joined = args.sheet.is_some() || args.animation.is_some();
     let one = |(number, frame): &(usize, Frame)| -> Result<Option<Picture>> {
@@ -366,7 +400,8 @@ pub fn render(args: &RenderArgs) -> Exit {
     };
     let pictures: Result<Vec<Option<Picture>>> = chosen.par_iter().map(one).collect();
     let pictures: Vec<Picture> = pictures?.into_iter().flatten().collect();
-    let mut written = format!("{} pictures in {}", chosen.len(), out.display());
+    let count = counted(chosen.len(), "picture");
+    let mut written = format!("{count} in {}", out.display());
     let whole = [
         ("sheet.png", args.sheet.and_then(|n| sheet(&pictures, n.into())).map(|p| p.png())),
         ("animation.png", args.animation.and_then(|rate| animation(&pictures, rate))),
@@ -374,7 +409,7 @@ pub fn render(args: &RenderArgs) -> Exit {
     for (name, bytes) in whole {
         if let Some(bytes) = bytes {
             write_whole(&out.join(name), &bytes)?;
-            written = format!("{} pictures in {}", chosen.len(), out.join(name).display());
+            written = format!("{count} in {}", out.join(name).display());
         }
     }
     if !args.quiet {

@@ -1,7 +1,7 @@
 //! `seixo run`.
 
 use super::device;
-use super::plan::step_warnings;
+use super::plan::{shortest, step_warnings};
 use super::progress::{Display, clock};
 use super::ranks::{self, Call, Place};
 use super::setup::{self, Setup};
@@ -16,6 +16,7 @@ use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
+use seixo::params::Params;
 use seixo::ranks::Team;
 use seixo::run::resume::{Standing, standing};
 use seixo::run::{Options, Start, run as run_simulation};
@@ -107,7 +108,7 @@ fn size(text: &str) -> std::result::Result<u64, String> {
 }
 
 /// Refuses a case that the machine cannot hold, before anything is built.
-fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool, place: Option<Place>) -> Result<()> {
+fn fits(args: &RunArgs, asked: &Asked, case: &Case, place: Option<Place>) -> Result<()> {
     let estimate = Estimate::new(case).at_most(args.steps);
     let on_cpu = match args.device.backend {
         BackendName::Cpu => true,
@@ -137,8 +138,14 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, resumes: bool, place: Option
         );
         return Err(Error::usage("--memory-limit", text));
     }
+    Ok(())
+}
+
+/// Refuses results for which there is no room, with steps of `dt` [s].
+fn fits_disk(args: &RunArgs, asked: &Asked, case: &Case, dt: f64) -> Result<()> {
+    let estimate = Estimate::new(case).at_step(case, dt).at_most(args.steps);
     let free = machine::disk(&asked.out).map_or(f64::INFINITY, |n| n as f64);
-    if estimate.disk() > free && !args.force_disk && !resumes {
+    if estimate.disk() > free && !args.force_disk {
         let text = format!(
             "{}: the results take about {}, {} are free on the disk of {}: raise output.every{}, output.table_every or \
              run.spacing, or run all the same with --force-disk",
@@ -251,8 +258,13 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
             }
         },
     };
-    fits(args, &asked, &loaded.case, matches!(start, Start::Resume(_)), place)?;
-    let setup = Setup::build(loaded, asked.name, args.quiet)?;
+    fits(args, &asked, &loaded.case, place)?;
+    let setup = Setup::build(loaded, asked.name.clone(), args.quiet)?;
+    if !matches!(start, Start::Resume(_)) {
+        let case = &setup.loaded.case;
+        let params = Params::new(case, &setup.scene)?;
+        fits_disk(args, &asked, case, shortest(case, &setup.scene, &params))?;
+    }
     call.tell(&setup.loaded.text);
     let mut simulation = match team {
         Some((team, processor)) => {
@@ -281,10 +293,8 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
             groups.total() - setup.scene.reserve,
             setup.scene.water()
         ));
-        if simulation.plan.wet() {
-            let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
-            words.iter().for_each(|line| remark(line));
-        }
+        let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
+        words.iter().for_each(|line| remark(line));
         let advice = simulation.solids.advice(simulation.case.run.time_step);
         advice.words.iter().for_each(|line| remark(line));
     }

@@ -1,12 +1,13 @@
 //! `seixo surface`: the surface of the water as meshes, from the frames that a run has written.
 
 use super::render::{chosen, place, series_of, without};
-use super::{Exit, finite};
+use super::{Exit, counted, finite};
 use clap::ValueEnum;
 use rayon::prelude::*;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
 use seixo::output::replay::{Frame, particles};
+use seixo::output::spare::spare_folder;
 use seixo::output::surface::surface;
 use seixo::output::write_whole;
 use std::path::PathBuf;
@@ -65,7 +66,9 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
         return Err(without("frames with water", &args.dir, &case, series));
     }
-    let out = args.out.clone().unwrap_or_else(|| place(&args.dir, series).join("surface"));
+    let own = place(&args.dir, series).join("surface");
+    let out = args.out.clone().unwrap_or_else(|| own.clone());
+    spare_folder(&out, &own)?;
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let one = |(number, frame): &(usize, Frame)| -> Result<usize> {
         let Some(path) = &frame.fluid else { return Ok(0) };
@@ -86,7 +89,7 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     let written: Result<Vec<usize>> = chosen.par_iter().map(one).collect();
     let count: usize = written?.into_iter().sum();
     if !args.quiet {
-        say(&format!("{count} surfaces in {}", out.display()));
+        say(&format!("{} in {}", counted(count, "surface"), out.display()));
     }
     Ok(0)
 }

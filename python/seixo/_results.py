@@ -8,6 +8,7 @@ import json
 import os
 import re
 import tomllib
+import warnings
 import xml.etree.ElementTree
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -290,7 +291,14 @@ def _frames(folder: Path) -> list[Frame]:
         # A list that somebody changed leads nowhere else.
         if not file.is_absolute() and ".." not in file.parts:
             found.setdefault(float(item.get("timestep", "nan")), {})[item.get("name", "")] = folder / file
-    return [Frame(time, parts.get("fluid"), parts.get("solids")) for time, parts in found.items()]
+    frames = []
+    for time, parts in found.items():
+        gone = [str(path) for path in parts.values() if not path.exists()]
+        if gone:
+            warnings.warn(f"the frame at {time:g} s is left out: {', '.join(gone)} is gone", stacklevel=4)
+        else:
+            frames.append(Frame(time, parts.get("fluid"), parts.get("solids")))
+    return frames
 
 
 def _pieces(path: Path) -> list[Path]:

@@ -24,6 +24,7 @@ pub fn check(case: &Case) -> Vec<Problem> {
     c.contact();
     c.gauges(&case.gauge);
     c.output();
+    c.slips();
     c.problems
 }
 
@@ -149,6 +150,9 @@ impl Checker<'_> {
         if run.spacing > 0.0 && run.time_step > 0.0 && run.end.is_finite() && run.end / run.time_step > 1e9 {
             let message = format!("{:.1e} steps of {:e} s", run.end / run.time_step, run.time_step);
             self.add("run.time_step", message, "shorten run.end or use a larger run.time_step");
+        }
+        if run.from.as_deref() == Some("") {
+            self.add("run.from", "it names nothing", "name the folder of a run, or leave it out");
         }
         // The flow shortens an adaptive step; nothing else does.
         let adapts = run.adaptive && self.case.fluid.is_some();

@@ -158,6 +158,10 @@ impl Checker<'_> {
                 );
             }
         }
+        if form.file == Some("") {
+            complete = false;
+            self.add(path("file"), "it names nothing", "name an STL or OBJ file, relative to the case");
+        }
         for (axis, &length) in form.size.iter().flatten().enumerate() {
             self.positive(&path(&format!("size.{axis}")), length, "m");
         }

@@ -7,6 +7,7 @@ mod bounds;
 pub mod check;
 mod check_geometry;
 mod check_motion;
+mod check_slips;
 mod check_solids;
 mod contact;
 pub mod file;

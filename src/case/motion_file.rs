@@ -80,6 +80,26 @@ pub(super) fn allow_files(schema: &mut serde_json::Value) {
     }
 }
 
+/// The first column of a line of names that states a unit other than its own, with that unit.
+fn other_unit<'a>(line: &'a str, key: &str, form: &Form) -> Option<(&'a str, &'a str)> {
+    let stated = |column: &'a str| {
+        let (name, rest) = column.trim().split_once(['[', '('])?;
+        Some((name.trim(), rest.split([']', ')']).next()?.trim()))
+    };
+    let own = match key {
+        "motion" => &["m", "metres", "meters"][..],
+        "velocity" => &["m/s", "m s-1"],
+        _ => &["m3/s", "m\u{b3}/s", "m^3/s", "m2/s", "m\u{b2}/s", "m^2/s"],
+    };
+    let columns = line.split(',').take(form.columns).enumerate();
+    let mut found = columns.filter_map(|(k, column)| {
+        let (name, unit) = stated(column)?;
+        let known = if k == 0 { &["s", "sec", "seconds"][..] } else { own };
+        (!unit.is_empty() && !known.contains(&unit.to_lowercase().as_str())).then_some((name, unit))
+    });
+    found.next()
+}
+
 /// The rows of `file`, a name relative to the case at `path`.
 fn rows(path: &Path, file: &str, key: &str, form: &Form) -> Result<Array> {
     let place = path.with_file_name("").join(file);
@@ -101,8 +121,13 @@ fn rows(path: &Path, file: &str, key: &str, form: &Form) -> Result<Array> {
             continue;
         }
         let cells: Vec<Option<f64>> = line.split(',').map(|c| c.trim().parse().ok()).collect();
-        // One line of names before the first row.
-        if rows.is_empty() && !headed && cells.iter().all(Option::is_none) {
+        // One line of names before the first row: names have letters, and what has none is a row that went wrong.
+        let names = line.chars().any(char::is_alphabetic) && cells.iter().all(Option::is_none);
+        if rows.is_empty() && !headed && names {
+            if let Some((name, unit)) = other_unit(line, key, form) {
+                let why = format!("`{name}` is in [{unit}]: write {}, and its name so", form.what);
+                return Err(wrong(n, why));
+            }
             headed = true;
             continue;
         }

@@ -80,6 +80,7 @@ pub struct Output {
     #[schemars(range(min = 0))]
     pub every: f64,
     /// Which particles to write.
+    #[schemars(transform = super::bounds::each_once)]
     pub kinds: Vec<OutputKind>,
     /// Fields of the particles to write beside their positions; all of them if absent. Files of bodies and moving walls hold `body` and
     /// `id` in any case: their places are read from them.
@@ -112,6 +113,7 @@ pub struct Series {
     pub every: f64,
     /// Which particles to write.
     #[serde(default = "kinds")]
+    #[schemars(transform = super::bounds::each_once)]
     pub kinds: Vec<OutputKind>,
     /// Fields of the particles to write beside their positions; all of them if absent. Files of bodies and moving walls hold `body` and
     /// `id` in any case.
@@ -153,7 +155,7 @@ impl Choice<'_> {
     }
 }
 
-fn kinds() -> Vec<OutputKind> {
+pub(super) fn kinds() -> Vec<OutputKind> {
     vec![OutputKind::Fluid, OutputKind::Body, OutputKind::Wall]
 }
 

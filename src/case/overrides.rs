@@ -1,7 +1,7 @@
 //! `--set key=value`: edits the text of a case, so that comments stay and messages point at lines.
 
 use super::report::closest;
-use crate::error::Error;
+use crate::error::{Error, tidy};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// Applies `key=value` pairs in order.
@@ -12,10 +12,19 @@ pub(super) fn apply(text: &str, sets: &[String]) -> crate::error::Result<String>
     let mut document: DocumentMut =
         text.parse().map_err(|e: toml_edit::TomlError| Error::file("case", "", e.to_string()))?;
     for set in sets {
-        one(&mut document, set).map_err(|why| Error::usage("--set", format!("--set {set}: {why}")))?;
+        one(&mut document, set).map_err(|why| {
+            let shown = match set.char_indices().nth(LONGEST_SHOWN) {
+                Some((cut, _)) => format!("{} ...", &set[..cut]),
+                None => set.clone(),
+            };
+            Error::usage("--set", tidy(&format!("--set {shown}: {why}")))
+        })?;
     }
     Ok(document.to_string())
 }
+
+/// Letters of an override that are shown.
+const LONGEST_SHOWN: usize = 200;
 
 fn one(document: &mut DocumentMut, set: &str) -> Result<(), String> {
     let (key, value) = set.split_once('=').ok_or("expected key=value, e.g. run.end=2.5")?;
@@ -25,7 +34,15 @@ fn one(document: &mut DocumentMut, set: &str) -> Result<(), String> {
     }
     // What is no TOML value is taken as a string, so that law=paper needs no quotes in quotes.
     let value = value.trim();
-    let value = value.parse::<Value>().unwrap_or_else(|_| Value::from(value));
+    let value = match value.parse::<Value>() {
+        Ok(value) => value,
+        // Nobody means such a string.
+        Err(why) if value.starts_with(['{', '[']) => {
+            let why = why.message().lines().last().unwrap_or_default();
+            return Err(format!("this list or table cannot be read ({why}); words in it stand in quotes"));
+        }
+        Err(_) => Value::from(value),
+    };
     let Some((&last, way)) = parts.split_last() else { return Err("the key is empty".into()) };
     let mut at = Place::Item(document.as_item_mut());
     let mut done = String::new();
@@ -73,6 +90,11 @@ impl<'a> Place<'a> {
             Self::Item(Item::None) => Err(format!("`{done}` is not there")),
             Self::Table(table) => {
                 if part.parse::<usize>().is_ok() {
+                    if table.is_empty() {
+                        return Err(format!(
+                            "the case has no `{done}`; a whole list is given as {done}=[{{...}}, {{...}}]"
+                        ));
+                    }
                     let near = table.iter().map(|(k, _)| k.to_owned()).collect::<Vec<_>>().join(", ");
                     return Err(format!("`{done}` is a table, not a list; it holds {near}"));
                 }

@@ -1,6 +1,6 @@
 //! Messages about a case file: file, line and column, the line itself, what is allowed, a remedy.
 
-use crate::error::Problem;
+use crate::error::{Problem, tidy};
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::ops::Range;
 use toml::Spanned;
@@ -61,7 +61,7 @@ pub(super) fn render(path: &str, text: &str, messages: &[Message]) -> String {
 pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> Message {
     let span = error.span().unwrap_or(0..0);
     let key = table.and_then(|t| path_at(t, &span));
-    let said = error.message().trim().to_owned();
+    let said = tidy(&plain(error.message().trim()));
     let title = match &key {
         Some(key) => format!("{key}: {said}"),
         None => said.clone(),
@@ -73,9 +73,52 @@ pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> M
             None => format!("allowed: {}", allowed.join(", ")),
         }),
         [name, ..] if said.starts_with("missing field") => Some(format!("add `{name} = ...` here")),
+        _ if said.contains("expected ") => key.as_ref().map(|key| {
+            let named: Vec<&str> = key.split('.').filter(|part| part.parse::<usize>().is_err()).collect();
+            format!("`seixo keys {}` tells what it takes, with an example", named.join("."))
+        }),
         _ => None,
     };
     Message { span, key: key.unwrap_or_default(), title, label: short(&said), remedy, warning: false }
+}
+
+/// What the reader of types says, in the words of a case: `invalid type: map, expected f64` as `a table, expected a number`.
+fn plain(said: &str) -> String {
+    let found = ["invalid type: ", "invalid value: ", "invalid length "].into_iter().find_map(|how| {
+        let (found, wanted) = said.strip_prefix(how)?.rsplit_once(", expected ")?;
+        Some((how, found, wanted))
+    });
+    let Some((how, found, wanted)) = found else {
+        return said.replace("wanted string or table", "expected one of its names in quotes");
+    };
+    let wanted = match wanted {
+        "f64" | "f32" | "a float" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more".to_owned(),
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        "a string" => "words in quotes".to_owned(),
+        "string or table" => "one of its names in quotes".to_owned(),
+        w if w.starts_with("enum ") => "one of its names in quotes".to_owned(),
+        w if w.starts_with("struct ") || w == "a map" => "a table".to_owned(),
+        w => match w.strip_prefix("an array of length ") {
+            Some(count) => format!("a list of {count}"),
+            None => w.to_owned(),
+        },
+    };
+    let value = |text: &str| text.split('`').nth(1).unwrap_or(text).to_owned();
+    let found = match found {
+        f if how == "invalid length " => format!("a list of {f}"),
+        "map" => "a table".to_owned(),
+        "sequence" => "a list".to_owned(),
+        f if f.starts_with("string ") => format!("the words `{}`", f["string ".len()..].trim_matches('"')),
+        f if f.starts_with("integer ") || f.starts_with("floating point ") => {
+            format!("the number {}", value(f))
+        }
+        f if f.starts_with("boolean ") => value(f),
+        f => f.to_owned(),
+    };
+    format!("{found}, expected {wanted}")
 }
 
 /// The message up to the list of what is allowed, which stands in the remedy.

@@ -49,7 +49,7 @@ impl Solids {
                 } else {
                     String::new()
                 };
-                words.push(format!("{numbers}: {n} sub-steps a step{more}"));
+                words.push(format!("{numbers}: {n} sub-step{} a step{more}", if *n == 1 { "" } else { "s" }));
             }
             Err(e) => words.extend([e.to_string(), format!("{numbers}: refused, see above")]),
         }

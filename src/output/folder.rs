@@ -13,15 +13,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Marks a folder of results, and holds the lock of the run that writes there.
-const MARKER: &str = ".seixo";
+pub(super) const MARKER: &str = ".seixo";
 /// Room that is given free for `result.json` when the disk is full.
 const RESERVE: &str = ".reserve";
 /// Bytes of it.
 const RESERVED: usize = 32 << 10;
 /// The page of `seixo report`.
-const REPORT: &str = "report.html";
+pub(super) const REPORT: &str = "report.html";
 /// Files of a run in the folder itself, beside `NAME.pvd`.
-const FILES: [&str; 8] =
+pub(super) const FILES: [&str; 8] =
     ["case.toml", "result.json", "monitors.csv", "bodies.csv", "gauges.csv", "final.png", REPORT, RESERVE];
 
 /// The folder of the checkpoints of a run in `root`.
@@ -41,19 +41,6 @@ pub(crate) const MESHES: &str = "meshes";
 pub(crate) fn is_mesh(name: &str) -> bool {
     let sum = name.rsplit_once('.').and_then(|(stem, _)| stem.rsplit_once('-')).map(|(_, sum)| sum);
     sum.is_some_and(|s| s.len() == 8 && s.bytes().all(|b| b.is_ascii_hexdigit()))
-}
-
-/// Refuses to write the table or page of a reader to `path` if that is where the run in the same folder has a file of its
-/// own; `report.html` is nobody else's.
-///
-/// # Errors
-/// [`Error::Folder`] with the path.
-pub fn spare_results(path: &Path) -> Result<()> {
-    let root = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-    let list = case_name(root)?.map(|name| format!("{name}.pvd"));
-    let taken = FILES.contains(&file) && file != REPORT || list.as_deref() == Some(file) || file == MARKER;
-    if list.is_some() && taken { Err(FolderError::Result(path.to_path_buf()).into()) } else { Ok(()) }
 }
 
 /// Name of the case whose run `root` holds; nothing if it is no folder of seixo's.
@@ -109,12 +96,12 @@ impl Folder {
             Err(e) if e.kind() == ErrorKind::NotFound => false,
             Err(e) => return Err(Error::io(root)(e)),
         };
-        if filled && mode == Mode::New {
-            return Err(FolderError::NotEmpty(root.to_path_buf()).into());
-        }
         let earlier = folder.marker()?;
         if filled && earlier.is_none() {
             return Err(FolderError::Foreign { folder: root.to_path_buf(), marker: MARKER }.into());
+        }
+        if filled && mode == Mode::New {
+            return Err(FolderError::NotEmpty(root.to_path_buf()).into());
         }
         std::fs::create_dir_all(root).map_err(Error::io(root))?;
         folder.lock = Arc::new(folder.take()?);
@@ -132,7 +119,8 @@ impl Folder {
         let Ok(root) = self.root.canonicalize() else { return Ok(()) };
         for input in inputs.iter().filter_map(|p| p.canonicalize().ok()) {
             if input == root {
-                return Err(FolderError::State(input).into());
+                let of = if root.is_dir() { FolderError::State } else { FolderError::Input };
+                return Err(of(input).into());
             }
             let name = input.file_name().and_then(|n| n.to_str()).unwrap_or_default();
             if input.parent() == Some(&root) && self.is_ours(name, &self.name) {

@@ -79,18 +79,23 @@ impl Picture {
 
     /// The time in the upper left corner.
     pub fn time(&mut self, time: f64) {
-        let (letter, text) = (self.letters().val(), format!("t = {time:.3} s"));
+        let (letter, text) = (self.letters().val(), clock(time));
         let edge = letter / 2;
         self.plate(edge / 2, edge / 2, self.length(&text) + edge, letter + edge);
         self.write(edge, edge, &text);
     }
 
-    /// A bar of the colours in the upper right corner, from `range[0]` to `range[1]`, called `name`.
-    pub fn bar(&mut self, name: &str, range: [f64; 2]) {
+    /// A bar of the colours in the upper right corner, from `range[0]` to `range[1]`, called `name`; none in a picture that
+    /// it would cover, or in which it would meet the `time`.
+    pub fn bar(&mut self, name: &str, range: [f64; 2], time: f64) {
         let letter = self.letters().val();
         let (width, edge) = ((self.width / 4).max(8 * letter).min(self.width), letter / 2);
         let (left, high) = (self.width.saturating_sub(width + 2 * edge), letter / 2);
         let bottom = edge + letter + letter / 8;
+        let beside = self.length(&clock(time)) + 2 * edge;
+        if left < beside + edge || 3 * (bottom + high + letter) > self.height() {
+            return;
+        }
         self.plate(left.saturating_sub(edge), edge / 2, width + 2 * edge, bottom + high + letter + edge / 2);
         for x in 0..width {
             let color = water(x as f32 / width.max(2) as f32).to_array().map(|c| (255.0 * c).round() as u8);
@@ -104,6 +109,11 @@ impl Picture {
         // Above the bar, so that it meets no number.
         self.write(left + middle, edge, name);
     }
+}
+
+/// The time as it is written [s].
+fn clock(time: f64) -> String {
+    format!("t = {time:.3} s")
 }
 
 /// A number in few digits.
@@ -165,13 +175,21 @@ mod tests {
         let blank = Picture { width: 300, bytes: vec![255; 3 * 300 * 200] };
         let mut written = blank.clone();
         written.time(1.25);
-        written.bar("speed [m/s]", [0.0, 2.5]);
+        let before = written.bytes.clone();
+        written.bar("speed [m/s]", [0.0, 2.5], 1.25);
+        assert_ne!(written.bytes, before);
         let ink = written.bytes.iter().zip(&blank.bytes).filter(|(a, b)| a != b).count();
         assert!(ink > 3000, "{ink}");
         // Too small for words: nothing is written beside it.
         let mut tiny = Picture { width: 3, bytes: vec![255; 3 * 3 * 2] };
         tiny.time(1.0);
-        tiny.bar("x", [0.0, 1.0]);
+        tiny.bar("x", [0.0, 1.0], 1.0);
+        // Where it would cover the scene or the time there is no bar.
+        for (width, height) in [(200, 100), (240, 400), (400, 100)] {
+            let mut small = Picture { width, bytes: vec![255; 3 * width * height] };
+            small.bar("speed [m/s]", [0.0, 2.5], 1.25);
+            assert!(small.bytes.iter().all(|&b| b == 255), "{width} x {height}");
+        }
         let all = sheet(&[blank.clone(), written.clone(), blank], 2).unwrap();
         assert_eq!((all.width, all.height()), (600, 400));
         assert_eq!(all.bytes[3 * 300..3 * 600], written.bytes[..3 * 300]);

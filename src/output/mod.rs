@@ -27,6 +27,7 @@ pub mod pvd;
 pub mod render;
 pub mod replay;
 pub mod result;
+pub mod spare;
 pub mod surface;
 pub mod table;
 pub mod vtu;

@@ -196,7 +196,7 @@ impl Painter {
         if self.style.labels {
             picture.time(time);
             if scene.groups.fluid > 0 {
-                picture.bar(self.style.field.name(), self.range);
+                picture.bar(self.style.field.name(), self.range, time);
             }
         }
         picture

@@ -1,6 +1,7 @@
 //! `run.from`: a run that begins with the last state of another one.
 
 use super::resume::changed;
+use crate::case::Case;
 use crate::case::file::parse;
 use crate::checkpoint::{Found, file};
 use crate::error::{Error, Result};
@@ -14,12 +15,27 @@ use std::path::Path;
 /// [`Error::Case`] if there is none, or if it is of a later time than the end of the run; [`Error::Checkpoint`] if it is of
 /// another scene or kind of processor.
 pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
-    let run = &simulation.case.run;
-    let Some(from) = &run.from else { return Ok(None) };
-    let found = file::newest(&checkpoints(Path::new(from)))?;
-    let found =
-        found.ok_or_else(|| Error::key("run.from", format!("run.from: `{from}` holds no checkpoint"), ""))?;
+    let Some(found) = named(&simulation.case)? else { return Ok(None) };
     fits(simulation, &found).map_err(|e| Error::misfit(format!("run.from: {e}")))?;
+    Ok(Some(Found { archive: found.archive.to_restore(), ..found }))
+}
+
+/// The state that `run.from` of `case` names, whatever it is of: the newest that is whole.
+///
+/// # Errors
+/// As a run that would begin with it, but for what only its processor tells.
+pub fn named(case: &Case) -> Result<Option<Found>> {
+    let run = &case.run;
+    let Some(from) = &run.from else { return Ok(None) };
+    let remedy = "name the folder of a run with states (run.checkpoint), or leave run.from out";
+    let found = file::newest(&checkpoints(Path::new(from))).map_err(|e| match e {
+        Error::Checkpoint(why) => {
+            Error::damaged(format!("run.from: no state in `{from}` is whole: {why}; {remedy}"))
+        }
+        other => other,
+    })?;
+    let found = found
+        .ok_or_else(|| Error::key("run.from", format!("run.from: `{from}` holds no checkpoint"), remedy))?;
     let time = found.origin.time;
     if time >= run.end {
         let text = format!(
@@ -29,9 +45,9 @@ pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
         return Err(Error::key("run.end", text, "give a later end, with --until say"));
     }
     let (old, ..) = parse("checkpoint", found.origin.case.clone(), &[])?;
-    let scene: Vec<String> = changed(&old, &simulation.case).into_iter().filter(|c| is_of_scene(c)).collect();
+    let scene: Vec<String> = changed(&old, case).into_iter().filter(|c| is_of_scene(c)).collect();
     if scene.is_empty() {
-        return Ok(Some(Found { archive: found.archive.to_restore(), ..found }));
+        return Ok(Some(found));
     }
     let more = if scene.len() > TOLD { format!(" and {} more", scene.len() - TOLD) } else { String::new() };
     Err(Error::misfit(format!(

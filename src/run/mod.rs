@@ -7,7 +7,7 @@
 
 mod due;
 pub mod frames;
-mod from;
+pub mod from;
 mod meshes;
 mod pace;
 pub mod resume;
@@ -17,6 +17,7 @@ pub mod tables;
 pub mod verdict;
 
 use crate::checkpoint::{Archive, Found};
+use crate::console::remark;
 use crate::error::{Error, Result};
 use crate::gauges::Gauges;
 use crate::machine::memory_peak;
@@ -135,6 +136,9 @@ pub fn run(
     if let Some(archive) = &mut archive {
         simulation.exchange(archive)?;
     } else if let Some(mut found) = earlier(simulation)? {
+        for why in &found.damaged {
+            remark(&format!("warning: run.from: an older state is taken: {why}"));
+        }
         simulation.exchange(&mut found.archive)?;
         stands(simulation)?;
         inputs.extend(simulation.case.run.from.as_ref().map(PathBuf::from));

@@ -31,6 +31,12 @@ pub fn standing(root: &Path, case: &Case) -> Result<Standing> {
     if case_name(root)?.is_none() {
         return Ok(Standing::Nothing);
     }
+    let mut files = case.clone();
+    if let Some((key, file)) = files.files().into_iter().find(|(_, file)| !Path::new(file).exists()) {
+        let message = format!("{key}: {file} is gone");
+        let remedy = format!("the results have a copy: go on with `seixo run --resume {}`", root.display());
+        return Err(Error::key(key, message, remedy));
+    }
     if let Ok(text) = std::fs::read_to_string(root.join("case.toml"))
         && let Ok((old, ..)) = parse("case.toml", text, &[])
     {

@@ -41,9 +41,12 @@ impl Builder<'_> {
                     (low, high) = (low.min(center - reach), high.max(center + reach));
                 }
                 bounds.add(&label, low, high);
-                if solid.is_body {
-                    notes.extend(self.through_walls(&label, low, high));
-                }
+                notes.extend(if solid.is_body {
+                    self.through_walls(&label, low, high)
+                } else {
+                    // A piston goes back into the wall behind it.
+                    self.out_of_tank(&label, (lo, hi), (low, high))
+                });
             }
         }
         self.notes.append(&mut notes);
@@ -114,6 +117,31 @@ impl Builder<'_> {
             )
         };
         through.map(note).collect()
+    }
+
+    /// What there is to say of a moving wall from `lo` to `hi` [m] that reaches from `low` to `high` [m]: faces with a wall behind
+    /// which its motion takes all of it.
+    fn out_of_tank(&self, label: &str, (lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)) -> Vec<String> {
+        let Some(tank) = &self.case.tank else { return vec![] };
+        let bare = tank.without_wall();
+        let walled = |k: &usize| !(bare.contains(&TANK_FACES[*k].0) || self.lattice.plane && *k / 2 == 1);
+        let gone = |k: &usize| {
+            let (axis, size) = (k / 2, hi - lo);
+            let (min, max) = (tank.min[axis], tank.max[axis]);
+            // Its near side at the end of its way, and at the start, when it is inside or not.
+            if k.is_multiple_of(2) {
+                low[axis] + size[axis] < min && hi[axis] >= min
+            } else {
+                high[axis] - size[axis] > max && lo[axis] <= max
+            }
+        };
+        let told = |k: usize| {
+            format!(
+                "{label}: its motion takes it out of the tank through `{}`, which does not stop it",
+                TANK_FACES[k].1
+            )
+        };
+        (0..6).filter(walled).filter(gone).map(told).collect()
     }
 
     /// How far water and bodies fly with their velocity at t = 0 until the end, against and along each axis [m].

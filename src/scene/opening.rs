@@ -300,7 +300,12 @@ impl Builder<'_> {
                     let remedy = "make it larger, or leave it out";
                     self.problems.push(Problem::new("fluid.max_volume", message, remedy));
                 }
-                most - there as f64
+                if most > holds.max(there as f64) {
+                    self.notes.push(format!(
+                        "fluid.max_volume: {volume} m3 are more than the domain holds, which is the most that is kept room for"
+                    ));
+                }
+                most.min(holds) - there as f64
             }
             None => comes.min(holds - there as f64),
         };

@@ -7,6 +7,7 @@ use super::definition::{Setup, files_of};
 use super::engine::{Context, Make, Options, Processor, Shard};
 use seixo::console::say;
 use seixo::error::{Error, Result};
+use seixo::output::spare::spare_run;
 use seixo::output::write_whole;
 use seixo::stop::Stop;
 use serde::{Deserialize, Serialize};
@@ -168,6 +169,7 @@ pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
     }
     let out = args.out.clone().or_else(|| folders.first().cloned());
     let out = out.unwrap_or_else(|| PathBuf::from(format!("study-{}", study.name)));
+    spare_run(&out)?;
     manifest.write(&out)?;
     let options = Options {
         out: out.clone(),

@@ -122,7 +122,7 @@ radius = 0.2
 height = 0.3
 center = [1.5, 1.5, 0.5]
 mass = 2.0
-inertia = [1, 1, 1]
+inertia = [0.04, 0.04, 0.04]
 
 [[body]]
 name = "hull"

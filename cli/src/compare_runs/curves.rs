@@ -32,7 +32,14 @@ pub struct Run {
     pub curves: Vec<Quantity>,
     /// Seconds that each step took.
     pub pace: Vec<[f64; 2]>,
+    /// Its spacing [m].
+    pub spacing: f64,
+    /// Whether it is in two dimensions: what it holds is of a slice one spacing wide.
+    pub flat: bool,
 }
+
+/// Units of what a slice has in proportion to its width.
+const OF_SLICE: [&str; 6] = ["J", "N", "N m", "m3", "m3/s", "kg m/s"];
 
 impl Run {
     /// The run in `root`, to be called `name`.
@@ -42,7 +49,7 @@ impl Run {
     pub fn read(root: &Path, name: String) -> Result<Self> {
         case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(|| FolderError::NoRun(root.to_path_buf()))?;
         let path = root.join("case.toml");
-        load(&path, None, &[])?;
+        let case = load(&path, None, &[])?.case;
         // As it stands there: a mesh is named by what it holds.
         let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
         let mut keys = Vec::new();
@@ -61,7 +68,20 @@ impl Run {
         }
         curves.append(&mut columns("monitors", "", &monitors));
         let result = result.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
-        Ok(Self { name, result, keys, curves, pace: pace(&monitors) })
+        let (spacing, flat) = (case.run.spacing, case.run.dimensions == 2);
+        Ok(Self { name, result, keys, curves, pace: pace(&monitors), spacing, flat })
+    }
+
+    /// Energies, forces, momenta and volumes of the slice for each metre across, which slices of other widths share.
+    pub fn per_metre(&mut self) {
+        for quantity in &mut self.curves {
+            let Some((name, unit)) = quantity.name.rsplit_once(" [") else { continue };
+            let unit = unit.trim_end_matches(']');
+            if OF_SLICE.contains(&unit) {
+                quantity.name = format!("{name} [{unit}/m]");
+                quantity.points.iter_mut().for_each(|p| p[1] /= self.spacing);
+            }
+        }
     }
 
     /// The curve `name` of `table`.

@@ -4,13 +4,13 @@ mod curves;
 mod difference;
 
 use super::report::chart::{Chart, Curve};
-use super::report::page::{charts, html, section, table};
+use super::report::page::{MARK, charts, html, section, table};
 use super::{Exit, finite};
 use curves::{Quantity, Run};
 use difference::Difference;
 use seixo::console::{remark, say, say_json};
 use seixo::error::{Error, Result};
-use seixo::output::folder::spare_results;
+use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -53,6 +53,9 @@ struct Row {
 #[derive(Serialize)]
 struct Answer {
     reference: String,
+    /// What stands above the rows of each run.
+    #[serde(skip)]
+    headings: Vec<String>,
     differences: Vec<Row>,
     remarks: Vec<String>,
     page: PathBuf,
@@ -64,19 +67,21 @@ pub fn compare_runs(args: &CompareRunsArgs) -> Exit {
     if csv == args.out {
         return Err(Error::usage("--out", "--out names the page: give it another extension than .csv"));
     }
-    own(&csv)?;
-    [&args.out, &csv].into_iter().try_for_each(|path| spare_results(path))?;
+    spare(&args.out, MARK)?;
+    spare(&csv, &(COLUMNS.join(",") + "\n"))?;
     let window = [args.from.unwrap_or(f64::NEG_INFINITY), args.until.unwrap_or(f64::INFINITY)];
     if window[0] > window[1] {
         return Err(Error::usage("--from", "--from is after --until: nothing lies between"));
     }
-    let runs = read(&args.dirs)?;
+    let mut runs = read(&args.dirs)?;
+    let slices = slices(&mut runs);
     let (reference, others) = runs.split_first().ok_or_else(|| Error::usage("DIRS", "name two runs"))?;
     let asked = asked(reference, others, &args.only)?;
     let mut answer = Answer {
         reference: reference.name.clone(),
+        headings: Vec::new(),
         differences: Vec::new(),
-        remarks: Vec::new(),
+        remarks: slices.into_iter().collect(),
         page: args.out.clone(),
         csv,
     };
@@ -94,21 +99,6 @@ pub fn compare_runs(args: &CompareRunsArgs) -> Exit {
     Ok(0)
 }
 
-/// Refuses to write the table where there is another one: nobody has asked for a file of this name.
-fn own(csv: &Path) -> Result<()> {
-    let Ok(file) = std::fs::File::open(csv) else { return Ok(()) };
-    let mut first =
-        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(file).into_records();
-    if first.next().is_none_or(|row| row.is_ok_and(|row| row.iter().eq(COLUMNS))) {
-        return Ok(());
-    }
-    let text = format!(
-        "{} is there already and no table of differences: give another name with --out",
-        csv.display()
-    );
-    Err(Error::usage("--out", text))
-}
-
 /// The runs, each called by the last part of its folder, or by the whole path where two would be called the same.
 fn read(dirs: &[PathBuf]) -> Result<Vec<Run>> {
     for (k, dir) in dirs.iter().enumerate() {
@@ -124,6 +114,23 @@ fn read(dirs: &[PathBuf]) -> Result<Vec<Run>> {
         last(d).filter(|_| alone).unwrap_or_else(|| d.display().to_string())
     };
     dirs.iter().map(|d| Run::read(d, called(d))).collect()
+}
+
+/// Makes slices of different widths alike, runs in two dimensions that have other spacings; says so.
+fn slices(runs: &mut [Run]) -> Option<String> {
+    let widths = || runs.iter().map(|r| r.spacing);
+    if runs.iter().all(|r| !r.flat) || widths().all(|l0| Some(l0) == widths().next()) {
+        return None;
+    }
+    if !runs.iter().all(|r| r.flat) {
+        let text = "some runs are in two dimensions: their energies, forces, momenta and volumes are those of a slice one \
+                    spacing wide";
+        return Some(text.into());
+    }
+    runs.iter_mut().for_each(Run::per_metre);
+    let text = "the runs are slices of different widths, one spacing each: energies, forces, momenta and volumes are \
+                given for each metre across";
+    Some(text.into())
 }
 
 /// What is compared: what the reference and another run both have, but for what is zero in all of them.
@@ -198,6 +205,11 @@ fn hold(
     window: [f64; 2],
 ) -> Result<()> {
     let before = answer.differences.len();
+    let spacings = match [other.spacing, reference.spacing] {
+        [one, two] if one == two => String::new(),
+        [one, two] => format!(" (spacing {one} m against {two} m)"),
+    };
+    answer.headings.push(format!("{} against {}{spacings}", other.name, reference.name));
     let mut met = false;
     let mut apart = Vec::new();
     let least = least(reference);
@@ -294,21 +306,21 @@ fn cells(row: &Row) -> [String; 6] {
     ]
 }
 
-/// The rows of each run that is held against the reference.
-fn by_run(answer: &Answer) -> impl Iterator<Item = &[Row]> {
-    answer.differences.chunk_by(|a, b| a.run == b.run)
+/// The rows of each run that is held against the reference, and what stands above them.
+fn by_run(answer: &Answer) -> impl Iterator<Item = (&str, &[Row])> {
+    let headings = answer.headings.iter().map(String::as_str);
+    headings.zip(answer.differences.chunk_by(|a, b| a.run == b.run))
 }
 
 fn words(answer: &Answer) -> String {
     let mut lines = Vec::new();
-    for rows in by_run(answer) {
-        let name = rows.first().map_or("", |r| r.run.as_str());
+    for (heading, rows) in by_run(answer) {
         let cells: Vec<[String; 6]> = rows.iter().map(cells).collect();
         let wide = cells.iter().map(|c| c[0].chars().count()).max().unwrap_or(0).max(HEAD[0].len());
         let line = |c: [&str; 6]| {
             format!("  {:<wide$}{:>12}{:>12}{:>10}{:>12}{:>15}", c[0], c[1], c[2], c[3], c[4], c[5])
         };
-        lines.push(format!("{name} against {}", answer.reference));
+        lines.push(heading.to_owned());
         lines.push(line(HEAD));
         lines.extend(cells.iter().map(|c| line(c.each_ref().map(String::as_str))));
         lines.push(String::new());
@@ -365,15 +377,10 @@ fn page(runs: &[Run], asked: &[Quantity], answer: &Answer, window: [f64; 2]) -> 
         answer.remarks.iter().map(|r| format!("<li>{}</li>", super::report::page::escape(r))).collect();
     let notes = if notes.is_empty() { notes } else { format!("<ul>{notes}</ul>\n") };
     let differences: String = by_run(answer)
-        .map(|rows| {
+        .map(|(heading, rows)| {
             let mut lines = vec![HEAD.map(str::to_owned).to_vec()];
             lines.extend(rows.iter().map(|r| cells(r).to_vec()));
-            let name = rows.first().map_or("", |r| r.run.as_str());
-            format!(
-                "<h3>{}</h3>\n{}",
-                super::report::page::escape(&format!("{name} against {}", answer.reference)),
-                table(&lines)
-            )
+            format!("<h3>{}</h3>\n{}", super::report::page::escape(heading), table(&lines))
         })
         .collect();
     let drawn = |from: &str, seen: &dyn Fn(&str) -> bool| {
@@ -423,6 +430,7 @@ fn facts(runs: &[Run]) -> Vec<Vec<String>> {
     vec![
         line("", &|r| Some(r.name.clone())),
         line("Verdict", &|r| r.result["verdict"]["grade"].as_str().map(str::to_owned)),
+        line("Spacing [m]", &|r| Some(r.spacing.to_string())),
         line("Particles", &|r| r.result["particles"]["total"].as_u64().map(|n| n.to_string())),
         line("Steps", &|r| r.result["steps"].as_u64().map(|n| n.to_string())),
         line("Time reached [s]", &|r| number(r, "time_s").map(|t| format!("{t:.4}"))),

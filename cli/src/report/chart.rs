@@ -147,7 +147,16 @@ impl Chart {
             );
             if curves.len() > 1 {
                 let name = escape(&curve.name);
-                let _ = write!(key, "<span class=\"key\"><i style=\"background:{color}\"></i>{name}</span>");
+                // One that is told by its dashes shows them.
+                let mark = if dash.is_empty() {
+                    format!("<i style=\"background:{color}\"></i>")
+                } else {
+                    let line = format!(
+                        "<line x1=\"0\" x2=\"32\" y1=\"2\" y2=\"2\" class=\"curve\" style=\"stroke:{color}{dash}\"/>"
+                    );
+                    format!("<svg viewBox=\"0 0 32 4\" aria-hidden=\"true\">{line}</svg>")
+                };
+                let _ = write!(key, "<span class=\"key\">{mark}{name}</span>");
             }
         }
         let said = self.said(&curves);

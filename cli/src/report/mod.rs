@@ -6,18 +6,19 @@ pub mod table;
 
 use super::Exit;
 use super::progress::clock;
-use super::render::{LookArgs, Show, frames_of};
+use super::render::{LookArgs, Show, frames_of, is_there};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
-use page::{charts, escape, html, section, table};
+use page::{MARK, charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputField};
-use seixo::console::say;
+use seixo::console::{remark, say};
 use seixo::error::{Error, FolderError, Result};
-use seixo::output::folder::{case_name, spare_results};
+use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
+use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::scene::Scene;
@@ -72,19 +73,25 @@ impl Run {
             bodies: Table::read_by(&root.join("bodies.csv"), "body")?,
             gauges: Table::read(&root.join("gauges.csv"))?,
             // A run may have been told to write none.
-            frames: if root.join("vtu").exists() { frames_of(root).unwrap_or_default() } else { Vec::new() },
+            frames: if root.join("vtu").exists() { whole_frames(root) } else { Vec::new() },
         })
     }
+}
+
+/// The frames of the run in `root` whose files are there.
+fn whole_frames(root: &Path) -> Vec<Frame> {
+    let all = frames_of(root).unwrap_or_default().into_iter().enumerate();
+    all.filter(|(k, frame)| is_there(*k, frame)).map(|(_, frame)| frame).collect()
 }
 
 /// `seixo report`.
 pub fn report(args: &ReportArgs) -> Exit {
     seixo::threads::start(None)?;
     let run = Run::read(&args.dir)?;
+    let path = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
+    spare(&path, MARK)?;
     let pictures = pictures(args, &run)?;
     let page = page(&run, &pictures)?;
-    let path = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
-    spare_results(&path)?;
     write_whole(&path, page.as_bytes())?;
     if !args.quiet {
         say(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
@@ -105,6 +112,7 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
     let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
     let seen: Vec<&Frame> = (0..count).map(|k| &run.frames[pick(k)]).collect();
     let show = Show::open(&run.case, &args.look, &seen)?;
+    show.unseen(&args.look).iter().for_each(|note| remark(note));
     let draw = |k: usize| {
         let frame = seen[k];
         Ok((frame.time, STANDARD.encode(show.picture(frame)?.png())))
@@ -245,7 +253,15 @@ fn bodies(run: &Run) -> Vec<Chart> {
 const MOST_GAUGES: usize = 36;
 
 fn gauges(run: &Run) -> Vec<Chart> {
-    let columns = run.gauges.columns().iter().skip(1).take(MOST_GAUGES);
+    let flat = run.case.run.dimensions == 2;
+    // In two dimensions nothing acts along y, or turns about another axis.
+    let still = |c: &&String| {
+        let name = c.split(" [").next().unwrap_or_default();
+        let across = ["_y", "torque_x", "torque_z"].iter().any(|end| name.ends_with(end));
+        let points = run.gauges.curve(c).unwrap_or_default();
+        flat && across && points.iter().all(|p| p[1] == 0.0 || !p[1].is_finite())
+    };
+    let columns = run.gauges.columns().iter().skip(1).filter(|c| !still(c)).take(MOST_GAUGES);
     columns.map(|c| chart(c.clone(), &run.gauges, &[(c, c)])).collect()
 }
 

@@ -19,13 +19,16 @@ pub fn escape(text: &str) -> String {
     out
 }
 
+/// How every page begins, and nobody else's.
+pub const MARK: &str = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+    <meta name=\"generator\" content=\"seixo\">\n";
+
 /// A page that holds everything and fetches nothing: its title as text, what stands under it and its sections as HTML.
 pub fn html(title: &str, head: &str, sections: &[String], script: &str) -> String {
     let title = escape(title);
     let script = if script.is_empty() { String::new() } else { format!("<script>\n{script}</script>\n") };
     format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+        "{MARK}<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
          style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
          <title>{title} - seixo</title>\n<style>\n{}</style>\n</head>\n<body>\n\

@@ -10,12 +10,15 @@ pub(super) type Soup = (Vec<DVec3>, Vec<[u32; 3]>);
 
 /// Vertices and triangles of `bytes`; `path` says by its end what they are.
 pub(super) fn soup(path: &str, bytes: &[u8]) -> Result<Soup, Unfit> {
-    let end = path.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    let end = std::path::Path::new(path).extension().unwrap_or_default();
+    let end = end.to_string_lossy().to_ascii_lowercase();
     let corners = match end.as_str() {
         "stl" => stl(path, bytes)?,
         "obj" => obj(path, bytes)?,
         _ => {
-            let message = format!("{path}: a file that ends in `.{end}` is not read");
+            let ends =
+                if end.is_empty() { "without an ending".into() } else { format!("that ends in `.{end}`") };
+            let message = format!("{path}: a file {ends} is not read");
             return Err(Unfit::new(message, "give an STL or OBJ file: other programs export both"));
         }
     };

@@ -8,7 +8,8 @@ use crate::definition::{Definition, Setup};
 use crate::engine::{Context, Make, Options, Shard};
 use crate::report::write_table;
 use seixo::console::say;
-use seixo::error::Result;
+use seixo::error::{Error, Result};
+use seixo::output::spare::{spare, spare_run};
 use seixo::stop::Stop;
 use std::path::PathBuf;
 
@@ -74,6 +75,13 @@ pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
         suite.points().for_each(|point| say(&point));
         return Ok(());
     }
+    if let Some(folder) = args.join.iter().find(|folder| !folder.join("points").is_dir()) {
+        let text = format!("--join {}: it holds no points of a validation (no points/)", folder.display());
+        return Err(Error::usage("--join", text));
+    }
+    spare_run(&args.out)?;
+    let path = args.page.clone().unwrap_or_else(|| args.out.join("validation.md"));
+    spare(&path, page::MARK)?;
     let computers = args.computers.start()?;
     let options = Options {
         out: args.out.clone(),
@@ -87,7 +95,6 @@ pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
     let context = Context { stop: stop.clone(), save_every: args.computers.save_every, ..Context::new(make) };
     let rows = suite.run(&options, &context)?;
     write_table(&args.out.join("results.csv"), &rows)?;
-    let path = args.page.clone().unwrap_or_else(|| args.out.join("validation.md"));
     page::write(&path, &suite, &rows)?;
     for validation in &suite.validations {
         page::lines(validation, &rows).iter().for_each(|line| say(line));

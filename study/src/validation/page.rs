@@ -17,9 +17,12 @@ use std::path::Path;
 /// Most points of a curve in a chart.
 const CHART_POINTS: usize = 600;
 
-const HEAD: &str = "# Validation
+/// How the page begins, and nobody else's.
+pub(super) const MARK: &str = "# Validation
 
-Runs held against experiments and analytic solutions. This page is written by `seixo validate`; a validation is a file
+Runs held against experiments and analytic solutions. This page is written by `seixo validate`;";
+
+const HEAD: &str = " a validation is a file
 in `cases/validation` with its reference in `cases/reference`, and any of these lines can be run again:
 
 ```
@@ -42,7 +45,7 @@ pub fn write(path: &Path, suite: &Suite, rows: &[Row]) -> Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let images = folder.join("img");
     std::fs::create_dir_all(&images).map_err(Error::io(&images))?;
-    let mut text = HEAD.to_string();
+    let mut text = format!("{MARK}{HEAD}");
     let machines = work_precision::machines(rows);
     let _ = writeln!(text, "\nseixo {}; computed on: {machines}.\n", env!("CARGO_PKG_VERSION"));
     let missing = suite.len() - rows.len();
