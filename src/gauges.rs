@@ -1,5 +1,6 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
+mod cover;
 mod means;
 pub mod wall_force;
 
@@ -201,6 +202,8 @@ impl Gauges {
         let slots: Vec<usize> = of_points.chain(fixed.map(|wall| &wall.slots)).flatten().copied().collect();
         let pressures =
             if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
+        let any_fixed = self.force.iter().any(|(_, target)| target.is_fixed());
+        let pushes = if any_fixed { simulation.slot_pushes()? } else { Vec::new() };
         let params = &simulation.params;
         let mut rest = pressures.as_slice();
         let mut next = |count: usize| {
@@ -216,7 +219,12 @@ impl Gauges {
         let pressure = self.pressure.iter().map(at_point).collect();
         let on = |(_, target): &(String, Target)| match target {
             Target::Solid(solid) => simulation.fluid_force[*solid],
-            Target::Fixed(wall) => wall.pressure_force(next(wall.slots.len()), params),
+            Target::Fixed(wall) => {
+                let areas = wall.areas(&simulation.scene, simulation.solids.poses());
+                let mut sum = wall.pressure_force(next(wall.slots.len()), &areas, params);
+                sum += wall.slot_force(&pushes, &simulation.scene);
+                sum
+            }
         };
         Ok(Readings { pressure, wrench: self.force.iter().map(on).collect() })
     }

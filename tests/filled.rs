@@ -195,7 +195,7 @@ fn a_body_that_is_set_off_in_weightless_water_takes_it_along() {
         let mut speeds = Vec::new();
         while sim.steps < 20 {
             sim.step().expect("a step");
-            speeds.push(sim.solids.body[0].pose.velocity.x);
+            speeds.push(sim.solids.poses()[0].velocity.x);
         }
         println!("{processor:?}: {speeds:.4?}");
         assert!((speeds[4] - 0.089).abs() < 0.005 && (speeds[19] - 0.089).abs() < 0.005, "{speeds:?}");
