@@ -32,7 +32,7 @@ enum Target {
     /// A body or moving wall, by its index.
     Solid(usize),
     /// A fixed wall.
-    Fixed(FixedWall),
+    Fixed(Box<FixedWall>),
 }
 
 /// The gauges of a case, found in its scene.
@@ -94,7 +94,7 @@ impl Gauges {
         out.level.extend(case.gauge.level.iter().map(|g| (g.name.clone(), g.at)));
         for (k, gauge) in case.gauge.force.iter().enumerate() {
             let solid = scene.solids.iter().position(|s| s.name == gauge.on).map(Target::Solid);
-            let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Target::Fixed));
+            let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Box::new).map(Target::Fixed));
             let Some(target) = target else {
                 let solids = scene.solids.iter().map(|s| s.name.as_str());
                 let names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
