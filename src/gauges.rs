@@ -1,5 +1,6 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
+mod cover;
 mod means;
 pub mod wall_force;
 
@@ -31,7 +32,7 @@ enum Target {
     /// A body or moving wall, by its index.
     Solid(usize),
     /// A fixed wall.
-    Fixed(FixedWall),
+    Fixed(Box<FixedWall>),
 }
 
 /// The gauges of a case, found in its scene.
@@ -93,7 +94,7 @@ impl Gauges {
         out.level.extend(case.gauge.level.iter().map(|g| (g.name.clone(), g.at)));
         for (k, gauge) in case.gauge.force.iter().enumerate() {
             let solid = scene.solids.iter().position(|s| s.name == gauge.on).map(Target::Solid);
-            let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Target::Fixed));
+            let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Box::new).map(Target::Fixed));
             let Some(target) = target else {
                 let solids = scene.solids.iter().map(|s| s.name.as_str());
                 let names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
@@ -201,6 +202,8 @@ impl Gauges {
         let slots: Vec<usize> = of_points.chain(fixed.map(|wall| &wall.slots)).flatten().copied().collect();
         let pressures =
             if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
+        let any_fixed = self.force.iter().any(|(_, target)| target.is_fixed());
+        let pushes = if any_fixed { simulation.slot_pushes()? } else { Vec::new() };
         let params = &simulation.params;
         let mut rest = pressures.as_slice();
         let mut next = |count: usize| {
@@ -216,7 +219,12 @@ impl Gauges {
         let pressure = self.pressure.iter().map(at_point).collect();
         let on = |(_, target): &(String, Target)| match target {
             Target::Solid(solid) => simulation.fluid_force[*solid],
-            Target::Fixed(wall) => wall.pressure_force(next(wall.slots.len()), params),
+            Target::Fixed(wall) => {
+                let areas = wall.areas(&simulation.scene, simulation.solids.poses());
+                let mut sum = wall.pressure_force(next(wall.slots.len()), &areas, params);
+                sum += wall.slot_force(&pushes, &simulation.scene);
+                sum
+            }
         };
         Ok(Readings { pressure, wrench: self.force.iter().map(on).collect() })
     }

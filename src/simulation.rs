@@ -16,7 +16,7 @@ use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::settle::settle;
-use crate::slots::Slots;
+use crate::slots::{Push, Slots};
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, shortened, time_step};
 use glam::DVec3;
@@ -258,8 +258,11 @@ impl Simulation {
     /// An error if a step has become so short that the run would not end.
     pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
         if step.dt < SHORTEST_STEP * self.case.run.time_step {
-            let what =
-                format!("the flow or a solid asks for steps of {:.1e} s, the run would not end", step.dt);
+            let what = format!(
+                "the flow or a solid asks for steps of {:.1e} s, the run would not end; water that has no room left (more of it in a \
+                 closed tank than that holds, a piston into a part that is full) is pressed like this: leave it a way out",
+                step.dt
+            );
             return Err(self.diverged(step, Stage::Predict, what));
         }
         Ok(())
@@ -366,6 +369,18 @@ impl Simulation {
         let Some(found) = &self.slots else { return Ok(vec![]) };
         let backend = &mut self.backend;
         found.rows(self.solids.predicted(), |slots| {
+            Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
+        })
+    }
+
+    /// What the water in slots presses on fixed walls; nothing where no free body stands in the pressure equation.
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn slot_pushes(&mut self) -> Result<Vec<Push>> {
+        let Some(found) = &self.slots else { return Ok(vec![]) };
+        let backend = &mut self.backend;
+        found.pushes(self.solids.poses(), |slots| {
             Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
         })
     }

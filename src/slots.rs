@@ -16,6 +16,10 @@
 //! level P / rho g of all that are under water are none of it, and where P_f is negative there is air. Which rows that are the last
 //! step's pressures say. Slots that do not hang together have a field each.
 
+mod pushes;
+
+pub use pushes::Push;
+
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::{Bounds, PointGrid, fixed_walls, meeting_images};
@@ -25,6 +29,7 @@ use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
 /// at all: gaps of a half and of 1.1 spacings. Water comes in between.
@@ -117,12 +122,35 @@ struct Slot {
     deep: Vec<(usize, f64)>,
 }
 
+/// How a row lies before what is near it.
+#[derive(Clone, Copy)]
+struct Faced {
+    /// How much of it lies in a slot [-].
+    share: f64,
+    /// The nearest that it faces, if that is of a fixed wall: which of their particles.
+    wall: Option<usize>,
+}
+
+/// The pressure in a slot, linear but for the weight of the water.
+struct Field {
+    /// Middle of the rim, from the centre of mass, world axes [m].
+    middle: DVec3,
+    /// Inverse of C.
+    inverse: DMat3,
+    /// P + rho g . (middle - x) over the rim [Pa]: its mean, and its slope along xi.
+    mean: f64,
+    slope: DVec3,
+    any_wet: bool,
+}
+
 /// Finds the slots of the free bodies of a scene.
 pub struct Slots {
     spacing: f64,
     /// Weight of the water [N/m3].
     weight: DVec3,
     fixed: PointGrid,
+    /// Which of the walls' particles each point of theirs is.
+    fixed_of: Vec<usize>,
     layers: Vec<Layer>,
     periodic: Periodic,
 }
@@ -131,12 +159,13 @@ impl Slots {
     /// The slots of the free bodies of `scene`, in water of `density` [kg/m3].
     pub fn new(scene: &Scene, density: f64) -> Self {
         let l0 = scene.spacing;
-        let (fixed, _) = fixed_walls(scene);
+        let (fixed, fixed_of) = fixed_walls(scene);
         Self {
             periodic: scene.periodic,
             spacing: l0,
             weight: density * scene.gravity,
             fixed: PointGrid::new(fixed, CELL * l0),
+            fixed_of,
             layers: scene.solids.iter().map(|solid| Layer::new(solid, l0)).collect(),
         }
     }
@@ -151,6 +180,16 @@ impl Slots {
         poses: &[Pose],
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<SlotRow>> {
+        let found: Vec<Slot> = self.find(poses).into_iter().map(|(slot, _)| slot).collect();
+        let pressure = self.at_rims(found.iter(), read)?;
+        let of_slot = |(slot, told): (&Slot, &Vec<f64>)| self.passed_on(slot, &poses[slot.solid], told);
+        let mut out: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
+        out.sort_unstable_by_key(|slot| (slot.solid, slot.row));
+        Ok(out)
+    }
+
+    /// The slots with the solids at `poses`, each with how the rows of its body lie.
+    fn find(&self, poses: &[Pose]) -> Vec<(Slot, Arc<[Faced]>)> {
         let margin = FACING.1 * self.spacing;
         let boxes: Vec<Bounds> =
             self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect();
@@ -165,22 +204,27 @@ impl Slots {
             if !at_walls && others[k].is_empty() {
                 return vec![];
             }
-            layer.slots(k, &self.shares(k, at_walls, &others[k], poses))
+            let faced: Arc<[Faced]> = self.faced(k, at_walls, &others[k], poses).into();
+            let shares: Vec<f64> = faced.iter().map(|row| row.share).collect();
+            layer.slots(k, &shares).into_iter().map(|slot| (slot, faced.clone())).collect()
         };
-        let found: Vec<Slot> =
-            self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect();
-        if found.is_empty() {
-            return Ok(vec![]);
-        }
-        let places =
-            |slot: &Slot| slot.rim.iter().map(|&n| self.layers[slot.solid].first + n).collect::<Vec<_>>();
-        let pressure = read(&found.iter().flat_map(places).collect::<Vec<_>>())?;
+        self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect()
+    }
+
+    /// Pressures at the rims of the slots `found`, which `read` tells.
+    fn at_rims<'a>(
+        &self,
+        found: impl Iterator<Item = &'a Slot> + Clone,
+        read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
+    ) -> Result<Vec<Vec<f64>>> {
+        let places = |slot: &Slot| {
+            let first = self.layers[slot.solid].first;
+            slot.rim.iter().map(|&n| first + n).collect::<Vec<_>>()
+        };
+        let rows: Vec<usize> = found.clone().flat_map(places).collect();
+        let pressure = if rows.is_empty() { vec![] } else { read(&rows)? };
         let mut rest = &pressure[..];
-        let told: Vec<&[f64]> = found.iter().filter_map(|slot| rest.split_off(..slot.rim.len())).collect();
-        let of_slot = |(slot, told): (&Slot, &[f64])| self.passed_on(slot, &poses[slot.solid], told);
-        let mut out: Vec<SlotRow> = found.par_iter().zip(told).flat_map_iter(of_slot).collect();
-        out.sort_unstable_by_key(|slot| (slot.solid, slot.row));
-        Ok(out)
+        Ok(found.filter_map(|slot| rest.split_off(..slot.rim.len()).map(<[f64]>::to_vec)).collect())
     }
 
     /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
@@ -190,31 +234,48 @@ impl Slots {
         found
     }
 
-    /// How much of each row of layer `k` lies in a slot [-], with fixed walls if it is `at_walls` and with `others`.
-    fn shares(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<f64> {
+    /// How each row of layer `k` lies before fixed walls, if it is `at_walls`, and before `others`.
+    fn faced(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<Faced> {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
         let reach = FACING.1 * l0;
         let share = |(&offset, &area): (&DVec3, &DVec3)| {
             let outward = pose.orientation * area.normalize_or_zero();
             let x = pose.position + pose.orientation * offset;
-            let mut nearest = reach;
-            let mut see = |r: DVec3| {
+            let (mut nearest, mut wall) = (reach, None);
+            let mut see = |r: DVec3, of_wall: Option<usize>| {
                 let distance = r.length();
-                if r.dot(outward) > AHEAD * distance {
-                    nearest = nearest.min(distance);
+                if r.dot(outward) > AHEAD * distance && distance < nearest {
+                    (nearest, wall) = (distance, of_wall);
                 }
             };
             if at_walls {
-                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x));
+                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, Some(self.fixed_of[n as usize])));
             }
             for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
                 let local = pose.orientation.inverse() * (x - way - pose.position);
-                layer.grid.near(local, reach, |n| see(pose.orientation * (layer.grid.point(n) - local)));
+                layer
+                    .grid
+                    .near(local, reach, |n| see(pose.orientation * (layer.grid.point(n) - local), None));
             }
-            ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0)
+            let share = ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
+            Faced { share, wall }
         };
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
+    }
+
+    /// The pressure in a slot with `passing` rows of its rim, which lie at `place`.
+    fn field(&self, passing: &[(usize, f64)], place: impl Fn(usize) -> DVec3) -> Field {
+        let count = passing.len() as f64;
+        let middle = passing.iter().map(|&(n, _)| place(n)).sum::<DVec3>() / count;
+        let xi = |n: usize| (place(n) - middle) / self.spacing;
+        let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
+        let spread = passing.iter().map(|&(n, _)| outer(xi(n))).fold(DMat3::ZERO, |sum, m| sum + m);
+        let inverse = (spread + DMat3::from_diagonal(DVec3::splat(STIFFENING * count))).inverse();
+        let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n) - middle);
+        let mean = passing.iter().map(level).sum::<f64>() / count;
+        let slope = inverse * passing.iter().map(|row| level(row) * xi(row.0)).sum::<DVec3>();
+        Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0) }
     }
 
     /// The rows that lie deep in `slot`, and those at its rim with what they pass on; their `pressure` in the last step.
@@ -225,20 +286,10 @@ impl Slots {
         let on_surface = |n: usize| place(n) + pose.orientation * layer.to_surface[n];
         let passing = self.passing(slot, pressure, place);
         let count = passing.len() as f64;
-        let middle = passing.iter().map(|&(n, _)| place(n)).sum::<DVec3>() / count;
+        let field = self.field(&passing, place);
+        let Field { middle, inverse, any_wet, .. } = field;
         let xi = |n: usize| (place(n) - middle) / self.spacing;
-        let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
-        let spread = passing.iter().map(|&(n, _)| outer(xi(n))).fold(DMat3::ZERO, |sum, m| sum + m);
-        let inverse = (spread + DMat3::from_diagonal(DVec3::splat(STIFFENING * count))).inverse();
-        // P + rho g . (middle - x) over the rim: its mean and its slope along xi.
-        let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n) - middle);
-        let mean_level = passing.iter().map(level).sum::<f64>() / count;
-        let slope_level = inverse * passing.iter().map(|row| level(row) * xi(row.0)).sum::<DVec3>();
-        let any_wet = passing.iter().any(|&(_, p)| p > 0.0);
-        let under_water = |n: usize| {
-            let p = mean_level + slope_level.dot(xi(n)) + self.weight.dot(on_surface(n) - middle);
-            !any_wet || p > 0.0
-        };
+        let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
         for &(n, share) in slot.deep.iter().filter(|row| under_water(row.0)) {
@@ -280,6 +331,12 @@ impl Slots {
         let inside =
             |&(n, taken): &(usize, f64)| SlotRow { solid, row: n as u32, taken, ..SlotRow::default() };
         wet.into_iter().chain(dry_rows).map(at_rim).chain(slot.deep.iter().map(inside)).collect()
+    }
+
+    /// Pressure of the `field` of a slot on a body's surface, at `x` by a row at `place` [Pa].
+    fn in_slot(&self, field: &Field, place: DVec3, x: DVec3) -> f64 {
+        let xi = (place - field.middle) / self.spacing;
+        field.mean + field.slope.dot(xi) + self.weight.dot(x - field.middle)
     }
 
     /// Rows of the rim of `slot` that pass their `pressure` on, with it: all but those in the air above the water's level; all of them where

@@ -107,6 +107,61 @@ fn a_result_that_means_nothing_is_no_success() {
     assert_eq!(json(&some.out)["verdict"]["grade"], "degraded");
 }
 
+/// Walls that move give the water energy; a typed speed of sound, or an inflow without water yet, excuses nothing.
+#[test]
+fn a_verdict_knows_what_energy_a_scene_has_at_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("case.toml").display().to_string();
+    let out = folder.path().join("results").display().to_string();
+    let run = |end: f64, more: &str| {
+        let run = format!(
+            "[run]\nspacing = 0.01\ntime_step = 0.002\nadaptive = true\nend = {end}\ndimensions = 2\n{more}"
+        );
+        std::fs::write(&file, run).unwrap();
+        json(&ran(&["run", &file, "-o", &out, "--backend", "cpu", "--force", "-q", "--json"]).out)
+    };
+    let couette = "gravity = [0, 0, 0]\n[tank]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.14]\nperiodic = [\"x\"]\nopen = [\"z_max\"]\n\
+                   [fluid]\nviscosity = 0.01\nwall_friction = 0\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.1]\n\
+                   [[moving_wall]]\nname = \"plate\"\nmin = [0, 0, 0.1]\nmax = [0.2, 0.1, 0.14]\nopen = [\"z_max\"]\n\
+                   motion = [[0, 0, 0, 0], [10, 1.0, 0, 0]]\n";
+    let collapse = "[tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.4]\n[fluid]\nsound_speed = 50\n\
+                    [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.3]\n";
+    let empty = "[tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, 0.4]\nopen = [\"z_max\"]\n[fluid]\n[[inflow]]\nname = \"in\"\nface = \"x_min\"\n\
+                 min = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.01\n";
+    for (name, end, more, grade, why) in [
+        ("couette", 2.0, couette, "fine", ""),
+        ("collapse", 0.5, collapse, "degraded", "the energy rose by"),
+        ("empty", 0.02, empty, "fine", ""),
+    ] {
+        let result = run(end, more);
+        let verdict = &result["verdict"];
+        println!("{name}: {verdict}");
+        assert_eq!(verdict["grade"], grade, "{name}: {verdict}");
+        assert!(verdict["reasons"].to_string().contains(why), "{name}: {verdict}");
+    }
+}
+
+#[test]
+fn pressures_that_are_cut_are_judged() {
+    use seixo::output::result::{Grade, Summary};
+    use seixo::run::verdict::{Scale, judge};
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(small_case(folder.path())).unwrap();
+    let case: seixo::Case = text.parse().unwrap();
+    let options = seixo::Options { processor: seixo::Processor::Cpu, ..seixo::Options::default() };
+    let simulation = seixo::Simulation::open(&case, &options).unwrap();
+    let scale = Scale::new(&simulation, &simulation.scene);
+    let mut summary = Summary { steps: 100, ..Summary::default() };
+    summary.particles.fluid = 1000;
+    summary.pressure.unknowns_mean = 2000.0;
+    for (clamps, grade) in [(0, Grade::Fine), (10, Grade::Fine), (400, Grade::Degraded)] {
+        summary.pressure.clamps = clamps;
+        let verdict = judge(&summary, scale);
+        assert_eq!(verdict.grade, grade, "{clamps}: {verdict}");
+        assert_eq!(clamps == 400, verdict.to_string().contains("were cut at their upper bound"), "{verdict}");
+    }
+}
+
 /// A channel that gravity drives along its periodic axis gains energy without end.
 #[test]
 fn a_driven_channel_is_fine() {

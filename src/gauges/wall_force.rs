@@ -1,30 +1,47 @@
 //! Force of the fluid on a fixed wall: pressure on the surface ([`crate::kernels::wall_excess`]) times area over its wall layer, and the reactions of viscosity ([`crate::kernels::viscosity`]) and of the friction of
-//! unresolved boundary layers ([`crate::kernels::wall_friction`]).
+//! unresolved boundary layers ([`crate::kernels::wall_friction`]). Faces behind solids see no water; under a body that stands on the wall the water of the slot presses
+//! ([`crate::slots`]).
 //!
 //! Collisions of particles with the wall, Eq. (18), are not in it.
 
+use super::cover::{self, Standing, Tiles};
 use crate::backend::RowPressure;
-use crate::body::Wrench;
+use crate::body::{Pose, Wrench};
 use crate::fields::Fields;
 use crate::kernels::number_density::pair_weight;
 use crate::kernels::viscosity;
 use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene};
+use crate::slots::Push;
 use glam::{DMat3, DVec3, IVec3};
 use std::collections::{HashMap, HashSet};
+
+/// A face of a row, of the size of a particle.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    row: usize,
+    /// Into the free space, of length 1.
+    normal: DVec3,
+    /// Part before which nothing stands that never moves [-].
+    bare: f64,
+}
 
 /// The wall layer of a fixed wall.
 #[derive(Clone, Debug, Default)]
 pub struct FixedWall {
+    /// Index into [`Scene::walls`].
+    shape: usize,
     /// Slots of its wall particles that face the fluid.
     pub slots: Vec<usize>,
     position: Vec<DVec3>,
-    /// Area with its direction into the free space, one a slot [m2].
-    area: Vec<DVec3>,
     /// From a particle's centre to the true surface, one a slot [m].
     to_surface: Vec<DVec3>,
-    /// Torque counts about this point, the centre of the wall's box [m].
+    faces: Vec<Face>,
+    /// What stands before the faces and never moves.
+    still: Vec<Standing>,
+    tiles: Tiles,
+    /// Torque counts about this point, the middle of the wall: of a face of the tank that of its surface, else of its box [m].
     about: DVec3,
 }
 
@@ -32,10 +49,11 @@ impl FixedWall {
     /// The fixed wall `name`: an obstacle, a plane or a face of the tank (`tank.z_min`); `None` if there is none.
     pub fn find(scene: &Scene, name: &str) -> Option<Self> {
         let shape = scene.walls.iter().position(|w| w.name == name)?;
-        let about = scene.walls[shape].center;
         let on_lattice = scene.walls[shape].axes == DMat3::IDENTITY;
-        let mut out = Self { about, ..Self::default() };
         let l0 = scene.spacing;
+        let tiles = Tiles { spacing: l0, plane: scene.dimensions == 2, periodic: scene.periodic };
+        let (about, still) = (scene.walls[shape].middle, cover::still(scene, shape));
+        let mut out = Self { shape, about, still, tiles, ..Self::default() };
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
         let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
         let cell = |x: DVec3| ((scene.periodic.wrap(x) - origin) / l0).round().as_ivec3();
@@ -49,31 +67,64 @@ impl FixedWall {
             // Particles on an edge of a box belong to all of its faces there, whole.
             let open = |axis: usize| {
                 let face = DVec3::AXES[axis] * normal[axis].signum();
-                if normal[axis].abs() > 1e-6 && !solid.contains(&cell(x + l0 * face)) {
-                    face
-                } else {
-                    DVec3::ZERO
-                }
+                (normal[axis].abs() > 1e-6 && !solid.contains(&cell(x + l0 * face))).then_some(face)
             };
-            let faces = if on_lattice { open(0) + open(1) + open(2) } else { normal };
-            if faces == DVec3::ZERO {
+            let normals: Vec<DVec3> =
+                if on_lattice { (0..3).filter_map(open).collect() } else { vec![normal] };
+            let bare = |&normal: &DVec3| {
+                let center = x + 0.5 * l0 * normal;
+                let bare = out.tiles.bare(center, normal, &out.tiles.near(center, &out.still));
+                (bare > 0.0).then_some(Face { row: out.slots.len(), normal, bare })
+            };
+            let faces: Vec<Face> = normals.iter().filter_map(bare).collect();
+            if faces.is_empty() {
                 continue;
             }
+            out.faces.extend(faces);
             out.slots.push(slot);
-            out.position.push(scene.position[slot]);
-            out.area.push(faces * l0 * l0);
-            out.to_surface.push(faces * 0.5 * l0);
+            out.position.push(x);
+            out.to_surface.push(normals.iter().sum::<DVec3>() * 0.5 * l0);
         }
         Some(out)
     }
 
-    /// Force and torque of the pressures of its slots [N, N m].
-    pub fn pressure_force(&self, pressures: &[RowPressure], params: &Params) -> Wrench {
+    /// Area with its direction into the free space, one a slot, where solids do not stand before it [m2]; those of `scene` that move are at their `poses`.
+    pub fn areas(&self, scene: &Scene, poses: &[Pose]) -> Vec<DVec3> {
+        let l0 = self.tiles.spacing;
+        let moving = cover::moving(scene, poses);
+        let mut areas = vec![DVec3::ZERO; self.slots.len()];
+        for face in &self.faces {
+            let center = self.position[face.row] + 0.5 * l0 * face.normal;
+            let near = self.tiles.near(center, &moving);
+            let bare = if near.is_empty() {
+                face.bare
+            } else {
+                let all: Vec<&Standing> =
+                    near.into_iter().chain(self.tiles.near(center, &self.still)).collect();
+                self.tiles.bare(center, face.normal, &all)
+            };
+            areas[face.row] += bare * l0 * l0 * face.normal;
+        }
+        areas
+    }
+
+    /// Force and torque of the pressures of its slots on their bare `areas` [N, N m].
+    pub fn pressure_force(&self, pressures: &[RowPressure], areas: &[DVec3], params: &Params) -> Wrench {
         let mut sum = Wrench::default();
-        for (k, p) in pressures.iter().enumerate() {
-            let force = -p.on_surface(self.to_surface[k], params) * self.area[k];
+        for (k, (p, area)) in pressures.iter().zip(areas).enumerate() {
+            let force = -p.on_surface(self.to_surface[k], params) * *area;
             sum.force += force;
             sum.torque += (self.position[k] + self.to_surface[k] - self.about).cross(force);
+        }
+        sum
+    }
+
+    /// Force and torque of the `pushes` of slots that are on it [N, N m].
+    pub fn slot_force(&self, pushes: &[Push], scene: &Scene) -> Wrench {
+        let own = |push: &&Push| scene.static_wall_shape[push.wall] as usize == self.shape;
+        let mut sum = Wrench::default();
+        for push in pushes.iter().filter(own) {
+            sum += Wrench { force: push.force, torque: (push.at - self.about).cross(push.force) };
         }
         sum
     }

@@ -85,6 +85,8 @@ pub struct Pressure {
     pub relative_residual_max: f64,
     /// Solves that ended without meeting the tolerance.
     pub failures: u64,
+    /// Pressures that were cut at the upper bound, over all steps.
+    pub clamps: u64,
 }
 
 /// Extremes over the run.

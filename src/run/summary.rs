@@ -68,6 +68,8 @@ impl Totals {
             iterations_max,
             relative_residual_max,
             failures,
+            // Counted by the backend.
+            clamps: _,
         } = pressure;
         archive.small("totals.iterations_max", iterations_max)?;
         archive.number("totals.relative_residual_max", relative_residual_max)?;
@@ -140,6 +142,7 @@ impl Totals {
         if monitors.energy_end.partial_cmp(&monitors.energy_max).is_none_or(std::cmp::Ordering::is_gt) {
             monitors.energy_max = monitors.energy_end;
         }
+        self.pressure.clamps = counters.pressure_clamps;
         monitors.lost_particles = counters.lost;
         monitors.neighbours_max = counters.neighbours_max;
     }

@@ -1,6 +1,6 @@
 //! What can be said of a result: fine, degraded, or nothing at all.
 
-use crate::output::result::{Grade, Summary, Verdict};
+use crate::output::result::{Grade, Passed, Summary, Verdict, Water};
 use crate::scene::{Drive, Scene};
 use crate::simulation::Simulation;
 use crate::time_step::collapse_speed;
@@ -10,6 +10,8 @@ use glam::DQuat;
 /// anything [-].
 const FAILURES: (f64, f64) = (0.01, 0.5);
 const LOST: (f64, f64) = (1e-3, 0.1);
+/// Part of all pressures of all steps that are cut at the upper bound [-]: a slam cuts some.
+const CLAMPED: (f64, f64) = (1e-4, f64::INFINITY);
 /// Mean of n / n0 - 1 [-]: the water is compressed by that much.
 const COMPRESSION: (f64, f64) = (0.05, 0.3);
 /// Largest speed over that of a fall through the domain.
@@ -30,8 +32,12 @@ pub struct Scale {
     speed: f64,
     /// Energy [J].
     energy: f64,
-    /// Energy that gravity along periodic axes and walls that go up may give it [J].
+    /// Energy that gravity along periodic axes and walls that move may give it [J].
     given: f64,
+    /// Energy that water may have that comes in, and lack that goes out, over its mass [J/kg].
+    through: (f64, f64),
+    /// Mass of a particle of water [kg].
+    particle: f64,
 }
 
 impl Scale {
@@ -76,8 +82,24 @@ impl Scale {
         let speed = moved + drawn;
         // A wedge of 30 degrees that plunges throws water up at five times its speed, a flatter one faster.
         let thrown = 3.0 * driven;
-        // Water at rest without gravity is never quite at rest.
-        let noise = if water > 0.0 { 0.1 * params.sound_speed(simulation.case.run.time_step) } else { 0.0 };
+        // Water at rest without gravity is never quite at rest. Where it has a speed, that tells how fast is fast.
+        let noise = match 0.1 * params.sound_speed(simulation.case.run.time_step) {
+            noise if water > 0.0 && g == 0.0 => {
+                if speed > 0.0 {
+                    noise.min(speed)
+                } else {
+                    noise
+                }
+            }
+            _ => 0.0,
+        };
+        // Water that comes in stands as high as all of it in the end, what goes out falls from the opening.
+        let faces = scene.openings.iter().map(|o| o.face.dot(up) * g);
+        let at_start = scene.position[..scene.water()].iter().map(|x| x.dot(up) * g);
+        let lowest = faces.clone().chain(at_start).fold(f64::INFINITY, f64::min);
+        let highest = faces.fold(lowest + g * params.depth, f64::max);
+        let comes = highest + 0.5 * driven * driven;
+        let through = (comes.max(0.0), (-lowest).max(0.0));
         Self {
             speed: (speed * speed + 2.0 * g * height)
                 .sqrt()
@@ -89,8 +111,9 @@ impl Scale {
                 + turning
                 + water * noise * noise,
             given: (water + bodies)
-                * (0.5 * (speed * speed - moved * moved)
-                    + if risen > 0.0 { g * risen + 0.5 * driven * driven } else { 0.0 }),
+                * (0.5 * (speed * speed - moved * moved) + g * risen.max(0.0) + 0.5 * driven * driven),
+            through: if scene.openings.is_empty() { (0.0, 0.0) } else { through },
+            particle: params.particle_mass(),
         }
     }
 }
@@ -121,11 +144,19 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     let wet = (summary.particles.fluid > 0 || summary.water.is_some()) && summary.steps > 0;
     if wet {
         let came = summary.water.iter().flat_map(|w| &w.inflow).map(|i| i.particles).sum::<u64>();
-        let fluid = summary.particles.fluid as f64 + came as f64;
+        let fluid = (summary.particles.fluid as f64 + came as f64).max(1.0);
         judge.bound(p.failures as f64 / solves, FAILURES, || {
             format!(
                 "{} of {} pressure solves missed fluid.solver.tolerance (largest residual {:.1e})",
                 p.failures, summary.steps, p.relative_residual_max
+            )
+        });
+        let cut = p.clamps as f64 / (p.unknowns_mean * solves).max(1.0);
+        judge.bound(cut, CLAMPED, || {
+            format!(
+                "{} pressures, {:.1e} of all, were cut at their upper bound; use a larger fluid.sound_speed or a shorter run.time_step, \
+                 or give the water room",
+                p.clamps, cut
             )
         });
         judge.bound(m.lost_particles as f64 / fluid, LOST, || {
@@ -150,11 +181,14 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     judge.bound(m.penetration_max_over_l0, PENETRATION, || {
         format!("solids sank {:.1} particles deep into each other", m.penetration_max_over_l0)
     });
-    let gain = m.energy_max - m.energy_start - scale.given;
     // Water that comes in brings its energy along.
-    let gain = if summary.water.is_some() { 0.0 } else { gain };
-    judge.bound(gain, (GAIN.0 * scale.energy, GAIN.1 * scale.energy), || {
-        format!("the energy rose by {gain:.2e} J, where {:.2e} J is at hand", scale.energy)
+    let passed = |all: &[Passed]| all.iter().map(|p| p.particles).sum::<u64>() as f64 * scale.particle;
+    let through = |w: &Water| scale.through.0 * passed(&w.inflow) + scale.through.1 * passed(&w.outflow);
+    let passing = summary.water.as_ref().map_or(0.0, through);
+    let gain = m.energy_max - m.energy_start - scale.given - passing;
+    let energy = scale.energy + passing;
+    judge.bound(gain, (GAIN.0 * energy, GAIN.1 * energy), || {
+        format!("the energy rose by {gain:.2e} J, where {energy:.2e} J is at hand")
     });
     judge.0.sort_by_key(|fault| std::cmp::Reverse(fault.0));
     Verdict {

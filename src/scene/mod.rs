@@ -145,6 +145,9 @@ pub struct WallShape {
     pub half: DVec3,
     /// Orientation of the box (columns are its axes in the world).
     pub axes: DMat3,
+    /// Where torques on it count about [m]: of a face of the tank the middle of its surface, without what of the layers reaches beyond; else the
+    /// centre.
+    pub middle: DVec3,
 }
 
 /// Mass properties and freedom of a body that moves under forces.

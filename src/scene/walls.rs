@@ -54,7 +54,12 @@ impl Fixed {
                     } else {
                         slab.lo[axis] = interior.hi[axis];
                     }
-                    shape[axis][side] = self.add_shape(face_name(2 * axis + side), lattice, slab);
+                    let of = self.add_shape(face_name(2 * axis + side), lattice, slab);
+                    let (lo, hi) = (lattice.corner(interior.lo), lattice.corner(interior.hi));
+                    let middle = &mut self.shapes[of as usize].middle;
+                    *middle = 0.5 * (lo + hi);
+                    middle[axis] = if side == 0 { lo[axis] } else { hi[axis] };
+                    shape[axis][side] = of;
                 }
             }
         }
@@ -125,6 +130,7 @@ impl Fixed {
             center: slab.center,
             half: frame.half(layers),
             axes: slab.axes,
+            middle: slab.center,
         });
         let mut left_out = 0;
         for depth in 0..layers {
@@ -160,6 +166,7 @@ impl Fixed {
             center: 0.5 * (lo + hi),
             half: 0.5 * (hi - lo),
             axes: DMat3::IDENTITY,
+            middle: 0.5 * (lo + hi),
         });
         self.shapes.len() as u32 - 1
     }

@@ -85,7 +85,7 @@ impl DryScene {
     /// A fixed box without particles (enough for the smooth law).
     pub fn wall(mut self, center: DVec3, half: DVec3, axes: DMat3) -> Self {
         let name = format!("wall {}", self.scene.walls.len());
-        self.scene.walls.push(WallShape { name, center, half, axes });
+        self.scene.walls.push(WallShape { name, center, half, axes, middle: center });
         self
     }
 

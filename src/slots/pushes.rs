@@ -1,0 +1,65 @@
+//! What slots press on fixed walls: the reaction of what they press on bodies.
+
+use super::{Faced, Slot, Slots};
+use crate::body::Pose;
+use crate::error::Result;
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Force of the water in a slot on a fixed wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Push {
+    /// Which of the fixed walls' particles it acts on.
+    pub wall: usize,
+    /// Where [m].
+    pub at: DVec3,
+    /// Force [N].
+    pub force: DVec3,
+}
+
+impl Slots {
+    /// Forces of the water in slots on fixed walls with the solids at `poses`: equal and opposite to what it presses on the bodies there, and what rows at
+    /// the rim press on their own beside it. `read` tells pressures of slots of particles [Pa]; a slot with a dry rim presses nothing.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn pushes(
+        &self,
+        poses: &[Pose],
+        read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
+    ) -> Result<Vec<Push>> {
+        let found = self.find(poses);
+        let pressure = self.at_rims(found.iter().map(|(slot, _)| slot), read)?;
+        let of = |((slot, faced), told): (&(Slot, Arc<[Faced]>), &Vec<f64>)| {
+            self.pushes_of(slot, faced, &poses[slot.solid], told)
+        };
+        Ok(found.iter().zip(&pressure).flat_map(of).collect())
+    }
+
+    fn pushes_of(&self, slot: &Slot, faced: &[Faced], pose: &Pose, pressure: &[f64]) -> Vec<Push> {
+        let layer = &self.layers[slot.solid];
+        let place = |n: usize| pose.orientation * layer.offset[n];
+        let area = |n: usize| pose.orientation * layer.area[n];
+        let field = self.field(&self.passing(slot, pressure, place), place);
+        if !field.any_wet {
+            return vec![];
+        }
+        let push = |n: usize, area: DVec3| {
+            let on_surface = place(n) + pose.orientation * layer.to_surface[n];
+            let p = self.in_slot(&field, place(n), on_surface).max(0.0);
+            let wall = faced[n].wall?;
+            Some(Push { wall, at: pose.position + on_surface, force: faced[n].share * p * area })
+        };
+        // A row of the rim looks out as well: what of it looks into the slot is what looks as its neighbours deep in there do.
+        let is_deep = |n: &usize| slot.deep.binary_search_by_key(n, |row| row.0).is_ok();
+        let all: DVec3 = slot.deep.iter().map(|row| area(row.0)).sum();
+        let inwards = |n: usize| {
+            let near = layer.adjacent[n].iter().map(|&m| m as usize).filter(is_deep);
+            let near: DVec3 = near.map(area).sum();
+            let way = if near == DVec3::ZERO { all } else { near }.normalize_or_zero();
+            area(n).dot(way).max(0.0) * way
+        };
+        let rim = slot.rim.iter().filter_map(|&n| push(n, inwards(n)));
+        slot.deep.iter().filter_map(|row| push(row.0, area(row.0))).chain(rim).collect()
+    }
+}
