@@ -55,5 +55,5 @@ mod stability;
 mod study;
 mod surface;
 mod twins;
+mod wall_layers;
 mod water;
-mod waves;

@@ -407,11 +407,21 @@ fn what_is_wrong_with_a_file_is_said_with_the_key_and_the_place() {
     turned[3].swap(1, 2);
     let thin = cuboid(DVec3::new(0.2, 0.2, 0.01));
     let huge = cuboid(DVec3::splat(100.0));
+    let beside = |off: f64, size: f64| {
+        cuboid(DVec3::splat(size)).into_iter().map(move |t| t.map(|v| v + DVec3::splat(off)))
+    };
+    let overlapping: Triangles = solid.iter().copied().chain(beside(0.1, 0.2)).collect();
+    let nested: Triangles = solid.iter().copied().chain(beside(0.05, 0.1)).collect();
+    let mut inside_out = overlapping[..12].to_vec();
+    inside_out.extend(beside(0.3, 0.1).map(|[a, b, c]| [a, c, b]));
     for (name, text, key, parts) in [
         ("open.stl", stl(&open), "body.0.file", &["open", "3 edges", "triangle", "watertight"][..]),
         ("turned.stl", stl(&turned), "body.0.file", &["triangles", "and 4", "opposite ways"]),
         ("thin.stl", stl(&thin), "body.0.file", &["1.00e-2 m thin", "run.spacing"]),
         ("huge.stl", stl(&huge), "body.0.scale", &["100 m long", "millimetres", "scale = 0.001"]),
+        ("overlapping.stl", stl(&overlapping), "body.0.file", &["lie in each other", "m3 count twice"]),
+        ("nested.stl", stl(&nested), "body.0.file", &["encloses 8.00e-3 m3", "count twice"]),
+        ("inside_out.stl", stl(&inside_out), "body.0.file", &["m3 are turned inside out"]),
         ("none.stl", "solid it\nendsolid it\n".into(), "body.0.file", &["no triangle"]),
         (
             "not.stl",
@@ -438,6 +448,18 @@ fn what_is_wrong_with_a_file_is_said_with_the_key_and_the_place() {
             }
             other => panic!("{name}: expected a refusal, got {:?}", other.map(|_| ())),
         }
+    }
+    // A hollow one is whole, and so are two that touch.
+    let hollow = solid.iter().copied().chain(beside(0.05, 0.1).map(|[a, b, c]| [a, c, b])).collect();
+    let touching = solid
+        .iter()
+        .copied()
+        .chain(cuboid(DVec3::new(-0.2, -0.2, -0.2)).into_iter().map(|[a, b, c]| [a, c, b]));
+    for (name, solid, volume) in [("hollow.stl", hollow, 0.007), ("touching.stl", touching.collect(), 0.016)]
+    {
+        let path = file(&folder, name, &stl(&solid));
+        let mesh = seixo::shape::Mesh::open(&path, 1.0).unwrap_or_else(|e| panic!("{name}: {}", e.message));
+        assert!((seixo::shape::Geometry::volume(mesh) / volume - 1.0).abs() < 1e-6, "{name}");
     }
     let missing = case(
         "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\n\

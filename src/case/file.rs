@@ -87,10 +87,10 @@ pub fn load(path: &Path, spacing: Option<f64>, sets: &[String]) -> Result<Loaded
     load_text(path, text, spacing, sets)
 }
 
-/// Most bytes of a case; what is longer is something else.
+/// Most bytes of a case or of a table beside it; what is longer is something else.
 const LONGEST: u64 = 64 << 20;
 
-/// The text of a case from `source`.
+/// The text of a case, or of a table, from `source`.
 ///
 /// # Errors
 /// What the source says, and [`std::io::ErrorKind::InvalidData`] if it is no text, [`std::io::ErrorKind::FileTooLarge`] if it
@@ -103,7 +103,7 @@ pub fn read_text(source: impl std::io::Read) -> std::io::Result<String> {
         text.remove(0);
     }
     if length as u64 > LONGEST {
-        let why = "longer than 64 MB, which no case is";
+        let why = "longer than 64 MB, which no case and no table is";
         return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, why));
     }
     Ok(text)

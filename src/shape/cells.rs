@@ -45,20 +45,4 @@ impl Cells {
         let near = self.within(x, reach);
         near.reduce(|found, here| if here.1 < found.1 { here } else { found }).map(|(k, _)| k)
     }
-
-    /// The nearest of all points to `x`, of which there are some.
-    pub fn nearest_of_all(&self, x: DVec3) -> usize {
-        let mut reach = self.edge;
-        loop {
-            match self.nearest(x, reach) {
-                Some(k) => return k,
-                None => reach *= 2.0,
-            }
-        }
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
-    }
 }

@@ -3,6 +3,7 @@
 //! Everything else asks a shape: the scene for its particles and its volume, a body for its inertia, contact
 //! for its depth below a point and for what of its surface presses into others ([`Surface`]).
 
+mod areas;
 mod cells;
 mod convex;
 mod cuboid;
@@ -10,6 +11,7 @@ mod cylinder;
 mod disc;
 #[cfg(feature = "mesh")]
 mod mesh;
+mod nearest;
 mod polygon;
 mod sphere;
 mod surface;
@@ -25,7 +27,6 @@ pub use mesh::{Mesh, Thickness, Unfit};
 pub use polygon::Polygon;
 pub(crate) use polygon::signed_area;
 pub use sphere::Sphere;
-use sphere::close;
 pub use surface::{Line, Ring, Side, Surface};
 
 use glam::{DMat3, DQuat, DVec3};
@@ -271,7 +272,7 @@ pub struct Particles {
     pub dummy: Vec<DVec3>,
     /// Outward area of each particle of the wall layer [m2]; they sum to zero.
     pub area: Vec<DVec3>,
-    /// From each particle of the wall layer to the true surface [m].
+    /// From each particle of the wall layer to where its pressure acts on the true surface [m].
     pub to_surface: Vec<DVec3>,
 }
 

@@ -1,8 +1,8 @@
 //! A sphere: one ball of a surface, particles on concentric layers.
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, convex};
-use glam::{DMat3, DVec3};
+use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, areas, convex};
+use glam::DVec3;
 use std::f64::consts::PI;
 
 /// A sphere.
@@ -89,7 +89,7 @@ impl Geometry for Sphere {
                 out.add(depth, r * outward, area * outward, 0.5 * step * outward);
             }
         }
-        close(&mut out, self.volume());
+        areas::close(&mut out, self.volume());
         out
     }
 
@@ -107,26 +107,4 @@ fn fibonacci(n: usize) -> impl Iterator<Item = DVec3> {
         let r = (1.0 - z * z).sqrt();
         DVec3::new(r * cos, r * sin, z)
     })
-}
-
-/// Corrects areas that are even only nearly: an even pressure may not push, and one that grows with depth must
-/// push with the weight of `volume` [m3], so sum A = 0 and sum x A^T = volume.
-pub(super) fn close(particles: &mut Particles, volume: f64) {
-    let n = particles.area.len() as f64;
-    let mean = particles.area.iter().sum::<DVec3>() / n;
-    particles.area.iter_mut().for_each(|a| *a -= mean);
-    let at = particles.wall.iter().zip(&particles.to_surface).map(|(x, s)| *x + *s);
-    // columns: sum over x_k A
-    let mut moment = DMat3::ZERO;
-    for (x, a) in at.zip(&particles.area) {
-        for k in 0..3 {
-            *moment.col_mut(k) += x[k] * *a;
-        }
-    }
-    // A slice has no areas that face along y.
-    if moment.y_axis == DVec3::ZERO {
-        moment.y_axis = volume * DVec3::Y;
-    }
-    let correct = volume * moment.inverse();
-    particles.area.iter_mut().for_each(|a| *a = correct * *a);
 }

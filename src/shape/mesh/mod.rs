@@ -8,6 +8,7 @@ mod ground;
 mod particles;
 mod primitives;
 mod read;
+mod shells;
 mod skin;
 
 use super::cells::Cells;
@@ -116,7 +117,7 @@ impl Mesh {
         base: f64,
         close: impl FnOnce(read::Soup) -> Result<read::Soup, Unfit>,
     ) -> Result<&'static Self, Unfit> {
-        let bytes = std::fs::read(path).map_err(|e| {
+        let bytes = read::bytes(path).map_err(|e| {
             Unfit::new(format!("{path}: {e}"), "give an STL or OBJ file, by its path from the case")
         })?;
         Self::made((path.to_owned(), crc32fast::hash(&bytes), [scale, base, 0.0].map(f64::to_bits)), || {
@@ -156,6 +157,7 @@ impl Mesh {
         if signed < 0.0 {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
+        shells::check(path, &vertices, &triangles)?;
         let tensor = mass.reconstruct_inertia_matrix();
         let beside = [tensor.y_axis.x, tensor.z_axis.x, tensor.z_axis.y];
         let diagonal = DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z);
@@ -395,9 +397,10 @@ impl Geometry for Mesh {
     fn surface(&self, particles: &WallLayer, spacing: f64, _: u32) -> Surface {
         let mut points = vec![];
         let mut faces = vec![];
-        for (at, to_surface) in particles.offset.iter().zip(particles.to_surface) {
-            points.push(*at + *to_surface);
-            faces.push(face(*to_surface));
+        for &at in particles.offset {
+            let (distance, outward) = self.distance(at);
+            points.push(at - distance * outward);
+            faces.push(face(outward));
         }
         let mut thinned = Cells::new(0.4 * spacing);
         for &(a, b, on) in &self.sharp {

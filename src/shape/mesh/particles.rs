@@ -1,7 +1,8 @@
 //! Particles that fill a mesh.
 
+use super::super::areas::{self, Piece};
 use super::super::cells::Cells;
-use super::super::{ALL_FACES, Geometry, Particles, close};
+use super::super::{ALL_FACES, Geometry, Particles};
 use super::Mesh;
 use super::skin::Skin;
 use glam::DVec3;
@@ -22,6 +23,8 @@ const STRIDE: f64 = 0.3;
 const ROUNDS: usize = 15;
 const LOOKS: usize = 2;
 const MARGIN: f64 = 0.5;
+/// A piece of the surface that goes to one particle is no longer, over the spacing.
+const PIECE: f64 = 0.4;
 
 /// A place of a layer.
 #[derive(Clone, Copy)]
@@ -105,9 +108,8 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
             }
         }
     }
-    let mut wall = Cells::new(spacing);
-    out.wall.iter().for_each(|&at| wall.add(at));
-    share(mesh, spacing, &wall, &mut out);
+    let nearest = |x| mesh.nearest(x).0;
+    areas::share(&mut out, spacing, mesh.volume(), pieces(mesh, spacing), nearest);
     out
 }
 
@@ -154,30 +156,23 @@ fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Pl
     places
 }
 
-/// Gives each small piece of the surface to the nearest particle of the wall layer.
-fn share(mesh: &Mesh, spacing: f64, wall: &Cells, out: &mut Particles) {
-    if wall.is_empty() {
-        return;
-    }
-    for triangle in mesh.triangles.triangles() {
-        let [a, b, c] = [triangle.a, triangle.b, triangle.c];
-        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        let n = (longest / (0.3 * spacing)).ceil().max(1.0);
-        let area = 0.5 * (b - a).cross(c - a) / (n * n);
-        let point = |i: f64, j: f64| a + (b - a) * (i / n) + (c - a) * (j / n);
-        for i in 0..n as i32 {
-            for j in 0..n as i32 - i {
-                let (i, j) = (f64::from(i), f64::from(j));
-                let mut give = |at: DVec3| {
-                    let nearest = wall.nearest_of_all(at);
-                    out.area[nearest] += area;
-                };
-                give(point(i + 1.0 / 3.0, j + 1.0 / 3.0));
-                if i + j + 1.0 < n {
-                    give(point(i + 2.0 / 3.0, j + 2.0 / 3.0));
+/// The surface in small pieces, of which none is longer than [`PIECE`]: triangles, halved across their longest edge.
+fn pieces(mesh: &Mesh, spacing: f64) -> impl Iterator<Item = Piece> + '_ {
+    mesh.triangles.triangles().flat_map(move |triangle| {
+        let mut open = vec![[triangle.a, triangle.b, triangle.c]];
+        std::iter::from_fn(move || {
+            loop {
+                let [a, b, c] = open.pop()?;
+                let edges = [[a, b, c], [b, c, a], [c, a, b]];
+                let longer =
+                    |s: &[DVec3; 3], t: &[DVec3; 3]| s[0].distance(s[1]).total_cmp(&t[0].distance(t[1]));
+                let [from, to, apex] = edges.into_iter().max_by(longer)?;
+                if from.distance(to) <= PIECE * spacing {
+                    return Some(((a + b + c) / 3.0, 0.5 * (b - a).cross(c - a)));
                 }
+                let middle = 0.5 * (from + to);
+                open.extend([[middle, to, apex], [from, middle, apex]]);
             }
-        }
-    }
-    close(out, mesh.volume());
+        })
+    })
 }

@@ -3,10 +3,23 @@
 use super::Unfit;
 use glam::DVec3;
 use std::collections::HashMap;
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 
 /// Vertices [the file's length], each once.
 pub(super) type Soup = (Vec<DVec3>, Vec<[u32; 3]>);
+
+/// Most bytes of a mesh: 20 million triangles of a binary STL file.
+const LONGEST: u64 = 1 << 30;
+
+/// What is in the file `path`, which may be a pipe or a device that never ends.
+pub(super) fn bytes(path: &str) -> std::io::Result<Vec<u8>> {
+    let (mut file, mut bytes) = (std::fs::File::open(path)?, vec![]);
+    let known = file.metadata()?;
+    if known.len() <= LONGEST && (&mut file).take(LONGEST + 1).read_to_end(&mut bytes)? as u64 <= LONGEST {
+        return Ok(bytes);
+    }
+    Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, "longer than 1 GB, which no mesh is"))
+}
 
 /// Vertices and triangles of `bytes`; `path` says by its end what they are.
 pub(super) fn soup(path: &str, bytes: &[u8]) -> Result<Soup, Unfit> {

@@ -3,18 +3,17 @@
 //! Particles stand in layers half a spacing, one and a half and so on below its sides. A layer is the outline moved inwards: sides
 //! shrink to where they meet inside a corner, and an arc closes them round a notch. What of it goes on smoothly is divided evenly.
 
+mod layer;
+
+use super::areas;
 use super::cells::Cells;
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, close, face, nodes_between};
+use super::{Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
 use glam::{DVec2, DVec3};
 use std::sync::Mutex;
 
-/// A layer goes on smoothly where it turns by less [rad].
-const SMOOTH: f64 = 0.35;
 /// Particles stand at least so far apart, over the spacing.
 const APART: f64 = 0.6;
-/// A layer is looked for in steps of so much, over the spacing.
-const STEP: f64 = 0.05;
 /// Pieces of a side that go to the nearest particle each, over the spacing.
 const PIECE: f64 = 0.1;
 
@@ -58,12 +57,6 @@ pub(crate) fn signed_area(corners: &[DVec2]) -> f64 {
 
 fn sides_of(corners: &[DVec2]) -> impl Iterator<Item = [DVec2; 2]> + '_ {
     (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
-}
-
-/// A stretch of a layer: points close to each other, and its directions at both ends.
-struct Stretch {
-    points: Vec<DVec2>,
-    ways: [DVec2; 2],
 }
 
 impl Polygon {
@@ -164,118 +157,6 @@ impl Polygon {
         found.sort_by(f64::total_cmp);
         found
     }
-
-    /// The stretches of the layer at `depth` [m] in the order of the outline.
-    fn layer(&self, depth: f64, spacing: f64) -> Vec<Stretch> {
-        let mut out = vec![];
-        let n = self.corners.len();
-        for k in 0..n {
-            let [a, b, next] = [0, 1, 2].map(|j| self.corners[(k + j) % n]);
-            let (way, length) = ((b - a).normalize(), a.distance(b));
-            self.stretches(depth, spacing, length, &|s| (a + s * way + depth * way.perp(), way), &mut out);
-            let turn = way.angle_to(next - b);
-            if turn < 0.0 {
-                // Round a notch.
-                let arc = |s: f64| {
-                    let way = DVec2::from_angle(-s / depth).rotate(way);
-                    (b + depth * way.perp(), way)
-                };
-                self.stretches(depth, spacing, -turn * depth, &arc, &mut out);
-            }
-        }
-        out
-    }
-
-    /// What of a line, which `at` describes by place and direction over its `length` [m], is nowhere nearer to the outline than `depth` [m].
-    fn stretches(
-        &self,
-        depth: f64,
-        spacing: f64,
-        length: f64,
-        at: &dyn Fn(f64) -> (DVec2, DVec2),
-        out: &mut Vec<Stretch>,
-    ) {
-        let held = |s: f64| self.depth_at(at(s).0) > depth * (1.0 - 1e-6);
-        let steps = (length / (STEP * spacing)).ceil().max(1.0) as usize;
-        let place = |k: usize| length * k as f64 / steps as f64;
-        // Where between a place that is held and one that is not it ends.
-        let end = |mut inside: f64, mut beyond: f64| {
-            for _ in 0..40 {
-                let middle = 0.5 * (inside + beyond);
-                *(if held(middle) { &mut inside } else { &mut beyond }) = middle;
-            }
-            inside
-        };
-        let on: Vec<bool> = (0..=steps).map(|k| held(place(k))).collect();
-        let mut k = 0;
-        while k <= steps {
-            if !on[k] {
-                k += 1;
-                continue;
-            }
-            let first = k;
-            while k < steps && on[k + 1] {
-                k += 1;
-            }
-            let from = if first == 0 { 0.0 } else { end(place(first), place(first - 1)) };
-            let to = if k == steps { length } else { end(place(k), place(k + 1)) };
-            let inner = (first..=k).map(place).filter(|&s| s > from && s < to);
-            let places: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
-            let points = places.iter().map(|&s| at(s).0).collect();
-            out.push(Stretch { points, ways: [at(from).1, at(to).1] });
-            k += 1;
-        }
-    }
-}
-
-/// Joins stretches that go on smoothly, the last with the first as well.
-fn joined(stretches: Vec<Stretch>, spacing: f64) -> Vec<Stretch> {
-    let goes_on = |one: &Stretch, next: &Stretch| {
-        let gap = one.points.last().zip(next.points.first()).map_or(f64::INFINITY, |(a, b)| a.distance(*b));
-        gap < 1e-6 * spacing && one.ways[1].angle_to(next.ways[0]).abs() < SMOOTH
-    };
-    let mut out: Vec<Stretch> = vec![];
-    for next in stretches {
-        match out.last_mut() {
-            Some(last) if goes_on(last, &next) => {
-                last.points.extend_from_slice(&next.points);
-                last.ways[1] = next.ways[1];
-            }
-            _ => out.push(next),
-        }
-    }
-    if out.len() > 1
-        && goes_on(&out[out.len() - 1], &out[0])
-        && let Some(last) = out.pop()
-    {
-        out[0].points.splice(0..0, last.points);
-        out[0].ways[0] = last.ways[0];
-    }
-    out
-}
-
-impl Stretch {
-    fn length(&self) -> f64 {
-        self.points.windows(2).map(|p| p[0].distance(p[1])).sum()
-    }
-
-    /// Places about `spacing` [m] apart along it, its ends among them.
-    fn divided(&self, spacing: f64) -> Vec<DVec2> {
-        let length = self.length();
-        let count = (length / spacing).round().max(1.0);
-        let mut out = vec![self.points[0]];
-        let mut gone = 0.0;
-        for p in self.points.windows(2) {
-            let step = p[0].distance(p[1]);
-            while out.len() as f64 * length / count <= gone + step && (out.len() as f64) < count {
-                let share = (out.len() as f64 * length / count - gone) / step;
-                out.push(p[0].lerp(p[1], share));
-            }
-            gone += step;
-        }
-        out.extend(self.points.last());
-        out
-    }
 }
 
 impl Geometry for Polygon {
@@ -339,7 +220,7 @@ impl Geometry for Polygon {
         let mut taken = Cells::new(spacing);
         for layer in 0..layers {
             let depth = (f64::from(layer) + 0.5) * spacing;
-            let mut stretches = joined(self.layer(depth, spacing), spacing);
+            let mut stretches = self.layer(depth, spacing);
             if stretches.is_empty() {
                 break;
             }
@@ -356,25 +237,22 @@ impl Geometry for Polygon {
         if out.wall.is_empty() {
             return out;
         }
-        let mut wall = Cells::new(spacing);
-        out.wall.iter().for_each(|&at| wall.add(at));
-        for [a, b] in self.sides() {
-            let pieces = (a.distance(b) / (PIECE * spacing)).ceil().max(1.0);
-            let area = -(b - a).perp() * self.width / pieces;
-            for k in 0..pieces as usize {
-                let nearest = wall.nearest_of_all(space(a.lerp(b, (k as f64 + 0.5) / pieces)));
-                out.area[nearest] += space(area);
-            }
-        }
-        close(&mut out, self.volume());
+        let pieces = self.sides().flat_map(|[a, b]| {
+            let count = (a.distance(b) / (PIECE * spacing)).ceil().max(1.0);
+            let area = -space((b - a).perp()) * self.width / count;
+            (0..count as usize).map(move |k| (space(a.lerp(b, (k as f64 + 0.5) / count)), area))
+        });
+        areas::share(&mut out, spacing, self.volume(), pieces, |x| space(self.nearest(plane(x)).0));
         out
     }
 
     /// Points alone, all of one weight, which sum to 1 over the side that has most of them.
     fn surface(&self, particles: &WallLayer, spacing: f64, _: u32) -> Surface {
-        let above = particles.offset.iter().zip(particles.to_surface);
-        let mut points: Vec<DVec3> = above.map(|(at, to_surface)| *at + *to_surface).collect();
-        let mut faces: Vec<Faces> = particles.to_surface.iter().map(|&s| face(s)).collect();
+        let above = particles.offset.iter().map(|&at| {
+            let (distance, outward) = self.distance(at);
+            (at - distance * outward, face(outward))
+        });
+        let (mut points, mut faces): (Vec<DVec3>, Vec<Faces>) = above.unzip();
         let mut corners: Vec<DVec3> = vec![];
         for (at, corner) in self.corners().zip(&self.corners) {
             if corners.iter().all(|c| c.distance(at) > 0.4 * spacing) {

@@ -1,0 +1,95 @@
+//! The nearest of many points, however far it is: a k-d tree.
+
+/// Points of which no more are looked through one by one.
+const FEW: usize = 8;
+
+/// Points of `D` coordinates.
+pub(super) struct Nearest<const D: usize> {
+    points: Vec<[f64; D]>,
+    /// Their numbers: the middle one of a stretch of them divides the others along its axis.
+    order: Vec<usize>,
+    axes: Vec<usize>,
+}
+
+impl<const D: usize> Nearest<D> {
+    pub fn new(points: Vec<[f64; D]>) -> Self {
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        let mut axes = vec![0; points.len()];
+        divide(&points, &mut order, &mut axes);
+        Self { points, order, axes }
+    }
+
+    /// The number of the nearest to `x`, the first of those that are as near; `None` if there is none at all.
+    pub fn to(&self, x: [f64; D]) -> Option<usize> {
+        let mut found = (f64::INFINITY, usize::MAX);
+        self.look(x, 0, self.order.len(), &mut found);
+        (found.1 < self.points.len()).then_some(found.1)
+    }
+
+    fn look(&self, x: [f64; D], from: usize, to: usize, found: &mut (f64, usize)) {
+        if to - from <= FEW {
+            self.order[from..to].iter().for_each(|&k| self.compare(x, k, found));
+            return;
+        }
+        let middle = from + (to - from) / 2;
+        self.compare(x, self.order[middle], found);
+        let axis = self.axes[middle];
+        let beyond = x[axis] - self.points[self.order[middle]][axis];
+        let (near, far) = if beyond < 0.0 {
+            ((from, middle), (middle + 1, to))
+        } else {
+            ((middle + 1, to), (from, middle))
+        };
+        self.look(x, near.0, near.1, found);
+        if beyond * beyond <= found.0 {
+            self.look(x, far.0, far.1, found);
+        }
+    }
+
+    fn compare(&self, x: [f64; D], k: usize, found: &mut (f64, usize)) {
+        let off = x.iter().zip(&self.points[k]).map(|(x, p)| (x - p) * (x - p)).sum();
+        if (off, k) < *found {
+            *found = (off, k);
+        }
+    }
+}
+
+/// Puts a stretch of numbers in order, halved along the axis along which its points reach farthest.
+fn divide<const D: usize>(points: &[[f64; D]], order: &mut [usize], axes: &mut [usize]) {
+    if order.len() <= FEW {
+        return;
+    }
+    let reach = |axis: usize| {
+        let ends = order.iter().map(|&k| points[k][axis]);
+        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        high - low
+    };
+    let axis = (0..D).max_by(|&a, &b| reach(a).total_cmp(&reach(b))).unwrap_or_default();
+    let middle = order.len() / 2;
+    order.select_nth_unstable_by(middle, |&a, &b| points[a][axis].total_cmp(&points[b][axis]));
+    axes[middle] = axis;
+    let (low, high) = order.split_at_mut(middle);
+    let (low_axes, high_axes) = axes.split_at_mut(middle);
+    divide(points, low, low_axes);
+    divide(points, &mut high[1..], &mut high_axes[1..]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_the_nearest_of_all() {
+        let place = |k: usize| [0.618_034, 0.754_877, 0.569_84].map(|n| (n * k as f64).fract());
+        let points: Vec<[f64; 3]> = (0..700).map(place).collect();
+        let tree = Nearest::new(points.clone());
+        for k in 1000..1300 {
+            // Among them, and far off.
+            let x = place(k).map(|c| if k % 2 == 0 { c } else { 100.0 * c });
+            let off = |p: &[f64; 3]| p.iter().zip(x).map(|(p, x)| (p - x).powi(2)).sum::<f64>();
+            let nearest = (0..points.len()).min_by(|&a, &b| off(&points[a]).total_cmp(&off(&points[b])));
+            assert_eq!(tree.to(x), nearest, "{x:?}");
+        }
+        assert_eq!(Nearest::<3>::new(vec![]).to([0.0; 3]), None);
+    }
+}
