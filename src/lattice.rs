@@ -49,7 +49,7 @@ impl Shear {
         Self::of(dimensions, radius, |r2| weight(r2.sqrt(), radius), false, LAPLACIAN_EIGENVALUE)
     }
 
-    /// Of [`viscous_weight`], the accurate scheme's.
+    /// Of `viscous_weight`, the accurate scheme's.
     ///
     /// `wall` lets the water next to a flat wall feel no force in a linear shear flow that is at rest on the
     /// wall's surface. The wall layer stands half a spacing behind it with the wall's velocity, so that a pair with
@@ -81,7 +81,7 @@ impl Shear {
 
 /// Largest eigenvalue of the Laplacian's matrix over its diagonal, as measured (1.30 to 1.33).
 const LAPLACIAN_EIGENVALUE: f64 = 1.33;
-/// The same of [`viscous_weight`] in the plane and in space, over the diagonal of the lattice: 1.6 and 1.4 there, 1.67 to 1.80 and 1.38
+/// The same of `viscous_weight` in the plane and in space, over the diagonal of the lattice: 1.6 and 1.4 there, 1.67 to 1.80 and 1.38
 /// to 1.42 as measured once it has melted.
 const SMOOTH_EIGENVALUE: [f64; 2] = [1.8, 1.42];
 

@@ -2,7 +2,7 @@
 //! GPU twin: shaders/viscosity.wgsl
 //!
 //! The paper's scheme weighs pairs by Eq. (3) and takes lambda n0 of the lattice. The accurate one has a
-//! weight whose second moments keep to the lattice's on other arrangements ([`crate::lattice::viscous_weight`]).
+//! weight whose second moments keep to the lattice's on other arrangements (`crate::lattice::viscous_weight`).
 //!
 //! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction. A pair of
 //! fluid and wall weighs `params.shear.wall`: the wall's velocity holds on its surface, half a spacing before its layer.
