@@ -3,8 +3,10 @@
 use super::row_arrays::RowArrays;
 use super::wide::wide;
 use crate::kernels::Particles;
-use crate::kernels::viscosity::{coefficient, pair_weight, share};
+use crate::kernels::viscosity::{coefficient, share};
+use crate::lattice::{viscous_weight, weight};
 use crate::neighbours::Chunk;
+use crate::scheme::Source;
 use glam::DVec3;
 
 wide! {
@@ -44,7 +46,18 @@ fn laplacian_sum(
     let RowArrays { r, w, .. } = arrays;
     r.offsets(i, neighbour, on);
     let w = &mut w[..neighbour.len()];
-    r.map_squares(w, |r2| pair_weight(r2, on.params));
+    let re = on.params.effective_radius;
+    // As `pair_weight`, one loop for each weight and no jump in it.
+    match on.params.source {
+        Source::NumberDensity => r.map_squares(w, |r2| {
+            let r = r2.sqrt();
+            if r > 0.0 && r < re { weight(r, re) } else { 0.0 }
+        }),
+        Source::Mixed => r.map_squares(w, |r2| {
+            let (r, w) = (r2.sqrt(), viscous_weight(r2.sqrt() / re));
+            if r > 0.0 && r < re { w } else { 0.0 }
+        }),
+    }
     let mut sum = DVec3::ZERO;
     for (&w, &j) in w.iter().zip(neighbour) {
         let j = j as usize;
