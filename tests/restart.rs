@@ -216,8 +216,8 @@ fn a_run_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
     loop {
         let mut child = start(&root);
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        // Longer and longer, so that a slow machine comes to the end too.
-        let patience = Duration::from_millis(20 + (state >> 33) % (60 + 20 * kills));
+        // Short at first, so that a quick machine is killed often enough; longer and longer, so that a slow one comes to the end too.
+        let patience = Duration::from_millis(5 + (state >> 33) % (15 + 20 * kills));
         let clock = Instant::now();
         let ended = loop {
             if let Some(status) = child.try_wait().unwrap() {
