@@ -24,10 +24,7 @@ fn move_solids(@builtin(global_invocation_id) id: vec3u) {
     var outward = 0.0;
 //#if MIXED
     if k < params.moving_wall {
-        let own = direction_of(facing[k]);
-        if dot(own, own) > 0.0 {
-            outward = direction_word(rotate(pose.orientation, own));
-        }
+        outward = direction_word(rotate(pose.orientation, direction_of(facing[k])));
     }
 //#endif
     velocity[i] = vec4f(pose.velocity.xyz + cross(pose.angular_velocity.xyz, arm), outward);

@@ -21,28 +21,22 @@ var<private> dummies: u32;
 var<private> smallest: f32;
 var<private> wall: bool;
 var<private> carriers: u32;
-//#if MOVING
 // Where the row's own particle faces, if it is of a moving solid's wall layer.
 var<private> outward: vec3f;
-//#endif
 
 // As crate::kernels::neighbour_list::BEHIND.
 const BEHIND: f32 = 0.54;
 
-// Whether water at r from a wall particle that faces n lies behind it.
-fn behind(r: vec3f, n: vec3f) -> bool {
-    return dot(r, n) < -BEHIND * length(r);
-}
-
-// What is `hidden` counts and carries no pressure.
-fn see(i: u32, j: u32, r: vec3f, hidden: bool) {
+// A neighbour j at r. Of a pair of water and a moving solid's wall layer `facing` is where the wall faces, turned round if j is the
+// wall: what then lies behind it counts and carries no pressure.
+fn see(i: u32, j: u32, r: vec3f, facing: vec3f) {
     let distance_squared = dot(r, r);
     if distance_squared >= params.effective_radius * params.effective_radius || j == i {
         return;
     }
     smallest = min(smallest, distance_squared);
     let room = near + dummies < params.capacity;
-    if j < carriers && !hidden {
+    if j < carriers && dot(r, facing) >= -BEHIND * sqrt(distance_squared) {
         if room {
             set_neighbour_list(near, i, j);
         }
@@ -85,27 +79,22 @@ fn near_fluid(low: vec3u, high: vec3u) -> bool {
 fn see_cells(i: u32, me: vec3f, first: u32, last: u32) {
     let fluid_end = cell_start_at(last);
     for (var j = cell_start_at(first); j < fluid_end; j++) {
-        let r = offset(me, position[j].xyz);
-//#if MOVING
-        see(i, j, r, behind(r, outward));
-//#else
-        see(i, j, r, false);
-//#endif
+        see(i, j, offset(me, position[j].xyz), outward);
     }
 //#if MOVING
     let moving = moving_key();
     let moving_end = cell_start_at(moving + last) - params.fluid;
     for (var k = cell_start_at(moving + first) - params.fluid; k < moving_end; k++) {
         let other = moving_slot[k];
-        let r = offset(me, position[other.x].xyz);
-        see(i, other.x, r, i < params.fluid && behind(-r, direction_of(bitcast<f32>(other.y))));
+        let facing = select(vec3f(0.0), -direction_of(bitcast<f32>(other.y)), i < params.fluid);
+        see(i, other.x, offset(me, position[other.x].xyz), facing);
     }
 //#endif
 //#if STATIC
     let static_end = static_start_at(last);
     for (var k = static_start_at(first); k < static_end; k++) {
         let other = static_particle[k];
-        see(i, other.w, offset(me, bitcast<vec3f>(other.xyz)), false);
+        see(i, other.w, offset(me, bitcast<vec3f>(other.xyz)), vec3f(0.0));
     }
 //#endif
 }
@@ -138,8 +127,8 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
 //#if MIXED
     carriers = select(params.fluid, params.pressure_slots, i < params.fluid);
 //#endif
-//#if MOVING
     outward = vec3f(0.0);
+//#if MOVING
     if i >= params.fluid && i < params.fluid + params.moving_wall {
         let own = moving_key() + cell_index(cell);
         let end = cell_start_at(own + 1u) - params.fluid;

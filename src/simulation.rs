@@ -102,6 +102,11 @@ const LOST_MAX: f64 = 0.02;
 /// An adaptive step this much shorter than the typed one is that of a run that will not end.
 const SHORTEST_STEP: f64 = 1e-6;
 
+/// Pressures of the last step in `slots` of wall layers [Pa].
+fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
+    Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
+}
+
 impl Simulation {
     /// Set up `scene` of `case` on the backend that `make` returns.
     ///
@@ -367,10 +372,8 @@ impl Simulation {
     /// A device that is lost.
     pub fn slot_rows(&mut self) -> Result<Vec<SlotRow>> {
         let Some(found) = &self.slots else { return Ok(vec![]) };
-        let backend = &mut self.backend;
-        found.rows(self.solids.predicted(), |slots| {
-            Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
-        })
+        let backend = &mut *self.backend;
+        found.rows(self.solids.predicted(), |slots| row_pressures(backend, slots))
     }
 
     /// What the water in slots presses on fixed walls; nothing where no free body stands in the pressure equation.
@@ -379,10 +382,8 @@ impl Simulation {
     /// A device that is lost.
     pub fn slot_pushes(&mut self) -> Result<Vec<Push>> {
         let Some(found) = &self.slots else { return Ok(vec![]) };
-        let backend = &mut self.backend;
-        found.pushes(self.solids.poses(), |slots| {
-            Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
-        })
+        let backend = &mut *self.backend;
+        found.pushes(self.solids.poses(), |slots| row_pressures(backend, slots))
     }
 
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {

@@ -72,7 +72,7 @@ impl Gpu {
         // Moving solids stay where they are, and face there.
         let moving = g.moving_wall_range();
         let facing = if self.plan.needs(Arrays::Solids) {
-            self.context.download(buffers::velocity, moving.end)?[moving.clone()].to_vec()
+            self.context.download_parts(buffers::velocity, &[(moving.start, moving.len())])?
         } else {
             vec![]
         };
