@@ -129,10 +129,12 @@ struct Emission {
     velocity: vec4f,
 }
 
-// A box in which water is swallowed. Corners relative to the middle of the domain.
+// A box in which water is swallowed, but for the room in it. Corners relative to the middle of the domain.
 struct Outlet {
     low: vec4f,
     high: vec4f,
+    room_low: vec4f,
+    room_high: vec4f,
 }
 
 // A whole number below 2^30 as the word of a vector: bits of a normal f32, which no device flushes to zero; and back, where

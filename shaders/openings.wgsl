@@ -38,11 +38,23 @@ fn swallow(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let place = wrapped(x.xyz);
-    for (var k = 0u; k < arrayLength(&outlet); k += 1u) {
-        if all(place >= outlet[k].low.xyz) && all(place <= outlet[k].high.xyz) {
-            position[i].w = GHOST;
-            atomicAdd(&counters[SWALLOWED + k], 1u);
+    let outlets = arrayLength(&outlet);
+    var first = outlets;
+    for (var k = 0u; k < outlets; k += 1u) {
+        let it = outlet[k];
+        if within(place, it.room_low.xyz, it.room_high.xyz) {
             return;
         }
+        if first == outlets && within(place, it.low.xyz, it.high.xyz) {
+            first = k;
+        }
     }
+    if first < outlets {
+        position[i].w = GHOST;
+        atomicAdd(&counters[SWALLOWED + first], 1u);
+    }
+}
+
+fn within(x: vec3f, low: vec3f, high: vec3f) -> bool {
+    return all(x >= low) && all(x <= high);
 }

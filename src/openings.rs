@@ -3,7 +3,8 @@
 //! The wall layer of an inflow moves in with the water's velocity. When it has gone one spacing it becomes water where it is, and
 //! the wall goes on from where it began: what is in front of it feels no difference, as the particles stay where they are. The wall
 //! of an outflow draws back; when it has gone one spacing, the water that has followed it out of the tank is swallowed and the
-//! wall stands in the face again. A hole swallows what is a spacing outside of the face.
+//! wall stands in the face again. A hole swallows what has gone through the room behind it, in which its jet
+//! contracts.
 
 use crate::body::Pose;
 use crate::checkpoint::Archive;
@@ -117,10 +118,9 @@ impl Openings {
                 }
                 continue;
             }
-            let free = gate.opening.passes == Passes::Free;
             out.counts |= crosses && matches!(gate.opening.passes, Passes::Drawn(_));
-            out.outlets.push(if free || crosses {
-                gate.opening.outlet(if free { l0 } else { gate.travel })
+            out.outlets.push(if crosses || gate.opening.passes == Passes::Free {
+                gate.opening.outlet(gate.travel)
             } else {
                 Outlet::CLOSED
             });
@@ -214,12 +214,15 @@ impl Openings {
 }
 
 impl Opening {
-    /// The box behind the face, from `behind` the face on [m].
-    fn outlet(&self, behind: f64) -> Outlet {
-        let (mut low, mut high) = self.behind;
-        let shift = behind * self.outward;
-        low += shift.max(DVec3::ZERO);
-        high += shift.min(DVec3::ZERO);
-        Outlet { low, high }
+    /// The box behind the wall in it, which has gone so far from the face [m], or behind a hole.
+    fn outlet(&self, travel: f64) -> Outlet {
+        let (low, high) = self.behind;
+        match self.room {
+            Some((room_low, room_high)) => Outlet { low, high, room_low, room_high },
+            None => {
+                let shift = travel * self.outward;
+                Outlet::all((low + shift.max(DVec3::ZERO), high + shift.min(DVec3::ZERO)))
+            }
+        }
     }
 }

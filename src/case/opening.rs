@@ -80,7 +80,8 @@ pub struct Inflow {
 }
 
 /// A rectangle of the tank's wall through which water goes out. With `velocity` or `discharge` a wall that draws back and
-/// swallows the water that has followed it by a spacing; with neither a hole, through which water falls freely.
+/// swallows the water that has followed it by a spacing; with neither a hole, out of
+/// which water falls freely: it is gone half the hole's width outside.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Outflow {

@@ -21,18 +21,27 @@ pub struct Emission {
     pub velocity: DVec3,
 }
 
-/// A box in which water is swallowed; one that is empty swallows none.
+/// A box in which water is swallowed, but for the room in it; one that is empty swallows none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outlet {
     /// Lower corner [m].
     pub low: DVec3,
     /// Upper corner [m].
     pub high: DVec3,
+    /// Lower corner of the room behind a hole, in which its jet contracts: no outlet swallows there [m].
+    pub room_low: DVec3,
+    /// Upper corner of the room [m]; of none below the lower one.
+    pub room_high: DVec3,
 }
 
 impl Outlet {
     /// One that swallows nothing.
-    pub const CLOSED: Self = Self { low: DVec3::ONE, high: DVec3::NEG_ONE };
+    pub const CLOSED: Self = Self::all((DVec3::ONE, DVec3::NEG_ONE));
+
+    /// One that swallows in all of a box from its lower corner to its upper one [m].
+    pub const fn all((low, high): (DVec3, DVec3)) -> Self {
+        Self { low, high, room_low: DVec3::ONE, room_high: DVec3::NEG_ONE }
+    }
 
     /// Whether it swallows nothing.
     pub fn is_closed(&self) -> bool {
@@ -49,8 +58,10 @@ pub fn emit(emission: &Emission, k: usize, fields: &mut Fields) {
     fields.pressure[i] = fields.pressure[wall];
 }
 
-/// The first of `outlets` that holds `x`.
+/// The first of `outlets` that holds `x`, if it lies in no room.
 #[inline(always)]
 pub fn swallow(x: DVec3, outlets: &[Outlet]) -> Option<usize> {
-    outlets.iter().position(|o| x.cmpge(o.low).all() && x.cmple(o.high).all())
+    let within = |low: DVec3, high: DVec3| x.cmpge(low).all() && x.cmple(high).all();
+    let first = outlets.iter().position(|o| within(o.low, o.high))?;
+    (!outlets.iter().any(|o| within(o.room_low, o.room_high))).then_some(first)
 }

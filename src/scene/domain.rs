@@ -2,6 +2,7 @@
 
 use super::Drive;
 use super::build::{AXES, Builder};
+use super::opening::Planned;
 use super::oriented::Placed;
 use crate::case::TANK_FACES;
 use crate::error::Problem;
@@ -47,6 +48,12 @@ impl Builder<'_> {
                     // A piston goes back into the wall behind it.
                     self.out_of_tank(&label, (lo, hi), (low, high))
                 });
+            }
+        }
+        for Planned { opening, .. } in &self.openings {
+            if opening.room.is_some() {
+                let label = format!("outflow `{}` with what falls from it", opening.name);
+                bounds.add(&label, opening.behind.0, opening.behind.1);
             }
         }
         self.notes.append(&mut notes);

@@ -173,26 +173,32 @@ pub struct Emission {
     pub velocity: [f32; 4],
 }
 
-/// A box in which water is swallowed; see `Outlet` in shaders/common.wgsl.
+/// A box in which water is swallowed, but for the room in it; see `Outlet` in shaders/common.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
 pub struct Outlet {
     pub low: [f32; 4],
     pub high: [f32; 4],
+    pub room_low: [f32; 4],
+    pub room_high: [f32; 4],
 }
 
 impl Outlet {
     /// One that swallows nothing.
-    pub const CLOSED: Self = Self { low: [1.0; 4], high: [-1.0; 4] };
+    pub const CLOSED: Self =
+        Self { low: [1.0; 4], high: [-1.0; 4], room_low: [1.0; 4], room_high: [-1.0; 4] };
 
     /// That of the host, relative to the `middle` of the domain.
     pub fn new(outlet: &openings::Outlet, middle: DVec3) -> Self {
-        if outlet.is_closed() {
-            return Self::CLOSED;
-        }
-        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
-        Self { low: four(outlet.low - middle), high: four(outlet.high - middle) }
+        let corners = |low: DVec3, high: DVec3| {
+            let four = |v: DVec3| (v - middle).as_vec3().extend(0.0).to_array();
+            // A box that holds nothing must not become one that does by rounding.
+            if low.cmpgt(high).any() { ([1.0; 4], [-1.0; 4]) } else { (four(low), four(high)) }
+        };
+        let (low, high) = corners(outlet.low, outlet.high);
+        let (room_low, room_high) = corners(outlet.room_low, outlet.room_high);
+        Self { low, high, room_low, room_high }
     }
 }
 
