@@ -1,6 +1,5 @@
 //! Gauges: pressure at a point of a wall, level of the water on a line, force on a solid.
 
-mod cover;
 mod means;
 pub mod wall_force;
 

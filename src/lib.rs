@@ -77,6 +77,7 @@ pub mod checkpoint;
 pub mod compute;
 pub mod console;
 pub mod contact;
+mod cover;
 pub mod error;
 pub mod estimate;
 pub mod fields;

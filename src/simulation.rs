@@ -7,6 +7,7 @@ use crate::body::{Pose, Wrench};
 use crate::case::{Case, ContactDevice, Fluid};
 use crate::checkpoint::Archive;
 use crate::contact::{ContactReport, Solids};
+use crate::cover::driven::{Covered, DrivenFaces};
 use crate::error::{Error, Result};
 use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
@@ -16,7 +17,7 @@ use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::settle::settle;
-use crate::slots::{Push, Slots};
+use crate::slots::{Opposite, Push, Slots};
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, shortened, time_step};
 use glam::DVec3;
@@ -73,6 +74,8 @@ pub struct Simulation {
     solids_ledger: Option<(Ledger, f64)>,
     /// Slots between free bodies and other solids, where free bodies stand in the pressure equation.
     slots: Option<Slots>,
+    /// Faces of driven solids at which others may stand, where forces are told.
+    driven_faces: DrivenFaces,
     /// Where water comes in and goes out.
     pub openings: Openings,
     /// Particles that were gone when last looked.
@@ -140,6 +143,11 @@ impl Simulation {
         }
         Ok(Self {
             backend,
+            driven_faces: if plan.has(Stage::BodyForce) {
+                DrivenFaces::new(&scene)
+            } else {
+                DrivenFaces::default()
+            },
             slots: plan.needs(Arrays::Coupling).then(|| Slots::new(&scene, params.density)),
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,
@@ -181,6 +189,7 @@ impl Simulation {
             gone: _,
             // Follows from the case.
             slots: _,
+            driven_faces: _,
             // Times by the clock are those of each process.
             stages: _,
             backend,
@@ -376,7 +385,7 @@ impl Simulation {
         found.rows(self.solids.predicted(), |slots| row_pressures(backend, slots))
     }
 
-    /// What the water in slots presses on fixed walls; nothing where no free body stands in the pressure equation.
+    /// What the water in slots presses on walls and solids; nothing where no free body stands in the pressure equation.
     ///
     /// # Errors
     /// A device that is lost.
@@ -409,6 +418,7 @@ impl Simulation {
         let before = self.solids_ledger.is_some().then(|| self.solids.poses().to_vec());
         if self.plan.has(Stage::BodyForce) {
             self.fluid_force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
+            self.timed(Stage::BodyForce, Self::correct_driven)?;
         }
         let force = std::mem::take(&mut self.fluid_force);
         let report = self
@@ -429,6 +439,35 @@ impl Simulation {
             self.timed(Stage::MoveSolids, |s| s.backend.move_solids(&s.openings.place(s.solids.poses())))?;
         }
         Ok(report)
+    }
+
+    /// What the sum over a driven solid's rows does not know: no water presses where another solid stands, and under a free body that of its slot
+    /// does.
+    fn correct_driven(&mut self) -> Result<()> {
+        let (scene, poses) = (&self.scene, self.solids.predicted());
+        let covered = self.driven_faces.covered(scene, poses);
+        let slot = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;
+        let slots: Vec<usize> = covered.iter().map(slot).collect();
+        let pressures = if slots.is_empty() { vec![] } else { self.backend.wall_pressures(&slots)? };
+        for (c, pressure) in covered.iter().zip(pressures) {
+            let (solid, turn) = (&scene.solids[c.solid], poses[c.solid].orientation);
+            let to_surface = turn * solid.wall_to_surface[c.row];
+            let force = pressure.in_force(to_surface, &self.params) * c.area;
+            let arm = turn * solid.wall_offset[c.row] + to_surface;
+            self.fluid_force[c.solid] += Wrench { force, torque: arm.cross(force) };
+        }
+        let Some(found) = self.slots.as_ref().filter(|slots| slots.any_at_driven(poses)) else {
+            return Ok(());
+        };
+        let backend = &mut *self.backend;
+        for push in found.pushes(poses, |slots| row_pressures(backend, slots))? {
+            let Opposite::Solid(k) = push.on else { continue };
+            if !self.solids.is_free(k) {
+                let arm = self.params.periodic.nearest(push.at - poses[k].position);
+                self.fluid_force[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
+            }
+        }
+        Ok(())
     }
 
     /// Books what the water gave the solids and what contact did, on the way from the poses `before`.

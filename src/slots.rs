@@ -18,7 +18,7 @@
 
 mod pushes;
 
-pub use pushes::Push;
+pub use pushes::{Opposite, Push};
 
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
@@ -127,8 +127,8 @@ struct Slot {
 struct Faced {
     /// How much of it lies in a slot [-].
     share: f64,
-    /// The nearest that it faces, if that is of a fixed wall: which of their particles.
-    wall: Option<usize>,
+    /// What it faces nearest.
+    opposite: Option<Opposite>,
 }
 
 /// The pressure in a slot, linear but for the weight of the water.
@@ -188,11 +188,16 @@ impl Slots {
         Ok(out)
     }
 
+    /// Boxes around the solids at `poses`, with room for a slot.
+    fn boxes(&self, poses: &[Pose]) -> Vec<Bounds> {
+        let margin = FACING.1 * self.spacing;
+        self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect()
+    }
+
     /// The slots with the solids at `poses`, each with how the rows of its body lie.
     fn find(&self, poses: &[Pose]) -> Vec<(Slot, Arc<[Faced]>)> {
         let margin = FACING.1 * self.spacing;
-        let boxes: Vec<Bounds> =
-            self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect();
+        let boxes = self.boxes(poses);
         // Solids near each, with the way to the image that is.
         let mut others = vec![vec![]; boxes.len()];
         for (a, b, turns) in meeting_images(&boxes, &self.periodic) {
@@ -241,25 +246,25 @@ impl Slots {
         let share = |(&offset, &area): (&DVec3, &DVec3)| {
             let outward = pose.orientation * area.normalize_or_zero();
             let x = pose.position + pose.orientation * offset;
-            let (mut nearest, mut wall) = (reach, None);
-            let mut see = |r: DVec3, of_wall: Option<usize>| {
+            let (mut nearest, mut opposite) = (reach, None);
+            let mut see = |r: DVec3, of: Opposite| {
                 let distance = r.length();
                 if r.dot(outward) > AHEAD * distance && distance < nearest {
-                    (nearest, wall) = (distance, of_wall);
+                    (nearest, opposite) = (distance, Some(of));
                 }
             };
             if at_walls {
-                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, Some(self.fixed_of[n as usize])));
+                let of = |n: u32| Opposite::Wall(self.fixed_of[n as usize]);
+                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, of(n)));
             }
             for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
                 let local = pose.orientation.inverse() * (x - way - pose.position);
-                layer
-                    .grid
-                    .near(local, reach, |n| see(pose.orientation * (layer.grid.point(n) - local), None));
+                let way = |n: u32| pose.orientation * (layer.grid.point(n) - local);
+                layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other)));
             }
             let share = ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-            Faced { share, wall }
+            Faced { share, opposite }
         };
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }

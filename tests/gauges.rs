@@ -246,6 +246,40 @@ fn a_floor_carries_the_water_under_a_block_too() {
 }
 
 #[test]
+fn driven_solids_feel_water_where_it_stands() {
+    // A gate, closed on a floor, the joint of two walls one on the other that move as one, and a step with a block on it.
+    let slow = "motion = [[0, 0, 0, 0], [1, 0, 0, 0], [2, 0.001, 0, 0]]\n";
+    let wall = |name: &str, low: f64, high: f64| {
+        format!(
+            "[[moving_wall]]\nname = \"{name}\"\nmin = [0.4, 0, {low}]\nmax = [0.45, 0, {high}]\n{slow}\
+             [[gauge.force]]\nname = \"{name}\"\non = \"{name}\"\n"
+        )
+    };
+    let text = format!(
+        "[run]\nspacing = 0.0125\ntime_step = 5e-4\nend = 2.0\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+         [fluid]\nsound_speed = 10\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.3]\nopen = [\"z_max\"]\n[contact]\nspring = 1e6\n{}{}\
+         [[moving_wall]]\nname = \"step\"\nmin = [0.15, 0, 0]\nmax = [0.25, 0, 0.025]\n{slow}\
+         [[gauge.force]]\nname = \"step\"\non = \"step\"\n\
+         [[body]]\nname = \"b\"\nsize = [0.05, 0.1, 0.05]\ncenter = [0.2, 0, 0.05]\ndensity = 2500\n\
+         displaces_fluid = true\nstanding = true\n",
+        wall("low", 0.0, 0.1),
+        wall("high", 0.1, 0.3)
+    );
+    let mean = means(&case(&text), &Processor::Cpu, 0.1, 0.2);
+    let slice = 1000.0 * 9.81 * 0.0125;
+    let of = |name: &str, axis: char| mean[&format!("{name}_force_{axis} [N]")] / slice;
+    for (name, push) in [("low", 0.015), ("high", 0.005)] {
+        let (x, z) = (of(name, 'x'), of(name, 'z'));
+        println!("{name}: {x:.5} m2 for {push}, {z:.1e} for 0");
+        assert!((x / push - 1.0).abs() < 0.02 && z.abs() < 1e-4, "{name}: {x} {z}");
+    }
+    let z = of("step", 'z');
+    println!("step: {z:.5} m2 for {:.5}", -0.1 * 0.175);
+    assert!((z / (-0.1 * 0.175) - 1.0).abs() < 0.02, "{z}");
+}
+
+#[test]
 fn the_viscous_force_on_a_floor_is_the_momentum_that_the_water_loses() {
     // So soft a water (alpha) that its pressure, whose gradient does not keep momentum, has no reach in such short steps.
     let case = case(

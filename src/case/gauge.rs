@@ -52,7 +52,7 @@ pub struct ForceGauge {
     #[schemars(length(min = 1, max = 80))]
     pub name: String,
     /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
-    /// the centre of mass, or the middle of a fixed wall; of a face of the tank that of its surface. Where a solid stands before a part of a
-    /// fixed wall no water presses; under a free body that stands on it the water of the slot does.
+    /// the centre of mass, or the middle of a fixed wall; of a face of the tank that of its surface. Where another solid stands before a
+    /// part of it no water presses; under a free body that stands on it the water of the slot does.
     pub on: String,
 }

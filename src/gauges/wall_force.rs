@@ -4,16 +4,16 @@
 //!
 //! Collisions of particles with the wall, Eq. (18), are not in it.
 
-use super::cover::{self, Standing, Tiles};
 use crate::backend::RowPressure;
 use crate::body::{Pose, Wrench};
+use crate::cover::{self, Before, Standing, Tiles};
 use crate::fields::Fields;
 use crate::kernels::number_density::pair_weight;
 use crate::kernels::viscosity;
 use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
 use crate::scene::{Groups, Kind, Scene};
-use crate::slots::Push;
+use crate::slots::{Opposite, Push};
 use glam::{DMat3, DVec3, IVec3};
 use std::collections::{HashMap, HashSet};
 
@@ -51,8 +51,8 @@ impl FixedWall {
         let shape = scene.walls.iter().position(|w| w.name == name)?;
         let on_lattice = scene.walls[shape].axes == DMat3::IDENTITY;
         let l0 = scene.spacing;
-        let tiles = Tiles { spacing: l0, plane: scene.dimensions == 2, periodic: scene.periodic };
-        let (about, still) = (scene.walls[shape].middle, cover::still(scene, shape));
+        let tiles = Tiles::new(scene);
+        let (about, still) = (scene.walls[shape].middle, cover::still(scene, Before::Wall(shape)));
         let mut out = Self { shape, about, still, tiles, ..Self::default() };
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
         let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
@@ -91,7 +91,7 @@ impl FixedWall {
     /// Area with its direction into the free space, one a slot, where solids do not stand before it [m2]; those of `scene` that move are at their `poses`.
     pub fn areas(&self, scene: &Scene, poses: &[Pose]) -> Vec<DVec3> {
         let l0 = self.tiles.spacing;
-        let moving = cover::moving(scene, poses);
+        let moving = cover::moving(scene, poses, None);
         let mut areas = vec![DVec3::ZERO; self.slots.len()];
         for face in &self.faces {
             let center = self.position[face.row] + 0.5 * l0 * face.normal;
@@ -121,7 +121,7 @@ impl FixedWall {
 
     /// Force and torque of the `pushes` of slots that are on it [N, N m].
     pub fn slot_force(&self, pushes: &[Push], scene: &Scene) -> Wrench {
-        let own = |push: &&Push| scene.static_wall_shape[push.wall] as usize == self.shape;
+        let own = |push: &&Push| matches!(push.on, Opposite::Wall(k) if scene.static_wall_shape[k] as usize == self.shape);
         let mut sum = Wrench::default();
         for push in pushes.iter().filter(own) {
             sum += Wrench { force: push.force, torque: (push.at - self.about).cross(push.force) };

@@ -1,16 +1,26 @@
-//! What slots press on fixed walls: the reaction of what they press on bodies.
+//! What slots press on what stands opposite to a body: the reaction of what they press on bodies.
 
 use super::{Faced, Slot, Slots};
 use crate::body::Pose;
+use crate::contact::broad::meeting_images;
 use crate::error::Result;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Force of the water in a slot on a fixed wall.
+/// What a body's slot lies before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Opposite {
+    /// One of the fixed walls' particles.
+    Wall(usize),
+    /// A solid, by its index.
+    Solid(usize),
+}
+
+/// Force of the water in a slot on what stands opposite to the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
-    /// Which of the fixed walls' particles it acts on.
-    pub wall: usize,
+    /// What it acts on.
+    pub on: Opposite,
     /// Where [m].
     pub at: DVec3,
     /// Force [N].
@@ -18,7 +28,14 @@ pub struct Push {
 }
 
 impl Slots {
-    /// Forces of the water in slots on fixed walls with the solids at `poses`: equal and opposite to what it presses on the bodies there, and what rows at
+    /// Whether a free body is so near a driven solid that they may have a slot between them, with the solids at `poses`.
+    pub fn any_at_driven(&self, poses: &[Pose]) -> bool {
+        let boxes = self.boxes(poses);
+        let meet = meeting_images(&boxes, &self.periodic);
+        meet.into_iter().any(|(a, b, _)| self.layers[a].free != self.layers[b].free)
+    }
+
+    /// Forces of the water in slots on walls and solids with the solids at `poses`: equal and opposite to what it presses on the bodies there, and what rows at
     /// the rim press on their own beside it. `read` tells pressures of slots of particles [Pa]; a slot with a dry rim presses nothing.
     ///
     /// # Errors
@@ -47,8 +64,8 @@ impl Slots {
         let push = |n: usize, area: DVec3| {
             let on_surface = place(n) + pose.orientation * layer.to_surface[n];
             let p = self.in_slot(&field, place(n), on_surface).max(0.0);
-            let wall = faced[n].wall?;
-            Some(Push { wall, at: pose.position + on_surface, force: faced[n].share * p * area })
+            let on = faced[n].opposite?;
+            Some(Push { on, at: pose.position + on_surface, force: faced[n].share * p * area })
         };
         // A row of the rim looks out as well: what of it looks into the slot is what looks as its neighbours deep in there do.
         let is_deep = |n: &usize| slot.deep.binary_search_by_key(n, |row| row.0).is_ok();

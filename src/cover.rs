@@ -1,8 +1,10 @@
-//! What stands before the faces of fixed walls and keeps the water from them: solids of any shape, where they are, and walls that fit no lattice.
+//! What stands before the faces of walls and driven solids and keeps the water from them: solids of any shape, where they are, and walls.
+
+pub mod driven;
 
 use crate::body::Pose;
 use crate::periodic::Periodic;
-use crate::scene::{Scene, Shape, WallShape};
+use crate::scene::{Scene, Shape, Solid, WallShape};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Distances before a face, over l0, at which a point that lies in a solid tells that no water stands between: nearly at the face, where a solid ends
@@ -15,7 +17,7 @@ const POINTS: [u32; 2] = [10, 5];
 
 /// A solid where it is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Standing {
+pub(crate) struct Standing {
     shape: Shape,
     position: DVec3,
     to_shape: DMat3,
@@ -41,52 +43,70 @@ impl Standing {
         }
     }
 
-    fn holds(&self, x: DVec3, periodic: &Periodic) -> bool {
+    /// Whether its surface is nearer to `x` than `reach` [m], or `x` inside.
+    fn is_near(&self, x: DVec3, reach: f64, periodic: &Periodic) -> bool {
         let way = x - self.position;
-        let inside = |way: DVec3| {
-            way.length_squared() < self.radius * self.radius && self.shape.outside(self.to_shape * way) < 0.0
+        let most = self.radius + reach;
+        let near = |way: DVec3| {
+            way.length_squared() < most * most && self.shape.outside(self.to_shape * way) < reach
         };
         // What spans a periodic axis reaches over its sides.
-        inside(way) || periodic.is_any() && inside(periodic.nearest(way))
+        near(way) || periodic.is_any() && near(periodic.nearest(way))
+    }
+
+    fn holds(&self, x: DVec3, periodic: &Periodic) -> bool {
+        self.is_near(x, 0.0, periodic)
     }
 }
 
-/// What never moves before the faces of wall `of` of `scene`: solids, the walls of openings, and of fixed walls those that the lattice
-/// does not tell of.
-pub(super) fn still(scene: &Scene, of: usize) -> Vec<Standing> {
+/// Of what the faces are that something may stand before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Before {
+    /// A fixed wall, by its index in [`Scene::walls`].
+    Wall(usize),
+    /// A solid, by its index.
+    Solid(usize),
+}
+
+/// What never moves before the faces `of` a part of `scene`: solids, the walls of openings, and fixed walls, of which the lattice tells those
+/// before walls that fit it.
+pub(crate) fn still(scene: &Scene, of: Before) -> Vec<Standing> {
     let fits = |wall: &WallShape| wall.axes == DMat3::IDENTITY;
-    let own_fits = fits(&scene.walls[of]);
-    let walls = scene.walls.iter().enumerate().filter(|(k, wall)| *k != of && !(own_fits && fits(wall)));
+    let is_told = |wall: &WallShape| matches!(of, Before::Wall(own) if fits(&scene.walls[own]) && fits(wall));
+    let walls = scene.walls.iter().enumerate().filter(|(k, wall)| of != Before::Wall(*k) && !is_told(wall));
     let opened = scene.followed();
-    let solids = scene.solids.iter().enumerate().filter(|(k, s)| s.is_still() || *k >= opened);
+    let stands = |k: usize, s: &Solid| (s.is_still() || k >= opened) && of != Before::Solid(k);
+    let solids = scene.solids.iter().enumerate().filter(|(k, s)| stands(*k, s));
     let solids = solids.map(|(_, s)| Standing::new(s.shape, s.position, s.orientation, false));
     walls.map(|(_, wall)| Standing::wall(wall)).chain(solids).collect()
 }
 
-/// The solids of `scene` that move, at their `poses`.
-pub(super) fn moving(scene: &Scene, poses: &[Pose]) -> Vec<Standing> {
-    let solids = scene.solids[..scene.followed()].iter().zip(poses).filter(|(s, _)| !s.is_still());
-    solids.map(|(s, pose)| Standing::new(s.shape, pose.position, pose.orientation, s.is_free())).collect()
+/// The solids of `scene` that move, but for `own`, at their `poses`.
+pub(crate) fn moving(scene: &Scene, poses: &[Pose], own: Option<usize>) -> Vec<Standing> {
+    let solids = scene.solids[..scene.followed()].iter().zip(poses).enumerate();
+    let solids = solids.filter(|(k, (s, _))| !s.is_still() && Some(*k) != own);
+    solids
+        .map(|(_, (s, pose))| Standing::new(s.shape, pose.position, pose.orientation, s.is_free()))
+        .collect()
 }
 
-/// Faces of fixed walls, each a square with an edge of a spacing.
+/// Faces of wall particles, each a square with an edge of a spacing.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Tiles {
+pub(crate) struct Tiles {
     pub spacing: f64,
-    pub plane: bool,
-    pub periodic: Periodic,
+    plane: bool,
+    periodic: Periodic,
 }
 
 impl Tiles {
+    /// Those of `scene`.
+    pub fn new(scene: &Scene) -> Self {
+        Self { spacing: scene.spacing, plane: scene.dimensions == 2, periodic: scene.periodic }
+    }
+
     /// Those of `solids` that may reach before the face around `center`.
     pub fn near<'a>(&self, center: DVec3, solids: &'a [Standing]) -> Vec<&'a Standing> {
-        let reach = 2.0 * self.spacing;
-        let meets = |s: &&Standing| {
-            let way = center - s.position;
-            let least = way.length_squared().min(self.periodic.nearest(way).length_squared());
-            least < (s.radius + reach) * (s.radius + reach)
-        };
-        solids.iter().filter(meets).collect()
+        solids.iter().filter(|s| s.is_near(center, 2.0 * self.spacing, &self.periodic)).collect()
     }
 
     /// Part of the face around `center` that looks along `normal` before which water may stand [-].
