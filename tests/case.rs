@@ -212,6 +212,7 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ),
     ("damping = 10.0", "substeps = 0", &["contact.substeps: 0 sub-steps"]),
     ("damping = 10.0", "substeps = 4294967295", &["contact.substeps: 4294967295 sub-steps", "1 to 100000"]),
+    ("spring = 1e4", "", &["contact.spring: contact has no spring", "give `spring`, 2.0e4 N/m or more"]),
     ("spring = 1e4", "spring = 5e-324", &["contact.spring: ", "1e-9 to 1e18 N/m"]),
     (
         "spring = 1e4",

@@ -91,12 +91,13 @@ impl Checker<'_> {
     }
 
     /// A spring that a body's own weight presses through is none.
-    fn soft_spring(&mut self, spring: f64) {
+    fn spring(&mut self, spring: f64) {
         let run = &self.case.run;
-        if !(spring.is_finite() && spring > 0.0) {
+        if spring.is_nan() || spring < 0.0 {
+            self.positive("contact.spring", spring, "N/m");
             return;
         }
-        if !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
+        if spring != 0.0 && !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
             let allowed = format!("{SPRING_LEAST:e} to {SPRING_MOST:e} N/m");
             self.range("contact.spring", spring, false, &allowed);
             return;
@@ -115,6 +116,12 @@ impl Checker<'_> {
             lengths.into_iter().fold(f64::INFINITY, f64::min)
         };
         let free = self.case.body.iter().filter(|b| !b.is_driven() && b.locked.len() < 6);
+        if spring == 0.0 {
+            let stiff = free.map(|b| 100.0 * weight(b) / smallest(b)).fold(0.0, f64::max);
+            let stiff = if stiff > 0.0 { format!(", {stiff:.1e} N/m or more") } else { " [N/m]".to_owned() };
+            self.add("contact.spring", "contact has no spring", format!("give `spring`{stiff}"));
+            return;
+        }
         let sinks = |b: &&Body| weight(b) / spring > smallest(b);
         let found = free.filter(sinks).max_by(|a, b| weight(a).total_cmp(&weight(b)));
         if let Some((name, weight, edge)) = found.map(|b| (b.name.clone(), weight(b), smallest(b))) {
@@ -231,7 +238,7 @@ impl Checker<'_> {
         if contact.law == Law::Pressure {
             self.not_negative("contact.spring", contact.spring, "N/m");
         } else {
-            self.positive("contact.spring", contact.spring, "N/m");
+            self.spring(contact.spring);
         }
         self.one_of(
             "contact",
@@ -252,9 +259,6 @@ impl Checker<'_> {
         }
         self.not_negative("contact.viscous_friction", contact.viscous_friction, "kg/s");
         self.not_negative("contact.friction", contact.friction, "");
-        if contact.law != Law::Pressure {
-            self.soft_spring(contact.spring);
-        }
         match contact.substeps {
             Some(0) => self.add("contact.substeps", "0 sub-steps", "allowed: 1 or more, or leave it out"),
             Some(n) if n > MOST_SUBSTEPS => self.add(
