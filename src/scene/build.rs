@@ -4,7 +4,8 @@
 //! obstacles and moving walls of any other shape, water, bodies.
 
 use super::bodies;
-use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice};
+use super::lattice::{Cells, Grid, Lattice};
+use super::near::Near;
 use super::opening::Planned;
 use super::oriented::Placed;
 use super::placement::{Surroundings, point};
@@ -270,7 +271,7 @@ impl<'a> Builder<'a> {
     fn beside_walls(&mut self) -> usize {
         let from = self.water.clear;
         for shape in &self.off_lattice {
-            self.water.remove(shape, (from, BLOCKED), &self.lattice, &mut self.grid);
+            self.water.remove(shape, from, &self.lattice, &mut self.grid);
         }
         self.water.clear = self.water.cell.len();
         self.water.clear - from
@@ -280,6 +281,12 @@ impl<'a> Builder<'a> {
         let case = self.case;
         let gravity = self.gravity();
         let law = case.contact.as_ref().map_or(Law::Smooth, |c| c.law);
+        let mut near = Near::default();
+        let add = |near: &mut Near, solid: &Solid| {
+            let (placed, reach) = (solid.placed(), solid.placed().bounds());
+            near.add(placed.center - reach, placed.center + reach);
+        };
+        self.moving_walls.iter().for_each(|wall| add(&mut near, wall));
         for (k, body) in case.body.iter().enumerate() {
             let made = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
             let mut solid = match made {
@@ -291,10 +298,10 @@ impl<'a> Builder<'a> {
                 }
             };
             self.thin(&format!("body.{k}"), &solid);
-            let earlier: Vec<&Solid> = self.moving_walls.iter().chain(&self.bodies).collect();
             let surroundings = Surroundings {
                 fixed: &self.fixed,
-                earlier: &earlier,
+                earlier: [&self.moving_walls, &self.bodies],
+                near: &near,
                 law,
                 spacing: case.run.spacing,
                 up: (gravity.length() > 0.0).then(|| -gravity.normalize()),
@@ -309,9 +316,9 @@ impl<'a> Builder<'a> {
             self.seams(&format!("body.{k}"), what, &solid.name, &solid.placed(), false);
             let shape = solid.placed();
             let wet = if body.displaces_fluid {
-                self.water.remove(&shape, (0, FREE), &self.lattice, &mut self.grid)
+                Water::displace(&shape, &self.lattice, &mut self.grid)
             } else {
-                self.water.inside(&shape, &self.lattice)
+                Water::inside(&shape, &self.lattice, &self.grid)
             };
             if wet > 0 && body.displaces_fluid {
                 self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
@@ -322,8 +329,10 @@ impl<'a> Builder<'a> {
                 let remedy = "set `displaces_fluid = true`, or move it out of the water";
                 self.problems.push(Problem::new(format!("body.{k}.displaces_fluid"), message, remedy));
             }
+            add(&mut near, &solid);
             self.bodies.push(solid);
         }
+        self.water.keep_what_is_left(&self.grid);
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }

@@ -19,6 +19,7 @@ mod jitter;
 mod lattice;
 mod layout;
 mod motion;
+mod near;
 mod opening;
 mod oriented;
 mod part;
