@@ -1,6 +1,7 @@
 //! What stands before the faces of fixed walls and keeps the water from them: solids of any shape, where they are, and walls that fit no lattice.
 
 use crate::body::Pose;
+use crate::contact::broad::PointGrid;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, Shape, WallShape};
 use glam::{DMat3, DQuat, DVec3};
@@ -78,15 +79,22 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Those of `solids` that may reach before the face around `center`.
-    pub fn near<'a>(&self, center: DVec3, solids: &'a [Standing]) -> Vec<&'a Standing> {
-        let reach = 2.0 * self.spacing;
-        let meets = |s: &&Standing| {
-            let way = center - s.position;
-            let least = way.length_squared().min(self.periodic.nearest(way).length_squared());
-            least < (s.radius + reach) * (s.radius + reach)
-        };
-        solids.iter().filter(meets).collect()
+    /// Of the faces around each of `centers`, `count` of them, the numbers of the `solids` that may reach before it. Each
+    /// solid looks at the faces near it: a wall may have as many faces as there are solids.
+    pub fn reached(&self, centers: &PointGrid, count: usize, solids: &[Standing]) -> Vec<Vec<usize>> {
+        let mut out = vec![vec![]; count];
+        for (k, solid) in solids.iter().enumerate() {
+            let reach = solid.radius + 2.0 * self.spacing;
+            for image in self.periodic.images(self.periodic.wrap(solid.position), reach) {
+                centers.near(image, reach, |face| {
+                    let own = &mut out[face as usize];
+                    if own.last() != Some(&k) {
+                        own.push(k);
+                    }
+                });
+            }
+        }
+        out
     }
 
     /// Part of the face around `center` that looks along `normal` before which water may stand [-].
@@ -115,5 +123,43 @@ impl Tiles {
             }
         }
         1.0 - sum / f64::from(rows * n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn each_face_has_the_solids_that_comparing_all_finds() {
+        let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0));
+        for axes in [[false; 3], [true, false, false]] {
+            let tiles = Tiles { spacing: 0.02, plane: false, periodic: Periodic::new(axes, low, high) };
+            let place = |k: usize, n: f64| (k as f64 * n).fract();
+            let centers: Vec<DVec3> =
+                (0..2000).map(|k| DVec3::new(2.0 * place(k, 0.618), place(k, 0.755), 0.0)).collect();
+            let solids: Vec<Standing> = (0..60)
+                .map(|k| {
+                    let at = DVec3::new(2.0 * place(k, 0.31), place(k, 0.57), 0.2 * place(k, 0.27));
+                    let shape = Shape::cuboid(DVec3::splat(0.05 + 0.2 * place(k, 0.43)));
+                    Standing::new(shape, at, DQuat::IDENTITY, true)
+                })
+                .collect();
+            let meets = |x: DVec3, s: &Standing| {
+                let way = x - s.position;
+                let reach = s.radius + 2.0 * tiles.spacing;
+                way.length_squared().min(tiles.periodic.nearest(way).length_squared()) < reach * reach
+            };
+            let grid = PointGrid::new(centers.clone(), 0.08);
+            let (mut found, mut looked) = (0, 0);
+            for (x, own) in centers.iter().zip(tiles.reached(&grid, centers.len(), &solids)) {
+                let all: Vec<usize> = (0..solids.len()).filter(|&k| meets(*x, &solids[k])).collect();
+                assert_eq!(own, all, "{axes:?} {x}");
+                found += all.len();
+                looked += solids.len();
+            }
+            assert!(found > 1000 && 10 * found < looked, "{found} of {looked}");
+        }
     }
 }
