@@ -15,6 +15,7 @@ mod bodies;
 mod build;
 mod curve;
 mod domain;
+mod fits;
 mod jitter;
 mod lattice;
 mod layout;
