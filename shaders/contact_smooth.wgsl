@@ -156,7 +156,7 @@ fn search(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     }
 }
 
-// Depth (not above 0: outside), minus its gradient, and the nearest face; as `depth` in src/contact/geometry.rs.
+// Depth (not above 0: outside), minus its gradient, and the nearest face; as `depth` in src/shape/cuboid/depth.rs.
 struct Inside {
     depth: f32,
     outward: vec3f,
@@ -215,7 +215,7 @@ fn inside(c: Clearance, faces: u32) -> Inside {
 }
 
 // Share of a dashpot that a point feels which has come `depth` since it began, in sub-steps of `step`; as `felt` in
-// src/contact/smooth.rs.
+// src/contact/smooth/constants.rs.
 fn felt(depth: f32, speed: f32, step: f32) -> f32 {
     let steps = depth / max(-speed * step, 1e-30);
     return select(1.0, select(max(2.0 - 0.5 * steps, 1.0), 1.5 * steps, steps < 1.0), speed < 0.0);
@@ -486,11 +486,17 @@ fn press(n: u32, t: u32, width: u32) {
         }
     }
     workgroupBarrier();
-    part_x[t] = vec4f(square, 0.0);
-    part_z[t] = vec4f(product, 0.0);
-    workgroupBarrier();
+    for (var k = 0u; k < turns; k++) {
+        if turn == k {
+            part_x[seat] = joined(part_x[seat], vec4f(square, 0.0), k);
+            part_z[seat] = joined(part_z[seat], vec4f(product, 0.0), k);
+        }
+        workgroupBarrier();
+    }
     if face < pressed && t == first {
         var turning = part_y[t];
+        square = part_x[t].xyz;
+        product = part_z[t].xyz;
         for (var k = 1u; k < sharing; k++) {
             turning += part_y[t + k];
             square += part_x[t + k].xyz;

@@ -3,6 +3,7 @@
 pub mod driven;
 
 use crate::body::Pose;
+use crate::contact::broad::PointGrid;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, Shape, Solid, WallShape};
 use glam::{DMat3, DQuat, DVec3};
@@ -12,12 +13,16 @@ use glam::{DMat3, DQuat, DVec3};
 const AT: [f64; 2] = [0.1, 0.5];
 /// The same of free bodies, with what is covered then: as much as [`crate::slots`] takes for a slot, up to a gap of 1.1 spacings.
 const FADING: [(f64, f64); 2] = [(0.7, 2.0 / 3.0), (0.9, 1.0 / 3.0)];
+/// Edge of the cells that faces are found in, over l0.
+pub(crate) const CELL: f64 = 4.0;
 /// Points along an edge of a face, in the plane and in space.
 const POINTS: [u32; 2] = [10, 5];
 
 /// A solid where it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Standing {
+    /// Index of the solid; none of a fixed wall.
+    solid: Option<usize>,
     shape: Shape,
     position: DVec3,
     to_shape: DMat3,
@@ -26,15 +31,22 @@ pub(crate) struct Standing {
 }
 
 impl Standing {
-    fn new(shape: Shape, position: DVec3, orientation: DQuat, is_free: bool) -> Self {
-        let to_shape = DMat3::from_quat(orientation.inverse());
-        Self { radius: shape.radius(), shape, position, to_shape, is_free }
+    fn new(number: usize, solid: &Solid, position: DVec3, orientation: DQuat) -> Self {
+        Self {
+            solid: Some(number),
+            shape: solid.shape,
+            position,
+            to_shape: DMat3::from_quat(orientation.inverse()),
+            radius: solid.shape.radius(),
+            is_free: solid.is_free(),
+        }
     }
 
     /// The box of a fixed wall.
     fn wall(wall: &WallShape) -> Self {
         let shape = Shape::cuboid(2.0 * wall.half);
         Self {
+            solid: None,
             radius: shape.radius(),
             shape,
             position: wall.center,
@@ -59,35 +71,23 @@ impl Standing {
     }
 }
 
-/// Of what the faces are that something may stand before.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Before {
-    /// A fixed wall, by its index in [`Scene::walls`].
-    Wall(usize),
-    /// A solid, by its index.
-    Solid(usize),
-}
-
-/// What never moves before the faces `of` a part of `scene`: solids, the walls of openings, and fixed walls, of which the lattice tells those
-/// before walls that fit it.
-pub(crate) fn still(scene: &Scene, of: Before) -> Vec<Standing> {
+/// What never moves before the faces of `wall` of `scene`, or of solids: solids, the walls of openings, and fixed walls, of which the
+/// lattice tells those before walls that fit it.
+pub(crate) fn still(scene: &Scene, wall: Option<usize>) -> Vec<Standing> {
     let fits = |wall: &WallShape| wall.axes == DMat3::IDENTITY;
-    let is_told = |wall: &WallShape| matches!(of, Before::Wall(own) if fits(&scene.walls[own]) && fits(wall));
-    let walls = scene.walls.iter().enumerate().filter(|(k, wall)| of != Before::Wall(*k) && !is_told(wall));
+    let is_told = |other: &WallShape| wall.is_some_and(|own| fits(&scene.walls[own]) && fits(other));
+    let walls = scene.walls.iter().enumerate().filter(|(k, other)| wall != Some(*k) && !is_told(other));
     let opened = scene.followed();
-    let stands = |k: usize, s: &Solid| (s.is_still() || k >= opened) && of != Before::Solid(k);
-    let solids = scene.solids.iter().enumerate().filter(|(k, s)| stands(*k, s));
-    let solids = solids.map(|(_, s)| Standing::new(s.shape, s.position, s.orientation, false));
+    let solids = scene.solids.iter().enumerate().filter(|(k, s)| s.is_still() || *k >= opened);
+    let solids = solids.map(|(k, s)| Standing::new(k, s, s.position, s.orientation));
     walls.map(|(_, wall)| Standing::wall(wall)).chain(solids).collect()
 }
 
-/// The solids of `scene` that move, but for `own`, at their `poses`.
-pub(crate) fn moving(scene: &Scene, poses: &[Pose], own: Option<usize>) -> Vec<Standing> {
+/// The solids of `scene` that move, at their `poses`.
+pub(crate) fn moving(scene: &Scene, poses: &[Pose]) -> Vec<Standing> {
     let solids = scene.solids[..scene.followed()].iter().zip(poses).enumerate();
-    let solids = solids.filter(|(k, (s, _))| !s.is_still() && Some(*k) != own);
-    solids
-        .map(|(_, (s, pose))| Standing::new(s.shape, pose.position, pose.orientation, s.is_free()))
-        .collect()
+    let solids = solids.filter(|(_, (s, _))| !s.is_still());
+    solids.map(|(k, (s, pose))| Standing::new(k, s, pose.position, pose.orientation)).collect()
 }
 
 /// Faces of wall particles, each a square with an edge of a spacing.
@@ -104,13 +104,40 @@ impl Tiles {
         Self { spacing: scene.spacing, plane: scene.dimensions == 2, periodic: scene.periodic }
     }
 
-    /// Those of `solids` that may reach before the face around `center`.
-    pub fn near<'a>(&self, center: DVec3, solids: &'a [Standing]) -> Vec<&'a Standing> {
-        solids.iter().filter(|s| s.is_near(center, 2.0 * self.spacing, &self.periodic)).collect()
+    /// Of the faces around each of `centers`, `count` of them, the numbers of the `solids` that may reach before it. Each
+    /// solid looks at the faces near it: a wall may have as many faces as there are solids. Centres that are those of a solid in its frame come
+    /// with its pose and radius [m].
+    pub fn reached(
+        &self,
+        (centers, count): (&PointGrid, usize),
+        of: Option<(&Pose, f64)>,
+        solids: &[Standing],
+    ) -> Vec<Vec<usize>> {
+        let mut out = vec![vec![]; count];
+        let (origin, to_frame, size) = match of {
+            Some((pose, radius)) => {
+                (self.periodic.wrap(pose.position), DMat3::from_quat(pose.orientation.inverse()), radius)
+            }
+            None => (DVec3::ZERO, DMat3::IDENTITY, 0.0),
+        };
+        for (k, solid) in solids.iter().enumerate() {
+            let reach = solid.radius + 2.0 * self.spacing;
+            for image in self.periodic.images(self.periodic.wrap(solid.position), reach + size) {
+                centers.near(to_frame * (image - origin), reach, |face| {
+                    let own = &mut out[face as usize];
+                    if own.last() != Some(&k) {
+                        own.push(k);
+                    }
+                });
+            }
+        }
+        out
     }
 
     /// Part of the face around `center` that looks along `normal` before which water may stand [-].
     pub fn bare(&self, center: DVec3, normal: DVec3, solids: &[&Standing]) -> f64 {
+        let near = |s: &&Standing| s.is_near(center, 2.0 * self.spacing, &self.periodic);
+        let solids: Vec<&Standing> = solids.iter().copied().filter(near).collect();
         if solids.is_empty() {
             return 1.0;
         }
@@ -135,5 +162,62 @@ impl Tiles {
             }
         }
         1.0 - sum / f64::from(rows * n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn each_face_has_the_solids_that_comparing_all_finds() {
+        let (low, high) = (DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0));
+        for axes in [[false; 3], [true, false, false]] {
+            let tiles = Tiles { spacing: 0.02, plane: false, periodic: Periodic::new(axes, low, high) };
+            let place = |k: usize, n: f64| (k as f64 * n).fract();
+            let centers: Vec<DVec3> =
+                (0..2000).map(|k| DVec3::new(2.0 * place(k, 0.618), place(k, 0.755), 0.0)).collect();
+            let solids: Vec<Standing> = (0..60)
+                .map(|k| {
+                    let at = DVec3::new(2.0 * place(k, 0.31), place(k, 0.57), 0.2 * place(k, 0.27));
+                    let shape = Shape::cuboid(DVec3::splat(0.05 + 0.2 * place(k, 0.43)));
+                    Standing {
+                        solid: None,
+                        shape,
+                        position: at,
+                        to_shape: DMat3::IDENTITY,
+                        radius: shape.radius(),
+                        is_free: true,
+                    }
+                })
+                .collect();
+            let meets = |x: DVec3, s: &Standing| {
+                let way = x - s.position;
+                let reach = s.radius + 2.0 * tiles.spacing;
+                way.length_squared().min(tiles.periodic.nearest(way).length_squared()) < reach * reach
+            };
+            // As those of a wall, and as those of a solid that has turned and gone on beyond the side.
+            let turn = DQuat::from_rotation_z(0.7);
+            let pose = Pose {
+                position: DVec3::new(if axes[0] { 3.2 } else { 1.2 }, 0.4, 0.1),
+                orientation: turn,
+                velocity: DVec3::ZERO,
+                angular_velocity: DVec3::ZERO,
+            };
+            let own: Vec<DVec3> =
+                centers.iter().map(|x| turn.inverse() * (*x - DVec3::new(1.2, 0.4, 0.1))).collect();
+            let (mut found, mut looked) = (0, 0);
+            for (points, of) in [(centers.clone(), None), (own, Some((&pose, 2.0)))] {
+                let grid = PointGrid::new(points, 0.08);
+                for (x, own) in centers.iter().zip(tiles.reached((&grid, centers.len()), of, &solids)) {
+                    let all: Vec<usize> = (0..solids.len()).filter(|&k| meets(*x, &solids[k])).collect();
+                    assert_eq!(own, all, "{axes:?} {x}");
+                    found += all.len();
+                    looked += solids.len();
+                }
+            }
+            assert!(found > 1000 && 10 * found < looked, "{found} of {looked}");
+        }
     }
 }

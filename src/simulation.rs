@@ -1,11 +1,13 @@
 //! A scene in motion: backend, solids and clock. How it is opened and read is in `open.rs`, [`Simulation::step`] in
-//! `step.rs`.
+//! `step.rs`, what ends a run before its end in `simulation/guards.rs`, its state in `simulation/archive.rs`.
+
+mod archive;
+mod guards;
 
 use crate::backend::{Backend, Counters, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
 use crate::case::{Case, ContactDevice, Fluid};
-use crate::checkpoint::Archive;
 use crate::contact::{ContactReport, Solids};
 use crate::cover::driven::{Covered, DrivenFaces};
 use crate::error::{Error, Result};
@@ -20,7 +22,6 @@ use crate::settle::settle;
 use crate::slots::{Opposite, Push, Slots};
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, shortened, time_step};
-use glam::DVec3;
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -97,14 +98,6 @@ pub(crate) fn settings(case: &Case) -> Settings {
     }
 }
 
-/// Steps between looks at the counters and the fastest particles.
-const LOOK_EVERY: u64 = 10;
-/// Part of the fluid that may get lost before the run is stopped.
-const LOST_MAX: f64 = 0.02;
-
-/// An adaptive step this much shorter than the typed one is that of a run that will not end.
-const SHORTEST_STEP: f64 = 1e-6;
-
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
     Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
@@ -170,68 +163,6 @@ impl Simulation {
         })
     }
 
-    /// Save the whole state between two steps, or take it over.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Checkpoint`] if the state is that of another scene, or what the backend says.
-    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self {
-            // Follows from the case.
-            case: _,
-            scene: _,
-            params: _,
-            plan,
-            groups,
-            wait_for_stages: _,
-            threads: _,
-            stop: _,
-            // Looked up when it matters.
-            gone: _,
-            // Follows from the case.
-            slots: _,
-            driven_faces: _,
-            // Times by the clock are those of each process.
-            stages: _,
-            backend,
-            solids,
-            fluid_force,
-            time,
-            steps,
-            speed,
-            fastest,
-            solids_ledger,
-            openings,
-        } = self;
-        let Groups { fluid, moving_wall, static_wall, static_dummy, moving_dummy } = *groups;
-        archive.same("particles of water", fluid as u64)?;
-        archive.same("wall particles that move", moving_wall as u64)?;
-        archive.same("wall particles", static_wall as u64)?;
-        archive.same("dummies", static_dummy as u64)?;
-        archive.same("dummies that move", moving_dummy as u64)?;
-        archive.same("solids that move", fluid_force.len() as u64)?;
-        archive.number("time", time)?;
-        archive.count("steps", steps)?;
-        archive.number("speed", speed)?;
-        archive.number("fastest", fastest)?;
-        let vectors = fluid_force.iter().flat_map(|w| [w.force, w.torque]);
-        let mut vectors: Vec<DVec3> = vectors.collect();
-        archive.array("fluid_force", &mut vectors, true)?;
-        for (wrench, v) in fluid_force.iter_mut().zip(vectors.chunks_exact(2)) {
-            *wrench = Wrench { force: v[0], torque: v[1] };
-        }
-        if let Some((ledger, energy)) = solids_ledger {
-            ledger.exchange(archive, "ledger.solids")?;
-            archive.number("ledger.energy", energy)?;
-        }
-        openings.exchange(archive)?;
-        solids.exchange(archive, backend.compute())?;
-        // Lists that are made anew ask where solids face.
-        if !archive.is_saving() && plan.has(Stage::MoveSolids) {
-            backend.move_solids(&openings.place(solids.poses()))?;
-        }
-        backend.exchange(archive)
-    }
-
     /// Give up a step in progress with [`Error::Interrupted`] when `stop` has become overdue. The state is that of no
     /// moment then; one that was kept before can be taken over with [`Self::exchange`].
     pub fn stop_with(&mut self, stop: &Stop) {
@@ -267,19 +198,6 @@ impl Simulation {
         let step = Step { relaxation, ..self.params.step_driven(self.time, dt, flow, driven) };
         // What jumps over its neighbours needs the damping.
         if self.fastest * dt > self.params.spacing { step.whole() } else { step }
-    }
-
-    /// An error if a step has become so short that the run would not end.
-    pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
-        if step.dt < SHORTEST_STEP * self.case.run.time_step {
-            let what = format!(
-                "the flow or a solid asks for steps of {:.1e} s, the run would not end; water that has no room left (more of it in a \
-                 closed tank than that holds, a piston into a part that is full) is pressed like this: leave it a way out",
-                step.dt
-            );
-            return Err(self.diverged(step, Stage::Predict, what));
-        }
-        Ok(())
     }
 
     fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
@@ -490,71 +408,5 @@ impl Simulation {
     pub fn ledger(&mut self) -> Result<Option<Ledger>> {
         let Some((solids, _)) = &self.solids_ledger else { return Ok(None) };
         Ok(Some(self.backend.ledger()?.unwrap_or_default().plus(solids)))
-    }
-
-    fn check_bodies(&self, step: &Step) -> Result<()> {
-        let (min, max) = (self.params.domain_min, self.params.domain_max);
-        for (k, pose) in self.solids.poses().iter().enumerate() {
-            let x = pose.position;
-            let name = self.solids.name(k);
-            if !(x.is_finite() && pose.velocity.is_finite() && pose.angular_velocity.is_finite()) {
-                return Err(self.diverged(
-                    step,
-                    Stage::Contact,
-                    format!("{name}: the motion is not a number"),
-                ));
-            }
-            let bounded =
-                |k: &usize| !(self.params.periodic.is_along(*k) || self.params.dimensions == 2 && *k == 1);
-            if (0..3).filter(bounded).any(|k| x[k] < min[k] || x[k] > max[k]) {
-                let what = format!(
-                    "{name} left the domain at ({:.4}, {:.4}, {:.4}) m; a wall is missing there, or contact.spring is \
-                     too soft for this fall",
-                    x.x, x.y, x.z
-                );
-                return Err(self.diverged(step, Stage::Contact, what));
-            }
-        }
-        Ok(())
-    }
-
-    /// Look at the guards and at the speed of the flow, every few steps.
-    pub(crate) fn look(&mut self, step: &Step) -> Result<Option<(FluidMonitor, Counters)>> {
-        if !self.plan.wet() || !self.steps.is_multiple_of(LOOK_EVERY) {
-            return Ok(None);
-        }
-        let (monitor, counters) = self.observe()?;
-        self.check(&counters, step)?;
-        (self.speed, self.fastest) = (monitor.speed_most, monitor.speed_max);
-        if !monitor.kinetic.is_finite() {
-            return Err(self.diverged(step, Stage::Correct, "the kinetic energy is not a number".into()));
-        }
-        Ok(Some((monitor, counters)))
-    }
-
-    /// An error if the guards have seen something that ends a run.
-    pub fn check(&self, counters: &Counters, step: &Step) -> Result<()> {
-        if let Some((slot, neighbours)) = counters.overflow {
-            let what = format!(
-                "particle slot {slot} has {neighbours} neighbours, more than the lists hold (a full lattice has {}): \
-                 the fluid has collapsed onto itself; use a smaller time step or a larger fluid.sound_speed",
-                self.params.neighbours
-            );
-            return Err(self.diverged(step, Stage::NeighbourList, what));
-        }
-        if let Some(particle) = counters.non_finite {
-            let what = format!("the velocity of particle {particle} is not a number");
-            return Err(self.diverged(step, Stage::Correct, what));
-        }
-        let fluid = self.scene.water() as u64 + self.openings.total_emitted();
-        if counters.lost as f64 > (LOST_MAX * fluid as f64).max(10.0) {
-            let what = format!(
-                "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began, and \
-                 enlarge run.domain if they may go there",
-                counters.lost, fluid
-            );
-            return Err(self.diverged(step, Stage::CellList, what));
-        }
-        Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Contact: the acceptance numbers of the paper's law and of the smooth law, against analytic results.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use seixo::body::Wrench;
 use seixo::case::{Contact, Law};
 use seixo::contact::Solids;
@@ -463,6 +463,43 @@ fn edges_that_cross_between_points_hold_and_push_across_both() {
                     assert!(gentle.energy_error.abs() < 1e-3 && hard.energy_error.abs() < 1e-3, "{hard:?}");
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn a_wall_s_edge_is_the_same_wherever_posts_leave_it_bare() {
+    // A floor with a hundred posts along each of two edges, which leave a hundred stretches of either. A bar lies across
+    // one of them on its own edge.
+    let (l0, pitch) = (0.02, 0.2);
+    let half = DVec3::new(50.5 * pitch, 0.5, 0.1);
+    let patches = |stretch: f64| {
+        let (low, high) = (DVec3::splat(-11.0), DVec3::splat(11.0));
+        let mut dry = DryScene::new(l0, low, high).wall(-half * DVec3::Z, half, DMat3::IDENTITY);
+        for k in 0..100 {
+            for side in [-1.0, 1.0] {
+                let at = DVec3::new((f64::from(k) - 49.5) * pitch, side * half.y, 0.0);
+                dry = dry.wall(at, DVec3::splat(0.02), DMat3::IDENTITY);
+            }
+        }
+        let x = (stretch - 50.0) * pitch;
+        let size = DVec3::new(0.1, 0.2, 0.1);
+        let at = DVec3::new(x, half.y, 0.05 * 2_f64.sqrt() - 0.05 * l0);
+        let mut bar = FreeBox::new(size, 800.0, at);
+        bar.orientation = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_4);
+        let mut solids = Solids::new(&dry.body(&bar).build(), Some(&smooth(1e6, 30.0, 0.5))).expect("valid");
+        let mut patches = solids.probe(None, 1e-4).expect("the host can").patches;
+        patches.iter_mut().for_each(|p| p.at.x -= x);
+        patches
+    };
+    let first = patches(5.0);
+    assert!(first.len() > 1, "{first:?}");
+    for stretch in [40.0, 88.0, 91.0, 94.0, 97.0] {
+        let other = patches(stretch);
+        assert_eq!(first.len(), other.len(), "{stretch}: {other:?} for {first:?}");
+        for (p, q) in first.iter().zip(&other) {
+            let same = (p.at - q.at).length() < 1e-9 && (p.force - q.force).abs() < 1e-6 * p.force;
+            assert!(same, "{stretch}: {q:?} for {p:?}");
         }
     }
 }

@@ -4,9 +4,10 @@ use crate::common::*;
 use glam::DVec3;
 use seixo::backend::{Processor, gpu};
 use seixo::case::Case;
+use seixo::fields::State;
 use seixo::params::Params;
-use seixo::plan::{Arrays, Plan, Stage};
-use seixo::scene::Scene;
+use seixo::plan::{Arrays, ParticleStage, Plan, Stage};
+use seixo::scene::{Kind, Scene};
 use seixo::simulation::Simulation;
 use std::f64::consts::PI;
 
@@ -81,6 +82,29 @@ fn water_that_fills_all_its_room_has_no_free_surface() {
     let paper = full_tank("preset = \"paper\"", "");
     let scene = Scene::build(&paper).expect("it builds");
     assert!(!Params::new(&paper, &scene).expect("valid").filled);
+}
+
+#[test]
+fn a_particle_without_neighbours_is_no_surface_where_there_is_none() {
+    let mut all = vec![Processor::Cpu];
+    all.extend(device());
+    for processor in all {
+        let case = full_tank("", "");
+        let scene = Scene::build(&case).expect("it builds");
+        let mut sim = Simulation::on(&case, scene, &processor).expect("it starts");
+        let mut fields = sim.backend.read().expect("the fields");
+        let fluid = sim.groups.fluid;
+        fields.kind[1..fluid].fill(Kind::Ghost);
+        fields.position[0] = DVec3::new(0.2, 0.2, 0.25);
+        sim.backend.write(&fields).expect("written");
+        let step = sim.params.step(0.0, 1e-3, 1.0);
+        for stage in [ParticleStage::CellList, ParticleStage::NeighbourList, ParticleStage::NumberDensity] {
+            sim.backend.run(stage, &step).expect("it runs");
+        }
+        let fields = sim.backend.read().expect("the fields");
+        assert_eq!((fields.kind[0], fields.number_density[0]), (Kind::Fluid, 0.0));
+        assert_eq!(fields.state[0], State::Inner, "{}", sim.backend.description());
+    }
 }
 
 /// Largest difference of the water's pressure from that at rest with 0 in the ceiling's layer, over rho g H, and the largest speed [m/s] after

@@ -4,69 +4,15 @@
 //! follows from the momentum and the orientation, so that a free body keeps its momentum to round-off
 //! while it tumbles. A prescribed solid is a body of infinite mass that follows its table.
 
+mod pose;
 pub mod slots;
+
+pub use pose::{Pose, Wrench};
 
 use crate::scene::{Drive, Motion, Solid};
 use crate::shape::Shape;
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
-
-/// Position and velocity of a solid, world axes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    /// Centre of mass [m].
-    pub position: DVec3,
-    /// Orientation: turns the solid's frame into the world's.
-    pub orientation: DQuat,
-    /// Velocity of the centre of mass [m/s].
-    pub velocity: DVec3,
-    /// Angular velocity [rad/s].
-    pub angular_velocity: DVec3,
-}
-
-impl Pose {
-    /// World position [m] of a point given in the solid's frame [m].
-    pub fn point(&self, offset: DVec3) -> DVec3 {
-        self.position + self.orientation * offset
-    }
-
-    /// Velocity [m/s] of the solid at the world point `at` [m].
-    pub fn velocity_at(&self, at: DVec3) -> DVec3 {
-        self.velocity + self.angular_velocity.cross(at - self.position)
-    }
-
-    /// Whether every number is finite.
-    pub fn is_finite(&self) -> bool {
-        self.position.is_finite()
-            && self.orientation.is_finite()
-            && self.velocity.is_finite()
-            && self.angular_velocity.is_finite()
-    }
-}
-
-/// Force [N] and torque about the centre of mass [N m], world axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Wrench {
-    /// Force [N].
-    pub force: DVec3,
-    /// Torque about the centre of mass [N m].
-    pub torque: DVec3,
-}
-
-impl Wrench {
-    /// Adds `factor` times `other`.
-    pub fn add(&mut self, factor: f64, other: &Self) {
-        self.force += factor * other.force;
-        self.torque += factor * other.torque;
-    }
-}
-
-impl std::ops::AddAssign for Wrench {
-    fn add_assign(&mut self, other: Self) {
-        self.force += other.force;
-        self.torque += other.torque;
-    }
-}
 
 /// A solid as the pressure equation sees it: how it answers forces, and those that act on it beside the fluid's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -3,6 +3,7 @@
 use super::check::{Checker, face, length};
 use super::{BodyShape, Face, Form, Tank, Vector};
 use crate::periodic::CELLS_MIN;
+use std::collections::HashMap;
 
 /// More cells than this are a slip of the pen; what a machine can hold is asked before anything is built.
 const MOST_CELLS: f64 = 1e11;
@@ -334,7 +335,10 @@ impl Checker<'_> {
 
     /// Names given as (path, name) must be there and differ.
     pub(super) fn unique(&mut self, names: &[(String, String)], what: &str) {
-        for (k, (path, name)) in names.iter().enumerate() {
+        let mut taken: HashMap<&str, &str> = HashMap::new();
+        for (path, name) in names {
+            let first = taken.get(name.as_str()).copied();
+            taken.entry(name).or_insert(path);
             if name.trim().is_empty() {
                 self.add(path.clone(), "the name is empty", "give it a name");
             } else if let Some(why) = unfit(name) {
@@ -343,7 +347,7 @@ impl Checker<'_> {
                     format!("the name `{}` {why}", name.escape_debug()),
                     "names stand in tables and on terminals: use letters, digits, spaces, _ and -",
                 );
-            } else if let Some((first, _)) = names[..k].iter().find(|(_, n)| n == name) {
+            } else if let Some(first) = first {
                 self.add(
                     path.clone(),
                     format!("the name `{name}` is taken by {}", first.trim_end_matches(".name")),

@@ -57,9 +57,12 @@ pub(crate) fn meeting(boxes: &[Bounds]) -> Vec<(usize, usize)> {
             }
         }
     }
-    for (n, &l) in large.iter().enumerate() {
+    let mut is_large = vec![false; boxes.len()];
+    large.iter().for_each(|&l| is_large[l] = true);
+    for &l in &large {
         for k in 0..boxes.len() {
-            if k != l && !large[..n].contains(&k) && meet(&boxes[l], &boxes[k]) {
+            // of two that are both large the first one reports them
+            if k != l && !(k < l && is_large[k]) && meet(&boxes[l], &boxes[k]) {
                 pairs.push((l.min(k), l.max(k)));
             }
         }
@@ -107,6 +110,12 @@ pub(crate) struct PointGrid {
     points: Vec<DVec3>,
     cells: HashMap<IVec3, Vec<u32>>,
     bounds: Bounds,
+}
+
+impl Default for PointGrid {
+    fn default() -> Self {
+        Self::new(vec![], 1.0)
+    }
 }
 
 impl PointGrid {

@@ -3,8 +3,9 @@
 //!
 //! Free bodies have [`crate::slots`] instead, as what presses on them moves them.
 
-use super::{Before, Standing, Tiles, moving, still};
+use super::{CELL, Standing, Tiles, moving, still};
 use crate::body::Pose;
+use crate::contact::broad::PointGrid;
 use crate::scene::{Scene, Solid};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -22,7 +23,9 @@ struct Face {
 struct Driven {
     solid: usize,
     faces: Vec<Face>,
-    still: Vec<Standing>,
+    /// The faces by where they are in the solid's frame.
+    centers: PointGrid,
+    radius: f64,
 }
 
 /// What of a row's area no water presses on.
@@ -40,6 +43,8 @@ pub struct Covered {
 #[derive(Clone, Debug, Default)]
 pub struct DrivenFaces {
     solids: Vec<Driven>,
+    /// What never moves.
+    still: Vec<Standing>,
     tiles: Tiles,
 }
 
@@ -47,29 +52,39 @@ impl DrivenFaces {
     /// Those of `scene` that tables follow.
     pub fn new(scene: &Scene) -> Self {
         let driven = scene.solids[..scene.followed()].iter().enumerate().filter(|(_, s)| !s.is_free());
-        let of = |(k, solid): (usize, &Solid)| Driven {
-            solid: k,
-            faces: faces(solid),
-            still: still(scene, Before::Solid(k)),
+        let of = |(k, solid): (usize, &Solid)| {
+            let faces = faces(solid);
+            let centers: Vec<DVec3> = faces.iter().map(|face| face.center).collect();
+            let radius = centers.iter().map(|x| x.length()).fold(0.0, f64::max);
+            Driven { solid: k, faces, centers: PointGrid::new(centers, CELL * scene.spacing), radius }
         };
-        Self { solids: driven.map(of).collect(), tiles: Tiles::new(scene) }
+        Self { solids: driven.map(of).collect(), still: still(scene, None), tiles: Tiles::new(scene) }
     }
 
     /// What is covered with the solids of `scene` at `poses`, in the order of solids and rows.
     pub fn covered(&self, scene: &Scene, poses: &[Pose]) -> Vec<Covered> {
-        let all = self.solids.iter().flat_map(|driven| {
-            let others = moving(scene, poses, Some(driven.solid));
+        if self.solids.is_empty() {
+            return vec![];
+        }
+        let all = [self.still.clone(), moving(scene, poses)].concat();
+        let of = |driven: &Driven| {
             let pose = &poses[driven.solid];
-            let of = |face: &Face| {
-                let center = pose.position + pose.orientation * face.center;
-                let near = [&driven.still, &others].map(|solids| self.tiles.near(center, solids)).concat();
-                let area = pose.orientation * face.area;
-                let covered = 1.0 - self.tiles.bare(center, area.normalize_or_zero(), &near);
-                (covered > 0.0).then(|| Covered { solid: driven.solid, row: face.row, area: covered * area })
+            let faces = (&driven.centers, driven.faces.len());
+            let reached = self.tiles.reached(faces, Some((pose, driven.radius)), &all);
+            let of = |(face, reached): (&Face, Vec<usize>)| {
+                let others = reached.iter().map(|&k| &all[k]).filter(|s| s.solid != Some(driven.solid));
+                let (center, area) =
+                    (pose.position + pose.orientation * face.center, pose.orientation * face.area);
+                let bare = self.tiles.bare(center, area.normalize_or_zero(), &others.collect::<Vec<_>>());
+                (bare < 1.0).then(|| Covered {
+                    solid: driven.solid,
+                    row: face.row,
+                    area: (1.0 - bare) * area,
+                })
             };
-            driven.faces.par_iter().filter_map(of).collect::<Vec<_>>()
-        });
-        all.collect()
+            driven.faces.par_iter().zip(reached).filter_map(of).collect::<Vec<_>>()
+        };
+        self.solids.iter().flat_map(of).collect()
     }
 }
 

@@ -6,7 +6,8 @@
 
 use crate::backend::RowPressure;
 use crate::body::{Pose, Wrench};
-use crate::cover::{self, Before, Standing, Tiles};
+use crate::contact::broad::PointGrid;
+use crate::cover::{self, CELL, Standing, Tiles};
 use crate::fields::Fields;
 use crate::kernels::number_density::pair_weight;
 use crate::kernels::viscosity;
@@ -18,11 +19,15 @@ use glam::{DMat3, DVec3, IVec3};
 use std::collections::{HashMap, HashSet};
 
 /// A face of a row, of the size of a particle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Face {
     row: usize,
+    /// Its middle [m].
+    center: DVec3,
     /// Into the free space, of length 1.
     normal: DVec3,
+    /// What never moves and may reach before it.
+    still: Vec<usize>,
     /// Part before which nothing stands that never moves [-].
     bare: f64,
 }
@@ -38,6 +43,8 @@ pub struct FixedWall {
     /// From a particle's centre to the true surface, one a slot [m].
     to_surface: Vec<DVec3>,
     faces: Vec<Face>,
+    /// The faces by where they are.
+    centers: PointGrid,
     /// What stands before the faces and never moves.
     still: Vec<Standing>,
     tiles: Tiles,
@@ -52,13 +59,14 @@ impl FixedWall {
         let on_lattice = scene.walls[shape].axes == DMat3::IDENTITY;
         let l0 = scene.spacing;
         let tiles = Tiles::new(scene);
-        let (about, still) = (scene.walls[shape].middle, cover::still(scene, Before::Wall(shape)));
+        let (about, still) = (scene.walls[shape].middle, cover::still(scene, Some(shape)));
         let mut out = Self { shape, about, still, tiles, ..Self::default() };
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
         let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
         let cell = |x: DVec3| ((scene.periodic.wrap(x) - origin) / l0).round().as_ivec3();
         let solid: HashSet<IVec3> =
             scene.position[scene.groups.static_range()].iter().map(|x| cell(*x)).collect();
+        let mut rows: Vec<(usize, DVec3, Vec<DVec3>)> = vec![];
         for (k, slot) in scene.groups.static_wall_range().enumerate() {
             let (normal, x) = (scene.static_wall_normal[k], scene.position[slot]);
             if scene.static_wall_shape[k] as usize != shape {
@@ -71,37 +79,47 @@ impl FixedWall {
             };
             let normals: Vec<DVec3> =
                 if on_lattice { (0..3).filter_map(open).collect() } else { vec![normal] };
-            let bare = |&normal: &DVec3| {
+            rows.push((slot, x, normals));
+        }
+        let centers: Vec<DVec3> =
+            rows.iter().flat_map(|(_, x, normals)| normals.iter().map(move |n| *x + 0.5 * l0 * *n)).collect();
+        let count = centers.len();
+        let mut reached =
+            tiles.reached((&PointGrid::new(centers, CELL * l0), count), None, &out.still).into_iter();
+        for (slot, x, normals) in rows {
+            let to_surface = normals.iter().sum::<DVec3>() * 0.5 * l0;
+            let face = |(normal, still): (DVec3, Vec<usize>)| {
                 let center = x + 0.5 * l0 * normal;
-                let bare = out.tiles.bare(center, normal, &out.tiles.near(center, &out.still));
-                (bare > 0.0).then_some(Face { row: out.slots.len(), normal, bare })
+                let near: Vec<&Standing> = still.iter().map(|&k| &out.still[k]).collect();
+                let bare = tiles.bare(center, normal, &near);
+                (bare > 0.0).then_some(Face { row: out.slots.len(), center, normal, still, bare })
             };
-            let faces: Vec<Face> = normals.iter().filter_map(bare).collect();
+            let faces: Vec<Face> = normals.into_iter().zip(reached.by_ref()).filter_map(face).collect();
             if faces.is_empty() {
                 continue;
             }
             out.faces.extend(faces);
             out.slots.push(slot);
             out.position.push(x);
-            out.to_surface.push(normals.iter().sum::<DVec3>() * 0.5 * l0);
+            out.to_surface.push(to_surface);
         }
+        out.centers = PointGrid::new(out.faces.iter().map(|face| face.center).collect(), CELL * l0);
         Some(out)
     }
 
     /// Area with its direction into the free space, one a slot, where solids do not stand before it [m2]; those of `scene` that move are at their `poses`.
     pub fn areas(&self, scene: &Scene, poses: &[Pose]) -> Vec<DVec3> {
         let l0 = self.tiles.spacing;
-        let moving = cover::moving(scene, poses, None);
+        let moving = cover::moving(scene, poses);
         let mut areas = vec![DVec3::ZERO; self.slots.len()];
-        for face in &self.faces {
-            let center = self.position[face.row] + 0.5 * l0 * face.normal;
-            let near = self.tiles.near(center, &moving);
-            let bare = if near.is_empty() {
+        let reached = self.tiles.reached((&self.centers, self.faces.len()), None, &moving);
+        for (face, reached) in self.faces.iter().zip(reached) {
+            let bare = if reached.is_empty() {
                 face.bare
             } else {
-                let all: Vec<&Standing> =
-                    near.into_iter().chain(self.tiles.near(center, &self.still)).collect();
-                self.tiles.bare(center, face.normal, &all)
+                let near = reached.iter().map(|&k| &moving[k]);
+                let all: Vec<&Standing> = near.chain(face.still.iter().map(|&k| &self.still[k])).collect();
+                self.tiles.bare(face.center, face.normal, &all)
             };
             areas[face.row] += bare * l0 * l0 * face.normal;
         }

@@ -140,28 +140,34 @@ impl Folder {
         }
     }
 
-    /// Writes the marker and locks it; nothing where the file system knows no locks.
+    /// Locks the marker and writes it; returns the lock, nothing where the file system knows none.
     fn take(&self) -> Result<Option<File>> {
         let path = self.file(MARKER);
         let options = File::options().read(true).write(true).create(true).truncate(false).open(&path);
         let file = options.map_err(Error::io(&path))?;
-        match file.try_lock() {
-            Ok(()) => {}
+        let locked = match file.try_lock() {
+            Ok(()) => true,
             Err(TryLockError::WouldBlock) => {
                 return Err(FolderError::InUse(self.root.clone()).into());
             }
             // Some network file systems have no locks; then it is the user who keeps runs apart.
-            Err(TryLockError::Error(e)) if matches!(e.kind(), ErrorKind::Unsupported) => return Ok(None),
+            Err(TryLockError::Error(e)) if matches!(e.kind(), ErrorKind::Unsupported) => false,
             Err(TryLockError::Error(e)) => return Err(Error::io(&path)(e)),
-        }
+        };
+        self.mark(&path, &file)?;
+        Ok(locked.then_some(file))
+    }
+
+    /// Writes the marker into its `file`: in place, for a rename would leave the lock on a file that is gone; and not at
+    /// all if it says that already.
+    fn mark(&self, path: &Path, mut file: &File) -> Result<()> {
         let marker = Marker { seixo: env!("CARGO_PKG_VERSION").into(), name: self.name.clone() };
         let text = serde_json::to_string(&marker).unwrap_or_default() + "\n";
-        // In place, for a rename would leave the lock on a file that is gone; and not at all if it says that already.
-        if std::fs::read(&path).map_err(Error::io(&path))? != text.as_bytes() {
-            let put = std::io::Write::write_all(&mut &file, text.as_bytes());
-            put.and_then(|()| file.set_len(text.len() as u64)).map_err(Error::io(&path))?;
+        if std::fs::read(path).map_err(Error::io(path))? != text.as_bytes() {
+            let put = std::io::Write::write_all(&mut file, text.as_bytes());
+            put.and_then(|()| file.set_len(text.len() as u64)).map_err(Error::io(path))?;
         }
-        Ok(Some(file))
+        Ok(())
     }
 
     fn reserve(&self) -> Result<()> {

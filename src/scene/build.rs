@@ -4,7 +4,8 @@
 //! obstacles and moving walls of any other shape, water, bodies.
 
 use super::bodies;
-use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice};
+use super::lattice::{Cells, Grid, Lattice};
+use super::near::Near;
 use super::opening::Planned;
 use super::oriented::Placed;
 use super::placement::{Surroundings, point};
@@ -12,7 +13,7 @@ use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::{Flow, Water};
 use super::{Scene, Solid, wall_at};
-use crate::case::{self, Case, Law};
+use crate::case::{Case, Law};
 use crate::error::{CaseError, Problem, Result};
 use crate::periodic::Periodic;
 use glam::{DMat3, DVec3, IVec3};
@@ -270,7 +271,7 @@ impl<'a> Builder<'a> {
     fn beside_walls(&mut self) -> usize {
         let from = self.water.clear;
         for shape in &self.off_lattice {
-            self.water.remove(shape, (from, BLOCKED), &self.lattice, &mut self.grid);
+            self.water.remove(shape, from, &self.lattice, &mut self.grid);
         }
         self.water.clear = self.water.cell.len();
         self.water.clear - from
@@ -280,6 +281,12 @@ impl<'a> Builder<'a> {
         let case = self.case;
         let gravity = self.gravity();
         let law = case.contact.as_ref().map_or(Law::Smooth, |c| c.law);
+        let mut near = Near::default();
+        let add = |near: &mut Near, solid: &Solid| {
+            let (placed, reach) = (solid.placed(), solid.placed().bounds());
+            near.add(placed.center - reach, placed.center + reach);
+        };
+        self.moving_walls.iter().for_each(|wall| add(&mut near, wall));
         for (k, body) in case.body.iter().enumerate() {
             let made = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
             let mut solid = match made {
@@ -291,10 +298,10 @@ impl<'a> Builder<'a> {
                 }
             };
             self.thin(&format!("body.{k}"), &solid);
-            let earlier: Vec<&Solid> = self.moving_walls.iter().chain(&self.bodies).collect();
             let surroundings = Surroundings {
                 fixed: &self.fixed,
-                earlier: &earlier,
+                earlier: [&self.moving_walls, &self.bodies],
+                near: &near,
                 law,
                 spacing: case.run.spacing,
                 up: (gravity.length() > 0.0).then(|| -gravity.normalize()),
@@ -309,9 +316,9 @@ impl<'a> Builder<'a> {
             self.seams(&format!("body.{k}"), what, &solid.name, &solid.placed(), false);
             let shape = solid.placed();
             let wet = if body.displaces_fluid {
-                self.water.remove(&shape, (0, FREE), &self.lattice, &mut self.grid)
+                Water::displace(&shape, &self.lattice, &mut self.grid)
             } else {
-                self.water.inside(&shape, &self.lattice)
+                Water::inside(&shape, &self.lattice, &self.grid)
             };
             if wet > 0 && body.displaces_fluid {
                 self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
@@ -322,8 +329,10 @@ impl<'a> Builder<'a> {
                 let remedy = "set `displaces_fluid = true`, or move it out of the water";
                 self.problems.push(Problem::new(format!("body.{k}.displaces_fluid"), message, remedy));
             }
+            add(&mut near, &solid);
             self.bodies.push(solid);
         }
+        self.water.keep_what_is_left(&self.grid);
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }
@@ -347,75 +356,6 @@ impl<'a> Builder<'a> {
                 let remedy = "move the point onto a wall";
                 self.problems.push(Problem::new(format!("gauge.pressure.{k}.point"), message, remedy));
             }
-        }
-    }
-
-    /// Whether a box of the lattice ends at the periodic sides; a problem if not.
-    fn on_lattice(&mut self, key: &str, label: &str, (min, max): (case::Vector, case::Vector)) -> bool {
-        let cells = self.lattice.cells(min.into(), max.into());
-        let Some(tank) = self.tank else { return true };
-        let over =
-            |k: usize| self.periodic.is_along(k) && (cells.lo[k] < tank.lo[k] || cells.hi[k] > tank.hi[k]);
-        let Some((k, (low, high))) =
-            (0..3).filter(|&k| over(k)).find_map(|k| Some((k, self.periodic.sides(k)?)))
-        else {
-            return true;
-        };
-        let (axis, from, to) = (AXES[k], min[k], max[k]);
-        let message =
-            format!("{label} spans {axis} = {from} to {to} m, over the periodic sides at {low} and {high} m");
-        let remedy = "end it at the side, and put the rest, if there is any, at the opposite one";
-        self.problems.push(Problem::new(
-            format!("{key}.{}", if from < low { "min" } else { "max" }),
-            message,
-            remedy,
-        ));
-        false
-    }
-
-    /// Complains of a solid of any shape that reaches over a periodic side: half of it would be missing at the other one. A
-    /// fixed one that spans the whole axis goes on there.
-    pub(super) fn seams(&mut self, key: &str, what: &str, name: &str, shape: &Placed, fixed: bool) {
-        let (reach, slack) = (shape.bounds(), 1e-6 * self.lattice.spacing);
-        for k in 0..3 {
-            let Some((low, high)) = self.periodic.sides(k) else { continue };
-            let (from, to) = (shape.center[k] - reach[k], shape.center[k] + reach[k]);
-            let over = from < low - slack || to > high + slack;
-            if over && !(fixed && from <= low + slack && to >= high - slack) {
-                let axis = AXES[k];
-                let message = format!(
-                    "{what} `{name}` reaches from {axis} = {from:.4} to {to:.4} m, over a periodic side at {low} or {high} m"
-                );
-                let remedy = format!("keep it between them, or take \"{axis}\" out of tank.periodic");
-                self.problems.push(Problem::new(key, message, remedy));
-                return;
-            }
-        }
-    }
-
-    /// Axes along which a length changed by more than 1 % of the spacing.
-    fn changed(&self, off: DVec3) -> impl Iterator<Item = usize> + use<> {
-        let (limit, plane) = (0.01 * self.lattice.spacing, self.lattice.plane);
-        (0..3).filter(move |&k| !(plane && k == 1) && off[k] > limit)
-    }
-
-    /// Notes that a box's faces moved to the lattice.
-    fn rounded(&mut self, label: &str, min: DVec3, max: DVec3) {
-        let cells = self.lattice.cells(min, max);
-        let (lo, hi) = (self.lattice.corner(cells.lo), self.lattice.corner(cells.hi));
-        let off = (lo - min).abs().max((hi - max).abs());
-        let lines = self.changed(off).map(|k| {
-            format!("{} {:.4}..{:.4} m becomes {:.4}..{:.4} m", AXES[k], min[k], max[k], lo[k], hi[k])
-        });
-        let line = lines.collect::<Vec<_>>().join(", ");
-        if !line.is_empty() {
-            self.notes.push(format!("{label}: {line} at spacing {}", self.lattice.spacing));
-        }
-    }
-
-    fn taken(&mut self, label: &str, cells: usize) {
-        if cells > 0 {
-            self.notes.push(format!("{label}: {cells} cells left to the walls that already stand there"));
         }
     }
 }

@@ -4,6 +4,7 @@
 //! closer than d_c = sqrt(1.5) l0 (section 3 of the paper); otherwise two solids touch when their true
 //! surfaces meet.
 
+use super::near::Near;
 use super::oriented::Placed;
 use super::walls::Fixed;
 use super::{Shape, Solid, WallShape};
@@ -17,7 +18,9 @@ pub(crate) const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {
     pub fixed: &'a Fixed,
-    pub earlier: &'a [&'a Solid],
+    /// Moving walls, then bodies; numbered so in `near`.
+    pub earlier: [&'a [Solid]; 2],
+    pub near: &'a Near,
     pub law: Law,
     pub spacing: f64,
     /// Against gravity; `None` without gravity.
@@ -70,9 +73,24 @@ impl Surroundings<'_> {
         )))
     }
 
-    /// The fixed walls and earlier solids. Prescribed bodies may reach into what does not move under forces: a table
-    /// of motion is the user's word.
-    fn obstructions(&self, body: &Solid) -> Vec<Obstruction<'_>> {
+    /// The earlier solid of that number.
+    fn solid(&self, k: usize) -> &Solid {
+        let [walls, bodies] = self.earlier;
+        if k < walls.len() { &walls[k] } else { &bodies[k - walls.len()] }
+    }
+
+    /// Earlier solids that may be in the way of `body` on its way by `most` [m] along `up`, and a `margin` [m] beside it,
+    /// by their numbers. Prescribed bodies may reach into what does not move under forces: a table of motion is the
+    /// user's word.
+    fn near(&self, body: &Solid, up: DVec3, most: f64, margin: f64) -> impl Iterator<Item = (usize, &Solid)> {
+        let (low, high) = way(body, up, most, margin);
+        let free = body.is_free();
+        let found = self.near.meeting(low, high).into_iter().map(|k| (k, self.solid(k)));
+        found.filter(move |(_, solid)| free || solid.is_free())
+    }
+
+    /// The fixed walls, and the earlier solids near the way of `body` by `most` [m] along `up`.
+    fn obstructions(&self, body: &Solid, up: DVec3, most: f64) -> Vec<Obstruction<'_>> {
         let mut all = Vec::new();
         if body.is_free() {
             let wall = |w: &WallShape| Obstruction {
@@ -82,8 +100,8 @@ impl Surroundings<'_> {
             };
             all.extend(self.fixed.shapes.iter().map(wall));
         }
-        let solids = self.earlier.iter().filter(|s| body.is_free() || s.is_free());
-        all.extend(solids.map(|&s| Obstruction { name: solid_name(s), placed: s.placed(), solid: Some(s) }));
+        let solids = self.near(body, up, most, 0.0).map(|(_, s)| s);
+        all.extend(solids.map(|s| Obstruction { name: solid_name(s), placed: s.placed(), solid: Some(s) }));
         all
     }
 
@@ -92,7 +110,7 @@ impl Surroundings<'_> {
         // Lattices need not be in register, so that "paper" lets true surfaces overlap a little.
         let tolerance = if self.law == Law::Paper { 0.5 } else { 1e-6 } * self.spacing;
         let solid = self
-            .obstructions(body)
+            .obstructions(body, DVec3::ZERO, 0.0)
             .into_iter()
             .map(|b| {
                 let (overlap, out) = b.way_out(&own, body, tolerance);
@@ -123,9 +141,9 @@ impl Surroundings<'_> {
     }
 
     fn lift_surfaces(&self, body: &Solid, up: DVec3) -> f64 {
-        let all = self.obstructions(body);
         let start = body.placed();
         let most = 2.0 * start.reach(up).max(2.0 * self.spacing);
+        let all = self.obstructions(body, up, most);
         let mut total = 0.0;
         // Each round clears at least one shape for good, if they are convex: `up` never leads back into one.
         for _ in 0..MOST_LIFTS.max(all.len() + 1) {
@@ -171,22 +189,15 @@ impl Surroundings<'_> {
     fn pairs(&self, body: &Solid, up: DVec3, most: f64) -> Vec<Pair> {
         let d_c = CONTACT_DISTANCE * self.spacing;
         let own = body.placed();
-        let (lo, hi) = {
-            let (a, b) = (own.center, own.center + most * up);
-            let reach = own.bounds() + d_c;
-            (a.min(b) - reach, a.max(b) + reach)
-        };
+        let (lo, hi) = way(body, up, most, d_c);
         let near = |p: &DVec3| p.cmpge(lo).all() && p.cmple(hi).all();
-        let free = body.is_free();
         let mut others: Vec<(DVec3, Partner)> = Vec::new();
-        if free {
+        if body.is_free() {
             let walls = self.fixed.wall.iter().zip(&self.fixed.shape_of);
             others.extend(walls.filter(|(p, _)| near(p)).map(|(&p, &of)| (p, Partner::Wall(of))));
         }
-        for (k, solid) in self.earlier.iter().enumerate() {
-            if free || solid.is_free() {
-                others.extend(solid.wall_positions().filter(|p| near(p)).map(|p| (p, Partner::Solid(k))));
-            }
+        for (k, solid) in self.near(body, up, most, d_c) {
+            others.extend(solid.wall_positions().filter(|p| near(p)).map(|p| (p, Partner::Solid(k))));
         }
         // Columns along `up`, d_c wide: only neighbouring ones can hold pairs.
         let across = DMat3::from_cols(up.any_orthonormal_vector(), up.cross(up.any_orthonormal_vector()), up);
@@ -216,9 +227,17 @@ impl Surroundings<'_> {
             Partner::Wall(of) => {
                 self.fixed.shapes.get(of as usize).map_or("a wall".into(), |w| format!("wall `{}`", w.name))
             }
-            Partner::Solid(k) => solid_name(self.earlier[k]),
+            Partner::Solid(k) => solid_name(self.solid(k)),
         }
     }
+}
+
+/// The box around the way of `body` by `most` [m] along `up`, and a `margin` [m] beside it.
+fn way(body: &Solid, up: DVec3, most: f64, margin: f64) -> (DVec3, DVec3) {
+    let own = body.placed();
+    let (from, to) = (own.center, own.center + most * up);
+    let reach = own.bounds() + margin;
+    (from.min(to) - reach, from.max(to) + reach)
 }
 
 /// Most rounds of a lift out of shapes that are not convex.

@@ -1,6 +1,6 @@
 //! Water at t = 0: filling the free cells, making room for bodies, and looking for leaks.
 
-use super::lattice::{Cells, FACE, FLUID, FREE, Grid, Lattice, REACHED};
+use super::lattice::{BLOCKED, Cells, FACE, FLUID, FREE, Grid, Lattice, REACHED};
 use super::oriented::Placed;
 use super::placement::point;
 use super::walls::face_name;
@@ -162,42 +162,52 @@ impl Water {
     }
 
     /// Number of particles whose centres lie inside a shape or on its faces.
-    pub fn inside(&self, body: &Placed, lattice: &Lattice) -> usize {
+    pub fn inside(body: &Placed, lattice: &Lattice, grid: &Grid) -> usize {
         let margin = margin(body, lattice.spacing);
-        self.cell.iter().filter(|&&c| body.holds(lattice.center(c), margin)).count()
+        let near = around(body, lattice, grid).iter().filter(|&c| grid.get(c) == FLUID);
+        near.filter(|&c| body.holds(lattice.center(c), margin)).count()
     }
 
-    /// Removes as much water as a shape displaces, what lies deepest inside of it first: of the particles from the `from`-th on, whose
-    /// cells are `left` then. Returns how many.
-    pub fn remove(
-        &mut self,
-        body: &Placed,
-        (from, left): (usize, u8),
-        lattice: &Lattice,
-        grid: &mut Grid,
-    ) -> usize {
-        let l0 = lattice.spacing;
-        let reach = body.bounds() + l0;
-        let near = lattice.cells(body.center - reach, body.center + reach);
-        // Signed distance of a cell's centre, in whole percents of l0: of those on one face an even choice is taken.
-        let depth = |(k, &c): (usize, &IVec3)| {
-            let off = (near.contains(c)).then(|| body.distance(lattice.center(c)) / l0)?;
-            (off < 0.5 - 1e-6).then(|| ((100.0 * off).round() as i64, even(c), k, (0.5 - off).min(1.0)))
-        };
-        let mut cut: Vec<_> = self.cell.par_iter().enumerate().skip(from).filter_map(depth).collect();
-        let displaced: f64 = cut.iter().map(|(.., share)| share).sum();
-        cut.sort_by_key(|&(off, even, k, _)| (off, even, k));
-        cut.truncate(displaced.round() as usize);
-        let mut keep = vec![true; self.cell.len()];
-        for &(_, _, k, _) in &cut {
-            keep[k] = false;
-            grid.set(self.cell[k], left);
-        }
+    /// Takes as much water out of the grid as a body displaces, what lies deepest inside of it first. Returns how many
+    /// particles. [`Self::keep_what_is_left`] follows when all bodies have had theirs: each looks at the cells around it
+    /// alone.
+    pub fn displace(body: &Placed, lattice: &Lattice, grid: &mut Grid) -> usize {
+        let near: Vec<IVec3> = around(body, lattice, grid).iter().filter(|&c| grid.get(c) == FLUID).collect();
+        let cut = near.into_par_iter().filter_map(|c| cut(body, c, lattice).map(|cut| (cut, c)));
+        let cut = deepest(cut.collect());
+        cut.iter().for_each(|&c| grid.set(c, FREE));
+        cut.len()
+    }
+
+    /// Leaves out the particles whose cells no longer hold water.
+    pub fn keep_what_is_left(&mut self, grid: &Grid) {
+        self.keep(|_, c| grid.get(c) == FLUID);
+    }
+
+    /// Keeps the particles of which `left` says so, by number and cell.
+    fn keep(&mut self, left: impl Fn(usize, IVec3) -> bool) {
+        let keep: Vec<bool> = self.cell.iter().enumerate().map(|(k, &c)| left(k, c)).collect();
         let mut kept = keep.iter();
         self.cell.retain(|_| kept.next().copied().unwrap_or(true));
         let mut kept = keep.iter();
         self.velocity.retain(|_| kept.next().copied().unwrap_or(true));
-        cut.len()
+    }
+
+    /// Removes as much water as a wall displaces, what lies deepest inside of it first: of the particles from the
+    /// `from`-th on. Nothing enters their cells.
+    pub fn remove(&mut self, wall: &Placed, from: usize, lattice: &Lattice, grid: &mut Grid) {
+        let near = around(wall, lattice, grid);
+        let depth = |(k, &c): (usize, &IVec3)| {
+            let cut = near.contains(c).then(|| cut(wall, c, lattice))?;
+            cut.map(|cut| (cut, k))
+        };
+        let cut = deepest(self.cell.par_iter().enumerate().skip(from).filter_map(depth).collect());
+        let mut gone = vec![false; self.cell.len()];
+        for k in cut {
+            gone[k] = true;
+            grid.set(self.cell[k], BLOCKED);
+        }
+        self.keep(|k, _| !gone[k]);
     }
 
     /// Largest depth along gravity [m]: the highest column of cells where gravity follows an axis of the
@@ -275,17 +285,43 @@ impl Water {
     }
 }
 
-/// Where the way to the end of a leak first leaves the tank, or where it ends.
-fn leaves(queue: &[(IVec3, usize)], end: usize, tank: Option<Cells>) -> IVec3 {
+/// The way to the end of a leak, from that end back to the water.
+fn way_back(queue: &[(IVec3, usize)], end: usize) -> Vec<IVec3> {
     let mut path = vec![queue[end].0];
     let mut at = end;
     while queue[at].1 != usize::MAX {
         at = queue[at].1;
         path.push(queue[at].0);
     }
+    path
+}
+
+/// Where the way to the end of a leak first leaves the tank, or where it ends.
+fn leaves(queue: &[(IVec3, usize)], end: usize, tank: Option<Cells>) -> IVec3 {
     let outside = |c: &&IVec3| tank.is_some_and(|tank| !tank.contains(**c));
-    // It runs from its end back to the seed.
-    path.iter().rev().find(outside).copied().unwrap_or(queue[end].0)
+    way_back(queue, end).iter().rev().find(outside).copied().unwrap_or(queue[end].0)
+}
+
+/// Cells of the grid around a shape, a spacing beyond its box.
+fn around(shape: &Placed, lattice: &Lattice, grid: &Grid) -> Cells {
+    let reach = shape.bounds() + lattice.spacing;
+    let Cells { lo, hi } = lattice.cells(shape.center - reach, shape.center + reach);
+    Cells { lo: lo.max(grid.cells.lo), hi: hi.min(grid.cells.hi) }
+}
+
+/// What of a cell a shape displaces: signed distance of the cell's centre, in whole percents of l0, its place among
+/// those on one face, of which an even choice is taken, and the part of it [-]. `None` if that is nothing.
+fn cut(shape: &Placed, c: IVec3, lattice: &Lattice) -> Option<(i64, u64, f64)> {
+    let off = shape.distance(lattice.center(c)) / lattice.spacing;
+    (off < 0.5 - 1e-6).then(|| ((100.0 * off).round() as i64, even(c), (0.5 - off).min(1.0)))
+}
+
+/// The deepest of what is [`cut`], as many as its parts come to.
+fn deepest<T>(mut cut: Vec<((i64, u64, f64), T)>) -> Vec<T> {
+    let displaced: f64 = cut.iter().map(|((.., share), _)| share).sum();
+    cut.sort_by_key(|&((off, even, _), _)| (off, even));
+    cut.truncate(displaced.round() as usize);
+    cut.into_iter().map(|(_, of)| of).collect()
 }
 
 /// An order of cells, any part of which is spread evenly: the fractional part of a plane's multiples that no lattice repeats (Roberts 2018).
@@ -305,13 +341,7 @@ pub(super) fn margin(body: &Placed, spacing: f64) -> f64 {
 
 /// The message of a leak: where the path crosses the tank's interior, if there is one.
 fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Option<Cells>) -> Problem {
-    let mut at = end;
-    let mut path = vec![queue[at].0];
-    while queue[at].1 != usize::MAX {
-        at = queue[at].1;
-        path.push(queue[at].0);
-    }
-    let start = *path.last().unwrap_or(&queue[end].0);
+    let start = way_back(queue, end).last().copied().unwrap_or(queue[end].0);
     let Some(tank) = tank else {
         let message = format!("water at {} has nothing that holds it", point(lattice.center(start)));
         return Problem::new("tank", message, "give a [tank], or set run.gravity to zero for a free drop");
@@ -320,16 +350,15 @@ fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Optio
         let message = format!("water at {} lies outside of the tank", point(lattice.center(start)));
         return Problem::new("fluid.block", message, "make the block smaller or the tank larger");
     }
-    // The path runs from its end back to the water.
-    let out = path.iter().rev().find(|&&c| !tank.contains(c)).copied();
+    let out = leaves(queue, end, Some(tank));
     let face = (0..6).find(|&f| {
-        let (axis, c) = (f / 2, out.unwrap_or(queue[end].0));
-        if f % 2 == 0 { c[axis] < tank.lo[axis] } else { c[axis] >= tank.hi[axis] }
+        let axis = f / 2;
+        if f % 2 == 0 { out[axis] < tank.lo[axis] } else { out[axis] >= tank.hi[axis] }
     });
     let message = format!(
         "water can leave through {} at {}",
         face.map_or("the tank's side", face_name),
-        point(lattice.center(out.unwrap_or(queue[end].0)))
+        point(lattice.center(out))
     );
     Problem::new("tank.open", message, "remove that face from tank.open, or put a wall in front of it")
 }

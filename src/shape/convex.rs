@@ -1,7 +1,7 @@
 //! Rules for depth^8 over the parts of lines and rings that lie inside a shape.
 //!
-//! All shapes are convex, so that along a line the distance has one minimum: the part inside is one stretch,
-//! halved there. A ring may enter a shape several times.
+//! Along a line the distance from a convex shape has one minimum: the part inside is one stretch, halved there. A shape
+//! that is not convex gives its stretches one by one. A ring may enter a shape several times.
 
 /// Nodes and weights of Gauss's rule with five nodes on 0..1, exact to the ninth power.
 pub(crate) const GAUSS_5: [(f64, f64); 5] = [

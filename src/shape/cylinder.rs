@@ -1,7 +1,7 @@
 //! A cylinder with flat ends about the z axis of its frame: rings and a side, particles on rings.
 
 use super::surface::{Ring, Side, Surface};
-use super::{ALL_FACES, Faces, Geometry, Inside, Node, Particles, WallLayer, convex};
+use super::{ALL_FACES, Faces, Geometry, Inside, Particles, WallLayer};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -95,24 +95,6 @@ impl Geometry for Cylinder {
         }
         let end = start + length * along;
         start.z.min(end.z) < self.half_height + margin && start.z.max(end.z) > -self.half_height - margin
-    }
-
-    fn nodes(
-        &self,
-        (start, along, length): (DVec3, DVec3, f64),
-        faces: Faces,
-        _: f64,
-        visit: &mut dyn FnMut(Node, Inside),
-    ) {
-        let distance = |s: f64| {
-            let (d, gradient) = self.distance(start + s * along);
-            (d, gradient.dot(along))
-        };
-        convex::along(length, distance, |s, width| {
-            if let Some(inside) = self.depth(start + s * along, faces) {
-                visit(Node::point(s, width), inside);
-            }
-        });
     }
 
     /// Rings about the axis, a spacing apart in every direction.

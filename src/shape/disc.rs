@@ -1,7 +1,7 @@
 //! A round slice in the plane y = 0: the cylinder of two dimensions. It has no ends.
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, convex};
+use super::{Faces, Geometry, Inside, Particles, WallLayer};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -57,24 +57,6 @@ impl Geometry for Disc {
     fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool {
         let nearest = start + (-start.dot(along)).clamp(0.0, length) * along;
         self.distance(nearest).0 < margin
-    }
-
-    fn nodes(
-        &self,
-        (start, along, length): (DVec3, DVec3, f64),
-        faces: Faces,
-        _: f64,
-        visit: &mut dyn FnMut(Node, Inside),
-    ) {
-        let distance = |s: f64| {
-            let (d, gradient) = self.distance(start + s * along);
-            (d, gradient.dot(along))
-        };
-        convex::along(length, distance, |s, width| {
-            if let Some(inside) = self.depth(start + s * along, faces) {
-                visit(Node::point(s, width), inside);
-            }
-        });
     }
 
     /// Rings a spacing apart, the outermost half of one below the rim.

@@ -253,8 +253,19 @@ pub trait Geometry: std::fmt::Debug + Sync {
     fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool;
 
     /// Calls `visit` with every node of the rule that integrates depth^8, and its depth, over the stretch `start` + s `along`, s in 0..`length`. One of which length times
-    /// depth^8 stays below `least` may be left out.
-    fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, least: f64, visit: &mut dyn FnMut(Node, Inside));
+    /// depth^8 stays below `least` may be left out. As it is here that of a convex shape.
+    fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, _: f64, visit: &mut dyn FnMut(Node, Inside)) {
+        let (start, way, length) = line;
+        let distance = |s: f64| {
+            let (d, gradient) = self.distance(start + s * way);
+            (d, gradient.dot(way))
+        };
+        along(length, distance, |s, width| {
+            if let Some(inside) = self.depth(start + s * way, faces) {
+                visit(Node::point(s, width), inside);
+            }
+        });
+    }
 
     /// Particles about `spacing` [m] apart: the wall layer and what lies below it, hollow beyond `layers`.
     fn particles(&self, spacing: f64, dimensions: u32, layers: i32) -> Particles;

@@ -1,7 +1,7 @@
 //! A sphere: one ball of a surface, particles on concentric layers.
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, areas, convex};
+use super::{Faces, Geometry, Inside, Particles, WallLayer, areas};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -51,24 +51,6 @@ impl Geometry for Sphere {
     fn line_is_near(&self, start: DVec3, along: DVec3, length: f64, margin: f64) -> bool {
         let nearest = start + (-start.dot(along)).clamp(0.0, length) * along;
         nearest.length() < self.radius + margin
-    }
-
-    fn nodes(
-        &self,
-        (start, along, length): (DVec3, DVec3, f64),
-        faces: Faces,
-        _: f64,
-        visit: &mut dyn FnMut(Node, Inside),
-    ) {
-        let distance = |s: f64| {
-            let (d, gradient) = self.distance(start + s * along);
-            (d, gradient.dot(along))
-        };
-        convex::along(length, distance, |s, width| {
-            if let Some(inside) = self.depth(start + s * along, faces) {
-                visit(Node::point(s, width), inside);
-            }
-        });
     }
 
     /// Layers a spacing apart, the outermost half of one below the surface; on each a Fibonacci lattice.

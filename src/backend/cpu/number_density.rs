@@ -6,6 +6,7 @@ use crate::fields::State;
 use crate::kernels::Particles;
 use crate::kernels::number_density::{free_surface, pair_weight};
 use crate::neighbours::Chunk;
+use glam::DVec3;
 
 wide! {
     /// Weights, number densities and states of the slots from `first` on, of which those below `live` hold fluid.
@@ -21,7 +22,8 @@ wide! {
         for k in 0..density.len() {
             let (i, range) = (first + k, chunk.range(k));
             if range.is_empty() {
-                (density[k], state[k]) = (0.0, if i < live { State::Surface } else { State::Inactive });
+                let alone = || free_surface(0.0, || DVec3::ZERO, on.params);
+                (density[k], state[k]) = (0.0, if i < live { alone() } else { State::Inactive });
                 continue;
             }
             let neighbour = &chunk.neighbour[range.clone()];

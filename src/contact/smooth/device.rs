@@ -443,7 +443,7 @@ fn read(pair: &Pair, record: &SmoothPair, sums: &[[f32; 4]], bodies: &[Body]) ->
             [s[3], [s[1][3]; 4], [s[2][3]; 4], [s[3][3]; 4]].map(|v| v.map(f64::from));
         let own = DMat3::from_cols_array(&[xx[0], xy[0], zx, xy[0], yy[0], yz, zx, yz, zz]);
         let spread = a.rotation * own * a.rotation.transpose();
-        Patch::new(key, force, f64::from(s[0][3]), at, spread)
+        Patch::new(key.into(), force, f64::from(s[0][3]), at, spread)
     });
     let patches = patches.collect();
     // The same forces at the same points act on B, so their moment about its centre follows.

@@ -92,14 +92,20 @@ fn shared(scene: &Scene) -> Vec<Arc<Surface>> {
     let equal = |a: &Solid, b: &Solid| {
         a.shape == b.shape && a.wall_offset == b.wall_offset && a.wall_to_surface == b.wall_to_surface
     };
-    let mut made: Vec<(&Solid, Arc<Surface>)> = vec![];
-    let of = |solid| match made.iter().find(|(known, _)| equal(known, solid)) {
-        Some((_, surface)) => surface.clone(),
-        None => {
-            let surface = Arc::new(solid.surface(scene.spacing, scene.dimensions));
-            made.push((solid, surface.clone()));
-            surface
+    // what is equal is so in this; a hundred thousand that are not need not all be compared
+    let mark = |solid: &Solid| {
+        let last = solid.wall_offset.last().copied().unwrap_or_default();
+        (solid.wall_offset.len(), last.to_array().map(f64::to_bits))
+    };
+    let mut made: HashMap<_, Vec<(&Solid, Arc<Surface>)>> = HashMap::new();
+    let of = |solid| {
+        let alike = made.entry(mark(solid)).or_default();
+        if let Some((_, surface)) = alike.iter().find(|(known, _)| equal(known, solid)) {
+            return surface.clone();
         }
+        let surface = Arc::new(solid.surface(scene.spacing, scene.dimensions));
+        alike.push((solid, surface.clone()));
+        surface
     };
     scene.solids.iter().map(of).collect()
 }

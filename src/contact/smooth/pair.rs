@@ -2,7 +2,7 @@
 
 use super::constants::{Constants, felt};
 use super::frame::{Frame, View};
-use super::patch::{Contact, DeviceSums, Patch, place, square};
+use super::patch::{Contact, DeviceSums, Patch, edge_key, place, square};
 use super::round;
 use super::walls::WallBox;
 use crate::body::{Body, Pose, Wrench};
@@ -147,7 +147,7 @@ impl Pair {
     /// Deepest points [m] inside the first and inside the second solid. Of what a device has found only one is
     /// known, which may be either.
     pub fn deepest(&self) -> (f64, f64) {
-        let in_first = |c: &Contact| (8..32).contains(&c.patch) || c.patch >= 64;
+        let in_first = |c: &Contact| if c.patch < 32 { c.patch >= 8 } else { c.patch % 2 == 1 };
         self.contacts.iter().fold((0.0, 0.0), |(a, b): (f64, f64), c| {
             if in_first(c) { (a.max(c.depth), b) } else { (a, b.max(c.depth)) }
         })
@@ -393,21 +393,21 @@ impl Pair {
         let view = View::new(own.center, own.axes, other, least);
         for &k in &edges_a {
             let line = surfaces[self.a].edges[k as usize];
-            self.press_edge(line, &view, share * line.density, 1.0, 32 + k as u8, bodies);
+            self.press_edge(line, &view, share * line.density, 1.0, k, bodies);
         }
         match self.b {
             Other::Solid(b) => {
                 let view = View::new(other.center, other.axes, own, least);
                 for &k in &edges_b {
                     let line = surfaces[b].edges[k as usize];
-                    self.press_edge(line, &view, share * line.density, -1.0, 64 + k as u8, bodies);
+                    self.press_edge(line, &view, share * line.density, -1.0, k, bodies);
                 }
             }
             Other::Wall(w) => {
                 let view = View::new(DVec3::ZERO, DMat3::IDENTITY, own, least);
                 let density = surfaces[self.a].smallest_weight / spacing;
                 for &k in &edges_b {
-                    self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, 64 + k as u8, bodies);
+                    self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, k, bodies);
                 }
             }
         }
@@ -447,11 +447,11 @@ impl Pair {
     ///
     /// An edge that lies in a face belongs to the face's patch; one that crosses an edge makes its own,
     /// so that friction acts across the cross product of both.
-    fn press_edge(&mut self, line: Line, view: &View, density: f64, sign: f64, key: u8, bodies: &[Body]) {
+    fn press_edge(&mut self, line: Line, view: &View, density: f64, sign: f64, edge: u32, bodies: &[Body]) {
         let other = &view.other;
         let start = view.turn * line.start + view.shift;
         let along = view.turn * line.along;
-        let first = self.contacts.len();
+        let (first, key) = (self.contacts.len(), edge_key(edge, sign < 0.0));
         let mut push = DVec3::ZERO;
         let least = view.least / density;
         // places and velocities are linear along the edge: each node adds its share to those at the start
@@ -482,7 +482,7 @@ impl Pair {
         let axis = toward.max_position();
         if toward[axis] > ALONG_NORMAL * push.length() {
             let face = 2 * axis as u8 + u8::from(push[axis] > 0.0);
-            let patch = if sign > 0.0 { face } else { 8 + face };
+            let patch = u32::from(if sign > 0.0 { face } else { 8 + face });
             self.contacts[first..].iter_mut().for_each(|c| c.patch = patch);
         }
     }

@@ -18,12 +18,21 @@ pub(crate) struct Contact {
     /// Deviation of the place of the force that it stands for, along an edge, world [m].
     pub stretch: DVec3,
     pub force: f64,
-    pub patch: u8,
+    /// The patch that it belongs to: the face that presses, 8 more for one of the first solid; or an edge, see
+    /// [`edge_key`].
+    pub patch: u32,
+}
+
+/// Number of the patch of an edge that crosses another one: of the `second` solid of the pair, or of the first. A wall's
+/// edges may be many, where others cover parts of them.
+pub(super) fn edge_key(edge: u32, second: bool) -> u32 {
+    32 + 2 * edge + u32::from(second)
 }
 
 impl Contact {
     /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
     pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
+        let patch = patch.into();
         Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, patch }
     }
 
@@ -31,8 +40,8 @@ impl Contact {
     /// cross.
     pub fn face(&self) -> Option<u8> {
         match self.patch {
-            patch @ 0..6 => Some(patch),
-            patch @ 8..14 => Some(patch - 2),
+            patch @ 0..6 => Some(patch as u8),
+            patch @ 8..14 => Some(patch as u8 - 2),
             _ => None,
         }
     }
@@ -65,8 +74,8 @@ pub(crate) struct DeviceSums {
 /// All points pressed by one face: where friction acts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
-    /// Which face, of which of the two solids.
-    pub key: u8,
+    /// Which face or edge, of which of the two solids; as [`Contact::patch`].
+    pub key: u32,
     /// Direction of the normal force on the first solid.
     pub normal: DVec3,
     /// Centre of the normal force [m].
@@ -82,13 +91,13 @@ pub(crate) struct Patch {
 impl Patch {
     /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
     /// second moments about it [m2].
-    pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
+    pub fn new(key: u32, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
         Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, spread }
     }
 }
 
 /// Place of the patch `key`. Contacts of one mostly follow each other: that at `last` is looked at first.
-pub(super) fn place(patches: &[Patch], key: u8, last: usize) -> Option<usize> {
+pub(super) fn place(patches: &[Patch], key: u32, last: usize) -> Option<usize> {
     let same = patches.get(last).is_some_and(|p| p.key == key);
     if same { Some(last) } else { patches.iter().position(|p| p.key == key) }
 }

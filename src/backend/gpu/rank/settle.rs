@@ -11,6 +11,7 @@ use crate::backend::gpu::buffers;
 use crate::backend::gpu::layout::word_of;
 use crate::cells::Grid;
 use crate::error::{Error, Result};
+use crate::kernels::cell_list::counting_sort;
 use crate::kernels::device::halo as kernel;
 use crate::kernels::device::of_halo::buffer;
 use crate::kernels::move_solids::move_solids;
@@ -192,10 +193,13 @@ impl GpuRank {
         context.pass([(kernel::column_starts, groups(columns + 1))])?;
         self.starts = context.download(buffer::column_start, columns + 1)?;
         self.find_walls();
-        let (starts, walls) = (&self.starts, &self.walls.column);
+        // By column once: a rank asks for each of its own, and walls are many.
+        let (mut first, mut order) = (Vec::new(), Vec::new());
+        counting_sort(&self.walls.column, columns, &mut first, &mut order);
+        let starts = &self.starts;
         let of = |c: u32| -> Vec<u32> {
-            let at = walls.iter().enumerate().filter(|(_, column)| **column == c);
-            at.map(|(k, _)| (fluid + k) as u32).collect()
+            let (from, to) = (first[c as usize] as usize, first[c as usize + 1] as usize);
+            order[from..to].iter().map(|&k| fluid as u32 + k).collect()
         };
         self.share.set_borders(|c| starts[c as usize] as usize, of);
         self.live = starts[columns] as usize;

@@ -1,0 +1,97 @@
+//! What ends a run before its end: steps that become too short, water that is lost or collapses, bodies that leave, and what is
+//! no number.
+
+use super::Simulation;
+use crate::backend::Counters;
+use crate::error::Result;
+use crate::monitor::FluidMonitor;
+use crate::params::Step;
+use crate::plan::Stage;
+
+/// Steps between looks at the counters and the fastest particles.
+const LOOK_EVERY: u64 = 10;
+/// Part of the fluid that may get lost before the run is stopped.
+const LOST_MAX: f64 = 0.02;
+/// An adaptive step this much shorter than the typed one is that of a run that will not end.
+const SHORTEST_STEP: f64 = 1e-6;
+
+impl Simulation {
+    /// An error if a step has become so short that the run would not end.
+    pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
+        if step.dt < SHORTEST_STEP * self.case.run.time_step {
+            let what = format!(
+                "the flow or a solid asks for steps of {:.1e} s, the run would not end; water that has no room left (more of it in a \
+                 closed tank than that holds, a piston into a part that is full) is pressed like this: leave it a way out",
+                step.dt
+            );
+            return Err(self.diverged(step, Stage::Predict, what));
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_bodies(&self, step: &Step) -> Result<()> {
+        let (min, max) = (self.params.domain_min, self.params.domain_max);
+        for (k, pose) in self.solids.poses().iter().enumerate() {
+            let x = pose.position;
+            let name = self.solids.name(k);
+            if !(x.is_finite() && pose.velocity.is_finite() && pose.angular_velocity.is_finite()) {
+                return Err(self.diverged(
+                    step,
+                    Stage::Contact,
+                    format!("{name}: the motion is not a number"),
+                ));
+            }
+            let bounded =
+                |k: &usize| !(self.params.periodic.is_along(*k) || self.params.dimensions == 2 && *k == 1);
+            if (0..3).filter(bounded).any(|k| x[k] < min[k] || x[k] > max[k]) {
+                let what = format!(
+                    "{name} left the domain at ({:.4}, {:.4}, {:.4}) m; a wall is missing there, or contact.spring is \
+                     too soft for this fall",
+                    x.x, x.y, x.z
+                );
+                return Err(self.diverged(step, Stage::Contact, what));
+            }
+        }
+        Ok(())
+    }
+
+    /// Look at the guards and at the speed of the flow, every few steps.
+    pub(crate) fn look(&mut self, step: &Step) -> Result<Option<(FluidMonitor, Counters)>> {
+        if !self.plan.wet() || !self.steps.is_multiple_of(LOOK_EVERY) {
+            return Ok(None);
+        }
+        let (monitor, counters) = self.observe()?;
+        self.check(&counters, step)?;
+        (self.speed, self.fastest) = (monitor.speed_most, monitor.speed_max);
+        if !monitor.kinetic.is_finite() {
+            return Err(self.diverged(step, Stage::Correct, "the kinetic energy is not a number".into()));
+        }
+        Ok(Some((monitor, counters)))
+    }
+
+    /// An error if the guards have seen something that ends a run.
+    pub fn check(&self, counters: &Counters, step: &Step) -> Result<()> {
+        if let Some((slot, neighbours)) = counters.overflow {
+            let what = format!(
+                "particle slot {slot} has {neighbours} neighbours, more than the lists hold (a full lattice has {}): \
+                 the fluid has collapsed onto itself; use a smaller time step or a larger fluid.sound_speed",
+                self.params.neighbours
+            );
+            return Err(self.diverged(step, Stage::NeighbourList, what));
+        }
+        if let Some(particle) = counters.non_finite {
+            let what = format!("the velocity of particle {particle} is not a number");
+            return Err(self.diverged(step, Stage::Correct, what));
+        }
+        let fluid = self.scene.water() as u64 + self.openings.total_emitted();
+        if counters.lost as f64 > (LOST_MAX * fluid as f64).max(10.0) {
+            let what = format!(
+                "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began, and \
+                 enlarge run.domain if they may go there",
+                counters.lost, fluid
+            );
+            return Err(self.diverged(step, Stage::CellList, what));
+        }
+        Ok(())
+    }
+}
