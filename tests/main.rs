@@ -14,6 +14,7 @@ mod contact;
 mod contact_device;
 mod contact_forces;
 mod contact_hard;
+mod contact_impacts;
 mod device;
 mod errors;
 mod examples;

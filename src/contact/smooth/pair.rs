@@ -1,5 +1,6 @@
 //! A pair of solids under the smooth law: what of each lies in the other, forces, friction patches.
 
+use super::answer::Mode;
 use super::constants::{Constants, felt};
 use super::frame::{Frame, View};
 use super::patch::{Contact, DeviceSums, Patch, place, square};
@@ -170,7 +171,7 @@ impl Pair {
 
     /// Finds the contacts that a device does not look for, those of edges and of walls' corners. Those pressed
     /// by a face in `open` (bits 0 to 5: of `b`, 6 to 11: of `a`) are to be given to the device; of the
-    /// others, their deepest depth d [m], and the sums of w_i (d_i / d)^8 and w_i (d_i / d)^6.
+    /// others, their deepest depth d [m], and their sums over it.
     pub fn find_beside_device(
         &mut self,
         bodies: &[Body],
@@ -178,12 +179,12 @@ impl Pair {
         walls: &[WallBox],
         spacing: f64,
         open: u32,
-    ) -> [f64; 3] {
+    ) -> (f64, Mode) {
         self.contacts.clear();
         self.given.clear();
         self.points = 0;
         if self.is_empty() {
-            return [0.0; 3];
+            return (0.0, Mode::default());
         }
         // its lists of points are empty
         self.find(bodies, surfaces, walls);
@@ -198,8 +199,7 @@ impl Pair {
             !on_face
         });
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
-        let sum = |power: i32| self.contacts.iter().map(|c| c.weight * (c.depth / deepest).powi(power)).sum();
-        if deepest > 0.0 { [deepest, sum(8), sum(6)] } else { [0.0; 3] }
+        (deepest, Mode::of(&self.contacts, deepest, bodies[self.a].pose.position))
     }
 
     /// Joins the contacts kept beside the device with what it sums over its own and those it was given.
@@ -212,7 +212,7 @@ impl Pair {
         self.count = sums.count + self.contacts.len();
         if sums.count == 0 {
             if !self.contacts.is_empty() {
-                self.press();
+                self.press(bodies);
                 self.sum(bodies);
             }
             return;
@@ -329,7 +329,7 @@ impl Pair {
         }
         self.count = self.contacts.len();
         if !self.contacts.is_empty() {
-            self.press();
+            self.press(bodies);
             self.sum(bodies);
         }
     }
@@ -490,9 +490,9 @@ impl Pair {
     /// Normal forces of the points: the pair's spring and dashpot, no tension.
     ///
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
-    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i. The second spring
-    /// brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
-    fn press(&mut self) {
+    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i, nor on where that is: see [`Mode`].
+    /// The second spring brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
+    fn press(&mut self, bodies: &[Body]) {
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
         let per_deepest = deepest.recip();
@@ -500,12 +500,19 @@ impl Pair {
         let mean = sum.sqrt().sqrt().sqrt();
         let depth = deepest * mean;
         self.depth = deepest;
-        let shares = self.contacts.iter().map(|c| c.share(depth)).sum();
-        self.push(depth, shares);
+        let shares: f64 = self.contacts.iter().map(|c| c.share(depth)).sum();
+        let answers = if self.constants.mass > 0.0 {
+            let second = self.b.solid().map(|b| (&bodies[b], image(&bodies[b], self.image)));
+            let mode = Mode::of(&self.contacts, deepest, bodies[self.a].pose.position);
+            mode.share(self.constants.mass, &bodies[self.a], second)
+        } else {
+            1.0
+        };
+        self.push(depth, shares / answers);
     }
 
     /// Normal forces of the points and the energy, at the effective depth `depth` [m] and the sum of all
-    /// shares.
+    /// shares over the share of the mass that answers.
     fn push(&mut self, depth: f64, shares: f64) {
         let k = self.constants;
         let (secant, energy) = k.stored(depth);

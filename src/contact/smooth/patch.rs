@@ -54,7 +54,7 @@ pub(crate) struct DeviceSums {
     pub depth: f64,
     /// Deepest of all contacts [m].
     pub deepest: f64,
-    /// Sum of the s_i of all contacts.
+    /// Sum of the s_i of all contacts, over the share of the mass that answers.
     pub shares: f64,
     /// Wrenches on the two solids, of these.
     pub wrench: [Wrench; 2],
