@@ -1,6 +1,7 @@
 // Contact of true surfaces: which points of one solid come near the other's box (`search`), and the normal forces of a
 // pair of solids (`force`),
-//   D = (sum_i w_i d_i^8)^(1/8),  f_i = s_i (K d_i - C v_i) >= 0,  s_i = w_i (d_i / D)^6.
+//   D = (sum_i w_i d_i^8)^(1/8),  f_i = s_i (K d_i - C v_i) >= 0,  s_i = w_i (d_i / D)^6,
+// with C for the mass that answers the contact where it is (src/contact/smooth/answer.rs).
 // Twin: src/contact/smooth/mod.rs
 //
 // Edges are integrated on the host. What they bring to a face is taken in as more points; where two edges cross, only
@@ -38,7 +39,8 @@ struct SmoothPair {
     skin: f32,
     open: u32, // faces with a result: bits 0 to 5 of B's box, 6 to 11 of A's
     pairs: u32, // how many there are
-    pad: vec2u,
+    mass: f32,  // that the damping is for; 0: damped as it is
+    pad: u32,
 }
 
 // Where the two are now.
@@ -55,6 +57,14 @@ struct SmoothPose {
     above_a: vec4f,
     // Crossings of edges, which the host keeps: their deepest depth d, sums of w (d_i / d)^8 and of w (d_i / d)^6.
     found: vec4f,
+    // Of them sums of w (d_i / d)^7 n_i, and its moment about A's centre, A's frame.
+    found_push: vec4f,
+    found_moment: vec4f,
+    // Sum of the inverse masses, inverse inertia of A and of B, A's frame: diagonal, then yz, zx and xy; w of the
+    // diagonals: from B's centre to A's.
+    gives: array<vec4f, 2>,
+    turns_a: array<vec4f, 2>,
+    turns_b: array<vec4f, 2>,
     // Contacts that the host has found on faces: first and count in `contact_given`; z: place of the states.
     given: vec4u,
 }
@@ -242,6 +252,25 @@ fn joined(before: vec4f, next: vec4f, turn: u32) -> vec4f {
     return before + next;
 }
 
+// v M v of a symmetric matrix.
+fn form(m: array<vec4f, 2>, v: vec3f) -> f32 {
+    return dot(m[0].xyz, v * v) + 2.0 * dot(m[1].xyz, v.yzx * v.zxy);
+}
+
+// Share of the mass that answers a contact, from its sums of w d^6, w d^8 and w d^7 n and the moment of that.
+fn answering(n: u32, sixth: f32, eighth: f32, push: vec3f, moment: vec3f) -> f32 {
+    let mass = smooth_pair[n].mass;
+    let gives = smooth_pose[n].gives;
+    let turns_a = smooth_pose[n].turns_a;
+    let turns_b = smooth_pose[n].turns_b;
+    let between = vec3f(gives[0].w, turns_a[0].w, turns_b[0].w);
+    let response = form(gives, push) + form(turns_a, moment) + form(turns_b, moment + cross(between, push));
+    if mass == 0.0 || response <= 0.0 {
+        return 1.0;
+    }
+    return min(sixth * eighth / (response * mass), 1.0);
+}
+
 fn near_points(n: u32) -> u32 {
     return smooth_pair[n].near.x + smooth_pair[n].near.y;
 }
@@ -266,7 +295,7 @@ fn force_wide(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
 }
 
 // Result of a pair, zeros if nothing touches but crossings: D, the deepest depth, contacts without crossings, sum of
-// shares. Then of each face of B, and of A, that is open: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
+// shares over the share of the mass that answers. Then of each face of B, and of A, that is open: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
 // of the force; that centre, seen from A's.
 //
 // The threads' sums meet in GROUP places. Where there are more threads they bring them by turns, GROUP at a time: the
@@ -359,41 +388,57 @@ fn press(n: u32, t: u32, width: u32) {
     var eighth = 0.0;
     var sixth = 0.0;
     var touching = 0.0;
+    var seventh = vec3f(0.0);
+    var turned = vec3f(0.0);
     for (var m = t; m < total; m += width) {
-        let depth = contact_state[state + 3u * m].w;
+        let normal = contact_state[state + 3u * m];
+        let depth = normal.w;
         if depth > 0.0 {
             let x = depth / deepest;
             let x2 = x * x;
             let share = contact_state[state + 3u * m + 2u].x * x2 * x2 * x2;
+            let way = share * x * normal.xyz;
             sixth += share;
             eighth += share * x2;
             touching += 1.0;
+            seventh += way;
+            turned += cross(contact_state[state + 3u * m + 1u].xyz, way);
         }
     }
     for (var k = 0u; k < turns; k++) {
         if turn == k {
+            part_x[seat] = joined(part_x[seat], vec4f(seventh, 0.0), k);
             part_y[seat] = joined(part_y[seat], vec4f(eighth, sixth, touching, 0.0), k);
+            part_z[seat] = joined(part_z[seat], vec4f(turned, 0.0), k);
         }
         workgroupBarrier();
     }
     if t < 8u {
         for (var k = t + 8u; k < GROUP; k += 8u) {
+            part_x[t] += part_x[k];
             part_y[t] += part_y[k];
+            part_z[t] += part_z[k];
         }
     }
     workgroupBarrier();
     var parts = part_y[0];
+    var way = part_x[0].xyz;
+    var moving = part_z[0].xyz;
     for (var k = 1u; k < 8u; k++) {
         parts += part_y[k];
+        way += part_x[k].xyz;
+        moving += part_z[k].xyz;
     }
     let ratio = added.x / deepest;
     let sixth_power = ratio * ratio * ratio * ratio * ratio * ratio;
     parts.x += added.y * sixth_power * ratio * ratio;
     parts.y += added.z * sixth_power;
+    way += sixth_power * ratio * smooth_pose[n].found_push.xyz;
+    moving += sixth_power * ratio * smooth_pose[n].found_moment.xyz;
     let mean = sqrt(sqrt(sqrt(parts.x)));
     let depth = deepest * mean;
     let to_mean = 1.0 / (mean * mean * mean * mean * mean * mean);
-    let shares = parts.y * to_mean;
+    let shares = parts.y * to_mean / answering(n, parts.y, parts.x, way, moving);
     let spring = smooth_pair[n].spring;
     let beyond = max(depth - smooth_pair[n].stop_depth, 0.0);
     let secant = spring + (smooth_pair[n].stop - spring) * beyond / depth;
@@ -445,7 +490,7 @@ fn press(n: u32, t: u32, width: u32) {
             at += f * arm;
         }
     }
-    // `part_y` is still read for `parts`.
+    // `part_y` is still read for `parts`, and the others were: all threads have been at the barrier above.
     for (var k = 0u; k < turns; k++) {
         if turn == k {
             part_x[seat] = joined(part_x[seat], push, k);

@@ -365,12 +365,29 @@ fn structs_lie_the_same_on_both_sides() {
             skin,
             open,
             pairs,
+            mass,
             pad,
         }
     );
     same_layout!(
         "contact_smooth",
-        SmoothPose { row_x, row_y, row_z, spin, below_b, above_b, below_a, above_a, found, given }
+        SmoothPose {
+            row_x,
+            row_y,
+            row_z,
+            spin,
+            below_b,
+            above_b,
+            below_a,
+            above_a,
+            found,
+            found_push,
+            found_moment,
+            gives,
+            turns_a,
+            turns_b,
+            given,
+        }
     );
     same_layout!("contact_paper", PaperPair { first, near, count });
     same_layout!("contact_paper", PaperBlock { pair, first, count, list, blocks });

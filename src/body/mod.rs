@@ -43,6 +43,8 @@ pub(crate) struct Body {
     pub principal: DVec3,
     /// `true` for rotations about world axes that are locked.
     pub locked_rotation: [bool; 3],
+    /// Impulse [N s] and angular impulse [N m s] of contact since they were last taken, whether or not the solid gives way.
+    pub touched: Wrench,
     /// Shape, in the body's frame.
     pub shape: Shape,
     /// Place and orientation at the start, and tables of motion, of a prescribed solid.
@@ -68,6 +70,7 @@ impl Body {
             mass: f64::INFINITY,
             principal: DVec3::INFINITY,
             locked_rotation: [true; 3],
+            touched: Wrench::default(),
             shape: solid.shape,
             motion: None,
             isotropic: false,
@@ -155,6 +158,12 @@ impl Body {
         let locked = self.locked_rotation;
         self.momentum += DVec3::from_array([0, 1, 2].map(|k| if locked[k] { 0.0 } else { angular[k] }));
         self.pose.angular_velocity = self.inverse_inertia * self.momentum;
+    }
+
+    /// As [`Body::kick`], by another solid.
+    pub fn touch(&mut self, impulse: DVec3, angular: DVec3) {
+        self.touched += Wrench { force: impulse, torque: angular };
+        self.kick(impulse, angular);
     }
 
     /// Moves the free body for `h` [s] with the velocity it has. A free turn keeps momentum and energy to

@@ -164,7 +164,8 @@ impl Solids {
         self.bodies.iter().map(|b| b.fastest(t, dt)).fold(0.0, f64::max)
     }
 
-    /// Mean contact wrench over the last step, one per solid (friction included).
+    /// Mean wrench of contact over the last step, friction included, one per solid: of what is held or driven, too,
+    /// and nothing of what holds it.
     pub fn contact_wrenches(&self) -> &[Wrench] {
         &self.contact
     }
@@ -214,7 +215,7 @@ impl Solids {
         self.bodies.iter_mut().for_each(|b| b.follow(t, dt));
         let cut = self.hurry(cut, t, dt)?;
         let mut report = ContactReport { omega_dt: cut.omega_dt, ..ContactReport::default() };
-        let before: Vec<(DVec3, DVec3)> = self.bodies.iter().map(|b| (b.pose.velocity, b.momentum)).collect();
+        self.bodies.iter_mut().for_each(|b| b.touched = Wrench::default());
         for step in 0..cut.substeps {
             let (mut part, mut parts) = (0, if cut.all { cut.parts } else { 1 });
             while part < parts {
@@ -255,18 +256,11 @@ impl Solids {
         self.bring_back();
         for (k, body) in self.bodies.iter_mut().enumerate() {
             self.poses[k] = body.pose;
-            if !body.is_free() {
-                continue;
-            }
-            if !body.pose.is_finite() {
+            self.contact[k] = Wrench { force: body.touched.force / dt, torque: body.touched.torque / dt };
+            if body.is_free() && !body.pose.is_finite() {
                 let what = format!("body \"{}\" has a position or velocity that is no number", self.names[k]);
                 return Err(Error::Diverged { step: 0, time: t, stage: "contact", what });
             }
-            let (velocity, momentum) = before[k];
-            self.contact[k] = Wrench {
-                force: body.mass * ((body.pose.velocity - velocity) / dt - self.gravity) - fluid[k].force,
-                torque: (body.momentum - momentum) / dt - fluid[k].torque,
-            };
         }
         Ok(report)
     }
@@ -356,6 +350,7 @@ impl Solids {
             law.add_loads(&mut self.load);
         }
         for ((body, load), fluid) in self.bodies.iter_mut().zip(&self.load).zip(fluid) {
+            body.touched.add(span, load);
             if body.is_free() {
                 let steady = body.mass * self.gravity + fluid.force;
                 body.kick(h * steady + span * load.force, h * fluid.torque + span * load.torque);

@@ -47,7 +47,7 @@ pub(crate) fn collide(
         let impulse = -(1.0 + restitution) * approach / response * e;
         let kick = |body: &mut Body, middle: DVec3, impulse: DVec3| {
             let angular = (middle - body.pose.position).cross(impulse);
-            body.kick(impulse, angular);
+            body.touch(impulse, angular);
         };
         kick(&mut bodies[pair.a], middle, impulse);
         if let Some(b) = pair.b {

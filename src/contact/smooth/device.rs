@@ -48,7 +48,8 @@ pub struct SmoothPair {
     pub skin: f32,
     pub open: u32,
     pub pairs: u32,
-    pub pad: [u32; 2],
+    pub mass: f32,
+    pub pad: u32,
 }
 
 /// See `SmoothPose` in shaders/contact_smooth.wgsl.
@@ -65,6 +66,11 @@ pub struct SmoothPose {
     pub below_a: [f32; 4],
     pub above_a: [f32; 4],
     pub found: [f32; 4],
+    pub found_push: [f32; 4],
+    pub found_moment: [f32; 4],
+    pub gives: [[f32; 4]; 2],
+    pub turns_a: [[f32; 4]; 2],
+    pub turns_b: [[f32; 4]; 2],
     pub given: [u32; 4],
 }
 
@@ -268,8 +274,14 @@ impl Pairs {
         let of = |(pair, record): (&mut Pair, &SmoothPair)| {
             let (surfaces, walls) = (&model.surfaces, &model.walls);
             let found = pair.find_beside_device(bodies, surfaces, walls, model.spacing, record.open);
-            let [deepest, eighth, sixth] = found.map(|x| x as f32);
-            SmoothPose { found: [deepest, eighth, sixth, 0.0], ..pose(pair, clouds, model, bodies) }
+            let (deepest, mode) = found;
+            let still = bodies[pair.a].rotation.transpose();
+            SmoothPose {
+                found: [deepest, mode.eighth, mode.sixth, 0.0].map(|x| x as f32),
+                found_push: four(still * mode.push, 0.0),
+                found_moment: four(still * mode.moment, 0.0),
+                ..pose(pair, clouds, model, bodies)
+            }
         };
         if self.pairs.len() >= MANY_PAIRS {
             self.pairs.par_iter_mut().zip(&self.records).map(of).collect_into_vec(&mut self.poses);
@@ -304,7 +316,7 @@ impl Pairs {
                 record.pairs = pairs;
                 (record.spring, record.stop) = (c.spring as f32, c.stop as f32);
                 (record.stop_depth, record.damping) = (c.stop_depth as f32, c.damping as f32);
-                record.step = c.step as f32;
+                (record.step, record.mass) = (c.step as f32, c.mass as f32);
             }
             link.write(buffer::smooth_pair, &self.records)?;
             self.sent = true;
@@ -390,13 +402,25 @@ fn clearances(turn: DMat3, shift: DVec3, half: DVec3, cloud: &Cloud) -> (DVec3, 
     (of(1.0), of(-1.0))
 }
 
+/// The symmetric matrix `m` of the world in the frame that `still` leads to: its diagonal with `w`, and yz, zx and xy.
+fn symmetric(still: DMat3, m: DMat3, w: f64) -> [[f32; 4]; 2] {
+    let m = still * m * still.transpose();
+    [
+        four(DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z), w),
+        four(DVec3::new(m.z_axis.y, m.x_axis.z, m.y_axis.x), 0.0),
+    ]
+}
+
 fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> SmoothPose {
     let a = &bodies[pair.a];
     let still = a.rotation.transpose();
+    let (mut gives, mut turns_b) = (a.inverse_mass, DMat3::ZERO);
     let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
             let (pose, Body { rotation, shape, .. }) = (image(&bodies[b], pair.image), &bodies[b]);
             let half = shape.extent(DMat3::IDENTITY);
+            gives += bodies[b].inverse_mass;
+            turns_b = bodies[b].inverse_inertia;
             (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
         }
         Other::Wall(w) => {
@@ -404,6 +428,7 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> Smoot
             (wall.center, wall.axes, wall.half, DVec3::ZERO, DVec3::ZERO)
         }
     };
+    let between = still * (a.pose.position - center);
     let theirs = pair.b.solid().map_or(Cloud::default(), |b| clouds[b]);
     let back = axes.transpose();
     let turn = back * a.rotation;
@@ -421,6 +446,11 @@ fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> Smoot
         below_a: four(below_a, 0.0),
         above_a: four(above_a, 0.0),
         found: [0.0; 4],
+        found_push: [0.0; 4],
+        found_moment: [0.0; 4],
+        gives: symmetric(still, DMat3::from_diagonal(gives), between.x),
+        turns_a: symmetric(still, a.inverse_inertia, between.y),
+        turns_b: symmetric(still, turns_b, between.z),
         given: [0; 4],
     }
 }

@@ -249,9 +249,9 @@ impl Slip {
     fn kick(&self, bodies: &mut [Body], change: DVec3) {
         let push = change.x * self.tangent[0] + change.y * self.tangent[1];
         let twist = change.z * self.spin;
-        bodies[self.a].kick(push, self.arm_a.cross(push) + twist);
+        bodies[self.a].touch(push, self.arm_a.cross(push) + twist);
         if let Some(b) = self.b {
-            bodies[b].kick(-push, -self.arm_b.cross(push) - twist);
+            bodies[b].touch(-push, -self.arm_b.cross(push) - twist);
         }
     }
 }

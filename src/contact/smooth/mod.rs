@@ -19,6 +19,7 @@
 //! within half a spacing more; it is never reached with a sensible K, and it is conservative too. In solids of
 //! less than two spacings both lengths shrink with their thickness: they must not be pressed to their middle.
 
+mod answer;
 mod constants;
 pub mod device;
 mod fault;

@@ -1,5 +1,6 @@
 //! A pair of solids under the smooth law: what of each lies in the other, forces, friction patches.
 
+use super::answer::Mode;
 use super::constants::{Constants, felt};
 use super::frame::{Frame, View};
 use super::patch::{Contact, DeviceSums, Patch, edge_key, place, square};
@@ -170,7 +171,7 @@ impl Pair {
 
     /// Finds the contacts that a device does not look for, those of edges and of walls' corners. Those pressed
     /// by a face in `open` (bits 0 to 5: of `b`, 6 to 11: of `a`) are to be given to the device; of the
-    /// others, their deepest depth d [m], and the sums of w_i (d_i / d)^8 and w_i (d_i / d)^6.
+    /// others, their deepest depth d [m], and their sums over it.
     pub fn find_beside_device(
         &mut self,
         bodies: &[Body],
@@ -178,12 +179,12 @@ impl Pair {
         walls: &[WallBox],
         spacing: f64,
         open: u32,
-    ) -> [f64; 3] {
+    ) -> (f64, Mode) {
         self.contacts.clear();
         self.given.clear();
         self.points = 0;
         if self.is_empty() {
-            return [0.0; 3];
+            return (0.0, Mode::default());
         }
         // its lists of points are empty
         self.find(bodies, surfaces, walls);
@@ -198,8 +199,7 @@ impl Pair {
             !on_face
         });
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
-        let sum = |power: i32| self.contacts.iter().map(|c| c.weight * (c.depth / deepest).powi(power)).sum();
-        if deepest > 0.0 { [deepest, sum(8), sum(6)] } else { [0.0; 3] }
+        (deepest, Mode::of(&self.contacts, deepest, bodies[self.a].pose.position))
     }
 
     /// Joins the contacts kept beside the device with what it sums over its own and those it was given.
@@ -212,7 +212,7 @@ impl Pair {
         self.count = sums.count + self.contacts.len();
         if sums.count == 0 {
             if !self.contacts.is_empty() {
-                self.press();
+                self.press(bodies);
                 self.sum(bodies);
             }
             return;
@@ -329,7 +329,7 @@ impl Pair {
         }
         self.count = self.contacts.len();
         if !self.contacts.is_empty() {
-            self.press();
+            self.press(bodies);
             self.sum(bodies);
         }
     }
@@ -352,26 +352,28 @@ impl Pair {
                 let normal = other.axes * outward;
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
                 let weight = share * surfaces[self.a].weights[k as usize];
-                self.contacts.push(Contact::new(at, normal, depth, weight, speed, face));
+                let part = surfaces[self.a].part(k as usize);
+                self.contacts.push(Contact { part, ..Contact::new(at, normal, depth, weight, speed, face) });
             }
         }
-        let mut pushed = |at: DVec3, weight: f64| {
+        let mut pushed = |at: DVec3, weight: f64, part: f64| {
             let q = still * (at - a.pose.position);
             if let Some(Inside { depth, outward, face }) = own.shape.depth(q, own.faces) {
                 let normal = -(a.rotation * outward);
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
-                self.contacts.push(Contact::new(at, normal, depth, weight, speed, 8 + face));
+                self.contacts
+                    .push(Contact { part, ..Contact::new(at, normal, depth, weight, speed, 8 + face) });
             }
         };
         if let Other::Solid(b) = self.b {
             for &k in &self.points_b {
                 let at = other.center + other.axes * surfaces[b].points[k as usize];
-                pushed(at, share * surfaces[b].weights[k as usize]);
+                pushed(at, share * surfaces[b].weights[k as usize], surfaces[b].part(k as usize));
             }
         }
         let weight = surfaces[self.a].smallest_weight;
         for &at in &self.samples {
-            pushed(at, weight);
+            pushed(at, weight, 1.0);
         }
     }
 
@@ -475,6 +477,7 @@ impl Pair {
                 speed: (slip + s * turning).dot(normal),
                 stretch: node.deviation * direction,
                 force: 0.0,
+                part: 1.0,
                 patch: key,
             });
         });
@@ -490,9 +493,9 @@ impl Pair {
     /// Normal forces of the points: the pair's spring and dashpot, no tension.
     ///
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
-    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i. The second spring
-    /// brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
-    fn press(&mut self) {
+    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i, nor on where that is: see [`Mode`].
+    /// The second spring brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
+    fn press(&mut self, bodies: &[Body]) {
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
         let per_deepest = deepest.recip();
@@ -500,12 +503,19 @@ impl Pair {
         let mean = sum.sqrt().sqrt().sqrt();
         let depth = deepest * mean;
         self.depth = deepest;
-        let shares = self.contacts.iter().map(|c| c.share(depth)).sum();
-        self.push(depth, shares);
+        let shares: f64 = self.contacts.iter().map(|c| c.share(depth)).sum();
+        let answers = if self.constants.mass > 0.0 {
+            let second = self.b.solid().map(|b| (&bodies[b], image(&bodies[b], self.image)));
+            let mode = Mode::of(&self.contacts, deepest, bodies[self.a].pose.position);
+            mode.share(self.constants.mass, &bodies[self.a], second)
+        } else {
+            1.0
+        };
+        self.push(depth, shares / answers);
     }
 
     /// Normal forces of the points and the energy, at the effective depth `depth` [m] and the sum of all
-    /// shares.
+    /// shares over the share of the mass that answers.
     fn push(&mut self, depth: f64, shares: f64) {
         let k = self.constants;
         let (secant, energy) = k.stored(depth);
@@ -539,6 +549,7 @@ impl Pair {
             let patch = &mut self.patches[known];
             patch.normal += force;
             patch.pressing += c.force;
+            patch.weighed += c.force * c.part;
             patch.at += c.force * c.at;
         }
         let about_b = all.torque + (center_a - center_b).cross(all.force);
@@ -555,7 +566,8 @@ impl Pair {
             let Some(found) = place(&self.patches, c.patch, known) else { continue };
             known = found;
             let patch = &mut self.patches[known];
-            let share = c.force / patch.pressing;
+            // friction goes by where an even pressure would be, which is not where most points are
+            let share = c.force * c.part / patch.weighed.max(f64::MIN_POSITIVE);
             patch.spread += square(c.at - patch.at, share);
             if c.stretch != DVec3::ZERO {
                 patch.spread += square(c.stretch, share);

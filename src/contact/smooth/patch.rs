@@ -18,6 +18,8 @@ pub(crate) struct Contact {
     /// Deviation of the place of the force that it stands for, along an edge, world [m].
     pub stretch: DVec3,
     pub force: f64,
+    /// Part of a face that it stands for over that which its weight says [-].
+    pub part: f64,
     /// The patch that it belongs to: the face that presses, 8 more for one of the first solid; or an edge, see
     /// [`edge_key`].
     pub patch: u32,
@@ -33,7 +35,7 @@ impl Contact {
     /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
     pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
         let patch = patch.into();
-        Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, patch }
+        Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, part: 1.0, patch }
     }
 
     /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
@@ -63,7 +65,7 @@ pub(crate) struct DeviceSums {
     pub depth: f64,
     /// Deepest of all contacts [m].
     pub deepest: f64,
-    /// Sum of the s_i of all contacts.
+    /// Sum of the s_i of all contacts, over the share of the mass that answers.
     pub shares: f64,
     /// Wrenches on the two solids, of these.
     pub wrench: [Wrench; 2],
@@ -84,6 +86,8 @@ pub(crate) struct Patch {
     pub force: f64,
     /// Sum of the points' forces [N].
     pub pressing: f64,
+    /// The same, each times the part of the face that the point stands for [N].
+    pub weighed: f64,
     /// Second moments of the normal force about its centre [m2], world axes.
     pub spread: DMat3,
 }
@@ -92,7 +96,15 @@ impl Patch {
     /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
     /// second moments about it [m2].
     pub fn new(key: u32, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
-        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, spread }
+        Self {
+            key,
+            normal: force.normalize_or_zero(),
+            at,
+            force: force.length(),
+            pressing,
+            weighed: pressing,
+            spread,
+        }
     }
 }
 

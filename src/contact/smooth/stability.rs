@@ -128,6 +128,7 @@ impl Limits {
             stop_depth: STOP_DEPTH * reach,
             step: shortest,
             damping,
+            mass: if self.damping.is_ratio() { mass } else { 0.0 },
         }
     }
 }
