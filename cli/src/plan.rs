@@ -3,7 +3,7 @@
 mod words;
 
 use super::setup::{self, Setup};
-use super::{CaseArgs, Exit, width};
+use super::{CaseArgs, Exit};
 use glam::DMat3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -14,7 +14,7 @@ use seixo::backend::gpu::sizes;
 use seixo::case::Case;
 use seixo::case::file::load_text;
 use seixo::cells::Grid;
-use seixo::console::{say, say_json};
+use seixo::console::{say_json, tell};
 use seixo::contact::Solids;
 use seixo::error::Result;
 use seixo::estimate::Estimate;
@@ -210,8 +210,7 @@ pub fn plan(args: &PlanArgs) -> Exit {
     if args.json {
         say_json(&report);
     } else {
-        let words = report.words();
-        say(&width::of_stdout().map_or(words.clone(), |columns| width::wrapped(&words, columns)));
+        tell(&report.words());
     }
     Ok(0)
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputKind};
-use seixo::console::{remark, say};
+use seixo::console::{remark, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::{case_name, series_in};
 use seixo::output::label::{Picture, animation, sheet};
@@ -413,7 +413,7 @@ pub fn render(args: &RenderArgs) -> Exit {
         }
     }
     if !args.quiet {
-        say(&written);
+        tell(&written);
     }
     Ok(0)
 }

@@ -10,7 +10,7 @@ use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
 use seixo::Processor;
 use seixo::backend::gpu::Gpu;
 use seixo::case::Case;
-use seixo::console::{remark, say};
+use seixo::console::{remark, say, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
@@ -241,7 +241,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
                 if args.json {
                     say(result.trim_end());
                 } else if !args.quiet {
-                    say(&format!("the run in {} is done", asked.out.display()));
+                    tell(&format!("the run in {} is done", asked.out.display()));
                 }
                 return Ok(0);
             }
@@ -310,7 +310,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     if args.json {
         say(&finished.summary.json());
     } else if !args.quiet {
-        say(&words(&finished.summary, &asked.out));
+        tell(&words(&finished.summary, &asked.out));
     }
     match (finished.error, finished.signal) {
         (Some(error), _) => Err(error),

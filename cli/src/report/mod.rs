@@ -14,7 +14,7 @@ use page::{MARK, charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputField};
-use seixo::console::{remark, say};
+use seixo::console::{remark, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
@@ -94,7 +94,7 @@ pub fn report(args: &ReportArgs) -> Exit {
     let page = page(&run, &pictures)?;
     write_whole(&path, page.as_bytes())?;
     if !args.quiet {
-        say(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
+        tell(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
     }
     Ok(0)
 }
