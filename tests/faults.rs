@@ -38,10 +38,12 @@ fn run_and_plan_refuse_the_same_and_leave_no_folder() {
         let (code, err, left) = run(&sets);
         assert!(code == 2 && err.contains(words), "{sets:?}: {code} {err}");
         assert!(!left, "{sets:?} left a folder");
+        assert!(err.contains("small.toml:"), "{sets:?} has no line: {err}");
         let folder = tempfile::tempdir().unwrap();
         let case = small_case(folder.path());
         let plan = ran(&[vec!["plan", &case], sets.iter().flat_map(|s| ["--set", s]).collect()].concat());
         assert!(plan.code == 2 && plan.err.contains(words), "plan {sets:?}: {} {}", plan.code, plan.err);
+        assert!(plan.err.contains("small.toml:"), "plan {sets:?} has no line: {}", plan.err);
     }
     let (code, err, _) = run(&[&over, contact]);
     assert_eq!(code, 0, "a body above the open tank falls into it: {err}");

@@ -206,7 +206,8 @@ impl Seen {
 
 pub fn plan(args: &PlanArgs) -> Exit {
     seixo::threads::start(None)?;
-    let report = report(&Seen::new(&args.case, args.json)?, args.ranks)?;
+    let seen = Seen::new(&args.case, args.json)?;
+    let report = report(&seen, args.ranks).map_err(|e| seen.setup.loaded.placed(e))?;
     if args.json {
         say_json(&report);
     } else {

@@ -48,7 +48,7 @@ pub struct RunArgs {
     #[arg(long)]
     force: bool,
     /// Stop after this many steps.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     steps: Option<u64>,
     /// Memory that the run may take, e.g. 8G, instead of what the machine has free.
     #[arg(long, value_name = "SIZE", value_parser = size)]
@@ -91,6 +91,11 @@ fn duration(text: &str) -> std::result::Result<Duration, String> {
     }
     let time = Duration::try_from_secs_f64(total).map_err(|_| wrong())?;
     if time.is_zero() { Err(wrong()) } else { Ok(time) }
+}
+
+/// A number of steps.
+fn count(text: &str) -> std::result::Result<u64, String> {
+    text.parse().map_err(|_| "write a whole number, 0 or more".to_owned())
 }
 
 /// Bytes: `8G`, `500M`, or a number.
@@ -262,13 +267,14 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     let setup = Setup::build(loaded, asked.name.clone(), args.quiet)?;
     if !matches!(start, Start::Resume(_)) {
         let case = &setup.loaded.case;
-        let params = Params::new(case, &setup.scene)?;
+        let params = Params::new(case, &setup.scene).map_err(|e| setup.loaded.placed(e))?;
         fits_disk(args, &asked, case, shortest(case, &setup.scene, &params))?;
     }
     call.tell(&setup.loaded.text);
     let mut simulation = match team {
         Some((team, processor)) => {
-            Simulation::on_ranks_of(&setup.loaded.case, setup.scene.clone(), team, processor)?
+            Simulation::on_ranks_of(&setup.loaded.case, setup.scene.clone(), team, processor)
+                .map_err(|e| setup.loaded.placed(e))?
         }
         None => setup.simulation(&args.device)?,
     };

@@ -223,13 +223,19 @@ impl Checker<'_> {
                 self.add(
                     "contact",
                     message,
-                    "add [contact] with `spring` [N/m], or lock all six of the body's freedoms",
+                    "add [contact] with `spring` [N/m], e.g. 1e5 (`seixo plan` then tells what the bodies ask for), or \
+                     lock all six of the body's freedoms",
                 );
             }
             return;
         };
         if contact.law == Law::Pressure {
             self.not_negative("contact.spring", contact.spring, "N/m");
+        } else if contact.spring == 0.0 {
+            // Also what it is if nobody has written one.
+            let message = "there is no spring, so that nothing keeps solids apart";
+            let remedy = "add `spring` [N/m], e.g. 1e5; `seixo plan` then tells what the bodies ask for";
+            self.add("contact.spring", message, remedy);
         } else {
             self.positive("contact.spring", contact.spring, "N/m");
         }
