@@ -79,6 +79,8 @@ pub mod console;
 pub mod contact;
 pub mod error;
 pub mod estimate;
+mod extents;
+pub mod far;
 pub mod fields;
 pub mod gauges;
 pub mod kernels;

@@ -440,7 +440,11 @@ fn memory_and_disk_are_known_before_they_are_taken() {
             vec!["--spacing", "2e-5", "--set", "run.time_step=1e-6", "--set", "fluid.viscosity=0"],
             "GB are free",
         ),
-        (vec!["--set", "run.domain=[[-1e6,0,-1e6],[1e6,0,1e6]]"], "cells of search take about"),
+        (vec!["--set", "run.domain=[[-1e6,0,-1e6],[1e6,0,1e6]]"], "cells of search would take"),
+        (
+            vec!["--set", "run.domain=[[-400,0,-400],[400,0,400]]", "--memory-limit", "100M"],
+            "cells of search take about",
+        ),
         (vec!["--set", "output.every=1e-12", "--set", "run.end=1e5"], "are free on the disk of"),
     ] {
         let clock = std::time::Instant::now();

@@ -16,6 +16,7 @@ mod contact_hard;
 mod device;
 mod errors;
 mod examples;
+mod far;
 mod faults;
 mod filled;
 mod first_minute;

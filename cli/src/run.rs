@@ -120,18 +120,22 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, place: Option<Place>) -> Res
         BackendName::Gpu => false,
         BackendName::Auto => args.device.adapter.is_none(),
     };
-    let needs = |cpu: bool| match place {
+    let of = |estimate: &Estimate, cpu: bool| match place {
         Some(Place { here, all, .. }) => estimate.memory_on_ranks(here, all),
         None if cpu => estimate.memory_cpu,
         None => estimate.memory_beside_device,
     };
+    let needs = |cpu: bool| of(&estimate, cpu);
     let limit = args.memory_limit.or_else(machine::memory).map_or(f64::INFINITY, |n| n as f64);
     // Drivers are asked only if it matters whether there is one.
     let on_cpu = on_cpu
         && (args.device.backend == BackendName::Cpu || needs(true) <= limit || !Gpu::hardware_available());
     if needs(on_cpu) > limit {
+        let coarser = Estimate::spacing_within(case, limit, |estimate| of(estimate, on_cpu));
+        let coarser =
+            coarser.map_or("a larger run.spacing".into(), |l0| format!("run.spacing = {l0} or more"));
         let text = format!(
-            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory{}, {} are {}: use a larger run.spacing \
+            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory{}, {} are {}: use {coarser}, \
              or a smaller domain, or say with --memory-limit what the run may take",
             asked.name,
             estimate.particles,
@@ -263,6 +267,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
             }
         },
     };
+    seixo::far::refuse(&loaded.case).map_err(|e| loaded.placed(e))?;
     fits(args, &asked, &loaded.case, place)?;
     let setup = Setup::build(loaded, asked.name.clone(), args.quiet)?;
     if !matches!(start, Start::Resume(_)) {
