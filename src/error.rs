@@ -1,7 +1,7 @@
 //! Errors of the library, each with what a user can do about it. Programs match on variants and fields; people read
 //! the text, which is that of [`std::fmt::Display`].
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What can go wrong. `main` maps each to an exit code.
 #[derive(Debug, thiserror::Error)]
@@ -230,11 +230,24 @@ pub enum FolderError {
         changed: Vec<String>,
     },
     /// There is no run in it to go on with.
-    #[error("{} holds no run of seixo: there is no `.seixo` in it that names one", .0.display())]
+    #[error("{}", no_run(.0))]
     NoRun(PathBuf),
     /// A file of it is shorter than when the run stopped.
     #[error("{}: it is shorter than when the run stopped", .0.display())]
     Shorter(PathBuf),
+}
+
+/// Why there is no run in `folder`, as it is now, and what to do.
+fn no_run(folder: &Path) -> String {
+    let shown = folder.display();
+    let remedy = "name the folder that `seixo run` has told or was given with --out";
+    match folder {
+        _ if folder.is_dir() => {
+            format!("{shown} holds no run of seixo: there is no `.seixo` in it that names one; {remedy}")
+        }
+        _ if folder.exists() => format!("{shown} is a file; {remedy}"),
+        _ => format!("there is no folder {shown}; {remedy}"),
+    }
 }
 
 /// Changes that are told; nobody reads a hundred.

@@ -1,10 +1,7 @@
 //! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
 
-use crate::case::{
-    Case, Choice, Encoding, Face, Form, Guide, OutputField, OutputKind, OutputRegion, Place, Series, Vector,
-    Wall,
-};
-use glam::{DMat3, DVec3};
+use crate::case::{Case, Choice, Encoding, Face, OutputField, OutputKind, OutputRegion, Series, Vector};
+use crate::extents::{self, Extent, Of};
 use serde::Serialize;
 
 /// Bytes on the host, as measured on the transport case from 27,000 to 577,000 particles, states among them: for each particle, for
@@ -48,6 +45,9 @@ pub struct Estimate {
     pub particles: f64,
     /// Cells of the neighbour search.
     pub cells: f64,
+    /// Memory of these, and of the lattice that the scene is built on [bytes]: the price of the room, whatever is in it.
+    #[serde(skip)]
+    pub room: f64,
     /// Memory of a run on the CPU [bytes].
     pub memory_cpu: f64,
     /// Memory on the host of a run on a device [bytes].
@@ -67,86 +67,6 @@ pub struct Estimate {
     pub checkpoint_bytes: f64,
 }
 
-/// A box that grows.
-#[derive(Clone, Copy)]
-struct Bounds {
-    lo: Vector,
-    hi: Vector,
-}
-
-impl Bounds {
-    const NONE: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
-
-    fn add(&mut self, lo: Vector, hi: Vector) {
-        for k in 0..3 {
-            self.lo[k] = self.lo[k].min(lo[k]);
-            self.hi[k] = self.hi[k].max(hi[k]);
-        }
-    }
-    /// A solid, wherever its tables take it; one that turns about `pivot` in a sphere about it.
-    fn add_moving(&mut self, lo: Vector, hi: Vector, rows: &[[f64; 4]], pivot: Option<Vector>) {
-        self.add(lo, hi);
-        let (lo, hi) = pivot.map_or((lo, hi), |pivot| {
-            let far = [0, 1, 2].map(|k| (lo[k] - pivot[k]).abs().max((hi[k] - pivot[k]).abs()));
-            let reach = length(&far);
-            (pivot.map(|x| x - reach), pivot.map(|x| x + reach))
-        });
-        let still = [[0.0; 4]];
-        for row in if rows.is_empty() { &still } else { rows } {
-            let at = |x: Vector| [x[0] + row[1], x[1] + row[2], x[2] + row[3]];
-            self.add(at(lo), at(hi));
-        }
-    }
-    /// A solid about `center`, wherever tables and formulas take it, or a wave that it makes by strokes along a direction.
-    fn add_guided(
-        &mut self,
-        (lo, hi): (Vector, Vector),
-        guide: &Guide,
-        wave: Option<(Vector, [f64; 2])>,
-        center: Vector,
-    ) {
-        let pivot = guide.turns().then_some(guide.pivot.unwrap_or(center));
-        self.add_moving(lo, hi, guide.motion.unwrap_or_default(), pivot);
-        let sine = guide.sine.map(|s| (s.axis, s.formula().reach()));
-        for (axis, reach) in sine.into_iter().chain(wave) {
-            let unit = length(&axis).recip();
-            let row = |way: f64| [0.0, way * unit * axis[0], way * unit * axis[1], way * unit * axis[2]];
-            self.add_moving(lo, hi, &reach.map(row), pivot);
-        }
-    }
-    fn size(&self, k: usize) -> f64 {
-        (self.hi[k] - self.lo[k]).max(0.0)
-    }
-}
-
-fn length(v: &Vector) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// Lower and upper corner of the box around a wall [m], and its open faces. What cannot be read has no size: whoever
-/// builds the scene says so.
-fn edges<'a>(wall: &Wall, spacing: f64, flat: bool, open: &'a [Face]) -> (Vector, Vector, &'a [Face]) {
-    let (form, place) = match wall {
-        Wall::Lattice(min, max) => return (*min, *max, open),
-        Wall::Shaped(form, place) => (form, place),
-    };
-    let (Place::Center(at) | Place::Position(at)) = *place;
-    let Ok((shape, _)) = form.shape(spacing, flat) else { return (at, at, open) };
-    let turn = form.turn(flat);
-    let middle = DVec3::from(at)
-        + if matches!(place, Place::Position(_)) { turn * shape.origin() } else { DVec3::ZERO };
-    let half = shape.extent(DMat3::from_quat(turn * shape.frame()));
-    ((middle - half).to_array(), (middle + half).to_array(), open)
-}
-
-/// Edges of a form that is not turned [m]; none of what cannot be read.
-fn size(form: &Form, spacing: f64, flat: bool) -> Vector {
-    let of = |(shape, _): (crate::shape::Shape, f64)| {
-        (2.0 * shape.extent(DMat3::from_quat(shape.frame()))).to_array()
-    };
-    form.shape(spacing, flat).map_or([0.0; 3], of)
-}
-
 impl Estimate {
     /// Of `case`, which has passed the check.
     pub fn new(case: &Case) -> Self {
@@ -160,9 +80,10 @@ impl Estimate {
         let blocks = case.fluid.iter().flat_map(|f| &f.block);
         let water: f64 = blocks.clone().map(|b| cells(&|k| span(&b.min, &b.max, k))).sum();
         let tank = case.tank.as_ref();
-        let shapes = case.fluid.iter().flat_map(|f| &f.shape).map(|w| Wall::Shaped(w.form(tank), w.place()));
-        let shapes: Vec<(Vector, Vector, &[Face])> = shapes.map(|w| edges(&w, l0, flat, &[])).collect();
-        let water = water + shapes.iter().map(|(lo, hi, _)| cells(&|k| span(lo, hi, k))).sum::<f64>();
+        let extents = extents::all(case);
+        let shaped = |e: &&Extent| e.of == Of::Water && e.item.starts_with("fluid.shape");
+        let shapes = extents.iter().filter(shaped).map(|e| e.bounds);
+        let water = water + shapes.map(|b| cells(&|k| b.size(k))).sum::<f64>();
         // At most all of the tank below the highest level.
         let level = case.fluid.iter().flat_map(|f| &f.fill).map(|f| f.level).reduce(f64::max);
         let filled = |(t, level): (&crate::case::Tank, f64)| {
@@ -198,67 +119,29 @@ impl Estimate {
             (area * closed.max(0.0) * layers).min(f64::MAX)
         };
         let inside = |size: &dyn Fn(usize) -> f64, open: &[Face]| shell(size, open).min(cells(size));
-        let obstacles = case.obstacle.iter().map(|o| (o.wall(tank), &o.open[..]));
-        let moving = case.moving_wall.iter().map(|w| (w.wall(tank), &w.open[..]));
-        let walls: Vec<(Vector, Vector, &[Face])> =
-            obstacles.chain(moving).map(|(wall, open)| edges(&wall, l0, flat, open)).collect();
-        let mut solids: f64 =
-            walls.iter().map(|(lo, hi, open)| inside(&|k| span(lo, hi, k), open)).sum::<f64>();
+        let walls = extents::walls(case);
+        let mut solids: f64 = walls.iter().map(|(b, open, _)| inside(&|k| b.size(k), open)).sum();
         if let Some(tank) = &case.tank {
             solids += shell(&|k| span(&tank.min, &tank.max, k), &tank.without_wall());
         }
         let across = |p: &crate::case::Plane| if flat { 1.0 } else { (p.size[1] / l0).ceil().max(1.0) };
         solids +=
             case.plane.iter().map(|p| (p.size[0] / l0).ceil().max(1.0) * across(p) * layers).sum::<f64>();
-        let extent = |body: &crate::case::Body| size(&body.form(), l0, flat);
+        let extent = |body: &crate::case::Body| extents::size(&body.form(), l0, flat);
         solids += case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum::<f64>();
 
-        let mut lattice = Bounds::NONE;
-        case.tank.iter().for_each(|t| lattice.add(t.min, t.max));
-        blocks.for_each(|b| lattice.add(b.min, b.max));
-        shapes.iter().for_each(|(lo, hi, _)| lattice.add(*lo, *hi));
-        // What is on the lattice; ground that reaches beyond a tank is cut off there.
-        let on_lattice = |o: Option<(Vector, Vector)>| o.is_some() || tank.is_none();
-        let mut domain = Bounds::NONE;
-        let corners = case.obstacle.iter().map(|o| o.corners());
-        let corners = corners.chain(case.moving_wall.iter().map(|w| w.corners()));
-        for ((lo, hi, _), corners) in walls.iter().zip(corners) {
-            if on_lattice(corners) {
-                lattice.add(*lo, *hi);
-            }
-        }
-        domain.add(lattice.lo, lattice.hi);
-        for (w, (lo, hi, _)) in case.moving_wall.iter().zip(&walls[case.obstacle.len()..]) {
-            let center = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
-            let wave =
-                w.wave.as_ref().zip(w.wave(case)).map(|(k, wave)| (k.direction(), wave.formula.reach()));
-            domain.add_guided((*lo, *hi), &w.guide(), wave, center);
-        }
-        for body in &case.body {
-            let half = 0.5 * length(&extent(body));
-            let edges = (body.center.map(|x| x - half), body.center.map(|x| x + half));
-            domain.add_guided(edges, &body.guide(), None, body.center);
-        }
-        for plane in &case.plane {
-            let half = 0.5 * plane.size[0].hypot(if flat { 0.0 } else { plane.size[1] });
-            domain.add(plane.center.map(|x| x - half), plane.center.map(|x| x + half));
-        }
-        if let Some([lo, hi]) = run.domain {
-            domain = Bounds { lo, hi };
-        } else if length(&run.gravity) > 0.0 {
-            // Room for splashes, as the scene leaves it.
-            domain.hi[2] += axes().map(|k| domain.size(k)).fold(0.0, f64::max);
-        }
+        let (lattice, domain) = (extents::lattice(&extents), extents::domain(case, &extents));
         // Room for water that may come in is kept from the start on, as much as the case says and the domain holds.
         let slots = slots.map_or(water, |n| n.min(cells(&|k| domain.size(k))).max(water));
         let reach = run.effective_radius * l0;
         let wet = water > 0.0;
-        let searched = axes().map(|k| (domain.size(k) / reach).ceil() + 8.0).product::<f64>();
+        let searched = axes().map(|k| (domain.size(k) / reach).floor() + 1.0).product::<f64>();
         let searched = if wet { searched } else { 0.0 };
         let ground = (cells(&|k| lattice.size(k)) * LATTICE_CELL).max(0.0);
         let particles = water + solids;
         let kept = slots + solids;
-        let base = PROGRAM + kept * PARTICLE + searched * SEARCH_CELL + ground;
+        let room = searched * SEARCH_CELL + ground;
+        let base = PROGRAM + kept * PARTICLE + room;
 
         let output = &case.output;
         let frames = |every: f64| if every > 0.0 { (run.end / every).floor() + 2.0 } else { 0.0 };
@@ -266,10 +149,10 @@ impl Estimate {
         let each = if output.encoding == Encoding::Raw { FRAME_RAW } else { FRAME_BASE64 };
         let told = |fields: &[OutputField]| POINT + fields.iter().map(|f| f.bytes()).sum::<usize>() as f64;
         // No region holds more water than fits into it.
-        let room = |region: &OutputRegion| cells(&|k| span(&region.min, &region.max, k));
+        let holds = |region: &OutputRegion| cells(&|k| span(&region.min, &region.max, k));
         let frame = |choice: Choice<'_>| {
             let shown = |kind| if choice.has(kind) { 1.0 } else { 0.0 };
-            let water = choice.region.as_ref().map_or(water, |region| water.min(room(region)));
+            let water = choice.region.as_ref().map_or(water, |region| water.min(holds(region)));
             let told = each * told(choice.fields) / told(&OutputField::ALL);
             told * (water * shown(OutputKind::Fluid) + bodies * shown(OutputKind::Body))
         };
@@ -285,6 +168,7 @@ impl Estimate {
             water,
             particles,
             cells: searched,
+            room,
             memory_cpu: base + slots * WATER,
             memory_beside_device: base + slots * WATER_ON_DEVICE,
             frames: frames(output.every),
@@ -324,6 +208,23 @@ impl Estimate {
         let shared = self.water * WATER;
         let first = self.memory_cpu - shared;
         first + (here - 1.0) * (first - self.particles * PARTICLE_OF_FIRST) + shared * here / all
+    }
+
+    /// The smallest spacing [m], in two digits, at which `memory` of an estimate of `case` is no more than `room` bytes; nothing if none
+    /// is found.
+    pub fn spacing_within(case: &Case, room: f64, memory: impl Fn(&Self) -> f64) -> Option<f64> {
+        let (mut case, d) = (case.clone(), f64::from(case.run.dimensions));
+        for _ in 0..4 {
+            let over = memory(&Self::new(&case)) / room;
+            if over <= 1.0 {
+                return Some(case.run.spacing);
+            }
+            // Walls grow less than water does.
+            let wanted = case.run.spacing * over.powf(1.0 / d);
+            let digit = 10f64.powi(wanted.log10().floor() as i32 - 1);
+            case.run.spacing = format!("{:.1e}", ((wanted / digit).ceil() * digit)).parse().ok()?;
+        }
+        None
     }
 
     /// All bytes that will be written and kept.

@@ -80,6 +80,8 @@ pub mod contact;
 mod cover;
 pub mod error;
 pub mod estimate;
+mod extents;
+pub mod far;
 pub mod fields;
 pub mod gauges;
 pub mod kernels;

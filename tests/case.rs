@@ -69,7 +69,15 @@ const WRONG: &[(&str, &str, &[&str])] = &[
         "end = \"soon\"",
         &["test.toml:4:7", "run.end: the words `soon`, expected a number", "`seixo keys run.end`"],
     ),
-    ("end = 1.0\n", "", &["test.toml:1:1", "run: missing field `end`", "add `end = ...`"]),
+    (
+        "end = 1.0\n",
+        "",
+        &[
+            "test.toml:1:1",
+            "run: missing field `end`",
+            "add `end = ...` here; `seixo keys run.end` tells what it takes",
+        ],
+    ),
     ("end = 1.0", "end = 1.0\nend = 2.0", &["test.toml:5:1", "duplicate key"]),
     ("[tank]", "[tank", &["test.toml:6:6"]),
     ("\"smooth\"", "\"smoth\"", &["contact.law: unknown variant `smoth`", "did you mean `smooth`?", "paper"]),
@@ -212,7 +220,7 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ),
     ("damping = 10.0", "substeps = 0", &["contact.substeps: 0 sub-steps"]),
     ("damping = 10.0", "substeps = 4294967295", &["contact.substeps: 4294967295 sub-steps", "1 to 100000"]),
-    ("spring = 1e4", "", &["contact.spring: contact has no spring", "give `spring`, 2.0e4 N/m or more"]),
+    ("spring = 1e4\n", "", &["contact.spring: there is no spring", "add `spring`, 2.0e4 N/m or more"]),
     ("spring = 1e4", "spring = 5e-324", &["contact.spring: ", "1e-9 to 1e18 N/m"]),
     (
         "spring = 1e4",
@@ -246,6 +254,11 @@ const WRONG: &[(&str, &str, &[&str])] = &[
         "on = \"cube\"",
         "on = \"cub\"",
         &["gauge.force.0.on: nothing solid is called `cub`", "did you mean `cube`?"],
+    ),
+    (
+        "on = \"cube\"",
+        "on = \"tank.z_max\"",
+        &["gauge.force.0.on: `tank.z_max` has no wall to measure on", "take it out of tank.open"],
     ),
 ];
 

@@ -38,10 +38,12 @@ fn run_and_plan_refuse_the_same_and_leave_no_folder() {
         let (code, err, left) = run(&sets);
         assert!(code == 2 && err.contains(words), "{sets:?}: {code} {err}");
         assert!(!left, "{sets:?} left a folder");
+        assert!(err.contains("small.toml:"), "{sets:?} has no line: {err}");
         let folder = tempfile::tempdir().unwrap();
         let case = small_case(folder.path());
         let plan = ran(&[vec!["plan", &case], sets.iter().flat_map(|s| ["--set", s]).collect()].concat());
         assert!(plan.code == 2 && plan.err.contains(words), "plan {sets:?}: {} {}", plan.code, plan.err);
+        assert!(plan.err.contains("small.toml:"), "plan {sets:?} has no line: {}", plan.err);
     }
     let (code, err, _) = run(&[&over, contact]);
     assert_eq!(code, 0, "a body above the open tank falls into it: {err}");
@@ -438,7 +440,11 @@ fn memory_and_disk_are_known_before_they_are_taken() {
             vec!["--spacing", "2e-5", "--set", "run.time_step=1e-6", "--set", "fluid.viscosity=0"],
             "GB are free",
         ),
-        (vec!["--set", "run.domain=[[-1e6,0,-1e6],[1e6,0,1e6]]"], "cells of search take about"),
+        (vec!["--set", "run.domain=[[-1e6,0,-1e6],[1e6,0,1e6]]"], "cells of search would take"),
+        (
+            vec!["--set", "run.domain=[[-400,0,-400],[400,0,400]]", "--memory-limit", "100M"],
+            "cells of search take about",
+        ),
         (vec!["--set", "output.every=1e-12", "--set", "run.end=1e5"], "are free on the disk of"),
     ] {
         let clock = std::time::Instant::now();

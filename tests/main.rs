@@ -18,6 +18,7 @@ mod contact_impacts;
 mod device;
 mod errors;
 mod examples;
+mod far;
 mod faults;
 mod filled;
 mod first_minute;

@@ -100,7 +100,11 @@ fn what_is_wrong_with_a_file_is_told_with_its_line() {
     }
     std::fs::remove_file(folder.path().join("gate.csv")).unwrap();
     let plan = ran(&["plan", &path]);
-    assert!(plan.code == 2 && plan.err.contains("gate.csv: no such file"), "{}", plan.err);
+    assert!(
+        plan.code == 2 && plan.err.contains("gate.csv: no such file; `moving_wall.0.motion` of the case"),
+        "{}",
+        plan.err
+    );
     let number = case(folder.path(), "motion = 7");
     assert_eq!(ran(&["plan", &number]).code, 2);
 }

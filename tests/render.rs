@@ -82,7 +82,8 @@ fn what_cannot_be_drawn_is_refused_in_words() {
     let shown = root.display().to_string();
     assert_eq!(ran(&["run", &case, "-o", &shown, "--backend", "cpu", "-q", "--steps", "1"]).code, 0);
     for (args, word) in [
-        (vec!["render", "no/such"], "holds no run"),
+        (vec!["render", "no/such"], "there is no folder no/such; name the folder"),
+        (vec!["render", &case], "small.toml is a file; name the folder"),
         (vec!["render", &shown, "--size", "0x7"], "width and height in pixels"),
         (vec!["render", &shown, "--size", "100000x100000"], "width and height in pixels"),
         (vec!["render", &shown, "--slice", "w=1"], "an axis and a place"),
@@ -93,8 +94,12 @@ fn what_cannot_be_drawn_is_refused_in_words() {
         let drawn = ran(&args);
         assert!(drawn.code == 2 && drawn.err.contains(word), "{args:?}: {} {}", drawn.code, drawn.err);
     }
-    // A frame that is damaged is named.
-    std::fs::write(root.join("vtu/fluid_0000.vtu"), "<VTKFile>").unwrap();
+    // A frame that is damaged inside is named.
+    let frame = root.join("vtu/fluid_0000.vtu");
+    let mut bytes = std::fs::read(&frame).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 40].fill(b'!');
+    std::fs::write(&frame, bytes).unwrap();
     let drawn = ran(&["render", &shown]);
     assert!(drawn.code == 5 && drawn.err.contains("fluid_0000.vtu: "), "{} {}", drawn.code, drawn.err);
     let none = ran(&[

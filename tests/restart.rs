@@ -347,8 +347,19 @@ fn a_state_starts_another_case() {
     // The state is not cleared away by the run that begins with it.
     let onto = case.run("first", &[&["--set", &from, "--force"][..], &["--until", "0.08"]].concat());
     assert!(onto.code == 2 && case.root("first").join("checkpoint").exists(), "{}", onto.err);
+    let file = format!("run.from=\"{}\"", case.root("first").join("case.toml").display());
+    let file = case.run("third", &["--set", &file]);
+    assert!(
+        file.code == 2 && file.err.contains("run.from: ") && file.err.contains("is a file"),
+        "{}",
+        file.err
+    );
     let nowhere = case.run("third", &["--set", "run.from=\"nowhere\""]);
-    assert!(nowhere.code == 2 && nowhere.err.contains("holds no checkpoint"), "{}", nowhere.err);
+    assert!(
+        nowhere.code == 2 && nowhere.err.contains("nowhere` is not there; name the folder"),
+        "{}",
+        nowhere.err
+    );
 }
 
 #[cfg(unix)]

@@ -160,7 +160,7 @@ fn plan_tells_of_steps_sound_states_and_room() {
     assert!(told.code == 0 && told.err.contains("out of the tank through `tank.x_min`"), "{}", told.err);
     let told = plan(&["run.from=nowhere"]);
     assert!(
-        told.code == 2 && told.err.contains("nowhere` holds no checkpoint; name the folder"),
+        told.code == 2 && told.err.contains("nowhere` is not there") && told.err.contains("name the folder"),
         "{}",
         told.err
     );
@@ -200,24 +200,50 @@ fn small_run(folder: &Path) -> (String, String) {
 }
 
 #[test]
+fn a_report_without_pictures_or_verdict_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, out) = small_run(folder.path());
+    let told = |word: &str| {
+        let told = ran(&["report", &out, "--pictures", "2", "--size", "160x90"]);
+        assert!(told.code == 0 && told.err.contains(word), "`{word}`: {}", told.err);
+    };
+    std::fs::write(folder.path().join("out/result.json"), "{\"case\"").unwrap();
+    told("result.json is damaged: the page tells no verdict");
+    let list = folder.path().join("out/small.pvd");
+    let whole = std::fs::read_to_string(&list).unwrap();
+    std::fs::write(&list, &whole[..whole.len() / 2]).unwrap();
+    told("small.pvd is cut off: frames that it does not name are left out");
+    std::fs::write(&list, &whole).unwrap();
+    std::fs::rename(folder.path().join("out/vtu"), folder.path().join("moved")).unwrap();
+    told("no pictures: ");
+    told("small.pvd names cannot be read any more");
+    std::fs::remove_file(&list).unwrap();
+    told("small.pvd, is gone or names none");
+}
+
+#[test]
 fn what_is_told_of_folders_and_files_leads_on() {
     let folder = tempfile::tempdir().unwrap();
     let (case, out) = small_run(folder.path());
     let over = ran(&["run", &case, "-o", &case]);
     assert!(over.code == 2 && over.err.contains("would be overwritten"), "{}", over.err);
-    // A frame that is gone is left out.
-    std::fs::remove_file(folder.path().join("out/vtu/fluid_0002.vtu")).unwrap();
-    for args in [
-        &["render", &out, "--size", "160x90"][..],
-        &["report", &out, "--pictures", "3", "--size", "160x90"],
-        &["measure", &out, "--point", "0.2,0,0.2"],
-    ] {
-        let told = ran(args);
-        assert!(
-            told.code == 0 && told.err.contains("warning: frame 2 is left out"),
-            "{args:?}: {}",
-            told.err
-        );
+    // A frame that is cut off, empty or gone is left out, whoever reads it.
+    let frame = folder.path().join("out/vtu/fluid_0002.vtu");
+    let whole = std::fs::read(&frame).unwrap();
+    for (kept, why) in [(Some(whole.len() / 2), "is cut off"), (Some(0), "is empty"), (None, "is gone")] {
+        match kept {
+            Some(n) => std::fs::write(&frame, &whole[..n]).unwrap(),
+            None => std::fs::remove_file(&frame).unwrap(),
+        }
+        for args in [
+            &["render", &out, "--size", "160x90"][..],
+            &["report", &out, "--pictures", "3", "--size", "160x90"],
+            &["measure", &out, "--point", "0.2,0,0.2"],
+        ] {
+            let told = ran(args);
+            let words = ["warning: frame 2 is left out", why];
+            assert!(told.code == 0 && words.iter().all(|w| told.err.contains(w)), "{args:?}: {}", told.err);
+        }
     }
     assert!(!folder.path().join("out/pictures/frame_0002.png").exists());
     assert!(folder.path().join("out/pictures/frame_0003.png").exists());

@@ -2,7 +2,7 @@
 
 use super::setup::Setup;
 use super::{CaseArgs, Exit};
-use seixo::console::{say, say_json};
+use seixo::console::{say_json, tell};
 use seixo_study::device_compare::{Drift, StageError, compare_stages, drift};
 
 #[derive(Debug, clap::Args)]
@@ -44,7 +44,7 @@ pub fn compare(args: &CompareArgs) -> Exit {
     if args.json {
         say_json(&report);
     } else {
-        say(&words(&report));
+        tell(&words(&report));
     }
     Ok(0)
 }

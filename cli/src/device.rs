@@ -2,7 +2,7 @@
 
 use super::{BackendName, DeviceArgs, Exit};
 use seixo::backend::gpu::adapters;
-use seixo::console::{remark, say, say_json};
+use seixo::console::{remark, say_json, tell};
 use seixo::{Error, Processor, Result};
 
 /// The processor that `args` ask for.
@@ -45,7 +45,7 @@ pub fn list(json: bool) -> Exit {
     }
     for (k, a) in adapters.iter().enumerate().filter(|_| !json) {
         let software = if a.is_hardware() { "" } else { ", not taken by --backend auto" };
-        say(&format!("{k:>3}  {} ({}, {}, {}{software})", a.name, a.device_type, a.backend, a.driver));
+        tell(&format!("{k:>3}  {} ({}, {}, {}{software})", a.name, a.device_type, a.backend, a.driver));
     }
     Ok(0)
 }

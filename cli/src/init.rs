@@ -2,7 +2,7 @@
 
 use super::Exit;
 use clap::ValueEnum;
-use seixo::console::say;
+use seixo::console::{say, tell};
 use seixo::error::Error;
 use std::io::Write;
 use std::path::PathBuf;
@@ -67,6 +67,6 @@ pub fn init(args: &InitArgs) -> Exit {
     };
     file.write_all(args.starter.text().as_bytes()).map_err(Error::io(&path))?;
     let path = path.display();
-    say(&format!("{path} is written: read it, then `seixo plan {path}` and `seixo run {path}`"));
+    tell(&format!("{path} is written: read it, then `seixo plan {path}` and `seixo run {path}`"));
     Ok(0)
 }

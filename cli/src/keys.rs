@@ -3,7 +3,7 @@
 
 use super::Exit;
 use seixo::case::Case;
-use seixo::console::say;
+use seixo::console::{say, tell};
 use seixo::error::Error;
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -55,7 +55,7 @@ pub fn keys(args: &KeysArgs) -> Exit {
         let words = format!("no key has `{word}` in its path or description: `seixo keys` lists all");
         return Err(Error::usage("WORD", words));
     }
-    say(text.trim_end());
+    tell(text.trim_end());
     Ok(0)
 }
 

@@ -3,7 +3,7 @@
 mod words;
 
 use super::setup::{self, Setup};
-use super::{CaseArgs, Exit, width};
+use super::{CaseArgs, Exit};
 use glam::DMat3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -14,7 +14,7 @@ use seixo::backend::gpu::sizes;
 use seixo::case::Case;
 use seixo::case::file::load_text;
 use seixo::cells::Grid;
-use seixo::console::{say, say_json};
+use seixo::console::{say_json, tell};
 use seixo::contact::Solids;
 use seixo::error::Result;
 use seixo::estimate::Estimate;
@@ -185,8 +185,10 @@ struct Seen {
 
 impl Seen {
     fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        let mut loaded = setup::read(args)?;
+        let loaded = setup::read(args)?;
         let case = loaded.case.clone();
+        // A coarser scene would hide it, or end in another error.
+        seixo::far::refuse(&case).map_err(|e| loaded.placed(e))?;
         let (l0, d) = (case.run.spacing, f64::from(case.run.dimensions));
         let estimate = Estimate::new(&case);
         let fluid = estimate.water;
@@ -194,24 +196,33 @@ impl Seen {
         // What this machine has no room for is not built either.
         let room = machine::memory().map_or(f64::INFINITY, |n| n as f64 / 2.0);
         let coarser = (estimate.memory_beside_device / room).powf(1.0 / d).max(coarser);
+        let name = setup::name(&args.case);
         if coarser > 1.0 {
-            // From its text: standard input is read once.
-            loaded = load_text(&loaded.path.clone(), loaded.text, Some(coarser * l0), &[])?;
+            // From its text: standard input is read once. What the coarser lattice rounds is no news.
+            let other = load_text(&loaded.path, loaded.text.clone(), Some(coarser * l0), &[]);
+            match other.and_then(|other| Setup::build(other, name.clone(), true)) {
+                Ok(setup) => return Ok(Self { setup, case, coarser }),
+                // What is wrong with the coarser scene alone is no fault of the case.
+                Err(why) if estimate.memory_beside_device > room => {
+                    let wrong = words::too_large(&case, &estimate, room, (coarser * l0, &why));
+                    return Err(loaded.placed(wrong.into()));
+                }
+                Err(_) => {}
+            }
         }
-        // What the coarser lattice rounds is no news.
-        let setup = Setup::build(loaded, setup::name(&args.case), quiet || coarser > 1.0)?;
-        Ok(Self { setup, case, coarser })
+        let setup = Setup::build(loaded, name, quiet)?;
+        Ok(Self { setup, case, coarser: 1.0 })
     }
 }
 
 pub fn plan(args: &PlanArgs) -> Exit {
     seixo::threads::start(None)?;
-    let report = report(&Seen::new(&args.case, args.json)?, args.ranks)?;
+    let seen = Seen::new(&args.case, args.json)?;
+    let report = report(&seen, args.ranks).map_err(|e| seen.setup.loaded.placed(e))?;
     if args.json {
         say_json(&report);
     } else {
-        let words = report.words();
-        say(&width::of_stdout().map_or(words.clone(), |columns| width::wrapped(&words, columns)));
+        tell(&report.words());
     }
     Ok(0)
 }

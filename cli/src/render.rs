@@ -6,13 +6,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputKind};
-use seixo::console::{remark, say};
+use seixo::console::{remark, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::{case_name, series_in};
 use seixo::output::label::{Picture, animation, sheet};
 use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
-use seixo::output::replay::{Frame, frames, particles};
+use seixo::output::replay::{Frame, flaw, frames, particles};
 use seixo::output::spare::spare_folder;
 use seixo::output::write_whole;
 use seixo::params::Params;
@@ -288,7 +288,16 @@ fn range_of(frames: &[&Frame], style: &Style, params: &Params) -> Result<Option<
 pub fn frames_of(root: &Path) -> Result<Vec<Frame>> {
     let none = || FolderError::NoRun(root.to_path_buf());
     let name = case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
-    frames(root, &name)
+    listed(root, &name)
+}
+
+/// The frames that the list `name` in `root` names; says so if it is cut off.
+fn listed(root: &Path, name: &str) -> Result<Vec<Frame>> {
+    let list = root.join(format!("{name}.pvd"));
+    if let Some(why) = flaw(&list).filter(|_| list.exists()) {
+        remark(&format!("warning: {why}: frames that it does not name are left out"));
+    }
+    frames(root, name)
 }
 
 /// Where the frames of `[output]`, or of a series, of the run in `root` lie.
@@ -322,7 +331,7 @@ pub fn series_of(root: &Path, series: Option<&str>) -> Result<(Case, Vec<Frame>)
     let output = &mut case.output;
     (output.every, output.kinds, output.fields, output.region) =
         (named.every, named.kinds, named.fields, named.region);
-    let frames = frames(&series_in(root, name), name)?;
+    let frames = listed(&series_in(root, name), name)?;
     Ok((case, frames))
 }
 
@@ -331,12 +340,18 @@ pub fn without(frames: &str, root: &Path, case: &Case, series: Option<&str>) -> 
     let others = case.output.series.first().filter(|_| series.is_none());
     let others = others.map_or(String::new(), |s| format!("; its series has its own: --series {}", s.name));
     let output = &case.output;
+    let wet = frames.contains("water");
+    let list = list_of(root, series);
     let why = if output.every == 0.0 {
         "the case has output.every = 0".to_owned()
-    } else if !output.kinds.contains(&OutputKind::Fluid) {
+    } else if wet && case.fluid.is_none() {
+        "the case has no water".to_owned()
+    } else if wet && !output.kinds.contains(&OutputKind::Fluid) {
         "output.kinds leaves it out".to_owned()
+    } else if std::fs::read_to_string(&list).is_ok_and(|text| text.contains("<DataSet ")) {
+        format!("the files that {} names cannot be read any more", list.display())
     } else {
-        format!("the list of them, {}, is gone or names none", list_of(root, series).display())
+        format!("the list of them, {}, is gone or names none", list.display())
     };
     Error::usage("DIR", format!("{} holds no {frames}: {why}{others}", root.display()))
 }
@@ -362,13 +377,13 @@ pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     there.map(|k| (k, all[k].clone())).collect()
 }
 
-/// Whether the files of frame number `k` are there; says so if one is gone.
+/// Whether the files of frame number `k` are there and whole; says so if one is not.
 pub fn is_there(k: usize, frame: &Frame) -> bool {
-    let gone = [&frame.fluid, &frame.solids].into_iter().flatten().find(|path| !path.exists());
-    if let Some(path) = gone {
-        remark(&format!("warning: frame {k} is left out: {} is gone", path.display()));
+    let why = [&frame.fluid, &frame.solids].into_iter().flatten().find_map(|path| flaw(path));
+    if let Some(why) = &why {
+        remark(&format!("warning: frame {k} is left out: {why}"));
     }
-    gone.is_none()
+    why.is_none()
 }
 
 pub fn render(args: &RenderArgs) -> Exit {
@@ -413,7 +428,7 @@ pub fn render(args: &RenderArgs) -> Exit {
         }
     }
     if !args.quiet {
-        say(&written);
+        tell(&written);
     }
     Ok(0)
 }

@@ -10,7 +10,7 @@ use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
 use seixo::Processor;
 use seixo::backend::gpu::Gpu;
 use seixo::case::Case;
-use seixo::console::{remark, say};
+use seixo::console::{remark, say, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
@@ -48,7 +48,7 @@ pub struct RunArgs {
     #[arg(long)]
     force: bool,
     /// Stop after this many steps.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     steps: Option<u64>,
     /// Memory that the run may take, e.g. 8G, instead of what the machine has free.
     #[arg(long, value_name = "SIZE", value_parser = size)]
@@ -93,6 +93,11 @@ fn duration(text: &str) -> std::result::Result<Duration, String> {
     if time.is_zero() { Err(wrong()) } else { Ok(time) }
 }
 
+/// A number of steps.
+fn count(text: &str) -> std::result::Result<u64, String> {
+    text.parse().map_err(|_| "write a whole number, 0 or more".to_owned())
+}
+
 /// Bytes: `8G`, `500M`, or a number.
 fn size(text: &str) -> std::result::Result<u64, String> {
     let text = text.trim();
@@ -115,18 +120,22 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, place: Option<Place>) -> Res
         BackendName::Gpu => false,
         BackendName::Auto => args.device.adapter.is_none(),
     };
-    let needs = |cpu: bool| match place {
+    let of = |estimate: &Estimate, cpu: bool| match place {
         Some(Place { here, all, .. }) => estimate.memory_on_ranks(here, all),
         None if cpu => estimate.memory_cpu,
         None => estimate.memory_beside_device,
     };
+    let needs = |cpu: bool| of(&estimate, cpu);
     let limit = args.memory_limit.or_else(machine::memory).map_or(f64::INFINITY, |n| n as f64);
     // Drivers are asked only if it matters whether there is one.
     let on_cpu = on_cpu
         && (args.device.backend == BackendName::Cpu || needs(true) <= limit || !Gpu::hardware_available());
     if needs(on_cpu) > limit {
+        let coarser = Estimate::spacing_within(case, limit, |estimate| of(estimate, on_cpu));
+        let coarser =
+            coarser.map_or("a larger run.spacing".into(), |l0| format!("run.spacing = {l0} or more"));
         let text = format!(
-            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory{}, {} are {}: use a larger run.spacing \
+            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory{}, {} are {}: use {coarser}, \
              or a smaller domain, or say with --memory-limit what the run may take",
             asked.name,
             estimate.particles,
@@ -241,7 +250,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
                 if args.json {
                     say(result.trim_end());
                 } else if !args.quiet {
-                    say(&format!("the run in {} is done", asked.out.display()));
+                    tell(&format!("the run in {} is done", asked.out.display()));
                 }
                 return Ok(0);
             }
@@ -258,17 +267,19 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
             }
         },
     };
+    seixo::far::refuse(&loaded.case).map_err(|e| loaded.placed(e))?;
     fits(args, &asked, &loaded.case, place)?;
     let setup = Setup::build(loaded, asked.name.clone(), args.quiet)?;
     if !matches!(start, Start::Resume(_)) {
         let case = &setup.loaded.case;
-        let params = Params::new(case, &setup.scene)?;
+        let params = Params::new(case, &setup.scene).map_err(|e| setup.loaded.placed(e))?;
         fits_disk(args, &asked, case, shortest(case, &setup.scene, &params))?;
     }
     call.tell(&setup.loaded.text);
     let mut simulation = match team {
         Some((team, processor)) => {
-            Simulation::on_ranks_of(&setup.loaded.case, setup.scene.clone(), team, processor)?
+            Simulation::on_ranks_of(&setup.loaded.case, setup.scene.clone(), team, processor)
+                .map_err(|e| setup.loaded.placed(e))?
         }
         None => setup.simulation(&args.device)?,
     };
@@ -310,7 +321,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     if args.json {
         say(&finished.summary.json());
     } else if !args.quiet {
-        say(&words(&finished.summary, &asked.out));
+        tell(&words(&finished.summary, &asked.out));
     }
     match (finished.error, finished.signal) {
         (Some(error), _) => Err(error),

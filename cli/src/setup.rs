@@ -47,7 +47,9 @@ impl Setup {
     /// # Errors
     /// No suitable device, or a scene that does not fit it.
     pub fn simulation(&self, args: &DeviceArgs) -> Result<Simulation> {
-        Simulation::on(&self.loaded.case, self.scene.clone(), &device::processor(args)?)
+        let processor = device::processor(args)?;
+        let opened = Simulation::on(&self.loaded.case, self.scene.clone(), &processor);
+        opened.map_err(|e| self.loaded.placed(e))
     }
 }
 

@@ -4,7 +4,7 @@ use super::render::{chosen, place, series_of, without};
 use super::{Exit, counted, finite};
 use clap::ValueEnum;
 use rayon::prelude::*;
-use seixo::console::{remark, say};
+use seixo::console::{remark, tell};
 use seixo::error::{Error, Result};
 use seixo::output::replay::{Frame, particles};
 use seixo::output::spare::spare_folder;
@@ -89,7 +89,7 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     let written: Result<Vec<usize>> = chosen.par_iter().map(one).collect();
     let count: usize = written?.into_iter().sum();
     if !args.quiet {
-        say(&format!("{} in {}", counted(count, "surface"), out.display()));
+        tell(&format!("{} in {}", counted(count, "surface"), out.display()));
     }
     Ok(0)
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import html
 import json
 import os
 import re
@@ -16,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Union, cast, overload
 
 import numpy as np
 import numpy.typing as npt
+
+from ._errors import FileError
 
 if TYPE_CHECKING:
     import pandas
@@ -53,7 +56,10 @@ class Run:
             text = (self.path / "result.json").read_text(encoding="utf-8")
         except FileNotFoundError:
             return {}
-        found: dict[str, Any] = json.loads(text)
+        try:
+            found: dict[str, Any] = json.loads(text)
+        except ValueError as why:
+            raise FileError(f"{self.path / 'result.json'}: damaged ({why}); without it the run counts as under way", 5) from None
         return found
 
     @property
@@ -136,8 +142,11 @@ class Run:
         if not path.is_file():
             there = ", ".join(sorted(p.stem for p in self.path.glob("*.csv"))) or "none"
             raise FileNotFoundError(f"{path}: this run wrote no such table; tables: {there}")
-        with path.open(newline="", encoding="utf-8") as file:
-            headers, *rows = list(csv.reader(file))
+        try:
+            with path.open(newline="", encoding="utf-8") as file:
+                headers, *rows = list(csv.reader(file))
+        except (UnicodeDecodeError, csv.Error, ValueError):
+            raise FileError(f"{path}: damaged: no table with a line of names", 5) from None
         return headers, [row for row in rows if len(row) == len(headers)]
 
     @functools.cached_property
@@ -246,6 +255,9 @@ class Frame:
         return Particles(path)
 
 
+NO_FRAMES = "there are no frames: `output.every` of the case, or their list (.pvd) or files are gone"
+
+
 class Frames(Sequence[Frame]):
     """Frames in the order of time."""
 
@@ -263,7 +275,11 @@ class Frames(Sequence[Frame]):
     @overload
     def __getitem__(self, index: slice) -> Frames: ...
     def __getitem__(self, index: int | slice) -> Frame | Frames:
-        return Frames(self._frames[index]) if isinstance(index, slice) else self._frames[index]
+        if isinstance(index, slice):
+            return Frames(self._frames[index])
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"frame {index}: there are {len(self)}" if len(self) else NO_FRAMES)
+        return self._frames[index]
 
     def __repr__(self) -> str:
         return f"<seixo.Frames: {len(self)}>"
@@ -276,7 +292,7 @@ class Frames(Sequence[Frame]):
     def at(self, time: float) -> Frame:
         """The frame nearest to `time` [s]."""
         if not self._frames:
-            raise LookupError("the run wrote no frames: `output.every` of the case")
+            raise LookupError(NO_FRAMES)
         return min(self._frames, key=lambda frame: abs(frame.time - time))
 
 
@@ -286,19 +302,47 @@ def _frames(folder: Path) -> list[Frame]:
     if not lists:
         return []
     found: dict[float, dict[str, Path]] = {}
-    for item in xml.etree.ElementTree.parse(lists[0]).iter("DataSet"):
+    text = lists[0].read_text(encoding="utf-8", errors="replace")
+    cut = not text.rstrip().endswith("</VTKFile>")
+    if cut:
+        warnings.warn(f"{lists[0]} is cut off: frames that it does not name are left out", stacklevel=4)
+    # A line each: those of a list that is cut off are as good as ever.
+    for line in re.findall(r"<DataSet [^>]*/>", text):
+        item = {key: html.unescape(value) for key, value in re.findall(r' (\w+)="([^"]*)"', line)}
         file = Path(item.get("file", ""))
         # A list that somebody changed leads nowhere else.
         if not file.is_absolute() and ".." not in file.parts:
             found.setdefault(float(item.get("timestep", "nan")), {})[item.get("name", "")] = folder / file
+    moments = list(found)
+    if cut and moments and found[moments[-1]].keys() != found[moments[0]].keys():
+        del found[moments[-1]]
     frames = []
     for time, parts in found.items():
-        gone = [str(path) for path in parts.values() if not path.exists()]
-        if gone:
-            warnings.warn(f"the frame at {time:g} s is left out: {', '.join(gone)} is gone", stacklevel=4)
+        # What stands still is no part of a moment.
+        moving = [path for name, path in parts.items() if name in ("fluid", "solids")]
+        flaws = [flaw for flaw in map(_flaw, moving) if flaw]
+        if flaws:
+            warnings.warn(f"the frame at {time:g} s is left out: {', '.join(flaws)}", stacklevel=4)
         else:
             frames.append(Frame(time, parts.get("fluid"), parts.get("solids")))
     return frames
+
+
+def _flaw(path: Path) -> str | None:
+    """What shows at the ends of a file of a frame, or of a piece of it, that cannot be read."""
+    try:
+        with path.open("rb") as file:
+            length = file.seek(0, os.SEEK_END)
+            file.seek(max(0, length - 64))
+            end = file.read().rstrip()
+    except FileNotFoundError:
+        return f"{path} is gone"
+    except OSError as why:
+        return f"{path}: {why.strerror}"
+    if not end.endswith(b"</VTKFile>"):
+        return f"{path} is cut off" if length else f"{path} is empty"
+    pieces = _pieces(path) if path.suffix == ".pvtu" else []
+    return next((flaw for flaw in map(_flaw, pieces) if flaw), None)
 
 
 def _pieces(path: Path) -> list[Path]:
@@ -341,7 +385,11 @@ def _vtu(path: Path) -> dict[str, Array]:
         return {name: values for name, values in empty.items() if name not in ("connectivity", "offsets", "types")}
     if '<AppendedData encoding="raw">' in head:
         raise ImportError(f'{path}: `output.encoding = "raw"` is read by pyvista alone: `pip install pyvista`')
-    mesh = meshio.read(path)
+    try:
+        # `meshio.read` ends the whole program where it cannot read a file.
+        mesh = meshio.vtu.read(path)
+    except Exception as why:
+        raise FileError(f"{path}: damaged ({str(why) or type(why).__name__})", 5) from None
     # It keeps a column of fields with one component.
     fields = {name: values.reshape(-1) if values.shape[1:] == (1,) else values for name, values in mesh.point_data.items()}
     return {"Points": mesh.points, **fields}

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import datetime
+import decimal
 import json
+import numbers
+import operator
 import os
 import subprocess
 import sys
@@ -35,7 +39,7 @@ def run(
     backend: str | None = None,
     adapter: str | int | None = None,
     threads: int | None = None,
-    max_wall: str | float | None = None,
+    max_wall: str | float | datetime.timedelta | None = None,
     memory_limit: str | int | None = None,
     picture: bool = False,
     force: bool = False,
@@ -59,9 +63,9 @@ def run(
     options: dict[str, Any] = {
         "--backend": backend,
         "--adapter": adapter,
-        "--threads": threads,
-        "--steps": steps,
-        "--max-wall": max_wall,
+        "--threads": _whole("threads", threads),
+        "--steps": _whole("steps", steps),
+        "--max-wall": max_wall.total_seconds() if isinstance(max_wall, datetime.timedelta) else max_wall,
         "--memory-limit": memory_limit,
     }
     flags = {"--picture": picture, "--force": force, "--force-disk": force_disk, "--resume": resume}
@@ -104,8 +108,24 @@ def plan(
 def case_text(case: Case) -> tuple[str | None, str | None]:
     """The file of the case, or its text: one of them."""
     if isinstance(case, Mapping):
-        return None, tomli_w.dumps(_table(case))
+        return None, tomli_w.dumps(_table(case, ""))
+    if not isinstance(case, (str, os.PathLike)):
+        raise TypeError(f"case: a TOML file or a dict with the same keys, not {_named(case)}")
     return os.fspath(case), None
+
+
+def _whole(name: str, value: Any) -> int | None:
+    """A number of things."""
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    try:
+        return None if value is None else operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: a whole number, not {value!r}") from None
+
+
+def _named(value: Any) -> str:
+    return "None" if value is None else f"a value of type {type(value).__name__}"
 
 
 def _changes(spacing: float | None, until: float | None, sets: Mapping[str, Any] | None) -> list[str]:
@@ -121,7 +141,10 @@ def _changes(spacing: float | None, until: float | None, sets: Mapping[str, Any]
 
 def value_sets(sets: Mapping[str, Any] | None) -> list[str]:
     """Changes of single values, `key=value` with the value as TOML in one line; text stands as it is."""
-    return [f"{key}={value if isinstance(value, str) else _inline(_plain(value))}" for key, value in (sets or {}).items()]
+    if sets is not None and not isinstance(sets, Mapping):
+        raise TypeError(f'set: a dict such as {{"body.0.density": 800}}, not {_named(sets)}')
+    given = (sets or {}).items()
+    return [f"{key}={value if isinstance(value, str) else _inline(_plain(value, str(key)))}" for key, value in given]
 
 
 def _inline(value: Any) -> str:
@@ -133,21 +156,26 @@ def _inline(value: Any) -> str:
     return tomli_w.dumps({"x": value}).removeprefix("x = ").strip()
 
 
-def _table(table: Mapping[str, Any]) -> dict[str, Any]:
-    return {str(key): _plain(value) for key, value in table.items() if value is not None}
+def _table(table: Mapping[str, Any], path: str) -> dict[str, Any]:
+    before = f"{path}." if path else ""
+    return {str(key): _plain(value, f"{before}{key}") for key, value in table.items() if value is not None}
 
 
-def _plain(value: Any) -> Any:
-    """A value that TOML has: of arrays, lists; of paths, text; what is None is left out of tables."""
+def _plain(value: Any, path: str) -> Any:
+    """The value of the key `path` as TOML has it: of arrays, lists; of paths, text; what is None is left out of tables."""
     if isinstance(value, Mapping):
-        return _table(value)
+        return _table(value, path)
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
+        return _plain(value.tolist(), path)
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [_plain(item, f"{path}.{k}") for k, item in enumerate(value)]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    return value
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, (numbers.Real, decimal.Decimal)):
+        return float(value)
+    raise TypeError(f"{path}: {_named(value)} is no value of a case: numbers, text, True or False, lists and dicts are")
 
 
 def _start(arguments: list[str], text: str | None, *, echo: bool) -> tuple[int, str, str]:

@@ -4,11 +4,13 @@ by SEIXO_PROGRAM, and numpy, tomli-w, meshio; with and without pandas."""
 from __future__ import annotations
 
 import builtins
+import datetime
 import importlib.util
 import runpy
 import shutil
 import signal
 import sys
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -123,6 +125,70 @@ def test_a_region_without_water_has_a_frame_of_nothing(tmp_path: Path) -> None:
     out = seixo.run(CASE, tmp_path / "out", backend="cpu", steps=2, set={"output.region": dry})
     water = out.frames[0].fluid
     assert (len(water), water.velocity.shape, water.pressure.shape) == (0, (0, 3), (0,))
+
+
+def test_damaged_results_are_left_out_or_named(run: seixo.Run, tmp_path: Path) -> None:
+    root = tmp_path / "run"
+
+    def fresh() -> Path:
+        shutil.rmtree(root, ignore_errors=True)
+        shutil.copytree(run.path, root)
+        return root / "vtu" / "fluid_0001.vtu"
+
+    frame = fresh()
+    whole = frame.read_bytes()
+    for kept, words in ((len(whole) // 2, "is cut off"), (0, "is empty")):
+        frame.write_bytes(whole[:kept])
+        with pytest.warns(UserWarning, match=f"left out: .*fluid_0001.vtu {words}"):
+            assert len(seixo.read(root).frames) == 2
+    # What shows in the arrays alone ends no program.
+    at = whole.index(b"<AppendedData") + 200
+    frame.write_bytes(whole[:at] + b"A" * 200 + whole[at + 200 :])
+    with pytest.raises(seixo.FileError, match="fluid_0001.vtu: damaged"):
+        seixo.read(root).frames[1].fluid.velocity
+
+    fresh()
+    listed = next(root.glob("*.pvd"))
+    text = listed.read_text(encoding="utf-8")
+    listed.write_text(text[: text.index("_0001.")], encoding="utf-8")
+    with pytest.warns(UserWarning, match="is cut off"):
+        frames = seixo.read(root).frames
+    assert len(frames) == 1
+    with pytest.raises(IndexError, match="there are 1"):
+        frames[1]
+    listed.unlink()
+    with pytest.raises(IndexError, match="output.every"):
+        seixo.read(root).frames[-1]
+    for name, of in (("monitors.csv", "monitors"), ("result.json", "status")):
+        fresh()
+        (root / name).write_bytes(b"")
+        with pytest.raises(seixo.FileError, match=f"{name}: damaged"):
+            getattr(seixo.read(root), of)
+
+
+def test_values_that_no_case_has_are_named_by_their_key() -> None:
+    wrong: Any
+    for wrong, words in (
+        (CASE | {"run": {"end": 1j}}, "run.end: a value of type complex"),
+        (CASE | {"body": [{"center": [0, None, 0]}]}, "body.0.center.1: None"),
+        ([1, 2], "a TOML file or a dict"),
+    ):
+        with pytest.raises(TypeError, match=words):
+            seixo.run(wrong)
+    for wrong, words in (({"run.end": None}, "run.end: None"), (["run.end=1"], "set: a dict such as")):
+        with pytest.raises(TypeError, match=words):
+            seixo.plan(CASE, set=wrong)
+    wrong = 2.5
+    with pytest.raises(TypeError, match="steps: a whole number, not 2.5"):
+        seixo.run(CASE, steps=wrong)
+
+
+def test_numbers_and_times_of_other_types_are_taken(tmp_path: Path) -> None:
+    steps: Any = 3.0
+    ended = seixo.run(CASE, tmp_path / "out", set={"run.end": Fraction(1, 50)}, backend="cpu", steps=steps)
+    assert ended.result["steps"] == 3 and ended.case["run"]["end"] == 0.02
+    stopped = seixo.run(CASE, tmp_path / "long", until=60.0, backend="cpu", max_wall=datetime.timedelta(seconds=0.2))
+    assert stopped.status == "interrupted"
 
 
 def test_options_change_the_case_and_the_run(tmp_path: Path) -> None:

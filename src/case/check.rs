@@ -337,7 +337,12 @@ impl Checker<'_> {
             self.in_tank(&format!("gauge.level.{k}.at"), [gauge.at, gauge.at], "the line");
         }
         for (k, gauge) in gauges.force.iter().enumerate() {
-            if !solid.contains(&gauge.on.as_str()) {
+            let face = case.tank.is_some() && super::TANK_FACES.iter().any(|(_, name)| *name == gauge.on);
+            if face && !solid.contains(&gauge.on.as_str()) {
+                let message = format!("`{}` has no wall to measure on", gauge.on);
+                let remedy = "name another face, or take it out of tank.open or tank.periodic";
+                self.add(format!("gauge.force.{k}.on"), message, remedy);
+            } else if !solid.contains(&gauge.on.as_str()) {
                 let message = format!("nothing solid is called `{}`", gauge.on);
                 let remedy = match super::report::closest(&gauge.on, &solid) {
                     Some(name) => format!("did you mean `{name}`?"),

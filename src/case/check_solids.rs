@@ -118,8 +118,15 @@ impl Checker<'_> {
         let free = self.case.body.iter().filter(|b| !b.is_driven() && b.locked.len() < 6);
         if spring == 0.0 {
             let stiff = free.map(|b| 100.0 * weight(b) / smallest(b)).fold(0.0, f64::max);
-            let stiff = if stiff > 0.0 { format!(", {stiff:.1e} N/m or more") } else { " [N/m]".to_owned() };
-            self.add("contact.spring", "contact has no spring", format!("give `spring`{stiff}"));
+            let stiff = if stiff > 0.0 {
+                format!(", {stiff:.1e} N/m or more")
+            } else {
+                " [N/m], e.g. 1e5".to_owned()
+            };
+            let message = "there is no spring, so that nothing keeps solids apart";
+            let remedy = format!("add `spring`{stiff}; `seixo plan` then tells what the bodies ask for");
+            // Also where nobody has written one.
+            self.add("contact.spring", message, remedy);
             return;
         }
         let sinks = |b: &&Body| weight(b) / spring > smallest(b);
@@ -230,7 +237,8 @@ impl Checker<'_> {
                 self.add(
                     "contact",
                     message,
-                    "add [contact] with `spring` [N/m], or lock all six of the body's freedoms",
+                    "add [contact] with `spring` [N/m], e.g. 1e5 (`seixo plan` then tells what the bodies ask for), or \
+                     lock all six of the body's freedoms",
                 );
             }
             return;

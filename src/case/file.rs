@@ -38,7 +38,11 @@ impl Loaded {
             known.then(|| Message {
                 span,
                 key: p.key.clone(),
-                title: p.message.clone(),
+                title: if p.message.starts_with(&p.key) {
+                    p.message.clone()
+                } else {
+                    format!("{}: {}", p.key, p.message)
+                },
                 label: p.key.clone(),
                 remedy: Some(p.remedy.clone()).filter(|r| !r.is_empty()),
                 warning: false,

@@ -40,11 +40,11 @@ pub(super) fn inline(path: &Path, text: String) -> Result<String> {
             }
             _ => continue,
         };
-        for one in tables {
+        for (k, one) in tables.into_iter().enumerate() {
             for &key in keys {
                 let Some(Item::Value(value)) = one.get_mut(key) else { continue };
                 let Some(file) = value.as_str() else { continue };
-                let mut rows = Value::Array(rows(path, file, key, form)?);
+                let mut rows = Value::Array(rows(path, file, (&format!("{table}.{k}.{key}"), key), form)?);
                 // What stands around the name, a comment say, stays around the rows.
                 *rows.decor_mut() = value.decor().clone();
                 *value = rows;
@@ -100,20 +100,20 @@ fn other_unit<'a>(line: &'a str, key: &str, form: &Form) -> Option<(&'a str, &'a
     found.next()
 }
 
-/// The rows of `file`, a name relative to the case at `path`.
-fn rows(path: &Path, file: &str, key: &str, form: &Form) -> Result<Array> {
-    let place = path.with_file_name("").join(file);
-    let name = place.display().to_string();
+/// The rows of `file`, a name relative to the case at `path`, where `key` of the table at `place` names it.
+fn rows(path: &Path, file: &str, (place, key): (&str, &str), form: &Form) -> Result<Array> {
+    let file = path.with_file_name("").join(file);
+    let name = file.display().to_string();
     let wrong = |line: usize, why: String| {
         let at = if line > 0 { format!("{name}:{line}") } else { name.clone() };
-        Error::file(name.clone(), key, format!("{at}: {why}"))
+        Error::file(name.clone(), place, format!("{at}: {why}"))
     };
-    let text = std::fs::File::open(&place).and_then(read_text).map_err(|e| match e.kind() {
+    let text = std::fs::File::open(&file).and_then(read_text).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => {
-            wrong(0, format!("no such file; a table of `{key}` is named relative to its case"))
+            wrong(0, format!("no such file; `{place}` of the case names it, relative to the case"))
         }
         std::io::ErrorKind::InvalidData => wrong(0, "not a text file in UTF-8".into()),
-        _ => Error::io(&place)(e),
+        _ => Error::io(&file)(e),
     })?;
     let (mut rows, mut last, mut headed) = (Array::new(), f64::NEG_INFINITY, false);
     for (n, line) in text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())) {

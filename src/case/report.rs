@@ -62,9 +62,11 @@ pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> M
     let span = error.span().unwrap_or(0..0);
     let key = table.and_then(|t| path_at(t, &span));
     let said = tidy(&plain(error.message().trim()));
+    // What is allowed is told once, as the remedy.
+    let brief = short(&said);
     let title = match &key {
-        Some(key) => format!("{key}: {said}"),
-        None => said.clone(),
+        Some(key) => format!("{key}: {brief}"),
+        None => brief.clone(),
     };
     let quoted: Vec<&str> = said.split('`').skip(1).step_by(2).collect();
     let remedy = match quoted.as_slice() {
@@ -72,14 +74,18 @@ pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> M
             Some(name) => format!("did you mean `{name}`? allowed: {}", allowed.join(", ")),
             None => format!("allowed: {}", allowed.join(", ")),
         }),
-        [name, ..] if said.starts_with("missing field") => Some(format!("add `{name} = ...` here")),
-        _ if said.contains("expected ") => key.as_ref().map(|key| {
-            let named: Vec<&str> = key.split('.').filter(|part| part.parse::<usize>().is_err()).collect();
-            format!("`seixo keys {}` tells what it takes, with an example", named.join("."))
+        [name, ..] if said.starts_with("missing field") => Some(match &key {
+            Some(key) => {
+                format!("add `{name} = ...` here; `seixo keys {}.{name}` tells what it takes", named(key))
+            }
+            None => format!("add a table [{name}]; `seixo init` writes a case to begin with"),
         }),
+        _ if said.contains("expected ") => key
+            .as_ref()
+            .map(|key| format!("`seixo keys {}` tells what it takes, with an example", named(key))),
         _ => None,
     };
-    Message { span, key: key.unwrap_or_default(), title, label: short(&said), remedy, warning: false }
+    Message { span, key: key.unwrap_or_default(), title, label: brief, remedy, warning: false }
 }
 
 /// What the reader of types says, in the words of a case: `invalid type: map, expected f64` as `a table, expected a number`.
@@ -123,7 +129,13 @@ fn plain(said: &str) -> String {
 
 /// The message up to the list of what is allowed, which stands in the remedy.
 fn short(said: &str) -> String {
-    said.lines().next().unwrap_or("").split(", expected one of").next().unwrap_or("").to_owned()
+    let list = if said.starts_with("unknown") { ", expected " } else { ", expected one of" };
+    said.lines().next().unwrap_or("").split(list).next().unwrap_or("").to_owned()
+}
+
+/// A key as `seixo keys` knows it, without the numbers of list entries.
+fn named(key: &str) -> String {
+    key.split('.').filter(|part| part.parse::<usize>().is_err()).collect::<Vec<_>>().join(".")
 }
 
 /// The name most like a mistyped one: few slips of the finger, or the same beginning.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use bytemuck::Pod;
 use flate2::read::ZlibDecoder;
 use rayon::prelude::*;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// A frame of a run: where its files are.
@@ -90,6 +90,36 @@ pub fn particles(path: &Path) -> Result<Particles> {
     pieces.into_iter().for_each(|piece| all.append(piece));
     Ok(all)
 }
+
+/// What shows at the ends of a file of a frame, or of a piece of it, that cannot be read; what lies between is not looked at.
+pub fn flaw(path: &Path) -> Option<String> {
+    let end = |path: &Path| -> std::io::Result<(u64, Vec<u8>)> {
+        let mut file = std::fs::File::open(path)?;
+        let length = file.metadata()?.len();
+        file.seek(SeekFrom::Start(length.saturating_sub(END)))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok((length, bytes))
+    };
+    let of = |path: &Path| match end(path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Some(format!("{} is gone", path.display())),
+        Err(e) => Some(format!("{}: {e}", path.display())),
+        Ok((0, _)) => Some(format!("{} is empty", path.display())),
+        Ok((_, bytes)) if !bytes.trim_ascii_end().ends_with(b"</VTKFile>") => {
+            Some(format!("{} is cut off", path.display()))
+        }
+        Ok(_) => None,
+    };
+    of(path).or_else(|| {
+        let text =
+            path.extension().filter(|end| *end == "pvtu").and_then(|_| std::fs::read_to_string(path).ok())?;
+        let pieces = text.lines().filter(|l| l.contains("<Piece ")).filter_map(|l| attribute(l, "Source"));
+        pieces.map(|piece| path.with_file_name(piece)).find_map(|piece| of(&piece))
+    })
+}
+
+/// Bytes at the end of a file that hold its last tag.
+const END: u64 = 64;
 
 /// Whether a file lies below the folder that its name is relative to.
 fn is_inside(file: &Path) -> bool {

@@ -28,6 +28,10 @@ pub fn named(case: &Case) -> Result<Option<Found>> {
     let run = &case.run;
     let Some(from) = &run.from else { return Ok(None) };
     let remedy = "name the folder of a run with states (run.checkpoint), or leave run.from out";
+    if !Path::new(from).is_dir() {
+        let what = if Path::new(from).exists() { "is a file" } else { "is not there" };
+        return Err(Error::key("run.from", format!("run.from: `{from}` {what}"), remedy));
+    }
     let found = file::newest(&checkpoints(Path::new(from))).map_err(|e| match e {
         Error::Checkpoint(why) => {
             Error::damaged(format!("run.from: no state in `{from}` is whole: {why}; {remedy}"))

@@ -26,7 +26,9 @@ impl Scene {
     /// walls, water or each other, water that would run away, things outside of the domain.
     pub fn build(case: &Case) -> Result<Self> {
         crate::case::check::refuse(case)?;
+        let notes = crate::far::refuse(case)?;
         let mut builder = Builder::new(case)?;
+        builder.notes = notes;
         builder.walls();
         builder.water();
         builder.bodies();

@@ -8,7 +8,7 @@ use super::report::page::{MARK, charts, html, section, table};
 use super::{Exit, finite};
 use curves::{Quantity, Run};
 use difference::Difference;
-use seixo::console::{remark, say, say_json};
+use seixo::console::{remark, say_json, tell};
 use seixo::error::{Error, Result};
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
@@ -94,7 +94,7 @@ pub fn compare_runs(args: &CompareRunsArgs) -> Exit {
         say_json(&answer);
     } else {
         answer.remarks.iter().for_each(|r| remark(&format!("note: {r}")));
-        say(&words(&answer));
+        tell(&words(&answer));
     }
     Ok(0)
 }
@@ -318,7 +318,7 @@ fn words(answer: &Answer) -> String {
         let cells: Vec<[String; 6]> = rows.iter().map(cells).collect();
         let wide = cells.iter().map(|c| c[0].chars().count()).max().unwrap_or(0).max(HEAD[0].len());
         let line = |c: [&str; 6]| {
-            format!("  {:<wide$}{:>12}{:>12}{:>10}{:>12}{:>15}", c[0], c[1], c[2], c[3], c[4], c[5])
+            format!("  {:<wide$}{:>11}{:>11}{:>9}{:>10}{:>14}", c[0], c[1], c[2], c[3], c[4], c[5])
         };
         lines.push(heading.to_owned());
         lines.push(line(HEAD));

@@ -2,7 +2,9 @@
 
 use super::{BodyLine, Report, StageLine, WaveLine};
 use seixo::backend::gpu::forecast::Forecast;
-use seixo::estimate::bytes;
+use seixo::case::Case;
+use seixo::error::{CaseError, Error};
+use seixo::estimate::{Estimate, bytes};
 use seixo::plan::Stage;
 use seixo::share::Outlook;
 
@@ -228,6 +230,27 @@ fn of_ranks(ranks: &Outlook) -> Vec<String> {
     lines
 }
 
+/// Said of a case that is larger than `room` bytes, where a coarser scene cannot stand for it: `why`, at its spacing
+/// [m].
+pub(super) fn too_large(case: &Case, estimate: &Estimate, room: f64, (l0, why): (f64, &Error)) -> CaseError {
+    let first = match why {
+        Error::Case(found) => found.problems.first().map(|p| p.message.clone()),
+        _ => None,
+    };
+    let message = format!(
+        "run.spacing: {:.1e} particles and {:.1e} cells of search take about {} of memory, half of what is free here is \
+         {}, and no coarser scene tells more: at {l0:.3} m {}",
+        estimate.particles,
+        estimate.cells,
+        bytes(estimate.memory_beside_device),
+        bytes(room),
+        first.unwrap_or_else(|| why.to_string())
+    );
+    let coarser = Estimate::spacing_within(case, room, |estimate| estimate.memory_beside_device);
+    let coarser = coarser.map_or("use a larger one".into(), |l0| format!("use run.spacing = {l0} or more"));
+    CaseError::of("run.spacing", message, format!("{coarser}, or correct a length that is far too large"))
+}
+
 /// A scene against the limits of devices.
 fn forecast(f: &Forecast, ahead: bool, spacing: f64) -> Vec<String> {
     let fits = if f.bytes < LARGE_GPU { "fits a GPU with 24 GB" } else { "more than a GPU with 24 GB holds" };
@@ -244,10 +267,12 @@ fn forecast(f: &Forecast, ahead: bool, spacing: f64) -> Vec<String> {
     }
     if !f.parts.is_empty() {
         let parts: Vec<_> = f.parts.iter().map(|(buffer, parts)| format!("{buffer} {parts}")).collect();
+        let bound = f.bindings.map_or("would bind more buffers than a device has".into(), |n| {
+            format!("binds up to {n} buffers")
+        });
         lines.push(format!(
-            "    in parts, since devices bind no more than 2.15 GB: {}; a kernel binds up to {} buffers",
-            parts.join(", "),
-            f.bindings
+            "    in parts, since devices bind no more than 2.15 GB: {}; a kernel {bound}",
+            parts.join(", ")
         ));
     }
     if f.rows > 1 {

@@ -6,15 +6,15 @@ pub mod table;
 
 use super::Exit;
 use super::progress::clock;
-use super::render::{LookArgs, Show, frames_of, is_there};
+use super::render::{LookArgs, Show, frames_of, is_there, without};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
 use page::{MARK, charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
-use seixo::case::{Case, OutputField};
-use seixo::console::{remark, say};
+use seixo::case::{Case, OutputField, OutputKind};
+use seixo::console::{remark, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
@@ -45,6 +45,9 @@ pub struct ReportArgs {
     quiet: bool,
 }
 
+/// Kinds of particles that frames are of.
+const SHOWN: [OutputKind; 2] = [OutputKind::Fluid, OutputKind::Body];
+
 /// What a run left.
 struct Run {
     name: String,
@@ -63,17 +66,29 @@ impl Run {
         let none = || FolderError::NoRun(root.to_path_buf());
         let name = case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
         let loaded = load(&root.join("case.toml"), None, &[])?;
-        let result = std::fs::read_to_string(root.join("result.json")).ok();
+        let told = root.join("result.json");
+        let result = std::fs::read_to_string(&told).ok().and_then(|text| {
+            let read = serde_json::from_str(&text);
+            if read.is_err() {
+                remark(&format!("warning: {} is damaged: the page tells no verdict", told.display()));
+            }
+            read.ok()
+        });
+        // A run may have been told to write none.
+        let output = &loaded.case.output;
+        let frames = if output.every > 0.0 { whole_frames(root) } else { Vec::new() };
+        if frames.is_empty() && output.every > 0.0 && output.kinds.iter().any(|k| SHOWN.contains(k)) {
+            remark(&format!("warning: no pictures: {}", without("frames", root, &loaded.case, None)));
+        }
         Ok(Self {
             name,
             case: loaded.case,
             text: loaded.text,
-            result: result.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default(),
+            result: result.unwrap_or_default(),
             monitors: Table::read(&root.join("monitors.csv"))?,
             bodies: Table::read_by(&root.join("bodies.csv"), "body")?,
             gauges: Table::read(&root.join("gauges.csv"))?,
-            // A run may have been told to write none.
-            frames: if root.join("vtu").exists() { whole_frames(root) } else { Vec::new() },
+            frames,
         })
     }
 }
@@ -94,7 +109,7 @@ pub fn report(args: &ReportArgs) -> Exit {
     let page = page(&run, &pictures)?;
     write_whole(&path, page.as_bytes())?;
     if !args.quiet {
-        say(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
+        tell(&format!("{} ({:.1} MB)", path.display(), page.len() as f64 / 1e6));
     }
     Ok(0)
 }

@@ -12,6 +12,8 @@ use serde::Serialize;
 
 /// Bytes that a shader binds at most on any device [bytes].
 pub(crate) const BINDING_MAX: u64 = (1 << 31) - 1;
+/// Parts of all buffers that shaders are written for.
+const MOST_PARTS: u64 = 1000;
 /// Workgroups that a dispatch starts along one dimension.
 pub(crate) const WORKGROUPS_MAX: u32 = 65_535;
 
@@ -97,8 +99,9 @@ pub struct Forecast {
     pub largest: (&'static str, u64),
     /// Buffers that are made as several, since devices do not bind them whole, and of how many parts each.
     pub parts: Vec<(&'static str, u64)>,
-    /// Storage buffers of a kernel at most, parts counted.
-    pub bindings: u32,
+    /// Storage buffers of a kernel at most, parts counted; nothing if there are more parts than shaders are written
+    /// for.
+    pub bindings: Option<u32>,
     /// Workgroups of the largest dispatch.
     pub workgroups: u64,
     /// Rows that it is folded into: more than one where a device starts fewer along one dimension.
@@ -129,7 +132,12 @@ impl Forecast {
     pub fn at(sizes: &Sizes, plan: &Plan, switches: &[&str], spacing_ratio: f64) -> Result<Self> {
         let memory = Memory::new(sizes, plan);
         let division = Division::new(&memory, BINDING_MAX, WORKGROUPS_MAX);
-        let shaders = Shader::all(kernels::planned(plan), switches, &division)?;
+        // Every part is a line of each shader, and no device binds as many.
+        let shaders = if division.parts.iter().map(|p| p.count).sum::<u64>() <= MOST_PARTS {
+            Some(Shader::all(kernels::planned(plan), switches, &division)?)
+        } else {
+            None
+        };
         Ok(Self {
             particles: sizes.total,
             fluid: sizes.fluid,
@@ -137,7 +145,7 @@ impl Forecast {
             bytes: memory.total(),
             largest: memory.largest(),
             parts: division.parts.iter().map(|p| (p.buffer, p.count)).collect(),
-            bindings: Shader::bindings(&shaders),
+            bindings: shaders.as_deref().map(Shader::bindings),
             workgroups: memory.workgroups,
             rows: memory.workgroups.div_ceil(WORKGROUPS_MAX.into()).max(1),
             excesses: excesses(sizes, &memory),
@@ -218,7 +226,12 @@ mod tests {
         }
         assert_eq!((ten.rows, hundred.rows), (1, hundred.workgroups.div_ceil(65_535)));
         // What wgpu has at least, and what graphics cards have by far.
-        assert!(ten.bindings <= 8 && hundred.bindings < 64 && hundred.rows > 1, "{hundred:?}");
+        let bindings = |f: &Forecast| f.bindings.expect("few parts");
+        assert!(bindings(&ten) <= 8 && bindings(&hundred) < 64 && hundred.rows > 1, "{hundred:?}");
+        // A room of nothing but cells asks for thousands, which no shader is written for.
+        let empty = Sizes { cells: 1 << 50, ..sizes() };
+        let none = Forecast::at(&empty, &plan(), &[], 1.0).expect("nothing is written");
+        assert!(none.bindings.is_none() && none.parts.iter().any(|p| p.1 > 1000), "{none:?}");
         // What cannot be divided is named.
         let thousand = forecast(1_000_000_000);
         assert!(thousand.excesses.iter().any(|e| e.what == "position"), "{thousand:?}");
