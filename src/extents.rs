@@ -1,6 +1,6 @@
 //! How far the things of a case reach, and the domain that follows: from the case alone, nothing is built.
 
-use crate::case::{Case, Face, Form, Guide, Place, Plane, Vector, Wall};
+use crate::case::{Case, Face, Form, Guide, OpeningKeys, Place, Plane, Tank, Vector, Wall, room_behind};
 use glam::{DMat3, DVec3};
 
 /// A box that grows [m].
@@ -192,6 +192,9 @@ pub(crate) fn all(case: &Case) -> Vec<Extent> {
             add(Of::Moving, item.clone(), key, bounds);
         }
     }
+    for (hole, t) in case.openings().filter(|o| !o.is_inflow() && o.is_hole()).zip(tank.into_iter().cycle()) {
+        add(Of::Moving, hole.path(), "max", jet(&hole, t, case));
+    }
     for (k, plane) in case.plane.iter().enumerate() {
         let bounds = flat_wall(plane, case.run.effective_radius.ceil() * l0, flat);
         // A large one reaches as far as a far one.
@@ -199,6 +202,26 @@ pub(crate) fn all(case: &Case) -> Vec<Extent> {
         add(Of::Moving, format!("plane.{k}"), if near { "size" } else { "center" }, bounds);
     }
     found
+}
+
+/// Where the jet of a `hole` of the tank may be before it is swallowed.
+fn jet(hole: &OpeningKeys, tank: &Tank, case: &Case) -> Bounds {
+    let (l0, flat, (axis, side)) = (case.run.spacing, case.run.dimensions == 2, hole.side());
+    let (min, max) = (DVec3::from(tank.min), DVec3::from(tank.max));
+    let corners = hole.corners.map(|corner| corner.map(DVec3::from));
+    let (mut lo, mut hi) = match corners {
+        [Some(low), Some(high)] => (low.clamp(min, max), high.clamp(min, max)),
+        _ => (min, max),
+    };
+    let aside = (0..3).filter(|&k| k != axis && !(flat && k == 1));
+    let whole = |k: usize| hi[k] - lo[k] > max[k] - min[k] - 0.5 * l0;
+    let (deep, wider) = room_behind(aside.map(|k| (hi[k] - lo[k], whole(k), case.run.gravity[k])), l0);
+    let wall = case.run.effective_radius.ceil() * l0;
+    (lo, hi) = (lo - wider - wall, hi + wider + wall);
+    let face = if side == 0 { min[axis] } else { max[axis] };
+    let outside = if side == 0 { face - deep - wall } else { face + deep + wall };
+    (lo[axis], hi[axis]) = (face.min(outside), face.max(outside));
+    Bounds { lo, hi }
 }
 
 /// The box around a plane whose layers are `deep` [m].

@@ -30,7 +30,7 @@ pub use absorber::Absorber;
 pub use contact::{Contact, ContactDevice, Law};
 pub use fluid::{Block, Fluid, Preconditioner, Preset, Solver};
 pub use gauge::{ForceGauge, Gauges, LevelGauge, PressureGauge};
-pub(crate) use opening::{HURRY, OpeningKeys};
+pub(crate) use opening::{HURRY, OpeningKeys, room_behind};
 pub use opening::{Inflow, OUTFLOWS_MAX, Outflow, Rate};
 pub(crate) use output::Choice;
 pub use output::{Encoding, Output, OutputField, OutputKind, OutputRegion, Series};

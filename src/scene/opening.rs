@@ -3,13 +3,9 @@
 use super::build::{AXES, Builder};
 use super::lattice::{BLOCKED, Cells, SOLID};
 use super::{Drive, Motion, Shape, Solid};
-use crate::case::{HURRY, OpeningKeys, Rate};
+use crate::case::{HURRY, OpeningKeys, Rate, room_behind};
 use crate::error::Problem;
 use glam::{DQuat, DVec3, IVec3};
-
-/// Room for the jet behind a hole, in its width [-]. A slot in the floor passes 0.64 of b sqrt(2 g h) with this much and with
-/// twice as much room, 0.70 to 0.73 without.
-const ROOM: f64 = 0.5;
 
 /// A quantity over time on straight lines between rows; constant before the first and after the last.
 #[derive(Clone, Debug, PartialEq)]
@@ -206,8 +202,10 @@ impl Builder<'_> {
             (low, high)
         };
         let (behind, room) = if passes == Passes::Free {
-            let deep = (ROOM * self.width(cells, axis)).max(l0);
-            let wider = (0.5 * deep).max(l0);
+            let guided =
+                |k: usize| self.tank.is_some_and(|t| (t.lo[k], t.hi[k]) == (cells.lo[k], cells.hi[k]));
+            let aside = (0..3).filter(|&k| k != axis && !(self.lattice.plane && k == 1));
+            let (deep, wider) = room_behind(aside.map(|k| (hi[k] - lo[k], guided(k), self.gravity()[k])), l0);
             // No step takes water through what is behind the room.
             let wall = f64::from(self.layers) * l0;
             (box_behind(deep + wall, wider + wall), Some(box_behind(deep, wider)))
@@ -234,18 +232,6 @@ impl Builder<'_> {
             opening.solid = wall;
         }
         Planned { opening, cells, wall }
-    }
-
-    /// Width of the stream that may come out of a hole [m]: its smaller side of those that do not reach from wall to wall, which
-    /// guide the water; the upright one if all of the face is open.
-    fn width(&self, cells: Cells, axis: usize) -> f64 {
-        let aside = (0..3).filter(|&k| k != axis && !(self.lattice.plane && k == 1));
-        let size = |k: usize| f64::from(cells.hi[k] - cells.lo[k]) * self.lattice.spacing;
-        let guided = |k: usize| self.tank.is_some_and(|t| (t.lo[k], t.hi[k]) == (cells.lo[k], cells.hi[k]));
-        let least = aside.clone().filter(|&k| !guided(k)).map(size).reduce(f64::min);
-        let down = self.gravity().abs();
-        let upright = aside.max_by(|&a, &b| down[a].total_cmp(&down[b])).map_or(0.0, size);
-        least.unwrap_or(upright)
     }
 
     /// The walls that move in the openings, as solids that contact takes for still ones; after all others.
