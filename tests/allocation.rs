@@ -60,8 +60,8 @@ fn bytes_per_step(spacing: f64, preconditioner: &str) -> (usize, usize) {
 /// Set in the process that measures.
 const ALONE: &str = "SEIXO_TEST_ALLOCATION";
 
-/// Whether this process is to measure. The counters are the process's: if not, `name` is run in one of its own, where no
-/// other test runs, and must say `said`.
+/// Whether this process is to measure. The counters are the process's: if not, `name` is run in one of its own, where
+/// no other test runs, and must say `said`.
 fn is_alone(name: &str, said: &str) -> bool {
     if std::env::var_os(ALONE).is_some() {
         return true;
@@ -93,7 +93,8 @@ fn a_step_allocates_nothing_that_grows() {
 }
 
 /// Still water that saves its state at the end.
-const STILL: &str = "[run]\nspacing = 0.0125\ntime_step = 2e-4\nend = 1.0\ncheckpoint = { every = 1.0 }\ngravity = [0, 0, -9.81]\n\
+const STILL: &str = "[run]\nspacing = 0.0125\ntime_step = 2e-4\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+    checkpoint = { every = 1.0 }\n\
     [fluid]\nsound_speed = 3\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.5]\n\
     [tank]\nmin = [0, 0, 0]\nmax = [0.25, 0.25, 0.7]\nopen = [\"z_max\"]\n";
 

@@ -79,8 +79,8 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Of the faces around each of `centers`, `count` of them, the numbers of the `solids` that may reach before it. Each
-    /// solid looks at the faces near it: a wall may have as many faces as there are solids.
+    /// Of the faces around each of `centers`, `count` of them, the numbers of the `solids` that may reach before it.
+    /// Each solid looks at the faces near it: a wall may have as many faces as there are solids.
     pub fn reached(&self, centers: &PointGrid, count: usize, solids: &[Standing]) -> Vec<Vec<usize>> {
         let mut out = vec![vec![]; count];
         for (k, solid) in solids.iter().enumerate() {
