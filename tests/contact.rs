@@ -469,8 +469,8 @@ fn edges_that_cross_between_points_hold_and_push_across_both() {
 
 #[test]
 fn a_wall_s_edge_is_the_same_wherever_posts_leave_it_bare() {
-    // A floor with a hundred posts along each of two edges, which leave a hundred stretches of either. A bar lies across
-    // one of them on its own edge.
+    // A floor with a hundred posts along each of two edges, which leave a hundred stretches of either. A bar lies
+    // across one of them on its own edge.
     let (l0, pitch) = (0.02, 0.2);
     let half = DVec3::new(50.5 * pitch, 0.5, 0.1);
     let patches = |stretch: f64| {

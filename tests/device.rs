@@ -5,8 +5,9 @@ use crate::common;
 use seixo::backend::gpu::{self, Gpu};
 use seixo::backend::{Backend, Processor, Timing};
 use seixo::case::{Case, ContactDevice};
-use seixo::params::Params;
-use seixo::plan::{Plan, Stage};
+use seixo::checkpoint::Archive;
+use seixo::params::{Params, Step};
+use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
@@ -199,4 +200,22 @@ fn water_in_a_huge_domain_is_the_same_water() {
     for (a, b) in ends[0].1.iter().zip(&ends[1].1) {
         assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-2 * most, "{a:?} {b:?}");
     }
+}
+
+/// A step that is given up has counted some, and is done again.
+#[test]
+fn what_was_counted_after_a_state_is_forgotten_with_it() {
+    let case = common::hydrostatic(0.05, 1e-3, "sound_speed = 3");
+    let Some(mut sim) = on_device(&case) else { return };
+    (0..3).for_each(|_| drop(sim.step().expect("still water is no trouble")));
+    let mut kept = Archive::in_memory();
+    sim.exchange(&mut kept).expect("kept");
+    let counted = sim.backend.counters().expect("the device is there");
+    let far = Step { dt: 1e3, ahead: 1e3, ..sim.next_step() };
+    sim.backend.run(ParticleStage::Predict, &far).expect("it moves");
+    sim.exchange(&mut kept.into_restore()).expect("taken over");
+    assert_eq!(sim.backend.counters().expect("the device is there"), counted);
+    sim.backend.run(ParticleStage::Predict, &far).expect("it moves");
+    let more = sim.backend.counters().expect("the device is there").displacement_clamps;
+    assert!(more > counted.displacement_clamps, "nothing was counted");
 }

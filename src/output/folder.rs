@@ -158,8 +158,8 @@ impl Folder {
         Ok(locked.then_some(file))
     }
 
-    /// Writes the marker into its `file`: in place, for a rename would leave the lock on a file that is gone; and not at
-    /// all if it says that already.
+    /// Writes the marker into its `file`: in place, for a rename would leave the lock on a file that is gone; and not
+    /// at all if it says that already.
     fn mark(&self, path: &Path, mut file: &File) -> Result<()> {
         let marker = Marker { seixo: env!("CARGO_PKG_VERSION").into(), name: self.name.clone() };
         let text = serde_json::to_string(&marker).unwrap_or_default() + "\n";

@@ -114,7 +114,7 @@ pub fn run(
     simulation: &mut Simulation,
     scene: &Scene,
     text: &str,
-    options: Options,
+    mut options: Options,
     stop: &Stop,
     observe: &mut dyn FnMut(&Progress),
 ) -> Result<Finished> {
@@ -122,12 +122,12 @@ pub fn run(
     let _attended = stop.attend();
     let gauges = Gauges::new(&simulation.case, scene)?;
     let mut archive = None;
-    let mode = match &options.start {
+    let mode = match std::mem::take(&mut options.start) {
         Start::New => Mode::New,
         Start::Replace => Mode::Replace,
         Start::Resume(found) => {
-            fits(simulation, found)?;
-            archive = Some(found.archive.to_restore());
+            fits(simulation, &found)?;
+            archive = Some(found.archive.into_restore());
             Mode::Continue
         }
     };
@@ -159,8 +159,9 @@ pub fn run(
         // A run always does a step, however short it is.
         dt: 0.0,
     };
-    match &mut archive {
-        Some(archive) => run.exchange(archive)?,
+    // The state may be large, and ends here.
+    match archive {
+        Some(mut archive) => run.exchange(&mut archive)?,
         None => run.skip(simulation.time),
     }
     // What the run said of its end holds no more.

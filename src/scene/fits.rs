@@ -35,8 +35,8 @@ impl Builder<'_> {
         false
     }
 
-    /// Complains of a solid of any shape that reaches over a periodic side: half of it would be missing at the other one. A
-    /// fixed one that spans the whole axis goes on there.
+    /// Complains of a solid of any shape that reaches over a periodic side: half of it would be missing at the other
+    /// one. A fixed one that spans the whole axis goes on there.
     pub(super) fn seams(&mut self, key: &str, what: &str, name: &str, shape: &Placed, fixed: bool) {
         let (reach, slack) = (shape.bounds(), 1e-6 * self.lattice.spacing);
         for k in 0..3 {
@@ -46,7 +46,8 @@ impl Builder<'_> {
             if over && !(fixed && from <= low + slack && to >= high - slack) {
                 let axis = AXES[k];
                 let message = format!(
-                    "{what} `{name}` reaches from {axis} = {from:.4} to {to:.4} m, over a periodic side at {low} or {high} m"
+                    "{what} `{name}` reaches from {axis} = {from:.4} to {to:.4} m, over a periodic side \
+                     at {low} or {high} m"
                 );
                 let remedy = format!("keep it between them, or take \"{axis}\" out of tank.periodic");
                 self.problems.push(Problem::new(key, message, remedy));

@@ -79,9 +79,9 @@ impl Surroundings<'_> {
         if k < walls.len() { &walls[k] } else { &bodies[k - walls.len()] }
     }
 
-    /// Earlier solids that may be in the way of `body` on its way by `most` [m] along `up`, and a `margin` [m] beside it,
-    /// by their numbers. Prescribed bodies may reach into what does not move under forces: a table of motion is the
-    /// user's word.
+    /// Earlier solids that may be in the way of `body` on its way by `most` [m] along `up`, and a `margin` [m] beside
+    /// it, by their numbers. Prescribed bodies may reach into what does not move under forces: a table of motion is
+    /// the user's word.
     fn near(&self, body: &Solid, up: DVec3, most: f64, margin: f64) -> impl Iterator<Item = (usize, &Solid)> {
         let (low, high) = way(body, up, most, margin);
         let free = body.is_free();

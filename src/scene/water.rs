@@ -169,8 +169,8 @@ impl Water {
     }
 
     /// Takes as much water out of the grid as a body displaces, what lies deepest inside of it first. Returns how many
-    /// particles. [`Self::keep_what_is_left`] follows when all bodies have had theirs: each looks at the cells around it
-    /// alone.
+    /// particles. [`Self::keep_what_is_left`] follows when all bodies have had theirs: each looks at the cells around
+    /// it alone.
     pub fn displace(body: &Placed, lattice: &Lattice, grid: &mut Grid) -> usize {
         let near: Vec<IVec3> = around(body, lattice, grid).iter().filter(|&c| grid.get(c) == FLUID).collect();
         let cut = near.into_par_iter().filter_map(|c| cut(body, c, lattice).map(|cut| (cut, c)));

@@ -1,5 +1,5 @@
-//! What ends a run before its end: steps that become too short, water that is lost or collapses, bodies that leave, and what is
-//! no number.
+//! What ends a run before its end: steps that become too short, water that is lost or collapses, bodies that leave,
+//! and what is no number.
 
 use super::Simulation;
 use crate::backend::Counters;
@@ -20,8 +20,9 @@ impl Simulation {
     pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
         if step.dt < SHORTEST_STEP * self.case.run.time_step {
             let what = format!(
-                "the flow or a solid asks for steps of {:.1e} s, the run would not end; water that has no room left (more of it in a \
-                 closed tank than that holds, a piston into a part that is full) is pressed like this: leave it a way out",
+                "the flow or a solid asks for steps of {:.1e} s, the run would not end; water that has no room left \
+                 (more of it in a closed tank than that holds, a piston into a part that is full) is pressed like \
+                 this: leave it a way out",
                 step.dt
             );
             return Err(self.diverged(step, Stage::Predict, what));

@@ -1,5 +1,6 @@
 //! The state of the GPU path: the buffers as they are, to the last bit.
 
+use super::layout::counter;
 use super::{Gpu, buffers};
 use crate::checkpoint::Archive;
 use crate::compute::{Buffer, Element};
@@ -106,8 +107,11 @@ impl Gpu {
                 self.buffer(archive, buffers::ledger_sum, self.ledger_length())?;
             }
             if archive.is_saving() {
-                let seen = self.context.download(buffers::counters, super::layout::counter::WORDS)?;
+                let seen = self.context.download(buffers::counters, counter::WORDS)?;
                 self.take_counters(&seen)?;
+            } else {
+                // What a step has counted that was given up since the last look is no more.
+                self.context.upload(buffers::counters, &counter::START)?;
             }
             if self.params.viscosity > 0.0 && !listed {
                 if self.plan.needs(Arrays::Solids) {

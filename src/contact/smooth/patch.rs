@@ -25,8 +25,8 @@ pub(crate) struct Contact {
     pub patch: u32,
 }
 
-/// Number of the patch of an edge that crosses another one: of the `second` solid of the pair, or of the first. A wall's
-/// edges may be many, where others cover parts of them.
+/// Number of the patch of an edge that crosses another one: of the `second` solid of the pair, or of the first. A
+/// wall's edges may be many, where others cover parts of them.
 pub(super) fn edge_key(edge: u32, second: bool) -> u32 {
     32 + 2 * edge + u32::from(second)
 }
