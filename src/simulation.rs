@@ -3,15 +3,15 @@
 
 mod archive;
 mod guards;
+mod solids;
 
 use crate::backend::{Backend, Counters, Timing};
-use crate::body::slots::SlotRow;
-use crate::body::{Pose, Wrench};
+use crate::body::Wrench;
 use crate::case::{Case, ContactDevice, Fluid};
 use crate::contact::{ContactReport, Solids};
-use crate::cover::driven::{Covered, DrivenFaces};
+use crate::cover::driven::DrivenFaces;
 use crate::error::{Error, Result};
-use crate::ledger::{Entry, Ledger};
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::openings::Openings;
 use crate::params::{Params, Step};
@@ -19,7 +19,7 @@ use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::settle::settle;
-use crate::slots::{Opposite, Push, Slots};
+use crate::slots::Slots;
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, shortened, time_step};
 use rayon::ThreadPool;
@@ -96,11 +96,6 @@ pub(crate) fn settings(case: &Case) -> Settings {
         max_iterations: solver.max_iterations,
         warm_start: solver.warm_start,
     }
-}
-
-/// Pressures of the last step in `slots` of wall layers [Pa].
-fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
-    Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
 }
 
 impl Simulation {
@@ -275,44 +270,6 @@ impl Simulation {
         })
     }
 
-    /// Solids move as they would without the fluid's force in this step.
-    pub(crate) fn move_solids(&mut self, step: &Step) -> Result<()> {
-        if !self.plan.has(Stage::MoveSolids) {
-            return Ok(());
-        }
-        self.timed(Stage::MoveSolids, |s| {
-            let (gravity, contact) = (s.params.explicit_gravity(), !s.plan.needs(Arrays::Coupling));
-            let poses = s.solids.predict(step.time, step.dt, step.ahead, gravity, contact);
-            s.backend.move_solids(&s.openings.place(poses))
-        })
-    }
-
-    /// Whether [`Self::fluid_force`] is what acts: it is left at zero where nothing asks for the force on walls that move.
-    pub fn knows_fluid_force(&self) -> bool {
-        !self.plan.wet() || self.plan.has(Stage::BodyForce)
-    }
-
-    /// Rows of free bodies at slots, in the poses that [`Solids::predict`] gave last; none where no free body stands in the
-    /// pressure equation.
-    ///
-    /// # Errors
-    /// A device that is lost.
-    pub fn slot_rows(&mut self) -> Result<Vec<SlotRow>> {
-        let Some(found) = &self.slots else { return Ok(vec![]) };
-        let backend = &mut *self.backend;
-        found.rows(self.solids.predicted(), |slots| row_pressures(backend, slots))
-    }
-
-    /// What the water in slots presses on walls and solids; nothing where no free body stands in the pressure equation.
-    ///
-    /// # Errors
-    /// A device that is lost.
-    pub fn slot_pushes(&mut self) -> Result<Vec<Push>> {
-        let Some(found) = &self.slots else { return Ok(vec![]) };
-        let backend = &mut *self.backend;
-        found.pushes(self.solids.poses(), |slots| row_pressures(backend, slots))
-    }
-
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let report = self.timed(Stage::ConjugateGradient, |s| {
             if s.plan.needs(Arrays::Coupling) {
@@ -326,79 +283,6 @@ impl Simulation {
             return Err(self.diverged(step, Stage::ConjugateGradient, "the residual is not a number".into()));
         }
         Ok(report)
-    }
-
-    /// Fluid force, contact and motion of the solids; their particles follow.
-    pub(crate) fn advance_solids(&mut self, step: &Step) -> Result<ContactReport> {
-        if !self.plan.has(Stage::Contact) {
-            return Ok(ContactReport::default());
-        }
-        let before = self.solids_ledger.is_some().then(|| self.solids.poses().to_vec());
-        if self.plan.has(Stage::BodyForce) {
-            self.fluid_force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
-            self.timed(Stage::BodyForce, Self::correct_driven)?;
-        }
-        let force = std::mem::take(&mut self.fluid_force);
-        let report = self
-            .timed(Stage::Contact, |s| s.solids.advance_on(s.backend.compute(), step.time, step.dt, &force));
-        self.fluid_force = force;
-        // the solids count no steps
-        let report = report.map_err(|e| match e {
-            Error::Diverged { time, stage, what, .. } => {
-                Error::Diverged { step: self.steps, time, stage, what }
-            }
-            other => other,
-        })?;
-        self.check_bodies(step)?;
-        if let Some(before) = before {
-            self.book_solids(&before, step.dt);
-        }
-        if self.plan.has(Stage::MoveSolids) {
-            self.timed(Stage::MoveSolids, |s| s.backend.move_solids(&s.openings.place(s.solids.poses())))?;
-        }
-        Ok(report)
-    }
-
-    /// What the sum over a driven solid's rows does not know: no water presses where another solid stands, and under a free body that of its slot
-    /// does.
-    fn correct_driven(&mut self) -> Result<()> {
-        let (scene, poses) = (&self.scene, self.solids.predicted());
-        let covered = self.driven_faces.covered(scene, poses);
-        let slot = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;
-        let slots: Vec<usize> = covered.iter().map(slot).collect();
-        let pressures = if slots.is_empty() { vec![] } else { self.backend.wall_pressures(&slots)? };
-        for (c, pressure) in covered.iter().zip(pressures) {
-            let (solid, turn) = (&scene.solids[c.solid], poses[c.solid].orientation);
-            let to_surface = turn * solid.wall_to_surface[c.row];
-            let force = pressure.in_force(to_surface, &self.params) * c.area;
-            let arm = turn * solid.wall_offset[c.row] + to_surface;
-            self.fluid_force[c.solid] += Wrench { force, torque: arm.cross(force) };
-        }
-        let Some(found) = self.slots.as_ref().filter(|slots| slots.any_at_driven(poses)) else {
-            return Ok(());
-        };
-        let backend = &mut *self.backend;
-        for push in found.pushes(poses, |slots| row_pressures(backend, slots))? {
-            let Opposite::Solid(k) = push.on else { continue };
-            if !self.solids.is_free(k) {
-                let arm = self.params.periodic.nearest(push.at - poses[k].position);
-                self.fluid_force[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
-            }
-        }
-        Ok(())
-    }
-
-    /// Books what the water gave the solids and what contact did, on the way from the poses `before`.
-    fn book_solids(&mut self, before: &[Pose], dt: f64) {
-        let Some((ledger, energy)) = &mut self.solids_ledger else { return };
-        let solids = &self.solids;
-        let poses = solids.predicted().iter().zip(before).zip(solids.poses());
-        for (k, ((told, before), after)) in poses.enumerate() {
-            ledger.solid(dt, solids.is_free(k), &self.fluid_force[k], [told, before, after]);
-        }
-        let now = self.solids.energy().total();
-        ledger.add(Entry::Contact, now - *energy);
-        *energy = now;
     }
 
     /// Work of each part of the step since the start, if the case asks for it.

@@ -1,0 +1,130 @@
+//! Solids in a step: where they go, the slots between them, the water's force, contact.
+
+use super::Simulation;
+use crate::backend::Backend;
+use crate::body::slots::SlotRow;
+use crate::body::{Pose, Wrench};
+use crate::contact::ContactReport;
+use crate::cover::driven::Covered;
+use crate::error::{Error, Result};
+use crate::ledger::Entry;
+use crate::params::Step;
+use crate::plan::{Arrays, Stage};
+use crate::slots::{Opposite, Push};
+
+/// Pressures of the last step in `slots` of wall layers [Pa].
+fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
+    Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
+}
+impl Simulation {
+    /// Solids move as they would without the fluid's force in this step.
+    pub(crate) fn move_solids(&mut self, step: &Step) -> Result<()> {
+        if !self.plan.has(Stage::MoveSolids) {
+            return Ok(());
+        }
+        self.timed(Stage::MoveSolids, |s| {
+            let (gravity, contact) = (s.params.explicit_gravity(), !s.plan.needs(Arrays::Coupling));
+            let poses = s.solids.predict(step.time, step.dt, step.ahead, gravity, contact);
+            s.backend.move_solids(&s.openings.place(poses))
+        })
+    }
+
+    /// Whether [`Self::fluid_force`] is what acts: it is left at zero where nothing asks for the force on walls that move.
+    pub fn knows_fluid_force(&self) -> bool {
+        !self.plan.wet() || self.plan.has(Stage::BodyForce)
+    }
+
+    /// Rows of free bodies at slots, in the poses that [`Solids::predict`] gave last; none where no free body stands in the
+    /// pressure equation.
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn slot_rows(&mut self) -> Result<Vec<SlotRow>> {
+        let Some(found) = &self.slots else { return Ok(vec![]) };
+        let backend = &mut *self.backend;
+        found.rows(self.solids.predicted(), |slots| row_pressures(backend, slots))
+    }
+
+    /// What the water in slots presses on walls and solids; nothing where no free body stands in the pressure equation.
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn slot_pushes(&mut self) -> Result<Vec<Push>> {
+        let Some(found) = &self.slots else { return Ok(vec![]) };
+        let backend = &mut *self.backend;
+        found.pushes(self.solids.poses(), |slots| row_pressures(backend, slots))
+    }
+
+    /// Fluid force, contact and motion of the solids; their particles follow.
+    pub(crate) fn advance_solids(&mut self, step: &Step) -> Result<ContactReport> {
+        if !self.plan.has(Stage::Contact) {
+            return Ok(ContactReport::default());
+        }
+        let before = self.solids_ledger.is_some().then(|| self.solids.poses().to_vec());
+        if self.plan.has(Stage::BodyForce) {
+            self.fluid_force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
+            self.timed(Stage::BodyForce, Self::correct_driven)?;
+        }
+        let force = std::mem::take(&mut self.fluid_force);
+        let report = self
+            .timed(Stage::Contact, |s| s.solids.advance_on(s.backend.compute(), step.time, step.dt, &force));
+        self.fluid_force = force;
+        // the solids count no steps
+        let report = report.map_err(|e| match e {
+            Error::Diverged { time, stage, what, .. } => {
+                Error::Diverged { step: self.steps, time, stage, what }
+            }
+            other => other,
+        })?;
+        self.check_bodies(step)?;
+        if let Some(before) = before {
+            self.book_solids(&before, step.dt);
+        }
+        if self.plan.has(Stage::MoveSolids) {
+            self.timed(Stage::MoveSolids, |s| s.backend.move_solids(&s.openings.place(s.solids.poses())))?;
+        }
+        Ok(report)
+    }
+
+    /// What the sum over a driven solid's rows does not know: no water presses where another solid stands, and under a free body that of its slot
+    /// does.
+    fn correct_driven(&mut self) -> Result<()> {
+        let (scene, poses) = (&self.scene, self.solids.predicted());
+        let covered = self.driven_faces.covered(scene, poses);
+        let slot = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;
+        let slots: Vec<usize> = covered.iter().map(slot).collect();
+        let pressures = if slots.is_empty() { vec![] } else { self.backend.wall_pressures(&slots)? };
+        for (c, pressure) in covered.iter().zip(pressures) {
+            let (solid, turn) = (&scene.solids[c.solid], poses[c.solid].orientation);
+            let to_surface = turn * solid.wall_to_surface[c.row];
+            let force = pressure.in_force(to_surface, &self.params) * c.area;
+            let arm = turn * solid.wall_offset[c.row] + to_surface;
+            self.fluid_force[c.solid] += Wrench { force, torque: arm.cross(force) };
+        }
+        let Some(found) = self.slots.as_ref().filter(|slots| slots.any_at_driven(poses)) else {
+            return Ok(());
+        };
+        let backend = &mut *self.backend;
+        for push in found.pushes(poses, |slots| row_pressures(backend, slots))? {
+            let Opposite::Solid(k) = push.on else { continue };
+            if !self.solids.is_free(k) {
+                let arm = self.params.periodic.nearest(push.at - poses[k].position);
+                self.fluid_force[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
+            }
+        }
+        Ok(())
+    }
+
+    /// Books what the water gave the solids and what contact did, on the way from the poses `before`.
+    fn book_solids(&mut self, before: &[Pose], dt: f64) {
+        let Some((ledger, energy)) = &mut self.solids_ledger else { return };
+        let solids = &self.solids;
+        let poses = solids.predicted().iter().zip(before).zip(solids.poses());
+        for (k, ((told, before), after)) in poses.enumerate() {
+            ledger.solid(dt, solids.is_free(k), &self.fluid_force[k], [told, before, after]);
+        }
+        let now = self.solids.energy().total();
+        ledger.add(Entry::Contact, now - *energy);
+        *energy = now;
+    }
+}
