@@ -1,5 +1,6 @@
 //! A scene in motion: backend, solids and clock. How it is opened and read is in `open.rs`, [`Simulation::step`] in
-//! `step.rs`, what ends a run before its end in `simulation/guards.rs`, its state in `simulation/archive.rs`.
+//! `step.rs`, what it does to solids in `simulation/solids.rs`, what ends a run before its end in `simulation/guards.rs`,
+//! its state in `simulation/archive.rs`.
 
 mod archive;
 mod guards;
