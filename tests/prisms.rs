@@ -231,3 +231,29 @@ fn what_is_wrong_with_a_section_is_said_with_its_key() {
         }
     }
 }
+
+#[test]
+fn flat_faces_of_any_shape_slow_a_spin_by_the_mean_distance_of_an_even_pressure() {
+    // moment of inertia over mass, and mean distance from the middle of the face
+    let (square, round) = ((0.04 / 6.0, 0.2 * 0.382_597_858), (0.3 * 0.01, 2.0 / 3.0 * 0.1));
+    let prism = "shape = \"prism\"\nsection = [[0, 0], [0.2, 0], [0.2, 0.1], [0, 0.1]]\nheight = 0.2\ncenter = [0, 0, 0.05]";
+    let cone = "shape = \"cone\"\nradius = 0.1\nheight = 0.16\ncenter = [0, 0, 0.04]";
+    for (keys, (moment, arm), spacing, allowed) in [
+        (prism, square, 0.04, 0.1),
+        (prism, square, 0.02, 0.04),
+        (prism, square, 0.01, 0.03),
+        (cone, round, 0.02, 0.03),
+        (cone, round, 0.01, 0.03),
+    ] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n\
+             [[plane]]\nname = \"plane\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [1, 1]\n\
+             [[body]]\nname = \"it\"\n{keys}\ndensity = 1000\nangular_velocity = [0, 0, 10]\n\
+             [contact]\nspring = 1e6\nrestitution = 0.3\nfriction = 0.3\n"
+        ));
+        let [start, end] = [0.05, 0.15].map(|time| dry.run(time)[0].angular_velocity.z);
+        let (slowed, exact) = ((start - end) / 0.1, 0.3 * G * arm / moment);
+        println!("{keys} at {spacing}: {slowed:.3} rad/s2 for {exact:.3}: {:.3}", slowed / exact);
+        assert!((slowed / exact - 1.0).abs() < allowed, "{keys} at {spacing}: {slowed} for {exact}");
+    }
+}

@@ -53,6 +53,8 @@ pub struct Surface {
     pub points: Vec<DVec3>,
     /// Weight of each point [-]; those of a face and its edges sum to 1 (exactly for a cube).
     pub weights: Vec<f64>,
+    /// Part of a face that each point stands for over that which its weight says [-], where they differ; else none.
+    pub parts: Vec<f64>,
     /// For each point, the faces it lies on.
     pub faces: Vec<Faces>,
     /// Edges, body's frame; none in two dimensions.
@@ -90,6 +92,11 @@ impl Surface {
             smallest_weight: weight,
             ..Self::default()
         }
+    }
+
+    /// [`Surface::parts`] of point `k`.
+    pub fn part(&self, k: usize) -> f64 {
+        self.parts.get(k).copied().unwrap_or(1.0)
     }
 
     /// Whether it has parts that a device has no kernel for.

@@ -352,26 +352,28 @@ impl Pair {
                 let normal = other.axes * outward;
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
                 let weight = share * surfaces[self.a].weights[k as usize];
-                self.contacts.push(Contact::new(at, normal, depth, weight, speed, face));
+                let part = surfaces[self.a].part(k as usize);
+                self.contacts.push(Contact { part, ..Contact::new(at, normal, depth, weight, speed, face) });
             }
         }
-        let mut pushed = |at: DVec3, weight: f64| {
+        let mut pushed = |at: DVec3, weight: f64, part: f64| {
             let q = still * (at - a.pose.position);
             if let Some(Inside { depth, outward, face }) = own.shape.depth(q, own.faces) {
                 let normal = -(a.rotation * outward);
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
-                self.contacts.push(Contact::new(at, normal, depth, weight, speed, 8 + face));
+                self.contacts
+                    .push(Contact { part, ..Contact::new(at, normal, depth, weight, speed, 8 + face) });
             }
         };
         if let Other::Solid(b) = self.b {
             for &k in &self.points_b {
                 let at = other.center + other.axes * surfaces[b].points[k as usize];
-                pushed(at, share * surfaces[b].weights[k as usize]);
+                pushed(at, share * surfaces[b].weights[k as usize], surfaces[b].part(k as usize));
             }
         }
         let weight = surfaces[self.a].smallest_weight;
         for &at in &self.samples {
-            pushed(at, weight);
+            pushed(at, weight, 1.0);
         }
     }
 
@@ -475,6 +477,7 @@ impl Pair {
                 speed: (slip + s * turning).dot(normal),
                 stretch: node.deviation * direction,
                 force: 0.0,
+                part: 1.0,
                 patch: key,
             });
         });
@@ -546,6 +549,7 @@ impl Pair {
             let patch = &mut self.patches[known];
             patch.normal += force;
             patch.pressing += c.force;
+            patch.weighed += c.force * c.part;
             patch.at += c.force * c.at;
         }
         let about_b = all.torque + (center_a - center_b).cross(all.force);
@@ -562,7 +566,8 @@ impl Pair {
             let Some(found) = place(&self.patches, c.patch, known) else { continue };
             known = found;
             let patch = &mut self.patches[known];
-            let share = c.force / patch.pressing;
+            // friction goes by where an even pressure would be, which is not where most points are
+            let share = c.force * c.part / patch.weighed.max(f64::MIN_POSITIVE);
             patch.spread += square(c.at - patch.at, share);
             if c.stretch != DVec3::ZERO {
                 patch.spread += square(c.stretch, share);

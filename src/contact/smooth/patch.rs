@@ -18,13 +18,15 @@ pub(crate) struct Contact {
     /// Deviation of the place of the force that it stands for, along an edge, world [m].
     pub stretch: DVec3,
     pub force: f64,
+    /// Part of a face that it stands for over that which its weight says [-].
+    pub part: f64,
     pub patch: u8,
 }
 
 impl Contact {
     /// A point that is yet to be pressed; `patch` is the face that presses, 8 more for one of the first solid.
     pub fn new(at: DVec3, normal: DVec3, depth: f64, weight: f64, speed: f64, patch: u8) -> Self {
-        Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, patch }
+        Self { at, normal, depth, weight, speed, stretch: DVec3::ZERO, force: 0.0, part: 1.0, patch }
     }
 
     /// The face that presses: 0 to 5 of the pair's second solid, 6 to 11 of the first; `None` where two edges
@@ -75,6 +77,8 @@ pub(crate) struct Patch {
     pub force: f64,
     /// Sum of the points' forces [N].
     pub pressing: f64,
+    /// The same, each times the part of the face that the point stands for [N].
+    pub weighed: f64,
     /// Second moments of the normal force about its centre [m2], world axes.
     pub spread: DMat3,
 }
@@ -83,7 +87,15 @@ impl Patch {
     /// A patch from its force [N] on the first solid, the sum of its points' forces [N], the centre and the
     /// second moments about it [m2].
     pub fn new(key: u8, force: DVec3, pressing: f64, at: DVec3, spread: DMat3) -> Self {
-        Self { key, normal: force.normalize_or_zero(), at, force: force.length(), pressing, spread }
+        Self {
+            key,
+            normal: force.normalize_or_zero(),
+            at,
+            force: force.length(),
+            pressing,
+            weighed: pressing,
+            spread,
+        }
     }
 }
 

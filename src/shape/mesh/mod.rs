@@ -6,14 +6,14 @@
 
 mod ground;
 mod particles;
+mod points;
 mod primitives;
 mod read;
 mod shells;
 mod skin;
 
-use super::cells::Cells;
 use super::surface::Surface;
-use super::{ALL_FACES, Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
+use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
 use glam::{DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
@@ -393,37 +393,7 @@ impl Geometry for Mesh {
         particles::fill(self, spacing, layers)
     }
 
-    /// Points alone, all of one weight, which sum to 1 over the side of the body that has most of them.
     fn surface(&self, particles: &WallLayer, spacing: f64, _: u32) -> Surface {
-        let mut points = vec![];
-        let mut faces = vec![];
-        for &at in particles.offset {
-            let (distance, outward) = self.distance(at);
-            points.push(at - distance * outward);
-            faces.push(face(outward));
-        }
-        let mut thinned = Cells::new(0.4 * spacing);
-        for &(a, b, on) in &self.sharp {
-            let pieces = (a.distance(b) / (0.5 * spacing)).ceil().max(1.0);
-            for k in 0..=pieces as i32 {
-                let at = a.lerp(b, f64::from(k) / pieces);
-                match thinned.nearest(at, 0.05 * spacing) {
-                    Some(_) => {}
-                    None => {
-                        thinned.add(at);
-                        points.push(at);
-                        faces.push(on);
-                    }
-                }
-            }
-        }
-        for &at in self.triangles.vertices() {
-            if thinned.nearest(at, 0.4 * spacing).is_none() {
-                thinned.add(at);
-                points.push(at);
-                faces.push(face(at));
-            }
-        }
-        Surface::even(points, faces, ALL_FACES)
+        points::surface(self, particles, spacing)
     }
 }

@@ -157,7 +157,7 @@ fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Pl
 }
 
 /// The surface in small pieces, of which none is longer than [`PIECE`]: triangles, halved across their longest edge.
-fn pieces(mesh: &Mesh, spacing: f64) -> impl Iterator<Item = Piece> + '_ {
+pub(super) fn pieces(mesh: &Mesh, spacing: f64) -> impl Iterator<Item = Piece> + '_ {
     mesh.triangles.triangles().flat_map(move |triangle| {
         let mut open = vec![[triangle.a, triangle.b, triangle.c]];
         std::iter::from_fn(move || {

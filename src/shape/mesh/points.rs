@@ -1,0 +1,74 @@
+//! Points of a mesh that contact presses, and the part of the surface that each stands for.
+
+use super::super::cells::Cells;
+use super::super::nearest::Nearest;
+use super::super::{ALL_FACES, Faces, Geometry, Surface, WallLayer};
+use super::particles::pieces;
+use super::{Mesh, face};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Distance of points along a sharp edge, over the spacing, and how near another one of an edge may be.
+const ALONG: f64 = 0.5;
+const SAME: f64 = 0.05;
+/// A vertex this near to others, over the spacing, has no point of its own.
+const APART: f64 = 0.4;
+/// Pieces that are looked up together.
+const TOGETHER: usize = 1 << 16;
+
+/// Points above the wall layer of `mesh`, along its sharp edges and at its vertices, all of one weight, which sum to 1 over the side of the body that has
+/// most of them. With one weight edges, whose points lie closest, carry most of a face, and are as stiff as they should be;
+/// what a face's pressure does to a spin goes by the part of the surface to which each point is the nearest. Of an edge's
+/// point that is shared by the faces that meet there, since one of them alone is pressed.
+pub(super) fn surface(mesh: &Mesh, particles: &WallLayer, spacing: f64) -> Surface {
+    let (mut points, mut faces): (Vec<DVec3>, Vec<Faces>) = (vec![], vec![]);
+    let mut meeting: Vec<f64> = vec![];
+    for &at in particles.offset {
+        let (distance, outward) = mesh.distance(at);
+        points.push(at - distance * outward);
+        faces.push(face(outward));
+        meeting.push(1.0);
+    }
+    let mut thinned = Cells::new(APART * spacing);
+    for &(a, b, on) in &mesh.sharp {
+        let pieces = (a.distance(b) / (ALONG * spacing)).ceil().max(1.0);
+        for k in 0..=pieces as i32 {
+            let at = a.lerp(b, f64::from(k) / pieces);
+            if thinned.nearest(at, SAME * spacing).is_none() {
+                thinned.add(at);
+                points.push(at);
+                faces.push(on);
+                meeting.push(2.0);
+            }
+        }
+    }
+    for &at in mesh.triangles.vertices() {
+        if thinned.nearest(at, APART * spacing).is_none() {
+            thinned.add(at);
+            points.push(at);
+            faces.push(face(at));
+            meeting.push(1.0);
+        }
+    }
+    let parts = parts(mesh, &points, spacing);
+    let of_each = parts.iter().zip(meeting).map(|(part, faces)| part / (faces * spacing * spacing));
+    Surface { parts: of_each.collect(), ..Surface::even(points, faces, ALL_FACES) }
+}
+
+/// Area [m2] of the surface to which each of `points` is the nearest.
+fn parts(mesh: &Mesh, points: &[DVec3], spacing: f64) -> Vec<f64> {
+    let seen = |at: DVec3| [at.x, at.y, at.z, 0.0, 0.0, 0.0];
+    let tree = Nearest::new(points.iter().map(|&at| seen(at)).collect());
+    let mut parts = vec![0.0; points.len()];
+    let mut pieces = pieces(mesh, spacing);
+    loop {
+        let some: Vec<_> = pieces.by_ref().take(TOGETHER).collect();
+        if some.is_empty() {
+            return parts;
+        }
+        let found: Vec<_> = some.par_iter().map(|&(at, _)| tree.to(seen(at))).collect();
+        for ((_, area), k) in some.iter().zip(found).filter_map(|(piece, k)| Some((piece, k?))) {
+            parts[k] += area.length();
+        }
+    }
+}
