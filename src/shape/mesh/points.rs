@@ -16,10 +16,11 @@ const APART: f64 = 0.4;
 /// Pieces that are looked up together.
 const TOGETHER: usize = 1 << 16;
 
-/// Points above the wall layer of `mesh`, along its sharp edges and at its vertices, all of one weight, which sum to 1 over the side of the body that has
-/// most of them. With one weight edges, whose points lie closest, carry most of a face, and are as stiff as they should be;
-/// what a face's pressure does to a spin goes by the part of the surface to which each point is the nearest. Of an edge's
-/// point that is shared by the faces that meet there, since one of them alone is pressed.
+/// Points above the wall layer of `mesh`, along its sharp edges and at its vertices, all of one weight, which sum to 1 over
+/// the side of the body that has most of them. With one weight edges, whose points lie closest, carry most of a face, and
+/// are as stiff as they should be; what a face's pressure does to a spin goes by the part of the surface to which each
+/// point is the nearest. Of an edge's point that is shared by the faces that meet there, since one of them alone is
+/// pressed.
 pub(super) fn surface(mesh: &Mesh, particles: &WallLayer, spacing: f64) -> Surface {
     let (mut points, mut faces): (Vec<DVec3>, Vec<Faces>) = (vec![], vec![]);
     let mut meeting: Vec<f64> = vec![];
