@@ -295,7 +295,8 @@ fn force_wide(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
 }
 
 // Result of a pair, zeros if nothing touches but crossings: D, the deepest depth, contacts without crossings, sum of
-// shares over the share of the mass that answers. Then of each face of B, and of A, that is open: force on A and sum of the points' forces; moment about A's centre and mean distance from the centre
+// shares over the share of the mass that answers. Then of each face of B, and of A, that is open: force on A and sum of
+// the points' forces; moment about A's centre and mean distance from the centre
 // of the force; that centre, seen from A's.
 //
 // The threads' sums meet in GROUP places. Where there are more threads they bring them by turns, GROUP at a time: the

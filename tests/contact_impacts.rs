@@ -3,8 +3,8 @@
 use crate::common::dry::Dry;
 use glam::DVec3;
 
-/// Runs until two solids have touched and parted, and returns how fast the point of the first that is at `at` from its centre
-/// [m], turned as it was at the start, goes along z against the second solid, if there is one, and how fast it came.
+/// Runs until two solids have touched and parted, and returns how fast the point of the first that is at `at` from its
+/// centre [m], turned as it was at the start, goes along z against the second solid, if there is one, and how fast it came.
 fn parting(dry: &mut Dry, at: DVec3) -> f64 {
     let speed = |dry: &Dry| {
         let poses = dry.solids.poses();

@@ -43,7 +43,8 @@ pub(crate) struct Body {
     pub principal: DVec3,
     /// `true` for rotations about world axes that are locked.
     pub locked_rotation: [bool; 3],
-    /// Impulse [N s] and angular impulse [N m s] of contact since they were last taken, whether or not the solid gives way.
+    /// Impulse [N s] and angular impulse [N m s] of contact since they were last taken, whether or not the solid gives
+    /// way.
     pub touched: Wrench,
     /// Shape, in the body's frame.
     pub shape: Shape,

@@ -1,13 +1,13 @@
 //! How much of its mass a pair answers a contact with.
 //!
-//! The effective depth D grows by J . q' as the two solids move, J = sum_i w_i (d_i / D)^7 (n_i, r_i x n_i), and its spring
-//! K swings a mass 1 / (J M^-1 J^T). With S the sum of the shares the contact as a whole has the stiffness K S and the
+//! The effective depth D grows by J . q' as the two solids move, J = sum_i w_i (d_i / D)^7 (n_i, r_i x n_i), and its
+//! spring K swings a mass 1 / (J M^-1 J^T). With S the sum of the shares the contact as a whole has the stiffness K S and the
 //! effective mass
 //!
 //! m_e = S / (J M^-1 J^T) = (sum_i w_i d_i^6) (sum_i w_i d_i^8) / (j M^-1 j^T),  j = sum_i w_i d_i^7 (n_i, r_i x n_i):
 //!
-//! the reduced mass m where the contact lies on the line of the centres, a quarter of it at the end of a rod, which turns away.
-//! A dashpot for m would damp such an end twice as much as it should, so a restitution takes C sqrt(m_e / m).
+//! the reduced mass m where the contact lies on the line of the centres, a quarter of it at the end of a rod, which turns
+//! away. A dashpot for m would damp such an end twice as much as it should, so a restitution takes C sqrt(m_e / m).
 
 use super::patch::Contact;
 use crate::body::{Body, Pose};
@@ -40,8 +40,8 @@ impl Mode {
         mode
     }
 
-    /// m_e / `mass`, at most 1: 1 for a `mass` [kg] of 0, which is that of a case that gives C itself. `second` is how the
-    /// second solid lies beside the first, if it can move.
+    /// m_e / `mass`, at most 1: 1 for a `mass` [kg] of 0, which is that of a case that gives C itself. `second` is how
+    /// the second solid lies beside the first, if it can move.
     pub fn share(&self, mass: f64, first: &Body, second: Option<(&Body, Pose)>) -> f64 {
         if mass == 0.0 {
             return 1.0;

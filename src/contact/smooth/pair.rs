@@ -493,8 +493,9 @@ impl Pair {
     /// Normal forces of the points: the pair's spring and dashpot, no tension.
     ///
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
-    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i, nor on where that is: see [`Mode`].
-    /// The second spring brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce on it for ever.
+    /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i, nor on where that is: see
+    /// [`Mode`]. The second spring brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce
+    /// on it for ever.
     fn press(&mut self, bodies: &[Body]) {
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));

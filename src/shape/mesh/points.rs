@@ -13,15 +13,14 @@ const ALONG: f64 = 0.5;
 const SAME: f64 = 0.05;
 /// A vertex this near to others, over the spacing, has no point of its own.
 const APART: f64 = 0.4;
-/// Size of the pieces of the surface over that of those that the wall layer takes.
-const FINE: f64 = 0.5;
 /// Pieces that are looked up together.
 const TOGETHER: usize = 1 << 16;
 
-/// Points above the wall layer of `mesh`, along its sharp edges and at its vertices, all of one weight, which sum to 1 over the side of the body that has
-/// most of them. With one weight edges, whose points lie closest, carry most of a face, and are as stiff as they should be;
-/// what a face's pressure does to a spin goes by the part of the surface to which each point is the nearest. Of an edge's
-/// point that is shared by the faces that meet there, since one of them alone is pressed.
+/// Points above the wall layer of `mesh`, along its sharp edges and at its vertices, all of one weight, which sum to 1 over
+/// the side of the body that has most of them. With one weight edges, whose points lie closest, carry most of a face, and
+/// are as stiff as they should be; what a face's pressure does to a spin goes by the part of the surface to which each
+/// point is the nearest. Of an edge's point that is shared by the faces that meet there, since one of them alone is
+/// pressed.
 pub(super) fn surface(mesh: &Mesh, particles: &WallLayer, spacing: f64) -> Surface {
     let (mut points, mut faces): (Vec<DVec3>, Vec<Faces>) = (vec![], vec![]);
     let mut meeting: Vec<f64> = vec![];
@@ -62,7 +61,7 @@ fn parts(mesh: &Mesh, points: &[DVec3], spacing: f64) -> Vec<f64> {
     let seen = |at: DVec3| [at.x, at.y, at.z, 0.0, 0.0, 0.0];
     let tree = Nearest::new(points.iter().map(|&at| seen(at)).collect());
     let mut parts = vec![0.0; points.len()];
-    let mut pieces = pieces(mesh, FINE * spacing);
+    let mut pieces = pieces(mesh, spacing);
     loop {
         let some: Vec<_> = pieces.by_ref().take(TOGETHER).collect();
         if some.is_empty() {
