@@ -234,9 +234,7 @@ impl Slots {
 
     /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
     fn at_walls(&self, layer: &Layer, pose: &Pose, margin: f64) -> bool {
-        let mut found = false;
-        self.fixed.near(pose.position, layer.radius + margin, |_| found = true);
-        found
+        self.fixed.is_near(pose.position, layer.radius + margin)
     }
 
     /// How each row of layer `k` lies before fixed walls, if it is `at_walls`, and before `others`.

@@ -691,9 +691,9 @@ fn coupling() {
             for e in pair.errors(Stage::ConjugateGradient) {
                 assert!(e.l2_relative < SOLVE, "{:e}", e.l2_relative);
             }
-            let (g, c) = (pair.gpu.body_force(), pair.cpu.body_force());
+            let (g, c) = (pair.gpu.body_force(&[]), pair.cpu.body_force(&[]));
             let [(g, c), (others_g, others_c)] =
-                [1, 0].map(|k| (g.as_ref().expect("sums")[k], c.as_ref().expect("sums")[k]));
+                [1, 0].map(|k| (g.as_ref().expect("sums").0[k], c.as_ref().expect("sums").0[k]));
             println!("force {:.4} {:.4}, torque {:.6} {:.6}", g.force, c.force, g.torque, c.torque);
             assert!((g.force - c.force).length() < 10.0 * SOLVE * c.force.length().max(1.0));
             assert!((g.torque - c.torque).length() < SOLVE * c.force.length().max(1.0));
@@ -906,8 +906,9 @@ fn body_force() {
         let fields = pair.gpu.read().expect("readable");
         let slots: Vec<usize> = pair.scene.solids.iter().flat_map(|s| s.wall_slots.clone()).collect();
         let pressures = pair.gpu.wall_pressures(&slots).expect("readable");
-        let gpu = pair.gpu.body_force().expect("the device sums");
-        let cpu = pair.cpu.body_force().expect("the CPU sums");
+        let (gpu, told) = pair.gpu.body_force(&slots).expect("the device sums");
+        assert_eq!(told, pressures);
+        let (cpu, _) = pair.cpu.body_force(&[]).expect("the CPU sums");
         assert_eq!(gpu.len(), 2);
         // The sum, of what the device has.
         let mut rows = slots.iter().zip(&pressures);
@@ -1109,7 +1110,7 @@ fn bytes(scheme: &str, preconditioner: Preconditioner) -> Vec<u64> {
                 (_, Some(stage)) => gpu.run(stage, step),
                 (Stage::MoveSolids, _) => gpu.move_solids(&pair.poses),
                 (Stage::ConjugateGradient, _) => gpu.solve_pressure(step).map(|_| ()),
-                (Stage::BodyForce, _) => gpu.body_force().map(|_| ()),
+                (Stage::BodyForce, _) => gpu.body_force(&[]).map(|_| ()),
                 _ => Ok(()),
             };
             done.expect("the step runs");

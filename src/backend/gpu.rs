@@ -241,8 +241,8 @@ impl Backend for Gpu {
         self.show_poses(poses)
     }
 
-    fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        self.sum_forces()
+    fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
+        self.sum_forces(rows)
     }
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {

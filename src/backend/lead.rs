@@ -29,7 +29,7 @@ enum Order<'a> {
     FreeBodies(Cow<'a, [FreeBody]>, Cow<'a, [SlotRow]>),
     SolvePressure(Step),
     MoveSolids(Cow<'a, [Pose]>),
-    BodyForce,
+    BodyForce(Cow<'a, [usize]>),
     Counters,
     Ledger,
     Monitor,
@@ -148,8 +148,8 @@ impl Backend for Lead {
         self.all(&Order::MoveSolids(poses.into()), |own| own.move_solids(poses))
     }
 
-    fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        self.all(&Order::BodyForce, |own| own.body_force())
+    fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
+        self.all(&Order::BodyForce(rows.into()), |own| own.body_force(rows))
     }
 
     fn counters(&mut self) -> Result<Counters> {
@@ -245,7 +245,7 @@ pub fn follow(own: &mut dyn Ranked) -> Result<()> {
             Order::FreeBodies(bodies, slots) => own.free_bodies(&bodies, &slots)?,
             Order::SolvePressure(step) => drop(own.solve_pressure(&step)?),
             Order::MoveSolids(poses) => own.move_solids(&poses)?,
-            Order::BodyForce => drop(own.body_force()?),
+            Order::BodyForce(rows) => drop(own.body_force(&rows)?),
             Order::Counters => drop(own.counters()?),
             Order::Ledger => drop(own.ledger()?),
             Order::Monitor => drop(own.monitor()?),

@@ -215,8 +215,9 @@ pub trait Backend: Send {
     fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport>;
     /// Give the particles of moving solids the poses of their solids.
     fn move_solids(&mut self, poses: &[Pose]) -> Result<()>;
-    /// Force and torque of the fluid on each moving solid, in the pose given last.
-    fn body_force(&mut self) -> Result<Vec<Wrench>>;
+    /// Force and torque of the fluid on each moving solid, in the pose given last, and pressures of the wall particles `rows` as
+    /// [`Self::wall_pressures`] tells them: one wait on a device.
+    fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)>;
     /// What the guards have seen.
     fn counters(&mut self) -> Result<Counters>;
     /// Work of the stages on the water since the start, if the plan asks for the ledger.

@@ -141,23 +141,28 @@ impl PointGrid {
     }
 
     /// Calls `visit` with every point within `radius` [m] of `x`, in a fixed order.
-    pub fn near(&self, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
-        if !self.meets(&(x - radius, x + radius)) {
-            return;
-        }
-        let low = ((x - radius).max(self.bounds.0) / self.cell).floor().as_ivec3();
-        let high = ((x + radius).min(self.bounds.1) / self.cell).floor().as_ivec3();
-        for i in low.x..=high.x {
-            for j in low.y..=high.y {
-                for k in low.z..=high.z {
-                    for &n in self.cells.get(&IVec3::new(i, j, k)).into_iter().flatten() {
-                        if self.points[n as usize].distance_squared(x) < radius * radius {
-                            visit(n);
-                        }
-                    }
-                }
-            }
-        }
+    pub fn near(&self, x: DVec3, radius: f64, visit: impl FnMut(u32)) {
+        self.around(x, radius).for_each(visit);
+    }
+
+    /// Whether a point lies within `radius` [m] of `x`.
+    pub fn is_near(&self, x: DVec3, radius: f64) -> bool {
+        self.around(x, radius).next().is_some()
+    }
+
+    fn around(&self, x: DVec3, radius: f64) -> impl Iterator<Item = u32> {
+        let cell = |x: DVec3| (x / self.cell).floor().as_ivec3();
+        let low = cell((x - radius).max(self.bounds.0));
+        let high = if self.meets(&(x - radius, x + radius)) {
+            cell((x + radius).min(self.bounds.1))
+        } else {
+            low - 1
+        };
+        let cells = (low.x..=high.x).flat_map(move |i| {
+            (low.y..=high.y).flat_map(move |j| (low.z..=high.z).map(move |k| IVec3::new(i, j, k)))
+        });
+        let points = cells.flat_map(|cell| self.cells.get(&cell).into_iter().flatten().copied());
+        points.filter(move |&n| self.points[n as usize].distance_squared(x) < radius * radius)
     }
 }
 

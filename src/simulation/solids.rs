@@ -62,8 +62,7 @@ impl Simulation {
         }
         let before = self.solids_ledger.is_some().then(|| self.solids.poses().to_vec());
         if self.plan.has(Stage::BodyForce) {
-            self.fluid_force = self.timed(Stage::BodyForce, |s| s.backend.body_force())?;
-            self.timed(Stage::BodyForce, Self::correct_driven)?;
+            self.fluid_force = self.timed(Stage::BodyForce, Self::force_of_water)?;
         }
         let force = std::mem::take(&mut self.fluid_force);
         let report = self
@@ -86,33 +85,41 @@ impl Simulation {
         Ok(report)
     }
 
-    /// What the sum over a driven solid's rows does not know: no water presses where another solid stands, and under a free body that of its slot
-    /// does.
-    fn correct_driven(&mut self) -> Result<()> {
-        let (scene, poses) = (&self.scene, self.solids.predicted());
+    /// Force of the water on each solid: the sum over its rows, and what that does not know of driven solids. No water presses where another solid
+    /// stands, and under a free body that of its slot does.
+    fn force_of_water(&mut self) -> Result<Vec<Wrench>> {
+        let (scene, poses, backend) = (&self.scene, self.solids.predicted(), &mut *self.backend);
         let covered = self.driven_faces.covered(scene, poses);
-        let slot = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;
-        let slots: Vec<usize> = covered.iter().map(slot).collect();
-        let pressures = if slots.is_empty() { vec![] } else { self.backend.wall_pressures(&slots)? };
+        let row = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;
+        let rows: Vec<usize> = covered.iter().map(row).collect();
+        let (mut sums, mut pushes) = (None, vec![]);
+        if let Some(slots) = self.slots.as_ref().filter(|slots| slots.any_at_driven(poses)) {
+            pushes = slots.pushes(poses, |rims| {
+                let (force, told) = backend.body_force(&[&rows, rims].concat())?;
+                let at_rims = told[rows.len()..].iter().map(|row| row.pressure).collect();
+                sums = Some((force, told));
+                Ok(at_rims)
+            })?;
+        }
+        let (mut sum, pressures) = match sums {
+            Some(sums) => sums,
+            None => backend.body_force(&rows)?,
+        };
         for (c, pressure) in covered.iter().zip(pressures) {
             let (solid, turn) = (&scene.solids[c.solid], poses[c.solid].orientation);
             let to_surface = turn * solid.wall_to_surface[c.row];
             let force = pressure.in_force(to_surface, &self.params) * c.area;
             let arm = turn * solid.wall_offset[c.row] + to_surface;
-            self.fluid_force[c.solid] += Wrench { force, torque: arm.cross(force) };
+            sum[c.solid] += Wrench { force, torque: arm.cross(force) };
         }
-        let Some(found) = self.slots.as_ref().filter(|slots| slots.any_at_driven(poses)) else {
-            return Ok(());
-        };
-        let backend = &mut *self.backend;
-        for push in found.pushes(poses, |slots| row_pressures(backend, slots))? {
+        for push in pushes {
             let Opposite::Solid(k) = push.on else { continue };
             if !self.solids.is_free(k) {
                 let arm = self.params.periodic.nearest(push.at - poses[k].position);
-                self.fluid_force[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
+                sum[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
             }
         }
-        Ok(())
+        Ok(sum)
     }
 
     /// Books what the water gave the solids and what contact did, on the way from the poses `before`.

@@ -300,7 +300,7 @@ pub fn compare_stages(
                 pair.gpu.solve_pressure(&step)?;
             }
             Stage::BodyForce => {
-                let (gpu, cpu) = (pair.gpu.body_force()?, pair.cpu.body_force()?);
+                let (gpu, cpu) = (pair.gpu.body_force(&[])?.0, pair.cpu.body_force(&[])?.0);
                 out.extend(wrenches(stage, &gpu, &cpu, &scene.solids, 0.0));
                 continue;
             }

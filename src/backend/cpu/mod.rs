@@ -224,8 +224,9 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        Ok(self.sum_forces())
+    fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
+        let force = self.sum_forces();
+        Ok((force, if rows.is_empty() { vec![] } else { self.wall_pressures(rows)? }))
     }
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {

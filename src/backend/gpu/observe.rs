@@ -1,5 +1,6 @@
 //! What the host learns of the water: counters, sums over it, pressures of single wall particles.
 
+use super::exchange::Part;
 use super::layout::{self, MonitorSum, counter};
 use super::stretches::Stretches;
 use super::{Gpu, buffers, kernels};
@@ -98,23 +99,34 @@ impl Gpu {
     /// Pressures of wall particles, in one wait.
     pub(super) fn read_wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
         let stretches = Stretches::of(slots);
+        let read = self.context.download_bytes(&self.wall_parts(&stretches), false)?;
+        Ok(self.wall_told(slots, &stretches, &read))
+    }
+
+    /// Where the pressures of `stretches` of wall particles are, and what they are above those on the surface.
+    pub(super) fn wall_parts(&self, stretches: &Stretches) -> Vec<Part> {
         let of = |id, size: u64, skip: usize| {
             stretches
                 .iter()
                 .map(move |(first, count)| (id, (first - skip) as u64 * size, count as u64 * size))
         };
         let mut parts: Vec<_> = of(buffers::pressure.id(), buffers::pressure.size(), 0).collect();
-        let over = self.plan.needs(Arrays::Excess);
-        if over {
+        if self.plan.needs(Arrays::Excess) {
             parts.extend(of(buffers::excess.id(), buffers::excess.size(), self.groups.fluid));
         }
-        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.context.download_bytes(&parts, false)?);
+        parts
+    }
+
+    /// Pressures of the particles in `slots` from what was `read` of them.
+    pub(super) fn wall_told(&self, slots: &[usize], stretches: &Stretches, read: &[u8]) -> Vec<RowPressure> {
+        let values: Vec<f32> = bytemuck::pod_collect_to_vec(read);
         let (pressure, excess) = values.split_at(stretches.len());
+        let over = self.plan.needs(Arrays::Excess);
         let told = |&slot: &usize| {
             let at = stretches.place(slot);
             let excess = if over && excess[at] < layout::DRY { excess[at].into() } else { 0.0 };
             RowPressure { pressure: pressure[at].into(), excess }
         };
-        Ok(slots.iter().map(told).collect())
+        slots.iter().map(told).collect()
     }
 }

@@ -1,6 +1,8 @@
 //! Solids on the device: where they are, what is free to move, and the forces on them.
 
+use super::stretches::Stretches;
 use super::{Gpu, buffers, groups, kernels, layout};
+use crate::backend::RowPressure;
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::error::Result;
@@ -73,21 +75,27 @@ impl Gpu {
         self.context.pass([(kernels::move_solids::move_solids, groups(self.sizes.moving))])
     }
 
-    /// Force of the water on each solid.
-    pub(super) fn sum_forces(&mut self) -> Result<Vec<Wrench>> {
+    /// Force of the water on each solid, and pressures of the wall particles `rows`, in one wait.
+    pub(super) fn sum_forces(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
         let mut total = vec![Wrench::default(); self.solids];
         if self.chunk_solid.is_empty() {
-            return Ok(total);
+            return Ok((total, self.read_wall_pressures(rows)?));
         }
         let chunks = self.chunk_solid.len();
         self.context.begin(Some(Stage::BodyForce));
         self.context.pass([(kernels::body_force::body_force, chunks as u64)])?;
-        let parts = self.context.download(buffers::wrench, 2 * chunks)?;
+        let bytes = 2 * chunks as u64 * buffers::wrench.size();
+        let stretches = Stretches::of(rows);
+        let mut parts = vec![(buffers::wrench.id(), 0, bytes)];
+        parts.extend(self.wall_parts(&stretches));
+        let read = self.context.download_bytes(&parts, false)?;
+        let (wrenches, pressures) = read.split_at(bytes as usize);
+        let parts: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(wrenches);
         let vector = |v: &[f32; 4]| Vec3::new(v[0], v[1], v[2]).as_dvec3();
         for (&solid, part) in self.chunk_solid.iter().zip(parts.chunks_exact(2)) {
             total[solid].force += vector(&part[0]);
             total[solid].torque += vector(&part[1]);
         }
-        Ok(total)
+        Ok((total, self.wall_told(rows, &stretches, pressures)))
     }
 }

@@ -133,6 +133,24 @@ impl GpuRank {
     }
 
     /// What each rank holds and said.
+    /// Where the particles in `slots` of the whole are here, if they are this rank's.
+    fn here(&self, slots: &[usize]) -> Vec<Option<usize>> {
+        slots.iter().map(|&s| self.share.here(s).filter(|&s| self.share.owns(s))).collect()
+    }
+
+    /// What all ranks tell of particles, of which this one has `told` those that are `here`.
+    fn told(&self, here: &[Option<usize>], told: Vec<RowPressure>) -> Vec<RowPressure> {
+        if here.is_empty() {
+            return vec![];
+        }
+        let mut told = told.into_iter();
+        let told = here.iter().map(|s| s.and_then(|_| told.next()).unwrap_or_default());
+        let mut told: Vec<f64> = told.flat_map(|row| [row.pressure, row.excess]).collect();
+        self.share.sum(&mut told);
+        let rows = told.chunks_exact(2).map(|both| RowPressure { pressure: both[0], excess: both[1] });
+        rows.collect()
+    }
+
     fn standings(&self) -> Vec<Standing> {
         self.share.gather_all(vec![self.share.standing(self.live, self.gpu.bytes())])
     }
@@ -205,10 +223,12 @@ impl Backend for GpuRank {
         self.gpu.move_solids(poses)
     }
 
-    fn body_force(&mut self) -> Result<Vec<Wrench>> {
-        let mut wrenches = self.gpu.body_force()?;
+    fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
+        let here = self.here(rows);
+        let (mut wrenches, told) =
+            self.gpu.body_force(&here.iter().flatten().copied().collect::<Vec<_>>())?;
         self.share.sum_wrenches(&mut wrenches);
-        Ok(wrenches)
+        Ok((wrenches, self.told(&here, told)))
     }
 
     fn counters(&mut self) -> Result<Counters> {
@@ -246,15 +266,9 @@ impl Backend for GpuRank {
     }
 
     fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
-        let here: Vec<Option<usize>> =
-            slots.iter().map(|&s| self.share.here(s).filter(|&s| self.share.owns(s))).collect();
-        let read = self.gpu.wall_pressures(&here.iter().flatten().copied().collect::<Vec<_>>())?;
-        let mut read = read.into_iter();
-        let told = here.iter().map(|s| s.and_then(|_| read.next()).unwrap_or_default());
-        let mut told: Vec<f64> = told.flat_map(|row| [row.pressure, row.excess]).collect();
-        self.share.sum(&mut told);
-        let rows = told.chunks_exact(2).map(|both| RowPressure { pressure: both[0], excess: both[1] });
-        Ok(rows.collect())
+        let here = self.here(slots);
+        let told = self.gpu.wall_pressures(&here.iter().flatten().copied().collect::<Vec<_>>())?;
+        Ok(self.told(&here, told))
     }
 
     fn read(&mut self) -> Result<Fields> {

@@ -67,7 +67,7 @@ impl Rig {
             match stage {
                 Stage::MoveSolids => rank.move_solids(&[self.gate]).expect("it moves"),
                 Stage::ConjugateGradient => drop(rank.solve_pressure(&step).expect("it is solved")),
-                Stage::BodyForce => drop(rank.body_force().expect("it is summed")),
+                Stage::BodyForce => drop(rank.body_force(&[]).expect("it is summed")),
                 other => other.over_particles().map_or((), |s| rank.run(s, &step).expect("it runs")),
             }
         }
