@@ -13,6 +13,7 @@ mod moves;
 mod outlook;
 mod whole;
 
+use crate::backend::RowPressure;
 use crate::body::Wrench;
 use crate::cells::Grid;
 use crate::error::Result;
@@ -274,11 +275,21 @@ impl Share {
 
     /// Each of `wrenches` summed over the ranks.
     pub fn sum_wrenches(&self, wrenches: &mut [Wrench]) {
-        let parts = wrenches.iter().flat_map(|w| [w.force, w.torque]).flat_map(|v| v.to_array());
-        let mut numbers: Vec<f64> = parts.collect();
+        self.sum_forces(wrenches, &mut []);
+    }
+
+    /// Each of `forces` and of `rows`, which all but one rank know as zero, summed over the ranks at once.
+    pub fn sum_forces(&self, forces: &mut [Wrench], rows: &mut [RowPressure]) {
+        let told = rows.iter().flat_map(|row| [row.pressure, row.excess]);
+        let parts = forces.iter().flat_map(|w| [w.force, w.torque]).flat_map(|v| v.to_array());
+        let mut numbers: Vec<f64> = parts.chain(told).collect();
         self.sum(&mut numbers);
-        for (wrench, n) in wrenches.iter_mut().zip(numbers.chunks_exact(6)) {
+        let (parts, told) = numbers.split_at(6 * forces.len());
+        for (wrench, n) in forces.iter_mut().zip(parts.chunks_exact(6)) {
             *wrench = Wrench { force: DVec3::from_slice(n), torque: DVec3::from_slice(&n[3..]) };
+        }
+        for (row, n) in rows.iter_mut().zip(told.chunks_exact(2)) {
+            *row = RowPressure { pressure: n[0], excess: n[1] };
         }
     }
 

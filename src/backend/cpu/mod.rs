@@ -225,8 +225,9 @@ impl Backend for Cpu {
     }
 
     fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
-        let force = self.sum_forces();
-        Ok((force, if rows.is_empty() { vec![] } else { self.wall_pressures(rows)? }))
+        let (mut forces, mut told) = (self.sum_forces(), self.own_pressures(rows));
+        self.share.iter().for_each(|share| share.sum_forces(&mut forces, &mut told));
+        Ok((forces, told))
     }
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {
@@ -259,21 +260,9 @@ impl Backend for Cpu {
     }
 
     fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
-        let Self { fields, groups, excess, share, .. } = self;
-        let of = |i: usize| {
-            let wall = i.checked_sub(groups.fluid);
-            [fields.pressure[i], wall.map_or(0.0, |wall| excess.of(wall))]
-        };
-        let told = match share {
-            None => slots.iter().map(|&s| of(s)).collect::<Vec<_>>(),
-            Some(share) => {
-                let here = slots.iter().map(|&s| share.here(s).filter(|&s| share.owns(s)));
-                let mut told: Vec<f64> = here.flat_map(|s| s.map_or([0.0; 2], of)).collect();
-                share.sum(&mut told);
-                told.chunks_exact(2).map(|both| [both[0], both[1]]).collect()
-            }
-        };
-        Ok(told.into_iter().map(|[pressure, excess]| RowPressure { pressure, excess }).collect())
+        let mut told = self.own_pressures(slots);
+        self.share.iter().for_each(|share| share.sum_forces(&mut [], &mut told));
+        Ok(told)
     }
 
     fn read(&mut self) -> Result<Fields> {

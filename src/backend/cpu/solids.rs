@@ -2,6 +2,7 @@
 
 use super::Cpu;
 use super::team::owns;
+use crate::backend::RowPressure;
 use crate::body::slots;
 use crate::body::{Pose, Wrench};
 use crate::fields::State;
@@ -32,7 +33,7 @@ impl Cpu {
         }
     }
 
-    /// Force of the water on each solid; what it felt besides pressure is forgotten.
+    /// Force of the water on this rank's part of each solid; what it felt besides pressure is forgotten.
     pub(super) fn sum_forces(&mut self) -> Vec<Wrench> {
         let (params, share) = (&self.params, self.share.as_deref());
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
@@ -60,11 +61,21 @@ impl Cpu {
             }
             total
         });
-        let mut wrenches: Vec<Wrench> = wrenches.collect();
-        if let Some(share) = share {
-            share.sum_wrenches(&mut wrenches);
-        }
+        let wrenches: Vec<Wrench> = wrenches.collect();
         fields.reaction.fill(DVec3::ZERO);
         wrenches
+    }
+
+    /// Pressures of the wall particles `slots` as far as they are this rank's, else zero.
+    pub(super) fn own_pressures(&self, slots: &[usize]) -> Vec<RowPressure> {
+        let of = |i: usize| RowPressure {
+            pressure: self.fields.pressure[i],
+            excess: i.checked_sub(self.groups.fluid).map_or(0.0, |wall| self.excess.of(wall)),
+        };
+        let own = |&s: &usize| match &self.share {
+            None => of(s),
+            Some(share) => share.here(s).filter(|&s| share.owns(s)).map(of).unwrap_or_default(),
+        };
+        slots.iter().map(own).collect()
     }
 }

@@ -138,17 +138,10 @@ impl GpuRank {
         slots.iter().map(|&s| self.share.here(s).filter(|&s| self.share.owns(s))).collect()
     }
 
-    /// What all ranks tell of particles, of which this one has `told` those that are `here`.
-    fn told(&self, here: &[Option<usize>], told: Vec<RowPressure>) -> Vec<RowPressure> {
-        if here.is_empty() {
-            return vec![];
-        }
+    /// What is `told` of those of particles that are `here`, zero of the others.
+    fn own(here: &[Option<usize>], told: Vec<RowPressure>) -> Vec<RowPressure> {
         let mut told = told.into_iter();
-        let told = here.iter().map(|s| s.and_then(|_| told.next()).unwrap_or_default());
-        let mut told: Vec<f64> = told.flat_map(|row| [row.pressure, row.excess]).collect();
-        self.share.sum(&mut told);
-        let rows = told.chunks_exact(2).map(|both| RowPressure { pressure: both[0], excess: both[1] });
-        rows.collect()
+        here.iter().map(|s| s.and_then(|_| told.next()).unwrap_or_default()).collect()
     }
 
     fn standings(&self) -> Vec<Standing> {
@@ -225,10 +218,10 @@ impl Backend for GpuRank {
 
     fn body_force(&mut self, rows: &[usize]) -> Result<(Vec<Wrench>, Vec<RowPressure>)> {
         let here = self.here(rows);
-        let (mut wrenches, told) =
-            self.gpu.body_force(&here.iter().flatten().copied().collect::<Vec<_>>())?;
-        self.share.sum_wrenches(&mut wrenches);
-        Ok((wrenches, self.told(&here, told)))
+        let (mut forces, told) = self.gpu.body_force(&here.iter().flatten().copied().collect::<Vec<_>>())?;
+        let mut told = Self::own(&here, told);
+        self.share.sum_forces(&mut forces, &mut told);
+        Ok((forces, told))
     }
 
     fn counters(&mut self) -> Result<Counters> {
@@ -268,7 +261,9 @@ impl Backend for GpuRank {
     fn wall_pressures(&mut self, slots: &[usize]) -> Result<Vec<RowPressure>> {
         let here = self.here(slots);
         let told = self.gpu.wall_pressures(&here.iter().flatten().copied().collect::<Vec<_>>())?;
-        Ok(self.told(&here, told))
+        let mut told = Self::own(&here, told);
+        self.share.sum_forces(&mut [], &mut told);
+        Ok(told)
     }
 
     fn read(&mut self) -> Result<Fields> {
