@@ -46,7 +46,7 @@ pub enum Error {
     #[error("{0}")]
     Senseless(String),
     /// A file could not be read or written (exit code 5).
-    #[error("{path}: {source}")]
+    #[error("{}", of_file(path, source))]
     Io {
         /// The file.
         path: String,
@@ -235,6 +235,18 @@ pub enum FolderError {
     /// A file of it is shorter than when the run stopped.
     #[error("{}: it is shorter than when the run stopped", .0.display())]
     Shorter(PathBuf),
+}
+
+/// What the system says of the file or folder at `path`.
+fn of_file(path: &str, source: &std::io::Error) -> String {
+    let said = source.to_string();
+    // Files are written beside their places first, under names that lead nowhere.
+    let said = said.split(" at path ").next().unwrap_or_default();
+    let in_the_way = source.kind() == std::io::ErrorKind::AlreadyExists && Path::new(path).is_file();
+    if in_the_way || source.kind() == std::io::ErrorKind::NotADirectory {
+        return format!("{path}: a file stands where a folder should ({said}): choose another place");
+    }
+    format!("{path}: {said}")
 }
 
 /// Why there is no run in `folder`, as it is now, and what to do.

@@ -3,10 +3,11 @@
 use crate::common;
 use common::*;
 use glam::DVec3;
-use seixo::backend::{Processor, RowPressure};
+use seixo::backend::Processor;
 use seixo::case::Case;
 use seixo::gauges::Gauges;
 use seixo::gauges::wall_force::FixedWall;
+use seixo::kernels::body_force::RowPressure;
 use seixo::output::table::Cell;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;

@@ -227,6 +227,19 @@ fn what_is_told_of_folders_and_files_leads_on() {
     let (case, out) = small_run(folder.path());
     let over = ran(&["run", &case, "-o", &case]);
     assert!(over.code == 2 && over.err.contains("would be overwritten"), "{}", over.err);
+    let (file, inside) = (case.clone(), format!("{case}/results"));
+    let other = folder.path().join("other.toml").display().to_string();
+    std::fs::copy(&case, &other).unwrap();
+    for args in [
+        &["run", &other, "-q", "--backend", "cpu", "-o", &inside][..],
+        &["render", &out, "-o", &file],
+        &["study", "free-fall", "-q", "-o", &file],
+    ] {
+        let told = ran(args);
+        let words = "small.toml: a file stands where a folder should";
+        let words = if args[0] == "run" { &words[10..] } else { words };
+        assert!(told.code == 5 && told.err.contains(words), "{args:?}: {}", told.err);
+    }
     // A frame that is cut off, empty or gone is left out, whoever reads it.
     let frame = folder.path().join("out/vtu/fluid_0002.vtu");
     let whole = std::fs::read(&frame).unwrap();

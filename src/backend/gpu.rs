@@ -36,13 +36,14 @@ pub use rank::GpuRank;
 pub use set_up::{memory, sizes};
 
 use super::traffic::Traffic;
-use super::{Backend, Commands, Counters, RowPressure, Timing};
+use super::{Backend, Commands, Counters, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
 use crate::error::Result;
 use crate::fields::Fields;
+use crate::kernels::body_force::RowPressure;
 pub use crate::kernels::device as kernels;
 use crate::kernels::device::Over;
 use crate::kernels::openings::{Emission, Outlet};

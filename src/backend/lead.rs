@@ -1,12 +1,13 @@
 //! The backend of the first of many ranks: it does what it is asked and has the others do the same, each on its own particles.
 
 use super::traffic::Traffic;
-use super::{Backend, Commands, Counters, Ranked, RowPressure, Timing};
+use super::{Backend, Commands, Counters, Ranked, Timing};
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
+use crate::kernels::body_force::RowPressure;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;

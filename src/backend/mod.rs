@@ -15,11 +15,11 @@ use crate::checkpoint::Archive;
 use crate::compute::Compute;
 use crate::error::Result;
 use crate::fields::Fields;
-use crate::kernels::body_force;
+use crate::kernels::body_force::RowPressure;
 use crate::kernels::openings::{Emission, Outlet};
 use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
-use crate::params::{Params, Step};
+use crate::params::Step;
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::PressureReport;
 use crate::ranks::Standing;
@@ -171,29 +171,6 @@ impl Commands {
         if let Some(stage) = stage {
             *self.by_stage.entry(stage).or_default() += 1;
         }
-    }
-}
-
-/// What a particle of a wall tells.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RowPressure {
-    /// Pressure of its row [Pa].
-    pub pressure: f64,
-    /// What that is above the pressure on the surface, but for the weight of the water between [Pa].
-    pub excess: f64,
-}
-
-impl RowPressure {
-    /// Pressure on the surface [Pa], which lies `to_surface` [m] from the particle. A particle without pressure before water without any is
-    /// dry and has none.
-    pub fn on_surface(&self, to_surface: DVec3, params: &Params) -> f64 {
-        self.in_force(to_surface, params).max(0.0)
-    }
-
-    /// The same as it is in the force on solids: in the accurate scheme nothing is cut.
-    pub fn in_force(&self, to_surface: DVec3, params: &Params) -> f64 {
-        let wet = self.pressure > 0.0 || self.excess < 0.0;
-        if wet { body_force::surface_pressure(self.pressure, self.excess, to_surface, params) } else { 0.0 }
     }
 }
 

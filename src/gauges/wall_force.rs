@@ -4,11 +4,11 @@
 //!
 //! Collisions of particles with the wall, Eq. (18), are not in it.
 
-use crate::backend::RowPressure;
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::PointGrid;
 use crate::cover::{self, CELL, Standing, Tiles};
 use crate::fields::Fields;
+use crate::kernels::body_force::RowPressure;
 use crate::kernels::number_density::pair_weight;
 use crate::kernels::viscosity;
 use crate::neighbourhood::weight_over_square;

@@ -6,6 +6,29 @@ use crate::params::Params;
 use crate::scheme::Source;
 use glam::DVec3;
 
+/// What a particle of a wall tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowPressure {
+    /// Pressure of its row [Pa].
+    pub pressure: f64,
+    /// What that is above the pressure on the surface, but for the weight of the water between [Pa].
+    pub excess: f64,
+}
+
+impl RowPressure {
+    /// Pressure on the surface [Pa], which lies `to_surface` [m] from the particle. A particle without pressure before water without any is
+    /// dry and has none.
+    pub fn on_surface(&self, to_surface: DVec3, params: &Params) -> f64 {
+        self.in_force(to_surface, params).max(0.0)
+    }
+
+    /// The same as it is in the force on solids: in the accurate scheme nothing is cut.
+    pub fn in_force(&self, to_surface: DVec3, params: &Params) -> f64 {
+        let wet = self.pressure > 0.0 || self.excess < 0.0;
+        if wet { surface_pressure(self.pressure, self.excess, to_surface, params) } else { 0.0 }
+    }
+}
+
 /// Pressure on the true surface of the solid [Pa], `to_surface` from a wall-layer particle of `pressure` inside (world axes [m]): without the
 /// `excess` of its row ([`super::wall_excess`], none in the paper's scheme), with the weight of the water between.
 /// In the paper's scheme water does not pull; in the other one nothing is cut, or a body would not get what the water loses.

@@ -13,11 +13,11 @@ mod moves;
 mod outlook;
 mod whole;
 
-use crate::backend::RowPressure;
 use crate::body::Wrench;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::State;
+use crate::kernels::body_force::RowPressure;
 use crate::machine::memory_peak;
 use crate::params::Params;
 use crate::ranks::{Standing, Team, decode, encode};

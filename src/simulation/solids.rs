@@ -34,7 +34,7 @@ impl Simulation {
         !self.plan.wet() || self.plan.has(Stage::BodyForce)
     }
 
-    /// Rows of free bodies at slots, in the poses that [`Solids::predict`] gave last; none where no free body stands in the
+    /// Rows of free bodies at slots, in the poses that [`Solids::predict`](crate::contact::Solids::predict) gave last; none where no free body stands in the
     /// pressure equation.
     ///
     /// # Errors

@@ -2,11 +2,11 @@
 
 use super::Cpu;
 use super::team::owns;
-use crate::backend::RowPressure;
 use crate::body::slots;
 use crate::body::{Pose, Wrench};
 use crate::fields::State;
-use crate::kernels::{body_force, move_solids};
+use crate::kernels::body_force::{self, RowPressure};
+use crate::kernels::move_solids;
 use glam::DVec3;
 
 impl Cpu {

@@ -2,10 +2,10 @@
 
 use super::stretches::Stretches;
 use super::{Gpu, buffers, groups, kernels, layout};
-use crate::backend::RowPressure;
 use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::error::Result;
+use crate::kernels::body_force::RowPressure;
 use crate::plan::{Arrays, Stage};
 use glam::{DMat3, DVec3, Vec3};
 
