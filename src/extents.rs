@@ -245,8 +245,36 @@ pub(crate) fn lattice(extents: &[Extent]) -> Bounds {
     extents.iter().filter(on_lattice).map(|e| e.bounds).fold(Bounds::NONE, Bounds::union)
 }
 
-/// Times its own length by which the room around what nothing holds is longer at most, for its flight.
+/// Times its own length by which the room around what nothing holds is longer at most, for its flight: cells cost memory, and
+/// a domain can be typed.
 const FLIGHT: f64 = 4.0;
+
+/// `all` of a scene with room around it: what is not `held` by a tank flies so far against and along each axis [m], and water `depth` deep along
+/// gravity [m] splashes.
+pub(crate) fn with_room(case: &Case, all: Bounds, held: bool, flight: (DVec3, DVec3), depth: f64) -> Bounds {
+    let room = 4.0 * case.run.spacing;
+    // Nothing but walls keeps bodies and free drops in place, and they cost nothing while there are few.
+    let around = if held { room } else { (0.5 * (all.hi - all.lo).length()).max(room) };
+    let (mut lo, mut hi) = (all.lo - around, all.hi + around);
+    if !held {
+        let farthest = DVec3::splat(FLIGHT * around);
+        lo -= flight.0.min(farthest);
+        hi += flight.1.min(farthest);
+    }
+    let mut gravity = DVec3::from(case.run.gravity);
+    if case.run.dimensions == 2 {
+        gravity.y = 0.0;
+    }
+    if gravity.length() > 0.0 {
+        let up = -gravity.normalize();
+        let tank =
+            case.tank.as_ref().map_or(0.0, |t| (DVec3::from(t.max) - DVec3::from(t.min)).dot(up.abs()));
+        let head = up * (4.0 * depth).max(tank);
+        lo += head.min(DVec3::ZERO);
+        hi += head.max(DVec3::ZERO);
+    }
+    Bounds { lo, hi }
+}
 
 /// The domain as [`crate::scene::Scene`] makes it, as far as the numbers of the case tell.
 pub(crate) fn domain(case: &Case, extents: &[Extent]) -> Bounds {
@@ -269,26 +297,13 @@ pub(crate) fn domain(case: &Case, extents: &[Extent]) -> Bounds {
     }
     let water = extents.iter().filter(|e| e.of == Of::Water).map(|e| e.bounds);
     let water = water.reduce(Bounds::union);
-    let room = 4.0 * l0;
     let held = tank.is_some() && water.is_some();
-    let around = if held { room } else { (0.5 * (all.hi - all.lo).length()).max(room) };
-    let (mut lo, mut hi) = (all.lo - around, all.hi + around);
-    if !held {
-        let (back, ahead) = flight(case);
-        lo -= back.min(DVec3::splat(FLIGHT * around));
-        hi += ahead.min(DVec3::splat(FLIGHT * around));
-    }
-    let gravity = DVec3::from(case.run.gravity);
-    if gravity.length() > 0.0 {
-        let up = -gravity.normalize();
-        let along = |b: Bounds| (b.hi - b.lo).max(DVec3::ZERO).dot(up.abs());
-        let tank = tank.map_or(0.0, |t| along(Bounds::new(t.min, t.max)));
-        // What comes in may fill the tank.
-        let depth = if case.inflow.is_empty() { water.map_or(0.0, along) } else { tank };
-        let head = up * (4.0 * depth).max(tank);
-        lo += head.min(DVec3::ZERO);
-        hi += head.max(DVec3::ZERO);
-    }
+    // What comes in may fill the tank.
+    let up = DVec3::from(case.run.gravity).normalize_or_zero().abs();
+    let size = |b: Bounds| (b.hi - b.lo).max(DVec3::ZERO).dot(up);
+    let still = water.map_or(0.0, size);
+    let filled = tank.map(|t| size(Bounds::new(t.min, t.max))).filter(|_| !case.inflow.is_empty());
+    let Bounds { mut lo, mut hi } = with_room(case, all, held, flight(case), filled.unwrap_or(still));
     if let Some(t) = tank {
         for k in (0..3).filter(|&k| t.periodic()[k]) {
             (lo[k], hi[k]) = (t.min[k], t.max[k]);

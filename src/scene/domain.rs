@@ -6,11 +6,8 @@ use super::opening::Planned;
 use super::oriented::Placed;
 use crate::case::TANK_FACES;
 use crate::error::Problem;
+use crate::extents;
 use glam::{DMat3, DVec3, IVec3};
-
-/// The room around water and bodies that nothing holds is longer by their flight, but by this many times itself at most: cells
-/// cost memory, and a domain can be typed.
-const FLIGHT: f64 = 4.0;
 
 impl Builder<'_> {
     /// The case's domain, or one with room around everything; complains of what lies outside.
@@ -80,29 +77,9 @@ impl Builder<'_> {
             return self.in_plane(lo, hi);
         }
         let (lo, hi) = bounds.total();
-        let room = 4.0 * l0;
-        // Nothing but walls keeps bodies and free drops in place, and they cost nothing while there are few.
         let held = self.tank.is_some() && !self.water.cell.is_empty();
-        let around = if held { room } else { (0.5 * (hi - lo).length()).max(room) };
-        let (mut lo, mut hi) = (lo - around, hi + around);
-        if !held {
-            let (back, ahead) = self.flight();
-            let farthest = DVec3::splat(FLIGHT * around);
-            lo -= back.min(farthest);
-            hi += ahead.min(farthest);
-        }
-        let gravity = self.gravity();
-        if gravity.length() > 0.0 {
-            let up = -gravity.normalize();
-            let tank = self
-                .case
-                .tank
-                .as_ref()
-                .map_or(0.0, |t| (DVec3::from(t.max) - DVec3::from(t.min)).dot(up.abs()));
-            let head = up * (4.0 * self.depth).max(tank);
-            lo += head.min(DVec3::ZERO);
-            hi += head.max(DVec3::ZERO);
-        }
+        let all = extents::Bounds { lo, hi };
+        let extents::Bounds { lo, hi } = extents::with_room(self.case, all, held, self.flight(), self.depth);
         self.in_plane(lo, hi)
     }
 
