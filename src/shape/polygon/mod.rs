@@ -8,6 +8,7 @@ mod layer;
 use super::areas;
 use super::cells::Cells;
 use super::surface::Surface;
+use super::thin::Thin;
 use super::{Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
 use glam::{DVec2, DVec3};
 use std::sync::Mutex;
@@ -218,6 +219,7 @@ impl Geometry for Polygon {
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
         let mut out = Particles::default();
         let mut taken = Cells::new(spacing);
+        let thin = Thin::new(|x| self.distance(x), spacing);
         for layer in 0..layers {
             let depth = (f64::from(layer) + 0.5) * spacing;
             let mut stretches = self.layer(depth, spacing);
@@ -227,6 +229,9 @@ impl Geometry for Polygon {
             stretches.sort_by(|a, b| b.length().total_cmp(&a.length()));
             for at in stretches.iter().flat_map(|s| s.divided(spacing)) {
                 let at = space(at);
+                if layer > 0 && thin.merges(at) {
+                    continue;
+                }
                 if taken.nearest(at, APART * spacing).is_none() {
                     taken.add(at);
                     let (distance, outward) = self.distance(at);
@@ -236,6 +241,12 @@ impl Geometry for Polygon {
         }
         if out.wall.is_empty() {
             return out;
+        }
+        for layer in 1..layers {
+            let above = f64::from(layer);
+            let stretches = self.layer(above * spacing, spacing);
+            let places = stretches.iter().flat_map(|s| s.divided(PIECE * spacing)).map(space);
+            thin.fill(above, places, &taken, &mut out);
         }
         let pieces = self.sides().flat_map(|[a, b]| {
             let count = (a.distance(b) / (PIECE * spacing)).ceil().max(1.0);

@@ -1,0 +1,71 @@
+//! The middle of thin parts. Layers of particles below the two sides of a plate leave it hollow where they do not fit, and a hollow plate pulls:
+//! its rows have neighbours on one side alone, as those of a free surface have, and carry no pressure.
+//!
+//! Where the layers of two sides that look away from each other would come too near, one in the middle takes their place, and one stands in the
+//! middle where none of them reaches.
+
+use super::Particles;
+use super::cells::Cells;
+use glam::DVec3;
+
+/// Layers of two sides nearer to each other than twice this, over the spacing, are one in the middle.
+const MERGED: f64 = 0.3;
+/// Part of a layer for which there is room in the middle, from which on it gets one.
+const ROOM: f64 = 0.4;
+/// Dummies in the middle are no nearer than this to the layers, over the spacing.
+const APART: f64 = 0.6;
+/// Cosine between the normals of two sides that look away from each other.
+const AWAY: f64 = -0.5;
+/// Part of the spacing to which the middle is found.
+const EXACT: f64 = 1e-6;
+
+/// Sides of a thin part: signed distance [m] and direction outwards of a point.
+pub(super) struct Thin<F> {
+    distance: F,
+    spacing: f64,
+}
+
+impl<F: Fn(DVec3) -> (f64, DVec3)> Thin<F> {
+    pub fn new(distance: F, spacing: f64) -> Self {
+        Self { distance, spacing }
+    }
+
+    /// The middle between the side below which `at` lies and one that looks away from it, if it is no deeper than `reach` [m] below `at`.
+    fn middle(&self, at: DVec3, reach: f64) -> Option<DVec3> {
+        let (distance, outward) = (self.distance)(at);
+        let slack = EXACT * self.spacing;
+        let beyond = |t: f64| -(self.distance)(at - t * outward).0 < t - distance - slack;
+        let (mut low, mut high) = (0.0, reach + slack);
+        if !beyond(high) {
+            return None;
+        }
+        while high - low > slack {
+            let half = 0.5 * (low + high);
+            *(if beyond(half) { &mut high } else { &mut low }) = half;
+        }
+        let other = (self.distance)(at - (high + 10.0 * slack) * outward).1;
+        (other.dot(outward) < AWAY).then(|| at - 0.5 * (low + high) * outward)
+    }
+
+    /// Whether a particle of a layer below the first at `at` has its like of another side so near that one in the middle stands for both.
+    pub fn merges(&self, at: DVec3) -> bool {
+        self.middle(at, MERGED * self.spacing).is_some()
+    }
+
+    /// Puts dummies into the middle below `places`, close to each other and `above` spacings deep, as many layers as have their particles: as many as fill
+    /// the part with those of both sides. Too many push the water away, too few pull it.
+    pub fn fill(&self, above: f64, places: impl Iterator<Item = DVec3>, taken: &Cells, out: &mut Particles) {
+        let l0 = self.spacing;
+        let mut put = Cells::new(2.0 * l0);
+        for at in places.filter_map(|at| self.middle(at, (0.5 + MERGED) * l0)) {
+            let (distance, outward) = (self.distance)(at);
+            let room = 2.0 * (-distance / l0 - above);
+            if room < ROOM || taken.nearest(at, APART * l0).is_some() || put.nearest(at, l0 / room).is_some()
+            {
+                continue;
+            }
+            put.add(at);
+            out.add(1, at, DVec3::ZERO, -distance * outward);
+        }
+    }
+}
