@@ -1,7 +1,7 @@
 //! Wall layers of prisms, wedges, cones and meshes: how evenly they lie, and what still water does to what they stand for.
 
 use crate::common::{case, cpu_simulation};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use seixo::scene::Scene;
 use seixo::shape::{Geometry, Mesh, Particles, Polygon, Shape};
 use std::f64::consts::{PI, TAU};
@@ -168,4 +168,25 @@ fn a_gentle_beach_is_made_at_once() {
     assert!(off(&particles, beach.volume(), false) < 1e-12);
     // It took minutes; now a second.
     assert!(started.elapsed() < Duration::from_secs(20), "{:?}", started.elapsed());
+}
+
+#[test]
+fn plates_of_any_thickness_are_full() {
+    let (l0, mut most) = (0.02, DVec2::ZERO);
+    // Less than 2.35 spacings are the two wall layers alone.
+    for thick in [2.4, 2.5, 2.75, 3.0, 3.25, 3.5, 3.75, 4.0, 4.5, 5.5] {
+        let (x, z) = (0.6 * 20f64.to_radians().cos(), 0.6 * 20f64.to_radians().sin());
+        let up = thick * l0 / 20f64.to_radians().cos();
+        let section = [[0.0, 0.0], [x, z], [x, z + up], [0.0, up]];
+        let flat = Shape::Polygon(Polygon::new(&section, l0));
+        let solid = Shape::Mesh(Mesh::prism(&section, 0.2).expect("a mesh"));
+        let full = [(flat, 2), (solid, 3)].map(|(shape, dimensions)| {
+            let particles = shape.particles(l0, dimensions, 3);
+            let count = (particles.wall.len() + particles.dummy.len()) as f64;
+            count * l0.powi(3) / shape.volume()
+        });
+        println!("{thick} spacings: {full:.3?}");
+        most = most.max(DVec2::new(full[0] - 1.0, full[1] - 1.0).abs());
+    }
+    assert!(most.x < 0.09 && most.y < 0.15, "{most}");
 }

@@ -7,11 +7,12 @@
 use super::Particles;
 use super::cells::Cells;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Layers of two sides nearer to each other than twice this, over the spacing, are one in the middle.
 const MERGED: f64 = 0.3;
 /// Part of a layer for which there is room in the middle, from which on it gets one.
-const ROOM: f64 = 0.4;
+const ROOM: f64 = 0.35;
 /// Dummies in the middle are no nearer than this to the layers, over the spacing.
 const APART: f64 = 0.6;
 /// Cosine between the normals of two sides that look away from each other.
@@ -23,11 +24,13 @@ const EXACT: f64 = 1e-6;
 pub(super) struct Thin<F> {
     distance: F,
     spacing: f64,
+    /// Of two dimensions.
+    plane: bool,
 }
 
-impl<F: Fn(DVec3) -> (f64, DVec3)> Thin<F> {
-    pub fn new(distance: F, spacing: f64) -> Self {
-        Self { distance, spacing }
+impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
+    pub fn new(distance: F, spacing: f64, plane: bool) -> Self {
+        Self { distance, spacing, plane }
     }
 
     /// The middle between the side below which `at` lies and one that looks away from it, if it is no deeper than `reach` [m] below `at`.
@@ -52,6 +55,18 @@ impl<F: Fn(DVec3) -> (f64, DVec3)> Thin<F> {
         self.middle(at, MERGED * self.spacing).is_some()
     }
 
+    /// Places close to each other in those of `cells`, of the size of the spacing, that lie in a thin part.
+    pub fn beside(&self, cells: &[DVec3]) -> Vec<DVec3> {
+        let part = self.spacing / 3.0;
+        let steps = move || [0.0, -part, part].into_iter();
+        let offsets = move || {
+            steps().flat_map(move |x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z))))
+        };
+        let is_thin = |at: &&DVec3| self.middle(**at, 1.5 * self.spacing).is_some();
+        let thin: Vec<DVec3> = cells.par_iter().filter(is_thin).copied().collect();
+        thin.into_iter().flat_map(|at| offsets().map(move |by| at + by)).collect()
+    }
+
     /// Puts dummies into the middle below `places`, close to each other and `above` spacings deep, as many layers as have their particles: as many as fill
     /// the part with those of both sides. Too many push the water away, too few pull it.
     pub fn fill(&self, above: f64, places: impl Iterator<Item = DVec3>, taken: &Cells, out: &mut Particles) {
@@ -60,8 +75,12 @@ impl<F: Fn(DVec3) -> (f64, DVec3)> Thin<F> {
         for at in places.filter_map(|at| self.middle(at, (0.5 + MERGED) * l0)) {
             let (distance, outward) = (self.distance)(at);
             let room = 2.0 * (-distance / l0 - above);
-            if room < ROOM || taken.nearest(at, APART * l0).is_some() || put.nearest(at, l0 / room).is_some()
-            {
+            if !(ROOM..1.0 + 2.0 * MERGED).contains(&room) {
+                continue;
+            }
+            // Places that are taken one by one lie less densely than a lattice so far apart.
+            let apart = if self.plane { l0 / room } else { 0.9 * l0 / room.sqrt() };
+            if taken.nearest(at, APART * l0).is_some() || put.nearest(at, apart).is_some() {
                 continue;
             }
             put.add(at);

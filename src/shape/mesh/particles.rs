@@ -2,6 +2,7 @@
 
 use super::super::areas::{self, Piece};
 use super::super::cells::Cells;
+use super::super::thin::Thin;
 use super::super::{ALL_FACES, Geometry, Particles};
 use super::Mesh;
 use super::skin::Skin;
@@ -81,6 +82,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     let skin = (!fits).then(|| Skin::new(mesh, spacing));
     let mut out = Particles::default();
     let mut taken = Cells::new(spacing);
+    let thin = Thin::new(|x| mesh.distance(x), spacing, false);
     for layer in 0..layers {
         let (above, depth) = (f64::from(layer) * border, (f64::from(layer) + 0.5) * spacing);
         let mut here: Vec<_> = found.iter().filter(|f| f.1 > above && f.1 <= above + border).collect();
@@ -101,12 +103,21 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
             };
             here.par_iter().map(put).collect()
         };
+        let merged: Vec<bool> =
+            places.par_iter().map(|p| layer > 0 && skin.is_some() && thin.merges(p.at)).collect();
+        let places = places.into_iter().zip(merged).filter(|(_, merged)| !merged).map(|(place, _)| place);
         for Place { at, inside: (depth, outward), .. } in places {
             if taken.nearest(at, APART * spacing).is_none() {
                 taken.add(at);
                 out.add(layer, at, DVec3::ZERO, depth * outward);
             }
         }
+    }
+    for layer in if skin.is_some() { 1..layers } else { 1..1 } {
+        let above = f64::from(layer);
+        let here = found.iter().filter(|f| f.1 > (above - 0.5) * spacing && f.1 < (above + 1.0) * spacing);
+        let cells: Vec<DVec3> = here.map(|f| f.0).collect();
+        thin.fill(above, thin.beside(&cells).into_iter(), &taken, &mut out);
     }
     let nearest = |x| mesh.nearest(x).0;
     areas::share(&mut out, spacing, mesh.volume(), pieces(mesh, spacing), nearest);

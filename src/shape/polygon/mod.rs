@@ -219,7 +219,7 @@ impl Geometry for Polygon {
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
         let mut out = Particles::default();
         let mut taken = Cells::new(spacing);
-        let thin = Thin::new(|x| self.distance(x), spacing);
+        let thin = Thin::new(|x| self.distance(x), spacing, true);
         for layer in 0..layers {
             let depth = (f64::from(layer) + 0.5) * spacing;
             let mut stretches = self.layer(depth, spacing);
