@@ -15,8 +15,8 @@ const MERGED: f64 = 0.3;
 const ROOM: f64 = 0.35;
 /// Dummies in the middle are no nearer than this to the layers, over the spacing.
 const APART: f64 = 0.6;
-/// Cosine between the normals of two sides that look away from each other.
-const AWAY: f64 = -0.5;
+/// Cosine between the normals of two sides that look away from each other: a plate, not the tip of a wedge.
+const AWAY: f64 = -0.9;
 /// Part of the spacing to which the middle is found.
 const EXACT: f64 = 1e-6;
 
