@@ -39,6 +39,9 @@ pub type Faces = u8;
 /// The faces of a slice of two dimensions: those that look along x and z.
 pub(crate) const PLANE_FACES: Faces = 0b11_0011;
 
+/// Particles of sections and meshes stand at least so far apart, over the spacing.
+const APART: f64 = 0.6;
+
 /// A node of a rule along a stretch of a line.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {

@@ -4,8 +4,8 @@
 //! Where the layers of two sides that look away from each other would come too near, one in the middle takes their place, and one stands in the
 //! middle where none of them reaches.
 
-use super::Particles;
 use super::cells::Cells;
+use super::{APART, Particles};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -13,8 +13,6 @@ use rayon::prelude::*;
 const MERGED: f64 = 0.3;
 /// Part of a layer for which there is room in the middle, from which on it gets one.
 const ROOM: f64 = 0.35;
-/// Dummies in the middle are no nearer than this to the layers, over the spacing.
-const APART: f64 = 0.6;
 /// Cosine between the normals of two sides that look away from each other: a plate, not the tip of a wedge.
 const AWAY: f64 = -0.9;
 /// Part of the spacing to which the middle is found.

@@ -3,14 +3,12 @@
 use super::super::areas::{self, Piece};
 use super::super::cells::Cells;
 use super::super::thin::Thin;
-use super::super::{ALL_FACES, Geometry, Particles};
+use super::super::{ALL_FACES, APART, Geometry, Particles};
 use super::Mesh;
 use super::skin::Skin;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Particles stand at least so far apart, over the spacing.
-pub(super) const APART: f64 = 0.6;
 /// A lattice fits a surface whose wall layer is moved by no more, over the spacing.
 const FITS: f64 = 0.2;
 /// Where the normal's largest part along an axis of the lattice is more, its places lie evenly enough to begin with.
@@ -113,7 +111,8 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
             }
         }
     }
-    for layer in if skin.is_some() { 1..layers } else { 1..1 } {
+    // A lattice that fits is full.
+    for layer in 1..if skin.is_some() { layers } else { 1 } {
         let above = f64::from(layer);
         let here = found.iter().filter(|f| f.1 > (above - 0.5) * spacing && f.1 < (above + 1.0) * spacing);
         let cells: Vec<DVec3> = here.map(|f| f.0).collect();

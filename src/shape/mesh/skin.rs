@@ -5,9 +5,10 @@
 //! its edges, smooth for the water that slides past. What the lattices leave is filled from many candidates, the most crowded of which are
 //! taken out until as many are left as belong there (weighted sample elimination, after Yuksel 2015, Comput. Graph. Forum 34).
 
+use super::super::APART;
 use super::super::cells::Cells;
 use super::Mesh;
-use super::particles::{APART, Place};
+use super::particles::Place;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BinaryHeap, HashMap, HashSet};

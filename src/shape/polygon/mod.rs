@@ -9,12 +9,10 @@ use super::areas;
 use super::cells::Cells;
 use super::surface::Surface;
 use super::thin::Thin;
-use super::{Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
+use super::{APART, Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
 use glam::{DVec2, DVec3};
 use std::sync::Mutex;
 
-/// Particles stand at least so far apart, over the spacing.
-const APART: f64 = 0.6;
 /// Pieces of a side that go to the nearest particle each, over the spacing.
 const PIECE: f64 = 0.1;
 
