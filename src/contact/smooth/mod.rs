@@ -21,6 +21,7 @@
 
 mod answer;
 mod constants;
+mod coulomb;
 pub mod device;
 mod fault;
 mod frame;
