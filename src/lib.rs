@@ -99,6 +99,7 @@ pub mod params;
 pub mod periodic;
 pub mod plan;
 pub mod pressure;
+pub mod probe;
 pub mod ranks;
 pub mod run;
 pub mod scene;

@@ -3,6 +3,7 @@
 use crate::common::dry::Dry;
 use glam::DVec3;
 use seixo::body::{Pose, Wrench};
+use seixo::scene::WallShape;
 
 const G: f64 = 9.806_65;
 
@@ -95,4 +96,94 @@ fn what_holds_a_body_is_no_contact() {
     let exact = weight * DVec3::new(0.5 / 0.866_025_403_784, 0.0, 1.0);
     println!("{standing:?} for {exact}");
     assert!((standing.force - exact).length() < 1e-3 * weight, "{standing:?} for {exact}");
+}
+
+/// A spinning cube that is thrown into the corner of a tank, against the step that stands there.
+fn into_a_corner(contact: &str, tank: &str) -> Dry {
+    Dry::new(&format!(
+        "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1\ngravity = [0, 0, -{G}]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1, 0.5, 0.6]\n{tank}\n\
+         [[obstacle]]\nname = \"step\"\nmin = [0.8, 0, 0]\nmax = [1, 0.5, 0.1]\n\
+         [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.5, 0.36, 0.2]\nmass = 1\n\
+         velocity = [3, 1.5, -1]\nangular_velocity = [2, 5, -3]\n\
+         [contact]\n{contact}\n"
+    ))
+}
+
+#[test]
+fn fixed_walls_are_told_what_bodies_press_on_them() {
+    let smooth = "spring = 1e5\nrestitution = 0.5\nfriction = 0.4\nviscous_friction = 1";
+    let paper = "law = \"paper\"\nspring = 1e5\ndamping_ratio = 0.3\nviscous_friction = 2";
+    let pressure = "law = \"pressure\"";
+    for (contact, tank) in [
+        (smooth, "open = [\"z_max\"]"),
+        (paper, "open = [\"z_max\"]"),
+        (pressure, "open = [\"z_max\"]"),
+        (smooth, "open = [\"z_max\"]\nperiodic = [\"y\"]"),
+    ] {
+        let mut dry = into_a_corner(contact, tank);
+        let walls = dry.walls.clone();
+        let mut touched = vec![0.0; walls.len()];
+        while dry.time() < 0.8 {
+            let before = dry.solids.poses()[0];
+            dry.step();
+            let cube = dry.solids.contact_wrenches()[0];
+            let felt = dry.solids.wall_contact_wrenches().expect("a body moves");
+            let scale = cube.force.length();
+            let on_walls: DVec3 = felt.iter().map(|w| w.force).sum();
+            assert!((cube.force + on_walls).length() <= 1e-9 * scale, "{contact}: {cube:?} {felt:?}");
+            // moments about the cube, which goes on within the step; a lever may be a length of the tank off where it is periodic
+            if !tank.contains("periodic") {
+                let moment = |(w, wall): (&Wrench, &WallShape)| {
+                    w.torque + (wall.middle - before.position).cross(w.force)
+                };
+                let moments: DVec3 = felt.iter().zip(&walls).map(moment).sum();
+                let way = dry.dt * (before.velocity.length() + 1.0);
+                let off = (cube.torque + moments).length();
+                assert!(off <= way * scale, "{contact}: {off} of {scale}");
+            }
+            for (sum, (wrench, wall)) in touched.iter_mut().zip(felt.iter().zip(&walls)) {
+                *sum += dry.dt * wrench.force.length();
+                // a face of the tank is pressed outwards
+                let outward = match wall.name.as_str() {
+                    "tank.x_max" => DVec3::X,
+                    "tank.y_max" => DVec3::Y,
+                    "tank.z_min" => -DVec3::Z,
+                    _ => continue,
+                };
+                let pulled = -wrench.force.dot(outward);
+                assert!(pulled <= 1e-9 * scale || contact == paper, "{contact}: {} {wrench:?}", wall.name);
+            }
+        }
+        let hit: Vec<&str> =
+            walls.iter().zip(&touched).filter(|(_, sum)| **sum > 0.1).map(|(w, _)| w.name.as_str()).collect();
+        println!("{contact}: {hit:?}");
+        let side = if tank.contains("periodic") { "step" } else { "tank.y_max" };
+        for name in ["tank.z_min", "step", side] {
+            assert!(hit.contains(&name), "{contact}: {name} in {hit:?}");
+        }
+    }
+}
+
+#[test]
+fn two_posts_share_what_a_beam_carries_by_the_lever() {
+    let mut dry = Dry::new(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n\
+         [[obstacle]]\nname = \"left\"\nmin = [0, 0, 0]\nmax = [0.1, 0.2, 0.2]\n\
+         [[obstacle]]\nname = \"right\"\nmin = [0.8, 0, 0]\nmax = [0.9, 0.2, 0.2]\n\
+         [[body]]\nname = \"beam\"\nsize = [0.98, 0.1, 0.04]\ncenter = [0.5, 0.1, 0.22]\nmass = 2\n\
+         [[body]]\nname = \"load\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.3, 0.1, 0.29]\nmass = 3\n\
+         [contact]\nspring = 1e6\nrestitution = 0.1\nfriction = 0.3\n"
+    ));
+    dry.run(1.0);
+    let felt = dry.solids.wall_contact_wrenches().expect("bodies move");
+    let (left, right) = (felt[0], felt[1]);
+    println!("{left:?} {right:?}");
+    assert!((left.force.z + right.force.z + 5.0 * G).abs() < 1e-3 * 5.0 * G);
+    // where the posts press is told by their torque: it lies on their tops
+    let at = |w: &Wrench, middle: f64| middle - w.torque.y / w.force.z;
+    let (a, b) = (at(&left, 0.05), at(&right, 0.85));
+    assert!((-1e-3..0.101).contains(&a) && (0.799..0.901).contains(&b), "{a} {b}");
+    let moment = left.force.z * a + right.force.z * b + G * (2.0 * 0.5 + 3.0 * 0.3);
+    assert!(moment.abs() < 2e-3 * 5.0 * G, "{moment}");
 }

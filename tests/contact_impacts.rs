@@ -1,6 +1,6 @@
 //! Impacts aside of the centre of mass: the points that meet part with the restitution of the case.
 
-use crate::common::dry::Dry;
+use crate::common::dry::{Dry, G};
 use glam::DVec3;
 
 /// Runs until two solids have touched and parted, and returns how fast the point of the first that is at `at` from its
@@ -75,5 +75,46 @@ fn a_ball_that_strikes_a_bar_at_its_end_leaves_it_as_asked() {
             println!("{off} m off the middle: {measured:.4} for {asked}");
             assert!((measured - asked).abs() < 0.02, "{off}: {measured} for {asked}");
         }
+    }
+}
+
+/// What slides along a shelf of `width` [m] at 1 m/s against the post that stands on it, 0.15 m ahead; its front leans back by `lean` [m].
+fn against_a_post(lean: f64, width: f64) -> Dry {
+    let shape = if lean == 0.0 {
+        "size = [0.1, 0.1, 0.1]".to_string()
+    } else {
+        let (bottom, top) = (0.05, 0.05 - lean);
+        format!(
+            "shape = \"prism\"\nheight = 0.1\nsection = [[-0.05, -0.05], [{bottom}, -0.05], [{top}, 0.05], [-{bottom}, 0.05]]"
+        )
+    };
+    Dry::new(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n\
+         [[obstacle]]\nname = \"shelf\"\nmin = [0.8, 0, 0]\nmax = [1.6, {width}, 0.1]\n\
+         [[obstacle]]\nname = \"post\"\nmin = [1.4, 0, 0.1]\nmax = [1.6, 0.2, 0.3]\n\
+         [[body]]\nname = \"sledge\"\n{shape}\ncenter = [1.2, 0.1, 0.15]\nmass = 2\nvelocity = [1, 0, 0]\nstanding = true\n\
+         locked = [\"rotation_x\", \"rotation_y\", \"rotation_z\"]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.5\n",
+    ))
+}
+
+#[test]
+fn what_slides_along_a_floor_into_a_post_is_stopped_by_its_foot() {
+    // Pressed a little into the floor, the foremost edge is lower than the post begins.
+    for (lean, width) in [(0.0, 0.2), (0.0, 0.4), (0.03, 0.2), (0.03, 0.4)] {
+        let mut dry = against_a_post(lean, width);
+        let start = dry.solids.poses()[0].position.x;
+        let mut furthest = 0.0_f64;
+        while dry.time() < 0.3 {
+            furthest = furthest.max(dry.step()[0].position.x);
+        }
+        // from the centroid to the foremost edge
+        let (foot, top) = (0.1, 0.1 - lean);
+        let ahead = foot - (foot * foot + foot * top + top * top) / (3.0 * (foot + top));
+        let front = 1.4 - start - ahead;
+        let (deep, back) = (furthest - start - front, -dry.solids.poses()[0].velocity.x);
+        println!("lean {lean}, shelf {width}: {deep:.5} m deep, {back:.3} m/s back");
+        assert!(deep < 0.25 * 0.02, "lean {lean}: {deep} m deep");
+        assert!((back - 0.5).abs() < 0.03, "lean {lean}: {back} m/s back");
     }
 }

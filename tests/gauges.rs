@@ -410,3 +410,111 @@ fn a_wedge_that_plunges_into_weightless_water_feels_the_force_of_theory() {
     // The tank is 4 to 6 times as wide as what is wet of the wedge, and as deep as it is wide: some per cent more.
     assert!((0.9..1.2).contains(&(impulse / expected)), "{impulse} for {expected}");
 }
+
+#[test]
+fn a_force_gauge_tells_what_bodies_press_beside_the_water() {
+    // A block on the floor of still water, and a cube that slides into a post.
+    let case = case(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.1]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.3]\nopen = [\"z_max\"]\n\
+         [[obstacle]]\nname = \"shelf\"\nmin = [0.8, 0, 0]\nmax = [1.6, 0.2, 0.1]\n\
+         [[obstacle]]\nname = \"post\"\nmin = [1.4, 0, 0.1]\nmax = [1.6, 0.2, 0.3]\n\
+         [[body]]\nname = \"block\"\nsize = [0.08, 0.08, 0.06]\ncenter = [0.1, 0.1, 0.03]\ndensity = 2500\ndisplaces_fluid = true\n\
+         [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [1.2, 0.1, 0.15]\nmass = 2\nvelocity = [1, 0, 0]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.5\n\
+         [gauge]\nmean = true\n\
+         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n\
+         [[gauge.force]]\nname = \"post\"\non = \"post\"\n\
+         [[gauge.force]]\nname = \"block\"\non = \"block\"\n",
+    );
+    let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
+    let mut gauges = Gauges::new(&case, &scene).expect("the gauges find their walls");
+    let mut sim = Simulation::on(&case, scene, &Processor::Cpu).expect("the simulation starts");
+    let mut between = |from: f64, to: f64| {
+        let began = sim.time;
+        assert!((began - from).abs() < 1e-9);
+        gauges.begin();
+        while sim.time < to - 1e-9 {
+            let before = sim.time;
+            sim.step().expect("nothing happens to the water");
+            let dt = sim.time - before;
+            gauges.follow(&mut sim, dt).expect("the gauges can be read");
+        }
+        row(&gauges, &mut sim)
+    };
+    let hit = between(0.0, 0.3);
+    let impulse = 0.3 * hit["post_contact_force_x [N]"];
+    println!("impulse {impulse} of {}", 2.0 * 1.5);
+    assert!((impulse - 3.0).abs() < 0.03 * 3.0, "{impulse}");
+    let rest = between(0.3, 1.0);
+    // The block's weight less what the water carries of it.
+    let carried = rest["block_force_z [N]"];
+    let pressed = -rest["floor_contact_force_z [N]"];
+    let weight = 2500.0 * 0.08 * 0.08 * 0.06 * 9.81;
+    println!("{pressed} + {carried} of {weight}");
+    assert!((pressed + carried - weight).abs() < 0.01 * weight);
+    assert!((rest["block_contact_force_z [N]"] - pressed).abs() < 1e-3 * weight);
+    assert_eq!(rest["post_contact_force_x [N]"], 0.0);
+}
+
+#[test]
+fn gauges_in_the_water_read_its_velocity_and_volume() {
+    for (dimensions, width) in [(2, 0.02), (3, 0.16)] {
+        // Water that goes round a periodic channel, 0.2 m high.
+        let case = case(&format!(
+            "[run]\ndimensions = {dimensions}\nspacing = 0.02\ntime_step = 2e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+             [fluid]\nviscosity = 0\nwall_friction = 0\nsound_speed = 4\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.16, 0.2]\nvelocity = [0.5, 0, 0]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.16, 0.4]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n\
+             [[gauge.velocity]]\nname = \"middle\"\npoint = [0.2, 0.08, 0.1]\n\
+             [[gauge.velocity]]\nname = \"seam\"\npoint = [0.0, 0.08, 0.19]\n\
+             [[gauge.velocity]]\nname = \"air\"\npoint = [0.2, 0.08, 0.3]\n\
+             [[gauge.volume]]\nname = \"all\"\nmin = [-1, -1, -1]\nmax = [1, 1, 1]\n\
+             [[gauge.volume]]\nname = \"part\"\nmin = [0.1, -1, 0]\nmax = [0.3, 1, 0.1]\n"
+        ));
+        let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
+        let gauges = Gauges::new(&case, &scene).expect("nothing has to be found");
+        let mut sim = Simulation::on(&case, scene, &Processor::Cpu).expect("the simulation starts");
+        for _ in 0..50 {
+            sim.step().expect("the water goes on");
+        }
+        let row = row(&gauges, &mut sim);
+        println!("{row:?}");
+        for name in ["middle", "seam"] {
+            let of = |axis: &str| row[&format!("{name}_velocity_{axis} [m/s]")];
+            // The lattice of the start melts.
+            assert!((of("x") - 0.5).abs() < 1e-3 && of("y").abs() + of("z").abs() < 0.02, "{name}: {row:?}");
+        }
+        assert!(row["air_velocity_x [m/s]"].is_nan());
+        let all = 0.4 * width * 0.2;
+        assert!((row["all [m3]"] / all - 1.0).abs() < 1e-9, "{row:?}");
+        // A column of particles more or less at either side.
+        assert!((row["part [m3]"] / all - 0.25).abs() < 0.026, "{row:?}");
+    }
+}
+
+#[test]
+fn a_dry_scene_has_the_blow_of_a_body_on_a_post_and_nothing_of_water() {
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.3\ngravity = [0, 0, 0]\n\
+         [[obstacle]]\nname = \"post\"\nmin = [0.4, 0, 0]\nmax = [0.6, 0.2, 0.3]\n\
+         [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.2, 0.1, 0.15]\nmass = 2\nvelocity = [1, 0, 0]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.5\n\
+         [[gauge.force]]\nname = \"post\"\non = \"post\"\n";
+    let case: Case = text.parse().expect("a dry scene may have force gauges");
+    let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
+    let gauges = Gauges::new(&case, &scene).expect("the post is there");
+    assert_eq!(gauges.header().len(), 7, "{:?}", gauges.header());
+    let mut sim = Simulation::on(&case, scene, &Processor::Cpu).expect("the simulation starts");
+    let mut impulse = 0.0;
+    while sim.time < 0.3 - 1e-9 {
+        let before = sim.time;
+        sim.step().expect("the cube comes back");
+        impulse += (sim.time - before) * row(&gauges, &mut sim)["post_contact_force_x [N]"];
+    }
+    println!("{impulse}");
+    assert!((impulse - 3.0).abs() < 0.03, "{impulse}");
+    let still = text.replace("velocity = [1, 0, 0]", "motion = [[0, 0, 0, 0], [1, 0.1, 0, 0]]");
+    let wrong = still.parse::<Case>().unwrap_err().to_string();
+    assert!(wrong.contains("no [fluid] to measure"), "{wrong}");
+}

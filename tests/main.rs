@@ -15,6 +15,7 @@ mod contact_device;
 mod contact_forces;
 mod contact_hard;
 mod contact_impacts;
+mod contact_pairs;
 mod device;
 mod errors;
 mod examples;

@@ -2,7 +2,7 @@
 
 use super::render::{chosen, numbers, series_of, without};
 use super::{Exit, counted, finite};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use seixo::case::OutputField;
 use seixo::case::file::read_text;
@@ -12,6 +12,8 @@ use seixo::output::particles::Particles;
 use seixo::output::replay::particles;
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
+use seixo::periodic::Periodic;
+use seixo::probe::{Probe, Value};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -81,8 +83,14 @@ pub fn measure(args: &MeasureArgs) -> Exit {
         return Err(Error::usage("DIR", text));
     }
     let run = &case.run;
-    let probe =
-        Probe { spacing: run.spacing, radius: run.effective_radius * run.spacing, flat: run.dimensions == 2 };
+    let (low, high) = case.tank.as_ref().map_or(([0.0; 3], [0.0; 3]), |t| (t.min, t.max));
+    let along = case.tank.as_ref().map_or([false; 3], |t| t.periodic());
+    let probe = Probe {
+        spacing: run.spacing,
+        radius: run.effective_radius * run.spacing,
+        flat: run.dimensions == 2,
+        periodic: Periodic::new(along, low.into(), high.into()),
+    };
     let chosen = chosen(&frames, &args.times, args.every);
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
         return Err(without("frames with water", &args.dir, &case, args.series.as_deref()));
@@ -94,7 +102,7 @@ pub fn measure(args: &MeasureArgs) -> Exit {
     for (_, frame) in &chosen {
         let Some(path) = &frame.fluid else { continue };
         let water = particles(path)?;
-        let values: Vec<Option<Value>> = points.par_iter().map(|&x| probe.at(&water, x)).collect();
+        let values: Vec<Option<Value>> = points.par_iter().map(|&x| probe.at(values(&water), x)).collect();
         for (x, value) in points.iter().zip(values) {
             let place = [frame.time, x.x, x.y, x.z].map(|v| v.to_string());
             let number = |x: f64, held: bool| if held { x.to_string() } else { String::new() };
@@ -165,137 +173,12 @@ fn listed(path: &Path) -> Result<Vec<DVec3>> {
     Ok(points)
 }
 
-/// What the water does at a place.
-#[derive(Clone, Copy, Debug, Default)]
-struct Value {
-    velocity: DVec3,
-    pressure: f64,
-}
-
-/// Reads between particles.
-struct Probe {
-    spacing: f64,
-    radius: f64,
-    flat: bool,
-}
-
-impl Probe {
-    /// Velocity and pressure at `x`: those of the linear function that comes nearest to the particles within the effective radius,
-    /// by least squares with the weight (1 - r^2 / re^2)^2; where they do not span space, their mean. Exact for linear fields, on
-    /// walls and at the surface, too. Nothing where no particle is nearer than the middle of a cube of eight may be, and a tenth.
-    fn at(&self, water: &Particles, mut x: DVec3) -> Option<Value> {
-        let mut near: Vec<(f64, DVec3, usize)> = Vec::new();
-        let mut nearest = f64::INFINITY;
-        for (k, p) in water.position.iter().enumerate() {
-            let p = DVec3::from(p.map(f64::from));
-            if self.flat {
-                x.y = p.y;
-            }
-            let away = (p - x).length_squared() / (self.radius * self.radius);
-            if away < 1.0 {
-                near.push(((1.0 - away).powi(2), p, k));
-                nearest = nearest.min(away);
-            }
-        }
-        let dimensions: f64 = if self.flat { 2.0 } else { 3.0 };
-        let reach = 1.1 * 0.5 * dimensions.sqrt() * self.spacing;
-        if nearest.sqrt() * self.radius > reach {
-            return None;
-        }
-        // A file holds what was asked for.
-        let value = |k: usize| {
-            let velocity = water.velocity.get(k).map_or(DVec3::ZERO, |v| DVec3::from(v.map(f64::from)));
-            (velocity, water.pressure.get(k).map_or(0.0, |&p| f64::from(p)))
-        };
-        let total: f64 = near.iter().map(|n| n.0).sum();
-        let middle = near.iter().map(|n| n.0 * n.1).sum::<DVec3>() / total;
-        let mut mean = Value::default();
-        for &(w, _, k) in &near {
-            let (velocity, pressure) = value(k);
-            mean.velocity += w / total * velocity;
-            mean.pressure += w / total * pressure;
-        }
-        // Moments of the particles about their middle, over those of a full neighbourhood.
-        let mut moment = DMat3::ZERO;
-        // Of velocity and pressure with the place: rows x, y, z of the velocity, then the pressure.
-        let mut with = [DVec3::ZERO; 4];
-        for &(w, p, k) in &near {
-            let d = (p - middle) / self.spacing;
-            moment += DMat3::from_cols(w * d * d.x, w * d * d.y, w * d * d.z);
-            let (velocity, pressure) = value(k);
-            for (sum, of) in with.iter_mut().zip([velocity.x, velocity.y, velocity.z, pressure]) {
-                *sum += w * of * d;
-            }
-        }
-        if self.flat {
-            moment.y_axis = DVec3::Y * total;
-        }
-        // In a full neighbourhood the determinant is total^3 times 0.1 or so.
-        if moment.determinant() < 1e-3 * total.powi(3) {
-            return Some(mean);
-        }
-        let inverse = moment.inverse();
-        let off = (x - middle) / self.spacing;
-        let [vx, vy, vz, p] = with.map(|sum| (inverse * sum).dot(off));
-        Some(Value { velocity: mean.velocity + DVec3::new(vx, vy, vz), pressure: mean.pressure + p })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Water below z = 0.3 on a lattice that is shaken, with linear fields.
-    fn water(flat: bool) -> Particles {
-        let mut out = Particles::default();
-        let (l0, mut seed) = (0.02, 7_u32);
-        let mut shaken = || {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            0.2 * l0 * (f64::from(seed >> 8) / f64::from(1 << 24) - 0.5)
-        };
-        for (i, j, k) in (0..15).flat_map(|i| (0..15).flat_map(move |j| (0..15).map(move |k| (i, j, k)))) {
-            if flat && j > 0 {
-                continue;
-            }
-            let at = |n: i32| (f64::from(n) + 0.5) * l0;
-            let y = if flat { 0.0 } else { at(j) + shaken() };
-            let x = DVec3::new(at(i) + shaken(), y, at(k) + shaken());
-            out.position.push(x.as_vec3().to_array());
-            let x = x.as_vec3().as_dvec3();
-            out.velocity.push([1.0 + 2.0 * x.x as f32, 0.5, 3.0 * x.z as f32]);
-            out.pressure.push((9810.0 * (0.3 - x.z)) as f32);
-        }
-        out
-    }
-
-    #[test]
-    fn linear_fields_are_read_as_they_are_also_at_walls_and_the_surface() {
-        for flat in [false, true] {
-            let (water, probe) = (water(flat), Probe { spacing: 0.02, radius: 0.042, flat });
-            let y = if flat { 0.0 } else { 0.15 };
-            // Inside, on a wall, in a corner, at the surface.
-            for [x, z] in [[0.151, 0.147], [0.0, 0.15], [0.003, 0.004], [0.2, 0.299]] {
-                let found = probe.at(&water, DVec3::new(x, y, z)).expect("water");
-                let velocity = DVec3::new(1.0 + 2.0 * x, 0.5, 3.0 * z);
-                assert!((found.velocity - velocity).abs().max_element() < 1e-5, "{x}, {z}: {found:?}");
-                assert!((found.pressure - 9810.0 * (0.3 - z)).abs() < 0.02, "{x}, {z}: {found:?}");
-            }
-            for [x, z] in [[0.15, 0.33], [-0.03, 0.1], [5.0, 5.0]] {
-                assert!(probe.at(&water, DVec3::new(x, y, z)).is_none(), "{x}, {z}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_lone_particle_is_its_own_mean() {
-        let mut one = water(false);
-        for values in [&mut one.position, &mut one.velocity] {
-            values.truncate(1);
-        }
-        one.pressure.truncate(1);
-        let probe = Probe { spacing: 0.02, radius: 0.042, flat: false };
-        let at = DVec3::from(one.position[0].map(f64::from)) + 0.005;
-        let found = probe.at(&one, at).expect("water");
-        assert!((found.pressure - f64::from(one.pressure[0])).abs() < 1e-9);
-    }
+/// The particles of a frame, which holds what was asked for.
+fn values(water: &Particles) -> impl Iterator<Item = (DVec3, Value)> {
+    let vector = |v: &[f32; 3]| DVec3::from(v.map(f64::from));
+    water.position.iter().enumerate().map(move |(k, x)| {
+        let velocity = water.velocity.get(k).map_or(DVec3::ZERO, vector);
+        let pressure = water.pressure.get(k).map_or(0.0, |&p| f64::from(p));
+        (vector(x), Value { velocity, pressure })
+    })
 }

@@ -2,7 +2,7 @@
 //!
 //! Everything is listed at once; `file` adds line and column from the dotted path of each problem.
 
-use super::{Case, Choice, Face, Fluid, Gauges, Vector};
+use super::{Case, Choice, Face, Fluid, Vector};
 use crate::error::{CaseError, Problem, Result};
 
 /// Most iterations of a solve: beyond, a step would not come to its end.
@@ -22,7 +22,7 @@ pub fn check(case: &Case) -> Vec<Problem> {
         c.body(k, body);
     }
     c.contact();
-    c.gauges(&case.gauge);
+    c.gauges();
     c.output();
     c.slips();
     c.problems
@@ -281,76 +281,6 @@ impl Checker<'_> {
             );
         } else {
             self.range(path, gamma, gamma > 0.0, "more than 0, at most 0.5");
-        }
-    }
-
-    fn gauges(&mut self, gauges: &Gauges) {
-        if let Some(every) = gauges.every {
-            self.positive("gauge.every", every, "s");
-        }
-        let wet = self.case.fluid.is_some();
-        let kinds = [
-            ("pressure", gauges.pressure.len()),
-            ("level", gauges.level.len()),
-            ("force", gauges.force.len()),
-        ];
-        for (kind, count) in kinds {
-            if count > 0 && !wet {
-                self.add(
-                    format!("gauge.{kind}"),
-                    "there is no [fluid] to measure",
-                    "remove the gauge or add [fluid]",
-                );
-            }
-        }
-        let names: Vec<(String, String)> = (gauges.pressure.iter().enumerate())
-            .map(|(k, g)| (format!("gauge.pressure.{k}.name"), g.name.clone()))
-            .chain(
-                gauges
-                    .level
-                    .iter()
-                    .enumerate()
-                    .map(|(k, g)| (format!("gauge.level.{k}.name"), g.name.clone())),
-            )
-            .chain(
-                gauges
-                    .force
-                    .iter()
-                    .enumerate()
-                    .map(|(k, g)| (format!("gauge.force.{k}.name"), g.name.clone())),
-            )
-            .collect();
-        self.unique(&names, "gauge");
-        let case = self.case;
-        let mut solid: Vec<&str> = (case.body.iter().map(|b| b.name.as_str()))
-            .chain(case.moving_wall.iter().map(|w| w.name.as_str()))
-            .chain(case.obstacle.iter().map(|o| o.name.as_str()))
-            .chain(case.plane.iter().map(|p| p.name.as_str()))
-            .chain(case.openings().filter(|o| !o.is_hole()).map(|o| o.name))
-            .collect();
-        if let Some(tank) = &case.tank {
-            let bare = tank.without_wall();
-            let walls = super::TANK_FACES.iter().filter(|(face, _)| !bare.contains(face));
-            solid.extend(walls.map(|(_, name)| *name));
-        }
-        for (k, gauge) in gauges.level.iter().enumerate() {
-            self.in_tank(&format!("gauge.level.{k}.at"), [gauge.at, gauge.at], "the line");
-        }
-        for (k, gauge) in gauges.force.iter().enumerate() {
-            let face = case.tank.is_some() && super::TANK_FACES.iter().any(|(_, name)| *name == gauge.on);
-            if face && !solid.contains(&gauge.on.as_str()) {
-                let message = format!("`{}` has no wall to measure on", gauge.on);
-                let remedy = "name another face, or take it out of tank.open or tank.periodic";
-                self.add(format!("gauge.force.{k}.on"), message, remedy);
-            } else if !solid.contains(&gauge.on.as_str()) {
-                let message = format!("nothing solid is called `{}`", gauge.on);
-                let remedy = match super::report::closest(&gauge.on, &solid) {
-                    Some(name) => format!("did you mean `{name}`?"),
-                    None if solid.is_empty() => "remove the gauge".to_owned(),
-                    None => format!("allowed: {}", solid.join(", ")),
-                };
-                self.add(format!("gauge.force.{k}.on"), message, remedy);
-            }
         }
     }
 

@@ -114,10 +114,16 @@ impl Checker<'_> {
                 self.add(path("inertia"), message, remedy);
             }
         }
-        let friction = case.contact.as_ref().map_or(0.0, |c| c.friction);
-        if friction.is_finite() && friction > MOST_FRICTION {
-            let message = format!("a coefficient of friction of {friction} is that of no two solids");
-            self.warn("contact.friction", message, "0.1 to 1 is usual");
+        if let Some(contact) = &case.contact {
+            let of_pairs = contact.pair.iter().enumerate();
+            let of_pairs =
+                of_pairs.filter_map(|(k, p)| Some((format!("contact.pair.{k}.friction"), p.friction?)));
+            for (key, friction) in of_pairs.chain([("contact.friction".into(), contact.friction)]) {
+                if friction.is_finite() && friction > MOST_FRICTION {
+                    let message = format!("a coefficient of friction of {friction} is that of no two solids");
+                    self.warn(&key, message, "0.1 to 1 is usual");
+                }
+            }
         }
     }
 

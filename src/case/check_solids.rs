@@ -2,7 +2,7 @@
 
 use super::check::{Checker, length};
 use super::section::flaw;
-use super::{Body, BodyShape, ContactDevice, Form, Law};
+use super::{Body, BodyShape, Contact, ContactDevice, Form, Law};
 use glam::DMat3;
 
 /// Most sub-steps of a step that a case can ask for.
@@ -294,6 +294,7 @@ impl Checker<'_> {
             let message = "`viscous_friction` belongs to law = \"paper\" or \"smooth\"";
             self.add("contact.viscous_friction", message, "remove it or set one of these laws");
         }
+        self.contact_pairs(contact);
         let only = |key: &str, law: &str| {
             (format!("`{key}` belongs to law = \"{law}\""), format!("remove `{key}` or set law = \"{law}\""))
         };
@@ -301,10 +302,34 @@ impl Checker<'_> {
             ("torque", !contact.torque, Law::Paper, "paper"),
             ("friction", contact.friction != 0.0, Law::Smooth, "smooth"),
             ("restitution", contact.restitution.is_some(), Law::Smooth, "smooth"),
+            ("pair", !contact.pair.is_empty(), Law::Smooth, "smooth"),
         ] {
             if given && contact.law != law {
                 let (message, remedy) = only(key, name);
                 self.add(format!("contact.{key}"), message, remedy);
+            }
+        }
+    }
+
+    fn contact_pairs(&mut self, contact: &Contact) {
+        let damped = [("damping", contact.damping), ("damping_ratio", contact.damping_ratio)];
+        let damped = damped.iter().find(|(_, given)| given.is_some()).map(|(key, _)| *key);
+        for (k, pair) in contact.pair.iter().enumerate() {
+            let path = format!("contact.pair.{k}");
+            if pair.friction.is_none() && pair.restitution.is_none() {
+                self.add(&path, "a pair without numbers of its own", "give it `friction` or `restitution`");
+            }
+            if let Some(friction) = pair.friction {
+                self.not_negative(&format!("{path}.friction"), friction, "");
+            }
+            if let Some(e) = pair.restitution {
+                let key = format!("{path}.restitution");
+                self.range(&key, e, (0.0..=1.0).contains(&e), "0 (plastic) to 1 (elastic)");
+                if let Some(damping) = damped {
+                    let message =
+                        format!("`restitution` of a pair and `contact.{damping}` exclude each other");
+                    self.add(key, message, "give `contact.restitution` instead of it");
+                }
             }
         }
     }

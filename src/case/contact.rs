@@ -64,9 +64,27 @@ pub struct Contact {
     /// Force this many contact sub-steps a step instead of as many as stability asks for.
     #[schemars(range(min = 1, max = 100_000))]
     pub substeps: Option<u32>,
+    /// Pairs of solids with friction or restitution of their own (law "smooth").
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pair: Vec<ContactPair>,
     /// Where pairs are searched and pressed. Sums, friction and motion are the host's, in f64, either way.
     #[serde(default)]
     pub device: ContactDevice,
+}
+
+/// Two solids, or two kinds of them, that touch otherwise than all others.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactPair {
+    /// Names of the two: bodies, moving walls, obstacles, planes, faces of the tank such as `tank.z_min`, or `tank` for all of
+    /// these. `*` stands for any letters: `"rock*"`. Of pairs that name the same two solids the last one counts.
+    pub between: [String; 2],
+    /// Coulomb coefficient mu between them [-], static and kinetic; that of `[contact]` if absent.
+    #[schemars(range(min = 0))]
+    pub friction: Option<f64>,
+    /// Normal restitution e between them [-]; that of `[contact]` if absent.
+    #[schemars(range(min = 0, max = 1))]
+    pub restitution: Option<f64>,
 }
 
 impl Contact {

@@ -12,14 +12,18 @@ pub struct Gauges {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<f64>,
     /// Pressures and forces of a row are means over the steps since the row before, each with its length, and not those of the last step.
-    /// Levels are of the moment.
+    /// What is read of the water itself (levels, velocities, volumes) is of the moment.
     pub mean: bool,
     /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
     pub pressure: Vec<PressureGauge>,
     /// Height of the water surface along a vertical line.
     pub level: Vec<LevelGauge>,
-    /// Force and torque of the fluid on a body or wall.
+    /// Force and torque of the fluid on a body or wall; where bodies move, those of other solids as well.
     pub force: Vec<ForceGauge>,
+    /// Velocity of the water at a point.
+    pub velocity: Vec<VelocityGauge>,
+    /// Volume of the water in a box.
+    pub volume: Vec<VolumeGauge>,
 }
 
 /// Pressure at a point on a wall.
@@ -55,4 +59,28 @@ pub struct ForceGauge {
     /// the centre of mass, or the middle of a fixed wall; of a face of the tank that of its surface. Where another solid stands before a
     /// part of it no water presses; under a free body that stands on it the water of the slot does.
     pub on: String,
+}
+
+/// Velocity at a point in the water.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VelocityGauge {
+    /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
+    pub name: String,
+    /// Point [m]; while there is no water, the cells are empty.
+    pub point: Vector,
+}
+
+/// Water in a box, such as what has come over a crest.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VolumeGauge {
+    /// Name, used in the header.
+    #[schemars(length(min = 1, max = 80))]
+    pub name: String,
+    /// Lower corner of the box [m].
+    pub min: Vector,
+    /// Upper corner of the box [m].
+    pub max: Vector,
 }

@@ -5,6 +5,7 @@
 mod absorber;
 mod bounds;
 pub mod check;
+mod check_gauges;
 mod check_geometry;
 mod check_motion;
 mod check_slips;
@@ -27,7 +28,7 @@ mod water;
 mod wave;
 
 pub use absorber::Absorber;
-pub use contact::{Contact, ContactDevice, Law};
+pub use contact::{Contact, ContactDevice, ContactPair, Law};
 pub use fluid::{Block, Fluid, Preconditioner, Preset, Solver};
 pub use gauge::{ForceGauge, Gauges, LevelGauge, PressureGauge};
 pub(crate) use opening::{HURRY, OpeningKeys, room_behind};

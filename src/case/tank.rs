@@ -55,7 +55,7 @@ pub struct Tank {
 
 impl Tank {
     /// Whether it is periodic along x, y, z.
-    pub(crate) fn periodic(&self) -> [bool; 3] {
+    pub fn periodic(&self) -> [bool; 3] {
         [Axis::X, Axis::Y, Axis::Z].map(|axis| self.periodic.contains(&axis))
     }
 

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8; 16] = b"seixo checkpoint";
 /// Format of the file; others are refused.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 /// Longest header and most bytes of an array: what is larger is damage.
 const LONGEST_HEADER: u64 = 1 << 28;
 const LARGEST: u64 = 1 << 40;

@@ -53,6 +53,7 @@ impl Solids {
             load: _,
             bodies,
             contact,
+            fixed,
             turns,
             periodic,
             candidates,
@@ -61,9 +62,8 @@ impl Solids {
         } = self;
         let Limits {
             spring: _,
-            damping: _,
+            between: _,
             viscous_friction: _,
-            friction: _,
             forced: _,
             lambda: _,
             lightest: _,
@@ -89,6 +89,7 @@ impl Solids {
         archive.array("solids.pose", &mut now, true)?;
         archive.array("solids.momentum", &mut momenta, true)?;
         archive.array("solids.contact", &mut wrenches, true)?;
+        fixed.exchange(archive)?;
         if periodic.is_any() {
             archive.array("solids.turns", turns, true)?;
         }

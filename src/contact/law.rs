@@ -3,6 +3,7 @@
 
 use super::candidates::Candidates;
 use super::device::Link;
+use super::fixed::FixedWalls;
 use super::probe::Probe;
 use super::substeps::{Cut, Limits, Worst};
 use crate::body::{Body, Wrench};
@@ -65,9 +66,17 @@ pub(crate) trait Law: Send {
     /// Adds the wrenches of the last evaluation to `load`, one per solid.
     fn add_loads(&self, load: &mut [Wrench]);
 
+    /// Gives the fixed walls what the last evaluation presses on them over `span` [s].
+    fn press_walls(&self, bodies: &[Body], span: f64, fixed: &mut FixedWalls);
+
+    /// Whether it is known of the last evaluation which fixed wall each force is on.
+    fn tells_walls_apart(&self) -> bool {
+        true
+    }
+
     /// What acts on velocities, after the forces of a sub-step of `h` [s]: friction, or impulses. Returns how many
     /// points and how many pairs of solids it acted on if that is all there is to the law.
-    fn act(&mut self, bodies: &mut [Body], limits: &Limits, h: f64) -> Summary;
+    fn act(&mut self, bodies: &mut [Body], fixed: &mut FixedWalls, limits: &Limits, h: f64) -> Summary;
 
     /// What the last evaluation found.
     fn summary(&self) -> Summary;

@@ -6,9 +6,11 @@
 
 mod advice;
 mod archive;
+mod between;
 pub(crate) mod broad;
 mod candidates;
 pub mod device;
+mod fixed;
 mod law;
 mod paper;
 mod pressure;
@@ -32,6 +34,7 @@ use crate::periodic::Periodic;
 use crate::scene::Scene;
 use candidates::Candidates;
 use device::{Link, Traffic};
+use fixed::FixedWalls;
 use glam::{DVec3, IVec3};
 use law::{Fault, Kind, Law, Now};
 use substeps::{Cut, Limits};
@@ -58,6 +61,7 @@ pub struct Solids {
     poses: Vec<Pose>,
     predicted: Vec<Pose>,
     contact: Vec<Wrench>,
+    fixed: FixedWalls,
     /// Whole lengths that each has gone over periodic sides.
     turns: Vec<IVec3>,
     periodic: Periodic,
@@ -103,6 +107,7 @@ impl Solids {
             periodic: scene.periodic,
             poses,
             contact: vec![Wrench::default(); bodies.len()],
+            fixed: FixedWalls::new(scene),
             load: vec![Wrench::default(); bodies.len()],
             gravity: scene.gravity,
             spacing: scene.spacing,
@@ -170,6 +175,12 @@ impl Solids {
         &self.contact
     }
 
+    /// Mean wrench of contact over the last step on each of [`Scene::walls`], about its `middle`; `None` if no solid moves
+    /// freely, or if a device has pressed them that does not tell walls apart.
+    pub fn wall_contact_wrenches(&self) -> Option<&[Wrench]> {
+        self.law.as_ref().filter(|law| law.tells_walls_apart()).map(|_| self.fixed.mean())
+    }
+
     /// Poses at `t + ahead`, where the fluid finds its forces in the step of `dt` [s]: V* = V + dt (`gravity` + contact acceleration of
     /// the last step), X* = X + ahead V*, the same for the angular momentum; prescribed solids by their table.
     /// `gravity` is that of the fluid's explicit stage ([`crate::params::Params::explicit_gravity`]), so that body
@@ -216,6 +227,7 @@ impl Solids {
         let cut = self.hurry(cut, t, dt)?;
         let mut report = ContactReport { omega_dt: cut.omega_dt, ..ContactReport::default() };
         self.bodies.iter_mut().for_each(|b| b.touched = Wrench::default());
+        self.fixed.begin();
         for step in 0..cut.substeps {
             let (mut part, mut parts) = (0, if cut.all { cut.parts } else { 1 });
             while part < parts {
@@ -254,6 +266,7 @@ impl Solids {
         }
         report.penetration_max_over_l0 /= self.spacing;
         self.bring_back();
+        self.fixed.end(dt);
         for (k, body) in self.bodies.iter_mut().enumerate() {
             self.poses[k] = body.pose;
             self.contact[k] = Wrench { force: body.touched.force / dt, torque: body.touched.torque / dt };
@@ -357,7 +370,9 @@ impl Solids {
             }
         }
         if let Some(law) = &mut self.law {
-            let (pressed, acted) = (law.summary(), law.act(&mut self.bodies, &self.limits, h));
+            law.press_walls(&self.bodies, span, &mut self.fixed);
+            let pressed = law.summary();
+            let acted = law.act(&mut self.bodies, &mut self.fixed, &self.limits, h);
             report.pairs = pressed.points + acted.points;
             report.solid_pairs = pressed.solids + acted.solids;
             report.potential_energy = pressed.energy;

@@ -1,5 +1,6 @@
 //! How a step is cut into contact sub-steps: what the case asks for, what the worst contact needs, what is refused.
 
+use super::between::Betweens;
 use super::candidates::reduced_mass;
 use super::law::Law;
 use super::stiffness::{Damping, Lambda, restitution};
@@ -31,9 +32,9 @@ pub(crate) const ABSURD_SUBSTEPS: u32 = 10_000;
 #[derive(Clone)]
 pub(crate) struct Limits {
     pub spring: f64,
-    pub damping: Damping,
+    /// Friction and damping of any two solids.
+    pub between: Betweens,
     pub viscous_friction: f64,
-    pub friction: f64,
     pub forced: Option<u32>,
     pub lambda: Vec<Lambda>,
     /// Mass of the lightest free body [kg].
@@ -101,9 +102,8 @@ impl Limits {
         let lightest = free.map(|b| b.mass).fold(f64::INFINITY, f64::min);
         Ok(Self {
             spring: contact.map_or(0.0, |c| c.spring),
-            damping: contact.map_or(Ok(Damping::Coefficient(0.0)), |c| Damping::new(c, lightest))?,
+            between: Betweens::new(contact, scene, lightest)?,
             viscous_friction: contact.map_or(0.0, |c| c.viscous_friction),
-            friction: contact.map_or(0.0, |c| c.friction),
             forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
             lambda: vec![Lambda::default(); bodies.len()],
             lightest,
@@ -132,19 +132,20 @@ impl Limits {
         (both(|l| l.spring), both(|l| l.damping))
     }
 
-    /// Takes what the case asks of a pair over `dt` [s] into `worst`; `viscous` [kg/s] adds to the dashpot.
+    /// Takes what the case asks of a pair with `damping` over `dt` [s] into `worst`; `viscous` [kg/s] adds to the dashpot.
     pub fn ask(
         &self,
         worst: &mut Worst,
         bodies: &[Body],
         (a, b): (usize, Option<usize>),
+        damping: Damping,
         dt: f64,
         viscous: f64,
     ) {
-        let (spring, damping) = self.lambda_of(a, b);
-        let asked = self.damping.coefficient(self.spring, self.spring, reduced_mass(bodies, a, b));
+        let (spring, damped) = self.lambda_of(a, b);
+        let asked = damping.coefficient(self.spring, self.spring, reduced_mass(bodies, a, b));
         worst.omega_dt = worst.omega_dt.max(dt * (self.spring * spring).sqrt());
-        worst.damping_dt = worst.damping_dt.max(dt * (asked + viscous) * damping);
+        worst.damping_dt = worst.damping_dt.max(dt * (asked + viscous) * damped);
     }
 
     /// What the worst contact asks of a step of `dt` [s].
@@ -214,19 +215,25 @@ impl Limits {
     /// dt sqrt(K / m_e) of a sub-step: smaller where the energy of an impact is what the case is about,
     /// because it gives a restitution or has next to no damping to take an error away.
     pub fn omega_step(&self) -> f64 {
-        match self.damping {
+        let of = |damping| match damping {
             Damping::Ratio(ratio) => {
                 (RETURNED_OMEGA_STEP / restitution(ratio)).clamp(ELASTIC_OMEGA_STEP, DAMPED_OMEGA_STEP)
             }
             Damping::Coefficient(c) if c < 0.02 * (self.spring * self.lightest).sqrt() => ELASTIC_OMEGA_STEP,
             Damping::Coefficient(_) => OMEGA_STEP,
-        }
+        };
+        self.between.dampings().map(of).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether contacts have a restitution; the case gives it for all or for none.
+    pub fn restores(&self) -> bool {
+        self.between.usual.damping.is_ratio()
     }
 
     /// dt sqrt(K / m_e) of the most sub-steps that a stop is softened to. With a restitution it is the least that there is, so that the
     /// parts of longer sub-steps make what the stop asks for.
     pub fn stop_carried_at(&self) -> f64 {
-        if self.damping.is_ratio() { ELASTIC_OMEGA_STEP } else { self.omega_step() }
+        if self.restores() { ELASTIC_OMEGA_STEP } else { self.omega_step() }
     }
 }
 

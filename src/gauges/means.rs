@@ -15,6 +15,8 @@ pub(super) struct Means {
     pressure: Vec<f64>,
     /// Impulse and its moment, one a force gauge [N s, N m s].
     impulse: Vec<[f64; 6]>,
+    /// The same of other solids.
+    contact: Vec<[f64; 6]>,
 }
 
 impl Means {
@@ -23,10 +25,14 @@ impl Means {
         self.seconds += dt;
         self.pressure.resize(readings.pressure.len(), 0.0);
         self.pressure.iter_mut().zip(&readings.pressure).for_each(|(sum, p)| *sum += dt * p);
-        self.impulse.resize(readings.wrench.len(), [0.0; 6]);
-        for (sum, Wrench { force, torque }) in self.impulse.iter_mut().zip(&readings.wrench) {
-            let parts = force.to_array().into_iter().chain(torque.to_array());
-            sum.iter_mut().zip(parts).for_each(|(sum, part)| *sum += dt * part);
+        for (sums, wrenches) in
+            [(&mut self.impulse, &readings.wrench), (&mut self.contact, &readings.contact)]
+        {
+            sums.resize(wrenches.len(), [0.0; 6]);
+            for (sum, Wrench { force, torque }) in sums.iter_mut().zip(wrenches) {
+                let parts = force.to_array().into_iter().chain(torque.to_array());
+                sum.iter_mut().zip(parts).for_each(|(sum, part)| *sum += dt * part);
+            }
         }
     }
 
@@ -40,6 +46,7 @@ impl Means {
         (self.seconds > 0.0).then(|| Readings {
             pressure: self.pressure.iter().map(over).collect(),
             wrench: self.impulse.iter().map(wrench).collect(),
+            contact: self.contact.iter().map(wrench).collect(),
         })
     }
 
@@ -50,6 +57,7 @@ impl Means {
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         archive.number("gauges.seconds", &mut self.seconds)?;
         archive.array("gauges.pressure", &mut self.pressure, false)?;
-        archive.array("gauges.impulse", &mut self.impulse, false)
+        archive.array("gauges.impulse", &mut self.impulse, false)?;
+        archive.array("gauges.contact", &mut self.contact, false)
     }
 }

@@ -107,6 +107,11 @@ impl FixedWall {
         Some(out)
     }
 
+    /// Its number in [`Scene::walls`].
+    pub fn shape(&self) -> usize {
+        self.shape
+    }
+
     /// Area with its direction into the free space, one a slot, where solids do not stand before it [m2]; those of `scene` that move are at their `poses`.
     pub fn areas(&self, scene: &Scene, poses: &[Pose]) -> Vec<DVec3> {
         let l0 = self.tiles.spacing;

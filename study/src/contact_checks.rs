@@ -21,6 +21,7 @@ pub fn smooth(spring: f64, damping: f64, friction: f64) -> Contact {
         torque: true,
         substeps: None,
         device: Default::default(),
+        pair: vec![],
     }
 }
 

@@ -98,8 +98,11 @@ impl DryScene {
     }
 
     /// One layer of wall particles for the paper's law, centres at z = -l0 / 2 (surface z = 0) and at
-    /// x, y = whole multiples of the spacing, between the corners.
+    /// x, y = whole multiples of the spacing, between the corners; of the first wall of the scene, which is made if there is none.
     pub fn particle_floor(mut self, low: (f64, f64), high: (f64, f64)) -> Self {
+        if self.scene.walls.is_empty() {
+            self = self.floor();
+        }
         let l0 = self.scene.spacing;
         let cell = |x: f64| (x / l0).round() as i64;
         for i in cell(low.0)..=cell(high.0) {
@@ -107,6 +110,7 @@ impl DryScene {
                 let x = DVec3::new(i as f64 * l0, j as f64 * l0, -0.5 * l0);
                 self.scene.position.push(x);
                 self.scene.static_wall_normal.push(DVec3::Z);
+                self.scene.static_wall_shape.push(0);
                 self.scene.groups.static_wall += 1;
             }
         }

@@ -107,6 +107,7 @@ impl Slide {
             torque: self.torque,
             substeps: self.substeps,
             device: Default::default(),
+            pair: vec![],
         }
     }
 

@@ -77,6 +77,7 @@ pub(crate) fn contact(law: Law, spring: f64, damping_ratio: f64, single: bool) -
         torque: false,
         substeps: single.then_some(1),
         device: Default::default(),
+        pair: vec![],
     }
 }
 

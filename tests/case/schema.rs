@@ -136,6 +136,9 @@ swing = { axis = [1, 0, 0], amplitude_deg = 1, period = 1 }
 [contact]
 spring = 1e6
 
+[[contact.pair]]
+between = ["box", "tank"]
+
 [[gauge.force]]
 name = "force"
 on = "box"

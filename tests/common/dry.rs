@@ -4,7 +4,7 @@ use super::case;
 use seixo::body::{Pose, Wrench};
 use seixo::contact::{ContactReport, Solids};
 use seixo::error::Result;
-use seixo::scene::Scene;
+use seixo::scene::{Scene, WallShape};
 
 /// Standard gravity [m/s2].
 pub const G: f64 = 9.80665;
@@ -12,6 +12,8 @@ pub const G: f64 = 9.80665;
 /// A dry scene in motion.
 pub struct Dry {
     pub solids: Solids,
+    /// The fixed walls.
+    pub walls: Vec<WallShape>,
     pub dt: f64,
     step: u32,
 }
@@ -21,7 +23,7 @@ impl Dry {
         let case = case(text);
         let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let solids = Solids::new(&scene, case.contact.as_ref()).unwrap();
-        Self { solids, dt: case.run.time_step, step: 0 }
+        Self { solids, walls: scene.walls, dt: case.run.time_step, step: 0 }
     }
 
     pub fn time(&self) -> f64 {

@@ -28,6 +28,7 @@ impl Lists {
             walls: Walls {
                 grid: PointGrid::new(positions, 2.0 * scene.spacing),
                 normals: of.iter().map(|&k| scene.static_wall_normal[k]).collect(),
+                of: of.iter().map(|&k| scene.static_wall_shape[k]).collect(),
             },
             pairs: vec![],
             generation: 0,

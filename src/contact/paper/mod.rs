@@ -24,6 +24,7 @@ pub(crate) use pair::{Constants, Layer, Pair, Walls};
 
 use super::candidates::MANY_PAIRS;
 use super::device::Link;
+use super::fixed::FixedWalls;
 use super::law::{Kind, Law, Now, Summary};
 use super::probe::Probe;
 use super::stiffness::{Damping, Lambda};
@@ -61,7 +62,7 @@ impl Paper {
     /// # Errors
     /// [`Error::Case`] if the case gives a restitution.
     pub fn new(contact: &case::Contact, scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Result<Self> {
-        let Damping::Coefficient(damping) = limits.damping else {
+        let Damping::Coefficient(damping) = limits.between.usual.damping else {
             let message = "contact.restitution: needs law = \"smooth\"";
             return Err(Error::key("contact.restitution", message, "give damping or damping_ratio"));
         };
@@ -127,7 +128,20 @@ impl Law for Paper {
         }
     }
 
-    fn act(&mut self, _: &mut [Body], _: &Limits, _: f64) -> Summary {
+    fn press_walls(&self, bodies: &[Body], span: f64, fixed: &mut FixedWalls) {
+        for pair in self.evaluated() {
+            let at = bodies[pair.a].pose.position;
+            for &(wall, on_body) in &pair.from_walls {
+                fixed.touch(wall as usize, -span * on_body.force, at, -span * on_body.torque);
+            }
+        }
+    }
+
+    fn tells_walls_apart(&self) -> bool {
+        !self.on_device
+    }
+
+    fn act(&mut self, _: &mut [Body], _: &mut FixedWalls, _: &Limits, _: f64) -> Summary {
         Summary::default()
     }
 
@@ -146,7 +160,7 @@ impl Law for Paper {
     fn worst(&self, limits: &Limits, bodies: &[Body], dt: f64) -> Worst {
         let mut worst = Worst { softest: limits.spring, ..Worst::default() };
         for pair in limits.extremes(bodies) {
-            limits.ask(&mut worst, bodies, pair, dt, limits.viscous_friction);
+            limits.ask(&mut worst, bodies, pair, limits.between.usual.damping, dt, limits.viscous_friction);
         }
         worst.wanted = (worst.omega_dt / OMEGA_STEP).max(worst.damping_dt);
         worst

@@ -32,6 +32,8 @@ pub(crate) struct Layer {
 pub(crate) struct Walls {
     pub grid: PointGrid,
     pub normals: Vec<DVec3>,
+    /// Number in [`Scene::walls`](crate::scene::Scene::walls) of the one that each is of.
+    pub of: Vec<u32>,
 }
 
 /// A free solid and what it may touch: candidates (i, j), found once and kept while nothing has moved
@@ -48,6 +50,8 @@ pub(crate) struct Pair {
     pub candidates: Vec<(u32, u32)>,
     /// Wrench on `a` and on `b`, of the last evaluation.
     pub wrench: [Wrench; 2],
+    /// Part of that on `a` that comes from each fixed wall, by its number.
+    pub from_walls: Vec<(u32, Wrench)>,
     /// Pairs of particles within d_c, n_c.
     pub count: usize,
     /// Mean over the pairs of K (d_c - d)^2 / 2 [J].
@@ -66,6 +70,7 @@ impl Pair {
             image,
             candidates: vec![],
             wrench: Default::default(),
+            from_walls: vec![],
             count: 0,
             energy: 0.0,
             closest: f64::INFINITY,
@@ -111,6 +116,7 @@ impl Pair {
     pub fn evaluate(&mut self, law: &Constants, bodies: &[Body], layers: &[Layer], walls: &Walls) {
         let a = &bodies[self.a];
         let mut sum = [Wrench::default(); 2];
+        self.from_walls.clear();
         let (mut count, mut energy, mut closest, mut normal_force) = (0, 0.0, f64::INFINITY, 0.0);
         let mut last = u32::MAX;
         let b = self.b.map(|b| (image(&bodies[b], self.image), bodies[b].rotation, &layers[b]));
@@ -145,18 +151,32 @@ impl Pair {
             normal_force += along;
             energy += 0.5 * law.spring * (law.distance - d).powi(2);
             closest = closest.min(d);
-            sum[0] += Wrench { force, torque: (x_i - a.pose.position).cross(force) };
-            if let Some((pose, ..)) = &b {
-                let arm = x_i - pose.position;
-                sum[1] += Wrench { force: -force, torque: -arm.cross(force) };
+            let on_a = Wrench { force, torque: (x_i - a.pose.position).cross(force) };
+            sum[0] += on_a;
+            match &b {
+                Some((pose, ..)) => {
+                    let arm = x_i - pose.position;
+                    sum[1] += Wrench { force: -force, torque: -arm.cross(force) };
+                }
+                None => add_to(&mut self.from_walls, walls.of[j as usize], on_a),
             }
         }
         let share = 1.0 / count.max(1) as f64;
-        self.wrench = sum.map(|w| Wrench {
+        let mean = |w: Wrench| Wrench {
             force: w.force * share,
             torque: if law.torque { w.torque * share } else { DVec3::ZERO },
-        });
+        };
+        self.wrench = sum.map(mean);
+        self.from_walls.iter_mut().for_each(|(_, w)| *w = mean(*w));
         (self.count, self.energy, self.closest) = (count, energy * share, closest);
         self.normal_force = normal_force * share;
+    }
+}
+
+/// Adds what comes from the fixed wall `wall`.
+fn add_to(from_walls: &mut Vec<(u32, Wrench)>, wall: u32, wrench: Wrench) {
+    match from_walls.iter_mut().find(|(known, _)| *known == wall) {
+        Some((_, sum)) => *sum += wrench,
+        None => from_walls.push((wall, wrench)),
     }
 }

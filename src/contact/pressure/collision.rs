@@ -1,6 +1,7 @@
 //! Eq. (18) for a pair of solids.
 
 use crate::body::Body;
+use crate::contact::fixed::FixedWalls;
 use crate::contact::paper::{Layer, Pair, Walls};
 use glam::DVec3;
 
@@ -9,8 +10,8 @@ use glam::DVec3;
 pub(crate) fn collide(
     pair: &Pair,
     bodies: &mut [Body],
-    layers: &[Layer],
-    walls: &Walls,
+    (layers, walls): (&[Layer], &Walls),
+    fixed: &mut FixedWalls,
     distance: f64,
     restitution: f64,
 ) -> usize {
@@ -50,8 +51,9 @@ pub(crate) fn collide(
             body.touch(impulse, angular);
         };
         kick(&mut bodies[pair.a], middle, impulse);
-        if let Some(b) = pair.b {
-            kick(&mut bodies[b], middle_b, -impulse);
+        match pair.b {
+            Some(b) => kick(&mut bodies[b], middle_b, -impulse),
+            None => fixed.touch(walls.of[j as usize] as usize, -impulse, middle, DVec3::ZERO),
         }
     }
     count

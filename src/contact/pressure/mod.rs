@@ -10,6 +10,7 @@
 mod collision;
 
 use super::device::Link;
+use super::fixed::FixedWalls;
 use super::law::{Kind, Law, Now, Summary};
 use super::paper::Lists;
 use super::probe::Probe;
@@ -53,11 +54,14 @@ impl Law for Pressure {
 
     fn add_loads(&self, _: &mut [Wrench]) {}
 
-    fn act(&mut self, bodies: &mut [Body], _: &Limits, _: f64) -> Summary {
+    fn press_walls(&self, _: &[Body], _: f64, _: &mut FixedWalls) {}
+
+    fn act(&mut self, bodies: &mut [Body], fixed: &mut FixedWalls, _: &Limits, _: f64) -> Summary {
         let mut summary = Summary::default();
         let Lists { pairs, layers, walls, .. } = &self.lists;
         for pair in pairs {
-            let hits = collision::collide(pair, bodies, layers, walls, DISTANCE * self.spacing, RESTITUTION);
+            let distance = DISTANCE * self.spacing;
+            let hits = collision::collide(pair, bodies, (layers, walls), fixed, distance, RESTITUTION);
             summary.add(hits, 0.0, 0.0);
         }
         summary

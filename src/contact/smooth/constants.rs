@@ -13,6 +13,8 @@ pub(crate) struct Constants {
     pub damping: f64,
     /// Length of a sub-step [s].
     pub step: f64,
+    /// Coulomb coefficient [-].
+    pub friction: f64,
     /// Reduced mass that the damping is for [kg], if the case asks for a restitution; else 0.
     pub mass: f64,
 }

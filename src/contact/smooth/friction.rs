@@ -16,9 +16,10 @@
 //! patches of two solids by their normal forces.
 
 use super::coulomb::{ARM, System, root_of, sticks};
-use super::pair::Pair;
+use super::pair::{Other, Pair};
 use super::patch::Patch;
 use crate::body::Body;
+use crate::contact::fixed::FixedWalls;
 use glam::{DMat2, DMat3, DVec3};
 
 /// Most sweeps over the patches of a sub-step. What one sub-step leaves, the next one stops.
@@ -45,7 +46,7 @@ const SMALL_ARM: f64 = 0.9;
 #[derive(Clone, Debug)]
 struct Slip {
     a: usize,
-    b: Option<usize>,
+    b: Other,
     arm_a: DVec3,
     arm_b: DVec3,
     tangent: [DVec3; 2],
@@ -69,27 +70,29 @@ struct Slip {
 /// Working memory of the friction solve.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Friction {
+    /// Patches with Coulomb friction, and those that the viscous one has dragged, of the last sub-step.
     slips: Vec<Slip>,
+    dragged: Vec<Slip>,
 }
 
 impl Friction {
-    /// Applies the friction `mu` [-] and `eta` [kg/s] to the bodies for the sub-step `h` [s] with the
+    /// Applies the pairs' Coulomb friction and the viscous one, `eta` [kg/s], to the bodies for the sub-step `h` [s], with the
     /// pairs' normal forces.
-    pub fn apply(&mut self, pairs: &[Pair], bodies: &mut [Body], mu: f64, eta: f64, h: f64) {
+    pub fn apply(&mut self, pairs: &[Pair], bodies: &mut [Body], eta: f64, h: f64) {
+        self.dragged.clear();
         if eta > 0.0 {
             for pair in pairs {
                 let all: f64 = pair.patches.iter().map(|p| p.force).sum();
                 for patch in &pair.patches {
-                    let slip = Slip::new(pair, patch, bodies, 0.0);
+                    let mut slip = Slip::new(pair, patch, bodies, 0.0);
                     slip.drag(bodies, eta * h * patch.force / all);
+                    self.dragged.push(slip);
                 }
             }
         }
         self.slips.clear();
-        if mu <= 0.0 {
-            return;
-        }
-        for pair in pairs {
+        for pair in pairs.iter().filter(|pair| pair.constants.friction > 0.0) {
+            let mu = pair.constants.friction;
             for patch in &pair.patches {
                 self.slips.push(Slip::new(pair, patch, bodies, mu * patch.force * h));
             }
@@ -102,6 +105,16 @@ impl Friction {
             }
             if !open {
                 break;
+            }
+        }
+    }
+
+    /// Gives fixed walls, whose numbers in the scene `of` tells, what the last [`Self::apply`] has taken from them.
+    pub fn press_walls(&self, bodies: &[Body], of: impl Fn(usize) -> usize, fixed: &mut FixedWalls) {
+        for slip in self.slips.iter().chain(&self.dragged) {
+            if let Other::Wall(w) = slip.b {
+                let (push, twist) = slip.parts(slip.impulse);
+                fixed.touch(of(w), -push, bodies[slip.a].pose.position + slip.arm_a, -twist);
             }
         }
     }
@@ -149,7 +162,7 @@ impl Slip {
         response += DMat3::IDENTITY * (1e-12 * trace);
         Self {
             a,
-            b,
+            b: pair.b,
             arm_a,
             arm_b,
             tangent,
@@ -171,7 +184,7 @@ impl Slip {
             let spin = body.pose.angular_velocity.dot(self.spin);
             DVec3::new(v.dot(self.tangent[0]), v.dot(self.tangent[1]), spin)
         };
-        of(&bodies[self.a], self.arm_a) - self.b.map_or(DVec3::ZERO, |b| of(&bodies[b], self.arm_b))
+        of(&bodies[self.a], self.arm_a) - self.b.solid().map_or(DVec3::ZERO, |b| of(&bodies[b], self.arm_b))
     }
 
     /// One visit: the patch's impulse for the velocities as they are. Whether it changed.
@@ -208,18 +221,22 @@ impl Slip {
     }
 
     /// Drag `eta_h` [kg] times the slip in the middle of the sub-step: stable for any eta.
-    fn drag(&self, bodies: &mut [Body], eta_h: f64) {
+    fn drag(&mut self, bodies: &mut [Body], eta_h: f64) {
         let middle = DMat3::IDENTITY + 0.5 * eta_h * self.response;
-        let impulse = -eta_h * (middle.inverse() * self.velocity(bodies));
-        self.kick(bodies, impulse);
+        self.impulse = -eta_h * (middle.inverse() * self.velocity(bodies));
+        self.kick(bodies, self.impulse);
+    }
+
+    /// Push [N s] and twist [N m s] of an `impulse` along the tangents and the spin [N s].
+    fn parts(&self, impulse: DVec3) -> (DVec3, DVec3) {
+        (impulse.x * self.tangent[0] + impulse.y * self.tangent[1], impulse.z * self.spin)
     }
 
     /// Gives both bodies the impulse `change` along the tangents and the spin [N s].
     fn kick(&self, bodies: &mut [Body], change: DVec3) {
-        let push = change.x * self.tangent[0] + change.y * self.tangent[1];
-        let twist = change.z * self.spin;
+        let (push, twist) = self.parts(change);
         bodies[self.a].touch(push, self.arm_a.cross(push) + twist);
-        if let Some(b) = self.b {
+        if let Some(b) = self.b.solid() {
             bodies[b].touch(-push, -self.arm_b.cross(push) - twist);
         }
     }

@@ -33,8 +33,10 @@ mod round;
 mod stability;
 mod walls;
 
+use super::between::Against;
 use super::candidates::{Candidates, Close, MANY_PAIRS, reduced_mass};
 use super::device::Link;
+use super::fixed::FixedWalls;
 use super::law::{Fault, Kind, Law, Now, Summary};
 use super::probe::Probe;
 use super::substeps::{Cut, Limits, Worst};
@@ -221,7 +223,14 @@ impl Smooth {
     fn constants_of(&self, pair: &Pair, limits: &Limits, bodies: &[Body]) -> Constants {
         let [a, b] = self.middles.of(pair);
         let weight = self.surfaces[pair.a].smallest_weight;
-        limits.constants(bodies, pair.a, pair.b.solid(), weight, self.spacing.min(a).min(b))
+        let between = limits.between.of(
+            pair.a,
+            match pair.b {
+                Other::Solid(b) => Against::Solid(b),
+                Other::Wall(w) => Against::Wall(self.walls[w].of),
+            },
+        );
+        limits.constants(bodies, pair.a, pair.b.solid(), between, weight, self.spacing.min(a).min(b))
     }
 
     /// Constants of `pairs` for sub-steps of `h` [s].
@@ -231,7 +240,7 @@ impl Smooth {
             // before the first step there is no sub-step to follow
             if h > 0.0 {
                 let mass = reduced_mass(bodies, pair.a, pair.b.solid());
-                pair.constants.discretise(mass, h, limits.damping.is_ratio());
+                pair.constants.discretise(mass, h, limits.restores());
             }
         }
     }
@@ -286,9 +295,19 @@ impl Law for Smooth {
         }
     }
 
-    fn act(&mut self, bodies: &mut [Body], limits: &Limits, h: f64) -> Summary {
+    fn press_walls(&self, bodies: &[Body], span: f64, fixed: &mut FixedWalls) {
+        for pair in self.evaluated() {
+            if let Other::Wall(w) = pair.b {
+                let (on_body, at) = (&pair.wrench[0], bodies[pair.a].pose.position);
+                fixed.touch(self.walls[w].of, -span * on_body.force, at, -span * on_body.torque);
+            }
+        }
+    }
+
+    fn act(&mut self, bodies: &mut [Body], fixed: &mut FixedWalls, limits: &Limits, h: f64) -> Summary {
         let mut friction = std::mem::take(&mut self.friction);
-        friction.apply(self.evaluated(), bodies, limits.friction, limits.viscous_friction, h);
+        friction.apply(self.evaluated(), bodies, limits.viscous_friction, h);
+        friction.press_walls(bodies, |w| self.walls[w].of, fixed);
         self.friction = friction;
         Summary::default()
     }

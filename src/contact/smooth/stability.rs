@@ -3,6 +3,7 @@
 use super::constants::Constants;
 use super::{EXPONENT, STOP_DEPTH, Smooth};
 use crate::body::Body;
+use crate::contact::between::Between;
 use crate::contact::candidates::reduced_mass;
 use crate::contact::stiffness::{Damping, Lambda};
 use crate::contact::substeps::{DAMPING_STEP, Limits, MOST_SUBSTEPS, STOP_OMEGA_STEP, Worst};
@@ -74,22 +75,25 @@ fn turning(p: DVec3, principal: DVec3) -> f64 {
 pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> Worst {
     let mut worst = Worst { softest: limits.spring, ..Worst::default() };
     for (a, b) in limits.extremes(bodies) {
-        limits.ask(&mut worst, bodies, (a, b), dt, 0.0);
-        let (spring, damping) = limits.lambda_of(a, b);
+        let (spring, damped) = limits.lambda_of(a, b);
         let reach = law.spacing.min(law.middles.between(a, b));
-        let c = limits.constants(bodies, a, b, law.surfaces[a].smallest_weight, reach);
-        let stopping = c.damping * (c.stop / c.spring).sqrt();
-        let for_spring = dt * (c.spring * spring).sqrt() / limits.omega_step();
-        let for_stop = dt * (c.stop * spring).sqrt() / limits.omega_step().max(STOP_OMEGA_STEP);
-        worst.wanted = worst.wanted.max(for_spring).max(dt * c.damping * damping / DAMPING_STEP);
-        worst.hardest = worst.hardest.max(for_stop).max(dt * stopping * damping / DAMPING_STEP);
-        worst.softest = worst.softest.min(c.spring);
+        for damping in limits.between.dampings() {
+            limits.ask(&mut worst, bodies, (a, b), damping, dt, 0.0);
+            let between = Between { damping, ..limits.between.usual };
+            let c = limits.constants(bodies, a, b, between, law.surfaces[a].smallest_weight, reach);
+            let stopping = c.damping * (c.stop / c.spring).sqrt();
+            let for_spring = dt * (c.spring * spring).sqrt() / limits.omega_step();
+            let for_stop = dt * (c.stop * spring).sqrt() / limits.omega_step().max(STOP_OMEGA_STEP);
+            worst.wanted = worst.wanted.max(for_spring).max(dt * c.damping * damped / DAMPING_STEP);
+            worst.hardest = worst.hardest.max(for_stop).max(dt * stopping * damped / DAMPING_STEP);
+            worst.softest = worst.softest.min(c.spring);
+        }
     }
     worst
 }
 
 impl Limits {
-    /// Constants of the contact of `a` with `b` as the smooth law uses them: what the case asks for, as
+    /// Constants of the contact of `a` with `b`, with the friction and damping that are `between` them, as the smooth law uses them: what the case asks for, as
     /// far as the sub-steps of the longest step so far can carry it. Within `reach` [m] the second spring stops
     /// the fastest body.
     pub fn constants(
@@ -97,6 +101,7 @@ impl Limits {
         bodies: &[Body],
         a: usize,
         b: Option<usize>,
+        between: Between,
         weight: f64,
         reach: f64,
     ) -> Constants {
@@ -106,7 +111,7 @@ impl Limits {
         let carried = |omega_step: f64| (omega_step / shortest).powi(2) / both(|l| l.spring);
         let carried_damping = DAMPING_STEP / shortest / both(|l| l.damping);
         // a dashpot that does not fit would be a weaker one, and the restitution another
-        let fits = match self.damping {
+        let fits = match between.damping {
             Damping::Ratio(ratio) => (0.5 * carried_damping / ratio).powi(2) / mass,
             Damping::Coefficient(_) => f64::INFINITY,
         };
@@ -118,7 +123,7 @@ impl Limits {
         let closing = if b.is_some() { 2.0 } else { 1.0 } * self.fastest;
         let corner = weight.powf(2.0 / EXPONENT);
         let stop = mass * (2.0 * closing / reach).powi(2) / corner;
-        let damping = self.damping.coefficient(spring, self.spring, mass);
+        let damping = between.damping.coefficient(spring, self.spring, mass);
         let damping = if self.forced.is_some() { damping } else { damping.min(carried_damping) };
         // the stop's dashpot is as much stronger as the root of its spring
         let stop_fits = spring * (carried_damping / damping).powi(2);
@@ -128,7 +133,8 @@ impl Limits {
             stop_depth: STOP_DEPTH * reach,
             step: shortest,
             damping,
-            mass: if self.damping.is_ratio() { mass } else { 0.0 },
+            friction: between.friction,
+            mass: if between.damping.is_ratio() { mass } else { 0.0 },
         }
     }
 }

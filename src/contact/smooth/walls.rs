@@ -3,6 +3,10 @@
 //! All of a wall is real that no other wall covers: the back and the sides of a plane, the rims of an open tank.
 //! A face that counts for nothing although a body can reach it would give the distance to another face to
 //! whatever comes in through it, and a force to match.
+//!
+//! A wall that stands on another one goes on into it, as far as what lies on the other may be pressed in: else the foot of a body
+//! that slides along a floor, a little below its surface, would not meet the post that stands there, until it rises and is
+//! suddenly deep in it.
 
 use crate::periodic::Periodic;
 use crate::scene::Scene;
@@ -13,6 +17,8 @@ use glam::{DMat3, DVec3};
 #[derive(Clone, Debug)]
 pub(crate) struct WallBox {
     pub name: String,
+    /// Its number in [`Scene::walls`].
+    pub of: usize,
     pub center: DVec3,
     pub axes: DMat3,
     pub half: DVec3,
@@ -42,14 +48,17 @@ impl WallBox {
 
 /// Gap over the spacing up to which a wall covers what it faces: nothing fits in between.
 const COVERED: f64 = 2e-3;
+/// How far a wall goes on into another one that it stands on, over the spacing.
+const FOOT: f64 = 0.5;
 /// Most points along an edge of a face at which it is looked at whether it is covered.
 const MOST_LOOKS: f64 = 40.0;
 
 /// The walls of a scene.
 pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
     let (spacing, flat) = (scene.spacing, scene.dimensions == 2);
-    let boxes = scene.walls.iter().map(|wall| WallBox {
+    let boxes = scene.walls.iter().enumerate().map(|(of, wall)| WallBox {
         name: wall.name.clone(),
+        of,
         center: wall.center,
         axes: wall.axes,
         half: wall.half,
@@ -60,14 +69,52 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
     let mut walls: Vec<WallBox> = boxes.flat_map(|wall| images(wall, &scene.periodic, spacing)).collect();
     for k in 0..walls.len() {
         let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
-        let open = |face: u8| all & 1 << face != 0 && !face_is_covered(&walls, k, face, spacing, flat);
+        let beside = 0.5 * COVERED * spacing;
+        let open =
+            |face: u8| all & 1 << face != 0 && !face_is_covered(&walls, k, face, beside, spacing, flat);
         walls[k].faces = (0..6).filter(|&face| open(face)).map(|face| 1 << face).sum();
     }
     for k in 0..walls.len() {
         let (edges, corners) = wall_edges(&walls, k, spacing, flat);
         (walls[k].edges, walls[k].corners) = (edges, corners);
     }
+    let feet: Vec<Vec<u8>> = (0..walls.len()).map(|k| wall_feet(&walls, k, spacing, flat)).collect();
+    for (wall, feet) in walls.iter_mut().zip(feet) {
+        for face in feet {
+            let (axis, length) = (usize::from(face / 2), FOOT * spacing);
+            wall.half[axis] += 0.5 * length;
+            wall.center += 0.5 * length * (wall.axes * face_normal(face));
+        }
+    }
     walls
+}
+
+/// Faces of wall `k` that stand in full on other walls, with an open face that meets these at an inner corner.
+fn wall_feet(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
+    let (wall, length) = (&walls[k], FOOT * spacing);
+    let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
+    // what has been found covered is so by more than a crust
+    let stands = |face: u8| {
+        (all & !wall.faces) >> face & 1 == 1 && face_is_covered(walls, k, face, length, spacing, flat)
+    };
+    let meets = |foot: u8, side: u8| {
+        let (across, beside) = (usize::from(foot / 2), usize::from(side / 2));
+        let along = 3 - across - beside;
+        let out = face_normal(foot) * (wall.half + 0.5 * length)
+            + face_normal(side) * (wall.half + 0.5 * COVERED * spacing);
+        let places = looks(wall.half[along], spacing, flat && along == 1);
+        places.into_iter().any(|x| is_covered(walls, k, out + x * DVec3::AXES[along], spacing))
+    };
+    let has_corner = |foot: u8| {
+        (0..6).any(|side| side / 2 != foot / 2 && wall.faces >> side & 1 == 1 && meets(foot, side))
+    };
+    (0..6).filter(|&face| stands(face) && has_corner(face)).collect()
+}
+
+/// Places half a spacing apart across an edge of half length `half` [m]; the middle of one that is seen end on.
+fn looks(half: f64, spacing: f64, end_on: bool) -> Vec<f64> {
+    let n = if end_on { 1.0 } else { (4.0 * half / spacing).ceil().clamp(2.0, MOST_LOOKS) };
+    (0..n as usize).map(|i| ((2.0 * i as f64 + 1.0) / n - 1.0) * half).collect()
 }
 
 /// `wall` and its images over periodic sides that lie up to half a length beyond them: bodies are brought back between the sides. A wall that
@@ -92,21 +139,15 @@ fn is_covered(walls: &[WallBox], k: usize, q: DVec3, spacing: f64) -> bool {
     walls.iter().enumerate().any(|(other, w)| other != k && near(w))
 }
 
-/// Whether other walls leave nothing of a face of wall `k`, by points half a spacing apart just outside of it.
-fn face_is_covered(walls: &[WallBox], k: usize, face: u8, spacing: f64, flat: bool) -> bool {
+/// Whether other walls leave nothing of the plane `beyond` [m] outside of a face of wall `k`, by points half a spacing apart.
+fn face_is_covered(walls: &[WallBox], k: usize, face: u8, beyond: f64, spacing: f64, flat: bool) -> bool {
     let (half, out) = (walls[k].half, face_normal(face));
     let normal = usize::from(face / 2);
     let (u, v) = ((normal + 1) % 3, (normal + 2) % 3);
-    let looks = |axis: usize| {
-        if flat && axis == 1 { 1.0 } else { (4.0 * half[axis] / spacing).ceil().clamp(2.0, MOST_LOOKS) }
-    };
-    let places = |axis: usize| {
-        let n = looks(axis);
-        (0..n as usize).map(move |i| ((2.0 * i as f64 + 1.0) / n - 1.0) * half[axis])
-    };
+    let places = |axis: usize| looks(half[axis], spacing, flat && axis == 1).into_iter();
     places(u).all(|x| {
         places(v).all(|y| {
-            let mut q = out * (half + 0.5 * COVERED * spacing);
+            let mut q = out * (half + beyond);
             (q[u], q[v]) = (x, y);
             is_covered(walls, k, q, spacing)
         })
@@ -188,6 +229,7 @@ mod tests {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
         WallBox {
             name: String::new(),
+            of: 0,
             center: 0.5 * (low + high),
             axes: DMat3::IDENTITY,
             half: 0.5 * (high - low),
@@ -206,7 +248,7 @@ mod tests {
             wall([0.5, 0.2, 0.0], [1.0, 0.4, 0.3]),
         ];
         let open = |k: usize| -> Faces {
-            (0..6).filter(|&f| !face_is_covered(&walls, k, f, 0.05, false)).map(|f| 1 << f).sum()
+            (0..6).filter(|&f| !face_is_covered(&walls, k, f, 1e-6, 0.05, false)).map(|f| 1 << f).sum()
         };
         // x_min of the step lies against the floor, z_min of the block on it
         let faces = [open(0), open(1), open(2)];

@@ -1,0 +1,172 @@
+//! Friction and restitution of two solids: those of the scene, or what `[[contact.pair]]` says of them.
+
+use super::stiffness::{Damping, damping_ratio};
+use crate::case::Contact;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+
+/// What a free solid touches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Against {
+    /// A solid of [`Scene::solids`].
+    Solid(usize),
+    /// A fixed wall of [`Scene::walls`].
+    Wall(usize),
+}
+
+/// Friction and damping of a contact.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Between {
+    /// Coulomb coefficient [-].
+    pub friction: f64,
+    pub damping: Damping,
+}
+
+/// The solids and fixed walls that one end of a row of `[[contact.pair]]` names.
+#[derive(Clone, Debug)]
+struct Named {
+    solids: Vec<bool>,
+    walls: Vec<bool>,
+}
+
+impl Named {
+    fn has(&self, one: Against) -> bool {
+        match one {
+            Against::Solid(k) => self.solids[k],
+            Against::Wall(k) => self.walls[k],
+        }
+    }
+}
+
+/// A row of `[[contact.pair]]`.
+#[derive(Clone, Debug)]
+struct Row {
+    ends: [Named; 2],
+    friction: Option<f64>,
+    damping: Option<Damping>,
+}
+
+/// What any two solids have between them.
+#[derive(Clone, Debug)]
+pub(crate) struct Betweens {
+    /// What no row says anything else of.
+    pub usual: Between,
+    rows: Vec<Row>,
+}
+
+impl Betweens {
+    /// What `contact` says of the solids of `scene`, of which the lightest free one has `lightest` [kg].
+    ///
+    /// # Errors
+    /// [`Error::Case`] if the numbers contradict each other, or if a row names nothing that can touch.
+    pub fn new(contact: Option<&Contact>, scene: &Scene, lightest: f64) -> Result<Self> {
+        let Some(contact) = contact else {
+            let usual = Between { friction: 0.0, damping: Damping::Coefficient(0.0) };
+            return Ok(Self { usual, rows: vec![] });
+        };
+        let usual = Between { friction: contact.friction, damping: Damping::new(contact, lightest)? };
+        let mut rows = Vec::with_capacity(contact.pair.len());
+        for (k, pair) in contact.pair.iter().enumerate() {
+            let key = format!("contact.pair.{k}.between");
+            let [first, second] = &pair.between;
+            let ends = [named(scene, first, &key)?, named(scene, second, &key)?];
+            if !can_touch(scene, &ends) {
+                let message = format!(
+                    "{key}: `{first}` and `{second}` cannot touch: no body that forces move is one of them"
+                );
+                return Err(Error::key(
+                    key,
+                    message,
+                    "name a body that is free to move, and what it touches",
+                ));
+            }
+            let damping = pair.restitution.map(|e| Damping::Ratio(damping_ratio(e)));
+            rows.push(Row { ends, friction: pair.friction, damping });
+        }
+        Ok(Self { usual, rows })
+    }
+
+    /// What the free solid `a` has against `b`: of rows that name both the last one counts, for each of its numbers.
+    pub fn of(&self, a: usize, b: Against) -> Between {
+        let (a, mut out) = (Against::Solid(a), self.usual);
+        for Row { ends: [first, second], friction, damping } in &self.rows {
+            if first.has(a) && second.has(b) || first.has(b) && second.has(a) {
+                out.friction = friction.unwrap_or(out.friction);
+                out.damping = damping.unwrap_or(out.damping);
+            }
+        }
+        out
+    }
+
+    /// Every damping that a contact may have.
+    pub fn dampings(&self) -> impl Iterator<Item = Damping> {
+        let others = self.rows.iter().filter_map(|row| row.damping);
+        std::iter::once(self.usual.damping).chain(others)
+    }
+}
+
+/// What `name` stands for: a solid, a fixed wall, `tank` for all its faces, or with `*` for any letters as many as there are.
+fn named(scene: &Scene, name: &str, key: &str) -> Result<Named> {
+    let fits = |known: &str| matches(name, known);
+    let of_tank = |known: &str| name == "tank" && known.starts_with("tank.");
+    let out = Named {
+        solids: scene.solids.iter().map(|s| fits(&s.name)).collect(),
+        walls: scene.walls.iter().map(|w| fits(&w.name) || of_tank(&w.name)).collect(),
+    };
+    if out.solids.iter().chain(&out.walls).any(|&one| one) {
+        return Ok(out);
+    }
+    let solids = scene.solids.iter().map(|s| s.name.as_str());
+    let mut names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
+    let more = names.len().saturating_sub(MOST_NAMES);
+    names.truncate(MOST_NAMES);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let remedy = format!("there are: {}{more}", names.join(", "));
+    Err(Error::key(key, format!("{key}: nothing is called `{name}`"), remedy))
+}
+
+/// Most names that a message lists.
+const MOST_NAMES: usize = 20;
+
+/// Whether `known` is `pattern`, in which `*` stands for any letters.
+fn matches(pattern: &str, known: &str) -> bool {
+    let Some((start, rest)) = pattern.split_once('*') else { return pattern == known };
+    let Some(left) = known.strip_prefix(start) else { return false };
+    let mut places = left.char_indices().map(|(at, _)| at).chain([left.len()]);
+    places.any(|at| matches(rest, &left[at..]))
+}
+
+/// Whether forces move something of one end that can touch something of the other.
+fn can_touch(scene: &Scene, ends: &[Named; 2]) -> bool {
+    let free = |k: usize| scene.solids[k].is_free();
+    let moves = |end: &Named| end.solids.iter().enumerate().any(|(k, &is)| is && free(k));
+    let only = |end: &Named| {
+        let mut own = end.solids.iter().enumerate().filter(|(_, is)| **is).map(|(k, _)| k);
+        (own.next(), own.next().is_some() || end.walls.contains(&true))
+    };
+    // a body does not touch itself
+    let alone = matches!((only(&ends[0]), only(&ends[1])), ((Some(a), false), (Some(b), false)) if a == b);
+    !alone && ends.iter().any(moves)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn a_star_stands_for_any_letters() {
+        for (pattern, known, fits) in [
+            ("rock 1", "rock 1", true),
+            ("rock 1", "rock 12", false),
+            ("rock*", "rock 12", true),
+            ("rock*", "a rock", false),
+            ("*", "", true),
+            ("*.z_min", "tank.z_min", true),
+            ("a*b*c", "aXbYbZc", true),
+            ("a*b*c", "aXbYbZ", false),
+            ("*ä*", "Trägheit", true),
+        ] {
+            assert_eq!(matches(pattern, known), fits, "{pattern} {known}");
+        }
+    }
+}

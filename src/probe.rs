@@ -1,0 +1,141 @@
+//! What the water does between its particles.
+
+use crate::periodic::Periodic;
+use glam::{DMat3, DVec3};
+
+/// What the water does at a place.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Value {
+    /// [m/s].
+    pub velocity: DVec3,
+    /// [Pa].
+    pub pressure: f64,
+}
+
+/// Reads between particles.
+#[derive(Clone, Copy, Debug)]
+pub struct Probe {
+    /// l0 [m].
+    pub spacing: f64,
+    /// Effective radius [m].
+    pub radius: f64,
+    /// In two dimensions, where y is that of the particles.
+    pub flat: bool,
+    /// Sides across which the water goes on.
+    pub periodic: Periodic,
+}
+
+impl Probe {
+    /// Velocity and pressure at `x` [m] of the water whose particles have `values`, position first: those of the linear function that comes
+    /// nearest to the particles within the effective radius, by least squares with the weight (1 - r^2 / re^2)^2; where they do not span
+    /// space, their mean. Exact for linear fields, on walls and at the surface, too. Nothing where no particle is nearer than the middle of a
+    /// cube of eight may be, and a tenth.
+    pub fn at(&self, values: impl Iterator<Item = (DVec3, Value)>, x: DVec3) -> Option<Value> {
+        let mut near: Vec<(f64, DVec3, Value)> = Vec::new();
+        let mut nearest = f64::INFINITY;
+        for (p, value) in values {
+            let mut way = self.periodic.nearest(p - x);
+            if self.flat {
+                way.y = 0.0;
+            }
+            let away = way.length_squared() / (self.radius * self.radius);
+            if away < 1.0 {
+                near.push(((1.0 - away).powi(2), way / self.spacing, value));
+                nearest = nearest.min(away);
+            }
+        }
+        let dimensions: f64 = if self.flat { 2.0 } else { 3.0 };
+        let reach = 1.1 * 0.5 * dimensions.sqrt() * self.spacing;
+        if nearest.sqrt() * self.radius > reach {
+            return None;
+        }
+        let total: f64 = near.iter().map(|n| n.0).sum();
+        let middle = near.iter().map(|n| n.0 * n.1).sum::<DVec3>() / total;
+        let mut mean = Value::default();
+        for (w, _, value) in &near {
+            mean.velocity += w / total * value.velocity;
+            mean.pressure += w / total * value.pressure;
+        }
+        // Moments of the particles about their middle, over those of a full neighbourhood.
+        let mut moment = DMat3::ZERO;
+        // Of velocity and pressure with the place: rows x, y, z of the velocity, then the pressure.
+        let mut with = [DVec3::ZERO; 4];
+        for &(w, p, Value { velocity, pressure }) in &near {
+            let d = p - middle;
+            moment += DMat3::from_cols(w * d * d.x, w * d * d.y, w * d * d.z);
+            for (sum, of) in with.iter_mut().zip([velocity.x, velocity.y, velocity.z, pressure]) {
+                *sum += w * of * d;
+            }
+        }
+        if self.flat {
+            moment.y_axis = DVec3::Y * total;
+        }
+        // In a full neighbourhood the determinant is total^3 times 0.1 or so.
+        if moment.determinant() < 1e-3 * total.powi(3) {
+            return Some(mean);
+        }
+        let inverse = moment.inverse();
+        let [vx, vy, vz, p] = with.map(|sum| (inverse * sum).dot(-middle));
+        Some(Value { velocity: mean.velocity + DVec3::new(vx, vy, vz), pressure: mean.pressure + p })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn probe(flat: bool) -> Probe {
+        Probe { spacing: 0.02, radius: 0.042, flat, periodic: Periodic::default() }
+    }
+
+    /// Water below z = 0.3 on a lattice that is shaken, with linear fields.
+    fn water(flat: bool) -> Vec<(DVec3, Value)> {
+        let mut out = Vec::new();
+        let (l0, mut seed) = (0.02, 7_u32);
+        let mut shaken = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            0.2 * l0 * (f64::from(seed >> 8) / f64::from(1 << 24) - 0.5)
+        };
+        for (i, j, k) in (0..15).flat_map(|i| (0..15).flat_map(move |j| (0..15).map(move |k| (i, j, k)))) {
+            if flat && j > 0 {
+                continue;
+            }
+            let at = |n: i32| (f64::from(n) + 0.5) * l0;
+            let y = if flat { 0.0 } else { at(j) + shaken() };
+            let x = DVec3::new(at(i) + shaken(), y, at(k) + shaken());
+            let velocity = DVec3::new(1.0 + 2.0 * x.x, 0.5, 3.0 * x.z);
+            out.push((x, Value { velocity, pressure: 9810.0 * (0.3 - x.z) }));
+        }
+        out
+    }
+
+    #[test]
+    fn linear_fields_are_read_as_they_are_also_at_walls_and_the_surface() {
+        for flat in [false, true] {
+            let (water, probe) = (water(flat), probe(flat));
+            let y = if flat { 0.0 } else { 0.15 };
+            // Inside, on a wall, in a corner, at the surface.
+            for [x, z] in [[0.151, 0.147], [0.0, 0.15], [0.003, 0.004], [0.2, 0.299]] {
+                let found = probe.at(water.iter().copied(), DVec3::new(x, y, z)).expect("water");
+                let velocity = DVec3::new(1.0 + 2.0 * x, 0.5, 3.0 * z);
+                assert!((found.velocity - velocity).abs().max_element() < 1e-5, "{x}, {z}: {found:?}");
+                assert!((found.pressure - 9810.0 * (0.3 - z)).abs() < 0.02, "{x}, {z}: {found:?}");
+            }
+            for [x, z] in [[0.15, 0.33], [-0.03, 0.1], [5.0, 5.0]] {
+                assert!(probe.at(water.iter().copied(), DVec3::new(x, y, z)).is_none(), "{x}, {z}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_lone_particle_is_its_own_mean_and_is_seen_across_a_periodic_side() {
+        let (place, value) = water(false)[0];
+        let found = probe(false).at([(place, value)].into_iter(), place + 0.005).expect("water");
+        assert!((found.pressure - value.pressure).abs() < 1e-9);
+        let periodic = Periodic::new([true, false, false], DVec3::ZERO, DVec3::ONE);
+        let across = Probe { periodic, ..probe(false) };
+        let beyond = place + DVec3::new(0.99, 0.0, 0.0);
+        assert!(across.at([(place, value)].into_iter(), beyond).is_some());
+        assert!(probe(false).at([(place, value)].into_iter(), beyond).is_none());
+    }
+}
