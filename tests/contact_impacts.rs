@@ -118,3 +118,70 @@ fn what_slides_along_a_floor_into_a_post_is_stopped_by_its_foot() {
         assert!((back - 0.5).abs() < 0.03, "lean {lean}: {back} m/s back");
     }
 }
+
+#[test]
+fn what_slides_over_the_joint_of_two_walls_goes_on() {
+    let mut dry = Dry::new(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 3\ngravity = [0, 0, -{G}]\n\
+         [[obstacle]]\nname = \"a\"\nmin = [0, 0, 0]\nmax = [0.5, 0.4, 0.1]\n\
+         [[obstacle]]\nname = \"b\"\nmin = [0.5, 0, 0]\nmax = [1, 0.4, 0.1]\n\
+         [[body]]\nname = \"block\"\nsize = [0.2, 0.2, 0.1]\ncenter = [0.39, 0.2, 0.15]\nmass = 10\nvelocity = [0.1, 0, 0]\nstanding = true\n\
+         [contact]\nspring = 1e6\nrestitution = 0.3\n"
+    ));
+    // Once it has sunk in, it is a tenth of a millimetre deep in the second wall as soon as it is there.
+    let mut deepest = 0.0_f64;
+    while dry.time() < 2.5 {
+        dry.step();
+        deepest = deepest.max(0.15 - dry.solids.poses()[0].position.z);
+    }
+    let pose = dry.solids.poses()[0];
+    println!("{pose:?} {deepest}");
+    assert!((pose.position.x - 0.64).abs() < 1e-6 && (pose.velocity.x - 0.1).abs() < 1e-6, "{pose:?}");
+    assert!(deepest < 1.1 * 10.0 * G / 1e6, "{deepest}");
+}
+
+#[test]
+fn cylinders_keep_their_energy_on_edges() {
+    // The side of a cylinder lies across an edge, or on one, and its rims go over edges.
+    let wedge = "shape = \"wedge\"\nsize = [0.1, 0.1, 0.1]";
+    let prism = "shape = \"prism\"\nheight = 0.1\nsection = [[-0.05, -0.05], [0.05, -0.05], [0.02, 0.05], [-0.05, 0.05]]";
+    for (name, shape) in [("wedge", wedge), ("prism", prism)] {
+        let (mut worst, mut hits) = (0.0_f64, 0);
+        for k in 0..16_u32 {
+            let f = |n: f64| (f64::from(k + 1) * n).fract() - 0.5;
+            let turned = |a: f64, b: f64, c: f64| {
+                format!(
+                    "orientation = {{ axis = [{}, {}, {}], angle_deg = {} }}\nangular_velocity = [{}, {}, {}]",
+                    f(a),
+                    f(b),
+                    f(c),
+                    360.0 * f(a + b),
+                    20.0 * f(b + c),
+                    20.0 * f(c + a),
+                    20.0 * f(a * b)
+                )
+            };
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = 0.02\ntime_step = 2.5e-4\nend = 1\ngravity = [0, 0, 0]\n\
+                 [[body]]\nname = \"a\"\nshape = \"cylinder\"\nradius = 0.05\nheight = 0.1\ncenter = [-0.12, 0, 0]\nmass = 1\nvelocity = [1, 0, 0]\n{}\n\
+                 [[body]]\nname = \"b\"\n{shape}\ncenter = [0.12, {}, {}]\nmass = 2\nvelocity = [-1, 0, 0]\n{}\n\
+                 [contact]\nspring = 1e6\nrestitution = 1\n",
+                turned(0.618_034, 0.754_877, 0.569_84),
+                0.06 * f(0.819_17),
+                0.06 * f(0.671_04),
+                turned(0.549_7, 0.445_04, 0.324_7),
+            ));
+            let energy = |dry: &mut Dry| dry.solids.energy().kinetic;
+            let start = energy(&mut dry);
+            let mut touched = false;
+            while dry.time() < 0.25 {
+                touched |= dry.try_step().unwrap().pairs > 0;
+            }
+            let gain = energy(&mut dry) / start - 1.0;
+            println!("{name} {k}: {touched} {gain:.5}");
+            hits += u32::from(touched);
+            worst = worst.max(gain.abs());
+        }
+        assert!(hits >= 10 && worst < 1e-2, "{name}: {worst} in {hits} impacts");
+    }
+}

@@ -92,8 +92,9 @@ pub(crate) fn around(distance: impl Fn(f64) -> (f64, f64), mut visit: impl FnMut
         (0..AROUND).for_each(|k| visit(k as f64 * turn, 1.0 / AROUND as f64));
         return;
     }
-    // stretches inside, in order; those that meet are one
+    // stretches inside, in order; those that meet are one, but for where it is deepest: next to an edge the distance has a kink there
     let mut arcs: Vec<(f64, f64)> = vec![];
+    let mut deepest: Vec<f64> = vec![];
     for k in 0..AROUND {
         let (here, next) = (samples[k], samples[(k + 1) % AROUND]);
         let (from, to) = (k as f64 * turn, (k + 1) as f64 * turn);
@@ -114,13 +115,19 @@ pub(crate) fn around(distance: impl Fn(f64) -> (f64, f64), mut visit: impl FnMut
         if here.1 < 0.0 && next.1 >= 0.0 {
             let lowest = root((from, here.1), (to, next.1), |t| distance(t).1);
             let low = (lowest, distance(lowest).0);
+            deepest.push(lowest);
             between((from, here.0), low);
             between(low, (to, next.0));
         } else {
             between((from, here.0), (to, next.0));
         }
     }
-    for (from, to) in arcs {
+    let halves = arcs.into_iter().flat_map(|(from, to)| {
+        let inside = deepest.iter().copied().filter(move |&t| from < t && t < to);
+        let ends: Vec<f64> = std::iter::once(from).chain(inside).chain([to]).collect();
+        ends.windows(2).map(|w| (w[0], w[1])).collect::<Vec<_>>()
+    });
+    for (from, to) in halves {
         let pieces = ((to - from) / (4.0 * turn)).ceil().max(2.0);
         let width = (to - from) / pieces;
         for piece in 0..pieces as usize {

@@ -3,7 +3,8 @@
 //! They have no points that turn with the body, or it would roll over its own lattice. A ball touches with its
 //! deepest point alone; the side of a cylinder with the deepest line along it; of a ring the arc inside is
 //! integrated. At a deepest point the depth does not change with the place on the body, so the force, the
-//! gradient of the depth at that point, is still minus the derivative of the energy.
+//! gradient of the depth at that point, is still minus the derivative of the energy; where the gradient jumps there, at an edge
+//! of the other, it is the mean of both sides that the depth does not change along.
 
 use super::frame::Frame;
 use crate::shape::{Inside, Ring, Side, Surface, along, around, root};
@@ -25,6 +26,8 @@ pub(super) struct Pressed {
 
 /// Slope of the depth along a circle that counts as none [-].
 const LEVEL: f64 = 1e-12;
+/// Angle beside the deepest point at which the depth is looked at: on the other side of an edge's plane.
+const BESIDE: f64 = 1e-7;
 /// First angle at which the other side of the deepest point of a circle is looked for; then twice that, and so on.
 const BRACKET: f64 = 0.02;
 
@@ -54,6 +57,28 @@ pub(super) fn press(own: &Frame, surface: &Surface, other: &Frame, share: f64, a
     }
     if let Some(side) = &surface.side {
         view.side(side, share, add);
+    }
+}
+
+/// The deepest point of a circle.
+struct Deepest {
+    at: DVec3,
+    /// Points right before and after it on the circle.
+    beside: [DVec3; 2],
+    /// Share of the first of these in the mean along which the depth does not change.
+    share: f64,
+}
+
+impl Deepest {
+    /// One with nothing particular beside it.
+    fn alone(at: DVec3) -> Self {
+        Self { at, beside: [at; 2], share: 0.5 }
+    }
+
+    /// The mean of a gradient that is `of` a point.
+    fn mean(&self, of: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let [before, after] = self.beside;
+        if before == after { of(self.at) } else { self.share * of(before) + (1.0 - self.share) * of(after) }
     }
 }
 
@@ -101,17 +126,27 @@ impl View<'_> {
         let length = 2.0 * side.half_height;
         let at = |s: f64| self.deepest(side, s - side.half_height);
         let distance = |s: f64| {
-            let (distance, gradient) = self.distance(at(s));
-            (distance, gradient.z)
+            let deepest = at(s);
+            (self.distance(deepest.at).0, deepest.mean(|p| self.distance(p).1).z)
         };
-        along(length, distance, |s, width| self.add(at(s), share * width / length, add));
+        along(length, distance, |s, width| {
+            let deepest = at(s);
+            let inside = |p: DVec3| self.other.shape.depth(self.turn * p + self.shift, self.other.faces);
+            if let Some(Inside { depth, outward, face }) = inside(deepest.at) {
+                let outward = deepest.mean(|p| inside(p).map_or(outward, |found| found.outward));
+                let at = self.own.center + self.own.axes * deepest.at;
+                let weight = share * width / length;
+                add(Pressed { at, normal: self.other.axes * outward, depth, weight, face });
+            }
+        });
     }
 
     /// The deepest point of the circle of a side at the height `z` [m]: where the depth does not change with the angle.
     ///
     /// Under a face the gradient at the axis leads there at once. Near an edge it turns within a depth, which is much
-    /// less than the circle, so that the zero is bracketed from there.
-    fn deepest(&self, side: &Side, z: f64) -> DVec3 {
+    /// less than the circle, so that the zero is bracketed from there. Where it turns at once, from one face of an edge to the
+    /// other, neither face is what the deepest point recedes from, but the mean of both along which the depth does not change.
+    fn deepest(&self, side: &Side, z: f64) -> Deepest {
         let axis = z * DVec3::Z;
         let at = |angle: f64| {
             let (sin, cos) = angle.sin_cos();
@@ -127,17 +162,21 @@ impl View<'_> {
         let straight = axis - side.radius * across;
         let tilt = self.distance(straight).1.dot(DVec3::new(across.y, -across.x, 0.0));
         if tilt.abs() < LEVEL {
-            return straight;
+            return Deepest::alone(straight);
         }
         let first = (f64::atan2(-across.y, -across.x), tilt);
         let mut step = -BRACKET * tilt.signum();
         while step.abs() < std::f64::consts::PI {
             let next = (first.0 + step, slope(first.0 + step));
             if next.1 * tilt <= 0.0 {
-                return at(root(first, next, slope)).0;
+                let angle = root(first, next, slope);
+                let beside = [angle - BESIDE, angle + BESIDE];
+                let [before, after] = beside.map(slope);
+                let share = if before < 0.0 && after > 0.0 { after / (after - before) } else { 0.5 };
+                return Deepest { at: at(angle).0, beside: beside.map(|angle| at(angle).0), share };
             }
             step *= 2.0;
         }
-        straight
+        Deepest::alone(straight)
     }
 }
