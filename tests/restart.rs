@@ -393,8 +393,14 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     let before = steps("wall");
     assert_eq!(case.run("wall", &["--max-wall", "0.3s", "--resume"]).code, 75);
     assert!(steps("wall") > before, "it went on");
-    for wrong in ["", "soon", "-3h", "0", "3x"] {
-        assert_eq!(case.run("wrong", &["--max-wall", wrong]).code, 2, "{wrong}");
+    assert_eq!(case.run("clock", &["--max-wall", "0:00.3"]).code, 75);
+    for wrong in ["", "soon", "-3h", "0", "3x", "1:2:3:4"] {
+        let told = case.run("wrong", &[&format!("--max-wall={wrong}")]);
+        assert!(
+            told.code == 2 && told.err.contains("1:30:00 (hours:minutes:seconds)"),
+            "{wrong}: {}",
+            told.err
+        );
     }
 }
 

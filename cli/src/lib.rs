@@ -18,6 +18,7 @@ mod setup;
 mod shell;
 mod signals;
 mod surface;
+mod typed;
 mod width;
 
 use clap::{Parser, Subcommand, ValueEnum};
