@@ -5,6 +5,7 @@ mod bench;
 mod compare;
 mod compare_runs;
 mod device;
+mod frames;
 mod init;
 mod keys;
 mod measure;
