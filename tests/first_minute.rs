@@ -151,3 +151,12 @@ fn a_run_says_what_plan_says_where_there_is_something_to_change() {
     );
     assert!(!run("1e-3").contains("time step"), "{}", run("1e-3"));
 }
+
+#[test]
+fn bench_without_a_case_says_what_to_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = seixo().current_dir(folder.path()).arg("bench").output().unwrap();
+    let err = String::from_utf8_lossy(&told.stderr);
+    let words = ["name the case to time, `seixo bench CASE", "seixo init"];
+    assert!(told.status.code() == Some(2) && words.iter().all(|w| err.contains(w)), "{err}");
+}
