@@ -272,3 +272,18 @@ fn what_is_told_of_folders_and_files_leads_on() {
     let told = ran(&["run", &case, "-o", &out, "--resume"]);
     assert!(told.code == 2 && told.err.contains("no `.seixo`"), "{}", told.err);
 }
+
+#[test]
+fn faces_that_are_not_there_are_not_offered() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    for (on, words) in [
+        ("tank.y_min", "`tank.y_min` has no wall to measure on"),
+        ("tank.y_min", "in two dimensions the tank has walls along x and z alone"),
+        ("nothing", "allowed: gate, tank.x_min, tank.x_max, tank.z_min\n"),
+    ] {
+        let set = format!("gauge.force=[{{name=\"f\",on=\"{on}\"}}]");
+        let told = ran(&["plan", &case, "--set", &set]);
+        assert!(told.code == 2 && told.err.contains(words), "{on}: {}", told.err);
+    }
+}
