@@ -227,12 +227,12 @@ impl Geometry for Polygon {
             stretches.sort_by(|a, b| b.length().total_cmp(&a.length()));
             for at in stretches.iter().flat_map(|s| s.divided(spacing)) {
                 let at = space(at);
-                if layer > 0 && thin.merges(at) {
+                let (distance, outward) = self.distance(at);
+                if layer > 0 && thin.merges(at, (-distance, outward)) {
                     continue;
                 }
                 if taken.nearest(at, APART * spacing).is_none() {
                     taken.add(at);
-                    let (distance, outward) = self.distance(at);
                     out.add(layer, at, DVec3::ZERO, -distance * outward);
                 }
             }
