@@ -193,7 +193,6 @@ fn what_is_wrong_with_a_section_is_said_with_its_key() {
     let prism = |rest: &str| format!("shape = \"prism\"\n{rest}");
     for (keys, key, part) in [
         (prism("height = 0.2"), "obstacle.0", "without `section`"),
-        (prism("section = [[0, 0], [0.2, 0], [0.2, 0.2]]"), "obstacle.0", "without `height`"),
         (prism("section = [[0, 0], [0.2, 0]]\nheight = 0.1"), "obstacle.0.section", "2 corners"),
         (
             prism("section = [[0, 0], [0.2, 0.2], [0.2, 0], [0, 0.2]]\nheight = 0.1"),

@@ -127,7 +127,8 @@ pub fn measure(args: &MeasureArgs) -> Exit {
 fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
     let mut points = args.points.clone();
     for [a, b] in &args.lines {
-        points.extend((0..args.count).map(|k| a.lerp(*b, f64::from(k) / f64::from(args.count - 1))));
+        // What both ends share stays as it was typed.
+        points.extend((0..args.count).map(|k| *a + f64::from(k) / f64::from(args.count - 1) * (*b - *a)));
     }
     if let Some(path) = &args.file {
         let listed = listed(path)?;
