@@ -111,6 +111,11 @@ impl Mesh {
         })
     }
 
+    /// Its triangles, which turn outwards.
+    pub fn faces(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        self.triangles.triangles().map(|triangle| [triangle.a, triangle.b, triangle.c])
+    }
+
     fn from_file(
         path: &str,
         scale: f64,
