@@ -39,7 +39,7 @@ fn many_bodies_are_not_told_one_by_one() {
     for k in 0..25 {
         let center = [0.1 * f64::from(k % 5) + 0.1, 0.1 * f64::from(k / 5) + 0.05, 0.1];
         text += &format!(
-            "[[body]]\nname = \"wedge {k}\"\nshape = \"wedge\"\nsize = [0.08, 0.08, 0.06]\ncenter = {center:?}\n\
+            "[[body]]\nname = \"wedge {k}\"\nshape = \"wedge\"\nsize = [0.08, 0.03, 0.06]\ncenter = {center:?}\n\
              density = {}\n",
             500 + k
         );
