@@ -119,7 +119,8 @@ impl Simulation {
         self.read(&gauges)
     }
 
-    /// [`Self::gauges`], of `gauges` that were found once for many readings: the walls that they are on take a while to find.
+    /// [`Self::gauges`], of `gauges` that were found once for many readings: the walls that they are on take a while
+    /// to find.
     ///
     /// # Errors
     /// A device that is lost.

@@ -49,8 +49,8 @@ impl BenchArgs {
         let own = || Some(PathBuf::from(OWN)).filter(|path| path.is_file());
         self.case.clone().or_else(own).ok_or_else(|| {
             let text = format!(
-                "name the case to time, `seixo bench CASE --spacings L,L,..`, e.g. one that `seixo init` writes: {OWN}, which is timed \
-                 without a name, is a file of seixo's repository and not here"
+                "name the case to time, `seixo bench CASE --spacings L,L,..`, e.g. one that `seixo init` writes: {OWN}, \
+                 which is timed without a name, is a file of seixo's repository and not here"
             );
             Error::usage("CASE", text)
         })

@@ -36,8 +36,8 @@ pub fn place(root: &Path, series: Option<&str>) -> PathBuf {
     series.map_or_else(|| root.to_path_buf(), |name| series_in(root, name))
 }
 
-/// The case of the run in `root`, and the frames of its `[output]`; with `series` those of that one, and what it chose stands in the case as
-/// the choice of `[output]`.
+/// The case of the run in `root`, and the frames of its `[output]`; with `series` those of that one, and what it
+/// chose stands in the case as the choice of `[output]`.
 ///
 /// # Errors
 /// As [`frames_of`]; [`Error::Usage`] if the case has no such series.
@@ -93,7 +93,8 @@ fn list_of(root: &Path, series: Option<&str>) -> PathBuf {
     place(root, series).join(format!("{name}.pvd"))
 }
 
-/// The frames of `all` nearest to each of `times`, or every `every`th, with their numbers; says so where a time is far from all of them.
+/// The frames of `all` nearest to each of `times`, or every `every`th, with their numbers; says so where a time is
+/// far from all of them.
 pub fn chosen(case: &Case, all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     let nearest = |t: &f64| {
         let distance = |k: &usize| (all[*k].time - t).abs();

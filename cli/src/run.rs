@@ -42,8 +42,8 @@ pub struct RunArgs {
     /// The same command can be given again until the run has reached its end.
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "", conflicts_with = "force")]
     resume: Option<String>,
-    /// Stop after this time by the clock with the state saved (exit code 75): seconds, or 1h30m, 90m, 2d, or as Slurm writes it, 1:30:00
-    /// (hours:minutes:seconds), 90:00 (minutes:seconds), 1-12:00:00 (days-hours:minutes:seconds).
+    /// Stop after this time by the clock with the state saved (exit code 75): seconds, or 1h30m, 90m, 2d, or as Slurm
+    /// writes it, 1:30:00 (hours:minutes:seconds), 90:00 (minutes:seconds), 1-12:00:00 (days-hours:minutes:seconds).
     #[arg(long, value_name = "TIME", value_parser = duration)]
     max_wall: Option<Duration>,
     /// Replace earlier results in the folder.

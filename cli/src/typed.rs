@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-const TIMES: &str = "write a time like 600 (seconds), 90s, 90m, 1h30m or 2d, or as Slurm does: 1:30:00 (hours:minutes:seconds), 90:00 \
-                     (minutes:seconds), 1-12:00:00 (days-hours:minutes:seconds)";
+const TIMES: &str = "write a time like 600 (seconds), 90s, 90m, 1h30m or 2d, or as Slurm does: 1:30:00 \
+                     (hours:minutes:seconds), 90:00 (minutes:seconds), 1-12:00:00 (days-hours:minutes:seconds)";
 
-/// A time by the clock: seconds, `1h30m`, or as Slurm writes it, `1-12:00:00`, `1:30:00` or `90:00`. A number alone is seconds, which Slurm
-/// takes for minutes.
+/// A time by the clock: seconds, `1h30m`, or as Slurm writes it, `1-12:00:00`, `1:30:00` or `90:00`. A number alone
+/// is seconds, which Slurm takes for minutes.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let text = text.trim();
     let seconds = if text.contains([':', '-']) { clock(text) } else { units(text) };
@@ -14,7 +14,8 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     time.ok_or_else(|| TIMES.to_owned())
 }
 
-/// The seconds of `days-hours`, `days-hours:minutes`, `days-hours:minutes:seconds`, `hours:minutes:seconds` or `minutes:seconds`.
+/// The seconds of `days-hours`, `days-hours:minutes`, `days-hours:minutes:seconds`, `hours:minutes:seconds` or
+/// `minutes:seconds`.
 fn clock(text: &str) -> Option<f64> {
     let (days, rest) = text.split_once('-').map_or((None, text), |(days, rest)| (Some(days), rest));
     let parts: Vec<&str> = rest.split(':').collect();

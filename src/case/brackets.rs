@@ -1,5 +1,6 @@
-//! Lists where a table belongs, and tables where a list of them does. Serde takes the values of a table from a list, too, in the order in which
-//! the keys happen to stand in the source: `orientation = [0, 0, 1]` would be told that its first number should be a list.
+//! Lists where a table belongs, and tables where a list of them does. Serde takes the values of a table from a list,
+//! too, in the order in which the keys happen to stand in the source: `orientation = [0, 0, 1]` would be told that
+//! its first number should be a list.
 
 use super::Case;
 use super::report::{Message, named};

@@ -157,8 +157,9 @@ impl Archive {
         Ok(())
     }
 
-    /// [`Archive::array`] of its own length that only some cases of a scene have, as those in which a body is free: it stays as it is where the
-    /// state holds none of it, and what the state holds is passed over where the case has none.
+    /// [`Archive::array`] of its own length that only some cases of a scene have, as those in which a body is free:
+    /// it stays as it is where the state holds none of it, and what the state holds is passed over where the case has
+    /// none.
     ///
     /// # Errors
     /// As [`Archive::array`].

@@ -1,5 +1,6 @@
-//! How thin a solid is. What counts is a plate, which particles cannot fill, and not a tip: a solid that ends in an edge is as thin as one likes
-//! near it, and its particles end a little before. How near to the edge somebody has put the pieces of its surface says nothing.
+//! How thin a solid is. What counts is a plate, which particles cannot fill, and not a tip: a solid that ends in an
+//! edge is as thin as one likes near it, and its particles end a little before. How near to the edge somebody has put
+//! the pieces of its surface says nothing.
 
 use glam::DVec3;
 
@@ -31,8 +32,8 @@ impl Way {
     }
 }
 
-/// Thickness [m] and place where a solid is thinnest, by `ways` from all pieces of its surface, with the `distance` of a point from that. Where
-/// it is tips for the most part, it is as thin as they are at most.
+/// Thickness [m] and place where a solid is thinnest, by `ways` from all pieces of its surface, with the `distance`
+/// of a point from that. Where it is tips for the most part, it is as thin as they are at most.
 pub(super) fn thinnest(ways: impl Iterator<Item = Way>, distance: impl Fn(DVec3) -> f64) -> (f64, DVec3) {
     let (mut plate, mut tip) = ((f64::INFINITY, DVec3::ZERO), (0.0, DVec3::ZERO));
     let (mut all, mut of_tips) = (0.0, 0.0);

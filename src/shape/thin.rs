@@ -31,8 +31,8 @@ impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
         Self { distance, spacing, plane }
     }
 
-    /// The middle between the side below which `at` lies, at a signed `distance` [m] and with the direction `outward`, and one that looks away from
-    /// it, if it is no deeper than `reach` [m] below `at`.
+    /// The middle between the side below which `at` lies, at a signed `distance` [m] and with the direction
+    /// `outward`, and one that looks away from it, if it is no deeper than `reach` [m] below `at`.
     fn middle(&self, at: DVec3, (distance, outward): (f64, DVec3), reach: f64) -> Option<DVec3> {
         let slack = EXACT * self.spacing;
         let beyond = |t: f64| -(self.distance)(at - t * outward).0 < t - distance - slack;
@@ -48,14 +48,14 @@ impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
         (other.dot(outward) < AWAY).then(|| at - 0.5 * (low + high) * outward)
     }
 
-    /// Whether a particle of a layer below the first at `at`, `depth` [m] below a side with the direction `outward`, has its like of another side so near
-    /// that one in the middle stands for both.
+    /// Whether a particle of a layer below the first at `at`, `depth` [m] below a side with the direction `outward`,
+    /// has its like of another side so near that one in the middle stands for both.
     pub fn merges(&self, at: DVec3, (depth, outward): (f64, DVec3)) -> bool {
         self.middle(at, (-depth, outward), MERGED * self.spacing).is_some()
     }
 
-    /// Places close to each other in those of `cells`, of the size of the spacing, that lie in a thin part. Each comes with its depth [m] and the
-    /// direction outwards.
+    /// Places close to each other in those of `cells`, of the size of the spacing, that lie in a thin part. Each
+    /// comes with its depth [m] and the direction outwards.
     pub fn beside(&self, cells: &[(DVec3, f64, DVec3)]) -> Vec<DVec3> {
         let part = self.spacing / 3.0;
         let steps = move || [0.0, -part, part].into_iter();

@@ -23,7 +23,8 @@ impl Table {
         Ok(Self::read_by(path, "")?.into_iter().next().map_or_else(Self::default, |(_, table)| table))
     }
 
-    /// The rows of the table at `path` for each text in the column `by`, in the order in which they come; all of them together if it is empty.
+    /// The rows of the table at `path` for each text in the column `by`, in the order in which they come; all of them
+    /// together if it is empty.
     ///
     /// # Errors
     /// As [`Table::read`].
@@ -103,7 +104,8 @@ fn unread(path: &Path, error: csv::Error) -> Error {
 /// The error of a table that no run wrote as it is.
 fn damaged(path: &Path, line: u64, why: &str) -> Error {
     let text = format!(
-        "line {line}: {why}; this is no table of seixo's, or somebody changed it: move it away to go on without it, or run the case again"
+        "line {line}: {why}; this is no table of seixo's, or somebody changed it: move it away to go on without it, or \
+         run the case again"
     );
     Error::io(path)(std::io::Error::new(std::io::ErrorKind::InvalidData, text))
 }

@@ -10,7 +10,8 @@ use crate::plan::{Arrays, Stage};
 use glam::{DMat3, DVec3, Vec3};
 use std::collections::BTreeMap;
 
-/// Rows of moving walls at slots, by their numbers, as the device holds them; zeros stand for those at no slot, also before the first upload.
+/// Rows of moving walls at slots, by their numbers, as the device holds them; zeros stand for those at no slot, also
+/// before the first upload.
 pub(super) type SlotRows = BTreeMap<usize, [[f32; 4]; 4]>;
 
 /// What makes the device hold `now` where it holds `before`: the first of each stretch of rows, and the rows of it.
