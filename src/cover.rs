@@ -107,11 +107,11 @@ impl Tiles {
     /// Of the faces around each of `centers`, `count` of them, the numbers of the `solids` that may reach before it. Each
     /// solid looks at the faces near it: a wall may have as many faces as there are solids. Centres that are those of a solid in its frame come
     /// with its pose and radius [m].
-    pub fn reached(
+    pub fn reached<'a>(
         &self,
         (centers, count): (&PointGrid, usize),
         of: Option<(&Pose, f64)>,
-        solids: &[Standing],
+        solids: impl IntoIterator<Item = &'a Standing>,
     ) -> Vec<Vec<usize>> {
         let mut out = vec![vec![]; count];
         let (origin, to_frame, size) = match of {
@@ -120,7 +120,7 @@ impl Tiles {
             }
             None => (DVec3::ZERO, DMat3::IDENTITY, 0.0),
         };
-        for (k, solid) in solids.iter().enumerate() {
+        for (k, solid) in solids.into_iter().enumerate() {
             let reach = solid.radius + 2.0 * self.spacing;
             for image in self.periodic.images(self.periodic.wrap(solid.position), reach + size) {
                 centers.near(to_frame * (image - origin), reach, |face| {

@@ -116,6 +116,15 @@ impl Simulation {
     /// [`Error::Case`] for a gauge on nothing, or a device that is lost.
     pub fn gauges(&mut self) -> Result<Vec<(String, f64)>> {
         let gauges = Gauges::new(&self.case, &self.scene)?;
+        self.read(&gauges)
+    }
+
+    /// [`Self::gauges`], of `gauges` that were found once for many readings: the walls that they are on take a while
+    /// to find.
+    ///
+    /// # Errors
+    /// A device that is lost.
+    pub fn read(&mut self, gauges: &Gauges) -> Result<Vec<(String, f64)>> {
         let value = |cell| if let Cell::Number(value) = cell { value } else { f64::NAN };
         let row = gauges.row(self)?.into_iter().map(value);
         // The first column is the time.

@@ -370,3 +370,49 @@ fn a_dry_case_runs_with_its_contact_on_the_gpu_and_is_refused_on_the_cpu() {
     let force = simulation.solids.contact_wrenches()[1].force.z / (0.5 * 9.806_65);
     assert!(force > 0.1, "the floor carries the cube: {force}");
 }
+
+#[test]
+fn walls_are_told_the_same_by_the_device() {
+    if !device() {
+        return;
+    }
+    for law in [Law::Smooth, Law::Paper] {
+        let mut dry = DryScene::new(0.02, DVec3::splat(-1.0), DVec3::splat(1.0)).floor();
+        if law == Law::Paper {
+            dry = dry.particle_floor((-0.5, -0.5), (0.5, 0.5));
+        } else {
+            // its face lies at x = 0.05, turned a little
+            dry =
+                dry.wall(DVec3::new(0.15, 0.0, 0.1), DVec3::new(0.1, 0.4, 0.3), DMat3::from_rotation_z(0.01));
+        }
+        let mut body = FreeBox::new(DVec3::splat(0.1), 800.0, DVec3::new(0.0, 0.0, 0.049));
+        body.velocity = DVec3::new(1.0, 0.3, -0.2);
+        body.angular_velocity = DVec3::new(0.0, 1.0, 0.5);
+        let scene = dry.body(&body).build();
+        let friction = if law == Law::Paper { 0.0 } else { 0.3 };
+        let contact = Contact { friction, ..contact(law) };
+        let mut gpu = compute(&scene, &contact);
+        let made = || Solids::new(&scene, Some(&contact)).expect("valid");
+        let (mut on_host, mut on_device) = (made(), made());
+        let water = vec![Wrench::default(); 1];
+        for step in 0..3 {
+            let t = f64::from(step) * 1e-4;
+            on_host.advance(t, 1e-4, &water).expect("the host can");
+            on_device.advance_on(gpu.compute(), t, 1e-4, &water).expect("the device can");
+        }
+        let host = on_host.wall_contact_wrenches().expect("the host knows");
+        let Some(device) = on_device.wall_contact_wrenches() else {
+            // all walls are one to this law on a device
+            assert_eq!(law, Law::Paper);
+            assert!(host[0].force.z < -1.0, "{host:?}");
+            continue;
+        };
+        assert_eq!(law, Law::Smooth);
+        let most = host.iter().map(|w| w.force.length()).fold(0.0, f64::max);
+        for (h, d) in host.iter().zip(device) {
+            let off = (h.force - d.force).length().max((h.torque - d.torque).length());
+            println!("{law:?}: {h:?}, off by {off:e}");
+            assert!(off < 1e-4 * most && h.force.length() > 1e-2 * most, "{h:?} {d:?}");
+        }
+    }
+}

@@ -85,6 +85,19 @@ fn what_is_far_is_refused_by_its_numbers_with_its_key() {
         let told = told(&[set]).expect_err(set);
         assert!(told.contains(key) && told.contains("lengths are metres"), "{set}: `{key}` is not in {told}");
     }
+    // All of several that are equally far out.
+    let more =
+        |x: f64, z: f64| format!("{{name=\"b{z}\",center=[{x},0.05,{z}],size=[0.1,0.1,0.1],density=500}}");
+    for bodies in [
+        [more(0.2, 50000.0), more(0.7, 50000.5), more(0.5, 0.2)],
+        [more(0.2, 40000.0), more(0.7, 60000.0), more(0.5, 0.2)],
+        [more(0.2, 50000.0), more(0.7, -50000.0), more(0.5, 0.2)],
+    ] {
+        let set = format!("body=[{}]", bodies.join(","));
+        let told = told(&[&set]).expect_err(&set);
+        let keys = ["body.0.center: it reaches to z", "body.1.center: it reaches to z"];
+        assert!(keys.iter().all(|key| told.contains(key)) && !told.contains("body.2"), "{set}: {told}");
+    }
     // The same from a program, at once and with a line of the file.
     let told = ran_on(SCENE, &["--set", "body.0.center=[0.7,0.05,50000]"]);
     assert!(told.code == 2 && told.err.contains("| center = [0.7,0.05,50000]"), "{}", told.err);
@@ -101,6 +114,9 @@ fn what_is_long_for_a_reason_is_no_slip() {
             "moving_wall.0.pivot=[0.8,0,50]",
             "moving_wall.0.rotation=[[0,0,0,0],[1,0,0.05,0]]",
         ],
+        // Plates much longer than the rest.
+        &["plane=[{name=\"p\",center=[0.5,0,-0.2],normal=[0,0,1],along=[1,0,0],size=[300,0.1]},\
+             {name=\"q\",center=[0.5,0,-0.5],normal=[0,0,1],along=[1,0,0],size=[300,0.1]}]"],
         // A flood of the whole length.
         &["tank.max=[10000,0.1,0.4]", "fluid.block=[]", "fluid.fill=[{seed=[0.2,0,0.1],level=0.2}]"],
     ] {

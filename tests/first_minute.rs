@@ -39,7 +39,7 @@ fn many_bodies_are_not_told_one_by_one() {
     for k in 0..25 {
         let center = [0.1 * f64::from(k % 5) + 0.1, 0.1 * f64::from(k / 5) + 0.05, 0.1];
         text += &format!(
-            "[[body]]\nname = \"wedge {k}\"\nshape = \"wedge\"\nsize = [0.08, 0.08, 0.06]\ncenter = {center:?}\n\
+            "[[body]]\nname = \"wedge {k}\"\nshape = \"wedge\"\nsize = [0.08, 0.03, 0.06]\ncenter = {center:?}\n\
              density = {}\n",
             500 + k
         );
@@ -150,4 +150,13 @@ fn a_run_says_what_plan_says_where_there_is_something_to_change() {
         run("8e-3")
     );
     assert!(!run("1e-3").contains("time step"), "{}", run("1e-3"));
+}
+
+#[test]
+fn bench_without_a_case_says_what_to_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = seixo().current_dir(folder.path()).arg("bench").output().unwrap();
+    let err = String::from_utf8_lossy(&told.stderr);
+    let words = ["name the case to time, `seixo bench CASE", "seixo init"];
+    assert!(told.status.code() == Some(2) && words.iter().all(|w| err.contains(w)), "{err}");
 }

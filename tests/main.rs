@@ -24,6 +24,7 @@ mod faults;
 mod filled;
 mod first_minute;
 mod fluid;
+mod frames;
 mod fuzz;
 mod gauges;
 mod guide;

@@ -132,3 +132,43 @@ fn a_report_works_in_a_browser() {
     assert_eq!(title, expected, "{log}");
     assert!(!log.contains("CONSOLE"), "{log}");
 }
+
+#[test]
+fn a_table_that_no_run_wrote_is_named_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("out");
+    let out = root.display().to_string();
+    assert_eq!(ran(&["run", &case, "-o", &out, "--backend", "cpu", "-q", "--steps", "3"]).code, 0);
+    let other = folder.path().join("other").display().to_string();
+    assert_eq!(ran(&["run", &case, "-o", &other, "--backend", "cpu", "-q", "--steps", "3"]).code, 0);
+    let page = folder.path().join("page.html").display().to_string();
+    for (name, held, words) in [
+        ("gauges.csv", &b"a;b\n1;2\n"[..], "line 1: it has no column `time [s]`"),
+        ("bodies.csv", b"time [s],x\n1,2\n", "line 1: it has no column `body`"),
+        ("monitors.csv", b"time [s],x\n0,1\n1,2,3\n2,3\n", "line 3: it has 3 values, the line of names 2"),
+        ("monitors.csv", b"time [s],x\n0,1\nsoon,3\n2,3\n", "line 3: its `time [s]` is no number"),
+        ("monitors.csv", b"time [s],\xff\n", "line 1: it is no text in UTF-8"),
+        ("gauges.csv", b"time [s],x\n0,1\n1,\xff\n2,1\n", "line 3: it is no text in UTF-8"),
+    ] {
+        let file = root.join(name);
+        let own = std::fs::read(&file).ok();
+        std::fs::write(&file, held).unwrap();
+        for args in
+            [&["report", &out, "-q", "--pictures", "0"][..], &["compare-runs", &other, &out, "-o", &page]]
+        {
+            let told = ran(args);
+            let words = [&format!("{name}: {words}"), "move it away"];
+            assert!(told.code == 5 && words.iter().all(|w| told.err.contains(*w)), "{args:?}: {}", told.err);
+        }
+        match own {
+            Some(own) => std::fs::write(&file, own).unwrap(),
+            None => std::fs::remove_file(&file).unwrap(),
+        }
+    }
+    // A run in progress may be in the middle of its last row.
+    let file = root.join("monitors.csv");
+    let own = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &own[..own.len() - 9]).unwrap();
+    assert_eq!(ran(&["report", &out, "-q", "--pictures", "0"]).code, 0);
+}

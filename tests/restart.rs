@@ -362,6 +362,31 @@ fn a_state_starts_another_case() {
     );
 }
 
+/// What is lowered is let go: a state of a scene in which no body is free has no answer of theirs to the water.
+#[test]
+fn a_body_that_is_driven_in_a_state_is_free_from_then_on() {
+    for backend in ["cpu", "gpu"] {
+        let body = |more: &str| {
+            let rest = "size=[0.2,0.05,0.2],center=[0.25,0,0.62],density=500";
+            format!("body=[{{name=\"caisson\",{rest}{more}}}]")
+        };
+        let lowered = [&body(",motion=[[0,0,0,0],[0.04,0,0,-0.06]]"), "contact.spring=1e5", "run.end=0.05"];
+        let case = Case::new(&lowered, backend);
+        let first = case.run("first", &[]);
+        assert_eq!(first.code, 0, "{backend}: {}", first.err);
+        let from = format!("run.from=\"{}\"", case.root("first").display());
+        let freed = Case::new(&[&body(""), "contact.spring=1e5", &from, "run.end=0.15"], backend);
+        let second = freed.run("second", &[]);
+        assert_eq!(second.code, 0, "{backend}: {}", second.err);
+        let table = std::fs::read_to_string(freed.root("second").join("bodies.csv")).unwrap();
+        let rows = table.lines().skip(1).filter(|l| l.split(',').nth(1) == Some("caisson"));
+        let heights: Vec<f64> = rows.map(|l| l.split(',').nth(4).unwrap().parse().unwrap()).collect();
+        let (start, end) = (heights[0], heights[heights.len() - 1]);
+        // Too high for its weight, it sinks.
+        assert!((start - 0.56).abs() < 1e-6 && end < start - 0.005, "{backend}: {start} to {end}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
@@ -393,8 +418,14 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     let before = steps("wall");
     assert_eq!(case.run("wall", &["--max-wall", "0.3s", "--resume"]).code, 75);
     assert!(steps("wall") > before, "it went on");
-    for wrong in ["", "soon", "-3h", "0", "3x"] {
-        assert_eq!(case.run("wrong", &["--max-wall", wrong]).code, 2, "{wrong}");
+    assert_eq!(case.run("clock", &["--max-wall", "0:00.3"]).code, 75);
+    for wrong in ["", "soon", "-3h", "0", "3x", "1:2:3:4"] {
+        let told = case.run("wrong", &[&format!("--max-wall={wrong}")]);
+        assert!(
+            told.code == 2 && told.err.contains("1:30:00 (hours:minutes:seconds)"),
+            "{wrong}: {}",
+            told.err
+        );
     }
 }
 

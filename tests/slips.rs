@@ -1,6 +1,6 @@
 //! Values that run but are hardly meant: each is warned of or refused, and what is told leads on.
 
-use crate::cli::{ran, small_case};
+use crate::cli::{json, ran, small_case};
 use seixo::case::file::parse;
 use std::path::Path;
 
@@ -271,4 +271,78 @@ fn what_is_told_of_folders_and_files_leads_on() {
     }
     let told = ran(&["run", &case, "-o", &out, "--resume"]);
     assert!(told.code == 2 && told.err.contains("no `.seixo`"), "{}", told.err);
+}
+
+#[test]
+fn faces_that_are_not_there_are_not_offered() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    for (on, words) in [
+        ("tank.y_min", "`tank.y_min` has no wall to measure on"),
+        ("tank.y_min", "in two dimensions the tank has walls along x and z alone"),
+        ("nothing", "allowed: gate, tank.x_min, tank.x_max, tank.z_min\n"),
+    ] {
+        let set = format!("gauge.force=[{{name=\"f\",on=\"{on}\"}}]");
+        let told = ran(&["plan", &case, "--set", &set]);
+        assert!(told.code == 2 && told.err.contains(words), "{on}: {}", told.err);
+    }
+}
+
+#[test]
+fn a_disc_needs_no_length_unless_its_mass_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let disc =
+        |more: &str| format!("body=[{{name=\"d\",shape=\"cylinder\",radius=0.1,center=[1.2,0,0.6]{more}}}]");
+    let told = |more: &str| {
+        let sets = ["--set", &disc(more), "--set", "contact={spring=1e5}"];
+        ran(&[&["plan", &case, "--json"], &sets[..]].concat())
+    };
+    let mass = |more: &str| json(&told(more).out)["bodies"][0]["mass_kg"].as_f64().unwrap();
+    let [with, without] = ["density=500,height=0.4", "density=500"].map(|more| mass(&format!(",{more}")));
+    assert!((with - without).abs() < 1e-12 * with, "{with} {without}");
+    // An eighth of 0.4 m is the slice.
+    assert!((mass(",mass=4,height=0.4") - 0.5).abs() < 1e-12);
+    for more in [",mass=4", ",density=500,inertia=[0.1,0.1,0.1]"] {
+        let told = told(more);
+        assert!(told.code == 2 && told.err.contains("add `height` [m]"), "{more}: {}", told.err);
+    }
+}
+
+#[test]
+fn a_shape_that_was_forgotten_is_all_that_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    for (set, key, shape) in [
+        ("obstacle=[{name=\"o\",file=\"o.stl\",position=[1,0,0]}]", "obstacle.0.file", "mesh"),
+        ("body=[{name=\"b\",section=[[0,0],[1,0],[1,1]],center=[1,0,0]}]", "body.0.section", "prism"),
+        ("body=[{name=\"b\",radius=0.1,center=[1,0,0],density=500}]", "body.0.radius", "cylinder"),
+        ("moving_wall=[{name=\"w\",radius=0.1,center=[1,0,0]}]", "moving_wall.0.radius", "cylinder"),
+        ("fluid.shape=[{radius=0.1,center=[1,0,0.5]}]", "fluid.shape.0.radius", "cylinder"),
+    ] {
+        let told = ran(&["plan", &case, "--set", set, "--set", "contact={spring=1e5}"]);
+        let about = told.err.lines().filter(|l| l.starts_with("error") && l.contains(key)).count();
+        let words = format!("add shape = \"{shape}\"");
+        assert!(told.code == 2 && about == 1 && told.err.contains(&words), "{set}: {}", told.err);
+        assert!(!told.err.contains("does not belong"), "{set}: {}", told.err);
+    }
+}
+
+#[test]
+fn a_plan_tells_solids_that_move_from_those_that_do_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let pier = "obstacle=[{name=\"pier\",shape=\"cylinder\",radius=0.1,center=[1.2,0,0.1]}]";
+    let told = ran(&["plan", &case, "--set", pier]);
+    let lines = ["  moving solids: gate\n", "  fixed solids of any shape: pier\n"];
+    assert!(told.code == 0 && lines.iter().all(|l| told.out.contains(l)), "{}{}", told.out, told.err);
+    let disc = |k: usize| {
+        format!(
+            "{{name=\"b{k}\",shape=\"cylinder\",radius=0.05,density=500,center=[{},0,0.9]}}",
+            0.2 + 0.11 * k as f64
+        )
+    };
+    let bodies = format!("body=[{}]", (0..16).map(disc).collect::<Vec<_>>().join(","));
+    let told = ran(&["plan", &case, "--set", &bodies, "--set", "contact={spring=1e5}"]);
+    assert!(told.code == 0 && told.out.contains("b11 and 5 more\n"), "{}{}", told.out, told.err);
 }

@@ -14,9 +14,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct BenchArgs {
-    /// The case; cases/dam_break_transport.toml if absent.
-    #[arg(default_value = "cases/dam_break_transport.toml")]
-    case: PathBuf,
+    /// The case; in seixo's repository cases/dam_break_transport.toml if absent.
+    case: Option<PathBuf>,
     /// Spacings l0 [m] to time.
     #[arg(long, value_delimiter = ',', default_value = "0.03,0.02,0.015,0.01,0.0075,0.006")]
     spacings: Vec<f64>,
@@ -40,6 +39,22 @@ pub struct BenchArgs {
     /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
+}
+
+/// The case that is timed where none is named, of a checkout.
+const OWN: &str = "cases/dam_break_transport.toml";
+
+impl BenchArgs {
+    fn case(&self) -> Result<PathBuf> {
+        let own = || Some(PathBuf::from(OWN)).filter(|path| path.is_file());
+        self.case.clone().or_else(own).ok_or_else(|| {
+            let text = format!(
+                "name the case to time, `seixo bench CASE --spacings L,L,..`, e.g. one that `seixo init` writes: {OWN}, \
+                 which is timed without a name, is a file of seixo's repository and not here"
+            );
+            Error::usage("CASE", text)
+        })
+    }
 }
 
 /// How a file of results begins, and nobody else's.
@@ -77,7 +92,7 @@ fn choices(args: &DeviceArgs) -> Vec<BackendName> {
 
 fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -> Result<Option<Row>> {
     let changes = Changes { spacing: Some(spacing), sets: args.sets.clone(), until: None };
-    let case = CaseArgs { case: args.case.clone(), changes };
+    let case = CaseArgs { case: args.case()?, changes };
     let setup = Setup::new(&case, true)?;
     let end = setup.loaded.case.run.end;
     if !(0.0..=end).contains(&args.from) {
@@ -104,6 +119,7 @@ fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -
 
 pub fn bench(args: &BenchArgs) -> Exit {
     seixo::threads::start(args.device.threads)?;
+    let case = args.case()?;
     args.out.iter().try_for_each(|path| spare(path, MARK))?;
     let host = host_bandwidth();
     let (mut rows, mut growth) = (Vec::new(), Vec::new());
@@ -126,7 +142,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
         commit: commit(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         adapters: adapters(),
-        case: args.case.display().to_string(),
+        case: case.display().to_string(),
         sets: args.sets.clone(),
         rows,
         growth,

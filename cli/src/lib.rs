@@ -5,6 +5,7 @@ mod bench;
 mod compare;
 mod compare_runs;
 mod device;
+mod frames;
 mod init;
 mod keys;
 mod measure;
@@ -18,6 +19,7 @@ mod setup;
 mod shell;
 mod signals;
 mod surface;
+mod typed;
 mod width;
 
 use clap::{Parser, Subcommand, ValueEnum};

@@ -1,6 +1,7 @@
 //! `seixo measure`: velocity and pressure at points of one's choice, from the frames that a run has written.
 
-use super::render::{chosen, numbers, series_of, without};
+use super::frames::{chosen, held, series_of, without};
+use super::render::numbers;
 use super::{Exit, counted, finite};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,7 +10,6 @@ use seixo::case::file::read_text;
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
 use seixo::output::particles::Particles;
-use seixo::output::replay::particles;
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use seixo::periodic::Periodic;
@@ -74,8 +74,8 @@ pub fn measure(args: &MeasureArgs) -> Exit {
     let points = points(args)?;
     args.out.iter().try_for_each(|path| spare(path, &(HEADER.join(",") + "\n")))?;
     let (case, frames) = series_of(&args.dir, args.series.as_deref())?;
-    let held = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
-    if held == [false; 2] {
+    let known = [OutputField::Velocity, OutputField::Pressure].map(|f| case.output.fields.contains(&f));
+    if known == [false; 2] {
         let text = format!(
             "the frames of {} hold neither velocity nor pressure: output.fields of its case leaves them out",
             args.dir.display()
@@ -91,40 +91,40 @@ pub fn measure(args: &MeasureArgs) -> Exit {
         flat: run.dimensions == 2,
         periodic: Periodic::new(along, low.into(), high.into()),
     };
-    let chosen = chosen(&frames, &args.times, args.every);
-    if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
-        return Err(without("frames with water", &args.dir, &case, args.series.as_deref()));
-    }
+    let chosen = chosen(&case, &frames, &args.times, args.every);
     let mut table = csv::Writer::from_writer(Vec::new());
     let unwritten = |e: csv::Error| Error::io("table")(e.into());
     table.write_record(HEADER).map_err(unwritten)?;
-    let mut dry = 0;
-    for (_, frame) in &chosen {
-        let Some(path) = &frame.fluid else { continue };
-        let water = particles(path)?;
+    let (mut rows, mut dry) = (0, 0);
+    for (k, frame) in &chosen {
+        let Some(water) = frame.fluid.as_ref().and_then(|path| held(*k, path)) else { continue };
+        rows += points.len();
         let values: Vec<Option<Value>> = points.par_iter().map(|&x| probe.at(values(&water), x)).collect();
         for (x, value) in points.iter().zip(values) {
             let place = [frame.time, x.x, x.y, x.z].map(|v| v.to_string());
-            let number = |x: f64, held: bool| if held { x.to_string() } else { String::new() };
+            let number = |x: f64, known: bool| if known { x.to_string() } else { String::new() };
             let found = value.map(|v| {
-                let [x, y, z] = v.velocity.to_array().map(|x| number(x, held[0]));
-                [x, y, z, number(v.pressure, held[1])]
+                let [x, y, z] = v.velocity.to_array().map(|x| number(x, known[0]));
+                [x, y, z, number(v.pressure, known[1])]
             });
             dry += usize::from(found.is_none());
             table.write_record(place.into_iter().chain(found.unwrap_or_default())).map_err(unwritten)?;
         }
     }
+    if rows == 0 {
+        return Err(without("frames with water", &args.dir, &case, args.series.as_deref()));
+    }
     let bytes = table.into_inner().map_err(|e| Error::io("table")(e.into_error()))?;
-    for (what, _) in [("velocity", held[0]), ("pressure", held[1])].iter().filter(|(_, held)| !held) {
+    for (what, _) in [("velocity", known[0]), ("pressure", known[1])].iter().filter(|(_, known)| !known) {
         remark(&format!("note: no {what}: output.fields of the case leaves it out"));
     }
-    if dry == points.len() * chosen.len() {
+    if dry == rows {
         remark("note: no point lies in the water at any of these times");
     }
     match &args.out {
         Some(path) => {
             write_whole(path, &bytes)?;
-            say(&format!("{} in {}", counted(points.len() * chosen.len(), "row"), path.display()));
+            say(&format!("{} in {}", counted(rows, "row"), path.display()));
         }
         None => say(String::from_utf8_lossy(&bytes).trim_end()),
     }
@@ -135,7 +135,8 @@ pub fn measure(args: &MeasureArgs) -> Exit {
 fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
     let mut points = args.points.clone();
     for [a, b] in &args.lines {
-        points.extend((0..args.count).map(|k| a.lerp(*b, f64::from(k) / f64::from(args.count - 1))));
+        // What both ends share stays as it was typed.
+        points.extend((0..args.count).map(|k| *a + f64::from(k) / f64::from(args.count - 1) * (*b - *a)));
     }
     if let Some(path) = &args.file {
         let listed = listed(path)?;

@@ -154,7 +154,10 @@ struct Report {
     adaptive: bool,
     end_s: f64,
     particles: seixo::output::result::Particles,
+    /// Those that move.
     solids: Vec<String>,
+    /// Those that do not, and stand on no lattice of the water.
+    fixed_solids: Vec<String>,
     waves: Vec<WaveLine>,
     bodies: Vec<BodyLine>,
     stages: Vec<StageLine>,
@@ -235,6 +238,9 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let dt = shortest(case, scene, &params);
     let mut advice = if plan.wet() { step_advice(&params, case, speed).0 } else { vec![] };
     advice.extend(many_steps(case, dt));
+    let called = |still: bool| -> Vec<String> {
+        scene.solids.iter().filter(|s| s.is_still() == still).map(|s| s.name.clone()).collect()
+    };
     let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
     if built {
         // What `run` refuses.
@@ -294,7 +300,8 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         adaptive: case.run.adaptive,
         end_s: case.run.end,
         particles: count,
-        solids: scene.solids.iter().map(|s| s.name.clone()).collect(),
+        solids: called(false),
+        fixed_solids: called(true),
         bodies: scene.solids.iter().filter_map(BodyLine::new).collect(),
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),

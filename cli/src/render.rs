@@ -1,23 +1,22 @@
 //! `seixo render`: pictures of the frames that a run wrote.
 
+use super::frames::{chosen, held, place, series_of, without};
 use super::{Exit, counted};
 use clap::ValueEnum;
 use glam::DVec3;
 use rayon::prelude::*;
-use seixo::case::file::load;
 use seixo::case::{Case, OutputKind};
 use seixo::console::{remark, tell};
-use seixo::error::{Error, FolderError, Result};
-use seixo::output::folder::{case_name, series_in};
+use seixo::error::{Error, Result};
 use seixo::output::label::{Picture, animation, sheet};
 use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
-use seixo::output::replay::{Frame, flaw, frames, particles};
+use seixo::output::replay::{Frame, particles};
 use seixo::output::spare::spare_folder;
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::scene::Scene;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct RenderArgs {
@@ -223,13 +222,13 @@ impl Show {
     /// The run of `case`, of which `frames` are shown, seen as `look` says.
     ///
     /// # Errors
-    /// A folder without a run, a case or a frame that cannot be read any more.
-    pub fn open(case: &Case, look: &LookArgs, frames: &[&Frame]) -> Result<Self> {
+    /// A case that cannot be built any more, a look that shows nothing.
+    pub fn open(case: &Case, look: &LookArgs, frames: &[(usize, Frame)]) -> Result<Self> {
         let scene = Scene::build(case)?;
         let params = Params::new(case, &scene)?;
         let mut style = look.style(case)?;
         if style.range.is_none() {
-            style.range = range_of(frames, &style, &params)?;
+            style.range = range_of(frames, &style, &params);
         }
         Ok(Self { painter: Painter::new(&scene, &style, &params), scene })
     }
@@ -254,168 +253,68 @@ impl Show {
         notes
     }
 
-    /// The picture of a frame.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn picture(&self, frame: &Frame) -> Result<Picture> {
-        let read = |path: &Option<PathBuf>| path.as_deref().map_or(Ok(Particles::default()), particles);
+    /// The picture of frame number `k`; nothing, and says so, if it cannot be read.
+    pub fn picture(&self, (k, frame): &(usize, Frame)) -> Option<Picture> {
+        let read = |path: &Option<PathBuf>| match path {
+            Some(path) => held(*k, path),
+            None => Some(Particles::default()),
+        };
         let (fluid, solids) = (read(&frame.fluid)?, read(&frame.solids)?);
         let poses = placed_by(&self.scene, &solids);
-        Ok(self.painter.paint(&self.scene, frame.time, &poses, drops_of(&fluid)))
+        Some(self.painter.paint(&self.scene, frame.time, &poses, drops_of(&fluid)))
     }
 }
 
 /// Frames that are looked at for the range of the colours.
 const LOOKED_AT: usize = 5;
 
-/// The range of what `frames` show, from some of them.
-fn range_of(frames: &[&Frame], style: &Style, params: &Params) -> Result<Option<[f64; 2]>> {
+/// The range of what `frames` show, from some of them. What cannot be read is told of when it is to be drawn.
+fn range_of(frames: &[(usize, Frame)], style: &Style, params: &Params) -> Option<[f64; 2]> {
     let step = frames.len().div_ceil(LOOKED_AT).max(1);
-    let mut values = Vec::new();
     // From the end on, so that a start from rest alone sets no range.
-    for path in frames.iter().rev().step_by(step).filter_map(|f| f.fluid.as_deref()) {
-        let water = particles(path)?;
-        values.extend(drops_of(&water).map(|drop| style.field.of(&drop, params.number_density)));
-    }
-    Ok(style.field.range(&mut values))
-}
-
-/// The frames of the run in `root`.
-///
-/// # Errors
-/// [`FolderError::NoRun`], [`Error::Io`].
-pub fn frames_of(root: &Path) -> Result<Vec<Frame>> {
-    let none = || FolderError::NoRun(root.to_path_buf());
-    let name = case_name(root)?.filter(|n| !n.is_empty()).ok_or_else(none)?;
-    listed(root, &name)
-}
-
-/// The frames that the list `name` in `root` names; says so if it is cut off.
-fn listed(root: &Path, name: &str) -> Result<Vec<Frame>> {
-    let list = root.join(format!("{name}.pvd"));
-    if let Some(why) = flaw(&list).filter(|_| list.exists()) {
-        remark(&format!("warning: {why}: frames that it does not name are left out"));
-    }
-    frames(root, name)
-}
-
-/// Where the frames of `[output]`, or of a series, of the run in `root` lie.
-pub fn place(root: &Path, series: Option<&str>) -> PathBuf {
-    series.map_or_else(|| root.to_path_buf(), |name| series_in(root, name))
-}
-
-/// The case of the run in `root`, and the frames of its `[output]`; with `series` those of that one, and what it chose stands in the case as
-/// the choice of `[output]`.
-///
-/// # Errors
-/// As [`frames_of`]; [`Error::Usage`] if the case has no such series.
-pub fn series_of(root: &Path, series: Option<&str>) -> Result<(Case, Vec<Frame>)> {
-    let Some(name) = series else {
-        let frames = frames_of(root)?;
-        return Ok((load(&root.join("case.toml"), None, &[])?.case, frames));
-    };
-    if case_name(root)?.is_none() {
-        return Err(FolderError::NoRun(root.to_path_buf()).into());
-    }
-    let mut case = load(&root.join("case.toml"), None, &[])?.case;
-    let Some(named) = case.output.series.iter().find(|s| s.name == name).cloned() else {
-        let names: Vec<&str> = case.output.series.iter().map(|s| s.name.as_str()).collect();
-        let there = if names.is_empty() { "none".into() } else { names.join(", ") };
-        let text = format!(
-            "the case of {} has no output.series called `{name}`; there are: {there}",
-            root.display()
-        );
-        return Err(Error::usage("--series", text));
-    };
-    let output = &mut case.output;
-    (output.every, output.kinds, output.fields, output.region) =
-        (named.every, named.kinds, named.fields, named.region);
-    let frames = listed(&series_in(root, name), name)?;
-    Ok((case, frames))
-}
-
-/// The error of a run in `root` without `frames` ("frames", "frames with water"), and why there are none.
-pub fn without(frames: &str, root: &Path, case: &Case, series: Option<&str>) -> Error {
-    let others = case.output.series.first().filter(|_| series.is_none());
-    let others = others.map_or(String::new(), |s| format!("; its series has its own: --series {}", s.name));
-    let output = &case.output;
-    let wet = frames.contains("water");
-    let list = list_of(root, series);
-    let why = if output.every == 0.0 {
-        "the case has output.every = 0".to_owned()
-    } else if wet && case.fluid.is_none() {
-        "the case has no water".to_owned()
-    } else if wet && !output.kinds.contains(&OutputKind::Fluid) {
-        "output.kinds leaves it out".to_owned()
-    } else if std::fs::read_to_string(&list).is_ok_and(|text| text.contains("<DataSet ")) {
-        format!("the files that {} names cannot be read any more", list.display())
-    } else {
-        format!("the list of them, {}, is gone or names none", list.display())
-    };
-    Error::usage("DIR", format!("{} holds no {frames}: {why}{others}", root.display()))
-}
-
-/// The list of the frames of the run in `root`, or of a series of it.
-fn list_of(root: &Path, series: Option<&str>) -> PathBuf {
-    let name = series.map(str::to_owned).or_else(|| case_name(root).ok().flatten()).unwrap_or_default();
-    place(root, series).join(format!("{name}.pvd"))
-}
-
-/// The frames nearest to each of `times`, or every `every`th, with their numbers.
-pub fn chosen(all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
-    let nearest = |t: &f64| {
-        let distance = |k: &usize| (all[*k].time - t).abs();
-        (0..all.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
-    };
-    let picked: Vec<usize> = if times.is_empty() {
-        (0..all.len()).step_by(every as usize).collect()
-    } else {
-        times.iter().filter_map(nearest).collect()
-    };
-    let there = picked.into_iter().filter(|&k| is_there(k, &all[k]));
-    there.map(|k| (k, all[k].clone())).collect()
-}
-
-/// Whether the files of frame number `k` are there and whole; says so if one is not.
-pub fn is_there(k: usize, frame: &Frame) -> bool {
-    let why = [&frame.fluid, &frame.solids].into_iter().flatten().find_map(|path| flaw(path));
-    if let Some(why) = &why {
-        remark(&format!("warning: frame {k} is left out: {why}"));
-    }
-    why.is_none()
+    let files = frames.iter().rev().step_by(step).filter_map(|(_, frame)| frame.fluid.as_deref());
+    let waters: Vec<Particles> = files.filter_map(|file| particles(file).ok()).collect();
+    let drops = waters.iter().flat_map(drops_of);
+    let mut values: Vec<f64> = drops.map(|drop| style.field.of(&drop, params.number_density)).collect();
+    style.field.range(&mut values)
 }
 
 pub fn render(args: &RenderArgs) -> Exit {
     seixo::threads::start(None)?;
     let series = args.series.as_deref();
     let (case, frames) = series_of(&args.dir, series)?;
-    let chosen = chosen(&frames, &args.times, args.every);
+    let none = || without("frames", &args.dir, &case, series);
+    let chosen = chosen(&case, &frames, &args.times, args.every);
     if chosen.is_empty() {
-        return Err(without("frames", &args.dir, &case, series));
+        return Err(none());
     }
-    let seen: Vec<&Frame> = chosen.iter().map(|(_, frame)| frame).collect();
-    let show = Show::open(&case, &args.look, &seen)?;
+    let show = Show::open(&case, &args.look, &chosen)?;
     show.unseen(&args.look).iter().for_each(|note| remark(note));
     let pictures = place(&args.dir, series).join("pictures");
     let out = args.out.clone().unwrap_or_else(|| pictures.clone());
     spare_folder(&out, &pictures)?;
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let joined = args.sheet.is_some() || args.animation.is_some();
-    let one = |(number, frame): &(usize, Frame)| -> Result<Option<Picture>> {
-        let picture = show.picture(frame)?;
+    // How many are drawn, and the picture where it is not written at once.
+    let one = |frame: &(usize, Frame)| -> Result<(usize, Option<Picture>)> {
+        let Some(picture) = show.picture(frame) else { return Ok((0, None)) };
         if joined {
-            return Ok(Some(picture));
+            return Ok((1, Some(picture)));
         }
+        let (number, time) = (frame.0, frame.1.time);
         write_whole(&out.join(format!("frame_{number:04}.png")), &picture.png())?;
         if !args.quiet {
-            remark(&format!("frame {number}, t = {:.3} s", frame.time));
+            remark(&format!("frame {number}, t = {time:.3} s"));
         }
-        Ok(None)
+        Ok((1, None))
     };
-    let pictures: Result<Vec<Option<Picture>>> = chosen.par_iter().map(one).collect();
-    let pictures: Vec<Picture> = pictures?.into_iter().flatten().collect();
-    let count = counted(chosen.len(), "picture");
+    let drawn: Vec<(usize, Option<Picture>)> = chosen.par_iter().map(one).collect::<Result<_>>()?;
+    let count: usize = drawn.iter().map(|d| d.0).sum();
+    if count == 0 {
+        return Err(none());
+    }
+    let pictures: Vec<Picture> = drawn.into_iter().filter_map(|d| d.1).collect();
+    let count = counted(count, "picture");
     let mut written = format!("{count} in {}", out.display());
     let whole = [
         ("sheet.png", args.sheet.and_then(|n| sheet(&pictures, n.into())).map(|p| p.png())),

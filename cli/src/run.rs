@@ -6,6 +6,7 @@ use super::progress::{Display, clock};
 use super::ranks::{self, Call, Place};
 use super::setup::{self, Setup};
 use super::signals::{self, RESUME};
+use super::typed::{count, duration, size};
 use super::{BackendName, CaseArgs, Changes, DeviceArgs, Exit};
 use seixo::Processor;
 use seixo::backend::gpu::Gpu;
@@ -41,7 +42,8 @@ pub struct RunArgs {
     /// The same command can be given again until the run has reached its end.
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "", conflicts_with = "force")]
     resume: Option<String>,
-    /// Stop after this time by the clock with the state saved, e.g. 3h50m, 90s (exit code 75).
+    /// Stop after this time by the clock with the state saved (exit code 75): seconds, or 1h30m, 90m, 2d, or as Slurm
+    /// writes it, 1:30:00 (hours:minutes:seconds), 90:00 (minutes:seconds), 1-12:00:00 (days-hours:minutes:seconds).
     #[arg(long, value_name = "TIME", value_parser = duration)]
     max_wall: Option<Duration>,
     /// Replace earlier results in the folder.
@@ -65,51 +67,6 @@ pub struct RunArgs {
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// A time by the clock: `3h50m`, `1d`, `90s`, or seconds.
-fn duration(text: &str) -> std::result::Result<Duration, String> {
-    let wrong = || "write a time like 3h50m, 90s or 600 (seconds)".to_owned();
-    let (mut total, mut number) = (0.0, String::new());
-    for c in text.trim().chars() {
-        let unit = match c {
-            '0'..='9' | '.' => {
-                number.push(c);
-                continue;
-            }
-            'd' => 86_400.0,
-            'h' => 3600.0,
-            'm' => 60.0,
-            's' => 1.0,
-            _ => return Err(wrong()),
-        };
-        total += unit * number.parse::<f64>().map_err(|_| wrong())?;
-        number.clear();
-    }
-    if !number.is_empty() {
-        total += number.parse::<f64>().map_err(|_| wrong())?;
-    }
-    let time = Duration::try_from_secs_f64(total).map_err(|_| wrong())?;
-    if time.is_zero() { Err(wrong()) } else { Ok(time) }
-}
-
-/// A number of steps.
-fn count(text: &str) -> std::result::Result<u64, String> {
-    text.parse().map_err(|_| "write a whole number, 0 or more".to_owned())
-}
-
-/// Bytes: `8G`, `500M`, or a number.
-fn size(text: &str) -> std::result::Result<u64, String> {
-    let text = text.trim();
-    let (number, unit) = match text.char_indices().next_back() {
-        Some((at, 'k' | 'K')) => (&text[..at], 1e3),
-        Some((at, 'M')) => (&text[..at], 1e6),
-        Some((at, 'G')) => (&text[..at], 1e9),
-        Some((at, 'T')) => (&text[..at], 1e12),
-        _ => (text, 1.0),
-    };
-    let bytes = number.parse::<f64>().map_err(|_| "write a size like 8G or 500M")? * unit;
-    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("write a size like 8G or 500M".into()) }
 }
 
 /// Refuses a case that the machine cannot hold, before anything is built.

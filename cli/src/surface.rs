@@ -1,12 +1,12 @@
 //! `seixo surface`: the surface of the water as meshes, from the frames that a run has written.
 
-use super::render::{chosen, place, series_of, without};
+use super::frames::{chosen, held, place, series_of, without};
 use super::{Exit, counted, finite};
 use clap::ValueEnum;
 use rayon::prelude::*;
 use seixo::console::{remark, tell};
 use seixo::error::{Error, Result};
-use seixo::output::replay::{Frame, particles};
+use seixo::output::replay::Frame;
 use seixo::output::spare::spare_folder;
 use seixo::output::surface::surface;
 use seixo::output::write_whole;
@@ -62,17 +62,17 @@ pub fn write(args: &SurfaceArgs) -> Exit {
         let text = "the water of a case in two dimensions has no surface to make a mesh of; draw it with `seixo render`";
         return Err(Error::usage("DIR", text));
     }
-    let chosen = chosen(&frames, &args.times, args.every);
+    let none = || without("frames with water", &args.dir, &case, series);
+    let chosen = chosen(&case, &frames, &args.times, args.every);
     if chosen.iter().all(|(_, frame)| frame.fluid.is_none()) {
-        return Err(without("frames with water", &args.dir, &case, series));
+        return Err(none());
     }
     let own = place(&args.dir, series).join("surface");
     let out = args.out.clone().unwrap_or_else(|| own.clone());
     spare_folder(&out, &own)?;
     std::fs::create_dir_all(&out).map_err(Error::io(&out))?;
     let one = |(number, frame): &(usize, Frame)| -> Result<usize> {
-        let Some(path) = &frame.fluid else { return Ok(0) };
-        let water = particles(path)?;
+        let Some(water) = frame.fluid.as_ref().and_then(|path| held(*number, path)) else { return Ok(0) };
         let mesh = surface(&water.position, &water.velocity, run.spacing, args.cell * run.spacing)
             .map_err(|why| Error::usage("--cell", format!("frame {number}: {why}; use larger cells")))?;
         let (extension, bytes) = match args.format {
@@ -88,6 +88,9 @@ pub fn write(args: &SurfaceArgs) -> Exit {
     };
     let written: Result<Vec<usize>> = chosen.par_iter().map(one).collect();
     let count: usize = written?.into_iter().sum();
+    if count == 0 {
+        return Err(none());
+    }
     if !args.quiet {
         tell(&format!("{} in {}", counted(count, "surface"), out.display()));
     }

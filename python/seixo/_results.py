@@ -142,12 +142,27 @@ class Run:
         if not path.is_file():
             there = ", ".join(sorted(p.stem for p in self.path.glob("*.csv"))) or "none"
             raise FileNotFoundError(f"{path}: this run wrote no such table; tables: {there}")
+        rows: list[tuple[int, list[str]]] = []
         try:
             with path.open(newline="", encoding="utf-8") as file:
-                headers, *rows = list(csv.reader(file))
-        except (UnicodeDecodeError, csv.Error, ValueError):
-            raise FileError(f"{path}: damaged: no table with a line of names", 5) from None
-        return headers, [row for row in rows if len(row) == len(headers)]
+                reader = csv.reader(file)
+                rows.extend((reader.line_num, row) for row in reader)
+        except UnicodeDecodeError:
+            raise _damaged(path, rows[-1][0] + 1 if rows else 1, "it is no text in UTF-8") from None
+        except csv.Error as why:
+            raise _damaged(path, rows[-1][0] + 1 if rows else 1, str(why)) from None
+        if not rows:
+            raise _damaged(path, 1, "it is empty")
+        (_, headers), *rows = rows
+        own = name in ("monitors", "bodies", "gauges")
+        for column in ("time [s]", "body") if name == "bodies" else ("time [s]",) if own else ():
+            if column not in headers:
+                raise _damaged(path, 1, f"it has no column {column!r}")
+        # A run in progress may be in the middle of its last row.
+        for line, row in rows[:-1]:
+            if len(row) != len(headers):
+                raise _damaged(path, line, f"it has {len(row)} values, the line of names {len(headers)}")
+        return headers, [row for _, row in rows if len(row) == len(headers)]
 
     @functools.cached_property
     def frames(self) -> Frames:
@@ -393,6 +408,11 @@ def _vtu(path: Path) -> dict[str, Array]:
     # It keeps a column of fields with one component.
     fields = {name: values.reshape(-1) if values.shape[1:] == (1,) else values for name, values in mesh.point_data.items()}
     return {"Points": mesh.points, **fields}
+
+
+def _damaged(path: Path, line: int, why: str) -> FileError:
+    """The error of a table that no run wrote as it is."""
+    return FileError(f"{path}: line {line}: {why}; this is no table of seixo's, or somebody changed it: run the case again", 5)
 
 
 def _column(cells: list[str]) -> Array:

@@ -4,12 +4,13 @@
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use seixo::case::file::{load, load_text};
+use seixo::gauges::Gauges;
 use seixo::scene::Kind;
 use seixo::{Error, Options, Processor};
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An error of the library as the package's exception of its exit code.
 fn told(py: Python<'_>, error: &Error) -> PyErr {
@@ -45,6 +46,8 @@ type Water<'py> = [Bound<'py, PyBytes>; 5];
 #[pyclass(module = "seixo._native", frozen)]
 struct Simulation {
     inner: Mutex<seixo::Simulation>,
+    /// Once somebody has asked what they read.
+    gauges: Mutex<Option<Gauges>>,
     #[pyo3(get)]
     warnings: Vec<String>,
 }
@@ -116,7 +119,7 @@ impl Simulation {
         let options = Options { processor, threads };
         let opened = py.detach(|| open(path, text, spacing, &sets, &options));
         let (inner, warnings) = opened.map_err(|e| told(py, &e))?;
-        Ok(Self { inner: Mutex::new(inner), warnings })
+        Ok(Self { inner: Mutex::new(inner), gauges: Mutex::default(), warnings })
     }
 
     /// Time [s].
@@ -193,7 +196,14 @@ impl Simulation {
 
     /// What the gauges read now, by the columns of gauges.csv.
     fn gauges(&self, py: Python<'_>) -> PyResult<Vec<(String, f64)>> {
-        self.with(py, seixo::Simulation::gauges)
+        self.with(py, |simulation| {
+            let mut found = self.gauges.lock().unwrap_or_else(PoisonError::into_inner);
+            let gauges = match found.take() {
+                Some(gauges) => gauges,
+                None => Gauges::new(&simulation.case, &simulation.scene)?,
+            };
+            simulation.read(found.insert(gauges))
+        })
     }
 
     /// Energies and guards now, by the columns of monitors.csv.

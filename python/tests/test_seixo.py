@@ -159,11 +159,21 @@ def test_damaged_results_are_left_out_or_named(run: seixo.Run, tmp_path: Path) -
     listed.unlink()
     with pytest.raises(IndexError, match="output.every"):
         seixo.read(root).frames[-1]
-    for name, of in (("monitors.csv", "monitors"), ("result.json", "status")):
+    for name, of, held, words in (
+        ("result.json", "status", b"", "damaged"),
+        ("monitors.csv", "monitors", b"", "line 1: it is empty"),
+        ("gauges.csv", "gauges", b"a,b\n1,2\n", "line 1: it has no column 'time .s.'"),
+        ("bodies.csv", "bodies", b"time [s],x\n1,2\n", "line 1: it has no column 'body'"),
+        ("monitors.csv", "monitors", b"time [s],x\n1,2\n2\n3,4\n", "line 3: it has 1 values, the line of names 2"),
+        ("monitors.csv", "monitors", b"time [s],x\n1,2\n2,\xff\n", "no text in UTF-8"),
+    ):
         fresh()
-        (root / name).write_bytes(b"")
-        with pytest.raises(seixo.FileError, match=f"{name}: damaged"):
+        (root / name).write_bytes(held)
+        with pytest.raises(seixo.FileError, match=f"{name}: .*{words}"):
             getattr(seixo.read(root), of)
+    # A run in progress may be in the middle of its last row.
+    (root / "monitors.csv").write_bytes(b"time [s],x\n1,2\n2")
+    assert list(seixo.read(root).monitors["x"]) == [2.0]
 
 
 def test_values_that_no_case_has_are_named_by_their_key() -> None:

@@ -78,8 +78,8 @@ pub struct Gpu {
     solids: usize,
     /// First of the moving-wall slots and number of each solid's wall layer.
     wall_layers: Vec<(usize, usize)>,
-    /// The device has rows at slots between solids.
-    slots_shown: bool,
+    /// Rows at slots between solids that the device has.
+    slot_rows: solids::SlotRows,
     /// Free bodies in the next solve.
     coupled: u64,
     counters: Counters,

@@ -60,14 +60,19 @@ impl Checker<'_> {
             .collect();
         if let Some(tank) = &case.tank {
             let bare = tank.without_wall();
-            let walls = super::TANK_FACES.iter().filter(|(face, _)| !bare.contains(face));
-            solid.extend(walls.map(|(_, name)| *name));
+            let sides = self.axes().flat_map(|k| [2 * k, 2 * k + 1]);
+            let walls = sides.map(|side| super::TANK_FACES[side]).filter(|(face, _)| !bare.contains(face));
+            solid.extend(walls.map(|(_, name)| name));
         }
         for (k, gauge) in case.gauge.force.iter().enumerate() {
             let face = case.tank.is_some() && super::TANK_FACES.iter().any(|(_, name)| *name == gauge.on);
             if face && !solid.contains(&gauge.on.as_str()) {
                 let message = format!("`{}` has no wall to measure on", gauge.on);
-                let remedy = "name another face, or take it out of tank.open or tank.periodic";
+                let remedy = if self.flat() && gauge.on.starts_with("tank.y_") {
+                    "in two dimensions the tank has walls along x and z alone: name one of these"
+                } else {
+                    "name another face, or take it out of tank.open or tank.periodic"
+                };
                 self.add(format!("gauge.force.{k}.on"), message, remedy);
             } else if !solid.contains(&gauge.on.as_str()) {
                 let message = format!("nothing solid is called `{}`", gauge.on);

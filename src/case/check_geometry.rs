@@ -186,6 +186,9 @@ impl Checker<'_> {
     pub(super) fn wall(&mut self, path: &str, label: &str, keys: &WallKeys, form: &Form) {
         let key = |key: &str| format!("{path}.{key}");
         let [min, max] = keys.corners;
+        if min.or(max).is_none() && self.forgotten(path, label, form) {
+            return;
+        }
         if form.shape == BodyShape::Box && form.size.is_none() {
             match (min, max) {
                 (Some(min), Some(max)) => {

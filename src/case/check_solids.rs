@@ -16,6 +16,15 @@ impl Checker<'_> {
         let path = |key: &str| format!("body.{k}.{key}");
         let label = format!("body `{}`", body.name);
         self.form(&format!("body.{k}"), &label, &body.form());
+        let (name, needed) = body.shape.keys();
+        let of_all = [("mass", body.mass.is_some()), ("inertia", body.inertia.is_some())];
+        if let Some((key, _)) = of_all.into_iter().find(|(_, given)| *given)
+            && (self.flat() && body.height.is_none() && needed.contains(&"height"))
+        {
+            let message =
+                format!("{label} is a {name} whose `{key}` is that of all its length along y, not told");
+            self.add(path(key), message, "add `height` [m], or give a `density` alone");
+        }
         if body.shape == BodyShape::Terrain {
             let message = format!("{label}: a terrain is ground, which does not move");
             self.add(path("shape"), message, "make it an [[obstacle]], or set shape = \"mesh\"");
@@ -141,8 +150,19 @@ impl Checker<'_> {
         }
     }
 
+    /// Whether `label` in the table `at` has a key of another shape than a box and no `shape`: that alone is told then.
+    pub(super) fn forgotten(&mut self, at: &str, label: &str, form: &Form) -> bool {
+        let Some((key, shape)) = form.forgotten(self.flat()) else { return false };
+        let message = format!("{label} has a `{key}` and no `shape`, or the one of a box without its `size`");
+        self.add(format!("{at}.{key}"), message, format!("add shape = \"{shape}\""));
+        true
+    }
+
     /// The keys that the shape of `label` in the table `at` needs, no others, and a particle across at least.
     pub(super) fn form(&mut self, at: &str, label: &str, form: &Form) {
+        if self.forgotten(at, label, form) {
+            return;
+        }
         let path = |key: &str| format!("{at}.{key}");
         let (name, needed) = form.shape.keys();
         let keys = [
@@ -152,9 +172,11 @@ impl Checker<'_> {
             ("section", form.section.is_some(), "[[0, 0], [1, 0], [1, 0.5]]", "its corners x and z [m]"),
             ("file", form.file.is_some(), "\"hull.stl\"", "an STL or OBJ file"),
         ];
+        let flat = self.flat();
         let mut complete = true;
         for (key, given, example, what) in keys {
-            if needed.contains(&key) && !given {
+            // A slice is as wide as the spacing, whatever the solid's length.
+            if needed.contains(&key) && !given && !(flat && key == "height") {
                 complete = false;
                 let message = format!("{label} is a {name} without `{key}`");
                 self.add(at, message, format!("add `{key} = {example}`, {what}"));
@@ -189,7 +211,6 @@ impl Checker<'_> {
             let corner = flaw.corner.map_or(String::new(), |k| format!(".{k}"));
             self.add(path(&format!("section{corner}")), format!("{label}: {}", flaw.message), flaw.remedy);
         }
-        let flat = self.flat();
         if flat && form.shape.needs_space() {
             let message = format!("{label}: there are no {name}s in two dimensions");
             let remedy = "set shape = \"prism\" with a `section`, or \"cylinder\": it lies along y";

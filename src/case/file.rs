@@ -1,5 +1,6 @@
 //! Reading a case file: text, overrides, parsing, checking; errors that point at file, line and key.
 
+use super::brackets::mistaken;
 use super::check::check;
 use super::motion_file::{allow_files, inline};
 use super::report::{Message, closest, explain, render, span_of};
@@ -177,6 +178,9 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
         CaseError::new(vec![problem], wrong(&[message]))
     };
     let table = DeTable::parse(&text).map_err(|e| unread(explain(&e, None)))?;
+    if let Some(message) = mistaken(table.get_ref()) {
+        return Err(unread(message).into());
+    }
     let case: Case = toml::from_str(&text).map_err(|e| unread(explain(&e, Some(table.get_ref()))))?;
     let located = |p: &Problem| Message {
         span: span_of(&table, &p.key),

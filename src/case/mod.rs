@@ -4,6 +4,7 @@
 
 mod absorber;
 mod bounds;
+mod brackets;
 pub mod check;
 mod check_gauges;
 mod check_geometry;

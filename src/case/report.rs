@@ -134,7 +134,7 @@ fn short(said: &str) -> String {
 }
 
 /// A key as `seixo keys` knows it, without the numbers of list entries.
-fn named(key: &str) -> String {
+pub(super) fn named(key: &str) -> String {
     key.split('.').filter(|part| part.parse::<usize>().is_err()).collect::<Vec<_>>().join(".")
 }
 

@@ -201,6 +201,18 @@ impl Body {
 }
 
 impl Form<'_> {
+    /// A key of a box without `size` that another shape has, and that shape: `shape` was forgotten.
+    pub(super) fn forgotten(&self, flat: bool) -> Option<(&'static str, &'static str)> {
+        let round = if flat || self.height.is_some() { "cylinder" } else { "sphere" };
+        let keys = [
+            ("file", self.file.is_some(), "mesh"),
+            ("section", self.section.is_some(), "prism"),
+            ("radius", self.radius.is_some(), round),
+        ];
+        let bare = self.shape == BodyShape::Box && self.size.is_none();
+        keys.into_iter().find(|key| bare && key.1).map(|(key, _, shape)| (key, shape))
+    }
+
     /// Its shape, and the share of a given mass that it stands for: in two dimensions (`plane`) a solid is a slice as
     /// wide as the `spacing` [m].
     ///
@@ -209,7 +221,7 @@ impl Form<'_> {
     pub(crate) fn shape(&self, spacing: f64, plane: bool) -> Result<(Shape, f64), Box<Problem>> {
         let (radius, height) = (self.radius.unwrap_or_default(), self.height.unwrap_or_default());
         let size: DVec3 = self.size.unwrap_or_default().into();
-        let slice = |width: f64| if plane { spacing / width } else { 1.0 };
+        let slice = |width: f64| if plane && width > 0.0 { spacing / width } else { 1.0 };
         Ok(match self.shape {
             BodyShape::Box => {
                 let share = slice(size.y);

@@ -29,7 +29,7 @@ pub struct MovingWall {
     /// Radius of a sphere, cylinder or cone [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Length of a cylinder or cone along its axis [m].
+    /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
@@ -110,7 +110,8 @@ pub struct Body {
     /// Radius of a sphere, cylinder or cone [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Length of a cylinder or cone along its axis [m].
+    /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out
+    /// beside a `density`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.

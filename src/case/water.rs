@@ -20,7 +20,7 @@ pub struct WaterShape {
     /// Radius of a sphere, cylinder or cone [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Length of a cylinder or cone along its axis [m].
+    /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
@@ -104,6 +104,10 @@ impl Checker<'_> {
                 self.add(format!("{path}.shape"), message, "use a [[fluid.fill]], or set shape = \"mesh\"");
                 continue;
             }
+            let (label, form) = (format!("water {path}"), water.form(case.tank.as_ref()));
+            if self.forgotten(&path, &label, &form) {
+                continue;
+            }
             if water.shape == BodyShape::Box && water.size.is_none() {
                 let message = "a box of water without `size`";
                 self.add(
@@ -115,7 +119,7 @@ impl Checker<'_> {
             }
             let places = [water.center, water.position];
             let keys = WallKeys { corners: [None, None], open: &[] as &[Face], places };
-            self.wall(&path, &format!("water {path}"), &keys, &water.form(case.tank.as_ref()));
+            self.wall(&path, &label, &keys, &form);
         }
         for (k, fill) in fills.iter().enumerate() {
             let path = format!("fluid.fill.{k}");

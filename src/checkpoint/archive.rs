@@ -157,6 +157,24 @@ impl Archive {
         Ok(())
     }
 
+    /// [`Archive::array`] of its own length that only some cases of a scene have, as those in which a body is free:
+    /// it stays as it is where the state holds none of it, and what the state holds is passed over where the case has
+    /// none.
+    ///
+    /// # Errors
+    /// As [`Archive::array`].
+    pub fn array_of_some<T: Pod>(&mut self, name: &str, values: &mut Vec<T>) -> Result<()> {
+        if self.saving || self.holds(name) && !values.is_empty() {
+            return self.array(name, values, true);
+        }
+        Ok(())
+    }
+
+    /// Whether the state has elements of the array `name`.
+    pub fn holds(&self, name: &str) -> bool {
+        self.sections.get(name).is_some_and(|section| !section.bytes.is_empty())
+    }
+
     /// Put in an array of elements of `width` bytes.
     pub fn bytes(&mut self, name: &str, width: usize, bytes: Vec<u8>) {
         self.sections.insert(name.to_owned(), Section { width, bytes });

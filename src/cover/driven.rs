@@ -66,13 +66,14 @@ impl DrivenFaces {
         if self.solids.is_empty() {
             return vec![];
         }
-        let all = [self.still.clone(), moving(scene, poses)].concat();
+        let moving = moving(scene, poses);
+        let all: Vec<&Standing> = self.still.iter().chain(&moving).collect();
         let of = |driven: &Driven| {
             let pose = &poses[driven.solid];
             let faces = (&driven.centers, driven.faces.len());
-            let reached = self.tiles.reached(faces, Some((pose, driven.radius)), &all);
+            let reached = self.tiles.reached(faces, Some((pose, driven.radius)), all.iter().copied());
             let of = |(face, reached): (&Face, Vec<usize>)| {
-                let others = reached.iter().map(|&k| &all[k]).filter(|s| s.solid != Some(driven.solid));
+                let others = reached.iter().map(|&k| all[k]).filter(|s| s.solid != Some(driven.solid));
                 let (center, area) =
                     (pose.position + pose.orientation * face.center, pose.orientation * face.area);
                 let bare = self.tiles.bare(center, area.normalize_or_zero(), &others.collect::<Vec<_>>());

@@ -177,9 +177,11 @@ impl Painter {
         let l0 = scene.spacing;
         for (solid, &pose) in scene.solids.iter().zip(poses) {
             if solid.is_body {
-                self.body(&mut bodies, solid, pose, l0);
+                // A pattern that is fixed to it, so that one sees it turn.
+                let octant = |q: DVec3| (q.x > 0.0) ^ (q.y > 0.0) ^ (q.z > 0.0);
+                self.solid(&mut bodies, solid, pose, |q| BODY[usize::from(octant(q))]);
             } else {
-                walls.solid(&self.camera, &solid.shape, pose, |_| MOVING_WALL);
+                self.solid(&mut walls, solid, pose, |_| MOVING_WALL);
             }
         }
         for drop in drops {
@@ -202,27 +204,13 @@ impl Painter {
         picture
     }
 
-    /// A body with a pattern fixed to it, so that one sees it turn.
-    fn body(&self, canvas: &mut Canvas, solid: &Solid, pose: (DVec3, DQuat), l0: f64) {
-        let octant = |q: DVec3| (q.x > 0.0) ^ (q.y > 0.0) ^ (q.z > 0.0);
-        if asks_much(&solid.shape) {
-            // Its surface is dear to ask for: its particles stand for it.
-            for &offset in &solid.wall_offset {
-                let x = pose.0 + pose.1 * offset;
-                canvas.ball(&self.camera, x, RADIUS * l0, BODY[usize::from(octant(offset))]);
-            }
-        } else {
-            canvas.solid(&self.camera, &solid.shape, pose, |q| BODY[usize::from(octant(q))]);
+    fn solid(&self, canvas: &mut Canvas, solid: &Solid, pose: (DVec3, DQuat), paint: impl Fn(DVec3) -> Vec3) {
+        match &solid.shape {
+            // Its distances are dear to ask for.
+            #[cfg(feature = "mesh")]
+            Shape::Mesh(mesh) => canvas.faces(&self.camera, mesh.faces(), pose, paint),
+            shape => canvas.solid(&self.camera, shape, pose, paint),
         }
-    }
-}
-
-fn asks_much(shape: &Shape) -> bool {
-    match shape {
-        #[cfg(feature = "mesh")]
-        Shape::Mesh(_) => true,
-        Shape::Polygon(_) => true,
-        _ => false,
     }
 }
 

@@ -177,24 +177,74 @@ impl Canvas {
         });
     }
 
+    /// Draw a closed surface of `triangles`, which turn outwards, in a pose; `paint` as of a [`Canvas::solid`].
+    pub fn faces(
+        &mut self,
+        camera: &Camera,
+        triangles: impl Iterator<Item = [DVec3; 3]>,
+        (position, orientation): (DVec3, DQuat),
+        paint: impl Fn(DVec3) -> Vec3,
+    ) {
+        for own in triangles {
+            let normal = orientation * (own[1] - own[0]).cross(own[2] - own[0]).normalize_or_zero();
+            if normal.dot(camera.forward) >= 0.0 {
+                continue;
+            }
+            let seen = camera.seen(normal);
+            let [a, b, c] = own.map(|x| camera.project(position + orientation * x));
+            let twice = |p: (f64, f64), q: (f64, f64), r: (f64, f64)| {
+                (q.0 - p.0) * (r.1 - p.1) - (q.1 - p.1) * (r.0 - p.0)
+            };
+            let flat = |p: (f64, f64, f64)| (p.0, p.1);
+            let area = twice(flat(a), flat(b), flat(c));
+            if area == 0.0 {
+                continue;
+            }
+            let low = (a.0.min(b.0).min(c.0), a.1.min(b.1).min(c.1));
+            let high = (a.0.max(b.0).max(c.0), a.1.max(b.1).max(c.1));
+            let middle = (0.5 * (low.0 + high.0), 0.5 * (low.1 + high.1), a.2);
+            let half = (0.5 * (high.0 - low.0), 0.5 * (high.1 - low.1));
+            self.each_sample_within(camera, middle, half, |canvas, at, i, j| {
+                let x = (i as f64, j as f64);
+                let share = [(b, c), (c, a), (a, b)].map(|(p, q)| twice(x, flat(p), flat(q)) / area);
+                if share.iter().all(|&s| s >= 0.0) {
+                    let [u, v, w] = share;
+                    let q = u * own[0] + v * own[1] + w * own[2];
+                    canvas.put(at, u * a.2 + v * b.2 + w * c.2, lit(paint(q), seen));
+                }
+            });
+        }
+    }
+
     /// Calls `visit` for every sample within `r` samples of a projected point.
     fn each_sample(
         &mut self,
         camera: &Camera,
-        (column, row, depth): (f64, f64, f64),
+        point: (f64, f64, f64),
         r: f64,
+        visit: impl FnMut(&mut Self, usize, usize, usize),
+    ) {
+        self.each_sample_within(camera, point, (r, r), visit);
+    }
+
+    /// The same within so many samples across and down.
+    fn each_sample_within(
+        &mut self,
+        camera: &Camera,
+        (column, row, depth): (f64, f64, f64),
+        (across, down): (f64, f64),
         mut visit: impl FnMut(&mut Self, usize, usize, usize),
     ) {
         if !(column.is_finite() && row.is_finite() && depth.is_finite()) {
             return;
         }
-        let span = |center: f64, end: usize| {
+        let span = |center: f64, r: f64, end: usize| {
             let low = (center - r).ceil().clamp(0.0, end as f64) as usize;
             let high = (center + r).floor().clamp(-1.0, end as f64 - 1.0) + 1.0;
             low..high as usize
         };
-        for j in span(row, camera.samples[1]) {
-            for i in span(column, camera.samples[0]) {
+        for j in span(row, down, camera.samples[1]) {
+            for i in span(column, across, camera.samples[0]) {
                 visit(self, j * self.width + i, i, j);
             }
         }

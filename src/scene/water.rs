@@ -360,5 +360,7 @@ fn describe(queue: &[(IVec3, usize)], end: usize, lattice: &Lattice, tank: Optio
         face.map_or("the tank's side", face_name),
         point(lattice.center(out))
     );
-    Problem::new("tank.open", message, "remove that face from tank.open, or put a wall in front of it")
+    let remedy = "take that face out of tank.open, or put a wall in front of it; an [[outflow]] in a closed face lets \
+                  water out";
+    Problem::new("tank.open", message, remedy)
 }

@@ -15,6 +15,7 @@ mod nearest;
 mod polygon;
 mod sphere;
 mod surface;
+mod thickness;
 mod thin;
 
 pub(crate) use cells::Cells;

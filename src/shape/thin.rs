@@ -31,9 +31,9 @@ impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
         Self { distance, spacing, plane }
     }
 
-    /// The middle between the side below which `at` lies and one that looks away from it, if it is no deeper than `reach` [m] below `at`.
-    fn middle(&self, at: DVec3, reach: f64) -> Option<DVec3> {
-        let (distance, outward) = (self.distance)(at);
+    /// The middle between the side below which `at` lies, at a signed `distance` [m] and with the direction
+    /// `outward`, and one that looks away from it, if it is no deeper than `reach` [m] below `at`.
+    fn middle(&self, at: DVec3, (distance, outward): (f64, DVec3), reach: f64) -> Option<DVec3> {
         let slack = EXACT * self.spacing;
         let beyond = |t: f64| -(self.distance)(at - t * outward).0 < t - distance - slack;
         let (mut low, mut high) = (0.0, reach + slack);
@@ -48,20 +48,24 @@ impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
         (other.dot(outward) < AWAY).then(|| at - 0.5 * (low + high) * outward)
     }
 
-    /// Whether a particle of a layer below the first at `at` has its like of another side so near that one in the middle stands for both.
-    pub fn merges(&self, at: DVec3) -> bool {
-        self.middle(at, MERGED * self.spacing).is_some()
+    /// Whether a particle of a layer below the first at `at`, `depth` [m] below a side with the direction `outward`,
+    /// has its like of another side so near that one in the middle stands for both.
+    pub fn merges(&self, at: DVec3, (depth, outward): (f64, DVec3)) -> bool {
+        self.middle(at, (-depth, outward), MERGED * self.spacing).is_some()
     }
 
-    /// Places close to each other in those of `cells`, of the size of the spacing, that lie in a thin part.
-    pub fn beside(&self, cells: &[DVec3]) -> Vec<DVec3> {
+    /// Places close to each other in those of `cells`, of the size of the spacing, that lie in a thin part. Each
+    /// comes with its depth [m] and the direction outwards.
+    pub fn beside(&self, cells: &[(DVec3, f64, DVec3)]) -> Vec<DVec3> {
         let part = self.spacing / 3.0;
         let steps = move || [0.0, -part, part].into_iter();
         let offsets = move || {
             steps().flat_map(move |x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z))))
         };
-        let is_thin = |at: &&DVec3| self.middle(**at, 1.5 * self.spacing).is_some();
-        let thin: Vec<DVec3> = cells.par_iter().filter(is_thin).copied().collect();
+        let is_thin = |&&(at, depth, outward): &&(DVec3, f64, DVec3)| {
+            self.middle(at, (-depth, outward), 1.5 * self.spacing).is_some()
+        };
+        let thin: Vec<DVec3> = cells.par_iter().filter(is_thin).map(|cell| cell.0).collect();
         thin.into_iter().flat_map(|at| offsets().map(move |by| at + by)).collect()
     }
 
@@ -70,7 +74,7 @@ impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
     pub fn fill(&self, above: f64, places: impl Iterator<Item = DVec3>, taken: &Cells, out: &mut Particles) {
         let l0 = self.spacing;
         let mut put = Cells::new(2.0 * l0);
-        for at in places.filter_map(|at| self.middle(at, (0.5 + MERGED) * l0)) {
+        for at in places.filter_map(|at| self.middle(at, (self.distance)(at), (0.5 + MERGED) * l0)) {
             let (distance, outward) = (self.distance)(at);
             let room = 2.0 * (-distance / l0 - above);
             if !(ROOM..1.0 + 2.0 * MERGED).contains(&room) {

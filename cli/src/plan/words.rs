@@ -70,8 +70,12 @@ impl Report {
         {
             lines.push(format!("  {name:<7}{count:>10}"));
         }
-        if !report.solids.is_empty() {
-            lines.push(format!("  moving solids: {}", report.solids.join(", ")));
+        let solids = [("moving solids", &report.solids), ("fixed solids of any shape", &report.fixed_solids)];
+        for (what, names) in solids.into_iter().filter(|(_, names)| !names.is_empty()) {
+            let more = names.len().saturating_sub(MOST_BODIES);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let first = &names[..names.len().min(MOST_BODIES)];
+            lines.push(format!("  {what}: {}{more}", first.join(", ")));
         }
         if !report.waves.is_empty() {
             lines.extend([String::new(), "waves".to_string()]);

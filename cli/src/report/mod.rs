@@ -5,8 +5,9 @@ pub mod page;
 pub mod table;
 
 use super::Exit;
+use super::frames::{frames_of, is_there, without};
 use super::progress::clock;
-use super::render::{LookArgs, Show, frames_of, is_there, without};
+use super::render::{LookArgs, Show};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
@@ -15,7 +16,7 @@ use rayon::prelude::*;
 use seixo::case::file::load;
 use seixo::case::{Case, OutputField, OutputKind};
 use seixo::console::{remark, tell};
-use seixo::error::{Error, FolderError, Result};
+use seixo::error::{FolderError, Result};
 use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
 use seixo::output::spare::spare;
@@ -58,7 +59,8 @@ struct Run {
     monitors: Table,
     bodies: Vec<(String, Table)>,
     gauges: Table,
-    frames: Vec<Frame>,
+    /// Those whose files are there, with their numbers.
+    frames: Vec<(usize, Frame)>,
 }
 
 impl Run {
@@ -78,7 +80,7 @@ impl Run {
         let output = &loaded.case.output;
         let frames = if output.every > 0.0 { whole_frames(root) } else { Vec::new() };
         if frames.is_empty() && output.every > 0.0 && output.kinds.iter().any(|k| SHOWN.contains(k)) {
-            remark(&format!("warning: no pictures: {}", without("frames", root, &loaded.case, None)));
+            no_pictures(root, &loaded.case);
         }
         Ok(Self {
             name,
@@ -93,10 +95,14 @@ impl Run {
     }
 }
 
+fn no_pictures(root: &Path, case: &Case) {
+    remark(&format!("warning: no pictures: {}", without("frames", root, case, None)));
+}
+
 /// The frames of the run in `root` whose files are there.
-fn whole_frames(root: &Path) -> Vec<Frame> {
+fn whole_frames(root: &Path) -> Vec<(usize, Frame)> {
     let all = frames_of(root).unwrap_or_default().into_iter().enumerate();
-    all.filter(|(k, frame)| is_there(*k, frame)).map(|(_, frame)| frame).collect()
+    all.filter(|(k, frame)| is_there(*k, frame)).collect()
 }
 
 /// `seixo report`.
@@ -125,14 +131,15 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
         return Ok(Vec::new());
     }
     let pick = |k: usize| if count == 1 { all - 1 } else { k * (all - 1) / (count - 1) };
-    let seen: Vec<&Frame> = (0..count).map(|k| &run.frames[pick(k)]).collect();
+    let seen: Vec<(usize, Frame)> = (0..count).map(|k| run.frames[pick(k)].clone()).collect();
     let show = Show::open(&run.case, &args.look, &seen)?;
     show.unseen(&args.look).iter().for_each(|note| remark(note));
-    let draw = |k: usize| {
-        let frame = seen[k];
-        Ok((frame.time, STANDARD.encode(show.picture(frame)?.png())))
-    };
-    (0..count).into_par_iter().map(draw).collect()
+    let draw = |frame: &(usize, Frame)| Some((frame.1.time, STANDARD.encode(show.picture(frame)?.png())));
+    let drawn: Vec<(f64, String)> = seen.par_iter().filter_map(draw).collect();
+    if drawn.is_empty() {
+        no_pictures(&args.dir, &run.case);
+    }
+    Ok(drawn)
 }
 
 fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
@@ -397,9 +404,4 @@ fn times(run: &Run) -> String {
         .collect();
     let chart = bars("seconds of each stage", "s", &stages);
     if chart.is_empty() { chart } else { format!("<div class=\"charts\">\n{chart}</div>\n") }
-}
-
-/// The error of a table that is none.
-fn damaged(path: &Path, why: impl std::fmt::Display) -> Error {
-    Error::io(path)(std::io::Error::new(std::io::ErrorKind::InvalidData, why.to_string()))
 }

@@ -114,8 +114,8 @@ impl Saved<'_> {
         archive.array("pressure", pressure, true)?;
         archive.array("number_density", number_density, true)?;
         archive.array("acceleration", acceleration, true)?;
-        archive.array("reaction", reaction, true)?;
-        archive.array("inertia_head", inertia_head, true)?;
+        archive.array_of_some("reaction", reaction)?;
+        archive.array_of_some("inertia_head", inertia_head)?;
         codes(archive, "kind", kind, |k| k as u8, Kind::from_code)?;
         codes(archive, "state", state, |s| s as u8, State::from_code)?;
         // The lists of the last step serve viscosity, at the start of the next one.

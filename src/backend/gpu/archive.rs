@@ -92,12 +92,18 @@ impl Gpu {
             self.buffer(archive, buffers::number_density, g.pressure())?;
             self.buffer(archive, buffers::state, g.pressure())?;
             self.buffer(archive, buffers::acceleration, g.fluid)?;
-            if self.plan.needs(Arrays::Reaction) {
-                self.buffer(archive, buffers::reaction, g.moving_wall)?;
-            }
-            if self.plan.needs(Arrays::Coupling) {
-                self.buffer(archive, buffers::inertia_head, g.moving_wall)?;
-            }
+            // Another case of the scene may have had neither: they are zeros then, as at t = 0.
+            let moving = |archive: &Archive, of: Arrays, name: &str| {
+                if self.plan.needs(of) && (archive.is_saving() || archive.holds(name)) {
+                    g.moving_wall
+                } else {
+                    0
+                }
+            };
+            let felt = moving(archive, Arrays::Reaction, buffers::reaction.id().name());
+            let heads = moving(archive, Arrays::Coupling, buffers::inertia_head.id().name());
+            self.buffer(archive, buffers::reaction, felt)?;
+            self.buffer(archive, buffers::inertia_head, heads)?;
             // The lists of the last step serve viscosity, at the start of the next one. A state of many ranks has none.
             let listed = archive.is_saving() || archive.sections.contains_key(LISTED);
             if self.params.viscosity > 0.0 && listed {

@@ -5,7 +5,7 @@ use super::context::Context;
 use super::fitted::Fitted;
 use super::layout::{self, Coefficients, Constants, WORKGROUP, WallParticle};
 use super::memory::{Memory, Sizes};
-use super::{Gpu, buffers, clock};
+use super::{Gpu, buffers, clock, solids};
 use crate::backend::{self, Counters};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
@@ -151,7 +151,7 @@ impl Gpu {
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
             wall_layers: wall_layers.collect(),
-            slots_shown: false,
+            slot_rows: solids::SlotRows::new(),
             coupled: 0,
             counters: Counters::new(backend::outflows(scene)),
             coefficients: Coefficients::default(),

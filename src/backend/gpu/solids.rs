@@ -8,6 +8,23 @@ use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
 use crate::plan::{Arrays, Stage};
 use glam::{DMat3, DVec3, Vec3};
+use std::collections::BTreeMap;
+
+/// Rows of moving walls at slots, by their numbers, as the device holds them; zeros stand for those at no slot, also
+/// before the first upload.
+pub(super) type SlotRows = BTreeMap<usize, [[f32; 4]; 4]>;
+
+/// What makes the device hold `now` where it holds `before`: the first of each stretch of rows, and the rows of it.
+fn changes(before: &SlotRows, now: &SlotRows) -> Vec<(usize, Vec<[[f32; 4]; 4]>)> {
+    let gone = before.keys().filter(|row| !now.contains_key(row));
+    let changed = now.iter().filter(|(row, values)| before.get(row) != Some(values)).map(|(row, _)| row);
+    let changed: Vec<usize> = gone.chain(changed).copied().collect();
+    let rows = |(first, count)| {
+        let values = (first..first + count).map(|row| now.get(&row).copied().unwrap_or_default());
+        (first, values.collect())
+    };
+    Stretches::of(&changed).iter().map(rows).collect()
+}
 
 impl Gpu {
     /// Free bodies and rows at slots for the next solves.
@@ -41,20 +58,22 @@ impl Gpu {
             self.context.upload(buffers::free_body, &free)?;
         }
         // Water in slots presses on a body that is held as well.
-        // Zeros stand for rows at no slot, also before the first upload.
-        if slots.is_empty() && !self.slots_shown {
-            return Ok(());
+        let device = |slot: &SlotRow| {
+            [
+                slot.per_pascal.force.as_vec3().extend(slot.taken as f32).to_array(),
+                four(slot.per_pascal.torque),
+                four(slot.head.force),
+                four(slot.head.torque),
+            ]
+        };
+        let row = |slot: &SlotRow| self.wall_layers[slot.solid as usize].0 + slot.row as usize;
+        let now: SlotRows = slots.iter().map(|slot| (row(slot), device(slot))).collect();
+        for (first, rows) in changes(&self.slot_rows, &now) {
+            let at = (first * size_of_val(&rows[0])) as u64;
+            self.context.upload_to(buffers::coupling.id(), at, bytemuck::cast_slice(&rows))?;
         }
-        self.slots_shown = !slots.is_empty();
-        let mut rows = vec![[0.0; 4]; 4 * self.groups.moving_wall];
-        for slot in slots {
-            let k = 4 * (self.wall_layers[slot.solid as usize].0 + slot.row as usize);
-            rows[k] = slot.per_pascal.force.as_vec3().extend(slot.taken as f32).to_array();
-            rows[k + 1] = four(slot.per_pascal.torque);
-            rows[k + 2] = four(slot.head.force);
-            rows[k + 3] = four(slot.head.torque);
-        }
-        self.context.upload(buffers::coupling, &rows)
+        self.slot_rows = now;
+        Ok(())
     }
 
     /// Moves the particles of solids to `poses`.
@@ -97,5 +116,38 @@ impl Gpu {
             total[solid].torque += vector(&part[1]);
         }
         Ok((total, self.wall_told(rows, &stretches, pressures)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_have_not_changed_are_not_sent_again() {
+        let rows = |rows: &[(usize, f32)]| -> SlotRows {
+            rows.iter().map(|&(row, value)| (row, [[value, 1.0, 0.0, -value]; 4])).collect()
+        };
+        let mut device = vec![[[0.0_f32; 4]; 4]; 2000];
+        let mut before = SlotRows::new();
+        for (now, sent) in [
+            (rows(&[]), 0),
+            (rows(&[(5, 1.0), (7, 2.0), (1500, 3.0)]), 4),
+            (rows(&[(5, 1.0), (7, 2.0), (1500, 3.0)]), 0),
+            (rows(&[(5, 1.0), (7, 2.5), (1500, 3.0)]), 1),
+            // The one between two that change is sent as it is.
+            (rows(&[(6, 4.0), (7, 2.5), (1500, 3.0)]), 2),
+            (rows(&[(8, 1.0)]), 4),
+            (rows(&[]), 1),
+        ] {
+            let parts = changes(&before, &now);
+            assert_eq!(parts.iter().map(|p| p.1.len()).sum::<usize>(), sent, "{before:?} to {now:?}");
+            for (first, rows) in parts {
+                device[first..first + rows.len()].copy_from_slice(&rows);
+            }
+            let held = device.iter().enumerate().filter(|(_, values)| **values != <[[f32; 4]; 4]>::default());
+            assert_eq!(held.map(|(row, values)| (row, *values)).collect::<SlotRows>(), now);
+            before = now;
+        }
     }
 }

@@ -13,6 +13,7 @@ mod shells;
 mod skin;
 
 use super::surface::Surface;
+use super::thickness::{self, Way};
 use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
 use glam::{DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
@@ -109,6 +110,11 @@ impl Mesh {
         Self::from_file(path, scale, spacing, |(vertices, triangles)| {
             ground::below(path, vertices, triangles, ground::BASE * spacing)
         })
+    }
+
+    /// Its triangles, which turn outwards.
+    pub fn faces(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        self.triangles.triangles().map(|triangle| [triangle.a, triangle.b, triangle.c])
     }
 
     fn from_file(
@@ -301,21 +307,20 @@ fn sharp(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<(DVec3, DVec3, Faces
     out
 }
 
-/// The thinnest place: the shortest way from the middle of a triangle inwards to the surface again.
 fn thinnest(mesh: &TriMesh) -> Thickness {
     let size = mesh.local_aabb().extents().length();
-    let mut thickness = Thickness { least: f64::INFINITY, place: DVec3::ZERO };
-    for triangle in mesh.triangles() {
-        let place = (triangle.a + triangle.b + triangle.c) / 3.0;
-        let inwards = -(triangle.b - triangle.a).cross(triangle.c - triangle.a).normalize_or_zero();
-        let start = place + 1e-7 * size * inwards;
-        if let Some(least) = mesh.cast_local_ray(&Ray::new(start, inwards), size, false)
-            && least < thickness.least
-        {
-            thickness = Thickness { least, place };
-        }
-    }
-    thickness
+    let ways = mesh.triangles().filter_map(|triangle| {
+        let start = (triangle.a + triangle.b + triangle.c) / 3.0;
+        let twice = (triangle.b - triangle.a).cross(triangle.c - triangle.a);
+        let (inwards, area) = (-twice.normalize_or_zero(), 0.5 * twice.length());
+        let ray = Ray::new(start + 1e-7 * size * inwards, inwards);
+        let end = mesh.cast_local_ray_and_get_normal(&ray, size, false)?;
+        // It leaves the solid there, whichever side parry looks from.
+        let outward = if end.normal.dot(inwards) < 0.0 { -end.normal } else { end.normal };
+        Some(Way { start, inwards, length: end.time_of_impact, area, outward })
+    });
+    let (least, place) = thickness::thinnest(ways, |q| mesh.project_local_point(q, false).point.distance(q));
+    Thickness { least, place }
 }
 
 impl Geometry for Mesh {

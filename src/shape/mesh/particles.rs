@@ -43,9 +43,13 @@ impl Place {
 
     /// The same with its depth looked up; `None` if that is not about `depth` [m], as where the way led nearer to another side.
     fn looked_up(self, mesh: &Mesh, depth: f64, spacing: f64) -> Option<Self> {
-        let inside = mesh.depth(self.at, ALL_FACES)?;
-        let sound = (inside.depth - depth).abs() < 0.1 * spacing;
-        sound.then_some(Self { inside: (inside.depth, inside.outward), ..self })
+        Some(self.settled(mesh)).filter(|place| (place.inside.0 - depth).abs() < 0.1 * spacing)
+    }
+
+    /// The same with its depth looked up, whatever it is.
+    fn settled(self, mesh: &Mesh) -> Self {
+        let (distance, outward) = mesh.distance(self.at);
+        Self { inside: (-distance, outward), ..self }
     }
 }
 
@@ -102,7 +106,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
             here.par_iter().map(put).collect()
         };
         let merged: Vec<bool> =
-            places.par_iter().map(|p| layer > 0 && skin.is_some() && thin.merges(p.at)).collect();
+            places.par_iter().map(|p| layer > 0 && skin.is_some() && thin.merges(p.at, p.inside)).collect();
         let places = places.into_iter().zip(merged).filter(|(_, merged)| !merged).map(|(place, _)| place);
         for Place { at, inside: (depth, outward), .. } in places {
             if taken.nearest(at, APART * spacing).is_none() {
@@ -115,7 +119,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     for layer in 1..if skin.is_some() { layers } else { 1 } {
         let above = f64::from(layer);
         let here = found.iter().filter(|f| f.1 > (above - 0.5) * spacing && f.1 < (above + 1.0) * spacing);
-        let cells: Vec<DVec3> = here.map(|f| f.0).collect();
+        let cells: Vec<_> = here.copied().collect();
         thin.fill(above, thin.beside(&cells).into_iter(), &taken, &mut out);
     }
     let nearest = |x| mesh.nearest(x).0;
@@ -154,12 +158,13 @@ fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Pl
                 if p.fixed {
                     return *p;
                 }
-                let Some(inside) = mesh.depth(at, ALL_FACES) else { return *p };
-                let put = Place::moved(at, (inside.depth, inside.outward), depth);
-                // On its way it has not left the layer for another side's; where it ends that is looked up.
-                let strays = (inside.depth - depth).abs() > 0.5 * spacing;
-                let put = if last { put.looked_up(mesh, depth, spacing) } else { (!strays).then_some(put) };
-                put.unwrap_or(*p)
+                let put = mesh.depth(at, ALL_FACES).and_then(|inside| {
+                    let put = Place::moved(at, (inside.depth, inside.outward), depth);
+                    // On its way it has not left the layer for another side's; where it ends that is looked up.
+                    let strays = (inside.depth - depth).abs() > 0.5 * spacing;
+                    if last { put.looked_up(mesh, depth, spacing) } else { (!strays).then_some(put) }
+                });
+                put.unwrap_or_else(|| if last { p.settled(mesh) } else { *p })
             })
             .collect();
     }

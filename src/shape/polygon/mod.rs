@@ -8,6 +8,7 @@ mod layer;
 use super::areas;
 use super::cells::Cells;
 use super::surface::Surface;
+use super::thickness::{Way, thinnest};
 use super::thin::Thin;
 use super::{APART, Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
 use glam::{DVec2, DVec3};
@@ -101,16 +102,18 @@ impl Polygon {
         self.corners.iter().copied().map(space)
     }
 
-    /// Where it is thinnest: the shortest way from the middle of a side inwards to another one [m], and that middle, in the coordinates
-    /// that it was given in [m].
+    /// Where it is thinnest: how thin [m], and the middle of a side there, in the coordinates that it was given in [m].
     pub(crate) fn thinnest(&self) -> (f64, DVec3) {
-        let ways = self.sides().map(|[a, b]| {
+        let ways = self.sides().filter_map(|[a, b]| {
             let (middle, inwards) = (0.5 * (a + b), (b - a).normalize().perp());
             let start = middle + 1e-9 * self.radius * inwards;
-            let way = self.crossings(start, inwards, 4.0 * self.radius).first().copied();
-            (way.unwrap_or(f64::INFINITY), space(middle + self.center))
+            let length = self.crossings(start, inwards, 4.0 * self.radius).first().copied()?;
+            let outward = self.nearest(middle + length * inwards).1;
+            let (start, inwards, outward) = (space(middle), space(inwards), space(outward));
+            Some(Way { start, inwards, length, area: a.distance(b), outward })
         });
-        ways.fold((f64::INFINITY, DVec3::ZERO), |least, way| if way.0 < least.0 { way } else { least })
+        let (least, place) = thinnest(ways, |q| space(self.nearest(plane(q)).0).distance(q));
+        (least, place + space(self.center))
     }
 
     fn sides(&self) -> impl Iterator<Item = [DVec2; 2]> + '_ {
@@ -227,12 +230,12 @@ impl Geometry for Polygon {
             stretches.sort_by(|a, b| b.length().total_cmp(&a.length()));
             for at in stretches.iter().flat_map(|s| s.divided(spacing)) {
                 let at = space(at);
-                if layer > 0 && thin.merges(at) {
+                let (distance, outward) = self.distance(at);
+                if layer > 0 && thin.merges(at, (-distance, outward)) {
                     continue;
                 }
                 if taken.nearest(at, APART * spacing).is_none() {
                     taken.add(at);
-                    let (distance, outward) = self.distance(at);
                     out.add(layer, at, DVec3::ZERO, -distance * outward);
                 }
             }

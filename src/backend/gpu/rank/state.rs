@@ -146,7 +146,11 @@ impl Ranked for GpuRank {
         let pressure = wide(archive::read(archive, buffers::pressure, all.pressure())?);
         let number_density = wide(archive::read(archive, buffers::number_density, all.pressure())?);
         let heads = if plan.needs(Arrays::Coupling) { all.moving_wall } else { 0 };
-        let inertia_head = wide(archive::read(archive, buffers::inertia_head, heads)?);
+        let inertia_head = if archive.holds(buffers::inertia_head.id().name()) {
+            wide(archive::read(archive, buffers::inertia_head, heads)?)
+        } else {
+            vec![0.0; heads]
+        };
         self.gpu.context.upload(buffers::counters, &counter::START)?;
         if plan.needs(Arrays::Ledger) {
             let sums = archive::read(archive, buffers::ledger_sum, self.ledger_length_of_all())?;
