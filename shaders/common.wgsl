@@ -79,6 +79,7 @@ struct Constants {
     zero: f32,             // 0.0, which no compiler knows: see `exactly`
     drive: vec3f,          // what of gravity lies along periodic axes; `gravity` is the rest
     dynamic_viscosity: f32, // rho nu, Pa s
+    wall_room: f32,        // sum W of a particle of a flat wall's layer with the water above it
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the

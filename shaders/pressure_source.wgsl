@@ -17,6 +17,7 @@
 // What a row sums over all its neighbours.
 struct Sums {
     density: f32,    // W, the particle itself among them
+    solids: f32,     // W of solids, the particle itself among them
     moment: Moment,
     inner: mat3x3f,  // e (v_j - v_i)^T, column c with component c of the velocity
     solid: mat3x3f,  // the same of the solids around a fluid particle
@@ -30,11 +31,13 @@ fn smooth_weight(w: f32) -> f32 {
     return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
 }
 
-fn add_neighbour(sums: Sums, w: f32, r: vec3f, v: vec3f, slips: bool) -> Sums {
+fn add_neighbour(sums: Sums, w: f32, r: vec3f, v: vec3f, is_solid: bool, slips: bool) -> Sums {
     var out = sums;
+    let even = smooth_weight(w);
     let e = pair_vector(w, r);
     let rate = mat3x3f(e * v.x, e * v.y, e * v.z);
-    out.density += smooth_weight(w);
+    out.density += even;
+    out.solids += select(0.0, even, is_solid);
     out.moment = add_moment(out.moment, e, r);
     if slips {
         out.solid += rate;
@@ -59,6 +62,20 @@ fn divergence(sums: Sums) -> f32 {
 
 //#endif
 //#if MIXED
+// Solids about a particle of water, over W0, between which it comes to be caught.
+const CAUGHT = vec2f(0.85, 1.0);
+// Room before a row at a body, over that of a flat wall, between which it comes to undo all.
+const SLOT = vec2f(0.35, 0.68);
+// Link of a caught particle to P = 0, over n0.
+const LEAK: f32 = 0.1;
+
+// Room that solids leave at a slot.
+fn room_of(solids: f32, is_fluid: bool) -> f32 {
+    let water = (CAUGHT.y - solids / params.smooth_density) / (CAUGHT.y - CAUGHT.x);
+    let row = ((params.smooth_density - solids) / params.wall_room - SLOT.x) / (SLOT.y - SLOT.x);
+    return saturate(select(row, water, is_fluid));
+}
+
 // Whether a slot is one of a body's wall layer.
 fn is_body(i: u32) -> bool {
     return i >= params.fluid && i < params.fluid + params.body_wall;
@@ -91,7 +108,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let v = velocity[i].xyz;
     var first_moment = vec3f(0.0);
     let zero = mat3x3f(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    var sums = Sums(1.0, Moment(vec3f(0.0), vec3f(0.0)), zero, zero, vec3f(0.0));
+    var sums = Sums(1.0, 1.0, Moment(vec3f(0.0), vec3f(0.0)), zero, zero, vec3f(0.0));
 //#endif
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list_at(k, i);
@@ -103,7 +120,8 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
 //#endif
 //#if MIXED
         first_moment += w * r;
-        sums = add_neighbour(sums, w, r, velocity[j].xyz - v, i < params.fluid && j >= params.fluid);
+        let is_solid = j >= params.fluid;
+        sums = add_neighbour(sums, w, r, velocity[j].xyz - v, is_solid, is_solid && i < params.fluid);
 //#endif
     }
     if links <= 0.0 {
@@ -118,11 +136,13 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         let j = neighbour_list_at(dummy_plane(k), i);
         at_body = at_body || is_body(j);
         let r = offset(x, position[j].xyz);
-        sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, i < params.fluid);
+        sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, true, i < params.fluid);
     }
     // A wall's row undoes as much as there is water before it.
     let share = links / params.wall_contact;
-    let wet = select(saturate(select(share, 2.0 * share - 1.0, at_body)), 1.0, i < params.fluid);
+    let room = room_of(sums.solids, i < params.fluid);
+    let row = select(saturate(share), min(saturate(2.0 * share - 1.0), room), at_body);
+    let wet = select(row, room, i < params.fluid);
     var b = wet * now.source_density * (sums.density - params.smooth_density) / params.smooth_density
         - wet * now.source_divergence * divergence(sums)
         - params.density * dot(params.gravity, first_moment);
@@ -132,5 +152,9 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
 //#if SURFACE_PRESSURE
     b += known;
 //#endif
-    source_diagonal[i] = vec2f(b, links + now.compressibility);
+    var diagonal = links + now.compressibility;
+//#if MIXED
+    diagonal += select(0.0, LEAK * (1.0 - wet) * params.number_density, i < params.fluid);
+//#endif
+    source_diagonal[i] = vec2f(b, diagonal);
 }

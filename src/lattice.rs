@@ -108,18 +108,24 @@ pub struct Lattice {
     pub neighbours: u32,
     /// Sum of the weights of a particle of a flat wall's layer with the water above [-].
     pub wall_contact: f64,
+    /// Sum of `smooth_weight` of a particle of a flat wall's layer with the water above [-].
+    pub wall_room: f64,
 }
 
 impl Lattice {
     /// Sums for an effective radius of `radius` spacings in `dimensions` dimensions.
     pub fn new(dimensions: u32, radius: f64) -> Self {
-        let (mut n, mut s, mut smooth, mut count, mut contact) = (0.0, 0.0, smooth_weight(0.0), 0, 0.0);
+        let (mut n, mut s, mut smooth, mut count) = (0.0, 0.0, smooth_weight(0.0), 0);
+        let (mut contact, mut room) = (0.0, 0.0);
         for (r2, z) in around(dimensions, radius) {
-            let w = weight(r2.sqrt(), radius);
+            let (w, even) = (weight(r2.sqrt(), radius), smooth_weight(r2.sqrt() / radius));
             n += w;
-            contact += if z > 0 { w } else { 0.0 };
             s += r2 * w;
-            smooth += smooth_weight(r2.sqrt() / radius);
+            smooth += even;
+            if z > 0 {
+                contact += w;
+                room += even;
+            }
             count += 1;
         }
         Self {
@@ -128,6 +134,7 @@ impl Lattice {
             smooth_density: smooth,
             neighbours: count,
             wall_contact: contact,
+            wall_room: room,
         }
     }
 }

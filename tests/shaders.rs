@@ -290,6 +290,7 @@ fn structs_lie_the_same_on_both_sides() {
             zero,
             drive,
             dynamic_viscosity,
+            wall_room,
         }
     );
     same_layout!(

@@ -185,3 +185,30 @@ fn a_body_that_is_held_has_its_slots_on_the_device_too() {
     println!("on the device {found:.4?} N");
     assert!(found[0].abs() < 0.01 && (found[1] / 0.981 - 1.0).abs() < 0.01, "{found:?}");
 }
+
+#[test]
+fn water_that_a_body_catches_on_the_ground_asks_no_pressure_without_bound() {
+    // A block falls through 0.2 m of water in the plane to the floor. 6241 pressures were cut at their upper bound.
+    let spacing = 0.02;
+    let mut simulation = simulation(&case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = 2e-3\nadaptive = true\nend = 2.0\ndimensions = 2\n\
+         gravity = [0, 0, -9.81]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1.6, 0.1, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1.6, 0.1, 1.0]\nopen = [\"z_max\"]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.3\nfriction = 0.2\n\
+         [[body]]\nname = \"block\"\nsize = [0.2, 0.1, 0.15]\ndensity = 2000\ndisplaces_fluid = true\n\
+         center = [0.6, 0.05, 0.285]\n"
+    )));
+    let (mut impulse, mut time) = (0.0, 0.0);
+    while simulation.time < 1.2 {
+        let dt = simulation.step().expect("it lands").dt;
+        if simulation.time > 0.9 {
+            (impulse, time) = (impulse + dt * simulation.fluid_force[0].force.z, time + dt);
+        }
+    }
+    let cut = simulation.backend.counters().expect("counted").pressure_clamps;
+    let lift = impulse / time / (9810.0 * 0.2 * 0.15 * spacing);
+    println!("{cut} cut, {lift:.3} of the water that it displaces");
+    assert!(cut < 10, "{cut}");
+    assert!((lift - 1.0).abs() < 0.1, "{lift}");
+}

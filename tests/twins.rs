@@ -388,6 +388,21 @@ fn pressure_source() {
         let (gpu, _) = pair.fields();
         assert!(gpu.source.iter().any(|&b| b > 0.0) && gpu.source.iter().any(|&b| b < 0.0));
         pair.check(Stage::PressureSource);
+        // A body that has caught water on the floor.
+        let mut fields = pair.gpu.read().expect("readable");
+        pair.poses = common::on_the_floor(&pair.scene, &mut fields.position);
+        pair.gpu.write(&fields).expect("writable");
+        pair.sync();
+        pair.move_solids();
+        pair.run_all(&LISTS);
+        pair.run_to_source();
+        let (cpu, rows) = (pair.cpu.fields(), pair.cpu.neighbours());
+        let c = 1.01 * laplacian_coefficient(&pair.params);
+        let links = |i: usize| rows.pressure(i).weight.iter().sum::<f64>();
+        let caught = |&i: &usize| cpu.state[i] == State::Inner && cpu.diagonal[i] > c * links(i);
+        let caught = (0..pair.scene.groups.fluid).filter(caught).count();
+        assert!(pair.params.source != Source::Mixed || caught > 1, "{caught} caught");
+        pair.check(Stage::PressureSource);
     });
 }
 

@@ -8,8 +8,10 @@
 //!
 //! The paper's source is the deviation of the number density alone. The mixed one takes the divergence of the velocity,
 //! corrected by the moment matrix so that a stretch at constant volume has none, the deviation of a smooth density sum,
-//! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles. Walls carry
-//! pressure to water alone: their layer holds none that could flow along it.
+//! and the weight of the water, which the pressure of water at rest balances on any arrangement of particles. The
+//! smooth sum, (1 + sum W) / W0, keeps its value on stretched and on disordered arrangements, where n of Eq. (4) rises:
+//! W ends smoothly and is finite at r = 0. Walls carry pressure to water alone: their layer holds none that could flow
+//! along it.
 
 use super::Particles;
 use crate::lattice::{reach, smooth_weight};
@@ -41,12 +43,17 @@ pub fn pressure_source(
         return (0.0, c);
     }
     let per_time = params.density / step.dt;
+    let mut leak = 0.0;
     let b = match params.source {
         Source::NumberDensity => number_density_source(n, params, step),
         Source::Mixed => {
             let first_moment: DVec3 = all.iter().take(carry).map(|(j, w)| w * on.offset(i, j)).sum();
-            let wet = wet_share(i, links, all.neighbour, on);
-            wet * step.relaxation * per_time / step.dt * deviation(all, params)
+            let density = |from: usize| -> f64 {
+                all.iter().filter(|&(j, _)| j >= from).map(|(_, w)| smooth_weight(reach(w))).sum()
+            };
+            let wet = wet_share(i, links, 1.0 + density(on.fluid), all.neighbour, on);
+            leak = c * leak_of(i, wet, on);
+            wet * step.relaxation * per_time / step.dt * ((1.0 + density(0)) / params.smooth_density - 1.0)
                 - wet * (1.0 - step.relaxation) * per_time * divergence(i, all, on)
                 - c * params.density * params.gravity.dot(first_moment)
         }
@@ -56,25 +63,29 @@ pub fn pressure_source(
     } else {
         all.iter().take(carry).map(|(j, w)| w * surface_pressure[j]).sum()
     };
-    (b + c * known, c * links + step.compressibility * per_time / step.dt)
+    (b + c * known, c * links + leak + step.compressibility * per_time / step.dt)
 }
 
-/// Part of divergence and deviation that the wall's row `i` undoes, whose weights with water sum to `links` [-]: all of them on a flat wall
-/// under water. A row in a slot between solids meets hardly any water, of which a little that is left to be undone, as of solids that touch,
-/// would ask a large pressure. At a body a row undoes nothing below half of a flat wall's water, as at the edge that a body
-/// stands on: the rest would press a tenth too much into the slot under it.
+/// Part of divergence and deviation that slot `i` undoes [-]: all of them in water and on a flat wall under it. Its
+/// weights with neighbours that carry pressure sum to `links`, and solids, itself among them, to `solids` = 1 + sum W.
+/// A row in a slot between solids meets hardly any water, of which a little that is left to be undone, as of solids
+/// that touch, would ask a large pressure. At a body a row undoes nothing below half of a flat wall's water, as at the
+/// edge that a body stands on: the rest would press a tenth too much into the slot under it. Solids that come to touch
+/// catch particles of water between them, which have no room and no way out: to undo that would take pressures without
+/// bound in a pocket of a few rows.
 #[inline(always)]
-pub fn wet_share(i: usize, links: f64, neighbour: &[u32], on: Particles) -> f64 {
+pub fn wet_share(i: usize, links: f64, solids: f64, neighbour: &[u32], on: Particles) -> f64 {
+    let room = room(i, solids, on.fluid, on.params);
     if i < on.fluid {
-        return 1.0;
+        return room;
     }
-    let share = links / on.params.wall_contact;
-    if share >= 1.0 {
+    let share = (links / on.params.wall_contact).min(1.0);
+    if share.min(room) >= 1.0 {
         return 1.0;
     }
     let bodies = on.fluid..on.fluid + on.params.body_wall;
     let at_body = bodies.contains(&i) || neighbour.iter().any(|&j| bodies.contains(&(j as usize)));
-    if at_body { (2.0 * share - 1.0).max(0.0) } else { share }
+    if at_body { (2.0 * share - 1.0).max(0.0).min(room) } else { share }
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).
@@ -84,11 +95,31 @@ pub fn number_density_source(n: f64, params: &Params, step: &Step) -> f64 {
     step.relaxation * (params.density / step.dt) / step.dt * deviation
 }
 
-/// (1 + sum W) / W0 - 1 [-]: W is smooth where it ends and finite at r = 0, so that the sum keeps its value on
-/// stretched and on disordered arrangements, where n of Eq. (4) rises.
-fn deviation(all: Row, params: &Params) -> f64 {
-    let near: f64 = all.iter().map(|(_, w)| smooth_weight(reach(w))).sum();
-    (1.0 + near) / params.smooth_density - 1.0
+/// Solids about a particle of water, over W0, from which on it is caught between them, and at which it wholly is, as in
+/// a hole of one particle: gaps of 0.85 and 0.6 spacings in the plane, of 0.6 and 0.4 in space.
+const CAUGHT: (f64, f64) = (0.85, 1.0);
+/// Room before a row at a body, over that of a flat wall, at which it undoes nothing, and from which on as much as it
+/// meets water: gaps of some 0.14 and 0.31 spacings. A corner has 0.73 and more.
+const SLOT: (f64, f64) = (0.35, 0.68);
+/// Link of a caught particle to P = 0, over n0 [-]: small beside links to water that is not caught.
+const LEAK: f64 = 0.1;
+
+/// Room that `solids` leave at slot `i` [-].
+#[inline(always)]
+fn room(i: usize, solids: f64, fluid: usize, params: &Params) -> f64 {
+    let room = if i < fluid {
+        (CAUGHT.1 - solids / params.smooth_density) / (CAUGHT.1 - CAUGHT.0)
+    } else {
+        ((params.smooth_density - solids) / params.wall_room - SLOT.0) / (SLOT.1 - SLOT.0)
+    };
+    room.clamp(0.0, 1.0)
+}
+
+/// What is added to the links of a particle of water that undoes the part `wet`: a pocket that no water joins to the
+/// rest has pressures near 0, and not those of a closed vessel.
+#[inline(always)]
+pub fn leak_of(i: usize, wet: f64, on: Particles) -> f64 {
+    if i < on.fluid { LEAK * (1.0 - wet) * on.params.number_density } else { 0.0 }
 }
 
 /// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Solids count with their

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Layers of two sides nearer to each other than twice this, over the spacing, are one in the middle.
 const MERGED: f64 = 0.3;
 /// Part of a layer for which there is room in the middle, from which on it gets one.
-const ROOM: f64 = 0.35;
+const ROOM: f64 = 0.32;
 /// Cosine between the normals of two sides that look away from each other: a plate, not the tip of a wedge.
 const AWAY: f64 = -0.9;
 /// Part of the spacing to which the middle is found.

@@ -217,6 +217,20 @@ pub fn poses(scene: &Scene, t: f64) -> Vec<Pose> {
         .collect()
 }
 
+/// The same with the body 0.3 spacings above the floor, where it catches a layer of the water at `position`; what else
+/// of it the body meets is put into the air.
+pub fn on_the_floor(scene: &Scene, position: &mut [DVec3]) -> Vec<Pose> {
+    let (mut poses, l0) = (poses(scene, 0.0), scene.spacing);
+    poses[1].position.z = (1.5 + 0.3) * l0;
+    let at = poses[1].position;
+    for x in &mut position[..scene.groups.fluid] {
+        if (*x - at).abs().max_element() < 1.8 * l0 {
+            x.z = if x.z < l0 { 0.15 * l0 } else { x.z + 0.6 * (scene.domain.1 - scene.domain.0).z };
+        }
+    }
+    poses
+}
+
 /// The stages of a step up to, and not including, `end`, in order.
 pub fn stages_before(end: Stage) -> impl Iterator<Item = Stage> {
     Stage::ALL.into_iter().take_while(move |&s| s != end)

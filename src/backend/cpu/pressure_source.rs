@@ -5,7 +5,7 @@ use super::row_arrays::{Columns, RowArrays, sum};
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::pressure_source::{laplacian_coefficient, number_density_source, wet_share};
+use crate::kernels::pressure_source::{laplacian_coefficient, leak_of, number_density_source, wet_share};
 use crate::lattice::{reach, smooth_weight};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
@@ -41,7 +41,11 @@ wide! {
             diagonal[k] = c * links + compressible;
             source[k] = match on.params.source {
                 Source::NumberDensity => number_density_source(density[k], on.params, step),
-                Source::Mixed => mixed_source(first + k, chunk.parts(k), on, step, arrays),
+                Source::Mixed => {
+                    let (source, leak) = mixed_source(first + k, chunk.parts(k), on, step, arrays);
+                    diagonal[k] += c * leak;
+                    source
+                }
             };
             if !surface_pressure.is_empty() {
                 source[k] += c * known(chunk.pressure(k), surface_pressure);
@@ -56,7 +60,7 @@ fn known(carriers: Row, surface_pressure: &[f64]) -> f64 {
     carriers.iter().map(|(j, w)| w * surface_pressure[j]).sum()
 }
 
-/// Right side of slot `i`, corrected, smooth and balanced.
+/// Right side of slot `i`, corrected, smooth and balanced, and what is added to its links.
 #[inline(always)]
 fn mixed_source(
     i: usize,
@@ -64,7 +68,7 @@ fn mixed_source(
     on: Particles,
     step: &Step,
     arrays: &mut RowArrays,
-) -> f64 {
+) -> (f64, f64) {
     let (params, n) = (on.params, all.neighbour.len());
     let RowArrays { r, v, w, s, e, .. } = arrays;
     let filled = r.offsets(i, all.neighbour, on);
@@ -74,6 +78,9 @@ fn mixed_source(
     // The filling has no weight and no part in the smooth sum either.
     s.iter_mut().zip(&*w).for_each(|(s, &w)| *s = smooth_weight(reach(w)));
     let deviation = (1.0 + sum(s)) / params.smooth_density - 1.0;
+    // Fluid comes first in a row.
+    let solids = all.neighbour.partition_point(|&j| (j as usize) < on.fluid);
+    let solids = 1.0 + sum(&s[solids..]);
     pair_vectors(r, w, params.effective_radius, e);
     let m = moment(r, e, filled, scale(on), params.dimensions);
     let inverse = inverse(m, params.dimensions).unwrap_or(DMat3::IDENTITY);
@@ -83,14 +90,15 @@ fn mixed_source(
     }
     s.copy_from_slice(w);
     s[carry..].fill(0.0);
-    let wet = wet_share(i, sum(s), all.neighbour, on);
+    let wet = wet_share(i, sum(s), solids, all.neighbour, on);
     let first_moment = r.weighted_sum(s);
     corrected_products(inverse, e, v, s);
     let divergence = scale(on) * sum(s);
     let per_time = params.density / step.dt;
-    wet * step.relaxation * per_time / step.dt * deviation
+    let source = wet * step.relaxation * per_time / step.dt * deviation
         - wet * (1.0 - step.relaxation) * per_time * divergence
-        - laplacian_coefficient(params) * params.density * params.gravity.dot(first_moment)
+        - laplacian_coefficient(params) * params.density * params.gravity.dot(first_moment);
+    (source, leak_of(i, wet, on))
 }
 
 /// Leaves of the relative velocity `v` of solid neighbours only what lies along their mean normal. Fluid comes first

@@ -106,6 +106,9 @@ pub struct Constants {
     pub zero: f32,
     pub drive: [f32; 3],
     pub dynamic_viscosity: f32,
+    pub wall_room: f32,
+    /// To a multiple of 16 bytes.
+    pub pad: [u32; 3],
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -318,6 +321,8 @@ impl Constants {
             body_wall: params.body_wall as u32,
             zero: 0.0,
             dynamic_viscosity: (params.density * params.viscosity) as f32,
+            wall_room: params.wall_room as f32,
+            pad: [0; 3],
         }
     }
 }
