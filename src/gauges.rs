@@ -181,7 +181,7 @@ impl Gauges {
             Some(mean) => mean,
             None => self.read(simulation)?,
         };
-        let mut row = vec![Cell::from(simulation.time)];
+        let mut row = vec![Cell::time(simulation.time)];
         row.extend(pressure.into_iter().map(|p| Cell::from(if known { p } else { f64::NAN })));
         let Params { viscosity, wall_friction, .. } = simulation.params;
         let any_fixed = self.wet && self.force.iter().any(|(_, target)| target.is_fixed());

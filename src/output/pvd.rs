@@ -1,5 +1,6 @@
 //! The PVD file: which VTU files make up which moment.
 
+use super::table::even;
 use super::write_whole;
 use crate::checkpoint::Archive;
 use crate::error::{Error, FolderError, Result};
@@ -54,6 +55,7 @@ impl Pvd {
     /// # Errors
     /// [`crate::error::Error::Io`]; the list is then as it was before.
     pub fn push(&mut self, time: f64, parts: &[(&str, String)]) -> Result<()> {
+        let time = even(time);
         let mut text = String::new();
         for (part, (name, file)) in parts.iter().enumerate() {
             let line = format!(

@@ -28,6 +28,18 @@ pub enum Cell {
     Text(String),
 }
 
+/// `time` [s] to eleven digits: what steps add up to is 0.7000000000000005 where 0.7 is meant.
+pub(crate) fn even(time: f64) -> f64 {
+    format!("{time:.10e}").parse().unwrap_or(time)
+}
+
+impl Cell {
+    /// The moment `time` [s] of a row.
+    pub(crate) fn time(time: f64) -> Self {
+        Self::Number(even(time))
+    }
+}
+
 impl From<f64> for Cell {
     fn from(value: f64) -> Self {
         Self::Number(value)
@@ -140,4 +152,20 @@ pub(crate) fn vector_columns(name: &str, unit: &str) -> [String; 3] {
 /// Three cells of a vector.
 pub(crate) fn vector_cells(v: glam::DVec3) -> [Cell; 3] {
     v.to_array().map(Cell::Number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::even;
+
+    #[test]
+    fn times_of_steps_are_those_that_are_meant() {
+        let sum = |dt: f64, steps: u32| (0..steps).fold(0.0, |t, _| t + dt);
+        for (dt, steps, meant) in [(1e-3, 700, 0.7), (9e-4, 5000, 4.5), (2e-5, 200_000, 4.0)] {
+            assert_ne!(sum(dt, steps), meant);
+            assert_eq!(even(sum(dt, steps)), meant);
+        }
+        // and no two steps have one time
+        assert!(even(100.0 + 1e-7) > even(100.0));
+    }
 }

@@ -233,7 +233,7 @@ impl Tables {
                 let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
                 let nothing = Wrench { force: DVec3::NAN, torque: DVec3::NAN };
                 let fluid = if known { fluid } else { nothing };
-                let mut row = vec![Cell::from(simulation.time), Cell::from(simulation.solids.name(k))];
+                let mut row = vec![Cell::time(simulation.time), Cell::from(simulation.solids.name(k))];
                 row.extend(vector_cells(simulation.solids.path(k)));
                 row.extend([q.w, q.x, q.y, q.z].map(Cell::Number));
                 for vector in [pose.velocity, pose.angular_velocity] {
@@ -259,7 +259,7 @@ impl Tables {
         bodies: Energy,
         since: &Since,
     ) -> Vec<Cell> {
-        let mut row = vec![Cell::from(simulation.steps), Cell::from(simulation.time), Cell::from(report.dt)];
+        let mut row = vec![Cell::from(simulation.steps), Cell::time(simulation.time), Cell::from(report.dt)];
         row.extend(
             [
                 fluid.speed_max * report.dt / simulation.params.spacing,

@@ -27,6 +27,7 @@
 
 use super::engine::{Job, Processor};
 use super::measure::Spec;
+use super::result_number::ResultNumber;
 use super::run_point::{Point, run};
 use super::validation::check::Check;
 use seixo::case::file::parse;
@@ -76,6 +77,9 @@ pub struct Definition {
     /// What counts as error.
     #[serde(default)]
     pub error: Vec<ErrorMeasure>,
+    /// Numbers that are told of every point.
+    #[serde(default)]
+    pub result: Vec<ResultNumber>,
     /// What is compared with what, for a validation.
     #[serde(default)]
     pub check: Vec<Check>,
@@ -248,8 +252,11 @@ impl Definition {
         for check in &study.check {
             check.sound().map_err(|e| wrong("check", &e))?;
         }
-        if study.error.is_empty() && study.check.is_empty() {
-            return Err(wrong("check", &"give [[error]] or [[check]]: what is to be found out"));
+        for result in &study.result {
+            result.sound().map_err(|e| wrong("result", &e))?;
+        }
+        if study.error.is_empty() && study.check.is_empty() && study.result.is_empty() {
+            return Err(wrong("error", &"give [[error]], [[result]] or [[check]]: what is to be found out"));
         }
         let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
         if study.name.is_empty() || study.name.starts_with('.') || !study.name.chars().all(plain) {
@@ -369,10 +376,14 @@ impl Definition {
         };
         let parameters = picks.iter().map(|p| (p.axis.clone(), p.name.clone())).collect();
         let identity = match &effective {
-            Ok(text) => format!("{text}\n{:?} {processor:?} {:?}", self.measure, self.limit),
+            Ok(text) => {
+                let told = if self.result.is_empty() { String::new() } else { format!(" {:?}", self.result) };
+                format!("{text}\n{:?} {processor:?} {:?}{told}", self.measure, self.limit)
+            }
             Err(error) => format!("{error} {all:?}"),
         };
         let (spec, limits, repetitions) = (self.measure.clone(), self.limit.clone(), self.repetitions);
+        let results = self.result.clone();
         let job = Job {
             method,
             parameters,
@@ -384,6 +395,7 @@ impl Definition {
                     Err(error) => return Err(Error::file("case", "", error)),
                 };
                 let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
+                results.iter().try_for_each(|result| result.put(&mut out))?;
                 limits.iter().for_each(|(name, most)| out.limit(name, *most));
                 Ok(out)
             }),

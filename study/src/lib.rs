@@ -43,6 +43,7 @@ pub mod pressure_solve;
 pub mod random_scenes;
 pub mod record;
 pub mod report;
+pub mod result_number;
 pub mod row;
 pub mod run_point;
 pub mod single;

@@ -1,0 +1,80 @@
+//! A number that a study tells of every point, without anything to hold it against.
+//!
+//! ```toml
+//! [[result]]
+//! name = "mean force on the gate [N]"
+//! curve = "gate_force_x [N]"
+//! take = "mean"                          # see [`Take`]
+//! window = [0.5, 1.0]
+//! ```
+
+use super::row::{Class, Measured};
+use super::validation::reduce::{Take, cut, reduce, since_moved, smooth};
+use seixo::error::{Error, Result};
+use serde::Deserialize;
+
+/// What is told.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ResultNumber {
+    /// Name of the column, with its unit.
+    pub name: String,
+    /// A measured curve.
+    pub curve: String,
+    /// What is taken from the curve.
+    pub take: Take,
+    /// First and last time (or place) that counts.
+    pub window: Option<[f64; 2]>,
+    /// Width of the moving mean that the curve goes through [s]; 0 for none.
+    #[serde(default)]
+    pub smooth: f64,
+    /// Level or time that `take` asks for.
+    #[serde(default)]
+    pub level: f64,
+    /// Second level, of `passage`.
+    #[serde(default)]
+    pub to: f64,
+    /// Time counts from the moment at which the curve has moved by this much from its start.
+    pub since_moved: Option<f64>,
+}
+
+impl ResultNumber {
+    /// What is wrong with it, if anything.
+    ///
+    /// # Errors
+    /// [`Error::Case`] naming it.
+    pub fn sound(&self) -> Result<()> {
+        if matches!(self.take, Take::Distance | Take::Lag) {
+            let text = format!("result `{}`: `take` asks for a second curve: that is a [[check]]", self.name);
+            return Err(Error::key("result", text, ""));
+        }
+        Ok(())
+    }
+
+    /// Puts the number among what a run `measured`. A curve that is not there is a mistake of the study; what does not come to pass in
+    /// a run, such as a passage, leaves its cell empty.
+    ///
+    /// # Errors
+    /// [`Error::Case`] with the curves that there are.
+    pub fn put(&self, measured: &mut Measured) -> Result<()> {
+        if measured.class > Class::Degraded {
+            return Ok(());
+        }
+        let Some(curve) = measured.curves.get(&self.curve) else {
+            let known: Vec<&str> = measured.curves.keys().map(String::as_str).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            let text =
+                format!("result `{}`: there is no curve `{}`; there are: {known}", self.name, self.curve);
+            return Err(Error::key("result", text, "name a curve that [measure] takes"));
+        };
+        let curve = match self.since_moved {
+            Some(by) => since_moved(curve, by).map(|(curve, _)| curve).unwrap_or_default(),
+            None => curve.clone(),
+        };
+        let curve = cut(&smooth(&curve, self.smooth), self.window);
+        if let Some(value) = reduce(self.take, &curve, [self.level, self.to]) {
+            measured.put(&self.name, value);
+        }
+        Ok(())
+    }
+}
