@@ -93,9 +93,12 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
 fn wall_feet(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
     let (wall, length) = (&walls[k], FOOT * spacing);
     let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
-    // what has been found covered is so by more than a crust
+    // what has been found covered is so by more than a crust, up to its corners: on a slope these may stick out
     let stands = |face: u8| {
-        (all & !wall.faces) >> face & 1 == 1 && face_is_covered(walls, k, face, length, spacing, flat)
+        let closed = (all & !wall.faces) >> face & 1 == 1;
+        closed
+            && face_is_covered(walls, k, face, length, spacing, flat)
+            && corners_are_covered(walls, k, face, length, spacing, flat)
     };
     let meets = |foot: u8, side: u8| {
         let (across, beside) = (usize::from(foot / 2), usize::from(side / 2));
@@ -109,6 +112,20 @@ fn wall_feet(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
         (0..6).any(|side| side / 2 != foot / 2 && wall.faces >> side & 1 == 1 && meets(foot, side))
     };
     (0..6).filter(|&face| stands(face) && has_corner(face)).collect()
+}
+
+/// Whether other walls hold the corners of a face of wall `k`, moved out by `beyond` [m].
+fn corners_are_covered(walls: &[WallBox], k: usize, face: u8, beyond: f64, spacing: f64, flat: bool) -> bool {
+    let (half, normal) = (walls[k].half, usize::from(face / 2));
+    let sides = |axis: usize| if flat && axis == 1 { vec![0.0] } else { vec![-half[axis], half[axis]] };
+    let (u, v) = ((normal + 1) % 3, (normal + 2) % 3);
+    sides(u).into_iter().all(|x| {
+        sides(v).into_iter().all(|y| {
+            let mut q = face_normal(face) * (half + beyond);
+            (q[u], q[v]) = (x, y);
+            is_covered(walls, k, q, spacing)
+        })
+    })
 }
 
 /// Places half a spacing apart across an edge of half length `half` [m]; the middle of one that is seen end on.
@@ -268,5 +285,28 @@ mod tests {
             edges.iter().filter(|e| e.along.z.abs() > 0.5 && e.start.x > 1.0).map(|e| e.length).sum();
         assert!((upright - 1.0).abs() < 1e-2, "{upright}");
         assert!(corners.contains(&DVec3::new(2.0, 1.0, 0.0)) && corners.len() >= 6, "{corners:?}");
+    }
+
+    #[test]
+    fn a_post_goes_on_into_the_floor_and_not_out_of_a_slope() {
+        let mut walls = vec![
+            wall([0.0, 0.0, -0.2], [2.0, 1.0, 0.0]),
+            wall([0.5, 0.2, 0.0], [0.6, 0.4, 0.3]),
+            // its back is hidden by a block and a slope, which lies a little lower further on
+            wall([1.0, 0.2, 0.0], [1.2, 0.42, 0.08]),
+            wall([1.2, 0.2, 0.0], [1.28, 0.3, 0.12]),
+        ];
+        let mut slope = wall([1.0, 0.0, 0.0], [2.0, 0.6, 0.08]);
+        slope.axes = DMat3::from_rotation_y(-0.2829);
+        slope.center = DVec3::new(1.2579, 0.3, 0.1395) - slope.axes * DVec3::new(0.0, 0.0, 0.04);
+        walls.push(slope);
+        let beside = 0.5 * COVERED * 0.02;
+        for k in 0..walls.len() {
+            let open = (0..6).filter(|&f| !face_is_covered(&walls, k, f, beside, 0.02, false));
+            walls[k].faces = open.map(|f| 1 << f).sum();
+        }
+        assert_eq!(wall_feet(&walls, 1, 0.02, false), [4]);
+        assert_eq!(walls[3].faces & 1, 0, "its back is not hidden");
+        assert!(!wall_feet(&walls, 3, 0.02, false).contains(&0));
     }
 }
