@@ -1,14 +1,17 @@
 //! A pair of solids under the smooth law: what of each lies in the other, forces, friction patches.
 
+mod beside_device;
+mod edges;
+mod lists;
+
 use super::answer::Mode;
 use super::constants::{Constants, felt};
-use super::frame::{Frame, View};
-use super::patch::{Contact, DeviceSums, Patch, edge_key, place, square};
-use super::round;
+use super::frame::Frame;
+use super::patch::{Contact, Patch, place, square};
 use super::walls::WallBox;
 use crate::body::{Body, Pose, Wrench};
 use crate::contact::candidates::image;
-use crate::shape::{Inside, Line, Surface};
+use crate::shape::{Inside, Surface};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
@@ -30,9 +33,6 @@ impl Other {
         }
     }
 }
-
-/// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
-const ALONG_NORMAL: f64 = 0.95;
 
 /// Share of the sum of w d^8 below which an edge is left out: the end of an upright one adds nothing to a face.
 pub(super) const LEAST: f64 = 1e-6;
@@ -169,68 +169,6 @@ impl Pair {
         self.points
     }
 
-    /// Finds the contacts that a device does not look for, those of edges and of walls' corners. Those pressed
-    /// by a face in `open` (bits 0 to 5: of `b`, 6 to 11: of `a`) are to be given to the device; of the
-    /// others, their deepest depth d [m], and their sums over it.
-    pub fn find_beside_device(
-        &mut self,
-        bodies: &[Body],
-        surfaces: &[Arc<Surface>],
-        walls: &[WallBox],
-        spacing: f64,
-        open: u32,
-    ) -> (f64, Mode) {
-        self.contacts.clear();
-        self.given.clear();
-        self.points = 0;
-        if self.is_empty() {
-            return (0.0, Mode::default());
-        }
-        // its lists of points are empty
-        self.find(bodies, surfaces, walls);
-        self.points = self.contacts.len();
-        self.find_edges(bodies, surfaces, walls, spacing, LEAST);
-        let given = &mut self.given;
-        self.contacts.retain(|c| {
-            let on_face = c.face().is_some_and(|face| open >> face & 1 == 1);
-            if on_face {
-                given.push(*c);
-            }
-            !on_face
-        });
-        let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
-        (deepest, Mode::of(&self.contacts, deepest, bodies[self.a].pose.position))
-    }
-
-    /// Joins the contacts kept beside the device with what it sums over its own and those it was given.
-    pub fn join(&mut self, sums: &DeviceSums, bodies: &[Body]) {
-        self.patches.clear();
-        self.wrench = sums.wrench;
-        self.before = self.depth;
-        (self.energy, self.depth) = (0.0, sums.deepest);
-        self.points += sums.count - self.given.len();
-        self.count = sums.count + self.contacts.len();
-        if sums.count == 0 {
-            if !self.contacts.is_empty() {
-                self.press(bodies);
-                self.sum(bodies);
-            }
-            return;
-        }
-        self.push(sums.depth, sums.shares);
-        self.sum(bodies);
-        self.patches.extend(&sums.patches);
-        // the device takes those that it was given for points
-        std::mem::swap(&mut self.contacts, &mut self.given);
-        self.push(sums.depth, sums.shares);
-        for c in &self.contacts {
-            if let Some(patch) = self.patches.iter_mut().find(|p| p.key == c.patch) {
-                patch.spread += square(c.stretch, c.force / patch.pressing);
-            }
-        }
-        std::mem::swap(&mut self.contacts, &mut self.given);
-    }
-
     /// The second solid.
     pub(super) fn other(&self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) -> Frame {
         match self.b {
@@ -245,69 +183,6 @@ impl Pair {
     /// How the second solid lies and moves, if it can, at its image beside the first.
     pub(super) fn pose_b(&self, bodies: &[Body]) -> Option<Pose> {
         self.b.solid().map(|b| image(&bodies[b], self.image))
-    }
-
-    /// Collects the points and edges of `a` and of `b` that come within `skin` [m] of the other's shape.
-    pub fn collect(&mut self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox], skin: f64) {
-        let body = &bodies[self.a];
-        let near = |surface: &Surface, own: Frame, to: Frame| {
-            let turn = to.axes.transpose() * own.axes;
-            let shift = to.local(own.center);
-            let points = surface.points.iter().enumerate();
-            let points = points.filter(|(_, p)| to.shape.outside(turn * **p + shift) < skin);
-            points.map(|(k, _)| k as u32).collect::<Vec<u32>>()
-        };
-        let other = self.other(bodies, surfaces, walls);
-        let own = Frame::body(body, surfaces[self.a].all_faces);
-        let theirs = self.b.solid().map(|b| &surfaces[b]);
-        self.round = surfaces[self.a].is_round() || theirs.is_some_and(|s| s.is_round());
-        self.round &= other.shape.outside(other.local(own.center)) < own.shape.radius() + skin
-            && own.shape.outside(own.local(other.center)) < other.shape.radius() + skin;
-        if surfaces[self.a].ball.is_some() || theirs.is_some_and(|s| s.ball.is_some()) {
-            return;
-        }
-        self.points_a = near(&surfaces[self.a], own, other);
-        if let Other::Solid(b) = self.b {
-            self.points_b = near(&surfaces[b], other, own);
-        }
-        self.collect_edges(bodies, surfaces, walls, skin);
-    }
-
-    /// Collects the edges of both, and a wall's corners, that come within `skin` [m] of the other's shape.
-    pub fn collect_edges(
-        &mut self,
-        bodies: &[Body],
-        surfaces: &[Arc<Surface>],
-        walls: &[WallBox],
-        skin: f64,
-    ) {
-        let body = &bodies[self.a];
-        let own = Frame::body(body, surfaces[self.a].all_faces);
-        let other = self.other(bodies, surfaces, walls);
-        let near = |lines: &[Line], center: DVec3, axes: DMat3, to: Frame| {
-            let turn = to.axes.transpose() * axes;
-            let shift = to.axes.transpose() * (center - to.center);
-            let lines = lines.iter().enumerate().filter(|(_, e)| {
-                to.shape.line_is_near(turn * e.start + shift, turn * e.along, e.length, skin)
-            });
-            lines.map(|(k, _)| k as u32).collect::<Vec<u32>>()
-        };
-        self.samples.clear();
-        self.edges_a = near(&surfaces[self.a].edges, own.center, own.axes, other);
-        match self.b {
-            Other::Solid(b) => self.edges_b = near(&surfaces[b].edges, other.center, other.axes, own),
-            Other::Wall(w) => {
-                self.edges_b = near(&walls[w].edges, DVec3::ZERO, DMat3::IDENTITY, own);
-                let near = |x: &&DVec3| own.shape.outside(own.local(**x)) < skin;
-                self.samples.extend(walls[w].corners.iter().filter(near));
-            }
-        }
-    }
-
-    /// Whether any candidate is left.
-    pub fn is_empty(&self) -> bool {
-        let points = self.points_a.len() + self.points_b.len() + self.samples.len();
-        points + self.edges_a.len() + self.edges_b.len() == 0 && !self.round
     }
 
     /// Forces, energy and friction patches at the bodies' poses and velocities; edges that would add less than the share
@@ -374,119 +249,6 @@ impl Pair {
         let weight = surfaces[self.a].smallest_weight;
         for &at in &self.samples {
             pushed(at, weight, 1.0);
-        }
-    }
-
-    /// Nodes of the edges inside the other solid, after the points.
-    fn find_edges(
-        &mut self,
-        bodies: &[Body],
-        surfaces: &[Arc<Surface>],
-        walls: &[WallBox],
-        spacing: f64,
-        least: f64,
-    ) {
-        let (edges_a, edges_b) = (std::mem::take(&mut self.edges_a), std::mem::take(&mut self.edges_b));
-        let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
-        let other = self.other(bodies, surfaces, walls);
-        let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
-        let eighths: f64 = self.contacts.iter().map(|c| c.weight * c.depth.powi(8)).sum();
-        let least = least * eighths;
-        let view = View::new(own.center, own.axes, other, least);
-        for &k in &edges_a {
-            let line = surfaces[self.a].edges[k as usize];
-            self.press_edge(line, &view, share * line.density, 1.0, k, bodies);
-        }
-        match self.b {
-            Other::Solid(b) => {
-                let view = View::new(other.center, other.axes, own, least);
-                for &k in &edges_b {
-                    let line = surfaces[b].edges[k as usize];
-                    self.press_edge(line, &view, share * line.density, -1.0, k, bodies);
-                }
-            }
-            Other::Wall(w) => {
-                let view = View::new(DVec3::ZERO, DMat3::IDENTITY, own, least);
-                let density = surfaces[self.a].smallest_weight / spacing;
-                for &k in &edges_b {
-                    self.press_edge(walls[w].edges[k as usize], &view, density, -1.0, k, bodies);
-                }
-            }
-        }
-        (self.edges_a, self.edges_b) = (edges_a, edges_b);
-    }
-
-    /// Balls, rings and round sides of both inside the other one.
-    fn find_round(&mut self, bodies: &[Body], surfaces: &[Arc<Surface>], walls: &[WallBox]) {
-        let own = Frame::body(&bodies[self.a], surfaces[self.a].all_faces);
-        let other = self.other(bodies, surfaces, walls);
-        let theirs = self.b.solid().map(|b| &surfaces[b]);
-        let mut contacts = std::mem::take(&mut self.contacts);
-        let b = self.pose_b(bodies);
-        let mut add = |sign: f64, p: round::Pressed| {
-            let normal = sign * p.normal;
-            let velocity_b = b.map_or(DVec3::ZERO, |b| b.velocity_at(p.at));
-            let speed = (bodies[self.a].pose.velocity_at(p.at) - velocity_b).dot(normal);
-            let patch = if sign > 0.0 { p.face } else { 8 + p.face };
-            contacts.push(Contact::new(p.at, normal, p.depth, p.weight, speed, patch));
-        };
-        let share = if theirs.is_some() { 0.5 } else { 1.0 };
-        match (surfaces[self.a].ball, theirs.and_then(|s| s.ball)) {
-            (Some(radius), _) => round::ball(&own, radius, &other, &mut |p| add(1.0, p)),
-            (None, Some(radius)) => round::ball(&other, radius, &own, &mut |p| add(-1.0, p)),
-            (None, None) => {
-                round::press(&own, &surfaces[self.a], &other, share, &mut |p| add(1.0, p));
-                if let Some(theirs) = theirs {
-                    round::press(&other, theirs, &own, share, &mut |p| add(-1.0, p));
-                }
-            }
-        }
-        self.contacts = contacts;
-    }
-
-    /// Nodes of one edge inside a shape. `sign` turns outward of that shape into the direction of the force
-    /// on the pair's first solid.
-    ///
-    /// An edge that lies in a face belongs to the face's patch; one that crosses an edge makes its own,
-    /// so that friction acts across the cross product of both.
-    fn press_edge(&mut self, line: Line, view: &View, density: f64, sign: f64, edge: u32, bodies: &[Body]) {
-        let other = &view.other;
-        let start = view.turn * line.start + view.shift;
-        let along = view.turn * line.along;
-        let (first, key) = (self.contacts.len(), edge_key(edge, sign < 0.0));
-        let mut push = DVec3::ZERO;
-        let least = view.least / density;
-        // places and velocities are linear along the edge: each node adds its share to those at the start
-        let (origin, direction) = (other.center + other.axes * start, other.axes * along);
-        let a = &bodies[self.a].pose;
-        let (mut slip, mut spin) = (a.velocity_at(origin), a.angular_velocity);
-        if let Some(b) = self.pose_b(bodies) {
-            slip -= b.velocity_at(origin);
-            spin -= b.angular_velocity;
-        }
-        let turning = spin.cross(direction);
-        other.shape.each_node((start, along, line.length), other.faces, least, |node, inside| {
-            let (s, width) = (node.place, node.length);
-            let normal = sign * (other.axes * inside.outward);
-            push += width * inside.depth.powi(7) * inside.outward;
-            self.contacts.push(Contact {
-                at: origin + s * direction,
-                normal,
-                depth: inside.depth,
-                weight: density * width,
-                speed: (slip + s * turning).dot(normal),
-                stretch: node.deviation * direction,
-                force: 0.0,
-                part: 1.0,
-                patch: key,
-            });
-        });
-        let toward = push.abs();
-        let axis = toward.max_position();
-        if toward[axis] > ALONG_NORMAL * push.length() {
-            let face = 2 * axis as u8 + u8::from(push[axis] > 0.0);
-            let patch = u32::from(if sign > 0.0 { face } else { 8 + face });
-            self.contacts[first..].iter_mut().for_each(|c| c.patch = patch);
         }
     }
 
