@@ -90,8 +90,9 @@ impl Smooth {
         // few pairs are ever deep, or much deeper than before
         let little = 1e-3 * self.spacing;
         let deep = |p: &&Pair| p.depth > p.before + little || p.depth > self.harmless;
-        // what goes on from one solid to the next is as deep in that at once as it was in the first
-        let before = |pair: &Pair| {
+        // what goes on from one solid to the next is as deep in that at once as it was in the first; looked for among all pairs
+        // only where a pair's own depth does not do
+        let before_beside = |pair: &Pair| {
             let holds = |p: &Pair, k: usize| p.a == k || p.b.solid() == Some(k);
             let beside = |p: &&Pair| holds(p, pair.a) || pair.b.solid().is_some_and(|b| holds(p, b));
             let others = self.evaluated().iter().filter(beside).map(|p| p.before).filter(|d| d.is_finite());
@@ -107,13 +108,16 @@ impl Smooth {
             };
             let driven = pair.b.solid().is_some_and(|b| !now.bodies[b].is_free());
             let fault = |what: String| Fault { a: pair.a, b: other(pair.b), what };
-            let before = before(pair);
-            if pair.depth > before + 2.0 * closing * now.substep + little {
-                return Some(fault(format!(
-                    "is suddenly {:.3e} m deep, after {:.3e} m: it came in where contact does not look; use a \
-                     smaller run.time_step or a thicker wall",
-                    pair.depth, before
-                )));
+            let grown = 2.0 * closing * now.substep + little;
+            if pair.depth > pair.before + grown {
+                let before = before_beside(pair);
+                if pair.depth > before + grown {
+                    return Some(fault(format!(
+                        "is suddenly {:.3e} m deep, after {:.3e} m: it came in where contact does not look; use a \
+                         smaller run.time_step or a thicker wall",
+                        pair.depth, before
+                    )));
+                }
             }
             let unknown = self.on_device && pair.depth > THROUGH * middle_a.max(middle_b);
             if in_a > THROUGH * middle_a || in_b > THROUGH * middle_b || unknown {
