@@ -107,8 +107,7 @@ impl Gauges {
             let solid = scene.solids.iter().position(|s| s.name == gauge.on).map(Target::Solid);
             let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Box::new).map(Target::Fixed));
             let Some(target) = target else {
-                let solids = scene.solids.iter().map(|s| s.name.as_str());
-                let names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
+                let names: Vec<&str> = scene.names().collect();
                 let message = format!("gauge.force {}: nothing is called `{}`", gauge.name, gauge.on);
                 let remedy = format!("there are: {}", names.join(", "));
                 return Err(Error::key(format!("gauge.force.{k}.on"), message, remedy));

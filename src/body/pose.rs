@@ -53,6 +53,14 @@ impl Wrench {
     }
 }
 
+impl std::ops::Div<f64> for Wrench {
+    type Output = Self;
+
+    fn div(self, by: f64) -> Self {
+        Self { force: self.force / by, torque: self.torque / by }
+    }
+}
+
 impl std::ops::AddAssign for Wrench {
     fn add_assign(&mut self, other: Self) {
         self.force += other.force;

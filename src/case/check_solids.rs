@@ -124,7 +124,7 @@ impl Checker<'_> {
             let lengths = [x, if flat { x } else { y }, z].map(|l| if l > 0.0 { l } else { f64::INFINITY });
             lengths.into_iter().fold(f64::INFINITY, f64::min)
         };
-        let free = self.case.body.iter().filter(|b| !b.is_driven() && b.locked.len() < 6);
+        let free = self.case.body.iter().filter(|b| b.can_move());
         if spring == 0.0 {
             let stiff = free.map(|b| 100.0 * weight(b) / smallest(b)).fold(0.0, f64::max);
             let stiff = if stiff > 0.0 {
@@ -251,9 +251,8 @@ impl Checker<'_> {
     }
 
     pub(super) fn contact(&mut self) {
-        let moves = |b: &&Body| !b.is_driven() && b.locked.len() < 6;
         let Some(contact) = &self.case.contact else {
-            if let Some(body) = self.case.body.iter().find(moves) {
+            if let Some(body) = self.case.body.iter().find(|b| b.can_move()) {
                 let message = format!("body `{}` can move, but there is no [contact]", body.name);
                 self.add(
                     "contact",

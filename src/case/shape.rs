@@ -194,6 +194,11 @@ impl Body {
         guide.motion.is_some() || guide.sine.is_some() || guide.turns()
     }
 
+    /// Whether forces can move it.
+    pub(crate) fn can_move(&self) -> bool {
+        !self.is_driven() && self.locked.len() < 6
+    }
+
     /// The keys that make its shape.
     pub(crate) fn form(&self) -> Form<'_> {
         form!(self, LARGE)

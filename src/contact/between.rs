@@ -23,7 +23,7 @@ pub(crate) struct Between {
 }
 
 /// The solids and fixed walls that one end of a row of `[[contact.pair]]` names.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct Named {
     solids: Vec<bool>,
     walls: Vec<bool>,
@@ -116,8 +116,7 @@ fn named(scene: &Scene, name: &str, key: &str) -> Result<Named> {
     if out.solids.iter().chain(&out.walls).any(|&one| one) {
         return Ok(out);
     }
-    let solids = scene.solids.iter().map(|s| s.name.as_str());
-    let mut names: Vec<&str> = solids.chain(scene.walls.iter().map(|w| w.name.as_str())).collect();
+    let mut names: Vec<&str> = scene.names().collect();
     let more = names.len().saturating_sub(MOST_NAMES);
     names.truncate(MOST_NAMES);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
@@ -140,12 +139,10 @@ fn matches(pattern: &str, known: &str) -> bool {
 fn can_touch(scene: &Scene, ends: &[Named; 2]) -> bool {
     let free = |k: usize| scene.solids[k].is_free();
     let moves = |end: &Named| end.solids.iter().enumerate().any(|(k, &is)| is && free(k));
-    let only = |end: &Named| {
-        let mut own = end.solids.iter().enumerate().filter(|(_, is)| **is).map(|(k, _)| k);
-        (own.next(), own.next().is_some() || end.walls.contains(&true))
-    };
+    let all = |end: &Named| end.solids.iter().chain(&end.walls).filter(|is| **is).count();
     // a body does not touch itself
-    let alone = matches!((only(&ends[0]), only(&ends[1])), ((Some(a), false), (Some(b), false)) if a == b);
+    let [first, second] = ends;
+    let alone = all(first) == 1 && first == second;
     !alone && ends.iter().any(moves)
 }
 

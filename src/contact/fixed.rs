@@ -39,8 +39,7 @@ impl FixedWalls {
 
     /// It has ended after `dt` [s].
     pub fn end(&mut self, dt: f64) {
-        let mean = |w: &Wrench| Wrench { force: w.force / dt, torque: w.torque / dt };
-        self.mean = self.touched.iter().map(mean).collect();
+        self.mean.iter_mut().zip(&self.touched).for_each(|(mean, &touched)| *mean = touched / dt);
     }
 
     /// Save the means of the last step, or take them over.

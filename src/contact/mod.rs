@@ -269,7 +269,7 @@ impl Solids {
         self.fixed.end(dt);
         for (k, body) in self.bodies.iter_mut().enumerate() {
             self.poses[k] = body.pose;
-            self.contact[k] = Wrench { force: body.touched.force / dt, torque: body.touched.torque / dt };
+            self.contact[k] = body.touched / dt;
             if body.is_free() && !body.pose.is_finite() {
                 let what = format!("body \"{}\" has a position or velocity that is no number", self.names[k]);
                 return Err(Error::Diverged { step: 0, time: t, stage: "contact", what });

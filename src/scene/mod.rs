@@ -238,6 +238,12 @@ impl Solid {
 }
 
 impl Scene {
+    /// Names of its solids, then of its fixed walls.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let solids = self.solids.iter().map(|s| s.name.as_str());
+        solids.chain(self.walls.iter().map(|w| w.name.as_str()))
+    }
+
     /// Particles of water at t = 0.
     pub fn water(&self) -> usize {
         self.groups.fluid - self.reserve

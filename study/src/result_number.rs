@@ -9,7 +9,7 @@
 //! ```
 
 use super::row::{Class, Measured};
-use super::validation::reduce::{Take, cut, reduce, since_moved, smooth};
+use super::validation::reduce::{Curve, Take, cut, prepared, reduce};
 use seixo::error::{Error, Result};
 use serde::Deserialize;
 
@@ -67,12 +67,10 @@ impl ResultNumber {
                 format!("result `{}`: there is no curve `{}`; there are: {known}", self.name, self.curve);
             return Err(Error::key("result", text, "name a curve that [measure] takes"));
         };
-        let curve = match self.since_moved {
-            Some(by) => since_moved(curve, by).map(|(curve, _)| curve).unwrap_or_default(),
-            None => curve.clone(),
-        };
-        let curve = cut(&smooth(&curve, self.smooth), self.window);
-        if let Some(value) = reduce(self.take, &curve, [self.level, self.to]) {
+        let curve = prepared(curve.clone(), self.since_moved, self.smooth);
+        let number =
+            |(curve, _): (Curve, f64)| reduce(self.take, &cut(&curve, self.window), [self.level, self.to]);
+        if let Some(value) = curve.and_then(number) {
             measured.put(&self.name, value);
         }
         Ok(())

@@ -114,20 +114,6 @@ fn wall_feet(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
     (0..6).filter(|&face| stands(face) && has_corner(face)).collect()
 }
 
-/// Whether other walls hold the corners of a face of wall `k`, moved out by `beyond` [m].
-fn corners_are_covered(walls: &[WallBox], k: usize, face: u8, beyond: f64, spacing: f64, flat: bool) -> bool {
-    let (half, normal) = (walls[k].half, usize::from(face / 2));
-    let sides = |axis: usize| if flat && axis == 1 { vec![0.0] } else { vec![-half[axis], half[axis]] };
-    let (u, v) = ((normal + 1) % 3, (normal + 2) % 3);
-    sides(u).into_iter().all(|x| {
-        sides(v).into_iter().all(|y| {
-            let mut q = face_normal(face) * (half + beyond);
-            (q[u], q[v]) = (x, y);
-            is_covered(walls, k, q, spacing)
-        })
-    })
-}
-
 /// Places half a spacing apart across an edge of half length `half` [m]; the middle of one that is seen end on.
 fn looks(half: f64, spacing: f64, end_on: bool) -> Vec<f64> {
     let n = if end_on { 1.0 } else { (4.0 * half / spacing).ceil().clamp(2.0, MOST_LOOKS) };
@@ -158,13 +144,32 @@ fn is_covered(walls: &[WallBox], k: usize, q: DVec3, spacing: f64) -> bool {
 
 /// Whether other walls leave nothing of the plane `beyond` [m] outside of a face of wall `k`, by points half a spacing apart.
 fn face_is_covered(walls: &[WallBox], k: usize, face: u8, beyond: f64, spacing: f64, flat: bool) -> bool {
-    let (half, out) = (walls[k].half, face_normal(face));
+    let places = |axis: usize| looks(walls[k].half[axis], spacing, flat && axis == 1);
+    places_are_covered(walls, k, face, beyond, spacing, places)
+}
+
+/// Whether other walls hold the corners of a face of wall `k`, moved out by `beyond` [m].
+fn corners_are_covered(walls: &[WallBox], k: usize, face: u8, beyond: f64, spacing: f64, flat: bool) -> bool {
+    let ends = |half: f64| vec![-half, half];
+    let places = |axis: usize| if flat && axis == 1 { vec![0.0] } else { ends(walls[k].half[axis]) };
+    places_are_covered(walls, k, face, beyond, spacing, places)
+}
+
+/// Whether other walls hold all of the plane `beyond` [m] outside of a face of wall `k`, at `places` along its two axes [m].
+fn places_are_covered(
+    walls: &[WallBox],
+    k: usize,
+    face: u8,
+    beyond: f64,
+    spacing: f64,
+    places: impl Fn(usize) -> Vec<f64>,
+) -> bool {
     let normal = usize::from(face / 2);
     let (u, v) = ((normal + 1) % 3, (normal + 2) % 3);
-    let places = |axis: usize| looks(half[axis], spacing, flat && axis == 1).into_iter();
-    places(u).all(|x| {
-        places(v).all(|y| {
-            let mut q = out * (half + beyond);
+    let (along_u, along_v) = (places(u), places(v));
+    along_u.iter().all(|&x| {
+        along_v.iter().all(|&y| {
+            let mut q = face_normal(face) * (walls[k].half + beyond);
             (q[u], q[v]) = (x, y);
             is_covered(walls, k, q, spacing)
         })

@@ -13,7 +13,7 @@
 //! peers = [{ name = "MPS of the paper's group, l0 = 15 mm", value = 18505 }]
 //! ```
 
-use super::reduce::{Curve, Take, cut, distance, lag, reduce, since_moved, smooth};
+use super::reduce::{Curve, Take, cut, distance, lag, prepared, reduce, smooth};
 use crate::compare::within;
 use crate::definition::Files;
 use crate::engine::first_line;
@@ -238,11 +238,7 @@ impl Check {
     pub fn prepared(&self, measured: &Measured) -> Option<(Curve, f64)> {
         let curve = measured.curves.get(self.curve.as_ref()?)?;
         let curve: Curve = curve.iter().map(|p| [p[0], (p[1] + self.plus) * self.times]).collect();
-        let (curve, origin) = match self.since_moved {
-            Some(by) => since_moved(&curve, by)?,
-            None => (curve, 0.0),
-        };
-        Some((smooth(&curve, self.smooth), origin))
+        prepared(curve, self.since_moved, self.smooth)
     }
 
     /// The number of a curve that is prepared, against that of the reference.

@@ -73,6 +73,16 @@ pub fn smooth(curve: &[[f64; 2]], width: f64) -> Curve {
     curve.iter().map(|p| [p[0], mean(p[0])]).collect()
 }
 
+/// The curve as numbers are taken from it: its time counted from when it has moved by `since`, if that is asked for, and a moving mean
+/// over `width`; with the moment from which time counts. `None` if it never moves so far.
+pub fn prepared(curve: Curve, since: Option<f64>, width: f64) -> Option<(Curve, f64)> {
+    let (curve, origin) = match since {
+        Some(by) => since_moved(&curve, by)?,
+        None => (curve, 0.0),
+    };
+    Some((smooth(&curve, width), origin))
+}
+
 /// The curve with its time counted from when it has moved by `distance` from its start, and that moment; `None` if
 /// it never does.
 pub fn since_moved(curve: &[[f64; 2]], distance: f64) -> Option<(Curve, f64)> {
