@@ -120,6 +120,41 @@ impl Fields {
         insert(acceleration, at, more, DVec3::ZERO);
     }
 
+    /// Other particles that never move in the place of those of `groups`: walls at `walls`, with these pressures, and dummies at `dummies`.
+    pub(crate) fn lay_still(&mut self, groups: &Groups, walls: &[(DVec3, f64)], dummies: &[DVec3]) {
+        let Self {
+            position,
+            velocity,
+            kind,
+            pressure,
+            number_density,
+            surface_pressure,
+            state,
+            source,
+            diagonal,
+            // Of water, or of solids that move.
+            id: _,
+            acceleration: _,
+            reaction: _,
+            inertia_head: _,
+        } = self;
+        let (all, carriers) = (groups.static_range(), groups.static_wall_range());
+        let count = walls.len() + dummies.len();
+        position.splice(all.clone(), walls.iter().map(|w| w.0).chain(dummies.iter().copied()));
+        velocity.splice(all.clone(), std::iter::repeat_n(DVec3::ZERO, count));
+        let kinds = std::iter::repeat_n(Kind::Wall, walls.len());
+        kind.splice(all, kinds.chain(std::iter::repeat_n(Kind::Dummy, dummies.len())));
+        pressure.splice(carriers.clone(), walls.iter().map(|w| w.1));
+        for values in [number_density, source] {
+            values.splice(carriers.clone(), std::iter::repeat_n(0.0, walls.len()));
+        }
+        if !surface_pressure.is_empty() {
+            surface_pressure.splice(carriers.clone(), std::iter::repeat_n(0.0, walls.len()));
+        }
+        diagonal.splice(carriers.clone(), std::iter::repeat_n(1.0, walls.len()));
+        state.splice(carriers, std::iter::repeat_n(State::Inactive, walls.len()));
+    }
+
     /// Bring the fluid back between the sides where these are periodic: since the last search it may have left them.
     pub(crate) fn wrap(&mut self, groups: &Groups, periodic: &Periodic) {
         if periodic.is_any() {

@@ -33,7 +33,7 @@ pub(crate) fn viscous_weight(q: f64) -> f64 {
 }
 
 /// Sums over the lattice of a weight of explicit viscosity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Shear {
     /// Sum w r^2 over l0^2 [-]; lambda n0 of Eq. (6) with the weight of Eq. (3).
     pub moment: f64,

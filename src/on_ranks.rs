@@ -3,12 +3,13 @@
 use crate::backend::lead::{Lead, follow};
 use crate::backend::{Backend, Processor, Ranked};
 use crate::case::Case;
+use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::Plan;
 use crate::ranks::{Team, decode, encode};
 use crate::scene::Scene;
-use crate::settle::settle;
+use crate::share::{Division, Start, check};
 use crate::simulation::{Simulation, settings};
 use std::sync::Arc;
 
@@ -54,17 +55,19 @@ impl Simulation {
         team: &Arc<dyn Team>,
         processor: &Processor,
     ) -> Result<Self> {
-        let (mut agreed, k) = (false, team.on_machine());
-        let set_up = Self::with_backend(case, scene, |scene, params, plan, settings| {
-            agreed = true;
-            let own = processor.of_team((team, k), scene, params, plan, settings);
+        let (mut dealt, k) = (false, team.on_machine());
+        let set_up = Self::with_shared(case, scene, |scene, params, plan, settings| {
+            let start = deal(&**team, scene, params, processor.has_every_wall());
+            dealt = true;
+            let own = start.and_then(|start| processor.of_team((team, k), &start, plan, settings));
             let together = agree(&**team, &own);
             let own = own?;
             together?;
             Ok(Box::new(Lead::new(team.clone(), own)) as Box<dyn Backend>)
         });
-        if !agreed {
+        if !dealt {
             let why = set_up.as_ref().err().map(ToString::to_string).unwrap_or_default();
+            team.deal(&mut |_| Vec::new());
             // The others are told; here the error is known already.
             let _ = agree::<()>(&**team, &Err(Error::usage("ranks", why)));
         }
@@ -72,15 +75,23 @@ impl Simulation {
     }
 }
 
-/// The part of a rank that is not the first: sets the case up as `set_up` has it and does what the first one orders, until it ends. Returns
-/// what this rank held, or nothing if the ranks could not begin, which the first one tells.
+/// Deals the particles of `scene` to the ranks; returns what the first one begins with. If they cannot share it the others get nothing.
+fn deal(team: &dyn Team, scene: &Arc<Scene>, params: &Params, every_wall: bool) -> Result<Start> {
+    let grid = Grid::new(params).and_then(|grid| check(team.ranks(), params, &grid).map(|()| grid));
+    let grid = grid.inspect_err(|_| drop(team.deal(&mut |_| Vec::new())))?;
+    let particles = (&scene.position[..], &scene.kind[..]);
+    let division = Division::new(team.ranks(), scene.groups, &grid, params, particles);
+    let start = |rank: usize| Start::new(rank, scene, params, &division, every_wall);
+    team.deal(&mut |rank| encode(&start(rank)));
+    Ok(start(0))
+}
+
+/// The part of a rank that is not the first: sets the case up that `set_up` has, with the particles that the first one deals, and does what that one orders,
+/// until it ends. Returns what this rank held, or nothing if the ranks could not begin, which the first one tells.
 ///
 /// # Errors
 /// What a stage says.
-pub fn serve(
-    team: &Arc<dyn Team>,
-    set_up: impl FnOnce() -> Result<(Case, Arc<Scene>)>,
-) -> Result<Option<Box<dyn Ranked>>> {
+pub fn serve(team: &Arc<dyn Team>, set_up: impl FnOnce() -> Result<Case>) -> Result<Option<Box<dyn Ranked>>> {
     serve_on(team, &Processor::Cpu, set_up)
 }
 
@@ -91,15 +102,22 @@ pub fn serve(
 pub fn serve_on(
     team: &Arc<dyn Team>,
     processor: &Processor,
-    set_up: impl FnOnce() -> Result<(Case, Arc<Scene>)>,
+    set_up: impl FnOnce() -> Result<Case>,
 ) -> Result<Option<Box<dyn Ranked>>> {
     let k = team.on_machine();
-    let own = set_up().and_then(|(case, scene)| {
-        let params = Params::new(&case, &scene)?;
-        let (plan, settings) = (Plan::new(&case, &scene, &params), settings(&case));
-        // Every rank finds the same places: it is little work, and bits repeat.
-        let scene = settle(scene, &params, &plan, settings)?;
-        processor.of_team((team, k), &scene, &params, &plan, settings)
+    let case = set_up();
+    let dealt = team.deal(&mut |_| Vec::new());
+    let own = case.and_then(|case| {
+        if dealt.is_empty() {
+            return Err(Error::usage("ranks", "the first rank has no particles for this one"));
+        }
+        let mut start: Start = decode(&dealt);
+        drop(dealt);
+        // What the scene needs, the whole of it says.
+        let here = std::mem::replace(&mut start.scene.groups, start.all);
+        let plan = Plan::new(&case, &start.scene, &start.params);
+        start.scene.groups = here;
+        processor.of_team((team, k), &start, &plan, settings(&case))
     });
     let together = agree(&**team, &own);
     let (Ok(mut own), Ok(())) = (own, together) else { return Ok(None) };

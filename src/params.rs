@@ -10,7 +10,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// How gamma of Eq. (8) follows from the time step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Relaxation {
     /// A typed number [-].
     Fixed(f64),
@@ -46,7 +46,7 @@ pub const RELAXATION_MAX: f64 = 0.5;
 const THROUGH: f64 = 12.0;
 
 /// A box in which the water comes to rest, see [`crate::kernels::absorber`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Zone {
     /// Lower corner [m].
     pub low: DVec3,
@@ -77,7 +77,7 @@ impl Zone {
 }
 
 /// Constants of a run.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Params {
     /// 2 or 3, d of Eqs. (5) and (6).
     pub dimensions: u32,

@@ -6,12 +6,13 @@
 //! search looks past a seam into the cells at the other side, and `cell_list` brings back the water that has left.
 
 use glam::{DVec3, IVec3};
+use serde::{Deserialize, Serialize};
 
 /// Cells of the search along a periodic axis at least: a cell and its two neighbours are then three.
 pub const CELLS_MIN: u32 = 3;
 
 /// The axes along which a scene is periodic. The default is periodic along none.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Periodic {
     /// Lower sides [m].
     low: DVec3,

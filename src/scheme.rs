@@ -36,7 +36,7 @@ pub enum FreeSurface {
 }
 
 /// How pairs of particles that collide at once share their impulses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Collision {
     /// The paper's Eq. (18): each as if it were the only one.
     Single,

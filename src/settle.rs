@@ -44,7 +44,7 @@ pub(crate) fn settle(
     }
     let still = Params { gravity: DVec3::ZERO, drive: DVec3::ZERO, ..params.clone() };
     let plan = Plan { ledger: false, ..plan.clone() };
-    let mut part = scene.part(&own, own.len(), &held);
+    let mut part = scene.part(&own, own.len(), &held, None);
     part.velocity.fill(DVec3::ZERO);
     let mut cpu = Cpu::new(&part, &still, &plan, settings)?;
     // Any time step gives the same places.

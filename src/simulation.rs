@@ -109,6 +109,15 @@ impl Simulation {
         scene: impl Into<Arc<Scene>>,
         make: impl FnOnce(&Scene, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
     ) -> Result<Self> {
+        Self::with_shared(case, scene, |scene, params, plan, settings| make(scene, params, plan, settings))
+    }
+
+    /// [`Self::with_backend`], of a backend that keeps the scene.
+    pub(crate) fn with_shared(
+        case: &Case,
+        scene: impl Into<Arc<Scene>>,
+        make: impl FnOnce(&Arc<Scene>, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
+    ) -> Result<Self> {
         let scene: Arc<Scene> = scene.into();
         let params = Params::new(case, &scene)?;
         let fastest = params.speed_at_start;

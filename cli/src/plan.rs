@@ -166,6 +166,9 @@ struct Report {
     /// As many ranks as were asked about.
     #[serde(skip_serializing_if = "Option::is_none")]
     ranks: Option<Outlook>,
+    /// Memory of the first of them and of each other one, on CPUs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    memory_of_ranks_bytes: Option<[f64; 2]>,
     /// From the case alone, as `run` judges it.
     estimate: Estimate,
     advice: Vec<String>,
@@ -306,6 +309,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
+        memory_of_ranks_bytes: ranks.as_ref().map(|r| estimate.memory_of_ranks(r.parts.len())),
         ranks,
         estimate,
         scheme: if plan.wet() { Some(scheme(seen, &params, &plan, dt)?) } else { None },

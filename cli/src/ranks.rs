@@ -138,15 +138,12 @@ pub fn end_all(error: &Error) {
 #[cfg(feature = "mpi")]
 pub fn serve(team: &Arc<dyn Team>, threads: u16, processor: &Processor) -> super::Exit {
     use seixo::on_ranks::hear_case;
-    use seixo::scene::Scene;
     let Some(text) = hear_case(&**team) else { return Ok(0) };
     let set_up = || {
         // Signals are for the first rank: it saves the state, for which it needs the others.
         std::mem::forget(super::signals::watch(true)?.attend());
         seixo::threads::start(Some(threads))?;
-        let (case, ..) = seixo::case::file::parse("case", text, &[])?;
-        let scene = Scene::build(&case)?;
-        Ok((case, Arc::new(scene)))
+        Ok(seixo::case::file::parse("case", text, &[])?.0)
     };
     if let Err(error) = seixo::on_ranks::serve_on(team, processor, set_up) {
         seixo::console::remark(&format!("rank {}: {error}", team.rank()));

@@ -9,6 +9,7 @@ use crate::plan::Plan;
 use crate::pressure::Settings;
 use crate::ranks::Team;
 use crate::scene::Scene;
+use crate::share::Start;
 use std::sync::Arc;
 
 /// What computes the particle stages.
@@ -53,27 +54,29 @@ impl Processor {
         Ok(Box::new(Gpu::new(scene, params, plan, settings, adapter.as_deref())?))
     }
 
-    /// The part of the particles of `scene` that a rank of `team` computes, the `k`-th on its machine ([`Team::on_machine`]): on a GPU if one is asked for, else on the
-    /// CPU.
+    /// Whether the ranks of a run have all walls that never move: on devices these stay as they were set up.
+    pub(crate) fn has_every_wall(&self) -> bool {
+        matches!(self, Self::Gpu { .. })
+    }
+
+    /// The part of a rank of `team`, which begins with `start`, the `k`-th on its machine ([`Team::on_machine`]): on a GPU if one is asked for, else on
+    /// the CPU.
     ///
     /// # Errors
     /// [`crate::Error::Usage`] for what ranks do not compute; as [`Self::open`].
     pub fn of_team(
         &self,
         (team, k): (&Arc<dyn Team>, usize),
-        scene: &Scene,
-        params: &Params,
+        start: &Start,
         plan: &Plan,
         settings: Settings,
     ) -> Result<Box<dyn Ranked>> {
         match self {
             Self::Gpu { adapter } => {
                 let asked = adapter.as_deref();
-                Ok(Box::new(GpuRank::of_team((team.clone(), k), scene, params, plan, settings, asked)?))
+                Ok(Box::new(GpuRank::of_team((team.clone(), k), start, plan, settings, asked)?))
             }
-            Self::Auto | Self::Cpu => {
-                Ok(Box::new(Cpu::of_team(team.clone(), scene, params, plan, settings)?))
-            }
+            Self::Auto | Self::Cpu => Ok(Box::new(Cpu::of_team(team.clone(), start, plan, settings)?)),
         }
     }
 }

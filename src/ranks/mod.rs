@@ -65,6 +65,8 @@ pub trait Team: Send + Sync {
         let all = self.gather(own.clone());
         all[..self.rank()].iter().filter(|other| **other == own).count()
     }
+    /// What the first one has for this one: it makes a `part` for each of the others, by their numbers and one after the other, and gets none.
+    fn deal(&self, part: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8>;
     /// What the first one says.
     fn hear(&self, said: Vec<u8>) -> Vec<u8>;
 }
@@ -82,6 +84,8 @@ pub struct Standing {
     pub copies: usize,
     /// Particles of wall layers that it computes, dry ones included.
     pub walls: usize,
+    /// Particles of walls that never move, dummies included, which it holds.
+    pub still: usize,
     /// Bytes held for particles, as of the last step.
     pub bytes: u64,
     /// Most memory that the process has held [bytes], where the system tells it (Linux).

@@ -41,6 +41,25 @@ fn count(n: usize) -> Count {
     Count::try_from(n).unwrap_or_else(|_| panic!("{n} bytes are more than MPI sends at once"))
 }
 
+impl Processes {
+    /// Sends what is of any length.
+    fn send(&self, rank: i32, what: &[u8]) {
+        let to = self.world.process_at_rank(rank);
+        to.send(&(what.len() as u64));
+        what.chunks(PIECE).for_each(|piece| to.send(piece));
+    }
+
+    /// Receives what [`Self::send`] sends.
+    fn receive(&self, rank: i32) -> Vec<u8> {
+        let from = self.world.process_at_rank(rank);
+        let mut what = vec![0; from.receive::<u64>().0 as usize];
+        what.chunks_mut(PIECE).for_each(|piece| {
+            from.receive_into(piece);
+        });
+        what
+    }
+}
+
 impl Team for Processes {
     fn rank(&self) -> usize {
         self.world.rank() as usize
@@ -89,28 +108,25 @@ impl Team for Processes {
     }
 
     fn collect(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
-        let first = self.world.process_at_rank(0);
         if self.world.rank() > 0 {
-            first.send(&(own.len() as u64));
-            own.chunks(PIECE).for_each(|piece| first.send(piece));
+            self.send(0, &own);
             return Vec::new();
         }
-        let mut all = vec![own];
-        for rank in 1..self.world.size() {
-            let from = self.world.process_at_rank(rank);
-            let mut part = vec![0; from.receive::<u64>().0 as usize];
-            part.chunks_mut(PIECE).for_each(|piece| {
-                from.receive_into(piece);
-            });
-            all.push(part);
-        }
-        all
+        std::iter::once(own).chain((1..self.world.size()).map(|rank| self.receive(rank))).collect()
     }
 
     fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; own.len() * self.ranks()];
         self.world.all_gather_into(own, &mut all[..]);
         all
+    }
+
+    fn deal(&self, part: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8> {
+        if self.world.rank() > 0 {
+            return self.receive(0);
+        }
+        (1..self.world.size()).for_each(|rank| self.send(rank, &part(rank as usize)));
+        Vec::new()
     }
 
     fn hear(&self, said: Vec<u8>) -> Vec<u8> {

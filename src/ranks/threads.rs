@@ -65,6 +65,14 @@ impl Team for Thread {
         (0..self.ranks()).map(|rank| self.take(rank)).collect()
     }
 
+    fn deal(&self, part: &mut dyn FnMut(usize) -> Vec<u8>) -> Vec<u8> {
+        if self.rank == 0 {
+            (1..self.ranks()).for_each(|rank| self.give(rank, part(rank)));
+            return Vec::new();
+        }
+        self.take(0)
+    }
+
     fn hear(&self, said: Vec<u8>) -> Vec<u8> {
         if self.rank == 0 {
             (1..self.ranks()).for_each(|rank| self.give(rank, said.clone()));

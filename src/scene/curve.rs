@@ -1,13 +1,14 @@
 //! Smooth curves through the rows of a table.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// A vector over time, constant before the first row and after the last. Two rows make a straight line. More make a
 /// cubic an interval: the spline of continuous second derivative, its slopes limited so that the curve is monotone
 /// wherever the rows are and stands between rows that are equal (Fritsch & Carlson 1980). An extremum lies beyond
 /// the rows only where six of them curve alike, as samples of a smooth function do (after Huynh 1993), so that a
 /// swing sampled 16 times a period keeps its acceleration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Curve {
     time: Vec<f64>,
     value: Vec<DVec3>,

@@ -35,11 +35,13 @@ pub use crate::shape::Shape;
 pub use curve::Curve;
 pub use motion::Motion;
 pub use opening::{Course, Opening, Passes};
+pub(crate) use part::Still;
 pub(crate) use placement::CONTACT_DISTANCE;
 
 use crate::periodic::Periodic;
 use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Wall particles that stand for `point`: those within half an effective radius `reach` of it, or, where the lattice
@@ -64,7 +66,7 @@ pub(crate) fn wall_at(
 }
 
 /// What a particle is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Kind {
     /// Water.
@@ -90,7 +92,7 @@ impl Kind {
 }
 
 /// How many particles each group holds; the groups lie in this order.
-#[derive(Clone, Copy, Default, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Groups {
     /// Fluid particles, and slots for those that are to come in.
     pub fluid: usize,
@@ -137,7 +139,7 @@ impl Groups {
 
 /// Geometry of a fixed wall, for contact and for the checks at t = 0. Surfaces lie where the wall
 /// particles put them (half a spacing outside the wall layer's centres).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WallShape {
     /// Name of the wall as the case gives it (`tank.z_min`, an obstacle's name ...).
     pub name: String,
@@ -153,7 +155,7 @@ pub struct WallShape {
 }
 
 /// Mass properties and freedom of a body that moves under forces.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FreeBody {
     /// Mass [kg].
     pub mass: f64,
@@ -170,7 +172,7 @@ pub struct FreeBody {
 }
 
 /// How a moving solid moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Drive {
     /// Newton's laws.
     Free(FreeBody),
@@ -180,13 +182,14 @@ pub enum Drive {
 
 /// A solid that moves as one: a body or a moving wall. Its particles are listed in the order in which
 /// they stand in the groups, wall layer first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solid {
     /// Name from the case.
     pub name: String,
     /// `true` for a `[[body]]`, `false` for a `[[moving_wall]]`.
     pub is_body: bool,
-    /// Shape, in the solid's frame.
+    /// Shape, in the solid's frame. A rank of many is told none: it has the particles, and contact is on the first one.
+    #[serde(skip, default = "untold")]
     pub shape: Shape,
     /// Initial position of the centre of mass [m].
     pub position: DVec3,
@@ -208,6 +211,11 @@ pub struct Solid {
     /// For each wall-layer particle, the vector from its centre to the true surface (to the edge or
     /// corner where it belongs to two or three faces), solid's frame [m].
     pub wall_to_surface: Vec<DVec3>,
+}
+
+/// A shape in the place of one that is not told.
+fn untold() -> Shape {
+    Shape::cuboid(DVec3::ZERO)
 }
 
 impl Solid {
@@ -281,7 +289,7 @@ impl Scene {
 }
 
 /// The scene.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Scene {
     /// 2 or 3. In two dimensions everything lies in the plane y = 0 and stands for a slice l0 wide.
     pub dimensions: u32,

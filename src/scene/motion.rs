@@ -3,10 +3,11 @@
 use super::Curve;
 use crate::waves::{Formula, Wave};
 use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// A motion over time: the displacement of the place that a solid turns about, and how it is turned about that. Tables
 /// are smooth, see [`Curve`]; formulas are what they are, see [`Formula`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     displacement: Way,
     rotation: Option<Rotation>,
@@ -15,7 +16,7 @@ pub struct Motion {
 }
 
 /// A displacement [m] over time.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Way {
     Table(Curve),
     /// Along a direction of length 1.
@@ -23,7 +24,7 @@ enum Way {
 }
 
 /// The turning part of a motion.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Rotation {
     turning: Turning,
     /// From the place that it turns about to the solid's centre at the start [m].
@@ -31,7 +32,7 @@ struct Rotation {
 }
 
 /// How a solid is turned [rad] over time.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Turning {
     /// By angles about the axes x, y and z of the world, in this order.
     Table(Curve),

@@ -6,9 +6,10 @@ use super::{Drive, Motion, Shape, Solid};
 use crate::case::{HURRY, OpeningKeys, Rate, room_behind};
 use crate::error::Problem;
 use glam::{DQuat, DVec3, IVec3};
+use serde::{Deserialize, Serialize};
 
 /// A quantity over time on straight lines between rows; constant before the first and after the last.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Course {
     rows: Vec<[f64; 2]>,
 }
@@ -44,7 +45,7 @@ impl Course {
 }
 
 /// What passes an opening.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Passes {
     /// Water comes in with a velocity [m/s].
     In(Course),
@@ -57,7 +58,7 @@ pub enum Passes {
 }
 
 /// An opening of the tank.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Opening {
     /// Name from the case.
     pub name: String,

@@ -1,42 +1,54 @@
-//! A part of the water of a scene, with all its solids.
+//! A part of the particles of a scene.
 
 use super::{Groups, Kind, Scene, Solid};
 use glam::DVec3;
 
+/// What a part has of the particles that never move, by their numbers among those, rising: walls, and dummies.
+pub(crate) type Still = [Vec<u32>; 2];
+
 impl Scene {
-    /// The water of the slots `own` in `slots` slots, and that of `held` as dummies: it stands still and carries no pressure.
-    pub(crate) fn part(&self, own: &[usize], slots: usize, held: &[usize]) -> Self {
-        let (all, carriers, parked) = (self.groups.fluid, self.groups.pressure(), slots - own.len());
-        let (walls, dummies) = (all..carriers, carriers..self.groups.total());
+    /// The water of the slots `own` in `slots` slots, and that of `held` as dummies: it stands still and carries no pressure. All solids, but of
+    /// what never moves `still` alone.
+    pub(crate) fn part(&self, own: &[usize], slots: usize, held: &[usize], still: Option<&Still>) -> Self {
+        let (all, parked) = (self.groups, slots - own.len());
+        let every = || [all.static_wall, all.static_dummy].map(|n| (0..n as u32).collect());
+        let (walls, dummies) = (all.static_wall_range().start, all.pressure());
+        let [still_walls, still_dummies] = still.cloned().unwrap_or_else(every);
+        let of = |first: usize, numbers: &[u32]| -> Vec<usize> {
+            numbers.iter().map(|&k| first + k as usize).collect()
+        };
+        let carriers: Vec<usize> = all.moving_wall_range().chain(of(walls, &still_walls)).collect();
+        let dummies: Vec<usize> =
+            of(dummies, &still_dummies).into_iter().chain(all.moving_dummy_range()).collect();
         let lay = |of: &[DVec3], rest: DVec3| -> Vec<DVec3> {
             let water = own.iter().map(|&i| of[i]).chain(std::iter::repeat_n(rest, parked));
-            let still = held.iter().map(|&i| of[i]);
-            let (walls, dummies) = (of[walls.clone()].iter(), of[dummies.clone()].iter());
-            water.chain(walls.copied()).chain(still).chain(dummies.copied()).collect()
+            water.chain(carriers.iter().chain(held).chain(&dummies).map(|&i| of[i])).collect()
         };
         let water = own.iter().map(|_| Kind::Fluid).chain(std::iter::repeat_n(Kind::Ghost, parked));
-        let walls_of = self.kind[walls.clone()].iter().copied();
-        let dummies_of = held.iter().map(|_| Kind::Dummy).chain(self.kind[dummies.clone()].iter().copied());
+        let of = |i: &usize| self.kind[*i];
+        let solids_kinds = carriers.iter().map(of).chain(held.iter().map(|_| Kind::Dummy));
         let none = |n: usize| std::iter::repeat_n(0, n);
-        let (solid_walls, solid_dummies) =
-            (self.solid[walls.clone()].iter(), self.solid[dummies.clone()].iter());
+        let solid_of = |i: &usize| self.solid[*i];
+        let groups = Groups {
+            fluid: slots,
+            static_wall: still_walls.len(),
+            static_dummy: still_dummies.len() + held.len(),
+            ..all
+        };
         let mut solids = self.solids.clone();
-        let by = slots as isize - all as isize;
-        solids.iter_mut().for_each(|solid| solid.move_slots(by, by + held.len() as isize));
+        let by = slots as isize - all.fluid as isize;
+        let by_dummies = groups.moving_dummy_range().start as isize - all.moving_dummy_range().start as isize;
+        solids.iter_mut().for_each(|solid| solid.move_slots(by, by_dummies));
         Self {
             position: lay(&self.position, self.domain.0),
             velocity: lay(&self.velocity, DVec3::ZERO),
-            kind: water.chain(walls_of).chain(dummies_of).collect(),
+            kind: water.chain(solids_kinds).chain(dummies.iter().map(of)).collect(),
             solid: none(slots)
-                .chain(solid_walls.copied())
+                .chain(carriers.iter().map(solid_of))
                 .chain(none(held.len()))
-                .chain(solid_dummies.copied())
+                .chain(dummies.iter().map(solid_of))
                 .collect(),
-            groups: Groups {
-                fluid: slots,
-                static_dummy: self.groups.static_dummy + held.len(),
-                ..self.groups
-            },
+            groups,
             reserve: parked,
             openings: self.openings.clone(),
             solids,

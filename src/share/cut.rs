@@ -15,6 +15,31 @@ fn least(ranks: usize, params: &Params) -> usize {
     if ranks == 2 && is_ring(ranks, params) { 2 } else { 1 }
 }
 
+/// Columns beyond a slab within which a rank has the walls that never move. Its rows have their neighbours in the first one; of the copies of water there
+/// it asks which walls are their neighbours (friction on walls shares its force so).
+pub(super) const REACH: u32 = 2;
+
+/// The columns before and after those of `rank`.
+pub(super) fn beyond(cuts: &[u32], rank: usize, ring: bool) -> [Option<u32>; 2] {
+    let (from, to, end) = (cuts[rank], cuts[rank + 1], cuts.last().copied().unwrap_or(0));
+    [
+        from.checked_sub(1).or(ring.then_some(end.saturating_sub(1))),
+        Some(to).filter(|&c| c < end).or(ring.then_some(0)),
+    ]
+}
+
+/// The columns of `rank` and `reach` more on either side, each once.
+pub(super) fn within(reach: u32, cuts: &[u32], rank: usize, ring: bool) -> impl Iterator<Item = u32> {
+    let (from, to, end) = (cuts[rank], cuts[rank + 1], cuts.last().copied().unwrap_or(0));
+    let reached = to - from + 2 * reach;
+    let (first, count) = match ring {
+        // Round a short tank all of them.
+        true => (from + end - reach % end.max(1), reached.min(end)),
+        false => (from.saturating_sub(reach), (to + reach).min(end) - from.saturating_sub(reach)),
+    };
+    (first..first + count).map(move |c| c % end)
+}
+
 /// Cuts `load`, of each column, into shares that are about even: the first column of each rank, and the end of the last one's.
 pub(super) fn cut(load: &[u64], ranks: usize, params: &Params) -> Vec<u32> {
     shares(load, ranks, least(ranks, params))
@@ -42,7 +67,10 @@ fn shares(load: &[u64], ranks: usize, least: usize) -> Vec<u32> {
 }
 
 /// Refuses ranks that cannot share a tank.
-pub(super) fn check(ranks: usize, params: &Params, grid: &Grid) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Usage`] if there are more of them than columns of cells.
+pub fn check(ranks: usize, params: &Params, grid: &Grid) -> Result<()> {
     let columns = grid.count[0] as usize;
     if ranks > 1 && 2.0 * params.collision_distance > params.effective_radius {
         let text = "ranks: fluid.collision_distance is more than half of run.effective_radius, and who collides beyond a cut is not \
@@ -71,6 +99,21 @@ pub(super) fn unevenness(load: &[u64], cuts: &[u32]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_lies_near_a_slab_is_told_once() {
+        let cuts = [0, 2, 3, 8];
+        let near = |reach, rank, ring| within(reach, &cuts, rank, ring).collect::<Vec<_>>();
+        assert_eq!(near(2, 0, false), [0, 1, 2, 3]);
+        assert_eq!(near(2, 1, false), [0, 1, 2, 3, 4]);
+        assert_eq!(near(2, 2, false), [1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(near(2, 0, true), [6, 7, 0, 1, 2, 3]);
+        assert_eq!(near(2, 2, true), [1, 2, 3, 4, 5, 6, 7, 0]);
+        assert_eq!(within(2, &[0, 2, 4], 1, true).collect::<Vec<_>>(), [0, 1, 2, 3]);
+        let beside = |rank, ring| beyond(&cuts, rank, ring);
+        assert_eq!([beside(0, false), beside(2, false)], [[None, Some(2)], [Some(2), None]]);
+        assert_eq!([beside(0, true), beside(2, true)], [[Some(7), Some(2)], [Some(2), Some(0)]]);
+    }
 
     #[test]
     fn shares_are_even_and_no_rank_is_without_a_column() {

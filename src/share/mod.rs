@@ -5,27 +5,31 @@
 //!
 //! and these copies are in the order of their owner, as both sort the same sequence by cell. Where the tank is periodic along x the ranks are a
 //! ring: the first one's copies of the last column of all come behind the others, the last one's of the first column in front. Solids come behind the water as on a
-//! single rank: every rank knows where they are, and computes the rows of those in its own columns.
+//! single rank: every rank knows where those are that move, on CPUs it has of the others what is near its slab, and it computes the rows of those in its own
+//! columns.
 
 mod border;
 mod cut;
+mod deal;
 mod moves;
 mod outlook;
+mod still;
 mod whole;
 
 use crate::body::Wrench;
 use crate::cells::Grid;
-use crate::error::Result;
 use crate::fields::State;
 use crate::kernels::body_force::RowPressure;
 use crate::machine::memory_peak;
-use crate::params::Params;
 use crate::ranks::{Standing, Team, decode, encode};
-use crate::scene::Groups;
+use crate::scene::{Groups, Scene, Still};
 pub use border::{Bordered, OfWalls, Side};
-use cut::{check, is_ring};
+pub use cut::check;
+use cut::{beyond, is_ring};
+pub(crate) use deal::room;
+pub use deal::{Division, Portion, Start};
 use glam::DVec3;
-pub use moves::Traveller;
+pub use moves::{Settled, Traveller};
 pub use outlook::{Outlook, Taken};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -33,6 +37,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
+pub use still::StillParticle;
 use whole::Kept;
 
 /// What a rank computes, and what it hands to those beside it.
@@ -50,6 +55,10 @@ pub struct Share {
     ring: bool,
     /// First column of each rank, and the end of the last one's.
     cuts: Vec<u32>,
+    /// Which walls that never move are here; all of them if none are named.
+    still: Option<Still>,
+    /// The whole scene, on the first rank.
+    whole: Option<Arc<Scene>>,
     /// Slots of the water that this rank computes.
     own: Range<usize>,
     /// Slots beside them with water that has just come in.
@@ -68,18 +77,16 @@ pub struct Share {
 }
 
 impl Share {
-    /// That of a rank of `team`, in a scene of `all` these particles.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] if there are more ranks than columns of cells.
-    pub fn new(team: Arc<dyn Team>, params: &Params, all: Groups, grid: &Grid) -> Result<Self> {
-        check(team.ranks(), params, grid)?;
-        Ok(Self {
+    /// That of a rank of `team` which begins with `start`; its water has no place in a backend yet, see [`Self::begin`].
+    pub fn new(team: Arc<dyn Team>, start: &Start, grid: &Grid) -> Self {
+        Self {
             sides: [None, None],
-            walls: vec![false; all.pressure() - all.fluid],
+            walls: Vec::new(),
             per_column: grid.total() / grid.count[0] as usize,
-            ring: is_ring(team.ranks(), params),
-            cuts: Vec::new(),
+            ring: is_ring(team.ranks(), &start.params),
+            cuts: start.cuts.clone(),
+            still: start.still.clone(),
+            whole: start.whole.clone(),
             own: 0..0,
             come_in: Vec::new(),
             searched: Vec::new(),
@@ -87,10 +94,10 @@ impl Share {
             kept: None,
             said: Default::default(),
             team,
-            corner: params.domain_min,
-            groups: all,
-            all,
-        })
+            corner: start.params.domain_min,
+            groups: start.scene.groups,
+            all: start.all,
+        }
     }
 
     /// Positions of the pressure-carrying slots at the search [m]: what collisions have moved across a cut since is still whose it was.
@@ -107,11 +114,6 @@ impl Share {
     /// Sizes of the groups of all ranks.
     pub fn all(&self) -> Groups {
         self.all
-    }
-
-    /// The slot here of the slot `i` of a single rank, if it is a solid's.
-    pub fn here(&self, i: usize) -> Option<usize> {
-        i.checked_sub(self.all.fluid).map(|k| k + self.groups.fluid)
     }
 
     /// Number of this rank.
@@ -163,11 +165,7 @@ impl Share {
 
     /// The columns before and after those of this rank, of which it has copies.
     pub(crate) fn beyond(&self) -> [Option<u32>; 2] {
-        let (mine, end) = (self.columns(), self.cuts.last().copied().unwrap_or(0));
-        [
-            mine.start.checked_sub(1).or(self.ring.then_some(end.saturating_sub(1))),
-            Some(mine.end).filter(|&c| c < end).or(self.ring.then_some(0)),
-        ]
+        beyond(&self.cuts, self.rank(), self.ring)
     }
 
     /// The columns of this rank.
@@ -206,6 +204,7 @@ impl Share {
             water: self.own.len(),
             copies: live - self.own.len(),
             walls: self.walls.iter().filter(|owned| **owned).count(),
+            still: self.groups.static_range().len(),
             bytes,
             memory_peak_bytes: memory_peak(),
             messages,

@@ -3,6 +3,7 @@
 use super::Share;
 use super::border::Side;
 use super::cut::{cut, unevenness};
+use super::still::StillParticle;
 use crate::cells::Grid;
 use crate::fields::Fields;
 use crate::kernels::cell_list::{CellList, inside};
@@ -27,33 +28,28 @@ pub struct Traveller {
     id: u64,
 }
 
-impl Share {
-    /// Cuts the tank by all water, and tells which slots of it this rank takes.
-    pub fn choose(&mut self, position: &[DVec3], kind: &[Kind], grid: &Grid, params: &Params) -> Vec<usize> {
-        let column = |i: usize| grid.coordinates(position[i])[0];
-        let mut load = vec![0; grid.count[0] as usize];
-        let water = || (0..self.all.fluid).filter(|&i| kind[i] == Kind::Fluid);
-        water().for_each(|i| load[column(i) as usize] += 1);
-        let cuts = cut(&load, self.ranks(), params);
-        let mine = cuts[self.rank()]..cuts[self.rank() + 1];
-        let own = water().filter(|&i| mine.contains(&column(i))).collect();
-        self.cuts = cuts;
-        own
-    }
+/// What a rank has when water has gone where it belongs.
+pub struct Settled {
+    /// Its water, copies before and after it.
+    pub water: Vec<Traveller>,
+    /// Walls that never move, layers and dummies, if others are here now.
+    pub still: Option<[Vec<StillParticle>; 2]>,
+}
 
-    /// The first `own` slots of `fields`, of `groups`, are what [`Self::choose`] told; there are no copies yet.
+impl Share {
+    /// The first `own` slots of `fields`, of `groups`, are this rank's water; there are no copies yet.
     pub fn begin(&mut self, groups: Groups, own: usize, fields: &Fields, grid: &Grid) {
         self.groups = groups;
         self.own = 0..own;
         self.come_in.clear();
         self.sides = self.beyond().map(|there| there.map(|_| Side::default()));
         let mine = self.columns();
-        for (owned, x) in self.walls.iter_mut().zip(&fields.position[groups.fluid..]) {
-            *owned = mine.contains(&grid.coordinates(*x)[0]);
-        }
+        let walls = &fields.position[groups.fluid..groups.pressure()];
+        self.walls = walls.iter().map(|x| mine.contains(&grid.coordinates(*x)[0])).collect();
     }
 
-    /// The slots of the water are more now, those of solids behind them moved up; borders are found anew before they are used.
+    /// Slots have changed: of the water there are more, and those of solids behind them have moved up, or other solids are here; borders are found anew
+    /// before they are used.
     pub fn groups_are(&mut self, groups: Groups) {
         self.groups = groups;
     }
@@ -88,7 +84,7 @@ impl Share {
 
     /// Particles go to the ranks in whose columns they now are, and copies of border columns to the ranks beside. Returns what is here
     /// then, for [`Self::place`].
-    pub fn settle(&mut self, fields: &mut Fields, grid: &Grid, params: &Params) -> Vec<Traveller> {
+    pub fn settle(&mut self, fields: &mut Fields, grid: &Grid, params: &Params) -> Settled {
         let column = |x: DVec3| grid.coordinates(x)[0];
         let traveller = |i: usize| Traveller {
             position: fields.position[i],
@@ -101,12 +97,16 @@ impl Share {
             self.own.clone().chain(come_in.iter().copied()).filter(|&i| fields.kind[i] == Kind::Fluid);
         let mut own: Vec<Traveller> = there.map(traveller).collect();
         come_in.into_iter().for_each(|i| self.park(fields, i..i + 1));
+        let mut still = None;
         if self.is_look_due() {
             let mut load = vec![0.0; self.all_columns()];
             own.iter().for_each(|t| load[column(t.position) as usize] += 1.0);
+            let before = self.columns();
             if self.cut_anew(load, params) {
-                let fluid = self.groups.fluid;
-                self.tell_walls(&mut fields.pressure[fluid..]);
+                let moving = self.groups.moving_wall_range();
+                self.tell_walls(&mut fields.pressure[moving]);
+                self.tell_walls(&mut fields.inertia_head);
+                still = self.still_of(before, fields, grid).map(|own| self.hand_on_still(own, grid));
             }
         }
         let domain = (params.domain_min, params.domain_max);
@@ -115,7 +115,7 @@ impl Share {
             !inside(grid.periodic.wrap(t.position), t.velocity, domain.0, domain.1, params.dimensions)
         };
         let [before, after] = self.migrate(&mut own, |t| (!stays(t)).then(|| column(t.position)));
-        [before, own, after].concat()
+        Settled { water: [before, own, after].concat(), still }
     }
 
     /// Whether it is time to see how even the shares are; counts the steps.
@@ -126,12 +126,8 @@ impl Share {
     }
 
     /// Hands those of `own` that are in the columns of other ranks on to these, and takes in what comes; `column` says where a particle is, and
-    /// nothing of one that stays whatever its place. Returns copies of what the ranks before and after have at their borders.
-    pub(crate) fn migrate<T: Pod>(
-        &self,
-        own: &mut Vec<T>,
-        column: impl Fn(&T) -> Option<u32>,
-    ) -> [Vec<T>; 2] {
+    /// nothing of one that stays whatever its place.
+    pub(super) fn migrate_alone<T: Pod>(&self, own: &mut Vec<T>, column: impl Fn(&T) -> Option<u32>) {
         let mine = self.columns();
         let astray = |t: &T| column(t).filter(|c| !mine.contains(c));
         loop {
@@ -153,6 +149,15 @@ impl Share {
                 break;
             }
         }
+    }
+
+    /// The same; returns copies of what the ranks before and after have at their borders.
+    pub(crate) fn migrate<T: Pod>(
+        &self,
+        own: &mut Vec<T>,
+        column: impl Fn(&T) -> Option<u32>,
+    ) -> [Vec<T>; 2] {
+        self.migrate_alone(own, &column);
         let border = |c: u32| {
             let at = own.iter().filter(|t| column(t) == Some(c));
             bytemuck::cast_slice(&at.copied().collect::<Vec<_>>()).to_vec()
@@ -199,6 +204,9 @@ impl Share {
 
     /// Tells all ranks the `values` of the wall layers that this one has: walls that change hands take what they have along.
     pub(crate) fn tell_walls(&self, values: &mut [f64]) {
+        if values.is_empty() {
+            return;
+        }
         let owned = self.walls.iter().enumerate().filter(|(k, owned)| **owned && *k < values.len());
         let own: Vec<[f64; 2]> = owned.map(|(k, _)| [k as f64, values[k]]).collect();
         for bytes in self.gather(bytemuck::cast_slice(&own).to_vec()) {
@@ -240,7 +248,8 @@ impl Share {
             }
         }
         self.sides = sides;
-        self.walls.fill(false);
+        self.walls.clear();
+        self.walls.resize(self.groups.pressure() - fluid, false);
         mine.flat_map(walls).for_each(|s| self.walls[s as usize - fluid] = true);
     }
 }

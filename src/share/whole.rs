@@ -1,10 +1,12 @@
 //! The particles of all ranks in one place: gathered by the first rank, or told by it.
 
-use super::Share;
+use super::{Division, Portion, Share};
+use crate::cells::Grid;
 use crate::error::Result;
 use crate::fields::{Fields, State};
 use crate::output::particles::Particles;
 use crate::output::pieces::{Pieces, Told};
+use crate::params::Params;
 use crate::periodic::Periodic;
 use crate::ranks::{decode, encode};
 use crate::scene::Kind;
@@ -17,7 +19,7 @@ struct Part {
     ids: Vec<u32>,
     /// Position and velocity of each particle of water.
     motion: Vec<DVec3>,
-    /// Slots of wall layers.
+    /// Wall layers, by their numbers among those of all ranks.
     walls: Vec<u32>,
     pressure: Vec<f64>,
     number_density: Vec<f64>,
@@ -35,20 +37,6 @@ pub(super) struct Kept {
     moving: Vec<[DVec3; 2]>,
 }
 
-/// All particles, for every rank to take its own from.
-#[derive(Serialize, Deserialize)]
-struct Whole {
-    position: Vec<DVec3>,
-    velocity: Vec<DVec3>,
-    kind: Vec<u8>,
-    id: Vec<u32>,
-    pressure: Vec<f64>,
-    number_density: Vec<f64>,
-    inertia_head: Vec<f64>,
-    state: Vec<u8>,
-    dt: f64,
-}
-
 impl Share {
     /// What this rank has of `fields`, encoded.
     fn part(&self, fields: &Fields) -> Vec<u8> {
@@ -57,7 +45,11 @@ impl Share {
         let part = Part {
             ids: fields.id[own.clone()].to_vec(),
             motion: own.clone().flat_map(|i| [fields.position[i], fields.velocity[i]]).collect(),
-            walls: self.owned().skip(own.len()).map(|i| (i - self.groups.fluid) as u32).collect(),
+            walls: self
+                .owned()
+                .skip(own.len())
+                .map(|i| self.wall_number(i - self.groups.fluid) as u32)
+                .collect(),
             pressure: carriers(&fields.pressure),
             number_density: carriers(&fields.number_density),
             surface_pressure: if fields.surface_pressure.is_empty() {
@@ -136,8 +128,10 @@ impl Share {
     /// Pressures and number densities of the wall layers, in the order of their slots. On the first rank only: the others get none.
     pub fn gather_walls(&self, fields: &Fields) -> [Vec<f64>; 2] {
         let walls = self.owned().skip(self.own.len());
-        let part =
-            walls.map(|i| ((i - self.groups.fluid) as u32, [fields.pressure[i], fields.number_density[i]]));
+        let part = walls.map(|i| {
+            let number = self.wall_number(i - self.groups.fluid) as u32;
+            (number, [fields.pressure[i], fields.number_density[i]])
+        });
         let parts = self.collect(encode(&part.collect::<Vec<_>>()));
         if self.rank() > 0 {
             return Default::default();
@@ -165,18 +159,23 @@ impl Share {
         self.gather(encode(&told)).iter().map(|bytes| decode::<Told>(bytes).bytes()).collect()
     }
 
-    /// Fields of all ranks without their water; solids are where they are in `fields`.
+    /// Fields of all ranks without their water, on the first rank; solids that move are where they are in `fields`.
     pub fn blank(&self, fields: &Fields) -> Fields {
-        let (all, here) = (self.all, self.groups.fluid);
-        let lay = |rest: DVec3, solids: &[DVec3]| -> Vec<DVec3> {
-            std::iter::repeat_n(rest, all.fluid).chain(solids.iter().copied()).collect()
+        let (all, here) = (self.all, self.groups);
+        let lay = |rest: DVec3, moving: &[DVec3], still: &[DVec3]| -> Vec<DVec3> {
+            let (walls, dummies) = (&moving[here.moving_wall_range()], &moving[here.moving_dummy_range()]);
+            let solids = walls.iter().chain(still).chain(dummies).copied();
+            std::iter::repeat_n(rest, all.fluid).chain(solids).collect()
         };
+        let still = self.whole.as_ref().map_or(&[][..], |scene| &scene.position[all.static_range()]);
+        let at_rest = vec![DVec3::ZERO; still.len()];
+        let kinds = self.whole.as_ref().map_or(&[][..], |scene| &scene.kind[all.fluid..]);
         let of_surface = if fields.surface_pressure.is_empty() { 0 } else { all.pressure() };
         let parked = std::iter::repeat_n(Kind::Ghost, all.fluid);
         Fields {
-            position: lay(self.corner, &fields.position[here..]),
-            velocity: lay(DVec3::ZERO, &fields.velocity[here..]),
-            kind: parked.chain(fields.kind[here..].iter().copied()).collect(),
+            position: lay(self.corner, &fields.position, still),
+            velocity: lay(DVec3::ZERO, &fields.velocity, &at_rest),
+            kind: parked.chain(kinds.iter().copied()).collect(),
             id: vec![0; all.fluid],
             pressure: vec![0.0; all.pressure()],
             number_density: vec![0.0; all.pressure()],
@@ -191,32 +190,17 @@ impl Share {
         }
     }
 
-    /// The first rank's state of a run: `fields` of all particles, given there alone, and the time step.
-    pub fn tell_fields(&self, fields: Option<(Fields, f64)>) -> (Fields, f64) {
-        let whole = fields.map(|(fields, dt)| Whole {
-            kind: fields.kind.iter().map(|&k| k as u8).collect(),
-            state: fields.state.iter().map(|&s| s as u8).collect(),
-            position: fields.position,
-            velocity: fields.velocity,
-            id: fields.id,
-            pressure: fields.pressure,
-            number_density: fields.number_density,
-            inertia_head: fields.inertia_head,
-            dt,
-        });
-        let whole: Whole = decode(&self.team.hear(whole.map_or_else(Vec::new, |whole| encode(&whole))));
-        let fields = Fields {
-            kind: whole.kind.iter().map(|&code| Kind::from_code(code).unwrap_or(Kind::Ghost)).collect(),
-            state: whole.state.iter().map(|&code| State::from_code(code).unwrap_or_default()).collect(),
-            position: whole.position,
-            velocity: whole.velocity,
-            id: whole.id,
-            pressure: whole.pressure,
-            number_density: whole.number_density,
-            inertia_head: whole.inertia_head,
-            ..Fields::default()
+    /// What this rank takes over of the first one's state of a run: `whole`, all particles and the time step, which are given there alone.
+    pub fn portion(&self, whole: Option<(Fields, f64)>, grid: &Grid, params: &Params) -> Portion {
+        let every_wall = self.still.is_none();
+        let Some((fields, dt)) = whole else {
+            return decode(&self.team.deal(&mut |_| Vec::new()));
         };
-        (fields, whole.dt)
+        let particles = (&fields.position[..], &fields.kind[..]);
+        let division = Division::new(self.ranks(), self.all, grid, params, particles);
+        let of = |rank: usize| Portion::new(rank, &fields, dt, &division, every_wall);
+        self.team.deal(&mut |rank| encode(&of(rank)));
+        of(0)
     }
 
     /// Gives the slots from `n` on that hold no particle the numbers that are left.
@@ -227,24 +211,31 @@ impl Share {
         fields.id[n..].iter_mut().zip(free).for_each(|(id, free)| *id = free);
     }
 
-    /// The slots `own` of `whole`, the state of all ranks, and its solids into `fields`.
-    pub fn take_over(&self, own: &[usize], whole: &Fields, fields: &mut Fields) {
-        let (all, here) = (self.all.fluid, self.groups.fluid);
+    /// The cuts of `portion`, and the walls that never move and are here then; [`Self::take_over`] follows when they have slots.
+    pub fn divide_as(&mut self, portion: &Portion) {
+        self.cuts.clone_from(&portion.cuts);
+        self.still.clone_from(&portion.still);
+    }
+
+    /// `portion` into `fields`, which have its solids and at least as many slots for water.
+    pub fn take_over(&self, portion: &Portion, fields: &mut Fields) {
+        let (here, n) = (self.groups.fluid, portion.groups.fluid);
         self.park(fields, 0..here);
-        for (n, &i) in own.iter().enumerate() {
-            fields.position[n] = whole.position[i];
-            fields.velocity[n] = whole.velocity[i];
-            fields.pressure[n] = whole.pressure[i];
-            fields.number_density[n] = whole.number_density[i];
-            fields.state[n] = whole.state[i];
-            fields.id[n] = whole.id[i];
-            fields.kind[n] = Kind::Fluid;
+        let carriers = portion.state.iter().map(|&code| State::from_code(code).unwrap_or_default());
+        let state: Vec<State> = carriers.collect();
+        for (to, from) in [(0, 0..n), (here, n..portion.groups.pressure())] {
+            let slots = to..to + from.len();
+            fields.pressure[slots.clone()].copy_from_slice(&portion.pressure[from.clone()]);
+            fields.number_density[slots.clone()].copy_from_slice(&portion.number_density[from.clone()]);
+            fields.state[slots].copy_from_slice(&state[from]);
         }
-        fields.position[here..].copy_from_slice(&whole.position[all..]);
-        fields.velocity[here..].copy_from_slice(&whole.velocity[all..]);
-        fields.pressure[here..].copy_from_slice(&whole.pressure[all..]);
-        fields.number_density[here..].copy_from_slice(&whole.number_density[all..]);
-        fields.state[here..].copy_from_slice(&whole.state[all..]);
-        fields.inertia_head.copy_from_slice(&whole.inertia_head);
+        for (to, from) in [(0, 0..n), (here, n..portion.position.len())] {
+            let slots = to..to + from.len();
+            fields.position[slots.clone()].copy_from_slice(&portion.position[from.clone()]);
+            fields.velocity[slots].copy_from_slice(&portion.velocity[from]);
+        }
+        fields.id[..n].copy_from_slice(&portion.id);
+        fields.kind[..n].fill(Kind::Fluid);
+        fields.inertia_head.copy_from_slice(&portion.inertia_head);
     }
 }

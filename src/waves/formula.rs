@@ -1,9 +1,10 @@
 //! A way over time as a formula: sums of sines that begin gently, and the stroke that makes a solitary wave.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// One sine, amplitude sin(frequency t + phase).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Component {
     /// Amplitude [m] or [rad].
     pub amplitude: f64,
@@ -14,10 +15,10 @@ pub struct Component {
 }
 
 /// A way [m] or an angle [rad] over time; 0 up to t = 0.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Formula(Form);
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Form {
     Sines(Sines),
     Stroke(Stroke),
@@ -25,7 +26,7 @@ enum Form {
 
 /// R(t) sum a_k sin(w_k t + p_k) with R = s^3 (10 - 15 s + 6 s^2), s = t / ramp, up to 1: its second derivative is
 /// continuous.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Sines {
     components: Vec<Component>,
     /// Time over which the sines grow to their size [s]; 0: they are whole at once.
@@ -37,7 +38,7 @@ struct Sines {
 }
 
 /// Even times from 0 to the repetition of a sum of sines.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Looks {
     /// Intervals between them.
     count: usize,
@@ -47,7 +48,7 @@ struct Looks {
 
 /// w(t) = A (tanh th + tanh th_0) with c (t - t_0) = th / k + A tanh th: the way of the water at the piston under a wave
 /// eta = H / cosh^2 k (c t - w), which is where w' = c eta / (d + eta) leads.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Stroke {
     /// A = H / (k d) [m].
     half: f64,

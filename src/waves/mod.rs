@@ -48,7 +48,7 @@ pub enum Profile {
 }
 
 /// What is asked of a piston.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wanted {
     /// Kind.
     pub kind: WaveKind,
@@ -71,7 +71,7 @@ pub struct Wanted {
 }
 
 /// A wave, and how a piston makes it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wave {
     /// What was asked.
     pub wanted: Wanted,

@@ -142,6 +142,12 @@ impl Report {
         if let Some(ranks) = &report.ranks {
             lines.extend([String::new(), format!("{} ranks at t = 0", ranks.parts.len())]);
             lines.extend(of_ranks(ranks));
+            let [first, other] = report.estimate.memory_of_ranks(ranks.parts.len());
+            lines.push(format!(
+                "  memory on CPUs: about {} a rank, {} the first",
+                bytes(other),
+                bytes(first)
+            ));
         }
         let e = &report.estimate;
         lines.extend([

@@ -19,7 +19,6 @@ mod wide;
 
 use self::ledger::WaterLedger;
 use self::search::Coordinates;
-pub(crate) use self::team::room;
 use self::wall_excess::WallExcess;
 use super::traffic::{Sizes, Traffic};
 use super::{Backend, Counters};
@@ -97,14 +96,7 @@ impl Cpu {
         let lightness = |solid| collision::lightness(solid, params);
         let grid = if wet { Grid::new(params)? } else { Grid::nothing() };
         let mut scratch = Scratch::default();
-        let fixed = (wet && !groups.static_range().is_empty()).then(|| {
-            let mut list = CellList::default();
-            list.index(&grid, groups.static_range(), &scene.position, &mut scratch);
-            let mut coordinates = Coordinates::default();
-            let place = |&s: &u32| grid.periodic.wrap(scene.position[s as usize]);
-            coordinates.set(list.slot.par_iter().map(place));
-            (list, coordinates)
-        });
+        let fixed = if wet { Self::index_fixed(&grid, groups, &scene.position, &mut scratch) } else { None };
         Ok(Self {
             params: params.clone(),
             settings,
@@ -138,6 +130,23 @@ impl Cpu {
             dt: 0.0,
             excess: WallExcess::new(scene, params, plan),
             share: None,
+        })
+    }
+
+    /// What never moves, by cells; nothing if there is nothing.
+    fn index_fixed(
+        grid: &Grid,
+        groups: Groups,
+        position: &[DVec3],
+        scratch: &mut Scratch,
+    ) -> Option<(CellList, Coordinates)> {
+        (!groups.static_range().is_empty()).then(|| {
+            let mut list = CellList::default();
+            list.index(grid, groups.static_range(), position, scratch);
+            let mut coordinates = Coordinates::default();
+            let place = |&s: &u32| grid.periodic.wrap(position[s as usize]);
+            coordinates.set(list.slot.par_iter().map(place));
+            (list, coordinates)
         })
     }
 

@@ -3,7 +3,6 @@
 use super::Cpu;
 use super::archive::Saved;
 use crate::backend::{Backend, Counters, Ranked};
-use crate::cells::Grid;
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, insert};
@@ -11,52 +10,33 @@ use crate::kernels::openings::Emission;
 use crate::ledger::Ledger;
 use crate::neighbours::Neighbours;
 use crate::output::pieces::Pieces;
-use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
 use crate::ranks::{Standing, Team};
-use crate::scene::Scene;
-use crate::share::Share;
+use crate::share::{Settled, Share, Start, room};
 use glam::DVec3;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Slots for as much more water than a rank has, one part in so many, and for a few more.
-const SPARE: (usize, usize) = (8, 256);
 
 /// Whether the pressure-carrying slot `i` is computed here: on one rank, or as `share` has it.
 pub(super) fn owns(share: Option<&Share>, i: usize) -> bool {
     share.is_none_or(|share| share.owns(i))
 }
 
-/// Slots for `water` particles of water and some more, `all` at most where that is enough.
-pub(crate) fn room(water: usize, all: usize) -> usize {
-    (water + water / SPARE.0 + SPARE.1).min(all).max(water)
-}
-
 impl Cpu {
-    /// The part of the particles of `scene` that a rank of `team` computes.
+    /// The part of a rank of `team`, which begins with `start`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for what ranks do not compute, and if there are too many of them for the tank.
-    pub fn of_team(
-        team: Arc<dyn Team>,
-        scene: &Scene,
-        params: &Params,
-        plan: &Plan,
-        settings: Settings,
-    ) -> Result<Self> {
+    /// [`Error::Usage`] for what ranks do not compute.
+    pub fn of_team(team: Arc<dyn Team>, start: &Start, plan: &Plan, settings: Settings) -> Result<Self> {
         if !plan.wet() {
             return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
         }
-        let grid = Grid::new(params)?;
-        let mut share = Share::new(team, params, scene.groups, &grid)?;
-        let own = share.choose(&scene.position, &scene.kind, &grid, params);
-        let slots = room(own.len(), scene.groups.fluid);
-        let mut cpu = Self::new(&scene.part(&own, slots, &[]), params, plan, settings)?;
-        cpu.fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
-        share.begin(cpu.groups, own.len(), &cpu.fields, &cpu.grid);
+        let mut cpu = Self::new(&start.scene, &start.params, plan, settings)?;
+        let mut share = Share::new(team, start, &cpu.grid);
+        cpu.fields.id[..start.ids.len()].copy_from_slice(&start.ids);
+        share.begin(cpu.groups, start.ids.len(), &cpu.fields, &cpu.grid);
         cpu.share = Some(Box::new(share));
         Ok(cpu)
     }
@@ -83,7 +63,12 @@ impl Cpu {
     /// Water that has moved goes to the ranks whose it is now, and copies of that at borders come here.
     pub(super) fn settle(&mut self) {
         let Some(share) = &mut self.share else { return };
-        let here = share.settle(&mut self.fields, &self.grid, &self.params);
+        let Settled { water: here, still } = share.settle(&mut self.fields, &self.grid, &self.params);
+        if let Some([walls, dummies]) = still {
+            let walls: Vec<_> = walls.iter().map(|s| (s.position, s.pressure)).collect();
+            let dummies: Vec<_> = dummies.iter().map(|s| s.position).collect();
+            self.lay_still(&walls, &dummies);
+        }
         self.make_room(here.len());
         if let Some(share) = &self.share {
             share.place(&here, &mut self.fields, self.live);
@@ -110,6 +95,20 @@ impl Cpu {
         // Made anew right after.
         self.neighbours = Neighbours::new(self.groups.pressure());
         share.groups_are(self.groups);
+    }
+
+    /// Other walls that never move: at `walls`, with these pressures, and dummies.
+    fn lay_still(&mut self, walls: &[(DVec3, f64)], dummies: &[DVec3]) {
+        let before = self.groups;
+        self.fields.lay_still(&before, walls, dummies);
+        (self.groups.static_wall, self.groups.static_dummy) = (walls.len(), dummies.len());
+        let [from, to] = [before, self.groups].map(|g| g.moving_dummy_range().start as isize);
+        self.solids.iter_mut().for_each(|solid| solid.move_slots(0, to - from));
+        self.fixed = Self::index_fixed(&self.grid, self.groups, &self.fields.position, &mut self.scratch);
+        self.excess.lay_still(self.groups.pressure() - self.groups.fluid);
+        // Made anew right after.
+        self.neighbours = Neighbours::new(self.groups.pressure());
+        self.share.iter_mut().for_each(|share| share.groups_are(self.groups));
     }
 
     /// `emissions` with the slots that they have here.
@@ -204,17 +203,20 @@ impl Ranked for Cpu {
                 ledger.work = Ledger::default();
             }
         }
-        let (whole, dt) = share.tell_fields(fields.map(|fields| (fields, self.dt)));
-        self.dt = dt;
-        let own = share.choose(&whole.position, &whole.kind, &self.grid, &self.params);
-        self.make_room(own.len());
+        let whole = fields.map(|fields| (fields, self.dt));
+        let portion = share.portion(whole, &self.grid, &self.params);
+        share.divide_as(&portion);
+        self.dt = portion.dt;
+        let (walls, dummies) = portion.still_places();
+        self.lay_still(&walls, &dummies);
+        self.make_room(portion.water());
         let Some(share) = self.share.as_mut() else { return Ok(()) };
-        share.take_over(&own, &whole, &mut self.fields);
+        share.take_over(&portion, &mut self.fields);
         // Zero between two steps.
         self.fields.acceleration.fill(DVec3::ZERO);
         self.fields.reaction.fill(DVec3::ZERO);
-        share.begin(self.groups, own.len(), &self.fields, &self.grid);
-        self.live = own.len();
+        share.begin(self.groups, portion.water(), &self.fields, &self.grid);
+        self.live = portion.water();
         self.neighbours = Neighbours::new(self.neighbours.rows());
         if self.params.viscosity > 0.0 {
             self.search_again();

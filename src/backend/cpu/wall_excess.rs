@@ -8,7 +8,7 @@ use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::wall_excess::{cut_share, known_excess, wall_excess};
 use crate::neighbours::{CHUNK, Neighbours};
 use crate::params::Params;
-use crate::plan::{Arrays, Plan};
+use crate::plan::{Arrays, Excess, Plan};
 use crate::scene::{Scene, Solid};
 use crate::share::{OfWalls, Share};
 use rayon::prelude::*;
@@ -18,6 +18,10 @@ use rayon::prelude::*;
 pub(super) struct WallExcess {
     /// [Pa], the moving walls' first.
     of: Vec<f64>,
+    /// Rows of walls that move.
+    moving: usize,
+    /// Whether it is told of those that never move.
+    of_still: bool,
     /// [`cut_share`] of each wall-layer slot of the moving solids, 0 where they are not free; empty where none is.
     cut_share: Vec<f64>,
     /// What the solve has found for the rows of free bodies.
@@ -63,8 +67,18 @@ impl WallExcess {
             scene.solids.iter().filter(|_| plan.needs(Arrays::Coupling)).flat_map(rows).collect();
         Self {
             of: vec![0.0; plan.excess.rows(groups.pressure() - groups.fluid, groups.moving_wall)],
+            moving: groups.moving_wall,
+            of_still: plan.excess == Excess::All,
             solved: vec![Solved::default(); cut_share.len()],
             cut_share,
+        }
+    }
+
+    /// There are other walls that never move: `carriers` rows with those that move.
+    pub fn lay_still(&mut self, carriers: usize) {
+        if self.of_still {
+            self.of.resize(carriers, 0.0);
+            self.of[self.moving..].fill(0.0);
         }
     }
 
@@ -103,7 +117,7 @@ impl WallExcess {
     /// What is left after the cut. A free body is pressed with what it answered and with what it feels of the cut; what it answered too
     /// little is its inertia head, which the next step adds.
     pub fn after_cut(&mut self, rows: Rows, fields: &mut Fields) {
-        let Self { of, cut_share, solved } = self;
+        let Self { of, cut_share, solved, .. } = self;
         let mut heads = std::mem::take(&mut fields.inertia_head);
         let state = &fields.state;
         let free = |wall: usize| cut_share.get(wall).filter(|felt| **felt > 0.0);

@@ -17,7 +17,6 @@ mod state;
 use super::Gpu;
 use super::adapter::{self, Caps};
 use super::layout::MonitorSum;
-use crate::backend::cpu::room;
 use crate::backend::traffic::Traffic;
 use crate::backend::{self, Backend, Commands, Counters, Timing};
 use crate::body::slots::SlotRow;
@@ -34,8 +33,8 @@ use crate::params::{Params, Step};
 use crate::plan::{ContactPlan, ParticleStage, Plan, Stage};
 use crate::pressure::{PressureReport, Settings};
 use crate::ranks::{Standing, Team};
-use crate::scene::{Groups, Kind, Scene};
-use crate::share::Share;
+use crate::scene::{Groups, Scene};
+use crate::share::{Share, Start};
 use crate::stop::Stop;
 use halo::{Lists, Shown};
 use levels::Rows;
@@ -84,46 +83,38 @@ fn check(plan: &Plan) -> Result<()> {
 }
 
 impl GpuRank {
-    /// The part of the particles of `scene` that a rank of `team` computes, the `k`-th on its machine: on the device of that number among those
-    /// that are `asked` for, see [`super::adapters`].
+    /// The part of a rank of `team`, which begins with `start`, the `k`-th on its machine: on the device of that number among those that are `asked` for,
+    /// see [`super::adapters`].
     ///
     /// # Errors
-    /// [`Error::Usage`] for what ranks do not compute, and if there are too many of them for the tank; [`Error::Gpu`] if there is no such
-    /// adapter, or the part does not fit it.
+    /// [`Error::Usage`] for what ranks do not compute; [`Error::Gpu`] if there is no such adapter, or the part does not fit it.
     pub fn of_team(
         (team, k): (Arc<dyn Team>, usize),
-        scene: &Scene,
-        params: &Params,
+        start: &Start,
         plan: &Plan,
         settings: Settings,
         asked: Option<&str>,
     ) -> Result<Self> {
         check(plan)?;
+        let (part, params, own) = (&start.scene, &start.params, start.ids.len());
         let grid = Grid::new(params)?;
-        let mut share = Share::new(team, params, scene.groups, &grid)?;
-        let own = share.choose(&scene.position, &scene.kind, &grid, params);
-        let beside: Vec<u32> = share.beyond().into_iter().flatten().collect();
-        let is_copy = |&i: &usize| {
-            scene.kind[i] == Kind::Fluid && beside.contains(&grid.coordinates(scene.position[i])[0])
-        };
-        let copies = (0..scene.groups.fluid).filter(is_copy).count();
-        let part = scene.part(&own, room(own.len() + copies, scene.groups.fluid), &[]);
+        let mut share = Share::new(team, start, &grid);
         // Contact is the first rank's, and its host's.
         let plan = Plan { contact: ContactPlan::default(), ..plan.clone() };
-        let place = Place { k, asked: asked.map(str::to_owned), all: scene.groups };
-        let mut gpu = open(&part, params, &plan, settings, &place)?;
-        let mut fields = backend::start(&part, &plan);
-        fields.id.iter_mut().zip(&own).for_each(|(id, &slot)| *id = slot as u32);
+        let place = Place { k, asked: asked.map(str::to_owned), all: start.all };
+        let mut gpu = open(part, params, &plan, settings, &place)?;
+        let mut fields = backend::start(part, &plan);
+        fields.id[..own].copy_from_slice(&start.ids);
         gpu.write_fields(&fields)?;
-        share.begin(gpu.groups, own.len(), &fields, &grid);
-        let stem = scene.part(&[], 0, &[]);
+        share.begin(gpu.groups, own, &fields, &grid);
+        let stem = part.part(&[], 0, &[], None);
         Ok(Self {
             walls: Walls::new(&stem, &grid, gpu.middle),
             stem,
             place,
             poses: Vec::new(),
             starts: Vec::new(),
-            live: own.len(),
+            live: own,
             came_in: 0..0,
             came: Came::default(),
             lists: Lists::default(),
@@ -133,7 +124,6 @@ impl GpuRank {
         })
     }
 
-    /// What each rank holds and said.
     /// Where the particles in `slots` of the whole are here, if they are this rank's.
     fn here(&self, slots: &[usize]) -> Vec<Option<usize>> {
         slots.iter().map(|&s| self.share.here(s).filter(|&s| self.share.owns(s))).collect()
@@ -145,6 +135,7 @@ impl GpuRank {
         here.iter().map(|s| s.and_then(|_| told.next()).unwrap_or_default()).collect()
     }
 
+    /// What each rank holds and said.
     fn standings(&self) -> Vec<Standing> {
         self.share.gather_all(vec![self.share.standing(self.live, self.gpu.bytes())])
     }

@@ -5,11 +5,13 @@ use crate::backend::Backend;
 use crate::backend::gpu::adapters;
 use crate::body::Pose;
 use crate::case::Case;
+use crate::cells::Grid;
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
 use crate::pressure::Settings;
 use crate::ranks::Team;
 use crate::scene::Scene;
+use crate::share::{Division, Start};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -38,12 +40,15 @@ pub(super) struct Rig {
 impl Rig {
     /// Of `case`, whose gate moves with `velocity` [m/s].
     pub fn new(one: Arc<dyn Team>, case: &Case, velocity: DVec3) -> Self {
-        let scene = Scene::build(case).expect("a valid scene");
+        let scene = Arc::new(Scene::build(case).expect("a valid scene"));
         let params = Params::new(case, &scene).expect("valid constants");
         let plan = Plan::new(case, &scene, &params);
         let settings = Settings { tolerance: 1e-5, max_iterations: 100, warm_start: true };
-        let rank =
-            GpuRank::of_team((one, 0), &scene, &params, &plan, settings, None).expect("it can be built");
+        let grid = Grid::new(&params).expect("a grid");
+        let particles = (&scene.position[..], &scene.kind[..]);
+        let division = Division::new(1, scene.groups, &grid, &params, particles);
+        let start = Start::new(0, &scene, &params, &division, true);
+        let rank = GpuRank::of_team((one, 0), &start, &plan, settings, None).expect("it can be built");
         let solid = &scene.solids[0];
         let gate = Pose {
             position: solid.position,

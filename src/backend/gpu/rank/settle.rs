@@ -6,7 +6,6 @@
 
 use super::{GpuRank, groups, open, wall_slots};
 use crate::backend::Backend;
-use crate::backend::cpu::room;
 use crate::backend::gpu::buffers;
 use crate::backend::gpu::layout::word_of;
 use crate::cells::Grid;
@@ -19,6 +18,7 @@ use crate::kernels::predict::DISPLACEMENT_MAX;
 use crate::kernels::shift::SHIFT_MAX;
 use crate::plan::Arrays;
 use crate::scene::{Kind, Scene};
+use crate::share::room;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use std::ops::Range;
@@ -281,7 +281,7 @@ impl GpuRank {
         };
         let mut fields = self.gpu.read_fields()?;
         self.name_kinds(&mut fields);
-        let part = self.stem.part(&[], more, &[]);
+        let part = self.stem.part(&[], more, &[], None);
         let mut wider = open(&part, &self.gpu.params, &self.gpu.plan, self.gpu.settings, &self.place)?;
         fields.widen(slots, more - slots, self.gpu.params.domain_min);
         wider.write_fields(&fields)?;

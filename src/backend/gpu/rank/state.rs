@@ -1,7 +1,6 @@
 //! The particles of all ranks in one place, and back: fields, frames, states. A state is that of a run on one device, which goes on with it.
 
 use super::{Came, GpuRank, Lists};
-use crate::backend::cpu::room;
 use crate::backend::gpu::layout::{self, LEDGER_WIDTH, counter, word_of};
 use crate::backend::gpu::memory::Sizes;
 use crate::backend::gpu::transfer::{kind, packed, vector};
@@ -14,7 +13,7 @@ use crate::ledger::{Entry, Ledger};
 use crate::output::pieces::Pieces;
 use crate::params::Step;
 use crate::plan::{Arrays, ParticleStage};
-use crate::share::Share;
+use crate::share::{Share, room};
 use glam::DVec3;
 
 impl GpuRank {
@@ -190,19 +189,20 @@ impl Ranked for GpuRank {
                 self.gpu.context.clear(buffers::ledger_sum)?;
             }
         }
-        let (whole, dt) = self.share.tell_fields(fields.map(|fields| (fields, self.gpu.dt)));
+        let (grid, whole) = (self.gpu.grid, fields.map(|fields| (fields, self.gpu.dt)));
+        let portion = self.share.portion(whole, &grid, &self.gpu.params);
+        self.share.divide_as(&portion);
+        let (own, dt) = (portion.water(), portion.dt);
         self.gpu.dt = dt;
-        let grid = self.gpu.grid;
-        let own = self.share.choose(&whole.position, &whole.kind, &grid, &self.gpu.params);
         self.poses.clear();
-        self.make_room(room(own.len(), self.share.all().fluid))?;
+        self.make_room(room(own, self.share.all().fluid))?;
         let mut local = self.local()?;
-        self.share.take_over(&own, &whole, &mut local);
+        self.share.take_over(&portion, &mut local);
         // Zero between two steps.
         local.acceleration.fill(DVec3::ZERO);
         local.reaction.fill(DVec3::ZERO);
         self.gpu.write_fields(&local)?;
-        self.share.begin(self.gpu.groups, own.len(), &local, &grid);
+        self.share.begin(self.gpu.groups, own, &local, &grid);
         self.walls.are_at(&local.position[super::wall_slots(&self.gpu)]);
         self.starts.clear();
         self.live = self.gpu.groups.fluid;
