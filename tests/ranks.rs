@@ -29,7 +29,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// What `of` says of a simulation of `case` on `ranks` threads, and how these stand then.
-fn on_ranks<T: Send>(
+pub(crate) fn on_ranks<T: Send>(
     case: &Case,
     ranks: usize,
     of: impl FnOnce(&mut Simulation) -> T + Send,
@@ -156,7 +156,7 @@ impl Seen {
     }
 
     /// Asserts that another run came to the same, but for `tolerance` of each number's size.
-    fn assert_near(&self, other: &Self, tolerance: f64, what: &str) {
+    pub(crate) fn assert_near(&self, other: &Self, tolerance: f64, what: &str) {
         let near =
             |a: f64, b: f64, scale: f64| (a - b).abs() <= tolerance * scale || a.is_nan() && b.is_nan();
         let [a, b] = [&self.water, &other.water];
@@ -369,6 +369,8 @@ fn plan_tells_what_ranks_have_and_say() {
         ),
         (shipped("dam_break_2d", &[]), 4),
         (ring(0.0, "solver = { preconditioner = \"multigrid\" }", FREE), 3),
+        (crate::ranks_levels::pool(0.0), 5),
+        (crate::ranks_levels::round(0.0, 0.0), 3),
     ] {
         let scene = Scene::build(&case).expect("it builds");
         let around = scene.periodic.is_along(0);

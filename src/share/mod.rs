@@ -8,6 +8,7 @@
 //! single rank: every rank knows where they are, and computes the rows of those in its own columns.
 
 mod border;
+mod coarse;
 mod cut;
 mod moves;
 mod outlook;
@@ -23,6 +24,8 @@ use crate::params::Params;
 use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::Groups;
 pub use border::{Bordered, OfWalls, Side};
+pub(crate) use coarse::Columns;
+use coarse::wet_cells;
 use cut::{check, is_ring};
 use glam::DVec3;
 pub use moves::Traveller;
@@ -50,6 +53,8 @@ pub struct Share {
     ring: bool,
     /// First column of each rank, and the end of the last one's.
     cuts: Vec<u32>,
+    /// Cells that the water of all fills.
+    wet_cells: f64,
     /// Slots of the water that this rank computes.
     own: Range<usize>,
     /// Slots beside them with water that has just come in.
@@ -80,6 +85,7 @@ impl Share {
             per_column: grid.total() / grid.count[0] as usize,
             ring: is_ring(team.ranks(), params),
             cuts: Vec::new(),
+            wet_cells: wet_cells(&all, params, grid),
             own: 0..0,
             come_in: Vec::new(),
             searched: Vec::new(),
