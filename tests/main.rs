@@ -45,6 +45,7 @@ mod periodic;
 mod prisms;
 mod ranks;
 mod ranks_gpu;
+mod ranks_levels;
 mod ranks_walls;
 mod render;
 mod report;

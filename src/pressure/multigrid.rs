@@ -1,29 +1,38 @@
 //! Aggregation multigrid as preconditioner of the PPE, rebuilt every step: levels as
 //! [`crate::kernels::multigrid_levels`] says, the cycle as [`crate::kernels::multigrid`] does, here in
 //! compressed rows. It is computed in f32: it need only be an approximation, and half the bytes move.
+//! Here is what it has of the particles and their cells; `hierarchy` has the cycle, `shared` what ranks do together.
 
+mod hierarchy;
 mod level;
+mod shared;
+#[cfg(test)]
+mod tests;
 
-use self::level::{Joined, Level, Scratch, coarsen, compress, gather};
+use self::hierarchy::Hierarchy;
+use self::level::{Level, NONE, compress, gather};
+use self::shared::meet;
 use super::cg::{Among, Precondition, System};
 use crate::cells::Grid;
 use crate::fields::State;
-use crate::kernels::multigrid::{OVER_CORRECTION, SWEEPS, first_sweep, over_correction, sweep, visits};
-use crate::kernels::multigrid_levels::{LevelSums, level_cells, place_of, step};
+use crate::kernels::multigrid::{OVER_CORRECTION, first_sweep, sweep};
+use crate::kernels::multigrid_levels::{LevelSums, place_of, step};
 use crate::neighbours::{CHUNK, Chunk};
+use crate::share::Side;
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// The hierarchy; buffers are kept between steps.
 #[derive(Default, Debug)]
 pub struct Multigrid {
-    /// Aggregate of each slot, `u32::MAX` where there is no unknown.
+    /// Row of the first coarse level that each slot belongs to, [`NONE`] where there is no unknown.
     aggregate: Vec<u32>,
     /// Cell of each slot as 9 x + 3 y + z, [`NOWHERE`] where there is no unknown: the difference of two of them
     /// is the entry in the stencil.
     code: Vec<i32>,
     members: Vec<u32>,
     member_start: Vec<u32>,
+    /// Row of each cell; of many ranks, of those in this one's columns and in the columns beside them.
     cell_aggregate: Vec<u32>,
     touched: Vec<u32>,
     weight: Vec<Vec<f32>>,
@@ -31,10 +40,7 @@ pub struct Multigrid {
     x: Vec<f32>,
     b: Vec<f32>,
     t: Vec<f32>,
-    levels: Vec<Level>,
-    used: usize,
-    joined: Joined,
-    scratch: Scratch,
+    coarse: Hierarchy,
 }
 
 /// Marks a slot without an unknown.
@@ -43,53 +49,51 @@ const NOWHERE: i32 = i32::MIN;
 impl Multigrid {
     /// Rebuild for `system` with particles at `position`.
     pub fn build(&mut self, system: &System, grid: &Grid, position: &[DVec3]) {
-        let counts = level_cells(grid.count);
-        self.used = counts.len();
-        self.levels.resize_with(self.used.max(self.levels.len()), Level::default);
-        for (level, count) in self.levels.iter_mut().zip(&counts) {
-            let along = |k| if grid.periodic.is_along(k) { count[k] as i32 } else { 0 };
-            level.around = [0, 1, 2].map(along);
-        }
+        let share = system.among.map(|among| among.share);
+        self.coarse.begin(grid, share);
         self.aggregate_cells(system, grid, position);
         self.first_level(system);
-        for l in 1..self.used {
-            let (fine, coarse) = self.levels.split_at_mut(l);
-            let join = system.among.filter(|_| l == 1).map(|among| (among, &mut self.joined));
-            coarsen(&mut fine[l - 1], &mut coarse[0], &mut self.scratch, join);
-        }
+        self.coarse.coarsen(share);
     }
 
-    /// Unknowns of each level, finest first.
+    /// Unknowns of each level that are here, finest first.
     pub fn sizes(&self) -> Vec<usize> {
-        std::iter::once(self.members.len()).chain(self.levels[..self.used].iter().map(Level::rows)).collect()
+        std::iter::once(self.members.len()).chain(self.coarse.used().iter().map(|l| l.own)).collect()
     }
 
-    /// Rows and entries beside the diagonal of each coarse level, finest first.
+    /// Rows and entries beside the diagonal of each coarse level that are here, finest first.
     pub fn stored(&self) -> Vec<[u64; 2]> {
-        self.levels[..self.used].iter().map(|l| [l.rows() as u64, l.value.len() as u64]).collect()
+        self.coarse.used().iter().map(|l| [l.own as u64, l.value.len() as u64]).collect()
     }
 
     /// Sums over the operators of the levels, finest first.
     pub fn sums(&self) -> Vec<LevelSums> {
         let sums = |level: &Level| {
-            let mut out = LevelSums { rows: level.rows(), ..Default::default() };
+            let mut out = LevelSums { rows: level.own, ..Default::default() };
             level.diagonal.iter().for_each(|&v| out.add(f64::from(v), true));
             level.value.iter().for_each(|&v| out.add(f64::from(v), false));
             out
         };
-        self.levels[..self.used].iter().map(sums).collect()
+        self.coarse.used().iter().map(sums).collect()
     }
 
     fn aggregate_cells(&mut self, system: &System, grid: &Grid, position: &[DVec3]) {
         let n = system.state.len();
-        self.aggregate.resize(n, u32::MAX);
+        self.aggregate.resize(n, NONE);
         self.code.resize(n, NOWHERE);
         for v in [&mut self.diagonal, &mut self.x, &mut self.b, &mut self.t] {
             v.resize(n, 0.0);
         }
-        if self.cell_aggregate.len() != grid.total() {
-            self.cell_aggregate = vec![u32::MAX; grid.total()];
+        // The first column here, and the cells of all columns.
+        let (first, columns) = match self.coarse.columns() {
+            Some(columns) => (columns.mine().start - 1, columns.mine().len() + 2),
+            None => (0, grid.count[0] as usize),
+        };
+        let cells = columns * (grid.total() / grid.count[0] as usize);
+        if self.cell_aggregate.len() != cells {
+            self.cell_aggregate = vec![NONE; cells];
         }
+        let here = |c: [i32; 3]| grid.index([(c[0] - first) as u32, c[1] as u32, c[2] as u32]);
         // For now `aggregate` holds the cells.
         (
             self.code.par_chunks_mut(CHUNK),
@@ -112,26 +116,27 @@ impl Multigrid {
                     code[k] = NOWHERE;
                     d32[k] = d[k] as f32;
                     if state[k] == State::Inner {
-                        let c = grid.coordinates(position[k]);
-                        code[k] = place_of(c.map(|k| k as i32));
-                        cell[k] = grid.index(c) as u32;
+                        let c = grid.coordinates(position[k]).map(|k| k as i32);
+                        code[k] = place_of(c);
+                        cell[k] = here(c) as u32;
                     }
                 }
             });
-        let coarse = &mut self.levels[0].coordinates;
-        coarse.clear();
+        let level = &mut self.coarse.levels[0];
+        level.coordinates.clear();
         self.touched.clear();
         self.member_start.clear();
         for (aggregate, code) in self.aggregate.iter_mut().zip(&self.code) {
             if *code == NOWHERE {
-                *aggregate = u32::MAX;
+                *aggregate = NONE;
                 continue;
             }
             let joined = &mut self.cell_aggregate[*aggregate as usize];
-            if *joined == u32::MAX {
-                *joined = coarse.len() as u32;
+            if *joined == NONE {
+                *joined = self.touched.len() as u32;
                 self.touched.push(*aggregate);
-                coarse.push(grid.coordinates_of(*aggregate as usize).map(|k| k as i32));
+                let [x, y, z] = grid.coordinates_of(*aggregate as usize).map(|k| k as i32);
+                level.coordinates.push([x + first, y, z]);
                 self.member_start.push(0);
             }
             *aggregate = *joined;
@@ -143,46 +148,48 @@ impl Multigrid {
         }
         self.member_start.push(sum);
         self.members.resize(sum as usize, 0);
-        let cursor = &mut self.scratch.cursor;
+        let cursor = &mut self.coarse.scratch.cursor;
         cursor.clone_from(&self.member_start);
         for (i, &a) in self.aggregate.iter().enumerate() {
-            if a != u32::MAX {
+            if a != NONE {
                 self.members[cursor[a as usize] as usize] = i as u32;
                 cursor[a as usize] += 1;
             }
         }
-        self.levels[0].own = 0..self.touched.len();
+        level.own = self.touched.len();
         if let Some(among) = system.among {
-            self.join_cells(among, grid, position);
+            self.meet_ranks(among, grid, position, here);
         }
         for &c in &self.touched {
-            self.cell_aggregate[c as usize] = u32::MAX;
+            self.cell_aggregate[c as usize] = NONE;
         }
     }
 
-    /// Numbers the cells of all ranks, rank by rank: the levels are the same on each.
-    fn join_cells(&mut self, among: Among, grid: &Grid, position: &[DVec3]) {
+    /// Finds the cells of the copies that are other ranks'; `here` tells the number of a cell on this one.
+    fn meet_ranks(
+        &mut self,
+        among: Among,
+        grid: &Grid,
+        position: &[DVec3],
+        here: impl Fn([i32; 3]) -> usize,
+    ) {
         let share = among.share;
-        let all = share.gather(bytemuck::cast_slice(&self.touched).to_vec());
-        let before: usize = all[..share.rank()].iter().map(Vec::len).sum();
-        let first = before / size_of::<u32>();
-        self.levels[0].own = first..first + self.touched.len();
-        self.touched = bytemuck::pod_collect_to_vec(&all.concat());
-        let coarse = &mut self.levels[0].coordinates;
-        coarse.clear();
-        for (k, &cell) in self.touched.iter().enumerate() {
-            coarse.push(grid.coordinates_of(cell as usize).map(|k| k as i32));
-            self.cell_aggregate[cell as usize] = k as u32;
+        let Some(columns) = self.coarse.columns().cloned() else { return };
+        let level = &mut self.coarse.levels[0];
+        meet(level, share, &columns);
+        for (row, &c) in level.coordinates.iter().enumerate().skip(level.own) {
+            self.cell_aggregate[here(c)] = row as u32;
+            self.touched.push(here(c) as u32);
         }
-        self.aggregate.iter_mut().filter(|a| **a != u32::MAX).for_each(|a| *a += first as u32);
-        let cells = &self.levels[0].coordinates;
-        let of = |c: u32| (0..cells.len() as u32).filter(|&k| cells[k as usize][0] == c as i32).collect();
-        self.joined.sides = share.borders(of);
         share.swap(&mut [&mut &mut self.diagonal[..]]);
-        for i in share.copies().filter(|&i| among.state[i] == State::Inner) {
-            let c = grid.coordinates(position[i]);
-            self.code[i] = place_of(c.map(|k| k as i32));
-            self.aggregate[i] = self.cell_aggregate[grid.index(c)];
+        let beyond = [columns.mine().start - 1, columns.mine().end];
+        for (side, x) in share.sides().iter().zip(beyond) {
+            let copies = side.iter().flat_map(Side::taken);
+            for i in copies.filter(|&i| among.state[i] == State::Inner) {
+                let [_, y, z] = grid.coordinates(position[i]).map(|k| k as i32);
+                self.code[i] = place_of([x, y, z]);
+                self.aggregate[i] = self.cell_aggregate[here([x, y, z])];
+            }
         }
     }
 
@@ -197,11 +204,11 @@ impl Multigrid {
         });
         let (codes, aggregate) = (&self.code, &self.aggregate);
         let (members, start) = (&self.members, &self.member_start);
-        let level = &mut self.levels[0];
-        let (rows, cells, around) = (start.len() - 1, &level.coordinates[level.own.clone()], level.around);
-        let everywhere = &level.coordinates;
+        let Hierarchy { levels, scratch, .. } = &mut self.coarse;
+        let level = &mut levels[0];
+        let (rows, cells, around) = (level.own, &level.coordinates, level.around);
         let seams = around != [0; 3];
-        self.scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
+        scratch.stencils(rows).par_iter_mut().enumerate().with_min_len(64).for_each(|(a, s)| {
             // Two stencils in turn: neighbours that follow each other mostly fall into the same entry, and would wait
             // for each other's sum.
             let mut turns = [[0.0; 27]; 2];
@@ -213,7 +220,7 @@ impl Multigrid {
                     // A pair without weight may lie further apart than neighbouring cells.
                     if codes[j] != NOWHERE && w > 0.0 {
                         let entry = if seams {
-                            place_of(step(cells[a], everywhere[aggregate[j] as usize], around)) + 13
+                            place_of(step(cells[a], cells[aggregate[j] as usize], around)) + 13
                         } else {
                             codes[j] - own
                         };
@@ -223,44 +230,7 @@ impl Multigrid {
             }
             *s = std::array::from_fn(|k| turns[0][k] + turns[1][k]);
         });
-        compress(level, &mut self.scratch);
-    }
-
-    /// x <- B b on level `l` (0 is the first coarse one, of which ranks have parts).
-    fn cycle(&mut self, l: usize, among: Option<Among>) {
-        let among = among.filter(|_| l == 0);
-        self.levels[l].first_smooth();
-        if l + 1 == self.used {
-            for _ in 1..SWEEPS {
-                self.joined.show(among, &mut self.levels[l]);
-                self.levels[l].smooth();
-            }
-            self.joined.show(among, &mut self.levels[l]);
-            return;
-        }
-        for visit in 0..visits(l) {
-            if visit > 0 {
-                self.joined.show(among, &mut self.levels[l]);
-                self.levels[l].smooth();
-            }
-            self.joined.show(among, &mut self.levels[l]);
-            let (fine, coarse) = self.levels.split_at_mut(l + 1);
-            let (level, next) = (&mut fine[l], &mut coarse[0]);
-            level.residual(|_, r| r);
-            next.b.fill(0.0);
-            let own = level.own.clone();
-            level.r[own.clone()].iter().zip(&level.parent[own]).for_each(|(r, &p)| next.b[p as usize] += r);
-            if let Some(among) = among {
-                self.joined.sum(among, &mut next.b, |sum, b| *sum += b);
-            }
-            self.cycle(l + 1, None);
-            let (fine, coarse) = self.levels.split_at_mut(l + 1);
-            let (level, next, factor) = (&mut fine[l], &coarse[0], over_correction(l));
-            // Those of other ranks, shown before, as well: they stay as their owners have them.
-            level.x.iter_mut().zip(&level.parent).for_each(|(x, &p)| *x += factor * next.x[p as usize]);
-            level.smooth();
-        }
-        self.joined.show(among, &mut self.levels[l]);
+        compress(level, scratch);
     }
 
     /// t <- b - A x on the finest level, in f32.
@@ -311,20 +281,19 @@ impl Precondition for Multigrid {
         self.residual(system);
         {
             let (t, members, start) = (&self.t, &self.members, &self.member_start);
-            let level = &mut self.levels[0];
-            let b = &mut level.b[level.own.clone()];
-            b.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(a, b)| {
+            let level = &mut self.coarse.levels[0];
+            level.b[..level.own].par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(a, b)| {
                 *b = members[start[a] as usize..start[a + 1] as usize].iter().map(|&i| t[i as usize]).sum();
             });
         }
-        self.cycle(0, system.among);
-        let coarse = &self.levels[0].x;
+        self.coarse.cycle(0, system.among.map(|among| among.share));
+        let coarse = &self.coarse.levels[0].x;
         (self.x.par_chunks_mut(CHUNK), self.aggregate.par_chunks(CHUNK), chunks)
             .into_par_iter()
             .filter(|(.., chunk)| !chunk.is_dry())
             .for_each(|(x, aggregate, _)| {
                 for (x, &a) in x.iter_mut().zip(aggregate) {
-                    if a != u32::MAX {
+                    if a != NONE {
                         *x += OVER_CORRECTION * coarse[a as usize];
                     }
                 }
@@ -333,7 +302,7 @@ impl Precondition for Multigrid {
             // As their owners do it; their chunks may be dry here.
             for i in among.share.copies() {
                 let a = self.aggregate[i];
-                let correction = if a == u32::MAX { 0.0 } else { OVER_CORRECTION * coarse[a as usize] };
+                let correction = if a == NONE { 0.0 } else { OVER_CORRECTION * coarse[a as usize] };
                 let unknown = among.state[i] == State::Inner;
                 self.x[i] = if unknown { first_sweep(self.b[i], self.diagonal[i]) + correction } else { 0.0 };
             }

@@ -5,7 +5,8 @@ use bytemuck::Pod;
 use glam::DVec3;
 use std::ops::Range;
 
-/// A border: what this rank gives and what it takes, ranges of water and single places, of wall layers (or of cells, [`super::Share::borders`]).
+/// A border: what this rank gives and what it takes, ranges of water and single places, of wall layers (or rows of
+/// a level).
 #[derive(Clone, Debug, Default)]
 pub struct Side {
     pub(super) give: Range<usize>,
@@ -51,7 +52,7 @@ impl Side {
     }
 
     /// Of the places `give` and `take` of an array.
-    pub(super) fn of(give: Vec<u32>, take: Vec<u32>) -> Self {
+    pub(crate) fn of(give: Vec<u32>, take: Vec<u32>) -> Self {
         Self { give: 0..0, take: 0..0, give_walls: give, take_walls: take }
     }
 

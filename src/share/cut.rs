@@ -11,8 +11,8 @@ pub(super) fn is_ring(ranks: usize, params: &Params) -> bool {
 
 /// Columns that a rank takes at least. Of two ranks round a tank that is periodic along x each shows the other its first and its last column:
 /// these are to be two, or one and the same would be there twice.
-fn least(ranks: usize, params: &Params) -> usize {
-    if ranks == 2 && is_ring(ranks, params) { 2 } else { 1 }
+pub(super) fn least(ranks: usize, ring: bool) -> usize {
+    if ranks == 2 && ring { 2 } else { 1 }
 }
 
 /// Columns beyond a slab within which a rank has the walls that never move. Its rows have their neighbours in the first one; of the copies of water there
@@ -42,7 +42,7 @@ pub(super) fn within(reach: u32, cuts: &[u32], rank: usize, ring: bool) -> impl 
 
 /// Cuts `load`, of each column, into shares that are about even: the first column of each rank, and the end of the last one's.
 pub(super) fn cut(load: &[u64], ranks: usize, params: &Params) -> Vec<u32> {
-    shares(load, ranks, least(ranks, params))
+    shares(load, ranks, least(ranks, is_ring(ranks, params)))
 }
 
 fn shares(load: &[u64], ranks: usize, least: usize) -> Vec<u32> {
@@ -77,7 +77,7 @@ pub fn check(ranks: usize, params: &Params, grid: &Grid) -> Result<()> {
                     seen: take a larger run.effective_radius, or run it on one rank";
         return Err(Error::usage("ranks", text));
     }
-    let least = least(ranks, params);
+    let least = least(ranks, is_ring(ranks, params));
     if ranks * least > columns {
         let takes = if least == 1 { "one or more" } else { "two or more where they meet at both ends" };
         let text = format!(

@@ -9,6 +9,7 @@
 //! columns.
 
 mod border;
+mod coarse;
 mod cut;
 mod deal;
 mod moves;
@@ -24,6 +25,8 @@ use crate::machine::memory_peak;
 use crate::ranks::{Standing, Team, decode, encode};
 use crate::scene::{Groups, Scene, Still};
 pub use border::{Bordered, OfWalls, Side};
+pub(crate) use coarse::Columns;
+use coarse::wet_cells;
 pub use cut::check;
 use cut::{beyond, is_ring};
 pub(crate) use deal::room;
@@ -55,6 +58,8 @@ pub struct Share {
     ring: bool,
     /// First column of each rank, and the end of the last one's.
     cuts: Vec<u32>,
+    /// Cells that the water of all fills.
+    wet_cells: f64,
     /// Which walls that never move are here; all of them if none are named.
     still: Option<Still>,
     /// The whole scene, on the first rank.
@@ -87,6 +92,7 @@ impl Share {
             cuts: start.cuts.clone(),
             still: start.still.clone(),
             whole: start.whole.clone(),
+            wet_cells: wet_cells(&start.all, &start.params, grid),
             own: 0..0,
             come_in: Vec::new(),
             searched: Vec::new(),

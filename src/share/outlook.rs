@@ -1,10 +1,10 @@
 //! What ranks would have and say, before anything is computed.
 
+use super::coarse::{self, Columns, Said};
 use super::cut::{check, cut, is_ring, unevenness};
 use crate::body::Pose;
 use crate::cells::Grid;
 use crate::error::Result;
-use crate::kernels::multigrid::{SWEEPS, visits};
 use crate::kernels::multigrid_levels::level_cells;
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
@@ -105,31 +105,36 @@ impl Outlook {
         let a_water = 64 + 48 * motions;
         let a_carrier = 1 + 8 * surface + 16 + 4 * multigrid;
         let bodies = u64::from(plan.coupled) + count(&[Stage::BodyForce]);
-        // The first coarse level has borders, shown before each use; the next is summed from all ranks on each visit to it.
-        let levels = level_cells(grid.count).len();
-        let (shown, visited) = match (multigrid, levels) {
-            (0, _) => (0, 0),
-            (_, 1) => (SWEEPS as u64, 0),
-            _ => (2 * visits(0) as u64, visits(0) as u64),
+        // Levels of the multigrid that are shared have borders; the first one that is not is summed from all ranks
+        // on each visit to it.
+        let count = level_cells(grid.count);
+        let finest = Columns::new(0, ring, cuts.clone());
+        let shared = coarse::shared(finest, &count, coarse::wet_cells(&groups, params, &grid));
+        let wet: Vec<[u64; 2]> = match multigrid {
+            0 => vec![[0; 2]; shared.len() + 1],
+            _ => (0..=shared.len()).map(|level| wet_cells(scene, &grid, level)).collect(),
         };
-        let [cells, parents, border_cells] = if multigrid > 0 { wet_cells(scene, &grid) } else { [0; 3] };
-        let joins = multigrid * (1 + 2 * u64::from(levels > 1));
+        let border: Vec<u64> = wet.iter().map(|[_, border]| *border).collect();
+        let said = Said::new(&shared, count.len(), &border, wet[shared.len()][0]);
         // Pressures at the rims of slots are a round of their own.
         let slots = u64::from(plan.coupled && has_slots(scene, params)?);
         Ok(Self {
             unevenness: unevenness(&water, &cuts),
             parts: parts.collect(),
-            messages: [step_messages, 1 + multigrid + shown],
+            messages: [step_messages + multigrid * said.messages[0], 1 + multigrid * (1 + said.messages[1])],
             message_bytes: [
-                a_water * water_at + a_carrier * carriers_at,
-                (8 + 4 * multigrid) * carriers_at + 4 * shown * border_cells,
+                a_water * water_at + a_carrier * carriers_at + said.message_bytes[0],
+                (8 + 4 * multigrid) * carriers_at + said.message_bytes[1],
             ],
-            rounds: [5 + bodies + slots + joins + 2 * filled, 3 + multigrid + visited],
-            round_bytes: [4 * cells + (4 + 27 * 8) * parents, 4 * visited * parents],
+            rounds: [
+                5 + bodies + slots + 2 * filled + multigrid * said.rounds[0],
+                3 + multigrid * (1 + said.rounds[1]),
+            ],
+            round_bytes: said.round_bytes,
             on_devices: on_devices(
                 plan,
                 [water_at, carriers_at],
-                [grid.total() as u64, cells],
+                [grid.total() as u64, wet[0][0]],
                 ranks as u64,
                 slots,
             ),
@@ -194,15 +199,12 @@ fn on_devices(
     }
 }
 
-/// Cells with water at t = 0, cells of the next level with some of them, and the most in a column.
-fn wet_cells(scene: &Scene, grid: &Grid) -> [u64; 3] {
-    let [mut wet, mut above] = [BTreeSet::new(), BTreeSet::new()];
-    for i in (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid) {
-        let c = grid.coordinates(scene.position[i]);
-        wet.insert(c);
-        above.insert(c.map(|k| k >> 1));
-    }
+/// Cells of a level with water at t = 0, and the most in a column.
+fn wet_cells(scene: &Scene, grid: &Grid, level: usize) -> [u64; 2] {
+    let water = (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid);
+    let cell = |i: usize| grid.coordinates(scene.position[i]).map(|k| k >> level);
+    let wet: BTreeSet<[u32; 3]> = water.map(cell).collect();
     let mut columns = vec![0_u64; grid.count[0] as usize];
     wet.iter().for_each(|c| columns[c[0] as usize] += 1);
-    [wet.len() as u64, above.len() as u64, columns.into_iter().max().unwrap_or(0)]
+    [wet.len() as u64, columns.into_iter().max().unwrap_or(0)]
 }

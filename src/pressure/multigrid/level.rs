@@ -1,13 +1,10 @@
 //! A level of the multigrid preconditioner, and how the next coarser one is made from it.
 
-use super::super::cg::Among;
+use super::shared::Border;
 use crate::kernels::multigrid::{first_sweep, sweep};
 use crate::kernels::multigrid_levels::{offset_of, place_of, step};
 use crate::neighbours::CHUNK;
-use crate::share::Side;
-use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Rows below which a level is not worth threads.
 const PARALLEL: usize = 4096;
@@ -15,11 +12,14 @@ const PARALLEL: usize = 4096;
 /// A coarse operator in compressed rows.
 #[derive(Default, Debug)]
 pub(super) struct Level {
+    /// Cells of the rows. Where ranks share the level those of the columns beside this rank's stand behind its own,
+    /// with x as [`crate::share::Columns`] counts it: one less than the first of its own, or one more than the
+    /// last.
     pub coordinates: Vec<[i32; 3]>,
     /// Cells along periodic axes, 0 along the others.
     pub around: [i32; 3],
-    /// Its rows that are computed here: all of them, or of the first level those of this rank.
-    pub own: Range<usize>,
+    /// So many rows are computed here, the first ones.
+    pub own: usize,
     /// Starts of these rows.
     pub start: Vec<u32>,
     pub column: Vec<u32>,
@@ -30,21 +30,19 @@ pub(super) struct Level {
     pub x: Vec<f32>,
     pub b: Vec<f32>,
     pub r: Vec<f32>,
+    /// Where it meets the parts of other ranks.
+    pub border: Border,
 }
 
 impl Level {
-    pub fn rows(&self) -> usize {
-        self.coordinates.len()
-    }
-
     /// out_i <- f(i, b_i - (A x)_i).
     pub fn residual(&mut self, update: impl Fn(usize, f32) -> f32 + Sync) {
         let Self { own, start, column, value, diagonal, x, b, r, .. } = self;
-        let (r, b, own_x) = (&mut r[own.clone()], &b[own.clone()], &x[own.clone()]);
+        let r = &mut r[..*own];
         let row = |(i, r): (usize, &mut f32)| {
             let (a, e) = (start[i] as usize, start[i + 1] as usize);
             let sum = gather(&column[a..e], &value[a..e], x);
-            *r = update(i, b[i] - diagonal[i] * own_x[i] - sum);
+            *r = update(i, b[i] - diagonal[i] * x[i] - sum);
         };
         if diagonal.len() < PARALLEL {
             r.iter_mut().enumerate().for_each(row);
@@ -56,51 +54,65 @@ impl Level {
     /// One damped Jacobi sweep.
     pub fn smooth(&mut self) {
         self.residual(|_, r| r);
-        let (x, r, d) = (&mut self.x[self.own.clone()], &self.r[self.own.clone()], &self.diagonal);
+        let (x, r, d) = (&mut self.x[..self.own], &self.r, &self.diagonal);
         x.iter_mut().zip(r).zip(d).for_each(|((x, r), d)| *x = sweep(*x, *r, *d));
     }
 
     /// The first sweep, from zero.
     pub fn first_smooth(&mut self) {
-        let (x, b, d) = (&mut self.x[self.own.clone()], &self.b[self.own.clone()], &self.diagonal);
+        let (x, b, d) = (&mut self.x[..self.own], &self.b, &self.diagonal);
         x.iter_mut().zip(b).zip(d).for_each(|((x, b), d)| *x = first_sweep(*b, *d));
     }
 }
 
-/// Where the first coarse level, of which each rank has a part, meets those of the others, and the next, which all compute.
+/// Numbers of cells in a box.
 #[derive(Default, Debug)]
-pub(super) struct Joined {
-    /// Its borders.
-    pub sides: [Option<Side>; 2],
-    /// Rows of the next level to which each rank's cells belong.
-    pub parents: Vec<Vec<u32>>,
+pub(super) struct Numbers {
+    low: [i32; 3],
+    size: [usize; 3],
+    of: Vec<u32>,
 }
 
-impl Joined {
-    /// Shows the ranks beside this one the border of `level`'s x.
-    pub fn show(&self, among: Option<Among>, level: &mut Level) {
-        if let Some(among) = among {
-            among.share.swap_at(&self.sides, &mut [&mut &mut level.x[..]]);
-        }
+/// Not numbered.
+pub(super) const NONE: u32 = u32::MAX;
+
+impl Numbers {
+    /// No numbers, of cells from `low` to `high`.
+    pub fn fit(&mut self, [low, high]: [[i32; 3]; 2]) {
+        self.low = low;
+        self.size = [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize);
+        self.of.clear();
+        self.of.resize(self.size.iter().product(), NONE);
     }
 
-    /// Sums `values` of the next level's rows over the ranks, each of which has added what its own cells bring.
-    pub fn sum<T: Pod + Default>(&self, among: Among, values: &mut [T], add: impl Fn(&mut T, T)) {
-        let own = self.parents[among.share.rank()].iter();
-        let own: Vec<T> = own.map(|&p| std::mem::take(&mut values[p as usize])).collect();
-        let all = among.share.gather(bytemuck::cast_slice(&own).to_vec());
-        for (parents, bytes) in self.parents.iter().zip(&all) {
-            let part = bytemuck::pod_collect_to_vec::<u8, T>(bytes);
-            parents.iter().zip(part).for_each(|(&p, v)| add(&mut values[p as usize], v));
-        }
+    #[inline(always)]
+    fn place(&self, c: [i32; 3]) -> usize {
+        let at = [0, 1, 2].map(|k| (c[k] - self.low[k]) as usize);
+        (at[0] * self.size[1] + at[1]) * self.size[2] + at[2]
     }
+
+    #[inline(always)]
+    pub fn of(&mut self, c: [i32; 3]) -> &mut u32 {
+        let place = self.place(c);
+        &mut self.of[place]
+    }
+}
+
+/// The lowest and the highest of `cells` along each axis.
+pub(super) fn bounds(cells: impl Iterator<Item = [i32; 3]>) -> [[i32; 3]; 2] {
+    cells
+        .map(|c| [c, c])
+        .reduce(|[low, high], [c, _]| {
+            [[0, 1, 2].map(|k| low[k].min(c[k])), [0, 1, 2].map(|k| high[k].max(c[k]))]
+        })
+        .unwrap_or_default()
 }
 
 /// Buffers of the construction.
 #[derive(Default, Debug)]
 pub(super) struct Scratch {
     pub stencil: Vec<[f64; 27]>,
-    pub map: Vec<u32>,
+    pub numbers: Numbers,
     pub cursor: Vec<u32>,
 }
 
@@ -128,99 +140,61 @@ pub(super) fn gather(index: &[u32], weight: &[f32], x: &[f32]) -> f32 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// Entries of a row.
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-#[repr(transparent)]
-struct Stencil([f64; 27]);
-
-/// Next coarser level of `fine`.
-pub(super) fn coarsen(
-    fine: &mut Level,
-    coarse: &mut Level,
-    scratch: &mut Scratch,
-    join: Option<(Among, &mut Joined)>,
-) {
-    let mut low = [i32::MAX; 3];
-    let mut high = [i32::MIN; 3];
-    for c in &fine.coordinates {
-        for k in 0..3 {
-            low[k] = low[k].min(c[k] >> 1);
-            high[k] = high[k].max(c[k] >> 1);
-        }
-    }
-    let size = [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize);
-    let map = &mut scratch.map;
-    map.clear();
-    map.resize(size.iter().product(), u32::MAX);
+/// Next coarser level of `fine`, both of which are here as a whole.
+pub(super) fn coarsen(fine: &mut Level, coarse: &mut Level, scratch: &mut Scratch) {
+    let numbers = &mut scratch.numbers;
+    numbers.fit(bounds(fine.coordinates.iter().map(|c| c.map(|k| k >> 1))));
     coarse.coordinates.clear();
     fine.parent.clear();
     for c in &fine.coordinates {
         let p = c.map(|k| k >> 1);
-        let at = [0, 1, 2].map(|k| (p[k] - low[k]) as usize);
-        let slot = &mut map[(at[0] * size[1] + at[1]) * size[2] + at[2]];
-        if *slot == u32::MAX {
-            *slot = coarse.coordinates.len() as u32;
+        let number = numbers.of(p);
+        if *number == NONE {
+            *number = coarse.coordinates.len() as u32;
             coarse.coordinates.push(p);
         }
-        fine.parent.push(*slot);
+        fine.parent.push(*number);
     }
+    coarse.own = coarse.coordinates.len();
+    galerkin(fine, coarse, scratch);
+    compress(coarse, scratch);
+}
+
+/// Stencils of `coarse`'s cells, as far as the rows of `fine` that are computed here make them.
+pub(super) fn galerkin(fine: &Level, coarse: &Level, scratch: &mut Scratch) {
     let stencil = scratch.stencils(coarse.coordinates.len());
-    for (row, i) in fine.own.clone().enumerate() {
+    for i in 0..fine.own {
         let p = fine.parent[i] as usize;
         let s = &mut stencil[p];
-        s[13] += f64::from(fine.diagonal[row]);
-        for k in fine.start[row] as usize..fine.start[row + 1] as usize {
+        s[13] += f64::from(fine.diagonal[i]);
+        for k in fine.start[i] as usize..fine.start[i + 1] as usize {
             let q = fine.parent[fine.column[k] as usize] as usize;
             let way = step(coarse.coordinates[p], coarse.coordinates[q], coarse.around);
             s[(place_of(way) + 13) as usize] += f64::from(fine.value[k]);
         }
     }
-    if let Some((among, joined)) = join {
-        let mut own: Vec<u32> = fine.parent[fine.own.clone()].to_vec();
-        own.sort_unstable();
-        own.dedup();
-        let all = among.share.gather(bytemuck::cast_slice(&own).to_vec());
-        joined.parents = all.iter().map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
-        let add = |sum: &mut Stencil, part: Stencil| sum.0.iter_mut().zip(part.0).for_each(|(a, b)| *a += b);
-        joined.sum(among, bytemuck::cast_slice_mut(stencil), add);
-    }
-    coarse.own = 0..coarse.coordinates.len();
-    compress(coarse, scratch);
 }
 
 /// Rows of `level` from the stencils of its cells.
 pub(super) fn compress(level: &mut Level, scratch: &mut Scratch) {
-    let Scratch { stencil, map, .. } = scratch;
-    let n = level.coordinates.len();
-    let mut low = [i32::MAX; 3];
-    let mut high = [i32::MIN; 3];
-    for c in &level.coordinates {
-        for k in 0..3 {
-            low[k] = low[k].min(c[k] - 1);
-            high[k] = high[k].max(c[k] + 1);
-        }
-    }
-    let size = [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize);
-    let place = |c: [i32; 3]| {
-        let at = [0, 1, 2].map(|k| (c[k] - low[k]) as usize);
-        (at[0] * size[1] + at[1]) * size[2] + at[2]
-    };
-    map.clear();
-    map.resize(size.iter().product(), u32::MAX);
+    let Scratch { stencil, numbers, .. } = scratch;
+    let [low, high] = bounds(level.coordinates.iter().copied());
+    numbers.fit([low.map(|k| k - 1), high.map(|k| k + 1)]);
     for (i, &c) in level.coordinates.iter().enumerate() {
-        map[place(c)] = i as u32;
+        *numbers.of(c) = i as u32;
     }
     level.start.clear();
     level.column.clear();
     level.value.clear();
     level.diagonal.clear();
     level.start.push(0);
+    let size = numbers.size;
     let way: [isize; 27] = std::array::from_fn(|k| {
         let d = offset_of(k).map(|d| d as isize);
         (d[0] * size[1] as isize + d[1]) * size[2] as isize + d[2]
     });
-    for (&c, s) in level.coordinates[level.own.clone()].iter().zip(&*stencil) {
-        let own = place(c);
+    for (&c, s) in level.coordinates[..level.own].iter().zip(&*stencil) {
+        let own = numbers.place(c);
         for (k, &v) in s.iter().enumerate() {
             if k != 13 && v != 0.0 {
                 let mut at = own.wrapping_add_signed(way[k]);
@@ -229,9 +203,9 @@ pub(super) fn compress(level: &mut Level, scratch: &mut Scratch) {
                     let beyond = |k: usize| {
                         if around[k] > 0 { (c[k] + d[k]).rem_euclid(around[k]) } else { c[k] + d[k] }
                     };
-                    at = place([0, 1, 2].map(beyond));
+                    at = numbers.place([0, 1, 2].map(beyond));
                 }
-                level.column.push(map[at]);
+                level.column.push(numbers.of[at]);
                 level.value.push(v as f32);
             }
         }
@@ -240,6 +214,6 @@ pub(super) fn compress(level: &mut Level, scratch: &mut Scratch) {
     }
     for v in [&mut level.x, &mut level.b, &mut level.r] {
         v.clear();
-        v.resize(n, 0.0);
+        v.resize(level.coordinates.len(), 0.0);
     }
 }
