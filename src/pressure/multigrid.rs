@@ -184,8 +184,12 @@ impl Multigrid {
         share.swap(&mut [&mut &mut self.diagonal[..]]);
         let beyond = [columns.mine().start - 1, columns.mine().end];
         for (side, x) in share.sides().iter().zip(beyond) {
-            let copies = side.iter().flat_map(Side::taken);
-            for i in copies.filter(|&i| among.state[i] == State::Inner) {
+            for i in side.iter().flat_map(Side::taken) {
+                if among.state[i] != State::Inner {
+                    // Its owner may have it among dry walls, where diagonals are not kept; here sweeps may pass it.
+                    self.diagonal[i] = 1.0;
+                    continue;
+                }
                 let [_, y, z] = grid.coordinates(position[i]).map(|k| k as i32);
                 self.code[i] = place_of([x, y, z]);
                 self.aggregate[i] = self.cell_aggregate[here([x, y, z])];
