@@ -66,3 +66,28 @@ fn shared_levels_repeat_to_the_last_bit() {
         assert!(run() == run());
     }
 }
+
+/// Water in three of twenty columns of cells.
+fn heap() -> Case {
+    case(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\n\
+         [fluid]\nsound_speed = 5\njitter = 0.1\n\
+         solver = { preconditioner = \"multigrid\", tolerance = 1e-9 }\n\
+         [[fluid.block]]\nmin = [0.8, 0, 0]\nmax = [1.1, 0.6, 0.5]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [2, 0.6, 1]\nopen = [\"z_max\"]\n",
+    )
+}
+
+#[test]
+fn ranks_without_water_take_as_many_iterations() {
+    let case = heap();
+    let (one, one_fields) = Seen::after(&mut simulation(&case), 10);
+    for (ranks, dry) in [(3, false), (5, true), (8, true)] {
+        let ((many, fields), stand) = on_ranks(&case, ranks, |s| Seen::after(s, 10));
+        assert_eq!(stand.iter().any(|r| r.water == 0), dry, "{stand:?}");
+        // A preconditioner that breaks down is left for the diagonal, with three times as many.
+        one.assert_near(&many, 1e-7, &format!("heap on {ranks}"));
+        let [x, v, p] = apart(&one_fields, &fields);
+        assert!(x < 1e-8 && v < 1e-6 && p < 0.1, "{ranks}: {x} {v} {p}");
+    }
+}

@@ -10,7 +10,7 @@ mod shared;
 mod tests;
 
 use self::hierarchy::Hierarchy;
-use self::level::{Level, NONE, compress, gather};
+use self::level::{Level, NONE, Scratch, compress, gather};
 use self::shared::meet;
 use super::cg::{Among, Precondition, System};
 use crate::cells::Grid;
@@ -32,7 +32,7 @@ pub struct Multigrid {
     code: Vec<i32>,
     members: Vec<u32>,
     member_start: Vec<u32>,
-    /// Row of each cell; of many ranks, of those in this one's columns and in the columns beside them.
+    /// Row of each cell; on one of many ranks, of those from the first to the last that it has.
     cell_aggregate: Vec<u32>,
     touched: Vec<u32>,
     weight: Vec<Vec<f32>>,
@@ -84,16 +84,6 @@ impl Multigrid {
         for v in [&mut self.diagonal, &mut self.x, &mut self.b, &mut self.t] {
             v.resize(n, 0.0);
         }
-        // The first column here, and the cells of all columns.
-        let (first, columns) = match self.coarse.columns() {
-            Some(columns) => (columns.mine().start - 1, columns.mine().len() + 2),
-            None => (0, grid.count[0] as usize),
-        };
-        let cells = columns * (grid.total() / grid.count[0] as usize);
-        if self.cell_aggregate.len() != cells {
-            self.cell_aggregate = vec![NONE; cells];
-        }
-        let here = |c: [i32; 3]| grid.index([(c[0] - first) as u32, c[1] as u32, c[2] as u32]);
         // For now `aggregate` holds the cells.
         (
             self.code.par_chunks_mut(CHUNK),
@@ -116,12 +106,17 @@ impl Multigrid {
                     code[k] = NOWHERE;
                     d32[k] = d[k] as f32;
                     if state[k] == State::Inner {
-                        let c = grid.coordinates(position[k]).map(|k| k as i32);
-                        code[k] = place_of(c);
-                        cell[k] = here(c) as u32;
+                        let c = grid.coordinates(position[k]);
+                        code[k] = place_of(c.map(|k| k as i32));
+                        cell[k] = grid.index(c) as u32;
                     }
                 }
             });
+        let (first, cells) = match system.among {
+            Some(_) => self.cells_here(),
+            None => (0, grid.total()),
+        };
+        self.cell_aggregate.resize(cells, NONE);
         let level = &mut self.coarse.levels[0];
         level.coordinates.clear();
         self.touched.clear();
@@ -131,12 +126,11 @@ impl Multigrid {
                 *aggregate = NONE;
                 continue;
             }
-            let joined = &mut self.cell_aggregate[*aggregate as usize];
+            let joined = &mut self.cell_aggregate[(*aggregate - first) as usize];
             if *joined == NONE {
                 *joined = self.touched.len() as u32;
-                self.touched.push(*aggregate);
-                let [x, y, z] = grid.coordinates_of(*aggregate as usize).map(|k| k as i32);
-                level.coordinates.push([x + first, y, z]);
+                self.touched.push(*aggregate - first);
+                level.coordinates.push(grid.coordinates_of(*aggregate as usize).map(|k| k as i32));
                 self.member_start.push(0);
             }
             *aggregate = *joined;
@@ -157,38 +151,43 @@ impl Multigrid {
             }
         }
         level.own = self.touched.len();
-        if let Some(among) = system.among {
-            self.meet_ranks(among, grid, position, here);
-        }
         for &c in &self.touched {
             self.cell_aggregate[c as usize] = NONE;
         }
+        if let Some(among) = system.among {
+            self.meet_ranks(among, grid, position);
+        }
     }
 
-    /// Finds the cells of the copies that are other ranks'; `here` tells the number of a cell on this one.
-    fn meet_ranks(
-        &mut self,
-        among: Among,
-        grid: &Grid,
-        position: &[DVec3],
-        here: impl Fn([i32; 3]) -> usize,
-    ) {
+    /// The first cell with an unknown that this rank has, and how many there are up to the last one: dry columns at the
+    /// ends of a slab take no room.
+    fn cells_here(&self) -> (u32, usize) {
+        let unknown = self.aggregate.iter().zip(&self.code).filter(|(_, code)| **code != NOWHERE);
+        let range = unknown.map(|(&cell, _)| (cell, cell)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        range.map_or((0, 0), |(first, last)| (first, (last - first) as usize + 1))
+    }
+
+    /// Finds the rows of the copies, which are other ranks'.
+    fn meet_ranks(&mut self, among: Among, grid: &Grid, position: &[DVec3]) {
         let share = among.share;
         let Some(columns) = self.coarse.columns().cloned() else { return };
-        let level = &mut self.coarse.levels[0];
-        meet(level, share, &columns);
-        for (row, &c) in level.coordinates.iter().enumerate().skip(level.own) {
-            self.cell_aggregate[here(c)] = row as u32;
-            self.touched.push(here(c) as u32);
-        }
+        let Hierarchy { levels, scratch: Scratch { numbers, .. }, .. } = &mut self.coarse;
+        meet(&mut levels[0], share, &columns);
         share.swap(&mut [&mut &mut self.diagonal[..]]);
         let beyond = [columns.mine().start - 1, columns.mine().end];
         for (side, x) in share.sides().iter().zip(beyond) {
-            let copies = side.iter().flat_map(Side::taken);
-            for i in copies.filter(|&i| among.state[i] == State::Inner) {
+            numbers.fit([[x, 0, 0], [x, grid.count[1] as i32 - 1, grid.count[2] as i32 - 1]]);
+            let rows = levels[0].coordinates.iter().enumerate().skip(levels[0].own);
+            rows.filter(|(_, c)| c[0] == x).for_each(|(row, &c)| *numbers.of(c) = row as u32);
+            for i in side.iter().flat_map(Side::taken) {
+                if among.state[i] != State::Inner {
+                    // Its owner may have it among dry walls, where diagonals are not kept; here sweeps may pass it.
+                    self.diagonal[i] = 1.0;
+                    continue;
+                }
                 let [_, y, z] = grid.coordinates(position[i]).map(|k| k as i32);
                 self.code[i] = place_of([x, y, z]);
-                self.aggregate[i] = self.cell_aggregate[here([x, y, z])];
+                self.aggregate[i] = *numbers.of([x, y, z]);
             }
         }
     }

@@ -114,12 +114,12 @@ impl Said {
     pub(super) fn new(shared: &[Columns], levels: usize, border: &[u64], rows: u64) -> Self {
         let (mut messages, mut message_bytes) = ([0; 2], [0; 2]);
         for (l, border) in border.iter().enumerate().take(shared.len()) {
-            // What the column of another rank is handed back: cells and stencils once, residuals in a cycle.
+            // What is handed back: stencils once, residuals in a cycle.
             let back = u64::from(l > 0 && shared[l - 1].is_split());
             let shown = shows(l, levels) + back * times(l);
-            messages = [messages[0] + 1 + 2 * back, messages[1] + shown];
-            let made = CELL + back * (CELL + STENCIL);
-            message_bytes = [message_bytes[0] + made * border, message_bytes[1] + 4 * shown * border];
+            messages = [messages[0] + 1 + back, messages[1] + shown];
+            message_bytes =
+                [message_bytes[0] + (CELL + back * STENCIL) * border, message_bytes[1] + 4 * shown * border];
         }
         let joined = if shared.len() < levels { times(shared.len()) } else { 0 };
         let is_joined = joined.min(1);

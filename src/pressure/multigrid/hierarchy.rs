@@ -59,7 +59,7 @@ impl Hierarchy {
             let (fine, coarse, count) = (&mut fine[l - 1], &mut coarse[0], count[l]);
             match share {
                 Some(share) if l < columns.len() => {
-                    shared::coarsen([fine, coarse], scratch, share, &columns[l - 1..=l], count);
+                    shared::coarsen([fine, coarse], scratch, share, &columns[l - 1..=l]);
                 }
                 Some(share) if l == columns.len() => {
                     joined.coarsen([fine, coarse], scratch, share, &columns[l - 1], count);

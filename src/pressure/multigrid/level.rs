@@ -96,6 +96,17 @@ impl Numbers {
         let place = self.place(c);
         &mut self.of[place]
     }
+
+    /// Numbers those of `cells` that have no number yet behind those in `list`, and puts them there.
+    pub fn extend(&mut self, list: &mut Vec<[i32; 3]>, cells: impl Iterator<Item = [i32; 3]>) {
+        for c in cells {
+            let number = self.of(c);
+            if *number == NONE {
+                *number = list.len() as u32;
+                list.push(c);
+            }
+        }
+    }
 }
 
 /// The lowest and the highest of `cells` along each axis.

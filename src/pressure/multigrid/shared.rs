@@ -3,7 +3,7 @@
 //! ones, and what the second one brings that is the next rank's is handed back. Behind the last level that is
 //! shared all ranks have the same ones.
 
-use super::level::{Level, NONE, Scratch, bounds, compress, galerkin};
+use super::level::{Level, Scratch, bounds, compress, galerkin};
 use crate::share::{Columns, Share, Side};
 use bytemuck::{Pod, Zeroable};
 
@@ -93,48 +93,37 @@ pub(super) fn meet(level: &mut Level, share: &Share, columns: &Columns) {
     level.border.sides = [Some(Side::of(a, c)), Some(Side::of(b, d))];
 }
 
-/// Next coarser level of `fine`, both of them shared, `columns` of both; so many cells it has along each axis.
+/// Next coarser level of `fine`, both of them shared, with the `columns` of both.
 pub(super) fn coarsen(
     [fine, coarse]: [&mut Level; 2],
     scratch: &mut Scratch,
     share: &Share,
     columns: &[Columns],
-    count: [u32; 3],
 ) {
     let (mine, of_fine) = (columns[1].mine(), &columns[0]);
-    let parent = |c: &[i32; 3]| [of_fine.parent(c[0]), c[1] >> 1, c[2] >> 1];
+    let Level { coordinates, parent, own, .. } = &mut *fine;
+    let parents = || coordinates.iter().map(|c| [of_fine.parent(c[0]), c[1] >> 1, c[2] >> 1]);
+    let is_mine = |p: &[i32; 3]| mine.contains(&p[0]);
+    // Cells of this rank, also those that only cells of the rank after bring.
     let numbers = &mut scratch.numbers;
-    numbers.fit([[mine.start - 1, 0, 0], [mine.end, count[1] as i32 - 1, count[2] as i32 - 1]]);
-    let cells = &mut coarse.coordinates;
-    cells.clear();
-    let mut theirs = Vec::new();
-    for c in &fine.coordinates[..fine.own] {
-        let p = parent(c);
-        let number = numbers.of(p);
-        if *number == NONE {
-            let list = if mine.contains(&p[0]) { &mut *cells } else { &mut theirs };
-            *number = list.len() as u32;
-            list.push(p);
-        }
-    }
-    let split = of_fine.is_split().then(|| {
-        let [_, come] = share.pass(told(theirs.iter()), Vec::new());
-        let number = |p: [i32; 3]| {
-            let number = numbers.of(p);
-            if *number == NONE {
-                *number = cells.len() as u32;
-                cells.push(p);
-            }
-            *number
-        };
-        heard(&come, mine.end - 1).map(number).collect()
-    });
+    numbers.fit(bounds(parents()));
+    coarse.coordinates.clear();
+    numbers.extend(&mut coarse.coordinates, parents().filter(is_mine));
     meet(coarse, share, &columns[1]);
-    let cells = &coarse.coordinates;
-    (coarse.own..cells.len()).for_each(|i| *numbers.of(cells[i]) = i as u32);
-    coarse.border.split = split.map(|own| [theirs.into_iter().map(|p| *numbers.of(p)).collect(), own]);
-    fine.parent.clear();
-    fine.parent.extend(fine.coordinates.iter().map(|c| *numbers.of(parent(c))));
+    numbers.fit(bounds(coarse.coordinates.iter().copied()));
+    coarse.coordinates.iter().enumerate().for_each(|(i, &c)| *numbers.of(c) = i as u32);
+    // What is handed back are the parents of the first fine column. Both ranks have its cells, and so the same list.
+    let mut rows = |mut cells: Vec<[i32; 3]>| -> Vec<u32> {
+        cells.sort_unstable();
+        cells.dedup();
+        cells.into_iter().map(|p| *numbers.of(p)).collect()
+    };
+    coarse.border.split = of_fine.is_split().then(|| {
+        let theirs = parents().take(*own).filter(|p| !is_mine(p)).collect();
+        [rows(theirs), rows(parents().skip(*own).filter(is_mine).collect())]
+    });
+    parent.clear();
+    parent.extend(parents().map(|p| *numbers.of(p)));
     galerkin(fine, coarse, scratch);
     coarse.border.hand_back::<Stencil>(share, bytemuck::cast_slice_mut(&mut scratch.stencil));
     compress(coarse, scratch);
@@ -159,28 +148,21 @@ impl Joined {
     ) {
         // In a ring the columns beyond the seam are the last and the first.
         let x = |c: i32| columns.parent(c).rem_euclid(count[0] as i32);
-        let parent = |c: &[i32; 3]| [x(c[0]), c[1] >> 1, c[2] >> 1];
-        let mut own: Vec<[i32; 3]> = fine.coordinates[..fine.own].iter().map(parent).collect();
-        own.sort_unstable();
-        own.dedup();
-        let all = share.gather(bytemuck::cast_slice(&own).to_vec());
+        let Level { coordinates, parent, own, .. } = &mut *fine;
+        let parents = || coordinates.iter().map(|c| [x(c[0]), c[1] >> 1, c[2] >> 1]);
+        let (numbers, mut here) = (&mut scratch.numbers, Vec::new());
+        numbers.fit(bounds(parents()));
+        numbers.extend(&mut here, parents().take(*own));
+        let all = share.gather(bytemuck::cast_slice(&here).to_vec());
         let all: Vec<Vec<[i32; 3]>> = all.iter().map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
-        let Scratch { numbers, .. } = scratch;
         numbers.fit(bounds(all.iter().flatten().copied()));
-        let cells = &mut coarse.coordinates;
-        cells.clear();
-        let mut number = |p: &[i32; 3]| {
-            let number = numbers.of(*p);
-            if *number == NONE {
-                *number = cells.len() as u32;
-                cells.push(*p);
-            }
-            *number
-        };
-        self.parents = all.iter().map(|part| part.iter().map(&mut number).collect()).collect();
-        coarse.own = cells.len();
-        fine.parent.clear();
-        fine.parent.extend(fine.coordinates.iter().map(|c| *numbers.of(parent(c))));
+        coarse.coordinates.clear();
+        numbers.extend(&mut coarse.coordinates, all.iter().flatten().copied());
+        coarse.own = coarse.coordinates.len();
+        let mut rows = |cells: &Vec<[i32; 3]>| cells.iter().map(|&p| *numbers.of(p)).collect();
+        self.parents = all.iter().map(&mut rows).collect();
+        parent.clear();
+        parent.extend(parents().map(|p| *numbers.of(p)));
         galerkin(fine, coarse, scratch);
         self.sum::<Stencil>(share, bytemuck::cast_slice_mut(&mut scratch.stencil));
         compress(coarse, scratch);
