@@ -17,6 +17,9 @@ pub struct Grid {
     pub count: [u32; 3],
     /// Across which sides the search goes on.
     pub periodic: Periodic,
+    /// The first of the columns along x whose cells are numbered, and how many these are, round a periodic side as well: all of them, or on one of many
+    /// ranks those near its slab.
+    pub held: [u32; 2],
 }
 
 /// Cells that lie above each other, and what is to be added to their particles' positions.
@@ -33,7 +36,13 @@ pub struct Column {
 impl Grid {
     /// A single cell, of a dry scene.
     pub(crate) fn nothing() -> Self {
-        Self { origin: DVec3::ZERO, width: DVec3::ONE, count: [1; 3], periodic: Periodic::default() }
+        Self {
+            origin: DVec3::ZERO,
+            width: DVec3::ONE,
+            count: [1; 3],
+            periodic: Periodic::default(),
+            held: [0, 1],
+        }
     }
 
     /// Grid over the domain of `params`.
@@ -64,12 +73,42 @@ impl Grid {
             width,
             count: [cells(0) as u32, along_y as u32, cells(2) as u32],
             periodic,
+            held: [0, cells(0) as u32],
         })
     }
 
-    /// Number of cells.
+    /// The same grid, of whose columns along x `count` are numbered, from the `first` on.
+    pub(crate) fn slab(self, first: u32, count: u32) -> Self {
+        Self { held: [first, count], ..self }
+    }
+
+    /// Number of cells that are numbered.
     pub fn total(&self) -> usize {
-        self.count.iter().map(|&c| c as usize).product()
+        self.held[1] as usize * self.per_column()
+    }
+
+    /// Cells of a column along x.
+    pub(crate) fn per_column(&self) -> usize {
+        self.count[1] as usize * self.count[2] as usize
+    }
+
+    /// Which of the columns that are numbered column `x` is; as many as there are, or more, if it is none of them.
+    #[inline(always)]
+    fn place(&self, x: u32) -> u32 {
+        let place = x.wrapping_sub(self.held[0]);
+        if x < self.held[0] { place.wrapping_add(self.count[0]) } else { place }
+    }
+
+    /// Whether the cells of column `x` are numbered.
+    #[inline(always)]
+    pub(crate) fn holds(&self, x: u32) -> bool {
+        self.place(x) < self.held[1]
+    }
+
+    /// The cells of column `x`.
+    pub(crate) fn cells_of(&self, x: u32) -> std::ops::Range<usize> {
+        let first = self.index([x, 0, 0]);
+        first..first + self.per_column()
     }
 
     /// Cell coordinates of a position inside the domain.
@@ -83,17 +122,20 @@ impl Grid {
         ]
     }
 
-    /// Number of the cell at these coordinates.
+    /// Number of the cell at these coordinates, in a column that has numbers.
     #[inline(always)]
     pub fn index(&self, c: [u32; 3]) -> usize {
-        (c[0] as usize * self.count[1] as usize + c[1] as usize) * self.count[2] as usize + c[2] as usize
+        (self.place(c[0]) as usize * self.count[1] as usize + c[1] as usize) * self.count[2] as usize
+            + c[2] as usize
     }
 
     /// Coordinates of the cell with this number.
     #[inline(always)]
     pub(crate) fn coordinates_of(&self, cell: usize) -> [u32; 3] {
         let (y, z) = (self.count[1] as usize, self.count[2] as usize);
-        [(cell / (y * z)) as u32, (cell / z % y) as u32, (cell % z) as u32]
+        let x = (cell / (y * z)) as u32 + self.held[0];
+        let x = if x < self.count[0] { x } else { x - self.count[0] };
+        [x, (cell / z % y) as u32, (cell % z) as u32]
     }
 
     /// The columns of cells around `c`: up to nine, and as many more where z is periodic.
@@ -110,7 +152,8 @@ impl Grid {
         let grid = *self;
         let z = (c[2].saturating_sub(1), (c[2] + 1).min(grid.count[2] - 1));
         let y = (c[1].saturating_sub(1), (c[1] + 1).min(grid.count[1] - 1));
-        let x = c[0].saturating_sub(1)..=(c[0] + 1).min(grid.count[0] - 1);
+        let [first, held] = grid.held;
+        let x = c[0].saturating_sub(1).max(first)..=(c[0] + 1).min(first + held - 1);
         let column = move |x, y| Column {
             first: grid.index([x, y, z.0]),
             last: grid.index([x, y, z.1]),
@@ -124,7 +167,7 @@ impl Grid {
     fn columns_round(&self, c: [u32; 3]) -> Vec<Column> {
         let [x, y, z] = [0, 1, 2].map(|axis| self.around(axis, c[axis]));
         let mut out = Vec::with_capacity(27);
-        for x in x.into_iter().flatten() {
+        for x in x.into_iter().flatten().filter(|x| self.holds(x.0)) {
             for y in y.into_iter().flatten() {
                 // Cells above each other are one run, but for those beyond a seam.
                 let within = z.into_iter().flatten().filter(|z| z.1 == 0.0).map(|z| z.0);

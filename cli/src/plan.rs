@@ -255,9 +255,9 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
     let ranks = match ranks {
-        Some(n) if built && plan.wet() => Some(Outlook::new(usize::from(n), scene, &params, &plan)?),
+        Some(n) if plan.wet() => Some(Outlook::new(usize::from(n), scene, &params, &plan)?),
         Some(_) => {
-            advice.push("ranks: not told, of a scene without water or one that was not built whole".into());
+            advice.push("ranks: not told, of a scene without water".into());
             None
         }
         None => None,

@@ -60,7 +60,11 @@ impl CellList {
         scratch.slots.clear();
         scratch.slots.extend(slots.map(|s| s as u32));
         scratch.cell.clear();
-        let cell = |&s: &u32| grid.index(grid.coordinates(position[s as usize])) as u32;
+        // What moves is everywhere on each of many ranks: far from the slab it is in no cell.
+        let cell = |&s: &u32| {
+            let c = grid.coordinates(position[s as usize]);
+            if grid.holds(c[0]) { grid.index(c) as u32 } else { grid.total() as u32 }
+        };
         scratch.cell.extend(scratch.slots.iter().map(cell));
         counting_sort(&scratch.cell, grid.total(), &mut self.start, &mut scratch.order);
         self.slot.clear();

@@ -28,15 +28,19 @@ pub(super) fn beyond(cuts: &[u32], rank: usize, ring: bool) -> [Option<u32>; 2] 
     ]
 }
 
-/// The columns of `rank` and `reach` more on either side, each once.
-pub(super) fn within(reach: u32, cuts: &[u32], rank: usize, ring: bool) -> impl Iterator<Item = u32> {
+/// The first of the columns of `rank` and `reach` more on either side, and how many these are: in a ring they go on round the seam.
+pub(super) fn near(reach: u32, cuts: &[u32], rank: usize, ring: bool) -> (u32, u32) {
     let (from, to, end) = (cuts[rank], cuts[rank + 1], cuts.last().copied().unwrap_or(0));
-    let reached = to - from + 2 * reach;
-    let (first, count) = match ring {
+    match ring {
         // Round a short tank all of them.
-        true => (from + end - reach % end.max(1), reached.min(end)),
+        true => ((from + end - reach % end) % end, (to - from + 2 * reach).min(end)),
         false => (from.saturating_sub(reach), (to + reach).min(end) - from.saturating_sub(reach)),
-    };
+    }
+}
+
+/// These columns, each once.
+pub(super) fn within(reach: u32, cuts: &[u32], rank: usize, ring: bool) -> impl Iterator<Item = u32> {
+    let (end, (first, count)) = (cuts.last().copied().unwrap_or(0), near(reach, cuts, rank, ring));
     (first..first + count).map(move |c| c % end)
 }
 

@@ -4,7 +4,7 @@
 //! | copies of the last column of the rank before | own | copies of the first column of the rank after |
 //!
 //! and these copies are in the order of their owner, as both sort the same sequence by cell. Where the tank is periodic along x the ranks are a
-//! ring: the first one's copies of the last column of all come behind the others, the last one's of the first column in front. Solids come behind the water as on a
+//! ring: in one of few columns the first one's copies of the last column of all come behind the others, the last one's of the first column in front. Solids come behind the water as on a
 //! single rank: every rank knows where those are that move, on CPUs it has of the others what is near its slab, and it computes the rows of those in its own
 //! columns.
 
@@ -12,6 +12,8 @@ mod border;
 mod coarse;
 mod cut;
 mod deal;
+mod loads;
+mod model;
 mod moves;
 mod outlook;
 mod still;
@@ -28,10 +30,11 @@ pub use border::{Bordered, OfWalls, Side};
 pub(crate) use coarse::Columns;
 use coarse::wet_cells;
 pub use cut::check;
-use cut::{beyond, is_ring};
+use cut::{REACH, beyond, is_ring, near};
 pub(crate) use deal::room;
 pub use deal::{Division, Portion, Start};
 use glam::DVec3;
+pub use model::Model;
 pub use moves::{Settled, Traveller};
 pub use outlook::{Outlook, Taken};
 use serde::Serialize;
@@ -52,8 +55,6 @@ pub struct Share {
     groups: Groups,
     /// Where slots without a particle are [m].
     corner: DVec3,
-    /// Cells of a column: of one number along x.
-    per_column: usize,
     /// Whether the first and the last rank are neighbours: the tank is periodic along x.
     ring: bool,
     /// First column of each rank, and the end of the last one's.
@@ -87,7 +88,6 @@ impl Share {
         Self {
             sides: [None, None],
             walls: Vec::new(),
-            per_column: grid.total() / grid.count[0] as usize,
             ring: is_ring(team.ranks(), &start.params),
             cuts: start.cuts.clone(),
             still: start.still.clone(),
@@ -172,6 +172,15 @@ impl Share {
     /// The columns before and after those of this rank, of which it has copies.
     pub(crate) fn beyond(&self) -> [Option<u32>; 2] {
         beyond(&self.cuts, self.rank(), self.ring)
+    }
+
+    /// `grid` with the cells that this rank numbers: of the columns within which it has the walls that never move, or all of them.
+    pub(crate) fn slab(&self, grid: Grid) -> Grid {
+        let (first, count) = near(REACH, &self.cuts, self.rank(), self.ring);
+        match &self.still {
+            Some(_) if count < grid.count[0] => grid.slab(first, count),
+            _ => grid.slab(0, grid.count[0]),
+        }
     }
 
     /// The columns of this rank.

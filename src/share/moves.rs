@@ -217,34 +217,36 @@ impl Share {
     }
 
     /// Finds the borders in the cells of this rank's water, which begin at `start`, and of solids.
-    pub fn find_borders(&mut self, start: &[u32], solids: [Option<&CellList>; 2]) {
-        let per_column = self.per_column;
+    pub fn find_borders(&mut self, grid: &Grid, start: &[u32], solids: [Option<&CellList>; 2]) {
+        let of_column = |start: &[u32], c: u32| {
+            let cells = grid.cells_of(c);
+            start[cells.start] as usize..start[cells.end] as usize
+        };
         let pressure = self.groups.pressure();
         let walls_of = |c: u32| -> Vec<u32> {
             let lists = solids.into_iter().flatten();
             let of = |list: &'_ CellList| -> Vec<u32> {
-                let (a, b) = (list.start[c as usize * per_column], list.start[(c as usize + 1) * per_column]);
-                list.slot[a as usize..b as usize]
-                    .iter()
-                    .copied()
-                    .filter(|&s| (s as usize) < pressure)
-                    .collect()
+                let there = list.slot[of_column(&list.start, c)].iter().copied();
+                there.filter(|&s| (s as usize) < pressure).collect()
             };
             lists.flat_map(of).collect()
         };
-        self.set_borders(|c| start[c as usize * per_column] as usize, walls_of);
+        self.set_borders(|c| of_column(start, c), walls_of);
     }
 
-    /// Takes over the borders: the water of a column begins at the slot `start` of it, and its wall layers have the slots `walls`, in an order
-    /// that the ranks beside know as well.
-    pub(crate) fn set_borders(&mut self, start: impl Fn(u32) -> usize, walls: impl Fn(u32) -> Vec<u32>) {
+    /// Takes over the borders: the `water` of a column has these slots, and its wall layers the slots `walls`, in an order that the ranks beside know as
+    /// well.
+    pub(crate) fn set_borders(
+        &mut self,
+        water: impl Fn(u32) -> Range<usize>,
+        walls: impl Fn(u32) -> Vec<u32>,
+    ) {
         let (mine, fluid) = (self.columns(), self.groups.fluid);
-        let water = |c: Range<u32>| start(c.start)..start(c.end);
-        self.own = water(mine.clone());
+        self.own = water(mine.start).start..water(mine.end - 1).end;
         let mut sides = self.borders(&walls);
         for ((side, end), beyond) in sides.iter_mut().zip(self.ends()).zip(self.beyond()) {
             if let Some((side, beyond)) = side.as_mut().zip(beyond) {
-                (side.give, side.take) = (water(end..end + 1), water(beyond..beyond + 1));
+                (side.give, side.take) = (water(end), water(beyond));
             }
         }
         self.sides = sides;

@@ -1,19 +1,20 @@
 //! What ranks would have and say, before anything is computed.
 
 use super::coarse::{self, Columns, Said};
-use super::cut::{check, cut, is_ring, unevenness};
+use super::cut::{beyond, check, cut, is_ring, unevenness};
+use super::loads::Loads;
+use super::model::Model;
 use crate::body::Pose;
 use crate::cells::Grid;
 use crate::error::Result;
 use crate::kernels::multigrid_levels::level_cells;
 use crate::params::Params;
 use crate::plan::{Plan, Stage};
-use crate::scene::{Kind, Scene, Solid};
+use crate::scene::{Scene, Solid};
 use crate::scheme::Preconditioner;
 use crate::slots::Slots;
 use glam::DVec3;
 use serde::Serialize;
-use std::collections::BTreeSet;
 
 /// What a rank would have at t = 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -59,41 +60,38 @@ pub struct Outlook {
     pub rounds: [u64; 2],
     /// Bytes that all ranks together gather in them, for cells of the multigrid.
     pub round_bytes: [u64; 2],
-    /// The same of ranks with a device each.
+    /// What a step would take on CPUs.
+    pub model: Model,
+    /// The same counts of ranks with a device each.
     pub on_devices: OnDevices,
 }
 
 impl Outlook {
-    /// That of `ranks` ranks in `scene` as `plan` has it.
+    /// That of `ranks` ranks in `scene` as `plan` has it; a scene with a larger spacing than that of `params` stands for one with that.
     ///
     /// # Errors
     /// As [`super::Share::new`].
     pub fn new(ranks: usize, scene: &Scene, params: &Params, plan: &Plan) -> Result<Self> {
         let grid = Grid::new(params)?;
         check(ranks, params, &grid)?;
-        let column = |x: &DVec3| grid.coordinates(*x)[0] as usize;
-        let (groups, columns) = (scene.groups, grid.count[0] as usize);
-        let [mut water, mut walls] = [vec![0_u64; columns], vec![0_u64; columns]];
-        let is_water = |i: &usize| scene.kind[*i] == Kind::Fluid;
-        (0..groups.fluid).filter(is_water).for_each(|i| water[column(&scene.position[i])] += 1);
-        scene.position[groups.fluid..groups.pressure()].iter().for_each(|x| walls[column(x)] += 1);
-        let cuts = cut(&water, ranks, params);
+        let loads = Loads::new(scene, &grid, params);
+        let (groups, columns) = (loads.groups(), grid.count[0] as usize);
+        let (water, walls) = (&loads.water[..], &loads.walls[..]);
+        let cuts = cut(water, ranks, params);
         let ring = is_ring(ranks, params);
-        let parts = cuts.windows(2).map(|c| {
-            let [from, to] = [c[0] as usize, c[1] as usize];
-            let before = from.checked_sub(1).or(ring.then_some(columns - 1));
-            let beside = [before, Some(to).filter(|&c| c < columns).or(ring.then_some(0))];
-            Taken {
-                columns: [c[0], c[1]],
-                water: water[from..to].iter().sum::<u64>() as usize,
-                copies: beside.into_iter().flatten().map(|c| water[c] as usize).sum(),
-                walls: walls[from..to].iter().sum::<u64>() as usize,
-            }
-        });
+        let of = |load: &[u64], columns: &mut dyn Iterator<Item = u32>| {
+            columns.map(|c| load[c as usize]).sum::<u64>() as usize
+        };
+        let part = |rank: usize| Taken {
+            columns: [cuts[rank], cuts[rank + 1]],
+            water: of(water, &mut (cuts[rank]..cuts[rank + 1])),
+            copies: of(water, &mut beyond(&cuts, rank, ring).into_iter().flatten()),
+            walls: of(walls, &mut (cuts[rank]..cuts[rank + 1])),
+        };
         let border = |c: &u32| [(*c as usize + columns - 1) % columns, *c as usize];
         let meet = if ring { &cuts[..ranks] } else { &cuts[1..ranks] };
         let most = |of: &[u64]| meet.iter().flat_map(border).map(|c| of[c]).max().unwrap_or(0);
-        let (water_at, carriers_at) = (most(&water), most(&water) + most(&walls));
+        let (water_at, carriers_at) = (most(water), most(water) + most(walls));
         let count = |stages: &[Stage]| stages.iter().filter(|&&s| plan.has(s)).count() as u64;
         let motions = count(&[Stage::Viscosity, Stage::WallFriction, Stage::Collision]);
         let surface = count(&[Stage::SurfacePressure]);
@@ -112,15 +110,16 @@ impl Outlook {
         let shared = coarse::shared(finest, &count, coarse::wet_cells(&groups, params, &grid));
         let wet: Vec<[u64; 2]> = match multigrid {
             0 => vec![[0; 2]; shared.len() + 1],
-            _ => (0..=shared.len()).map(|level| wet_cells(scene, &grid, level)).collect(),
+            _ => (0..=shared.len()).map(|level| loads.wet_cells(level)).collect(),
         };
         let border: Vec<u64> = wet.iter().map(|[_, border]| *border).collect();
         let said = Said::new(&shared, count.len(), &border, wet[shared.len()][0]);
         // Pressures at the rims of slots are a round of their own.
         let slots = u64::from(plan.coupled && has_slots(scene, params)?);
-        Ok(Self {
-            unevenness: unevenness(&water, &cuts),
-            parts: parts.collect(),
+        let told = Self {
+            unevenness: unevenness(water, &cuts),
+            parts: (0..ranks).map(part).collect(),
+            model: Model::default(),
             messages: [step_messages + multigrid * said.messages[0], 1 + multigrid * (1 + said.messages[1])],
             message_bytes: [
                 a_water * water_at + a_carrier * carriers_at + said.message_bytes[0],
@@ -138,7 +137,8 @@ impl Outlook {
                 ranks as u64,
                 slots,
             ),
-        })
+        };
+        Ok(Self { model: Model::new(&told), ..told })
     }
 }
 
@@ -197,14 +197,4 @@ fn on_devices(
             4 * number * in_iteration * carriers + levels[1],
         ],
     }
-}
-
-/// Cells of a level with water at t = 0, and the most in a column.
-fn wet_cells(scene: &Scene, grid: &Grid, level: usize) -> [u64; 2] {
-    let water = (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid);
-    let cell = |i: usize| grid.coordinates(scene.position[i]).map(|k| k >> level);
-    let wet: BTreeSet<[u32; 3]> = water.map(cell).collect();
-    let mut columns = vec![0_u64; grid.count[0] as usize];
-    wet.iter().for_each(|c| columns[c[0] as usize] += 1);
-    [wet.len() as u64, columns.into_iter().max().unwrap_or(0)]
 }

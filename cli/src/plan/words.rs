@@ -143,11 +143,19 @@ impl Report {
             lines.extend([String::new(), format!("{} ranks at t = 0", ranks.parts.len())]);
             lines.extend(of_ranks(ranks));
             let [first, other] = report.estimate.memory_of_ranks(ranks.parts.len());
-            lines.push(format!(
-                "  memory on CPUs: about {} a rank, {} the first",
-                bytes(other),
-                bytes(first)
-            ));
+            let m = &ranks.model;
+            lines.extend([
+                format!("  memory on CPUs: about {} a rank, {} the first", bytes(other), bytes(first)),
+                format!(
+                    "  a step on CPUs, by the model of docs/scaling.md: {:.3} s, {:.1} times as fast as one rank ({:.0} % its \
+                     water, {:.0} % copies, {:.0} % messages)",
+                    m.step_s(),
+                    m.speed_up,
+                    100.0 * m.own_s / m.step_s(),
+                    100.0 * m.copies_s / m.step_s(),
+                    100.0 * m.messages_s / m.step_s()
+                ),
+            ]);
         }
         let e = &report.estimate;
         lines.extend([

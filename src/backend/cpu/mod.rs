@@ -91,13 +91,18 @@ pub struct Cpu {
 impl Cpu {
     /// Particles of `scene`; allocates nothing for a dry one.
     pub fn new(scene: &Scene, params: &Params, plan: &Plan, settings: Settings) -> Result<Self> {
+        let grid = if plan.wet() { Grid::new(params)? } else { Grid::nothing() };
+        Ok(Self::on_grid(grid, scene, params, plan, settings))
+    }
+
+    /// The same with cells of its own.
+    fn on_grid(grid: Grid, scene: &Scene, params: &Params, plan: &Plan, settings: Settings) -> Self {
         let groups = scene.groups;
         let wet = plan.wet();
         let lightness = |solid| collision::lightness(solid, params);
-        let grid = if wet { Grid::new(params)? } else { Grid::nothing() };
         let mut scratch = Scratch::default();
         let fixed = if wet { Self::index_fixed(&grid, groups, &scene.position, &mut scratch) } else { None };
-        Ok(Self {
+        Self {
             params: params.clone(),
             settings,
             groups,
@@ -130,7 +135,7 @@ impl Cpu {
             dt: 0.0,
             excess: WallExcess::new(scene, params, plan),
             share: None,
-        })
+        }
     }
 
     /// What never moves, by cells; nothing if there is nothing.

@@ -99,7 +99,7 @@ impl Cpu {
         }
         if let Some(share) = share {
             let solids = [&self.moving, &self.fixed].map(|list| list.as_ref().map(|(list, _)| list));
-            share.find_borders(fluid_start, solids);
+            share.find_borders(grid, fluid_start, solids);
             if self.multigrid.is_some() {
                 share.keep_searched(&fields.position[..groups.pressure()]);
             }
@@ -142,7 +142,8 @@ impl Cpu {
                 let active = |k: usize| {
                     let i = c * CHUNK + k;
                     let x = grid.periodic.wrap(position[i]);
-                    let near = if i < fluid { i < live } else { near_fluid[grid.index(grid.coordinates(x))] };
+                    let beside_water = |c: [u32; 3]| grid.holds(c[0]) && near_fluid[grid.index(c)];
+                    let near = if i < fluid { i < live } else { beside_water(grid.coordinates(x)) };
                     near.then_some((i, x))
                 };
                 neighbour_list(chunk, active, params, &from, search)

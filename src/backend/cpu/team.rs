@@ -3,6 +3,7 @@
 use super::Cpu;
 use super::archive::Saved;
 use crate::backend::{Backend, Counters, Ranked};
+use crate::cells::Grid;
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, insert};
@@ -33,8 +34,9 @@ impl Cpu {
         if !plan.wet() {
             return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
         }
-        let mut cpu = Self::new(&start.scene, &start.params, plan, settings)?;
-        let mut share = Share::new(team, start, &cpu.grid);
+        let grid = Grid::new(&start.params)?;
+        let mut share = Share::new(team, start, &grid);
+        let mut cpu = Self::on_grid(share.slab(grid), &start.scene, &start.params, plan, settings);
         cpu.fields.id[..start.ids.len()].copy_from_slice(&start.ids);
         share.begin(cpu.groups, start.ids.len(), &cpu.fields, &cpu.grid);
         cpu.share = Some(Box::new(share));
@@ -97,9 +99,10 @@ impl Cpu {
         share.groups_are(self.groups);
     }
 
-    /// Other walls that never move: at `walls`, with these pressures, and dummies.
+    /// The tank is cut anew: walls that never move are at `walls`, with these pressures, and dummies; cells are those of the slab.
     fn lay_still(&mut self, walls: &[(DVec3, f64)], dummies: &[DVec3]) {
         let before = self.groups;
+        self.share.iter().for_each(|share| self.grid = share.slab(self.grid));
         self.fields.lay_still(&before, walls, dummies);
         (self.groups.static_wall, self.groups.static_dummy) = (walls.len(), dummies.len());
         let [from, to] = [before, self.groups].map(|g| g.moving_dummy_range().start as isize);

@@ -24,7 +24,10 @@ impl Water {
     fn new(count: [u32; 3], around: [bool; 3], dry: std::ops::Range<i32>) -> Self {
         let high = DVec3::from_array(count.map(f64::from));
         let periodic = Periodic::new(around, DVec3::ZERO, high);
-        Self { grid: Grid { origin: DVec3::ZERO, width: DVec3::ONE, count, periodic }, dry }
+        Self {
+            grid: Grid { origin: DVec3::ZERO, width: DVec3::ONE, count, periodic, held: [0, count[0]] },
+            dry,
+        }
     }
 
     /// A number by chance of two cells, from 0 to 1, the same for both.

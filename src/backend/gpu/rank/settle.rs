@@ -81,7 +81,7 @@ impl Walls {
 
     /// The column of cells at `x`, in f32 as devices find it: a layer may stand on a border of cells, all of it.
     fn column(&self, x: DVec3) -> u32 {
-        let Grid { origin, width, count, periodic } = &self.grid;
+        let Grid { origin, width, count, periodic, .. } = &self.grid;
         let [x, lower] = [periodic.wrap(x), *origin].map(|at| (at - self.middle).x as f32);
         (((x - lower) / width.x as f32).max(0.0) as u32).min(count[0] - 1)
     }
@@ -201,7 +201,8 @@ impl GpuRank {
             let (from, to) = (first[c as usize] as usize, first[c as usize + 1] as usize);
             order[from..to].iter().map(|&k| fluid as u32 + k).collect()
         };
-        self.share.set_borders(|c| starts[c as usize] as usize, of);
+        let water = |c: u32| starts[c as usize] as usize..starts[c as usize + 1] as usize;
+        self.share.set_borders(water, of);
         self.live = starts[columns] as usize;
         let taken = [0, 1].map(|k| self.share.sides()[k].as_ref().map_or(0, |side| side.water()[1].len()));
         if taken != self.came.copies || self.share.own().len() + taken.iter().sum::<usize>() != self.live {
