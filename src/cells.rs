@@ -45,8 +45,16 @@ impl Grid {
         }
     }
 
-    /// Grid over the domain of `params`.
+    /// Grid over the domain of `params`, all of whose cells are numbered.
+    ///
+    /// # Errors
+    /// [`Error::Key`] if they are too many.
     pub fn new(params: &Params) -> Result<Self> {
+        Self::over(params).numbered(params)
+    }
+
+    /// Grid over the domain of `params`, however many cells it has.
+    pub(crate) fn over(params: &Params) -> Self {
         let (radius, periodic) = (params.effective_radius, params.periodic);
         let extent = params.domain_max - params.domain_min;
         let cells = |k: usize| match periodic.is_along(k) {
@@ -55,12 +63,20 @@ impl Grid {
             false => (extent[k] / radius).floor() + 1.0,
         };
         let along_y = if params.dimensions == 2 { 1.0 } else { cells(1) };
-        let total = cells(0) * along_y * cells(2);
         let mut width = DVec3::splat(radius);
         for k in (0..3).filter(|&k| periodic.is_along(k)) {
             width[k] = extent[k] / cells(k);
         }
-        if total.is_nan() || total >= 2e9 {
+        let count = [cells(0) as u32, along_y as u32, cells(2) as u32];
+        Self { origin: params.domain_min, width, count, periodic, held: [0, count[0]] }
+    }
+
+    /// This grid, unless its cells are more than can be numbered.
+    pub(crate) fn numbered(self, params: &Params) -> Result<Self> {
+        let columns = f64::from(self.held[1]) * f64::from(self.count[1]);
+        let total = columns * f64::from(self.count[2]);
+        if !(1.0..2e9).contains(&total) {
+            let extent = params.domain_max - params.domain_min;
             let message = format!(
                 "the domain of {:.3} x {:.3} x {:.3} m holds {total:.2e} cells of the neighbour search, more than \
                  can be numbered",
@@ -68,13 +84,7 @@ impl Grid {
             );
             return Err(Error::key("run.domain", message, "give run.domain or enlarge run.spacing"));
         }
-        Ok(Self {
-            origin: params.domain_min,
-            width,
-            count: [cells(0) as u32, along_y as u32, cells(2) as u32],
-            periodic,
-            held: [0, cells(0) as u32],
-        })
+        Ok(self)
     }
 
     /// The same grid, of whose columns along x `count` are numbered, from the `first` on.
@@ -191,5 +201,38 @@ impl Grid {
             Some((c, 0.0)),
             if c + 1 < n { Some((c + 1, 0.0)) } else { around.then_some((0, length)) },
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slab_numbers_its_columns_and_sees_no_others() {
+        let periodic = Periodic::new([true, false, false], DVec3::ZERO, DVec3::splat(9.0));
+        for (ring, first, held) in [(false, 3, 4), (true, 7, 4)] {
+            let periodic = if ring { periodic } else { Periodic::default() };
+            let whole =
+                Grid { origin: DVec3::ZERO, width: DVec3::ONE, count: [9, 2, 3], periodic, held: [0, 9] };
+            let slab = whole.slab(first, held);
+            assert_eq!((whole.total(), slab.total()), (54, 24));
+            let numbered: Vec<u32> = (0..9).filter(|&x| slab.holds(x)).collect();
+            assert_eq!(numbered, if ring { vec![0, 1, 7, 8] } else { vec![3, 4, 5, 6] });
+            for cell in 0..slab.total() {
+                let c = slab.coordinates_of(cell);
+                assert_eq!(slab.index(c), cell);
+                // Its neighbours are those of the whole grid that have numbers.
+                let seen = |grid: &Grid| {
+                    let cells = grid.columns(c).flat_map(|column| column.first..=column.last);
+                    let mut all: Vec<[u32; 3]> = cells.map(|cell| grid.coordinates_of(cell)).collect();
+                    all.retain(|c| slab.holds(c[0]));
+                    all.sort_unstable();
+                    all
+                };
+                assert_eq!(seen(&slab), seen(&whole), "{c:?}");
+            }
+            assert_eq!(slab.cells_of((first + 1) % 9), 6..12);
+        }
     }
 }

@@ -224,7 +224,7 @@ impl Estimate {
         let part = |of: f64, beside: f64, columns: f64| (of / ranks as f64 + beside * of / columns).min(of);
         let [wet, all] = self.columns;
         let other = PROGRAM_OF_RANK
-            + self.cells * SEARCH_CELL
+            + part(self.cells, 4.0, all) * SEARCH_CELL
             + part(self.water, 2.0, wet) * WATER_OF_RANK
             + part(self.particles - self.water, 4.0, all) * WALL_OF_RANK;
         [other + self.particles * PARTICLE_OF_FIRST, other]

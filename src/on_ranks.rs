@@ -77,8 +77,8 @@ impl Simulation {
 
 /// Deals the particles of `scene` to the ranks; returns what the first one begins with. If they cannot share it the others get nothing.
 fn deal(team: &dyn Team, scene: &Arc<Scene>, params: &Params, every_wall: bool) -> Result<Start> {
-    let grid = Grid::new(params).and_then(|grid| check(team.ranks(), params, &grid).map(|()| grid));
-    let grid = grid.inspect_err(|_| drop(team.deal(&mut |_| Vec::new())))?;
+    let grid = Grid::over(params);
+    check(team.ranks(), params, &grid).inspect_err(|_| drop(team.deal(&mut |_| Vec::new())))?;
     let particles = (&scene.position[..], &scene.kind[..]);
     let division = Division::new(team.ranks(), scene.groups, &grid, params, particles);
     let start = |rank: usize| Start::new(rank, scene, params, &division, every_wall);

@@ -72,7 +72,7 @@ impl Outlook {
     /// # Errors
     /// As [`super::Share::new`].
     pub fn new(ranks: usize, scene: &Scene, params: &Params, plan: &Plan) -> Result<Self> {
-        let grid = Grid::new(params)?;
+        let grid = Grid::over(params);
         check(ranks, params, &grid)?;
         let loads = Loads::new(scene, &grid, params);
         let (groups, columns) = (loads.groups(), grid.count[0] as usize);
@@ -133,7 +133,7 @@ impl Outlook {
             on_devices: on_devices(
                 plan,
                 [water_at, carriers_at],
-                [grid.total() as u64, wet[0][0]],
+                [grid.count.map(u64::from).iter().product(), wet[0][0]],
                 ranks as u64,
                 slots,
             ),

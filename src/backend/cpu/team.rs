@@ -34,9 +34,15 @@ impl Cpu {
         if !plan.wet() {
             return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
         }
-        let grid = Grid::new(&start.params)?;
+        let grid = Grid::over(&start.params);
         let mut share = Share::new(team, start, &grid);
-        let mut cpu = Self::on_grid(share.slab(grid), &start.scene, &start.params, plan, settings);
+        let mut cpu = Self::on_grid(
+            share.slab(grid).numbered(&start.params)?,
+            &start.scene,
+            &start.params,
+            plan,
+            settings,
+        );
         cpu.fields.id[..start.ids.len()].copy_from_slice(&start.ids);
         share.begin(cpu.groups, start.ids.len(), &cpu.fields, &cpu.grid);
         cpu.share = Some(Box::new(share));
@@ -102,7 +108,11 @@ impl Cpu {
     /// The tank is cut anew: walls that never move are at `walls`, with these pressures, and dummies; cells are those of the slab.
     fn lay_still(&mut self, walls: &[(DVec3, f64)], dummies: &[DVec3]) {
         let before = self.groups;
-        self.share.iter().for_each(|share| self.grid = share.slab(self.grid));
+        if let Some(share) = &self.share {
+            // A slab that has become too wide, most of it dry, is one of billions of cells.
+            let slab = share.slab(self.grid).numbered(&self.params);
+            self.grid = slab.unwrap_or_else(|e| panic!("ranks: {e}"));
+        }
         self.fields.lay_still(&before, walls, dummies);
         (self.groups.static_wall, self.groups.static_dummy) = (walls.len(), dummies.len());
         let [from, to] = [before, self.groups].map(|g| g.moving_dummy_range().start as isize);
