@@ -429,6 +429,6 @@ impl Run {
         let by_time = progress.time / end;
         let by_steps = steps as f64 / self.steps_max as f64;
         progress.done = by_time.max(by_steps).clamp(1e-9, 1.0);
-        progress.remaining = self.pace.remaining(progress.wall, progress.done);
+        progress.remaining = self.pace.remaining(progress.wall, progress.done, self.totals.particles());
     }
 }
