@@ -331,6 +331,9 @@ fn words(summary: &Summary, out: &Path) -> String {
     if summary.verdict.grade == Grade::Fine {
         lines.push("verdict: fine".into());
     }
+    if let Some(left_out) = summary.verdict.left_out.first() {
+        lines.push(format!("not judged: {left_out}"));
+    }
     lines.push(format!("results in {}", out.display()));
     lines.join("\n")
 }

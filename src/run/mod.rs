@@ -317,7 +317,7 @@ impl Run {
         summary.case = options.name.clone();
         summary.status = status;
         summary.verdict = match error {
-            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()] },
+            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()], left_out: vec![] },
             None => verdict::judge(&summary, scale),
         };
         summary.exit_reason = reason;
