@@ -94,6 +94,8 @@ pub fn say_json(value: &impl serde::Serialize) {
 /// [`Error::Io`] if there is one.
 pub fn lost() -> Result<()> {
     let lost = LOST.lock().ok().and_then(|mut lost| lost.take());
+    // Whoever reads on no further, as `head` does, has what it wanted.
+    let lost = lost.filter(|e| e.kind() != std::io::ErrorKind::BrokenPipe);
     lost.map_or(Ok(()), |e| Err(Error::io("standard output")(e)))
 }
 

@@ -56,6 +56,10 @@ pub struct Estimate {
     /// Memory of these, and of the lattice that the scene is built on [bytes]: the price of the room, whatever is in it.
     #[serde(skip)]
     pub room: f64,
+    /// The obstacle, moving wall or body that more than half of the particles are of, and the edges of the box around
+    /// it [m].
+    #[serde(skip)]
+    pub mostly: Option<(String, Vector)>,
     /// Memory of a run on the CPU [bytes].
     pub memory_cpu: f64,
     /// Memory on the host of a run on a device [bytes].
@@ -128,7 +132,13 @@ impl Estimate {
         };
         let inside = |size: &dyn Fn(usize) -> f64, open: &[Face]| shell(size, open).min(cells(size));
         let walls = extents::walls(case);
-        let mut solids: f64 = walls.iter().map(|(b, open, _)| inside(&|k| b.size(k), open)).sum();
+        let obstacles = case.obstacle.iter().map(|o| format!("obstacle `{}`", o.name));
+        let moving = case.moving_wall.iter().map(|w| format!("moving wall `{}`", w.name));
+        let named = obstacles.chain(moving).zip(&walls);
+        let mut parts: Vec<(String, Vector, f64)> = named
+            .map(|(name, (b, open, _))| (name, [0, 1, 2].map(|k| b.size(k)), inside(&|k| b.size(k), open)))
+            .collect();
+        let mut solids: f64 = parts.iter().map(|one| one.2).sum();
         if let Some(tank) = &case.tank {
             solids += shell(&|k| span(&tank.min, &tank.max, k), &tank.without_wall());
         }
@@ -136,7 +146,12 @@ impl Estimate {
         solids +=
             case.plane.iter().map(|p| (p.size[0] / l0).ceil().max(1.0) * across(p) * layers).sum::<f64>();
         let extent = |body: &crate::case::Body| extents::size(&body.form(), l0, flat);
-        solids += case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum::<f64>();
+        let bodies = case.body.iter().map(|b| {
+            let size = extent(b);
+            (format!("body `{}`", b.name), [0, 1, 2].map(|k| size[k]), inside(&|k| size[k], &[]))
+        });
+        parts.extend(bodies);
+        solids += parts.iter().rev().take(case.body.len()).map(|one| one.2).sum::<f64>();
 
         let (lattice, domain) = (extents::lattice(&extents), extents::domain(case, &extents));
         // Room for water that may come in is kept from the start on, as much as the case says and the domain holds.
@@ -177,12 +192,15 @@ impl Estimate {
         let moving = (case.body.len() + case.moving_wall.len()) as f64;
         let rows = run.end / output.table_every.unwrap_or(run.time_step).max(run.time_step);
         let saves = run.checkpoint.wall > 0.0 || run.checkpoint.every.is_some();
+        let largest = parts.into_iter().max_by(|a, b| a.2.total_cmp(&b.2));
+        let mostly = largest.filter(|one| one.2 > 0.5 * particles).map(|(name, size, _)| (name, size));
         Self {
             water,
             particles,
             cells: searched,
             columns,
             room,
+            mostly,
             memory_cpu: base + slots * WATER,
             memory_beside_device: base + slots * WATER_ON_DEVICE,
             frames: frames(output.every),
@@ -192,6 +210,14 @@ impl Estimate {
             table_bytes: rows * (ROW + moving * ROW_OF_SOLID),
             checkpoint_bytes: if saves { 3.0 * CHECKPOINT * kept } else { 0.0 },
         }
+    }
+
+    /// Which solid most of the particles are of, in brackets: one that is far too large says so by its size.
+    pub fn of_whom(&self) -> String {
+        let told = |(name, [x, y, z]): &(String, Vector)| {
+            format!(" (most of them of {name}, {x:.4} x {y:.4} x {z:.4} m)")
+        };
+        self.mostly.as_ref().map(told).unwrap_or_default()
     }
 
     /// Of a run of `case` whose steps are `dt` [s] long: those that its scene allows.

@@ -138,7 +138,11 @@ const WRONG: &[(&str, &str, &[&str])] = &[
         &["body.0.size: body `cube` is 0.0700 m across along y", "0.07 or less"],
     ),
     ("[1, 0, 0, 1]]", "[0, 0, 0, 1]]", &["moving_wall.0.motion.1.0: time 0 does not come after 0"]),
-    ("[[0, 0, 0, 0], [1, 0, 0, 1]]", "[]", &["moving_wall.0.motion: the table of motion has no rows"]),
+    (
+        "[[0, 0, 0, 0], [1, 0, 0, 1]]",
+        "[]",
+        &["moving_wall.0.motion: the table of motion has no rows", "is an [[obstacle]]"],
+    ),
     ("max = [1.0, 1.0, 1.0]", "max = [1e9, 1e9, 1e9]", &["tank: the tank takes up or lies beyond"]),
     ("[0.2, 0.2, 0.2]", "[2e5, 2e5, 2e5]", &["body.0.size: body `cube` takes up"]),
     ("open = [\"z_max\"]", "open = [\"z_max\", \"z_max\"]", &["tank.open.1: `z_max` is listed twice"]),

@@ -130,6 +130,25 @@ fn a_verdict_knows_what_energy_a_scene_has_at_hand() {
                     [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.3]\n";
     let empty = "[tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, 0.4]\nopen = [\"z_max\"]\n[fluid]\n[[inflow]]\nname = \"in\"\nface = \"x_min\"\n\
                  min = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.01\n";
+    // A tank that is shaken at its own period, until its energy is half as much again.
+    let to_and_fro = |name: &str, [x0, x1]: [f64; 2], [z0, z1]: [f64; 2]| {
+        format!(
+            "[[moving_wall]]\nname = \"{name}\"\nmin = [{x0}, 0, {z0}]\nmax = [{x1}, 0.1, {z1}]\n\
+             sine = {{ axis = [1, 0, 0], amplitude = 0.03, period = 1.12 }}\n"
+        )
+    };
+    let shaken = "[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.15]\n".to_owned()
+        + &to_and_fro("left", [-0.09, 0.0], [-0.09, 0.5])
+        + &to_and_fro("right", [0.6, 0.69], [-0.09, 0.5])
+        + &to_and_fro("floor", [0.0, 0.6], [-0.09, 0.0]);
+    for (more, left_out) in [("", true), ("[output]\nledger = true\n", false)] {
+        let result = run(3.0, &format!("{shaken}{more}"));
+        let (verdict, monitors) = (&result["verdict"], &result["monitors"]);
+        let of = |key: &str| monitors[key].as_f64().unwrap();
+        assert!(of("energy_end_J") > 1.2 * of("energy_start_J"), "{monitors}");
+        assert_eq!(verdict["grade"], "fine", "{verdict}");
+        assert_eq!(verdict["left_out"].to_string().contains("output.ledger"), left_out, "{verdict}");
+    }
     for (name, end, more, grade, why) in [
         ("couette", 2.0, couette, "fine", ""),
         ("collapse", 0.5, collapse, "degraded", "the energy rose by"),

@@ -16,6 +16,7 @@ mod contact_forces;
 mod contact_hard;
 mod contact_impacts;
 mod contact_pairs;
+mod copies;
 mod device;
 mod errors;
 mod examples;

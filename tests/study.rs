@@ -313,6 +313,25 @@ fn a_point_that_is_stopped_goes_on_from_its_state() {
     assert_eq!(doctored.value("energy rise [-]"), Some(123.0));
 }
 
+/// What an inflow or a wall brings is no error of the scheme.
+#[test]
+fn energy_that_is_put_in_is_no_rise() {
+    let short = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.05\ndimensions = 2\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.2, 1, 0.4]\n\
+                 open = [\"z_max\"]\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 1, 0.2]\n";
+    let inflow =
+        "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0.2]\nmax = [0, 1, 0.3]\nvelocity = 1\n";
+    let wall = "[[moving_wall]]\nname = \"it\"\nmin = [0.06, 0, 0.2]\nmax = [0.14, 1, 0.3]\n\
+                motion = [[0, 0, 0, 0], [1, 0, 0, -0.5]]\n";
+    for (more, told) in [("", true), (inflow, false), (wall, false)] {
+        let spec = toml::from_str("of = [\"energy\"]\nfrom = 0.01\nevery = 0.01\n").expect("measures");
+        let point =
+            Point { text: format!("{short}{more}"), spec, processor: Default::default(), repetitions: 1 };
+        let measured = run_point(&point, &Context::new(&cpu_only)).expect("it runs");
+        assert_eq!(measured.value("energy rise [-]").is_some(), told, "{more}: {:?}", measured.values);
+    }
+}
+
 /// Killed in the middle of a point, the sweep goes on with the point's own state.
 #[test]
 fn a_sweep_that_is_killed_within_a_point_goes_on_within_it() {

@@ -107,6 +107,13 @@ rotation = [[0, 0, 0, 0], [1, 0, 0, 90]]
 velocity = [0.5, 0.0, 0.0]
 angular_velocity = [0.0, 0.0, 3.0]
 locked = ["y", "rotation_x"]
+copies = [[0.6, 0.2, 0.1], [0.7, 0.2, 0.1]]
+array = { count = [4, 1, 3], step = [0.12, 0.0, 0.1] }
+scatter = { count = 30, size = [1.0, 0.4, 0.3], gap = 0.01, turned = "about_z", seed = 2 }
+[[obstacle]]
+copies = [[1.2, 0.1, 0.0], [1.2, 0.3, 0.0]]
+array = { count = [2, 3, 1], step = [0.3, 0.1, 0.0] }
+scatter = { count = 50, size = [1.0, 0.4, 0.3], gap = 0.02, turned = "no", seed = 1 }
 [[fluid.block]]
 velocity = [1.0, 0.0, 0.0]
 [[fluid.shape]]

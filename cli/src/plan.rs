@@ -242,7 +242,10 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let mut advice = if plan.wet() { step_advice(&params, case, speed).0 } else { vec![] };
     advice.extend(many_steps(case, dt));
     let called = |still: bool| -> Vec<String> {
-        scene.solids.iter().filter(|s| s.is_still() == still).map(|s| s.name.clone()).collect()
+        let of_opening = |k: usize| scene.openings.iter().any(|opening| opening.solid == Some(k));
+        let solids =
+            scene.solids.iter().enumerate().filter(|&(k, s)| s.is_still() == still && !of_opening(k));
+        solids.map(|(_, s)| s.name.clone()).collect()
     };
     let free = scene.solids.iter().any(|s| matches!(s.drive, Drive::Free(_)));
     if built {

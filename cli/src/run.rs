@@ -92,10 +92,11 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, place: Option<Place>) -> Res
         let coarser =
             coarser.map_or("a larger run.spacing".into(), |l0| format!("run.spacing = {l0} or more"));
         let text = format!(
-            "{}: {:.1e} particles and {:.1e} cells of search take about {} of memory{}, {} are {}: use {coarser}, \
+            "{}: {:.1e} particles{} and {:.1e} cells of search take about {} of memory{}, {} are {}: use {coarser}, \
              or a smaller domain, or say with --memory-limit what the run may take",
             asked.name,
             estimate.particles,
+            estimate.of_whom(),
             estimate.cells,
             bytes(needs(on_cpu)),
             place.map_or(String::new(), |p| format!(" for {} of {} ranks here", p.here, p.all)),
@@ -278,7 +279,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     if args.json {
         say(&finished.summary.json());
     } else if !args.quiet {
-        tell(&words(&finished.summary, &asked.out));
+        tell(&words(&finished.summary, &simulation.case, &asked.out));
     }
     match (finished.error, finished.signal) {
         (Some(error), _) => Err(error),
@@ -291,7 +292,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
 /// So many bodies are named at the end.
 const BODIES: usize = 20;
 
-fn words(summary: &Summary, out: &Path) -> String {
+fn words(summary: &Summary, case: &Case, out: &Path) -> String {
     let m = &summary.monitors;
     // Why a run failed is an error, and said as one.
     let ended = match summary.status {
@@ -321,15 +322,21 @@ fn words(summary: &Summary, out: &Path) -> String {
         ));
     }
     lines.push(format!("energy: {:.6e} J at the start, {:.6e} J at the end", m.energy_start, m.energy_end));
-    for body in summary.bodies.iter().take(BODIES) {
+    // Where obstacles are the case says.
+    let stands = |name: &str| case.obstacle.iter().any(|o| o.name == name);
+    let bodies: Vec<_> = summary.bodies.iter().filter(|body| !stands(&body.name)).collect();
+    for body in bodies.iter().take(BODIES) {
         let [x, y, z] = body.position_m;
         lines.push(format!("{}: at ({x:.4}, {y:.4}, {z:.4}) m", body.name));
     }
-    if summary.bodies.len() > BODIES {
-        lines.push(format!("{} more bodies: in result.json", summary.bodies.len() - BODIES));
+    if bodies.len() > BODIES {
+        lines.push(format!("{} more bodies: in result.json", bodies.len() - BODIES));
     }
     if summary.verdict.grade == Grade::Fine {
         lines.push("verdict: fine".into());
+    }
+    if let Some(left_out) = summary.verdict.left_out.first() {
+        lines.push(format!("not judged: {left_out}"));
     }
     lines.push(format!("results in {}", out.display()));
     lines.join("\n")

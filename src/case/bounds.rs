@@ -15,3 +15,10 @@ pub(super) fn each_positive(schema: &mut Schema) {
 pub(super) fn each_once(schema: &mut Schema) {
     schema.insert("uniqueItems".into(), true.into());
 }
+
+/// Each number of a list is 1 or more.
+pub(super) fn each_counted(schema: &mut Schema) {
+    if let Some(items) = schema.get_mut("items").and_then(Value::as_object_mut) {
+        items.insert("minimum".into(), 1.into());
+    }
+}

@@ -33,6 +33,12 @@ pub fn check(case: &Case) -> Vec<Problem> {
 /// # Errors
 /// [`crate::error::Error::Case`] with all problems.
 pub fn refuse(case: &Case) -> Result<()> {
+    if let Some(key) = case.several() {
+        let message = format!("{key} stands for several solids that are not laid out yet");
+        return Err(
+            CaseError::from(Problem::new(key, message, "take what `Case::laid_out` makes of it")).into()
+        );
+    }
     let wrong: Vec<CaseError> = check(case).into_iter().filter(|p| !p.warning).map(CaseError::from).collect();
     if wrong.is_empty() { Ok(()) } else { Err(CaseError::all(wrong).into()) }
 }

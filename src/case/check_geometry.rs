@@ -353,7 +353,10 @@ impl Checker<'_> {
             } else if let Some(first) = first {
                 self.add(
                     path.clone(),
-                    format!("the name `{name}` is taken by {}", first.trim_end_matches(".name")),
+                    format!(
+                        "the name `{name}` is taken by {}",
+                        self.case.written.key(first.trim_end_matches(".name"))
+                    ),
                     format!("give each {what} its own name"),
                 );
             }

@@ -235,7 +235,8 @@ impl Checker<'_> {
             self.add(
                 path,
                 "the table of motion has no rows",
-                "write rows of time, x, y, z, e.g. [[0, 0, 0, 0], [3, 0, 0, 0.33]]",
+                "write rows of time, x, y, z, e.g. [[0, 0, 0, 0], [3, 0, 0, 0.33]]; what stands still is an \
+                 [[obstacle]]",
             );
         }
         if !self.increases(path, rows) {

@@ -2,6 +2,7 @@
 
 use super::brackets::mistaken;
 use super::check::check;
+use super::copies::lay_out;
 use super::motion_file::{allow_files, inline};
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
@@ -34,22 +35,24 @@ impl Loaded {
         let Error::Case(found) = &error else { return error };
         let Ok(table) = DeTable::parse(&self.text) else { return error };
         let of = |p: &Problem| {
-            let span = span_of(&table, &p.key);
+            let key = &p.key;
+            let span = span_of(&table, key);
             let known = p.file.is_none() && !span.is_empty();
             known.then(|| Message {
                 span,
-                key: p.key.clone(),
-                title: if p.message.starts_with(&p.key) {
+                key: key.clone(),
+                title: if p.message.starts_with(key) {
                     p.message.clone()
                 } else {
-                    format!("{}: {}", p.key, p.message)
+                    format!("{key}: {}", p.message)
                 },
-                label: p.key.clone(),
+                label: key.clone(),
                 remedy: Some(p.remedy.clone()).filter(|r| !r.is_empty()),
                 warning: false,
             })
         };
-        let Some(messages) = found.problems.iter().map(of).collect::<Option<Vec<_>>>() else { return error };
+        let problems = self.case.written.problems(found.problems.clone());
+        let Some(messages) = problems.iter().map(of).collect::<Option<Vec<_>>>() else { return error };
         let name = self.path.display().to_string();
         let mut report = render(&name, &self.text, &messages[..messages.len().min(MOST_SHOWN)]);
         report.push_str(&and_more(messages.len()));
@@ -130,6 +133,8 @@ pub fn load_text(path: &Path, text: String, spacing: Option<f64>, sets: &[String
     // What a case says of its place holds no more for its copy beside the results.
     let mut places = vec![("run.from".to_owned(), case.run.from.clone())];
     places.extend(case.files().into_iter().map(|(key, file)| (key, Some(file.clone()))));
+    // Copies have one table.
+    places.dedup();
     let mut absolute = Vec::new();
     for (key, place) in places {
         if let Some(place) = place.map(PathBuf::from).filter(|p| p.is_relative()) {
@@ -181,7 +186,7 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
     if let Some(message) = mistaken(table.get_ref()) {
         return Err(unread(message).into());
     }
-    let case: Case = toml::from_str(&text).map_err(|e| unread(explain(&e, Some(table.get_ref()))))?;
+    let mut case: Case = toml::from_str(&text).map_err(|e| unread(explain(&e, Some(table.get_ref()))))?;
     let located = |p: &Problem| Message {
         span: span_of(&table, &p.key),
         key: p.key.clone(),
@@ -194,7 +199,12 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
         let message = format!("{} elements, of which only the first {} would be read", s.written, s.read);
         Problem::new(s.path, message, format!("write {} elements", s.read))
     });
-    let problems = too_long.chain(check(&case));
+    let too_long: Vec<Problem> = too_long.collect();
+    let mut wrong_copies = lay_out(&mut case);
+    if wrong_copies.is_empty() {
+        wrong_copies = case.written.problems(check(&case));
+    }
+    let problems = too_long.into_iter().chain(wrong_copies);
     let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
     if !errors.is_empty() {
         let shown: Vec<Message> = errors.iter().take(MOST_SHOWN).map(located).collect();
@@ -236,17 +246,17 @@ fn missing(path: &Path) -> String {
 }
 
 impl Case {
-    /// The files of its meshes and the keys that name them.
+    /// The files of its meshes and the keys that name them, as they are written.
     pub(crate) fn files(&mut self) -> Vec<(String, &mut String)> {
         let obstacles = self.obstacle.iter_mut().map(|o| ("obstacle", &mut o.file));
         let walls = self.moving_wall.iter_mut().map(|w| ("moving_wall", &mut w.file));
         let water = self.fluid.iter_mut().flat_map(|f| &mut f.shape).map(|w| ("fluid.shape", &mut w.file));
         let bodies = self.body.iter_mut().map(|b| ("body", &mut b.file));
-        let mut numbered = Vec::new();
+        let (mut numbered, written) = (Vec::new(), &self.written);
         for (k, (table, file)) in
             obstacles.enumerate().chain(walls.enumerate()).chain(water.enumerate()).chain(bodies.enumerate())
         {
-            numbered.extend(file.as_mut().map(|file| (format!("{table}.{k}.file"), file)));
+            numbered.extend(file.as_mut().map(|file| (written.key(&format!("{table}.{k}.file")), file)));
         }
         numbered
     }

@@ -22,7 +22,7 @@ pub struct Gauges {
     pub force: Vec<ForceGauge>,
     /// Velocity of the water at a point.
     pub velocity: Vec<VelocityGauge>,
-    /// Volume of the water in a box.
+    /// Volume of the water in a box: behind a crest, that of overtopping.
     pub volume: Vec<VolumeGauge>,
 }
 

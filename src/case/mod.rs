@@ -12,6 +12,7 @@ mod check_motion;
 mod check_slips;
 mod check_solids;
 mod contact;
+mod copies;
 pub mod file;
 mod fluid;
 mod gauge;
@@ -20,6 +21,7 @@ mod opening;
 mod output;
 mod overrides;
 mod report;
+mod scatter;
 mod section;
 mod shape;
 mod solid;
@@ -30,12 +32,14 @@ mod wave;
 
 pub use absorber::Absorber;
 pub use contact::{Contact, ContactDevice, ContactPair, Law};
+pub use copies::{Array, Written};
 pub use fluid::{Block, Fluid, Preconditioner, Preset, Solver};
 pub use gauge::{ForceGauge, Gauges, LevelGauge, PressureGauge};
 pub(crate) use opening::{HURRY, OpeningKeys, room_behind};
 pub use opening::{Inflow, OUTFLOWS_MAX, Outflow, Rate};
 pub(crate) use output::Choice;
 pub use output::{Encoding, Output, OutputField, OutputKind, OutputRegion, Series};
+pub use scatter::{Scatter, Turned};
 pub use shape::BodyShape;
 pub(crate) use shape::{Form, Place, Wall};
 pub use solid::{Body, Freedom, MovingWall, Turn};
@@ -93,6 +97,9 @@ pub struct Case {
     /// Files to write.
     #[serde(default)]
     pub output: Output,
+    /// Where solids were written that stand in tables for several.
+    #[serde(skip)]
+    pub written: Written,
 }
 
 /// Resolution, time and gravity.

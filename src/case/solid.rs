@@ -1,6 +1,6 @@
 //! What moves: walls by a table or a formula, rigid bodies by forces.
 
-use super::{BodyShape, Face, Sine, Swing, Vector, WaveMaker};
+use super::{Array, BodyShape, Face, Scatter, Sine, Swing, Vector, WaveMaker};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -168,4 +168,14 @@ pub struct Body {
     /// Lift the body against gravity until it stands free of contact forces on what it overlaps at t = 0.
     #[serde(default)]
     pub standing: bool,
+    /// Where further ones like it go [m], each by its `center`. All of a table are called by its name and a number:
+    /// `rock_1`, which is where the table says, `rock_2` and so on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub copies: Vec<Vector>,
+    /// Several like it in rows from `center` on, named as those of `copies`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub array: Option<Array>,
+    /// Several like it at places by chance in a box about `center`, named as those of `copies`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Scatter>,
 }

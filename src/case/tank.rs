@@ -1,6 +1,6 @@
 //! What never moves: the tank, obstacles, planes.
 
-use super::{BodyShape, Turn, Vector};
+use super::{Array, BodyShape, Scatter, Turn, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -109,6 +109,18 @@ pub struct Obstacle {
     pub position: Option<Vector>,
     /// Turn about `center` or `position`.
     pub orientation: Option<Turn>,
+    /// Where further ones like it go [m], each by its `center`, its `position` or, of a box of the lattice, its
+    /// `min`. All of a table are called by its name and a number: `pile_1`, which is where the table says, `pile_2`
+    /// and so on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub copies: Vec<Vector>,
+    /// Several like it in rows from its own place on, named as those of `copies`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub array: Option<Array>,
+    /// Several like it at places by chance in a box about `center` (not of what has none: a file, a section, a box of
+    /// the lattice), named as those of `copies`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Scatter>,
 }
 
 /// A fixed rectangular wall at any angle; its layers lie behind the surface.

@@ -157,6 +157,7 @@ impl Canvas {
         let (center, radius) = (camera.project(position), shape.radius());
         let to_own = orientation.conjugate();
         let forward = to_own * camera.forward;
+        let convex = shape.is_convex();
         self.each_sample(camera, center, radius * camera.scale + 1.0, |canvas, at, i, j| {
             // From before the solid on, each time as far as nothing can be in the way.
             let start = camera.behind(i as f64, j as f64) + (center.2 - radius) * camera.forward;
@@ -168,11 +169,15 @@ impl Canvas {
                     canvas.put(at, center.2 - radius + way, lit(paint(q), normal));
                     return;
                 }
-                way += distance;
-                if way > 2.0 * radius {
+                // A convex one lies behind the plane across the way to its nearest point, which a ray along a face
+                // meets at once; of any other one no more is known than that the ball about `q` is free.
+                let towards = if convex { -slope.dot(forward) } else { 1.0 };
+                let free = distance / towards;
+                way += free;
+                if towards <= 0.0 || way > 2.0 * radius {
                     return;
                 }
-                q += distance * forward;
+                q += free * forward;
             }
         });
     }
@@ -337,4 +342,46 @@ pub fn water(value: f32) -> Vec3 {
     let k = (place as usize).min(4);
     let color = |k: usize| Vec3::from(COLORS[k].map(|c| f32::from(c) / 255.0));
     color(k).lerp(color(k + 1), place - k as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Depth and normal of the first point of a box with half edges `half` on the ray from `start` along `forward`.
+    fn met(half: DVec3, start: DVec3, forward: DVec3) -> Option<(f64, DVec3)> {
+        let (mut enter, mut leave, mut normal) = (f64::NEG_INFINITY, f64::INFINITY, DVec3::ZERO);
+        for (k, axis) in DVec3::AXES.into_iter().enumerate() {
+            let ends = [-half[k], half[k]].map(|side| (side - start[k]) / forward[k]);
+            if ends[0].min(ends[1]) > enter {
+                (enter, normal) = (ends[0].min(ends[1]), -axis * forward[k].signum());
+            }
+            leave = leave.min(ends[0].max(ends[1]));
+        }
+        (enter < leave).then_some((enter, normal))
+    }
+
+    #[test]
+    fn faces_of_a_box_are_drawn_at_a_grazing_angle() {
+        let half = DVec3::new(0.5, 2.0, 0.3);
+        for elevation in [0.5, 0.05, 0.01] {
+            let view = View { size: [160, 80], azimuth: 0.02, elevation, zoom: 1.0, target: None };
+            let camera = Camera::new(&view, -half, half);
+            let mut canvas = Canvas::new(&camera);
+            let pose = (DVec3::ZERO, DQuat::IDENTITY);
+            canvas.solid(&camera, &Shape::cuboid(2.0 * half), pose, |_| Vec3::ONE);
+            let (mut drawn, mut wrong) = (0, 0);
+            for at in 0..canvas.depth.len() {
+                let (column, row) = ((at % canvas.width) as f64, (at / canvas.width) as f64);
+                let seen = met(half, camera.behind(column, row), camera.forward);
+                let (depth, color) = seen.map_or((f32::INFINITY, BACKGROUND), |(depth, normal)| {
+                    (depth as f32, lit(Vec3::ONE, camera.seen(normal)))
+                });
+                drawn += usize::from(seen.is_some());
+                let same = canvas.depth[at] == depth || (canvas.depth[at] - depth).abs() < 0.05;
+                wrong += usize::from(!same || canvas.color[at].distance(color) > 1e-3);
+            }
+            assert!(drawn > 5000 && wrong < 20, "{elevation}: {wrong} of {drawn} samples");
+        }
+    }
 }

@@ -43,6 +43,9 @@ pub struct Verdict {
     pub grade: Grade,
     /// Why, the worst first; nothing of a fine result.
     pub reasons: Vec<String>,
+    /// What could not be judged, and what would let it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
 }
 
 impl std::fmt::Display for Verdict {

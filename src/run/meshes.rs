@@ -26,7 +26,11 @@ impl Meshes {
     /// [`Error::Io`] if one of them is gone.
     pub fn read(case: &Case, text: &str) -> Result<Self> {
         let (mut files, mut sets) = (BTreeMap::new(), Vec::new());
-        for (key, file) in case.clone().files() {
+        let mut case = case.clone();
+        let mut named = case.files();
+        // Copies have one table.
+        named.dedup_by(|a, b| a.0 == b.0);
+        for (key, file) in named {
             let path = Path::new(file.as_str());
             let bytes = std::fs::read(path).map_err(Error::io(path))?;
             let name = copy(path, &bytes);

@@ -317,7 +317,7 @@ impl Run {
         summary.case = options.name.clone();
         summary.status = status;
         summary.verdict = match error {
-            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()] },
+            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()], left_out: vec![] },
             None => verdict::judge(&summary, scale),
         };
         summary.exit_reason = reason;
@@ -429,6 +429,6 @@ impl Run {
         let by_time = progress.time / end;
         let by_steps = steps as f64 / self.steps_max as f64;
         progress.done = by_time.max(by_steps).clamp(1e-9, 1.0);
-        progress.remaining = self.pace.remaining(progress.wall, progress.done);
+        progress.remaining = self.pace.remaining(progress.wall, progress.done, self.totals.particles());
     }
 }

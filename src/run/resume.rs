@@ -79,7 +79,7 @@ fn same(root: &Path, old: &Case, new: &Case) -> Result<()> {
 pub(super) fn changed(old: &Case, new: &Case) -> Vec<String> {
     let plain = |case: &Case| {
         // When states are saved changes nothing about them.
-        let mut case = by_content(case.clone());
+        let mut case = by_content(case.as_written());
         case.run.checkpoint = Default::default();
         case.run.from = None;
         toml::Value::try_from(case).ok()

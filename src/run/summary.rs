@@ -188,6 +188,11 @@ impl Totals {
 
 impl Totals {
     /// What came in and went out, of a scene with openings.
+    /// Particles of water when last looked at.
+    pub fn particles(&self) -> u64 {
+        self.water.0
+    }
+
     fn water(&self, simulation: &Simulation) -> Option<Water> {
         let openings = &simulation.openings;
         let volume = simulation.params.spacing.powi(3);

@@ -1,7 +1,8 @@
 //! What can be said of a result: fine, degraded, or nothing at all.
 
+use crate::ledger::Entry;
 use crate::output::result::{Grade, Passed, Summary, Verdict, Water};
-use crate::scene::{Drive, Scene};
+use crate::scene::{Drive, Motion, Scene};
 use crate::simulation::Simulation;
 use crate::time_step::collapse_speed;
 use glam::DQuat;
@@ -32,8 +33,10 @@ pub struct Scale {
     speed: f64,
     /// Energy [J].
     energy: f64,
-    /// Energy that gravity along periodic axes and walls that move may give it [J].
-    given: f64,
+    /// Energy that gravity along periodic axes may give it, and what is moved once [J].
+    given: [f64; 2],
+    /// Whether anything is moved to and fro, or round and round: it may put in any energy.
+    stirred: bool,
     /// Energy that water may have that comes in, and lack that goes out, over its mass [J/kg].
     through: (f64, f64),
     /// Mass of a particle of water [kg].
@@ -110,13 +113,36 @@ impl Scale {
                 + (water + bodies) * speed * speed
                 + turning
                 + water * noise * noise,
-            given: (water + bodies)
-                * (0.5 * (speed * speed - moved * moved) + g * risen.max(0.0) + 0.5 * driven * driven),
+            given: [
+                0.5 * (water + bodies) * (speed * speed - moved * moved),
+                (water + bodies) * (g * risen.max(0.0) + 0.5 * driven * driven),
+            ],
+            stirred: scene.solids.iter().any(|solid| match &solid.drive {
+                Drive::Prescribed(motion) => goes_on(motion, end, solid.shape.radius()),
+                Drive::Free(_) => false,
+            }),
             through: if scene.openings.is_empty() { (0.0, 0.0) } else { through },
             particle: params.particle_mass(),
         }
     }
 }
+
+/// Whether a solid with this `radius` [m] comes back, or goes round, until `end` [s]: its way is longer than the room
+/// that it takes.
+fn goes_on(motion: &Motion, end: f64, radius: f64) -> bool {
+    let times = (0..=SAMPLES).map(|k| end * f64::from(k) / f64::from(SAMPLES));
+    let (start, turn) = (motion.displacement(0.0), motion.turn(0.0));
+    let (mut last, mut way, mut room) = ((start, turn), 0.0, (0.0_f64, start, start));
+    for (at, turned) in times.map(|t| (motion.displacement(t), motion.turn(t))) {
+        way += at.distance(last.0) + radius * turned.angle_between(last.1);
+        room = (room.0.max(turned.angle_between(turn)), room.1.min(at), room.2.max(at));
+        last = (at, turned);
+    }
+    way > 1.5 * (room.1.distance(room.2) + radius * room.0)
+}
+
+/// Times at which a motion is looked at.
+const SAMPLES: u32 = 2000;
 
 /// Reasons, each with the grade that it leaves.
 struct Judge(Vec<(Grade, String)>);
@@ -185,14 +211,31 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     let passed = |all: &[Passed]| all.iter().map(|p| p.particles).sum::<u64>() as f64 * scale.particle;
     let through = |w: &Water| scale.through.0 * passed(&w.inflow) + scale.through.1 * passed(&w.outflow);
     let passing = summary.water.as_ref().map_or(0.0, through);
-    let gain = m.energy_max - m.energy_start - scale.given - passing;
-    let energy = scale.energy + passing;
-    judge.bound(gain, (GAIN.0 * energy, GAIN.1 * energy), || {
-        format!("the energy rose by {gain:.2e} J, where {energy:.2e} J is at hand")
+    // What solids that are moved put in is known to the ledger alone: a tank that is shaken may come to any energy.
+    let work = summary.ledger.as_ref().map(|ledger| {
+        let of = |entry: Entry| ledger.get(entry.name()).copied().unwrap_or_default();
+        of(Entry::Walls) + of(Entry::Friction).max(0.0) + of(Entry::Viscosity).max(0.0)
     });
+    let [drawn, moved] = scale.given;
+    let rise = match work {
+        Some(work) if moved > 0.0 => m.energy_end - m.energy_start - work,
+        _ => m.energy_max - m.energy_start - moved,
+    };
+    let gain = rise - drawn - passing;
+    let energy = scale.energy + passing;
+    let mut left_out = vec![];
+    if scale.stirred && work.is_none() && gain > GAIN.0 * energy {
+        let why = "the energy: solids that go to and fro put in work, which output.ledger = true would tell";
+        left_out.push(why.to_owned());
+    } else {
+        judge.bound(gain, (GAIN.0 * energy, GAIN.1 * energy), || {
+            format!("the energy rose by {gain:.2e} J, where {energy:.2e} J is at hand")
+        });
+    }
     judge.0.sort_by_key(|fault| std::cmp::Reverse(fault.0));
     Verdict {
         grade: judge.0.first().map_or(Grade::Fine, |(grade, _)| *grade),
         reasons: judge.0.into_iter().map(|(_, why)| why).collect(),
+        left_out,
     }
 }

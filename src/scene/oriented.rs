@@ -50,14 +50,9 @@ impl Placed {
         let q = self.axes.transpose() * (p - self.center);
         if self.shape.as_cuboid().is_some() { self.shape.outside(q) } else { self.shape.distance(q).0 }
     }
-    /// Whether planes tell it apart from what does not touch it.
+    /// See [`Shape::is_convex`].
     pub fn is_convex(&self) -> bool {
-        match self.shape {
-            #[cfg(feature = "mesh")]
-            Shape::Mesh(_) => false,
-            Shape::Polygon(_) => false,
-            _ => true,
-        }
+        self.shape.is_convex()
     }
     /// How far the shapes overlap along the direction in which they overlap least [m]; 0 or less: apart.
     #[cfg(test)]

@@ -227,12 +227,24 @@ impl Builder<'_> {
                 (lengths.min_element(), DVec3::ZERO, "shape", "of its own frame")
             }
         };
-        let message =
-            format!("{} `{}` is {least:.2e} m thin at {} {whose}", solid.what(), solid.name, point(place));
-        if least < l0 * (1.0 - 1e-6) || solid.wall_offset.len() < 4 {
+        let named = format!("{} `{}`", solid.what(), solid.name);
+        let message = format!("{named} is {least:.2e} m thin at {} {whose}", point(place));
+        let key = format!("{key}.{of}");
+        let lengths = 2.0 * solid.shape.extent(DMat3::IDENTITY);
+        let longest = if self.lattice.plane { lengths.x.max(lengths.z) } else { lengths.max_element() };
+        let stand = solid.wall_offset.len();
+        if longest < 2.0 * l0 && (least < l0 || stand < 4) {
+            let message = format!("{named} is {longest:.2e} m long, too small for particles of {l0} m");
+            let remedy = format!("use run.spacing = {:.1e} or less, or check its `scale`", 0.25 * longest);
+            self.problems.push(Problem::new(key, message, remedy));
+        } else if least < l0 * (1.0 - 1e-6) {
             let message = format!("{message}, less than one particle of {l0} m");
             let remedy = format!("use run.spacing = {least:.1e} or less, or thicken it");
-            self.problems.push(Problem::new(format!("{key}.{of}"), message, remedy));
+            self.problems.push(Problem::new(key, message, remedy));
+        } else if stand < 4 {
+            let message = format!("{named} has room for {stand} particles of {l0} m on its surface alone");
+            let remedy = format!("use run.spacing = {:.1e} or less, or make it larger", 0.5 * l0);
+            self.problems.push(Problem::new(key, message, remedy));
         } else if least < 2.0 * l0 * (1.0 - 1e-6) {
             self.notes
                 .push(format!("{message}: less than two particles of {l0} m, the force on it is rough"));

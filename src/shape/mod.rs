@@ -156,6 +156,16 @@ impl Shape {
         }
     }
 
+    /// Whether planes tell it apart from what does not touch it.
+    pub fn is_convex(&self) -> bool {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(_) => false,
+            Self::Polygon(_) => false,
+            _ => true,
+        }
+    }
+
     /// Its centre in the coordinates of its file or section [m], before [`Shape::frame`] is left.
     pub(crate) fn origin(&self) -> DVec3 {
         match self {

@@ -46,6 +46,26 @@ impl<const D: usize> Nearest<D> {
         }
     }
 
+    /// Whether any of them is nearer to `x` than `reach`.
+    pub fn has_within(&self, x: [f64; D], reach: f64) -> bool {
+        reach > 0.0 && self.has(x, reach * reach, 0, self.order.len())
+    }
+
+    fn has(&self, x: [f64; D], square: f64, from: usize, to: usize) -> bool {
+        let is_near =
+            |k: usize| x.iter().zip(&self.points[k]).map(|(x, p)| (x - p) * (x - p)).sum::<f64>() < square;
+        if to - from <= FEW {
+            return self.order[from..to].iter().any(|&k| is_near(k));
+        }
+        let middle = from + (to - from) / 2;
+        let beyond = x[self.axes[middle]] - self.points[self.order[middle]][self.axes[middle]];
+        let [low, high] = [(from, middle), (middle + 1, to)];
+        let (near, far) = if beyond < 0.0 { (low, high) } else { (high, low) };
+        is_near(self.order[middle])
+            || self.has(x, square, near.0, near.1)
+            || beyond * beyond < square && self.has(x, square, far.0, far.1)
+    }
+
     fn compare(&self, x: [f64; D], k: usize, found: &mut (f64, usize)) {
         let off = x.iter().zip(&self.points[k]).map(|(x, p)| (x - p) * (x - p)).sum();
         if (off, k) < *found {
@@ -89,6 +109,8 @@ mod tests {
             let off = |p: &[f64; 3]| p.iter().zip(x).map(|(p, x)| (p - x).powi(2)).sum::<f64>();
             let nearest = (0..points.len()).min_by(|&a, &b| off(&points[a]).total_cmp(&off(&points[b])));
             assert_eq!(tree.to(x), nearest, "{x:?}");
+            let least = nearest.map_or(f64::NAN, |k| off(&points[k]).sqrt());
+            assert!(tree.has_within(x, 1.000_001 * least) && !tree.has_within(x, 0.999_999 * least), "{x:?}");
         }
         assert_eq!(Nearest::<3>::new(vec![]).to([0.0; 3]), None);
     }

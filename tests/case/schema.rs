@@ -75,6 +75,7 @@ size = [0.5, 0.5]
 name = "obstacle box"
 size = [0.2, 0.2, 0.2]
 center = [1.5, 0.5, 0.5]
+array = { count = [1, 1, 1], step = [0.1, 0.1, 0.1] }
 
 [[obstacle]]
 name = "obstacle drum"
@@ -82,6 +83,7 @@ shape = "cylinder"
 radius = 0.2
 height = 0.3
 center = [1.5, 1.5, 0.5]
+scatter = { count = 1, size = [1, 1, 1] }
 
 [[obstacle]]
 name = "obstacle hull"
@@ -123,6 +125,7 @@ height = 0.3
 center = [1.5, 1.5, 0.5]
 mass = 2.0
 inertia = [0.04, 0.04, 0.04]
+scatter = { count = 1, size = [2, 2, 2] }
 
 [[body]]
 name = "hull"
@@ -130,6 +133,7 @@ shape = "mesh"
 file = "hull.stl"
 center = [1.5, 1.5, 0.5]
 density = 500
+array = { count = [1, 1, 1], step = [0.1, 0.1, 0.1] }
 sine = { axis = [1, 0, 0], amplitude = 0.01, period = 1 }
 swing = { axis = [1, 0, 0], amplitude_deg = 1, period = 1 }
 

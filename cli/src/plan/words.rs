@@ -256,9 +256,10 @@ pub(super) fn too_large(case: &Case, estimate: &Estimate, room: f64, (l0, why): 
         _ => None,
     };
     let message = format!(
-        "run.spacing: {:.1e} particles and {:.1e} cells of search take about {} of memory, half of what is free here is \
-         {}, and no coarser scene tells more: at {l0:.3} m {}",
+        "run.spacing: {:.1e} particles{} and {:.1e} cells of search take about {} of memory, half of what is free \
+         here is {}, and no coarser scene tells more: at {l0:.3} m {}",
         estimate.particles,
+        estimate.of_whom(),
         estimate.cells,
         bytes(estimate.memory_beside_device),
         bytes(room),

@@ -146,8 +146,8 @@ fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
     let sections = [
         section("what", "What was run", &what(run)),
         section("seen", "Pictures", &film(pictures)),
-        section("bodies", "Bodies and moving walls", &charts(&bodies(run))),
-        section("gauges", "Gauges", &charts(&gauges(run))),
+        section("bodies", "Bodies and moving walls", &bodies(run)),
+        section("gauges", "Gauges", &gauges(run)),
         section("water", "Water in and out", &water(run)),
         section("energy", "Energies", &charts(&energies(run))),
         section("steps", "Steps", &(charts(&steps(run)) + &limits(run)?)),
@@ -177,11 +177,15 @@ fn verdict(result: &Value) -> String {
     };
     let reasons = result["verdict"]["reasons"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let reasons: String = reasons.map(|r| format!("<li>{}</li>", escape(r))).collect();
+    let left_out = result["verdict"]["left_out"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let left_out: String = left_out.map(|r| format!("<p>Not judged: {}</p>", escape(r))).collect();
     let list = if reasons.is_empty() { reasons } else { format!("<ul>{reasons}</ul>") };
     let ended = result["exit_reason"]
         .as_str()
         .map_or(String::new(), |r| format!("<p class=\"faint\">{}</p>", escape(r)));
-    format!("<div class=\"verdict {class}\"><strong>{word}</strong><p>{words}</p>{list}{ended}</div>")
+    format!(
+        "<div class=\"verdict {class}\"><strong>{word}</strong><p>{words}</p>{list}{left_out}{ended}</div>"
+    )
 }
 
 fn what(run: &Run) -> String {
@@ -251,7 +255,7 @@ fn chart(title: impl Into<String>, table: &Table, columns: &[(&str, &str)]) -> C
 /// Bodies whose way is drawn; more would be no page.
 const MOST_BODIES: usize = 12;
 
-fn bodies(run: &Run) -> Vec<Chart> {
+fn bodies(run: &Run) -> String {
     let of = |(name, table): &(String, Table)| {
         let three = |what: &str, unit: &str| {
             let columns = ["x", "y", "z"].map(|axis| format!("{what}{axis} [{unit}]"));
@@ -262,19 +266,22 @@ fn bodies(run: &Run) -> Vec<Chart> {
                 &[(x, "x"), (y, "y"), (z, "z")],
             )
         };
-        let mut seen = vec![three("", "m")];
+        // Obstacles of any shape have rows there, too, but no way.
+        let stands = run.case.obstacle.iter().any(|o| o.name == *name);
+        let mut seen = if stands { vec![] } else { vec![three("", "m")] };
         if run.case.fluid.is_some() {
             seen.push(three("fluid_force_", "N"));
         }
         seen
     };
-    run.bodies.iter().take(MOST_BODIES).flat_map(of).collect()
+    let drawn: Vec<Chart> = run.bodies.iter().take(MOST_BODIES).flat_map(of).collect();
+    charts(&drawn) + &page::rest(run.bodies.len(), MOST_BODIES, "bodies.csv")
 }
 
 /// Gauges that are drawn.
 const MOST_GAUGES: usize = 36;
 
-fn gauges(run: &Run) -> Vec<Chart> {
+fn gauges(run: &Run) -> String {
     let flat = run.case.run.dimensions == 2;
     // In two dimensions nothing acts along y, or turns about another axis.
     let still = |c: &&String| {
@@ -283,8 +290,9 @@ fn gauges(run: &Run) -> Vec<Chart> {
         let points = run.gauges.curve(c).unwrap_or_default();
         flat && across && points.iter().all(|p| p[1] == 0.0 || !p[1].is_finite())
     };
-    let columns = run.gauges.columns().iter().skip(1).filter(|c| !still(c)).take(MOST_GAUGES);
-    columns.map(|c| chart(c.clone(), &run.gauges, &[(c, c)])).collect()
+    let all: Vec<&String> = run.gauges.columns().iter().skip(1).filter(|c| !still(c)).collect();
+    let drawn = all.iter().take(MOST_GAUGES).map(|&c| chart(c.clone(), &run.gauges, &[(c, c)]));
+    charts(&drawn.collect::<Vec<_>>()) + &page::rest(all.len(), MOST_GAUGES, "gauges.csv")
 }
 
 /// What came in and went out, of a case with openings: sums, then curves.

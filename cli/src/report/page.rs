@@ -55,6 +55,14 @@ pub fn charts(charts: &[Chart]) -> String {
     if figures.is_empty() { figures } else { format!("<div class=\"charts\">\n{figures}</div>\n") }
 }
 
+/// What is said of `count` things with curves in `file`, of which a page shows no more than `shown`.
+pub fn rest(count: usize, shown: usize, file: &str) -> String {
+    match count.saturating_sub(shown) {
+        0 => String::new(),
+        more => format!("<p class=\"faint\">{more} more in {file}.</p>\n"),
+    }
+}
+
 /// Letters of a cell that is not broken.
 const LONGEST_NUMBER: usize = 14;
 

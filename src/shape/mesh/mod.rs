@@ -11,9 +11,9 @@ mod primitives;
 mod read;
 mod shells;
 mod skin;
+mod thickness;
 
 use super::surface::Surface;
-use super::thickness::{self, Way};
 use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
 use glam::{DQuat, DVec3};
 use parry3d_f64::mass_properties::MassProperties;
@@ -215,9 +215,9 @@ impl Mesh {
             let above = self.triangles.indices().iter().filter(|t| up(t)).copied().collect();
             // Triangles that a mesh was made of already, one of which looks up at least.
             let above = TriMesh::new(self.vertices().to_vec(), above);
-            above.map_or(self.thickness, |above| thinnest(&above))
+            above.map_or(self.thickness, |above| thickness::of_mesh(&above))
         } else {
-            thinnest(&self.triangles)
+            thickness::of_mesh(&self.triangles)
         };
         Thickness { place: self.frame * thickness.place + self.center, ..thickness }
     }
@@ -305,22 +305,6 @@ fn sharp(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<(DVec3, DVec3, Faces
         }
     }
     out
-}
-
-fn thinnest(mesh: &TriMesh) -> Thickness {
-    let size = mesh.local_aabb().extents().length();
-    let ways = mesh.triangles().filter_map(|triangle| {
-        let start = (triangle.a + triangle.b + triangle.c) / 3.0;
-        let twice = (triangle.b - triangle.a).cross(triangle.c - triangle.a);
-        let (inwards, area) = (-twice.normalize_or_zero(), 0.5 * twice.length());
-        let ray = Ray::new(start + 1e-7 * size * inwards, inwards);
-        let end = mesh.cast_local_ray_and_get_normal(&ray, size, false)?;
-        // It leaves the solid there, whichever side parry looks from.
-        let outward = if end.normal.dot(inwards) < 0.0 { -end.normal } else { end.normal };
-        Some(Way { start, inwards, length: end.time_of_impact, area, outward })
-    });
-    let (least, place) = thickness::thinnest(ways, |q| mesh.project_local_point(q, false).point.distance(q));
-    Thickness { least, place }
 }
 
 impl Geometry for Mesh {

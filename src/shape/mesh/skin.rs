@@ -7,6 +7,7 @@
 
 use super::super::APART;
 use super::super::cells::Cells;
+use super::super::nearest::Nearest;
 use super::Mesh;
 use super::particles::Place;
 use glam::DVec3;
@@ -64,6 +65,7 @@ pub(super) struct Skin<'a> {
     of: Vec<(usize, DVec3)>,
     faces: Vec<Face>,
     gaps: Vec<Gap>,
+    corners: Nearest<3>,
 }
 
 /// Places of a lattice in the plane of a face: `start` + k `step` along two axes [m].
@@ -148,12 +150,18 @@ impl<'a> Skin<'a> {
             gaps.extend(corner(at(v), &normals));
         }
         let of = face_of.into_iter().zip(normals).collect();
-        Self { mesh, spacing, of, faces, gaps }
+        let corners = Nearest::new(vertices.iter().map(|v| v.to_array()).collect());
+        Self { mesh, spacing, of, faces, gaps, corners }
     }
 
     /// The place `depth` [m] below a point of the surface, if that is the nearest one there, to `off` [m].
     fn below(&self, (at, outward, _): Candidate, depth: f64, off: f64) -> Option<Place> {
         let x = at - depth * outward;
+        // Below a rough surface of small triangles most of the folds are no more, and a corner that is nearer is
+        // found a hundred times as fast as the nearest point of all.
+        if self.corners.has_within(x.to_array(), depth - off) {
+            return None;
+        }
         let (nearest, inside) = self.mesh.nearest(x);
         let way = nearest - x;
         let sound = inside && nearest.distance(at) <= off;

@@ -8,7 +8,7 @@ mod layer;
 use super::areas;
 use super::cells::Cells;
 use super::surface::Surface;
-use super::thickness::{Way, thinnest};
+use super::thickness::{Surface as Outline, Way, thinnest};
 use super::thin::Thin;
 use super::{APART, Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
 use glam::{DVec2, DVec3};
@@ -112,7 +112,7 @@ impl Polygon {
             let (start, inwards, outward) = (space(middle), space(inwards), space(outward));
             Some(Way { start, inwards, length, area: a.distance(b), outward })
         });
-        let (least, place) = thinnest(ways, |q| space(self.nearest(plane(q)).0).distance(q));
+        let (least, place) = thinnest(ways, self);
         (least, place + space(self.center))
     }
 
@@ -158,6 +158,17 @@ impl Polygon {
         let mut found: Vec<f64> = self.sides().filter_map(crossing).collect();
         found.sort_by(f64::total_cmp);
         found
+    }
+}
+
+impl Outline for Polygon {
+    fn comes_within(&self, q: DVec3, distance: f64) -> bool {
+        self.nearest(plane(q)).0.distance(plane(q)) < distance
+    }
+
+    fn parts(&self, a: DVec3, b: DVec3) -> bool {
+        let (a, way) = (plane(a), plane(b - a));
+        way != DVec2::ZERO && !self.crossings(a, way.normalize(), way.length()).is_empty()
     }
 }
 
