@@ -31,7 +31,7 @@ impl Columns {
     fn coarser(&self) -> Option<Self> {
         let cuts: Vec<u32> = self.cuts.iter().map(|c| c.div_ceil(2)).collect();
         let least = least(cuts.len() - 1, self.ring) as u32;
-        cuts.windows(2).all(|c| c[1] - c[0] >= least).then(|| Self { cuts, ..*self })
+        cuts.windows(2).all(|c| c[1] - c[0] >= least).then_some(Self { cuts, ..*self })
     }
 
     /// Whether the first and the last one are neighbours, and of different ranks.
