@@ -368,8 +368,8 @@ fn plan_tells_what_ranks_have_and_say() {
         ),
         (shipped("dam_break_2d", &[]), 4),
         (ring(0.0, "solver = { preconditioner = \"multigrid\" }", FREE), 3),
-        (crate::ranks_levels::pool(0.0), 5),
-        (crate::ranks_levels::round(0.0, 0.0), 3),
+        (crate::ranks_levels::pool(), 5),
+        (crate::ranks_levels::round(0.0), 3),
     ] {
         let scene = Scene::build(&case).expect("it builds");
         let around = scene.periodic.is_along(0);

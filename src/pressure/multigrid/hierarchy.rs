@@ -45,10 +45,10 @@ impl Hierarchy {
         self.columns.first()
     }
 
-    /// How many levels ranks share.
+    /// The columns of the levels that ranks share.
     #[cfg(test)]
-    pub fn shared(&self) -> usize {
-        self.columns.len()
+    pub fn shared(&self) -> &[Columns] {
+        &self.columns
     }
 
     /// Makes the levels behind the first one.

@@ -94,9 +94,15 @@ impl Water {
             }
             coarse.cycle(0, share);
         }
+        for (level, columns) in coarse.used().iter().zip(coarse.shared()) {
+            let (own, beside) = level.coordinates.split_at(level.own);
+            let mine = columns.mine();
+            assert!(own.iter().all(|c| mine.contains(&c[0])), "own columns");
+            assert!(beside.iter().all(|c| c[0] == mine.start - 1 || c[0] == mine.end), "and those beside");
+        }
         let level = &coarse.levels[0];
         let out = level.coordinates[..level.own].iter().copied().zip(level.x.iter().copied()).collect();
-        (out, coarse.shared(), coarse.used().iter().map(|level| level.own).collect())
+        (out, coarse.shared().len(), coarse.used().iter().map(|level| level.own).collect())
     }
 
     /// The same of ranks that are cut like this.
