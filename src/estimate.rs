@@ -8,9 +8,7 @@ use serde::Serialize;
 /// each one of water (the lists and the solver), for each cell of the search, for each cell of the lattice.
 const PARTICLE: f64 = 400.0;
 const WATER: f64 = 1200.0;
-/// The same of one of many ranks, for each particle of its water and copies: what it says and hears is held twice.
-const WATER_OF_RANK: f64 = 1500.0;
-/// For each particle of walls near its slab.
+/// For each particle of walls near the slab of one of many ranks.
 const WALL_OF_RANK: f64 = 200.0;
 /// For each particle of the case, on the first rank: the scene, and states that are gathered.
 const PARTICLE_OF_FIRST: f64 = 300.0;
@@ -241,7 +239,7 @@ impl Estimate {
     }
 
     /// Memory of the first and of each other one of `ranks`, on CPUs: each has its part of the water and of the walls, with what lies beside, and the
-    /// first one the scene. (577,084 particles on 2, 4 and 8 ranks: 1.16, 1.05 and 0.93 times the sum of the peaks that were measured; 1,211,326 on 8: 0.93
+    /// first one the scene. (577,084 particles on 2, 4 and 8 ranks: 1.09, 1.07 and 1.00 times the sum of the peaks that were measured; 1,211,326 on 8: 1.00
     /// times.)
     pub fn memory_of_ranks(&self, ranks: usize) -> [f64; 2] {
         if ranks < 2 {
@@ -251,7 +249,7 @@ impl Estimate {
         let [wet, all] = self.columns;
         let other = PROGRAM_OF_RANK
             + part(self.cells, 4.0, all) * SEARCH_CELL
-            + part(self.water, 2.0, wet) * WATER_OF_RANK
+            + part(self.water, 2.0, wet) * WATER
             + part(self.particles - self.water, 4.0, all) * WALL_OF_RANK;
         [other + self.particles * PARTICLE_OF_FIRST, other]
     }
