@@ -102,12 +102,8 @@ impl Smooth {
             let [middle_a, middle_b] = self.middles.of(pair);
             let (in_a, in_b) = pair.deepest();
             let closing = Self::closing(pair, now);
-            let other = |b: Other| match b {
-                Other::Solid(b) => Ok(b),
-                Other::Wall(w) => Err(self.walls[w].name.clone()),
-            };
             let driven = pair.b.solid().is_some_and(|b| !now.bodies[b].is_free());
-            let fault = |what: String| Fault { a: pair.a, b: other(pair.b), what };
+            let fault = |what: String| Fault { a: pair.a, b: self.against(pair.b), what };
             let grown = 2.0 * closing * now.substep + little;
             if pair.depth > pair.before + grown {
                 let before = before_beside(pair);
@@ -199,10 +195,6 @@ impl Smooth {
             }
             all |= stops;
             if wanted > f64::from(MOST_SUBSTEPS) {
-                let b = match pair.b {
-                    Other::Solid(b) => Ok(b),
-                    Other::Wall(w) => Err(self.walls[w].name.clone()),
-                };
                 let what = format!(
                     "may go through it within a step: {:.3e} m of way in {MOST_SUBSTEPS} sub-steps, {:.3e} m from a \
                      face to the middle; use run.time_step = {:.1e} or less",
@@ -210,7 +202,7 @@ impl Smooth {
                     middle_a.min(middle_b),
                     dt * f64::from(MOST_SUBSTEPS) / wanted
                 );
-                return Err(Fault { a: pair.a, b, what });
+                return Err(Fault { a: pair.a, b: self.against(pair.b), what });
             }
             most = most.max(wanted);
         }
