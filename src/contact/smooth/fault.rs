@@ -221,3 +221,34 @@ impl Smooth {
         other.shape.line_is_near(other.local(a.pose.position), along, way.length(), a.radius() + turned)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::body::Wrench;
+    use crate::case::Case;
+    use crate::contact::Solids;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_body_that_is_suddenly_deep_is_one_in_the_first_sub_step_too() {
+        let text = "[run]\nspacing = 0.02\ntime_step = 1e-4\nend = 1\ngravity = [0, 0, -9.81]\n\
+                    [contact]\nspring = 1e3\nsubsteps = 1\n\
+                    [[obstacle]]\nname = \"floor\"\nmin = [0, 0, -0.1]\nmax = [0.4, 0.4, 0]\n\
+                    [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.2, 0.2, 0.05]\ndensity = 1000\nstanding = true\n";
+        let case: Case = toml::from_str(text).expect("a case");
+        let scene = Scene::build(&case).expect("a scene");
+        for watched in [false, true] {
+            let mut solids = Solids::new(&scene, case.contact.as_ref()).expect("a cube");
+            let mut step = |jump: f64| {
+                solids.bodies[0].pose.position.z += jump;
+                if watched {
+                    solids.energy();
+                }
+                solids.advance(0.0, 1e-4, &[Wrench::default()])
+            };
+            assert!(step(0.0).is_ok() && step(0.0).is_ok());
+            let told = step(-0.002).expect_err("it is 2 mm deep").to_string();
+            assert!(told.contains("suddenly"), "{told}");
+        }
+    }
+}

@@ -363,6 +363,7 @@ impl Law for Smooth {
 
     fn energy(&mut self, now: Now) -> f64 {
         self.press_on_host(now);
+        self.pairs.iter_mut().for_each(Pair::looked_at);
         self.pairs.iter().map(|p| p.energy).sum()
     }
 
