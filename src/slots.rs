@@ -84,7 +84,8 @@ impl Layer {
         }
     }
 
-    /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them, either of which may be empty.
+    /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them,
+    /// either of which may be empty.
     fn slots(&self, solid: usize, shares: &[f64]) -> Vec<Slot> {
         let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
         let mut out = vec![];
@@ -352,8 +353,8 @@ impl Slots {
         field.mean + field.slope.dot(xi) + self.weight.dot(x - field.middle)
     }
 
-    /// Those of the `rows` of a rim that pass their pressure on, with it: all but those in the air above the water's level; all of them where
-    /// none is under water.
+    /// Those of the `rows` of a rim that pass their pressure on, with it: all but those in the air above the water's
+    /// level; all of them where none is under water.
     fn passing(&self, rows: Vec<(usize, f64)>, place: impl Fn(usize) -> DVec3) -> Vec<(usize, f64)> {
         // Pressure that the row's height and the water above it make: P at the height of the centre of mass.
         let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n));

@@ -1,6 +1,6 @@
-//! Slots without a rim: of a block in a row of blocks under a slab, of one in a pile. The water in them is that of the slots
-//! of other bodies which they face, and of those that these face. What it presses is known from the pressures of the last step: the
-//! enclosed body has no row that the equation could couple it by.
+//! Slots without a rim: of a block in a row of blocks under a slab, of one in a pile. The water in them is that of the
+//! slots of other bodies which they face, and of those that these face. What it presses is known from the pressures of
+//! the last step: the enclosed body has no row that the equation could couple it by.
 
 use super::{Faced, Field, Found, Opposite, Slots};
 use crate::body::slots::SlotRow;
@@ -20,7 +20,8 @@ pub struct Pressed {
     pub loads: Vec<(usize, Wrench)>,
 }
 
-/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a rim alone that lends nothing.
+/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a rim alone that
+/// lends nothing.
 pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
     if found.iter().any(|f| f.slot.rim.is_empty()) {
         let beside = beside(&found);
@@ -82,8 +83,8 @@ fn lenders(found: &[Found], beside: &[BTreeSet<usize>], k: usize) -> Vec<usize> 
 }
 
 impl Slots {
-    /// What slots do to free bodies with the solids at `poses`. `read` tells the pressures of the last step [Pa] in slots of particles; 0 where
-    /// it is dry.
+    /// What slots do to free bodies with the solids at `poses`. `read` tells the pressures of the last step [Pa] in
+    /// slots of particles; 0 where it is dry.
     ///
     /// # Errors
     /// Those of `read`.
@@ -120,7 +121,8 @@ impl Slots {
         f.slot.deep.iter().map(inside).collect()
     }
 
-    /// Pressure of the `field` of a slot of solid `k` on the surface before row `n` [Pa], and where that is, from the centre of mass [m].
+    /// Pressure of the `field` of a slot of solid `k` on the surface before row `n` [Pa], and where that is, from the
+    /// centre of mass [m].
     pub(super) fn on_row(&self, field: &Field, k: usize, pose: &Pose, n: usize) -> (f64, DVec3) {
         let place = pose.orientation * self.layers[k].offset[n];
         let at = place + pose.orientation * self.layers[k].to_surface[n];

@@ -234,7 +234,8 @@ mod tests {
         let text = "[run]\nspacing = 0.02\ntime_step = 1e-4\nend = 1\ngravity = [0, 0, -9.81]\n\
                     [contact]\nspring = 1e3\nsubsteps = 1\n\
                     [[obstacle]]\nname = \"floor\"\nmin = [0, 0, -0.1]\nmax = [0.4, 0.4, 0]\n\
-                    [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.2, 0.2, 0.05]\ndensity = 1000\nstanding = true\n";
+                    [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.2, 0.2, 0.05]\n\
+                    density = 1000\nstanding = true\n";
         let case: Case = toml::from_str(text).expect("a case");
         let scene = Scene::build(&case).expect("a scene");
         for watched in [false, true] {

@@ -1,4 +1,5 @@
-//! What never moves, as contact sees it: fixed walls and still boxes, with the faces, edges and corners that bodies can reach.
+//! What never moves, as contact sees it: fixed walls and still boxes, with the faces, edges and corners that bodies
+//! can reach.
 //!
 //! All of a wall is real that no other wall covers: the back and the sides of a plane, the rims of an open tank.
 //! A face that counts for nothing although a body can reach it would give the distance to another face to

@@ -1,6 +1,6 @@
-//! A wall that stands on another one goes on into it, as far as what lies on the other may be pressed in: else the foot of a body
-//! that slides along a floor, a little below its surface, would not meet the post that stands there, until it rises and is
-//! suddenly deep in it. Where two of these make a corner on a third one, that ends before them.
+//! A wall that stands on another one goes on into it, as far as what lies on the other may be pressed in: else the
+//! foot of a body that slides along a floor, a little below its surface, would not meet the post that stands there,
+//! until it rises and is suddenly deep in it. Where two of these make a corner on a third one, that ends before them.
 
 use super::{COVERED, WallBox, corners_are_covered, face_is_covered, is_covered, looks};
 use crate::shape::{ALL_FACES, Faces, PLANE_FACES, face_normal};
@@ -8,7 +8,8 @@ use glam::DVec3;
 
 /// How far a wall goes on into another one that it stands on, over the spacing.
 const FOOT: f64 = 0.5;
-/// How far outside of a face its corner with others is looked for, over the spacing: what lies flush with it makes none.
+/// How far outside of a face its corner with others is looked for, over the spacing: what lies flush with it makes
+/// none.
 const BESIDE: f64 = 2.0 * COVERED;
 
 /// Gives all walls their feet.
@@ -49,8 +50,9 @@ fn wall_feet(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
     (0..6).filter(|&face| stands(face) && has_corner(face)).collect()
 }
 
-/// Covered faces of wall `k` that it gives up to those that go on into it there: two of its covered faces meet at an inner corner
-/// of the others. What is pressed into that corner is held by these, and would be far from any open face of `k`.
+/// Covered faces of wall `k` that it gives up to those that go on into it there: two of its covered faces meet at an
+/// inner corner of the others. What is pressed into that corner is held by these, and would be far from any open face
+/// of `k`.
 fn given_up(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
     let (wall, length) = (&walls[k], FOOT * spacing);
     let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
