@@ -76,6 +76,8 @@ pub struct Simulation {
     solids_ledger: Option<(Ledger, f64)>,
     /// Slots between free bodies and other solids, where free bodies stand in the pressure equation.
     slots: Option<Slots>,
+    /// Bodies that others enclose, and what the water between presses on each in this step.
+    enclosed: Vec<(usize, Wrench)>,
     /// Faces of driven solids at which others may stand, where forces are told.
     driven_faces: DrivenFaces,
     /// Where water comes in and goes out.
@@ -147,6 +149,7 @@ impl Simulation {
                 DrivenFaces::default()
             },
             slots: plan.needs(Arrays::Coupling).then(|| Slots::new(&scene, params.density)),
+            enclosed: vec![],
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
@@ -283,9 +286,7 @@ impl Simulation {
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let report = self.timed(Stage::ConjugateGradient, |s| {
             if s.plan.needs(Arrays::Coupling) {
-                let rest = s.params.balanced_gravity();
-                let slots = s.slot_rows()?;
-                s.backend.free_bodies(&s.solids.free_bodies(rest), &slots)?;
+                s.give_free_bodies()?;
             }
             s.backend.solve_pressure(step)
         })?;

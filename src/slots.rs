@@ -15,9 +15,13 @@
 //! A slot that stands up, between a float and a wall, has its upper rim in the air, where no water would come out: rows of the rim above the
 //! level P / rho g of all that are under water are none of it, and where P_f is negative there is air. Which rows that are the last
 //! step's pressures say. Slots that do not hang together have a field each.
+//!
+//! A body that others enclose has slots without a rim ([`enclosed`]).
 
+mod enclosed;
 mod pushes;
 
+pub use enclosed::Pressed;
 pub use pushes::{Opposite, Push};
 
 use crate::body::slots::SlotRow;
@@ -80,7 +84,8 @@ impl Layer {
         }
     }
 
-    /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them. One without either is none.
+    /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them,
+    /// either of which may be empty.
     fn slots(&self, solid: usize, shares: &[f64]) -> Vec<Slot> {
         let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
         let mut out = vec![];
@@ -100,10 +105,8 @@ impl Layer {
             rows.sort_unstable();
             let is_rim = |&n: &usize| self.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
             let (rim, deep): (Vec<usize>, Vec<usize>) = rows.into_iter().partition(is_rim);
-            if !rim.is_empty() && !deep.is_empty() {
-                let deep = deep.into_iter().map(|n| (n, shares[n])).collect();
-                out.push(Slot { solid, rim, deep });
-            }
+            let deep = deep.into_iter().map(|n| (n, shares[n])).collect();
+            out.push(Slot { solid, rim, deep });
         }
         out
     }
@@ -129,6 +132,17 @@ struct Faced {
     share: f64,
     /// What it faces nearest.
     opposite: Option<Opposite>,
+    /// Row of the solid that is.
+    row: u32,
+}
+
+/// A slot as it is found.
+struct Found {
+    slot: Slot,
+    /// How the rows of its body lie.
+    faced: Arc<[Faced]>,
+    /// Of one without a rim, those of the slots found that have the water which stands in it.
+    lenders: Vec<usize>,
 }
 
 /// The pressure in a slot, linear but for the weight of the water.
@@ -180,12 +194,7 @@ impl Slots {
         poses: &[Pose],
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<SlotRow>> {
-        let found: Vec<Slot> = self.find(poses).into_iter().map(|(slot, _)| slot).collect();
-        let pressure = self.at_rims(found.iter(), read)?;
-        let of_slot = |(slot, told): (&Slot, &Vec<f64>)| self.passed_on(slot, &poses[slot.solid], told);
-        let mut out: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
-        out.sort_unstable_by_key(|slot| (slot.solid, slot.row));
-        Ok(out)
+        Ok(self.press(poses, read)?.rows)
     }
 
     /// Boxes around the solids at `poses`, with room for a slot.
@@ -194,8 +203,8 @@ impl Slots {
         self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect()
     }
 
-    /// The slots with the solids at `poses`, each with how the rows of its body lie.
-    fn find(&self, poses: &[Pose]) -> Vec<(Slot, Arc<[Faced]>)> {
+    /// The slots with the solids at `poses`.
+    fn find(&self, poses: &[Pose]) -> Vec<Found> {
         let margin = FACING.1 * self.spacing;
         let boxes = self.boxes(poses);
         // Solids near each, with the way to the image that is.
@@ -211,25 +220,27 @@ impl Slots {
             }
             let faced: Arc<[Faced]> = self.faced(k, at_walls, &others[k], poses).into();
             let shares: Vec<f64> = faced.iter().map(|row| row.share).collect();
-            layer.slots(k, &shares).into_iter().map(|slot| (slot, faced.clone())).collect()
+            let found = |slot| Found { slot, faced: faced.clone(), lenders: vec![] };
+            layer.slots(k, &shares).into_iter().map(found).collect()
         };
-        self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free).flat_map_iter(of).collect()
+        let layers = self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free);
+        enclosed::lend(layers.flat_map_iter(of).collect())
     }
 
     /// Pressures at the rims of the slots `found`, which `read` tells.
-    fn at_rims<'a>(
+    fn at_rims(
         &self,
-        found: impl Iterator<Item = &'a Slot> + Clone,
+        found: &[Found],
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<Vec<f64>>> {
-        let places = |slot: &Slot| {
-            let first = self.layers[slot.solid].first;
-            slot.rim.iter().map(|&n| first + n).collect::<Vec<_>>()
+        let places = |found: &Found| {
+            let first = self.layers[found.slot.solid].first;
+            found.slot.rim.iter().map(|&n| first + n).collect::<Vec<_>>()
         };
-        let rows: Vec<usize> = found.clone().flat_map(places).collect();
+        let rows: Vec<usize> = found.iter().flat_map(places).collect();
         let pressure = if rows.is_empty() { vec![] } else { read(&rows)? };
         let mut rest = &pressure[..];
-        Ok(found.filter_map(|slot| rest.split_off(..slot.rim.len()).map(<[f64]>::to_vec)).collect())
+        Ok(found.iter().filter_map(|f| rest.split_off(..f.slot.rim.len()).map(<[f64]>::to_vec)).collect())
     }
 
     /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
@@ -244,25 +255,25 @@ impl Slots {
         let share = |(&offset, &area): (&DVec3, &DVec3)| {
             let outward = pose.orientation * area.normalize_or_zero();
             let x = pose.position + pose.orientation * offset;
-            let (mut nearest, mut opposite) = (reach, None);
-            let mut see = |r: DVec3, of: Opposite| {
+            let (mut nearest, mut opposite, mut row) = (reach, None, 0);
+            let mut see = |r: DVec3, of: Opposite, n: u32| {
                 let distance = r.length();
                 if r.dot(outward) > AHEAD * distance && distance < nearest {
-                    (nearest, opposite) = (distance, Some(of));
+                    (nearest, opposite, row) = (distance, Some(of), n);
                 }
             };
             if at_walls {
                 let of = |n: u32| Opposite::Wall(self.fixed_of[n as usize]);
-                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, of(n)));
+                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, of(n), n));
             }
             for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
                 let local = pose.orientation.inverse() * (x - way - pose.position);
                 let way = |n: u32| pose.orientation * (layer.grid.point(n) - local);
-                layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other)));
+                layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other), n));
             }
             let share = ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-            Faced { share, opposite }
+            Faced { share, opposite, row }
         };
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }
@@ -287,7 +298,7 @@ impl Slots {
         // Relative to the centre of mass, world axes.
         let place = |n: usize| pose.orientation * layer.offset[n];
         let on_surface = |n: usize| place(n) + pose.orientation * layer.to_surface[n];
-        let passing = self.passing(slot, pressure, place);
+        let passing = self.passing(slot.rim.iter().copied().zip(pressure.iter().copied()).collect(), place);
         let count = passing.len() as f64;
         let field = self.field(&passing, place);
         let Field { middle, inverse, any_wet, .. } = field;
@@ -342,10 +353,9 @@ impl Slots {
         field.mean + field.slope.dot(xi) + self.weight.dot(x - field.middle)
     }
 
-    /// Rows of the rim of `slot` that pass their `pressure` on, with it: all but those in the air above the water's level; all of them where
-    /// none is under water.
-    fn passing(&self, slot: &Slot, pressure: &[f64], place: impl Fn(usize) -> DVec3) -> Vec<(usize, f64)> {
-        let rows: Vec<(usize, f64)> = slot.rim.iter().copied().zip(pressure.iter().copied()).collect();
+    /// Those of the `rows` of a rim that pass their pressure on, with it: all but those in the air above the water's
+    /// level; all of them where none is under water.
+    fn passing(&self, rows: Vec<(usize, f64)>, place: impl Fn(usize) -> DVec3) -> Vec<(usize, f64)> {
         // Pressure that the row's height and the water above it make: P at the height of the centre of mass.
         let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n));
         let wet = rows.iter().filter(|(_, p)| *p > 0.0);

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 /// What the solids that move have pressed on each of [`Scene::walls`].
 pub(crate) struct FixedWalls {
+    names: Vec<String>,
     /// Where torques count about [m].
     middle: Vec<DVec3>,
     periodic: Periodic,
@@ -23,7 +24,13 @@ impl FixedWalls {
     pub fn new(scene: &Scene) -> Self {
         let none = vec![Wrench::default(); scene.walls.len()];
         let middle = scene.walls.iter().map(|wall| wall.middle).collect();
-        Self { middle, periodic: scene.periodic, touched: none.clone(), mean: none }
+        let names = scene.walls.iter().map(|wall| wall.name.clone()).collect();
+        Self { names, middle, periodic: scene.periodic, touched: none.clone(), mean: none }
+    }
+
+    /// Name of wall `k`, as in the case.
+    pub fn name(&self, k: usize) -> &str {
+        &self.names[k]
     }
 
     /// Wall `k` has got the `impulse` [N s] at the place `at` [m] and the moment `twist` [N m s] beside.

@@ -1,6 +1,7 @@
 //! What a contact law is: its search, its forces, what follows from them. A law is one folder here and one arm
 //! of [`super::kind`].
 
+use super::between::Against;
 use super::candidates::Candidates;
 use super::device::Link;
 use super::fixed::FixedWalls;
@@ -51,8 +52,8 @@ impl Summary {
 pub(crate) struct Fault {
     /// The solid that it is about.
     pub a: usize,
-    /// The other one: a solid, or the name of a wall.
-    pub b: std::result::Result<usize, String>,
+    /// The other one.
+    pub b: Against,
     /// What the first one does, said of it.
     pub what: String,
 }
@@ -63,8 +64,8 @@ pub(crate) trait Law: Send {
     /// one and the law has a kernel for these solids.
     fn evaluate(&mut self, now: Now, device: Option<Link>) -> Result<()>;
 
-    /// Adds the wrenches of the last evaluation to `load`, one per solid.
-    fn add_loads(&self, load: &mut [Wrench]);
+    /// Adds the wrenches of the last evaluation, made with `bodies`, to `load`, one per solid.
+    fn add_loads(&self, bodies: &[Body], load: &mut [Wrench]);
 
     /// Gives the fixed walls what the last evaluation presses on them over `span` [s].
     fn press_walls(&self, bodies: &[Body], span: f64, fixed: &mut FixedWalls);

@@ -32,6 +32,7 @@ use crate::compute::Compute;
 use crate::error::{Error, Result};
 use crate::periodic::Periodic;
 use crate::scene::Scene;
+use between::Against;
 use candidates::Candidates;
 use device::{Link, Traffic};
 use fixed::FixedWalls;
@@ -335,9 +336,9 @@ impl Solids {
     }
 
     fn fault(&self, fault: &Fault, time: f64) -> Error {
-        let other = match &fault.b {
-            Ok(b) => format!("\"{}\"", self.names[*b]),
-            Err(wall) => format!("wall \"{wall}\""),
+        let other = match fault.b {
+            Against::Solid(b) => format!("\"{}\"", self.names[b]),
+            Against::Wall(w) => format!("wall \"{}\"", self.fixed.name(w)),
         };
         let what = format!("body \"{}\" against {other}: it {}", self.names[fault.a], fault.what);
         Error::Diverged { step: 0, time, stage: "contact", what }
@@ -360,7 +361,7 @@ impl Solids {
         let span = if self.substep > 0.0 { 0.5 * (self.substep + h) } else { h };
         self.load.fill(Wrench::default());
         if let Some(law) = &self.law {
-            law.add_loads(&mut self.load);
+            law.add_loads(&self.bodies, &mut self.load);
         }
         for ((body, load), fluid) in self.bodies.iter_mut().zip(&self.load).zip(fluid) {
             body.touched.add(span, load);

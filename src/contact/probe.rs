@@ -49,7 +49,7 @@ impl Solids {
         self.evaluate(compute.as_mut().map(|c| &mut **c as &mut dyn Compute), h, dt)?;
         let mut probe = Probe { wrenches: vec![Wrench::default(); self.bodies.len()], ..Probe::default() };
         if let Some(law) = &mut self.law {
-            law.add_loads(&mut probe.wrenches);
+            law.add_loads(&self.bodies, &mut probe.wrenches);
             let link = compute.map(|compute| Link { compute, traffic: &mut self.traffic });
             law.probe(&self.bodies, link, &mut probe)?;
         }

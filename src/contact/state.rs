@@ -29,7 +29,7 @@ impl Solids {
         let half = 0.5 * self.substep;
         let mut load = vec![Wrench::default(); self.bodies.len()];
         if let Some(law) = &self.law {
-            law.add_loads(&mut load);
+            law.add_loads(&self.bodies, &mut load);
         }
         for (body, load) in self.bodies.iter().zip(&load).filter(|(b, _)| b.is_free()) {
             let mut body = body.clone();

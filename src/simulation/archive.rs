@@ -28,6 +28,7 @@ impl Simulation {
             gone: _,
             // Follows from the case.
             slots: _,
+            enclosed: _,
             driven_faces: _,
             // Times by the clock are those of each process.
             stages: _,

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::ledger::Entry;
 use crate::params::Step;
 use crate::plan::{Arrays, Stage};
-use crate::slots::{Opposite, Push};
+use crate::slots::{Opposite, Pressed, Push};
 
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
@@ -40,9 +40,22 @@ impl Simulation {
     /// # Errors
     /// A device that is lost.
     pub fn slot_rows(&mut self) -> Result<Vec<SlotRow>> {
-        let Some(found) = &self.slots else { return Ok(vec![]) };
+        Ok(self.pressed_by_slots()?.rows)
+    }
+
+    fn pressed_by_slots(&mut self) -> Result<Pressed> {
+        let Some(found) = &self.slots else { return Ok(Pressed::default()) };
         let backend = &mut *self.backend;
-        found.rows(self.solids.predicted(), |slots| row_pressures(backend, slots))
+        found.press(self.solids.predicted(), |slots| row_pressures(backend, slots))
+    }
+
+    /// Gives the pressure equation the free bodies, and what slots bring them.
+    pub(crate) fn give_free_bodies(&mut self) -> Result<()> {
+        let Pressed { rows, loads } = self.pressed_by_slots()?;
+        let mut bodies = self.solids.free_bodies(self.params.balanced_gravity());
+        loads.iter().for_each(|&(k, load)| bodies[k].load += load);
+        self.enclosed = loads;
+        self.backend.free_bodies(&bodies, &rows)
     }
 
     /// What the water in slots presses on walls and solids; nothing where no free body stands in the pressure equation.
@@ -111,6 +124,9 @@ impl Simulation {
             let force = pressure.in_force(to_surface, &self.params) * c.area;
             let arm = turn * solid.wall_offset[c.row] + to_surface;
             sum[c.solid] += Wrench { force, torque: arm.cross(force) };
+        }
+        for &(k, load) in &self.enclosed {
+            sum[k] += load;
         }
         for push in pushes {
             let Opposite::Solid(k) = push.on else { continue };

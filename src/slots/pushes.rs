@@ -1,11 +1,10 @@
 //! What slots press on what stands opposite to a body: the reaction of what they press on bodies.
 
-use super::{Faced, Slot, Slots};
+use super::{Field, Found, Slots};
 use crate::body::Pose;
 use crate::contact::broad::meeting_images;
 use crate::error::Result;
 use glam::DVec3;
-use std::sync::Arc;
 
 /// What a body's slot lies before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,24 +45,26 @@ impl Slots {
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<Push>> {
         let found = self.find(poses);
-        let pressure = self.at_rims(found.iter().map(|(slot, _)| slot), read)?;
-        let of = |((slot, faced), told): (&(Slot, Arc<[Faced]>), &Vec<f64>)| {
-            self.pushes_of(slot, faced, &poses[slot.solid], told)
+        let pressure = self.at_rims(&found, read)?;
+        let of = |(f, told): (&Found, &Vec<f64>)| {
+            let (slot, pose) = (&f.slot, &poses[f.slot.solid]);
+            let place = |n: usize| pose.orientation * self.layers[slot.solid].offset[n];
+            let rows = || slot.rim.iter().copied().zip(told.iter().copied()).collect();
+            let field = match slot.rim.is_empty() {
+                true => self.lent(&found, &pressure, f, poses),
+                false => Some(self.field(&self.passing(rows(), place), place)).filter(|field| field.any_wet),
+            };
+            field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, pose))
         };
         Ok(found.iter().zip(&pressure).flat_map(of).collect())
     }
 
-    fn pushes_of(&self, slot: &Slot, faced: &[Faced], pose: &Pose, pressure: &[f64]) -> Vec<Push> {
+    fn pushes_of(&self, found: &Found, field: &Field, pose: &Pose) -> Vec<Push> {
+        let Found { slot, faced, .. } = found;
         let layer = &self.layers[slot.solid];
-        let place = |n: usize| pose.orientation * layer.offset[n];
         let area = |n: usize| pose.orientation * layer.area[n];
-        let field = self.field(&self.passing(slot, pressure, place), place);
-        if !field.any_wet {
-            return vec![];
-        }
         let push = |n: usize, area: DVec3| {
-            let on_surface = place(n) + pose.orientation * layer.to_surface[n];
-            let p = self.in_slot(&field, place(n), on_surface).max(0.0);
+            let (p, on_surface) = self.on_row(field, slot.solid, pose, n);
             let on = faced[n].opposite?;
             Some(Push { on, at: pose.position + on_surface, force: faced[n].share * p * area })
         };

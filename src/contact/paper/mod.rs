@@ -119,7 +119,7 @@ impl Law for Paper {
         Ok(())
     }
 
-    fn add_loads(&self, load: &mut [Wrench]) {
+    fn add_loads(&self, _: &[Body], load: &mut [Wrench]) {
         for pair in self.evaluated() {
             load[pair.a] += pair.wrench[0];
             if let Some(b) = pair.b {

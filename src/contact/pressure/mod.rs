@@ -52,7 +52,7 @@ impl Law for Pressure {
         Ok(())
     }
 
-    fn add_loads(&self, _: &mut [Wrench]) {}
+    fn add_loads(&self, _: &[Body], _: &mut [Wrench]) {}
 
     fn press_walls(&self, _: &[Body], _: f64, _: &mut FixedWalls) {}
 

@@ -102,12 +102,8 @@ impl Smooth {
             let [middle_a, middle_b] = self.middles.of(pair);
             let (in_a, in_b) = pair.deepest();
             let closing = Self::closing(pair, now);
-            let other = |b: Other| match b {
-                Other::Solid(b) => Ok(b),
-                Other::Wall(w) => Err(self.walls[w].name.clone()),
-            };
             let driven = pair.b.solid().is_some_and(|b| !now.bodies[b].is_free());
-            let fault = |what: String| Fault { a: pair.a, b: other(pair.b), what };
+            let fault = |what: String| Fault { a: pair.a, b: self.against(pair.b), what };
             let grown = 2.0 * closing * now.substep + little;
             if pair.depth > pair.before + grown {
                 let before = before_beside(pair);
@@ -199,10 +195,6 @@ impl Smooth {
             }
             all |= stops;
             if wanted > f64::from(MOST_SUBSTEPS) {
-                let b = match pair.b {
-                    Other::Solid(b) => Ok(b),
-                    Other::Wall(w) => Err(self.walls[w].name.clone()),
-                };
                 let what = format!(
                     "may go through it within a step: {:.3e} m of way in {MOST_SUBSTEPS} sub-steps, {:.3e} m from a \
                      face to the middle; use run.time_step = {:.1e} or less",
@@ -210,7 +202,7 @@ impl Smooth {
                     middle_a.min(middle_b),
                     dt * f64::from(MOST_SUBSTEPS) / wanted
                 );
-                return Err(Fault { a: pair.a, b, what });
+                return Err(Fault { a: pair.a, b: self.against(pair.b), what });
             }
             most = most.max(wanted);
         }
@@ -227,5 +219,37 @@ impl Smooth {
         let turned = dt * b.map_or(0.0, |b| b.pose.angular_velocity.length()) * b.map_or(0.0, |b| b.radius());
         let along = other.axes.transpose() * way.normalize_or(DVec3::X);
         other.shape.line_is_near(other.local(a.pose.position), along, way.length(), a.radius() + turned)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::body::Wrench;
+    use crate::case::Case;
+    use crate::contact::Solids;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_body_that_is_suddenly_deep_is_one_in_the_first_sub_step_too() {
+        let text = "[run]\nspacing = 0.02\ntime_step = 1e-4\nend = 1\ngravity = [0, 0, -9.81]\n\
+                    [contact]\nspring = 1e3\nsubsteps = 1\n\
+                    [[obstacle]]\nname = \"floor\"\nmin = [0, 0, -0.1]\nmax = [0.4, 0.4, 0]\n\
+                    [[body]]\nname = \"cube\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.2, 0.2, 0.05]\n\
+                    density = 1000\nstanding = true\n";
+        let case: Case = toml::from_str(text).expect("a case");
+        let scene = Scene::build(&case).expect("a scene");
+        for watched in [false, true] {
+            let mut solids = Solids::new(&scene, case.contact.as_ref()).expect("a cube");
+            let mut step = |jump: f64| {
+                solids.bodies[0].pose.position.z += jump;
+                if watched {
+                    solids.energy();
+                }
+                solids.advance(0.0, 1e-4, &[Wrench::default()])
+            };
+            assert!(step(0.0).is_ok() && step(0.0).is_ok());
+            let told = step(-0.002).expect_err("it is 2 mm deep").to_string();
+            assert!(told.contains("suddenly"), "{told}");
+        }
     }
 }

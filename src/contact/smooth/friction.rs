@@ -18,7 +18,9 @@
 use super::coulomb::{ARM, System, root_of, sticks};
 use super::pair::{Other, Pair};
 use super::patch::Patch;
+use super::walls::WallBox;
 use crate::body::Body;
+use crate::contact::between::Against;
 use crate::contact::fixed::FixedWalls;
 use glam::{DMat2, DMat3, DVec3};
 
@@ -109,12 +111,15 @@ impl Friction {
         }
     }
 
-    /// Gives fixed walls, whose numbers in the scene `of` tells, what the last [`Self::apply`] has taken from them.
-    pub fn press_walls(&self, bodies: &[Body], of: impl Fn(usize) -> usize, fixed: &mut FixedWalls) {
+    /// Gives fixed walls and still boxes what the last [`Self::apply`] has taken from them.
+    pub fn press_walls(&self, bodies: &mut [Body], walls: &[WallBox], fixed: &mut FixedWalls) {
         for slip in self.slips.iter().chain(&self.dragged) {
-            if let Other::Wall(w) = slip.b {
-                let (push, twist) = slip.parts(slip.impulse);
-                fixed.touch(of(w), -push, bodies[slip.a].pose.position + slip.arm_a, -twist);
+            let Other::Wall(w) = slip.b else { continue };
+            let (push, twist) = slip.parts(slip.impulse);
+            let at = bodies[slip.a].pose.position + slip.arm_a;
+            match walls[w].of {
+                Against::Wall(k) => fixed.touch(k, -push, at, -twist),
+                Against::Solid(k) => bodies[k].touch(-push, -(at - walls[w].middle).cross(push) - twist),
             }
         }
     }

@@ -76,7 +76,10 @@ const STOP_DEPTH: f64 = 0.25;
 pub(crate) struct Smooth {
     /// One for all solids that are alike.
     pub surfaces: Vec<Arc<Surface>>,
+    /// Fixed walls and still boxes.
     pub walls: Vec<WallBox>,
+    /// Which solids are among `walls`.
+    still: Vec<bool>,
     pub pairs: Vec<Pair>,
     friction: Friction,
     middles: Middles,
@@ -118,12 +121,14 @@ impl Smooth {
     pub fn new(scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Self {
         let surfaces = shared(scene);
         let walls = walls::walls(scene);
+        let still = scene.solids.iter().map(|solid| walls::still_box(solid).is_some()).collect();
         let middles = Middles::new(bodies, &surfaces, &walls);
         let harmless = (fault::THROUGH * middles.least()).min(fault::DRIVEN * scene.spacing);
         limits.lambda = bodies.iter().zip(&surfaces).map(|(b, s)| stability::lambda(b, s)).collect();
         Self {
             surfaces,
             walls,
+            still,
             middles,
             harmless,
             pairs: vec![],
@@ -166,7 +171,7 @@ impl Smooth {
                 }
             }
         }
-        for &Close { a, b, image } in &candidates.close {
+        for &Close { a, b, image } in candidates.close.iter().filter(|close| !self.still[close.b]) {
             let skin = candidates.skin(a) + candidates.skin(b);
             pairs.push((Pair::new(a, Other::Solid(b), image), skin));
         }
@@ -219,17 +224,19 @@ impl Smooth {
         self.press(now.bodies, LEAST, Some(&now.candidates.travel));
     }
 
+    /// What `b` is of the scene.
+    fn against(&self, b: Other) -> Against {
+        match b {
+            Other::Solid(b) => Against::Solid(b),
+            Other::Wall(w) => self.walls[w].of,
+        }
+    }
+
     /// Constants of `pair` for the longest sub-steps of `limits`.
     fn constants_of(&self, pair: &Pair, limits: &Limits, bodies: &[Body]) -> Constants {
         let [a, b] = self.middles.of(pair);
         let weight = self.surfaces[pair.a].smallest_weight;
-        let between = limits.between.of(
-            pair.a,
-            match pair.b {
-                Other::Solid(b) => Against::Solid(b),
-                Other::Wall(w) => Against::Wall(self.walls[w].of),
-            },
-        );
+        let between = limits.between.of(pair.a, self.against(pair.b));
         limits.constants(bodies, pair.a, pair.b.solid(), between, weight, self.spacing.min(a).min(b))
     }
 
@@ -286,20 +293,28 @@ impl Law for Smooth {
         Ok(())
     }
 
-    fn add_loads(&self, load: &mut [Wrench]) {
+    fn add_loads(&self, bodies: &[Body], load: &mut [Wrench]) {
         for pair in self.evaluated() {
             load[pair.a] += pair.wrench[0];
-            if let Some(b) = pair.b.solid() {
-                load[b] += pair.wrench[1];
+            match pair.b {
+                Other::Solid(b) => load[b] += pair.wrench[1],
+                Other::Wall(w) => {
+                    let wall = &self.walls[w];
+                    if let Against::Solid(b) = wall.of {
+                        let Wrench { force, torque } = pair.wrench[0];
+                        let arm = bodies[pair.a].pose.position - wall.middle;
+                        load[b] += Wrench { force: -force, torque: -torque - arm.cross(force) };
+                    }
+                }
             }
         }
     }
 
     fn press_walls(&self, bodies: &[Body], span: f64, fixed: &mut FixedWalls) {
         for pair in self.evaluated() {
-            if let Other::Wall(w) = pair.b {
+            if let Against::Wall(k) = self.against(pair.b) {
                 let (on_body, at) = (&pair.wrench[0], bodies[pair.a].pose.position);
-                fixed.touch(self.walls[w].of, -span * on_body.force, at, -span * on_body.torque);
+                fixed.touch(k, -span * on_body.force, at, -span * on_body.torque);
             }
         }
     }
@@ -307,7 +322,7 @@ impl Law for Smooth {
     fn act(&mut self, bodies: &mut [Body], fixed: &mut FixedWalls, limits: &Limits, h: f64) -> Summary {
         let mut friction = std::mem::take(&mut self.friction);
         friction.apply(self.evaluated(), bodies, limits.viscous_friction, h);
-        friction.press_walls(bodies, |w| self.walls[w].of, fixed);
+        friction.press_walls(bodies, &self.walls, fixed);
         self.friction = friction;
         Summary::default()
     }
@@ -348,6 +363,7 @@ impl Law for Smooth {
 
     fn energy(&mut self, now: Now) -> f64 {
         self.press_on_host(now);
+        self.pairs.iter_mut().for_each(Pair::looked_at);
         self.pairs.iter().map(|p| p.energy).sum()
     }
 

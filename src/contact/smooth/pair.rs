@@ -110,6 +110,11 @@ impl Pair {
         (self.depth, self.apart) = (f64::INFINITY, f64::NEG_INFINITY);
     }
 
+    /// The last evaluation was none of a sub-step: the next one's depth is held against the one before.
+    pub fn looked_at(&mut self) {
+        self.depth = self.before;
+    }
+
     /// Whether the two solids, which did not touch at the last evaluation, still do not, when they have gone `way` [m] since the
     /// lists were made. Most pairs of a heap are such neighbours.
     pub fn stays_apart(

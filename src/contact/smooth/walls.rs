@@ -1,24 +1,25 @@
-//! Fixed walls as contact sees them: boxes with the faces, edges and corners that bodies can reach.
+//! What never moves, as contact sees it: fixed walls and still boxes, with the faces, edges and corners that bodies
+//! can reach.
 //!
 //! All of a wall is real that no other wall covers: the back and the sides of a plane, the rims of an open tank.
 //! A face that counts for nothing although a body can reach it would give the distance to another face to
 //! whatever comes in through it, and a force to match.
-//!
-//! A wall that stands on another one goes on into it, as far as what lies on the other may be pressed in: else the foot of a body
-//! that slides along a floor, a little below its surface, would not meet the post that stands there, until it rises and is
-//! suddenly deep in it.
 
+mod feet;
+
+use crate::contact::between::Against;
 use crate::periodic::Periodic;
-use crate::scene::Scene;
+use crate::scene::{Scene, Solid, WallShape};
 use crate::shape::{ALL_FACES, Cuboid, Faces, Geometry, Line, PLANE_FACES, Shape, face_normal};
 use glam::{DMat3, DVec3};
 
-/// A fixed wall.
+/// A fixed wall or a still box.
 #[derive(Clone, Debug)]
 pub(crate) struct WallBox {
-    pub name: String,
-    /// Its number in [`Scene::walls`].
-    pub of: usize,
+    /// What it is of the scene.
+    pub of: Against,
+    /// Where torques on a still box count about [m].
+    pub middle: DVec3,
     pub center: DVec3,
     pub axes: DMat3,
     pub half: DVec3,
@@ -31,6 +32,12 @@ pub(crate) struct WallBox {
 }
 
 impl WallBox {
+    /// One of half edges `half` [m] along the axes of the world, with no face open.
+    fn new(of: Against, center: DVec3, half: DVec3) -> Self {
+        let axes = DMat3::IDENTITY;
+        Self { of, middle: center, center, axes, half, faces: 0, edges: vec![], corners: vec![] }
+    }
+
     /// Its shape.
     pub fn shape(&self) -> Shape {
         Shape::Box(Cuboid { half: self.half })
@@ -44,29 +51,45 @@ impl WallBox {
     fn world(&self, q: DVec3) -> DVec3 {
         self.center + self.axes * q
     }
+
+    /// Moves a face out by `length` [m]; the opposite one stays.
+    fn move_face(&mut self, face: u8, length: f64) {
+        self.half[usize::from(face / 2)] += 0.5 * length;
+        self.center += 0.5 * length * (self.axes * face_normal(face));
+    }
 }
 
 /// Gap over the spacing up to which a wall covers what it faces: nothing fits in between.
 const COVERED: f64 = 2e-3;
-/// How far a wall goes on into another one that it stands on, over the spacing.
-const FOOT: f64 = 0.5;
 /// Most points along an edge of a face at which it is looked at whether it is covered.
 const MOST_LOOKS: f64 = 40.0;
 
-/// The walls of a scene.
+/// The box of a solid that is pressed as walls are: one that stands still for ever.
+pub(super) fn still_box(solid: &Solid) -> Option<&Cuboid> {
+    solid.shape.as_cuboid().filter(|_| solid.is_still())
+}
+
+/// The walls and still boxes of a scene.
 pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
-    let (spacing, flat) = (scene.spacing, scene.dimensions == 2);
-    let boxes = scene.walls.iter().enumerate().map(|(of, wall)| WallBox {
-        name: wall.name.clone(),
-        of,
-        center: wall.center,
-        axes: wall.axes,
-        half: wall.half,
-        faces: 0,
-        edges: vec![],
-        corners: vec![],
+    let still = scene.solids.iter().enumerate().filter_map(|(k, solid)| {
+        let Cuboid { half } = *still_box(solid)?;
+        let axes = DMat3::from_quat(solid.orientation);
+        Some(WallBox { axes, ..WallBox::new(Against::Solid(k), solid.position, half) })
     });
-    let mut walls: Vec<WallBox> = boxes.flat_map(|wall| images(wall, &scene.periodic, spacing)).collect();
+    of(fixed(&scene.walls).chain(still), &scene.periodic, scene.spacing, scene.dimensions == 2)
+}
+
+/// Fixed walls as boxes.
+fn fixed(walls: &[WallShape]) -> impl Iterator<Item = WallBox> {
+    walls.iter().enumerate().map(|(k, wall)| WallBox {
+        axes: wall.axes,
+        ..WallBox::new(Against::Wall(k), wall.center, wall.half)
+    })
+}
+
+/// `boxes` and their images, with what of them bodies can reach.
+fn of(boxes: impl Iterator<Item = WallBox>, periodic: &Periodic, spacing: f64, flat: bool) -> Vec<WallBox> {
+    let mut walls: Vec<WallBox> = boxes.flat_map(|wall| images(wall, periodic, spacing)).collect();
     for k in 0..walls.len() {
         let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
         let beside = 0.5 * COVERED * spacing;
@@ -78,40 +101,8 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
         let (edges, corners) = wall_edges(&walls, k, spacing, flat);
         (walls[k].edges, walls[k].corners) = (edges, corners);
     }
-    let feet: Vec<Vec<u8>> = (0..walls.len()).map(|k| wall_feet(&walls, k, spacing, flat)).collect();
-    for (wall, feet) in walls.iter_mut().zip(feet) {
-        for face in feet {
-            let (axis, length) = (usize::from(face / 2), FOOT * spacing);
-            wall.half[axis] += 0.5 * length;
-            wall.center += 0.5 * length * (wall.axes * face_normal(face));
-        }
-    }
+    feet::set(&mut walls, spacing, flat);
     walls
-}
-
-/// Faces of wall `k` that stand in full on other walls, with an open face that meets these at an inner corner.
-fn wall_feet(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
-    let (wall, length) = (&walls[k], FOOT * spacing);
-    let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
-    // what has been found covered is so by more than a crust, up to its corners: on a slope these may stick out
-    let stands = |face: u8| {
-        let closed = (all & !wall.faces) >> face & 1 == 1;
-        closed
-            && face_is_covered(walls, k, face, length, spacing, flat)
-            && corners_are_covered(walls, k, face, length, spacing, flat)
-    };
-    let meets = |foot: u8, side: u8| {
-        let (across, beside) = (usize::from(foot / 2), usize::from(side / 2));
-        let along = 3 - across - beside;
-        let out = face_normal(foot) * (wall.half + 0.5 * length)
-            + face_normal(side) * (wall.half + 0.5 * COVERED * spacing);
-        let places = looks(wall.half[along], spacing, flat && along == 1);
-        places.into_iter().any(|x| is_covered(walls, k, out + x * DVec3::AXES[along], spacing))
-    };
-    let has_corner = |foot: u8| {
-        (0..6).any(|side| side / 2 != foot / 2 && wall.faces >> side & 1 == 1 && meets(foot, side))
-    };
-    (0..6).filter(|&face| stands(face) && has_corner(face)).collect()
 }
 
 /// Places half a spacing apart across an edge of half length `half` [m]; the middle of one that is seen end on.
@@ -132,7 +123,8 @@ fn images(mut wall: WallBox, periodic: &Periodic, spacing: f64) -> Vec<WallBox> 
     }
     let reach = DVec3::from_array([0, 1, 2].map(|k| if spans[k] { 0.0 } else { half[k] + 0.5 * length[k] }));
     let turns = periodic.turns(center - reach, center + reach);
-    turns.map(|turns| WallBox { center: center + periodic.way(turns), ..wall.clone() }).collect()
+    let image = |way: DVec3| WallBox { middle: center + way, center: center + way, ..wall.clone() };
+    turns.map(|turns| image(periodic.way(turns))).collect()
 }
 
 /// Whether another wall than `k` holds the point `q` of its frame or is next to it.
@@ -249,16 +241,7 @@ mod tests {
 
     fn wall(low: [f64; 3], high: [f64; 3]) -> WallBox {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
-        WallBox {
-            name: String::new(),
-            of: 0,
-            center: 0.5 * (low + high),
-            axes: DMat3::IDENTITY,
-            half: 0.5 * (high - low),
-            faces: 0,
-            edges: vec![],
-            corners: vec![],
-        }
+        WallBox::new(Against::Wall(0), 0.5 * (low + high), 0.5 * (high - low))
     }
 
     #[test]
@@ -290,28 +273,5 @@ mod tests {
             edges.iter().filter(|e| e.along.z.abs() > 0.5 && e.start.x > 1.0).map(|e| e.length).sum();
         assert!((upright - 1.0).abs() < 1e-2, "{upright}");
         assert!(corners.contains(&DVec3::new(2.0, 1.0, 0.0)) && corners.len() >= 6, "{corners:?}");
-    }
-
-    #[test]
-    fn a_post_goes_on_into_the_floor_and_not_out_of_a_slope() {
-        let mut walls = vec![
-            wall([0.0, 0.0, -0.2], [2.0, 1.0, 0.0]),
-            wall([0.5, 0.2, 0.0], [0.6, 0.4, 0.3]),
-            // its back is hidden by a block and a slope, which lies a little lower further on
-            wall([1.0, 0.2, 0.0], [1.2, 0.42, 0.08]),
-            wall([1.2, 0.2, 0.0], [1.28, 0.3, 0.12]),
-        ];
-        let mut slope = wall([1.0, 0.0, 0.0], [2.0, 0.6, 0.08]);
-        slope.axes = DMat3::from_rotation_y(-0.2829);
-        slope.center = DVec3::new(1.2579, 0.3, 0.1395) - slope.axes * DVec3::new(0.0, 0.0, 0.04);
-        walls.push(slope);
-        let beside = 0.5 * COVERED * 0.02;
-        for k in 0..walls.len() {
-            let open = (0..6).filter(|&f| !face_is_covered(&walls, k, f, beside, 0.02, false));
-            walls[k].faces = open.map(|f| 1 << f).sum();
-        }
-        assert_eq!(wall_feet(&walls, 1, 0.02, false), [4]);
-        assert_eq!(walls[3].faces & 1, 0, "its back is not hidden");
-        assert!(!wall_feet(&walls, 3, 0.02, false).contains(&0));
     }
 }

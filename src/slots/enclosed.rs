@@ -1,0 +1,153 @@
+//! Slots without a rim: of a block in a row of blocks under a slab, of one in a pile. The water in them is that of the
+//! slots of other bodies which they face, and of those that these face. What it presses is known from the pressures of
+//! the last step: the enclosed body has no row that the equation could couple it by.
+
+use super::{Faced, Field, Found, Opposite, Slots};
+use crate::body::slots::SlotRow;
+use crate::body::{Pose, Wrench};
+use crate::error::Result;
+use crate::kernels::coupling::row;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
+
+/// What water in slots does to free bodies.
+#[derive(Clone, Debug, Default)]
+pub struct Pressed {
+    /// Rows at slots or in them, in the order of solids and rows.
+    pub rows: Vec<SlotRow>,
+    /// Solids that others enclose, and what the water between presses on each [N], [N m].
+    pub loads: Vec<(usize, Wrench)>,
+}
+
+/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a rim alone that
+/// lends nothing.
+pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
+    if found.iter().any(|f| f.slot.rim.is_empty()) {
+        let beside = beside(&found);
+        for k in 0..found.len() {
+            if found[k].slot.rim.is_empty() {
+                found[k].lenders = lenders(&found, &beside, k);
+            }
+        }
+    }
+    let lending: BTreeSet<usize> = found.iter().flat_map(|f| f.lenders.iter().copied()).collect();
+    let is_slot = |(k, f): &(usize, &Found)| match f.slot.rim.is_empty() {
+        true => !f.lenders.is_empty(),
+        false => !f.slot.deep.is_empty() || lending.contains(k),
+    };
+    let kept: Vec<usize> = found.iter().enumerate().filter(is_slot).map(|(k, _)| k).collect();
+    let place = |k: usize| kept.partition_point(|&other| other < k);
+    for f in &mut found {
+        f.lenders.iter_mut().for_each(|k| *k = place(*k));
+    }
+    let mut at = 0..;
+    found.retain(|_| at.next().is_some_and(|k| kept.binary_search(&k).is_ok()));
+    found
+}
+
+/// Which slots face each other.
+fn beside(found: &[Found]) -> Vec<BTreeSet<usize>> {
+    let rows = |f: &Found| f.slot.rim.iter().copied().chain(f.slot.deep.iter().map(|row| row.0)).collect();
+    let all: Vec<Vec<usize>> = found.iter().map(rows).collect();
+    let of = |(k, (f, rows)): (usize, (&Found, &Vec<usize>))| {
+        rows.iter().map(|&n| ((f.slot.solid, n), k)).collect::<Vec<_>>()
+    };
+    let slot_of: HashMap<(usize, usize), usize> = found.iter().zip(&all).enumerate().flat_map(of).collect();
+    let mut beside = vec![BTreeSet::new(); found.len()];
+    for (k, (f, rows)) in found.iter().zip(&all).enumerate() {
+        for &n in rows {
+            let Faced { opposite: Some(Opposite::Solid(solid)), row, .. } = f.faced[n] else { continue };
+            if let Some(&other) = slot_of.get(&(solid, row as usize)) {
+                beside[k].insert(other);
+                beside[other].insert(k);
+            }
+        }
+    }
+    beside
+}
+
+/// Slots with a rim that slot `k` comes to through others without one.
+fn lenders(found: &[Found], beside: &[BTreeSet<usize>], k: usize) -> Vec<usize> {
+    let (mut seen, mut open, mut out) = (BTreeSet::from([k]), vec![k], BTreeSet::new());
+    while let Some(k) = open.pop() {
+        for &other in &beside[k] {
+            if !found[other].slot.rim.is_empty() {
+                out.insert(other);
+            } else if seen.insert(other) {
+                open.push(other);
+            }
+        }
+    }
+    out.into_iter().collect()
+}
+
+impl Slots {
+    /// What slots do to free bodies with the solids at `poses`. `read` tells the pressures of the last step [Pa] in
+    /// slots of particles; 0 where it is dry.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn press(&self, poses: &[Pose], read: impl FnOnce(&[usize]) -> Result<Vec<f64>>) -> Result<Pressed> {
+        let found = self.find(poses);
+        let pressure = self.at_rims(&found, read)?;
+        let of_slot = |(f, told): (&Found, &Vec<f64>)| {
+            let slot = &f.slot;
+            match slot.rim.is_empty() {
+                true => Self::without_rim(f),
+                false => self.passed_on(slot, &poses[slot.solid], told),
+            }
+        };
+        let mut rows: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
+        rows.sort_unstable_by_key(|slot| (slot.solid, slot.row));
+        let load = |f: &Found| {
+            let (k, pose) = (f.slot.solid, &poses[f.slot.solid]);
+            let field = self.lent(&found, &pressure, f, poses)?;
+            let mut load = Wrench::default();
+            for &(n, share) in &f.slot.deep {
+                let (p, at) = self.on_row(&field, k, pose, n);
+                load.add(share * p, &row(pose.orientation * self.layers[k].area[n], at));
+            }
+            Some((k, load))
+        };
+        let loads = found.iter().filter(|f| f.slot.rim.is_empty()).filter_map(load).collect();
+        Ok(Pressed { rows, loads })
+    }
+
+    /// Rows of a slot without a rim: what presses on them is none of the equation's.
+    fn without_rim(f: &Found) -> Vec<SlotRow> {
+        let solid = f.slot.solid as u32;
+        let inside = |&(n, taken)| SlotRow { solid, row: n as u32, taken, ..SlotRow::default() };
+        f.slot.deep.iter().map(inside).collect()
+    }
+
+    /// Pressure of the `field` of a slot of solid `k` on the surface before row `n` [Pa], and where that is, from the
+    /// centre of mass [m].
+    pub(super) fn on_row(&self, field: &Field, k: usize, pose: &Pose, n: usize) -> (f64, DVec3) {
+        let place = pose.orientation * self.layers[k].offset[n];
+        let at = place + pose.orientation * self.layers[k].to_surface[n];
+        (self.in_slot(field, place, at).max(0.0), at)
+    }
+
+    /// The pressure in the slot `f` without a rim, by the rims of those that lend it theirs; `None` where they are dry.
+    pub(super) fn lent(
+        &self,
+        found: &[Found],
+        pressure: &[Vec<f64>],
+        f: &Found,
+        poses: &[Pose],
+    ) -> Option<Field> {
+        let center = poses[f.slot.solid].position;
+        let of = |&k: &usize| {
+            let (slot, pose) = (&found[k].slot, &poses[found[k].slot.solid]);
+            let place = |n: usize| {
+                self.periodic.nearest(pose.position - center)
+                    + pose.orientation * self.layers[slot.solid].offset[n]
+            };
+            slot.rim.iter().zip(&pressure[k]).map(move |(&n, &p)| (place(n), p)).collect::<Vec<_>>()
+        };
+        let (places, told): (Vec<DVec3>, Vec<f64>) = f.lenders.iter().flat_map(of).unzip();
+        let passing = self.passing(told.into_iter().enumerate().collect(), |n| places[n]);
+        Some(self.field(&passing, |n| places[n])).filter(|field| field.any_wet)
+    }
+}
