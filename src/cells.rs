@@ -48,7 +48,7 @@ impl Grid {
     /// Grid over the domain of `params`, all of whose cells are numbered.
     ///
     /// # Errors
-    /// [`Error::Key`] if they are too many.
+    /// An error that names `run.domain` if they are too many.
     pub fn new(params: &Params) -> Result<Self> {
         Self::over(params).numbered(params)
     }

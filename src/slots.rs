@@ -16,7 +16,7 @@
 //! level P / rho g of all that are under water are none of it, and where P_f is negative there is air. Which rows that are the last
 //! step's pressures say. Slots that do not hang together have a field each.
 //!
-//! A body that others enclose has slots without a rim ([`enclosed`]).
+//! A body that others enclose has slots without a rim (`slots/enclosed.rs`).
 
 mod enclosed;
 mod pushes;

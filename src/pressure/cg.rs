@@ -1,14 +1,13 @@
 //! Preconditioned conjugate gradients on the CPU.
 
+use super::cg_ranks::solve_on_ranks;
 use super::coupling::CoupledBody;
 use super::{Outcome, PressureReport, Settings};
-use crate::body::Wrench;
 use crate::fields::State;
 use crate::kernels::conjugate_gradient::apply;
 use crate::neighbours::{CHUNK, Chunk, Neighbours};
 use crate::share::Share;
 use crate::stop::Stop;
-use glam::DVec3;
 use rayon::prelude::*;
 
 /// The system A P = b of one step, A with what free bodies add. Vectors run over all pressure-carrying slots and are zero where the
@@ -41,6 +40,8 @@ pub struct Among<'a> {
 pub trait Precondition {
     /// z <- B r with B symmetric positive definite; z is zero where the pressure is no unknown.
     fn apply(&mut self, system: &System, r: &[f64], z: &mut [f64]);
+    /// The next r has this norm: so many ranks know its size without asking.
+    fn expect(&mut self, _norm: f64) {}
 }
 
 /// The diagonal, with what free bodies add to it. Multigrid is that of the water alone: a body brings six outliers at
@@ -60,38 +61,31 @@ impl Precondition for Jacobi {
 /// Vectors kept between solves.
 #[derive(Default, Debug)]
 pub struct Workspace {
-    r: Vec<f64>,
-    z: Vec<f64>,
-    p: Vec<f64>,
-    q: Vec<f64>,
-    sums: Vec<f64>,
+    pub(super) r: Vec<f64>,
+    pub(super) z: Vec<f64>,
+    pub(super) p: Vec<f64>,
+    pub(super) q: Vec<f64>,
+    /// A z, on many ranks.
+    pub(super) w: Vec<f64>,
+    pub(super) sums: Vec<f64>,
     /// A solve that is overdue ends as if its iterations had run out: whoever set this throws the step away.
     pub stop: Stop,
 }
 
 impl System<'_> {
     /// Chunks of rows. Those of dry walls hold no unknowns: nothing is computed there, and vectors stay zero.
-    fn chunks(&self) -> &[Chunk] {
+    pub(super) fn chunks(&self) -> &[Chunk] {
         &self.neighbours.chunks
-    }
-
-    /// `sum` over the rows of all ranks.
-    fn total(&self, sum: f64) -> f64 {
-        let Some(among) = self.among else { return sum };
-        let mut total = [sum];
-        among.share.sum(&mut total);
-        total[0]
-    }
-
-    /// Brings the copies of other ranks' rows in `p` up to date.
-    fn show(&self, mut p: &mut [f64]) {
-        if let Some(among) = self.among {
-            among.share.swap(&mut [&mut p]);
-        }
     }
 
     /// q <- A p on the unknowns, 0 elsewhere; the chunks of dry walls stay as they are. Returns p.q.
     pub fn multiply(&self, p: &[f64], q: &mut [f64], sums: &mut Vec<f64>) -> f64 {
+        let sum = self.multiply_water(p, q, sums);
+        self.bodies.iter().fold(sum, |sum, body| sum + body.answer(body.force(p), q))
+    }
+
+    /// The same without what free bodies add.
+    pub(super) fn multiply_water(&self, p: &[f64], q: &mut [f64], sums: &mut Vec<f64>) -> f64 {
         (q.par_chunks_mut(CHUNK), self.chunks(), self.state.par_chunks(CHUNK))
             .into_par_iter()
             .enumerate()
@@ -110,29 +104,21 @@ impl System<'_> {
                 sum
             })
             .collect_into_vec(sums);
-        let mut sum: f64 = sums.iter().sum();
-        let mut forces: Vec<Wrench> = self.bodies.iter().map(|body| body.force(p)).collect();
-        if let Some(among) = self.among {
-            // With the bodies' forces, in one round of all ranks.
-            forces.push(Wrench { force: DVec3::X * sum, torque: DVec3::ZERO });
-            among.share.sum_wrenches(&mut forces);
-            sum = forces.pop().map_or(sum, |last| last.force.x);
-        }
-        self.bodies.iter().zip(forces).fold(sum, |sum, (body, force)| sum + body.answer(force, q))
+        sums.iter().sum()
     }
 
     /// a.b of vectors that are zero in dry chunks, in an order that does not depend on the number of threads.
-    fn dot(&self, a: &[f64], b: &[f64], sums: &mut Vec<f64>) -> f64 {
+    pub(super) fn dot(&self, a: &[f64], b: &[f64], sums: &mut Vec<f64>) -> f64 {
         (a.par_chunks(CHUNK), b.par_chunks(CHUNK), self.chunks())
             .into_par_iter()
             .map(|(a, b, chunk)| if chunk.is_dry() { 0.0 } else { product(a, b) })
             .collect_into_vec(sums);
-        self.total(sums.iter().sum())
+        sums.iter().sum()
     }
 
-    /// r <- b - A x with x set to zero where there is no unknown, or everywhere unless `warm`. Returns r.r.
-    fn start(&self, warm: bool, b: &[f64], x: &mut [f64], work: &mut Workspace) -> f64 {
-        let Workspace { r, z, p, q, sums, .. } = work;
+    /// Sets x to zero where there is no unknown, or everywhere unless `warm`, and vectors where all is dry.
+    pub(super) fn set_out(&self, warm: bool, x: &mut [f64], work: &mut Workspace) {
+        let Workspace { r, z, p, .. } = work;
         (
             x.par_chunks_mut(CHUNK),
             r.par_chunks_mut(CHUNK),
@@ -150,8 +136,11 @@ impl System<'_> {
                     [r, z, p].into_iter().for_each(|v| v.fill(0.0));
                 }
             });
-        self.show(x);
-        self.multiply(x, q, sums);
+    }
+
+    /// r <- b - q. Returns r.r.
+    pub(super) fn residual(&self, b: &[f64], work: &mut Workspace) -> f64 {
+        let Workspace { r, q, sums, .. } = work;
         (r.par_chunks_mut(CHUNK), b.par_chunks(CHUNK), q.par_chunks(CHUNK), self.chunks())
             .into_par_iter()
             .filter(|(.., chunk)| !chunk.is_dry())
@@ -183,7 +172,7 @@ impl System<'_> {
                 sum
             })
             .collect_into_vec(sums);
-        self.total(sums.iter().sum())
+        sums.iter().sum()
     }
 }
 
@@ -210,6 +199,7 @@ pub fn solve_or_fall_back(
     settings: &Settings,
     work: &mut Workspace,
 ) -> PressureReport {
+    let solve = if system.among.is_some() { solve_on_ranks } else { solve };
     let first = solve(system, b, x, preconditioner, settings, work);
     if first.outcome != Outcome::Breakdown {
         return first;
@@ -219,7 +209,7 @@ pub fn solve_or_fall_back(
     PressureReport { iterations: first.iterations + again.iterations, ..again }
 }
 
-/// Solve A x = b. `x` holds the start and gets the answer; `b` must be zero where there is no unknown.
+/// Solve A x = b, of one rank. `x` holds the start and gets the answer; `b` must be zero where there is no unknown.
 pub fn solve(
     system: &System,
     b: &[f64],
@@ -232,7 +222,6 @@ pub fn solve(
         v.resize(x.len(), 0.0);
     }
     let unknowns = system.state.iter().filter(|&&s| s == State::Inner).count();
-    let unknowns = system.total(unknowns as f64) as usize;
     let mut report = PressureReport { unknowns, ..Default::default() };
     let b_norm = system.dot(b, b, &mut work.sums).sqrt();
     if b_norm == 0.0 || unknowns == 0 {
@@ -240,7 +229,9 @@ pub fn solve(
         report.outcome = Outcome::ZeroSource;
         return report;
     }
-    let mut r_norm = system.start(settings.warm_start, b, x, work).sqrt();
+    system.set_out(settings.warm_start, x, work);
+    system.multiply(x, &mut work.q, &mut work.sums);
+    let mut r_norm = system.residual(b, work).sqrt();
     if r_norm > b_norm {
         // The last pressure is worse than none: start from zero.
         x.fill(0.0);
@@ -267,7 +258,6 @@ pub fn solve(
                     .into_par_iter()
                     .filter(|(.., chunk)| !chunk.is_dry())
                     .for_each(|(p, z, _)| p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p));
-                system.show(p);
                 let pq = system.multiply(p, q, sums);
                 if pq > 0.0 {
                     r_norm = system.advance(rz / pq, x, work).sqrt();

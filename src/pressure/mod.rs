@@ -1,6 +1,7 @@
 //! The pressure Poisson equation, Eq. (8): a symmetric positive definite system over the neighbour lists.
 
 pub mod cg;
+mod cg_ranks;
 pub mod coupling;
 pub mod multigrid;
 

@@ -41,6 +41,8 @@ pub struct Multigrid {
     b: Vec<f32>,
     t: Vec<f32>,
     coarse: Hierarchy,
+    /// Norm of the residual that comes next, where it is known.
+    expected: Option<f64>,
 }
 
 /// Marks a slot without an unknown.
@@ -252,6 +254,10 @@ impl Multigrid {
 }
 
 impl Precondition for Multigrid {
+    fn expect(&mut self, norm: f64) {
+        self.expected = Some(norm);
+    }
+
     fn apply(&mut self, system: &System, r: &[f64], z: &mut [f64]) {
         let chunks = &system.neighbours.chunks;
         // Scaled to unit size: late residuals must not leave the range of f32.
@@ -259,7 +265,7 @@ impl Precondition for Multigrid {
             if chunk.is_dry() { 0.0 } else { r.iter().fold(0.0_f64, |m, r| m.max(r.abs())) }
         };
         let scale = (r.par_chunks(CHUNK), chunks).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
-        let scale = system.among.map_or(scale, |among| among.share.most(scale)).max(f64::MIN_POSITIVE);
+        let scale = self.expected.take().unwrap_or(scale).max(f64::MIN_POSITIVE);
         let (b, x, d) = (&mut self.b, &mut self.x, &self.diagonal);
         (b.par_chunks_mut(CHUNK), x.par_chunks_mut(CHUNK), d.par_chunks(CHUNK), r.par_chunks(CHUNK), chunks)
             .into_par_iter()

@@ -102,7 +102,8 @@ impl Outlook {
         let step_messages = 2 + motions + 1 + surface + 2 + multigrid + u64::from(plan.coupled);
         let a_water = 64 + 48 * motions;
         let a_carrier = 1 + 8 * surface + 16 + 4 * multigrid;
-        let bodies = u64::from(plan.coupled) + count(&[Stage::BodyForce]);
+        let coupled = u64::from(plan.coupled);
+        let bodies = coupled + count(&[Stage::BodyForce]);
         // Levels of the multigrid that are shared have borders; the first one that is not is summed from all ranks
         // on each visit to it.
         let count = level_cells(grid.count);
@@ -126,8 +127,8 @@ impl Outlook {
                 (8 + 4 * multigrid) * carriers_at + said.message_bytes[1],
             ],
             rounds: [
-                5 + bodies + slots + 2 * filled + multigrid * said.rounds[0],
-                3 + multigrid * (1 + said.rounds[1]),
+                3 + bodies + coupled + slots + 2 * filled + multigrid * said.rounds[0],
+                1 + coupled + multigrid * said.rounds[1],
             ],
             round_bytes: said.round_bytes,
             on_devices: on_devices(
