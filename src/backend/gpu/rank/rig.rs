@@ -46,8 +46,8 @@ impl Rig {
         let settings = Settings { tolerance: 1e-5, max_iterations: 100, warm_start: true };
         let grid = Grid::new(&params).expect("a grid");
         let particles = (&scene.position[..], &scene.kind[..]);
-        let division = Division::new(1, scene.groups, &grid, &params, particles);
-        let start = Start::new(0, &scene, &params, &division, true);
+        let division = Division::new(one.ranks(), scene.groups, &grid, &params, particles);
+        let start = Start::new(one.rank(), &scene, &params, &division, true);
         let rank = GpuRank::of_team((one, 0), &start, &plan, settings, None).expect("it can be built");
         let solid = &scene.solids[0];
         let gate = Pose {
