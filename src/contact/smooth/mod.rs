@@ -121,7 +121,7 @@ impl Smooth {
     pub fn new(scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Self {
         let surfaces = shared(scene);
         let walls = walls::walls(scene);
-        let still = scene.solids.iter().map(|solid| walls::still_box(solid).is_some()).collect();
+        let still = (0..scene.solids.len()).map(|k| walls::still_box(scene, k).is_some()).collect();
         let middles = Middles::new(bodies, &surfaces, &walls);
         let harmless = (fault::THROUGH * middles.least()).min(fault::DRIVEN * scene.spacing);
         limits.lambda = bodies.iter().zip(&surfaces).map(|(b, s)| stability::lambda(b, s)).collect();

@@ -9,7 +9,7 @@ mod feet;
 
 use crate::contact::between::Against;
 use crate::periodic::Periodic;
-use crate::scene::{Scene, Solid, WallShape};
+use crate::scene::{Scene, WallShape};
 use crate::shape::{ALL_FACES, Cuboid, Faces, Geometry, Line, PLANE_FACES, Shape, face_normal};
 use glam::{DMat3, DVec3};
 
@@ -52,6 +52,13 @@ impl WallBox {
         self.center + self.axes * q
     }
 
+    /// Whether the face that looks along `normal`, if one does, is open.
+    fn is_open_towards(&self, normal: DVec3) -> bool {
+        let along = self.axes.transpose() * normal;
+        let face = (0..6_u8).find(|&face| face_normal(face).dot(along) > 0.999);
+        face.is_none_or(|face| self.faces >> face & 1 == 1)
+    }
+
     /// Moves a face out by `length` [m]; the opposite one stays.
     fn move_face(&mut self, face: u8, length: f64) {
         self.half[usize::from(face / 2)] += 0.5 * length;
@@ -64,15 +71,17 @@ const COVERED: f64 = 2e-3;
 /// Most points along an edge of a face at which it is looked at whether it is covered.
 const MOST_LOOKS: f64 = 40.0;
 
-/// The box of a solid that is pressed as walls are: one that stands still for ever.
-pub(super) fn still_box(solid: &Solid) -> Option<&Cuboid> {
-    solid.shape.as_cuboid().filter(|_| solid.is_still())
+/// The box of solid `k` of `scene`, if it is pressed as walls are: it stands still for ever. The layer in an opening only does so for contact: it
+/// goes and comes with the water that passes, and has all its faces.
+pub(super) fn still_box(scene: &Scene, k: usize) -> Option<&Cuboid> {
+    let solid = &scene.solids[k];
+    solid.shape.as_cuboid().filter(|_| solid.is_still() && k < scene.followed())
 }
 
 /// The walls and still boxes of a scene.
 pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
     let still = scene.solids.iter().enumerate().filter_map(|(k, solid)| {
-        let Cuboid { half } = *still_box(solid)?;
+        let Cuboid { half } = *still_box(scene, k)?;
         let axes = DMat3::from_quat(solid.orientation);
         Some(WallBox { axes, ..WallBox::new(Against::Solid(k), solid.position, half) })
     });
@@ -90,12 +99,14 @@ fn fixed(walls: &[WallShape]) -> impl Iterator<Item = WallBox> {
 /// `boxes` and their images, with what of them bodies can reach.
 fn of(boxes: impl Iterator<Item = WallBox>, periodic: &Periodic, spacing: f64, flat: bool) -> Vec<WallBox> {
     let mut walls: Vec<WallBox> = boxes.flat_map(|wall| images(wall, periodic, spacing)).collect();
+    let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
+    walls.iter_mut().for_each(|wall| wall.faces = all);
     for k in 0..walls.len() {
-        let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
-        let beside = 0.5 * COVERED * spacing;
-        let open =
-            |face: u8| all & 1 << face != 0 && !face_is_covered(&walls, k, face, beside, spacing, flat);
-        walls[k].faces = (0..6).filter(|&face| open(face)).map(|face| 1 << face).sum();
+        for face in (0..6).filter(|face| all >> face & 1 == 1) {
+            if is_closed(&walls, k, face, spacing, flat) {
+                walls[k].faces &= !(1 << face);
+            }
+        }
     }
     for k in 0..walls.len() {
         let (edges, corners) = wall_edges(&walls, k, spacing, flat);
@@ -134,6 +145,21 @@ fn is_covered(walls: &[WallBox], k: usize, q: DVec3, spacing: f64) -> bool {
     walls.iter().enumerate().any(|(other, w)| other != k && near(w))
 }
 
+/// Whether other walls leave nothing free of a face of wall `k`: they stand before it, or have a face of their own in its plane that is still open. Of faces
+/// that cover each other one is left.
+fn is_closed(walls: &[WallBox], k: usize, face: u8, spacing: f64, flat: bool) -> bool {
+    let normal = walls[k].axes * face_normal(face);
+    let covers = |w: &WallBox, x: DVec3| {
+        let near = |x: DVec3| Cuboid { half: w.half }.outside(w.local(x)) < COVERED * spacing;
+        near(x) && (near(x + 1.5 * COVERED * spacing * normal) || w.is_open_towards(normal))
+    };
+    let places = |axis: usize| looks(walls[k].half[axis], spacing, flat && axis == 1);
+    all_places(walls, k, face, 0.5 * COVERED * spacing, places, |q| {
+        let x = walls[k].world(q);
+        walls.iter().enumerate().any(|(other, w)| other != k && covers(w, x))
+    })
+}
+
 /// Whether other walls leave nothing of the plane `beyond` [m] outside of a face of wall `k`, by points half a spacing apart.
 fn face_is_covered(walls: &[WallBox], k: usize, face: u8, beyond: f64, spacing: f64, flat: bool) -> bool {
     let places = |axis: usize| looks(walls[k].half[axis], spacing, flat && axis == 1);
@@ -156,6 +182,18 @@ fn places_are_covered(
     spacing: f64,
     places: impl Fn(usize) -> Vec<f64>,
 ) -> bool {
+    all_places(walls, k, face, beyond, places, |q| is_covered(walls, k, q, spacing))
+}
+
+/// Whether something `holds` of all points of the plane `beyond` [m] outside of a face of wall `k`, in its frame, at `places` along its two axes [m].
+fn all_places(
+    walls: &[WallBox],
+    k: usize,
+    face: u8,
+    beyond: f64,
+    places: impl Fn(usize) -> Vec<f64>,
+    holds: impl Fn(DVec3) -> bool,
+) -> bool {
     let normal = usize::from(face / 2);
     let (u, v) = ((normal + 1) % 3, (normal + 2) % 3);
     let (along_u, along_v) = (places(u), places(v));
@@ -163,7 +201,7 @@ fn places_are_covered(
         along_v.iter().all(|&y| {
             let mut q = face_normal(face) * (walls[k].half + beyond);
             (q[u], q[v]) = (x, y);
-            is_covered(walls, k, q, spacing)
+            holds(q)
         })
     })
 }
@@ -273,5 +311,39 @@ mod tests {
             edges.iter().filter(|e| e.along.z.abs() > 0.5 && e.start.x > 1.0).map(|e| e.length).sum();
         assert!((upright - 1.0).abs() < 1e-2, "{upright}");
         assert!(corners.contains(&DVec3::new(2.0, 1.0, 0.0)) && corners.len() >= 6, "{corners:?}");
+    }
+
+    /// Open faces of `walls`, l0 = 0.02 m.
+    fn open(walls: &[WallBox]) -> Vec<Faces> {
+        of(walls.iter().cloned(), &Periodic::default(), 0.02, false).iter().map(|w| w.faces).collect()
+    }
+
+    #[test]
+    fn of_faces_in_one_plane_that_cover_each_other_one_is_open() {
+        let up = 1 << 5;
+        // A slab, and two that lie in it and leave nothing of its top.
+        let slab = wall([0.0, 0.0, -0.2], [2.0, 1.0, 0.0]);
+        let [left, right] = [(0.0, 1.0), (1.0, 2.0)].map(|(a, b)| wall([a, 0.0, -0.1], [b, 1.0, 0.0]));
+        for walls in [
+            [slab.clone(), left.clone(), right.clone()],
+            [left.clone(), slab.clone(), right.clone()],
+            [left.clone(), right, slab.clone()],
+        ] {
+            let tops: Vec<bool> = open(&walls).iter().map(|faces| faces & up != 0).collect();
+            assert!(tops.iter().filter(|open| **open).count() >= 1, "{tops:?}");
+            // All of the slab's top is that of one of them.
+            let area: f64 =
+                walls.iter().zip(&tops).filter(|(_, open)| **open).map(|(w, _)| 2.0 * w.half.x).sum();
+            assert!(area >= 2.0 - 1e-9, "{tops:?}");
+        }
+        // The same box twice is one.
+        let twice = open(&[slab.clone(), slab.clone()]);
+        assert_eq!(twice[0] | twice[1], ALL_FACES);
+        assert_eq!(twice[0] & twice[1], 0);
+        // What lies in a larger one, flush with it, has no face of its own; what stands before a face closes it.
+        assert_eq!(open(&[left.clone(), slab.clone()])[0] & up, 0);
+        let on_it = wall([0.0, 0.0, 0.0], [2.0, 1.0, 0.1]);
+        let tops: Vec<bool> = open(&[slab, on_it]).iter().map(|faces| faces & up != 0).collect();
+        assert_eq!(tops, [false, true]);
     }
 }
