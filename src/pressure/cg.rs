@@ -72,6 +72,27 @@ pub struct Workspace {
     pub stop: Stop,
 }
 
+impl Workspace {
+    /// The last pressure is worse than none: the solve starts from zero.
+    pub(super) fn start_from_zero(&mut self, b: &[f64], x: &mut [f64]) {
+        x.fill(0.0);
+        self.r.copy_from_slice(b);
+    }
+
+    /// How a solve that has come as far as `report` ends here, with a residual of this norm; nothing if it goes on.
+    pub(super) fn end(&self, report: &PressureReport, norm: f64, settings: &Settings) -> Option<Outcome> {
+        if !norm.is_finite() {
+            Some(Outcome::NonFinite)
+        } else if report.residual <= settings.tolerance {
+            Some(Outcome::Converged)
+        } else if report.iterations >= settings.max_iterations || self.stop.is_overdue() {
+            Some(Outcome::MaxIterations)
+        } else {
+            None
+        }
+    }
+}
+
 impl System<'_> {
     /// Chunks of rows. Those of dry walls hold no unknowns: nothing is computed there, and vectors stay zero.
     pub(super) fn chunks(&self) -> &[Chunk] {
@@ -233,20 +254,14 @@ pub fn solve(
     system.multiply(x, &mut work.q, &mut work.sums);
     let mut r_norm = system.residual(b, work).sqrt();
     if r_norm > b_norm {
-        // The last pressure is worse than none: start from zero.
-        x.fill(0.0);
-        work.r.copy_from_slice(b);
+        work.start_from_zero(b, x);
         r_norm = b_norm;
     }
     let mut rz_old = 0.0;
     loop {
         report.residual = r_norm / b_norm;
-        report.outcome = if !r_norm.is_finite() {
-            Outcome::NonFinite
-        } else if report.residual <= settings.tolerance {
-            Outcome::Converged
-        } else if report.iterations >= settings.max_iterations || work.stop.is_overdue() {
-            Outcome::MaxIterations
+        report.outcome = if let Some(end) = work.end(&report, r_norm, settings) {
+            end
         } else {
             let Workspace { r, z, p, q, sums, .. } = &mut *work;
             preconditioner.apply(system, r, z);

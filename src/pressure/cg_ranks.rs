@@ -112,20 +112,14 @@ pub(super) fn solve_on_ranks(
     let own = system.residual(b, work);
     let [mut rr] = system.total([own]);
     if rr > bb {
-        // The last pressure is worse than none: start from zero.
-        x.fill(0.0);
-        work.r.copy_from_slice(b);
+        work.start_from_zero(b, x);
         rr = bb;
     }
     let (mut rz_old, mut alpha) = (0.0, 0.0);
     loop {
         report.residual = (rr / bb).sqrt();
-        report.outcome = if !rr.is_finite() {
-            Outcome::NonFinite
-        } else if report.residual <= settings.tolerance {
-            Outcome::Converged
-        } else if report.iterations >= settings.max_iterations || work.stop.is_overdue() {
-            Outcome::MaxIterations
+        report.outcome = if let Some(end) = work.end(&report, rr, settings) {
+            end
         } else {
             preconditioner.expect(rr.sqrt());
             preconditioner.apply(system, &work.r, &mut work.z);

@@ -30,7 +30,7 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> T {
 }
 
 /// The ranks before and after `rank` of `ranks`, in a `ring` or in a row.
-fn beside(rank: usize, ranks: usize, ring: bool) -> [Option<usize>; 2] {
+pub(crate) fn beside(rank: usize, ranks: usize, ring: bool) -> [Option<usize>; 2] {
     let around = |other: usize| Some(other).filter(|_| ring && ranks > 1);
     [
         rank.checked_sub(1).or_else(|| around(ranks - 1)),

@@ -173,19 +173,15 @@ impl Portion {
     /// That of `rank` in `whole`, as [`Start::new`].
     pub(super) fn new(rank: usize, whole: &Fields, dt: f64, division: &Division, every_wall: bool) -> Self {
         let (all, Given { water, still, .. }) = (division.all, division.given(rank));
-        let every = || [all.static_wall, all.static_dummy].map(|n| (0..n as u32).collect());
-        let [walls, dummies]: Still = if every_wall { every() } else { still.clone() };
-        let groups =
-            Groups { fluid: water.len(), static_wall: walls.len(), static_dummy: dummies.len(), ..all };
-        let of = |first: usize, numbers: Vec<u32>| numbers.into_iter().map(move |k| first + k as usize);
-        let still_walls = of(all.static_wall_range().start, walls);
-        let carriers: Vec<usize> =
-            water.iter().copied().chain(all.moving_wall_range()).chain(still_walls).collect();
-        let dummies: Vec<usize> = of(all.pressure(), dummies).chain(all.moving_dummy_range()).collect();
+        let still = (!every_wall).then_some(still);
+        let solids = all.solids_of(still.as_ref());
+        let groups = all.of_part(water.len(), &solids);
+        let [walls, dummies] = solids;
+        let carriers: Vec<usize> = water.iter().copied().chain(walls).collect();
         let slots = || carriers.iter().chain(&dummies);
         Self {
             cuts: division.cuts.clone(),
-            still: (!every_wall).then_some(still),
+            still,
             groups,
             position: slots().map(|&i| whole.position[i]).collect(),
             velocity: slots().map(|&i| whole.velocity[i]).collect(),

@@ -4,6 +4,7 @@ use super::Share;
 use super::cut::{REACH, within};
 use crate::cells::Grid;
 use crate::fields::Fields;
+use crate::ranks::beside;
 use crate::scene::Still;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -85,22 +86,18 @@ impl Share {
     ) -> [Vec<StillParticle>; 2] {
         let column = |s: &StillParticle| grid.coordinates(s.position)[0];
         self.migrate_alone(&mut own, |s| Some(column(s)));
-        let beside = |by: isize| {
-            let rank = self.rank().checked_add_signed(by).filter(|&r| r < self.ranks());
-            let round = if by < 0 { self.ranks() - 1 } else { 0 };
-            rank.or(self.ring.then_some(round))
-        };
+        let [before, after] = beside(self.rank(), self.ranks(), self.ring);
         let mut here = own;
         // Slabs may be narrower than what lies near them: what comes from one side is handed on to the other.
         for _ in 0..REACH {
-            let give = |by: isize| {
-                let Some(rank) = beside(by) else { return Vec::new() };
+            let give = |to: Option<usize>| {
+                let Some(rank) = to else { return Vec::new() };
                 let near: Vec<u32> = within(REACH, &self.cuts, rank, self.ring).collect();
                 let needed: Vec<StillParticle> =
                     here.iter().filter(|s| near.contains(&column(s))).copied().collect();
                 bytemuck::cast_slice(&needed).to_vec()
             };
-            for bytes in self.pass(give(-1), give(1)) {
+            for bytes in self.pass(give(before), give(after)) {
                 here.extend(bytemuck::pod_collect_to_vec::<u8, StillParticle>(&bytes));
             }
             here.sort_unstable_by_key(|s| (s.group, s.number));

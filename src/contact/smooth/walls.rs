@@ -277,7 +277,7 @@ fn uncovered(
 mod tests {
     use super::*;
 
-    fn wall(low: [f64; 3], high: [f64; 3]) -> WallBox {
+    pub(super) fn wall(low: [f64; 3], high: [f64; 3]) -> WallBox {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
         WallBox::new(Against::Wall(0), 0.5 * (low + high), 0.5 * (high - low))
     }

@@ -75,17 +75,12 @@ fn given_up(walls: &[WallBox], k: usize, spacing: f64, flat: bool) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::wall;
     use super::super::{face_is_covered, fixed, of};
     use super::*;
-    use crate::contact::between::Against;
     use crate::periodic::Periodic;
     use crate::scene::WallShape;
     use glam::DMat3;
-
-    fn wall(low: [f64; 3], high: [f64; 3]) -> WallBox {
-        let (low, high) = (DVec3::from(low), DVec3::from(high));
-        WallBox::new(Against::Wall(0), 0.5 * (low + high), 0.5 * (high - low))
-    }
 
     #[test]
     fn a_post_goes_on_into_the_floor_and_not_out_of_a_slope() {
