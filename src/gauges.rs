@@ -7,7 +7,7 @@ pub mod wall_force;
 mod water;
 
 use crate::body::Wrench;
-use crate::case::Case;
+use crate::case::{Case, is_pattern, stands_for};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::output::table::{Cell, vector_cells, vector_columns};
@@ -38,13 +38,22 @@ enum Target {
     Fixed(Box<FixedWall>),
 }
 
+/// A force gauge: all that it is on.
+#[derive(Clone, Debug)]
+struct Force {
+    name: String,
+    on: Vec<Target>,
+    /// Torque counts about the origin, and not about the middle of the only one.
+    of_several: bool,
+}
+
 /// The gauges of a case, found in its scene.
 #[derive(Clone, Debug, Default)]
 pub struct Gauges {
     pressure: Vec<WallPressure>,
     /// What is read of the water's particles.
     water: Vec<InWater>,
-    force: Vec<(String, Target)>,
+    force: Vec<Force>,
     /// Whether there is water, and whether a body may press on what forces are measured of.
     wet: bool,
     contact: bool,
@@ -104,15 +113,20 @@ impl Gauges {
         }
         out.water = InWater::all(case);
         for (k, gauge) in case.gauge.force.iter().enumerate() {
-            let solid = scene.solids.iter().position(|s| s.name == gauge.on).map(Target::Solid);
-            let target = solid.or_else(|| FixedWall::find(scene, &gauge.on).map(Box::new).map(Target::Fixed));
-            let Some(target) = target else {
+            let solids = scene.solids.iter().enumerate().filter(|(_, s)| stands_for(&gauge.on, &s.name));
+            let solids = solids.map(|(k, _)| Target::Solid(k));
+            let walls = scene.walls.iter().filter(|w| stands_for(&gauge.on, &w.name));
+            let walls =
+                walls.filter_map(|w| FixedWall::find(scene, &w.name).map(Box::new).map(Target::Fixed));
+            let on: Vec<Target> = solids.chain(walls).collect();
+            if on.is_empty() {
                 let names: Vec<&str> = scene.names().collect();
                 let message = format!("gauge.force {}: nothing is called `{}`", gauge.name, gauge.on);
                 let remedy = format!("there are: {}", names.join(", "));
                 return Err(Error::key(format!("gauge.force.{k}.on"), message, remedy));
-            };
-            out.force.push((gauge.name.clone(), target));
+            }
+            let of_several = is_pattern(&gauge.on);
+            out.force.push(Force { name: gauge.name.clone(), on, of_several });
         }
         Ok(out)
     }
@@ -127,12 +141,12 @@ impl Gauges {
         let mut header = vec!["time [s]".to_string()];
         header.extend(self.pressure.iter().map(|g| format!("{} [Pa]", g.name)));
         header.extend(self.water.iter().flat_map(InWater::columns));
-        for (name, target) in &self.force {
+        for Force { name, on, .. } in &self.force {
             if self.wet {
                 header.extend(vector_columns(&format!("{name}_force"), "N"));
                 header.extend(vector_columns(&format!("{name}_torque"), "N m"));
             }
-            if self.wet && target.is_fixed() {
+            if self.wet && on.iter().any(Target::is_fixed) {
                 header.extend(vector_columns(&format!("{name}_viscous"), "N"));
             }
             if self.contact {
@@ -183,16 +197,19 @@ impl Gauges {
         let mut row = vec![Cell::time(simulation.time)];
         row.extend(pressure.into_iter().map(|p| Cell::from(if known { p } else { f64::NAN })));
         let Params { viscosity, wall_friction, .. } = simulation.params;
-        let any_fixed = self.wet && self.force.iter().any(|(_, target)| target.is_fixed());
+        let any_fixed = self.wet && self.fixed().next().is_some();
         let viscous = viscosity + wall_friction > 0.0 && any_fixed;
         let fields = if viscous || !self.water.is_empty() { Some(simulation.fields()?) } else { None };
         let params = &simulation.params;
         for gauge in &self.water {
             row.extend(fields.iter().flat_map(|f| gauge.cells(f, &simulation.groups, params)));
         }
-        for (k, (_, target)) in self.force.iter().enumerate() {
-            let along = target.fixed().map(|wall| {
-                let along = |f| wall.viscous_force(f, &simulation.groups, params);
+        for (k, gauge) in self.force.iter().enumerate() {
+            let along = gauge.on.iter().any(Target::is_fixed).then(|| {
+                let along = |f| -> DVec3 {
+                    let walls = gauge.on.iter().filter_map(Target::fixed);
+                    walls.map(|wall| wall.viscous_force(f, &simulation.groups, params)).sum()
+                };
                 fields.as_ref().filter(|_| viscous).map_or(DVec3::ZERO, along)
             });
             let of_water = wrench.get(k).map(|w| {
@@ -214,12 +231,12 @@ impl Gauges {
         if !self.wet {
             return Ok(Readings { contact, ..Readings::default() });
         }
-        let fixed = self.force.iter().filter_map(|(_, target)| target.fixed());
+        let fixed = self.fixed();
         let of_points = self.pressure.iter().map(|gauge| &gauge.slots);
         let slots: Vec<usize> = of_points.chain(fixed.map(|wall| &wall.slots)).flatten().copied().collect();
         let pressures =
             if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
-        let any_fixed = self.force.iter().any(|(_, target)| target.is_fixed());
+        let any_fixed = self.fixed().next().is_some();
         let pushes = if any_fixed { simulation.slot_pushes()? } else { Vec::new() };
         let params = &simulation.params;
         let mut rest = pressures.as_slice();
@@ -234,7 +251,7 @@ impl Gauges {
             sum / own.len() as f64
         };
         let pressure = self.pressure.iter().map(at_point).collect();
-        let on = |(_, target): &(String, Target)| match target {
+        let mut on = |target: &Target| match target {
             Target::Solid(solid) => simulation.fluid_force[*solid],
             Target::Fixed(wall) => {
                 let areas = wall.areas(&simulation.scene, simulation.solids.poses());
@@ -243,7 +260,7 @@ impl Gauges {
                 sum
             }
         };
-        let wrench = self.force.iter().map(on).collect();
+        let wrench = self.force.iter().map(|gauge| gauge.sum(simulation, &mut on)).collect();
         Ok(Readings { pressure, wrench, contact })
     }
 
@@ -252,13 +269,35 @@ impl Gauges {
     fn contact_of(&self, simulation: &Simulation) -> Vec<Wrench> {
         let solids = &simulation.solids;
         let unknown = Wrench { force: DVec3::NAN, torque: DVec3::NAN };
-        let of = |(_, target): &(String, Target)| match target {
+        let mut of = |target: &Target| match target {
             Target::Solid(solid) => solids.contact_wrenches()[*solid],
             Target::Fixed(wall) => {
                 solids.wall_contact_wrenches().map_or(unknown, |walls| walls[wall.shape()])
             }
         };
-        self.force.iter().filter(|_| self.contact).map(of).collect()
+        self.force.iter().filter(|_| self.contact).map(|gauge| gauge.sum(simulation, &mut of)).collect()
+    }
+
+    /// The fixed walls that force gauges are on, in the order of the gauges.
+    fn fixed(&self) -> impl Iterator<Item = &FixedWall> {
+        self.force.iter().flat_map(|gauge| &gauge.on).filter_map(Target::fixed)
+    }
+}
+
+impl Force {
+    /// What `of` tells of all that the gauge is on: their torques, each about a middle of its own, are brought to the origin.
+    fn sum(&self, simulation: &Simulation, of: &mut impl FnMut(&Target) -> Wrench) -> Wrench {
+        let mut sum = Wrench::default();
+        for target in &self.on {
+            let one = of(target);
+            let about = match target {
+                _ if !self.of_several => DVec3::ZERO,
+                Target::Solid(solid) => simulation.solids.poses()[*solid].position,
+                Target::Fixed(wall) => wall.about(),
+            };
+            sum += Wrench { torque: one.torque + about.cross(one.force), ..one };
+        }
+        sum
     }
 }
 

@@ -113,6 +113,31 @@ fn in_two_dimensions_they_are_scattered_in_the_plane() {
 }
 
 #[test]
+fn what_is_scattered_keeps_clear_of_slopes_and_grounds() {
+    // Half of the box for them is in the ground: a prism in the plane, a wedge in space, which is a mesh as files are.
+    for (dimensions, ground) in [
+        (2, "shape = \"prism\"\nsection = [[0.2, 0], [1.9, 0], [1.9, 0.9]]\n"),
+        (3, "shape = \"wedge\"\nsize = [1.7, 1, 0.9]\ncenter = [1.333, 0.5, 0.3]\n"),
+        (3, "shape = \"prism\"\nheight = 1\nsection = [[0.2, 0], [1.9, 0], [1.9, 0.9]]\n"),
+    ] {
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\ndimensions = {dimensions}\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [2, 1, 1]\n[contact]\nspring = 1e5\n\
+             [[obstacle]]\nname = \"ground\"\n{ground}\
+             [[body]]\nname = \"it\"\nsize = [0.2, 0.1, 0.1]\ncenter = [1, 0.5, 0.5]\ndensity = 500\n\
+             scatter = {{ count = 10, size = [1.9, 0.9, 0.9], gap = 0.01 }}\n"
+        );
+        let case: Case = text.parse().unwrap_or_else(|e: Error| panic!("{e}"));
+        // That none overlaps the ground is what the scene looks at.
+        let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{dimensions}: {e}"));
+        let above = |b: &seixo::case::Body| b.center[2] > 0.9 * (b.center[0] - 0.2) / 1.7;
+        assert!(case.body.iter().all(above) && scene.solids.iter().filter(|s| s.is_body).count() == 10);
+        // The corner under which there is nothing is in the box of the ground, and used.
+        assert!(case.body.iter().any(|b| b.center[0] > 0.3 && b.center[2] < 0.9), "{:?}", case.body);
+    }
+}
+
+#[test]
 fn what_is_wrong_with_many_is_told_where_it_was_written() {
     let six = "array = { count = [3, 1, 2], step = [0.3, 0, 0.1001] }\n";
     let thrice = |text: &str, part: &str| assert_eq!(text.matches(part).count(), 1, "{text}");

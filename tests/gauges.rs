@@ -79,6 +79,31 @@ fn walls_of_still_water_carry_what_statics_say() {
 }
 
 #[test]
+fn a_gauge_of_several_is_their_sum() {
+    let more = "[[gauge.force]]\nname = \"all\"\non = \"tank\"\n[[gauge.force]]\nname = \"sides\"\non = \"tank.x_*\"\n\
+                [[gauge.force]]\nname = \"other\"\non = \"tank.x_max\"\n";
+    let case = still(more);
+    let scene = Scene::build(&case).unwrap();
+    let mut sim = Simulation::on(&case, scene, &Processor::Cpu).unwrap();
+    for _ in 0..5 {
+        sim.step().unwrap();
+    }
+    let gauges = Gauges::new(&case, &sim.scene).unwrap();
+    let row = row(&gauges, &mut sim);
+    let get = |name: &str| row[name];
+    let sides = get("side_force_x [N]") + get("other_force_x [N]");
+    assert!((get("sides_force_x [N]") - sides).abs() < 1e-9 && get("side_force_x [N]") < -1.0, "{row:?}");
+    // All of the tank carries the water's weight, where it is: about the origin.
+    let (fluid, _) = sim.observe().unwrap();
+    let weight = get("all_force_z [N]");
+    assert!(
+        weight < -1.0 && (get("all_torque_y [N m]") / (-fluid.centroid[0] * weight) - 1.0).abs() < 0.05,
+        "{row:?}"
+    );
+    assert!((get("all_torque_x [N m]") / (fluid.centroid[1] * weight) - 1.0).abs() < 0.05, "{row:?}");
+}
+
+#[test]
 fn a_device_reads_the_same_gauges() {
     if !crate::common::there_is_a_device("gauges on a device are not tested") {
         return;

@@ -1,6 +1,7 @@
 //! The part of the check that judges gauges.
 
 use super::check::Checker;
+use super::names::{is_pattern, stands_for};
 
 impl Checker<'_> {
     pub(super) fn gauges(&mut self) {
@@ -65,6 +66,9 @@ impl Checker<'_> {
             solid.extend(walls.map(|(_, name)| name));
         }
         for (k, gauge) in case.gauge.force.iter().enumerate() {
+            if is_pattern(&gauge.on) && solid.iter().any(|name| stands_for(&gauge.on, name)) {
+                continue;
+            }
             let face = case.tank.is_some() && super::TANK_FACES.iter().any(|(_, name)| *name == gauge.on);
             if face && !solid.contains(&gauge.on.as_str()) {
                 let message = format!("`{}` has no wall to measure on", gauge.on);

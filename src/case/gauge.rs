@@ -55,8 +55,9 @@ pub struct ForceGauge {
     /// Name, used in the header.
     #[schemars(length(min = 1, max = 80))]
     pub name: String,
-    /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. Torque is about
-    /// the centre of mass, or the middle of a fixed wall; of a face of the tank that of its surface. Where another solid stands before a
+    /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. `*` stands for any letters
+    /// (`"pile_*"`), `tank` for all of its faces: the gauge then is the sum over all of them. Torque is about
+    /// the centre of mass, or the middle of a fixed wall; of a face of the tank that of its surface, of a sum the origin. Where another solid stands before a
     /// part of it no water presses; under a free body that stands on it the water of the slot does.
     pub on: String,
 }

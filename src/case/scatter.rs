@@ -4,6 +4,7 @@ use super::check::Checker;
 use super::copies::MOST;
 use super::{BodyShape, Form, Place, Turn, Vector, Wall};
 use crate::chance::mixed;
+use crate::shape::Shape;
 use glam::{DMat3, DQuat, DVec3, IVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +15,7 @@ use std::f64::consts::TAU;
 const TRIES: u32 = 2000;
 
 /// Like solids at places by chance, in a box about `center`. None reaches out of it, and the boxes around any two of
-/// them, and around bodies and upright walls whose places are given, are apart.
+/// them, and around bodies whose places are given, are apart, and so are these boxes and obstacles and moving walls.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scatter {
@@ -96,6 +97,26 @@ impl Block {
         known.then(|| Self { center: axes * (0.5 * (low + high)), half: 0.5 * (high - low), axes })
     }
 
+    /// Whether `gap` and more lies between it and `wall`, as far as halving it down to parts of [`PART`] of it shows.
+    fn is_off(&self, wall: &Outline, gap: f64, flat: bool) -> bool {
+        let half = if flat { self.half * (DVec3::ONE - DVec3::Y) } else { self.half };
+        let least = PART * half.length();
+        let mut parts = vec![(DVec3::ZERO, half)];
+        while let Some((center, half)) = parts.pop() {
+            let (distance, reach) = (wall.distance(self.center + self.axes * center), half.length());
+            if distance >= reach + gap {
+                continue;
+            }
+            if distance <= gap || reach <= least {
+                return false;
+            }
+            let longest = half.max_position();
+            let quarter = DVec3::AXES[longest] * 0.5 * half[longest];
+            parts.extend([-quarter, quarter].map(|way| (center + way, half - quarter)));
+        }
+        true
+    }
+
     fn reach(&self, n: DVec3) -> f64 {
         (self.axes.transpose() * n).abs().dot(self.half)
     }
@@ -121,11 +142,30 @@ impl Block {
     }
 }
 
+/// Size of the parts of a box that are no longer halved, over its own.
+const PART: f64 = 0.02;
+
+/// A wall that does not fill the box around it.
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    shape: Shape,
+    center: DVec3,
+    axes: DMat3,
+}
+
+impl Outline {
+    /// Distance of `x` from it, negative inside [m].
+    fn distance(&self, x: DVec3) -> f64 {
+        self.shape.distance(self.axes.transpose() * (x - self.center)).0
+    }
+}
+
 /// What stands where something is to find room.
 pub(super) struct Standing {
     spacing: f64,
     flat: bool,
     blocks: Vec<Block>,
+    outlines: Vec<Outline>,
     /// Numbers of blocks by the cells of an even grid that they reach, and the edge of these.
     cells: HashMap<IVec3, Vec<usize>>,
     edge: f64,
@@ -134,7 +174,7 @@ pub(super) struct Standing {
 impl Standing {
     /// Nothing yet.
     pub fn new(spacing: f64, flat: bool) -> Self {
-        Self { spacing, flat, blocks: vec![], cells: HashMap::new(), edge: 0.0 }
+        Self { spacing, flat, blocks: vec![], outlines: vec![], cells: HashMap::new(), edge: 0.0 }
     }
 
     /// A solid of the shape `form` at `center`.
@@ -144,8 +184,7 @@ impl Standing {
         }
     }
 
-    /// A wall that fills most of the box around it; what has any other outline may be meant to be in the box of
-    /// another.
+    /// A wall: by the box around it if it fills most of that, else by its outline, for others may be meant to be in that box.
     pub fn add_wall(&mut self, wall: &Wall) {
         use BodyShape::{Box, Cone, Cylinder, Sphere};
         match wall {
@@ -159,7 +198,17 @@ impl Standing {
             {
                 self.add(form, *center);
             }
-            Wall::Shaped(..) => {}
+            Wall::Shaped(form, place) => {
+                // What cannot be told of a shape is told elsewhere.
+                let Ok((shape, _)) = form.shape(self.spacing, self.flat) else { return };
+                let turn = form.turn(self.flat);
+                let center = match place {
+                    Place::Center(at) => self.place(*at),
+                    Place::Position(at) => self.place(*at) + turn * shape.origin(),
+                };
+                let axes = DMat3::from_quat(turn * shape.frame());
+                self.outlines.push(Outline { shape, center, axes });
+            }
         }
     }
 
@@ -201,10 +250,11 @@ impl Standing {
     /// Whether nothing stands within `gap` of `block`.
     fn is_free(&self, block: &Block, gap: f64) -> bool {
         let mut cells = self.reached(block.center, block.bounds() + gap);
-        cells.all(|cell| {
+        let clear = cells.all(|cell| {
             let there = self.cells.get(&cell).into_iter().flatten();
             there.into_iter().all(|&k| self.blocks[k].is_clear_of(block, gap))
-        })
+        });
+        clear && self.outlines.iter().all(|wall| block.is_off(wall, gap, self.flat))
     }
 }
 

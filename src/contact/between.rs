@@ -1,7 +1,7 @@
 //! Friction and restitution of two solids: those of the scene, or what `[[contact.pair]]` says of them.
 
 use super::stiffness::{Damping, damping_ratio};
-use crate::case::Contact;
+use crate::case::{Contact, stands_for};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 
@@ -107,11 +107,9 @@ impl Betweens {
 
 /// What `name` stands for: a solid, a fixed wall, `tank` for all its faces, or with `*` for any letters as many as there are.
 fn named(scene: &Scene, name: &str, key: &str) -> Result<Named> {
-    let fits = |known: &str| matches(name, known);
-    let of_tank = |known: &str| name == "tank" && known.starts_with("tank.");
     let out = Named {
-        solids: scene.solids.iter().map(|s| fits(&s.name)).collect(),
-        walls: scene.walls.iter().map(|w| fits(&w.name) || of_tank(&w.name)).collect(),
+        solids: scene.solids.iter().map(|s| stands_for(name, &s.name)).collect(),
+        walls: scene.walls.iter().map(|w| stands_for(name, &w.name)).collect(),
     };
     if out.solids.iter().chain(&out.walls).any(|&one| one) {
         return Ok(out);
@@ -127,14 +125,6 @@ fn named(scene: &Scene, name: &str, key: &str) -> Result<Named> {
 /// Most names that a message lists.
 const MOST_NAMES: usize = 20;
 
-/// Whether `known` is `pattern`, in which `*` stands for any letters.
-fn matches(pattern: &str, known: &str) -> bool {
-    let Some((start, rest)) = pattern.split_once('*') else { return pattern == known };
-    let Some(left) = known.strip_prefix(start) else { return false };
-    let mut places = left.char_indices().map(|(at, _)| at).chain([left.len()]);
-    places.any(|at| matches(rest, &left[at..]))
-}
-
 /// Whether forces move something of one end that can touch something of the other.
 fn can_touch(scene: &Scene, ends: &[Named; 2]) -> bool {
     let free = |k: usize| scene.solids[k].is_free();
@@ -144,26 +134,4 @@ fn can_touch(scene: &Scene, ends: &[Named; 2]) -> bool {
     let [first, second] = ends;
     let alone = all(first) == 1 && first == second;
     !alone && ends.iter().any(moves)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::matches;
-
-    #[test]
-    fn a_star_stands_for_any_letters() {
-        for (pattern, known, fits) in [
-            ("rock 1", "rock 1", true),
-            ("rock 1", "rock 12", false),
-            ("rock*", "rock 12", true),
-            ("rock*", "a rock", false),
-            ("*", "", true),
-            ("*.z_min", "tank.z_min", true),
-            ("a*b*c", "aXbYbZc", true),
-            ("a*b*c", "aXbYbZ", false),
-            ("*ä*", "Trägheit", true),
-        ] {
-            assert_eq!(matches(pattern, known), fits, "{pattern} {known}");
-        }
-    }
 }

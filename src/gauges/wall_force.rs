@@ -107,6 +107,11 @@ impl FixedWall {
         Some(out)
     }
 
+    /// The point that its torque counts about [m].
+    pub fn about(&self) -> DVec3 {
+        self.about
+    }
+
     /// Its number in [`Scene::walls`].
     pub fn shape(&self) -> usize {
         self.shape
