@@ -159,6 +159,52 @@ fn what_slides_over_the_joint_of_two_walls_goes_on() {
 }
 
 #[test]
+fn what_slides_over_the_joint_of_still_prisms_goes_on() {
+    let prism = |from: f64| {
+        let to = from + 0.5;
+        format!(
+            "shape = \"prism\"\nheight = 0.4\nsection = [[{from}, 0], [{to}, 0], [{to}, 0.1], [{from}, 0.1]]"
+        )
+    };
+    let centre = |from: f64| format!("size = [0.5, 0.4, 0.1]\ncenter = [{}, 0.2, 0.05]", from + 0.25);
+    // 0.042 m/s were lost at the joint of prisms, 0.03 at that of a prism and a box; of one alone, by its points, 0.0002.
+    for (name, a, b) in [
+        ("prisms", prism(0.0), prism(0.5)),
+        ("prisms beside the lattice", prism(0.007), prism(0.507)),
+        ("prism and box", prism(0.0), centre(0.5)),
+        ("box and prism", centre(0.0), prism(0.5)),
+    ] {
+        let mut dry = over_a_joint(&a, &b);
+        let pose = dry.run(2.5)[0];
+        println!("{name}: {pose:?}");
+        assert!(pose.velocity.x > 0.099, "{name}: {pose:?}");
+    }
+}
+
+#[test]
+fn what_lands_beside_the_joint_of_still_prisms_is_not_thrown_aside() {
+    let prism = |from: f64, to: f64| {
+        format!(
+            "[[obstacle]]\nname = \"p{from}\"\nshape = \"prism\"\nsection = [[{from}, 0], [{to}, 0], [{to}, 0.1], [{from}, 0.1]]\n"
+        )
+    };
+    for aside in [0.5, -1.5] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\ngravity = [0, 0, -{G}]\n{}{}\
+             [[body]]\nname = \"block\"\nsize = [0.1, 0.2, 0.1]\ncenter = [{}, 0, 0.2207]\nmass = 10\n\
+             orientation = {{ axis = [0, 1, 0], angle_deg = 45 }}\nlocked = [\"rotation_y\"]\n\
+             [contact]\nspring = 1e6\nrestitution = 0.3\n",
+            prism(0.0, 0.5),
+            prism(0.5, 1.0),
+            0.5 + 1e-3 * aside
+        ));
+        let pose = dry.run(0.5)[0];
+        println!("{aside} mm aside: {pose:?}");
+        assert!(pose.velocity.x.abs() < 1e-3, "{aside} mm aside: {pose:?}");
+    }
+}
+
+#[test]
 fn what_is_pressed_into_the_corner_of_three_blocks_is_turned_back() {
     // The edge of the cube comes into the block below both, whose other faces are far away.
     let corners = |low: [f64; 3], high: [f64; 3]| format!("min = {low:?}\nmax = {high:?}");

@@ -12,6 +12,7 @@ mod disc;
 #[cfg(feature = "mesh")]
 mod mesh;
 mod nearest;
+mod open;
 mod polygon;
 mod sphere;
 mod surface;
@@ -153,6 +154,17 @@ impl Shape {
             #[cfg(feature = "mesh")]
             Self::Mesh(shape) => shape.frame(),
             _ => DQuat::IDENTITY,
+        }
+    }
+
+    /// The same with the sides alone that are not `covered`: asked for places in its frame [m] and the normals there. `None` if
+    /// it has all of them, none, or no sides.
+    pub(crate) fn uncovered(&self, spacing: f64, covered: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Self> {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => shape.uncovered(spacing, covered).map(Self::Mesh),
+            Self::Polygon(shape) => shape.uncovered(spacing, covered).map(Self::Polygon),
+            _ => None,
         }
     }
 

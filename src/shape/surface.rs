@@ -1,6 +1,6 @@
 //! What of a solid's surface presses into other solids.
 
-use super::Faces;
+use super::{Faces, Shape};
 use glam::DVec3;
 
 /// An edge.
@@ -69,6 +69,8 @@ pub struct Surface {
     pub ball: Option<f64>,
     /// Faces of the body that others can touch.
     pub all_faces: Faces,
+    /// The shape without the sides that others cover for ever, if there are such: that into which others are pressed.
+    pub open: Option<Shape>,
     /// Smallest weight of a surface particle [-].
     pub smallest_weight: f64,
 }
@@ -91,6 +93,19 @@ impl Surface {
             all_faces,
             smallest_weight: weight,
             ..Self::default()
+        }
+    }
+
+    /// The same without the points that are `out`; those that stay keep their weights.
+    pub(crate) fn without(&self, out: impl Fn(DVec3) -> bool) -> Self {
+        let stay: Vec<usize> = (0..self.points.len()).filter(|&k| !out(self.points[k])).collect();
+        let of = |all: &[f64]| stay.iter().filter_map(|&k| all.get(k).copied()).collect();
+        Self {
+            points: stay.iter().map(|&k| self.points[k]).collect(),
+            weights: of(&self.weights),
+            parts: of(&self.parts),
+            faces: stay.iter().map(|&k| self.faces[k]).collect(),
+            ..self.clone()
         }
     }
 

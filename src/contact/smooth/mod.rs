@@ -24,6 +24,7 @@ mod constants;
 mod coulomb;
 pub mod device;
 mod fault;
+mod flush;
 mod frame;
 mod friction;
 mod pair;
@@ -114,7 +115,9 @@ fn shared(scene: &Scene) -> Vec<Arc<Surface>> {
         alike.push((solid, surface.clone()));
         surface
     };
-    scene.solids.iter().map(of).collect()
+    let mut surfaces: Vec<Arc<Surface>> = scene.solids.iter().map(of).collect();
+    flush::take_covered(scene, &mut surfaces);
+    surfaces
 }
 
 impl Smooth {

@@ -179,7 +179,8 @@ impl Pair {
         match self.b {
             Other::Solid(b) => {
                 let own = Frame::body(&bodies[b], surfaces[b].all_faces);
-                Frame { center: own.center + self.image, ..own }
+                let shape = surfaces[b].open.unwrap_or(own.shape);
+                Frame { center: own.center + self.image, shape, ..own }
             }
             Other::Wall(w) => Frame::wall(&walls[w]),
         }

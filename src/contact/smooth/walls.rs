@@ -7,6 +7,7 @@
 
 mod feet;
 
+use super::flush::{self, Still};
 use crate::contact::between::Against;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, WallShape};
@@ -67,7 +68,7 @@ impl WallBox {
 }
 
 /// Gap over the spacing up to which a wall covers what it faces: nothing fits in between.
-const COVERED: f64 = 2e-3;
+pub(super) const COVERED: f64 = 2e-3;
 /// Most points along an edge of a face at which it is looked at whether it is covered.
 const MOST_LOOKS: f64 = 40.0;
 
@@ -85,7 +86,8 @@ pub(crate) fn walls(scene: &Scene) -> Vec<WallBox> {
         let axes = DMat3::from_quat(solid.orientation);
         Some(WallBox { axes, ..WallBox::new(Against::Solid(k), solid.position, half) })
     });
-    of(fixed(&scene.walls).chain(still), &scene.periodic, scene.spacing, scene.dimensions == 2)
+    let beside = flush::no_boxes(scene);
+    of(fixed(&scene.walls).chain(still), &beside, &scene.periodic, scene.spacing, scene.dimensions == 2)
 }
 
 /// Fixed walls as boxes.
@@ -96,14 +98,20 @@ fn fixed(walls: &[WallShape]) -> impl Iterator<Item = WallBox> {
     })
 }
 
-/// `boxes` and their images, with what of them bodies can reach.
-fn of(boxes: impl Iterator<Item = WallBox>, periodic: &Periodic, spacing: f64, flat: bool) -> Vec<WallBox> {
+/// `boxes` and their images, with what of them bodies can reach, with `beside` at some of their faces.
+fn of(
+    boxes: impl Iterator<Item = WallBox>,
+    beside: &[Still],
+    periodic: &Periodic,
+    spacing: f64,
+    flat: bool,
+) -> Vec<WallBox> {
     let mut walls: Vec<WallBox> = boxes.flat_map(|wall| images(wall, periodic, spacing)).collect();
     let all: Faces = if flat { PLANE_FACES } else { ALL_FACES };
     walls.iter_mut().for_each(|wall| wall.faces = all);
     for k in 0..walls.len() {
         for face in (0..6).filter(|face| all >> face & 1 == 1) {
-            if is_closed(&walls, k, face, spacing, flat) {
+            if is_closed(&walls, beside, k, face, spacing, flat) {
                 walls[k].faces &= !(1 << face);
             }
         }
@@ -147,7 +155,7 @@ fn is_covered(walls: &[WallBox], k: usize, q: DVec3, spacing: f64) -> bool {
 
 /// Whether other walls leave nothing free of a face of wall `k`: they stand before it, or have a face of their own in its plane that is still open. Of faces
 /// that cover each other one is left.
-fn is_closed(walls: &[WallBox], k: usize, face: u8, spacing: f64, flat: bool) -> bool {
+fn is_closed(walls: &[WallBox], beside: &[Still], k: usize, face: u8, spacing: f64, flat: bool) -> bool {
     let normal = walls[k].axes * face_normal(face);
     let covers = |w: &WallBox, x: DVec3| {
         let near = |x: DVec3| Cuboid { half: w.half }.outside(w.local(x)) < COVERED * spacing;
@@ -157,6 +165,7 @@ fn is_closed(walls: &[WallBox], k: usize, face: u8, spacing: f64, flat: bool) ->
     all_places(walls, k, face, 0.5 * COVERED * spacing, places, |q| {
         let x = walls[k].world(q);
         walls.iter().enumerate().any(|(other, w)| other != k && covers(w, x))
+            || beside.iter().any(|still| still.fills(x, normal, spacing))
     })
 }
 
@@ -315,7 +324,7 @@ mod tests {
 
     /// Open faces of `walls`, l0 = 0.02 m.
     fn open(walls: &[WallBox]) -> Vec<Faces> {
-        of(walls.iter().cloned(), &Periodic::default(), 0.02, false).iter().map(|w| w.faces).collect()
+        of(walls.iter().cloned(), &[], &Periodic::default(), 0.02, false).iter().map(|w| w.faces).collect()
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! spacing, one and a half and so on below the surface. Points of the surface press into others: those above the
 //! wall layer, the vertices and the sharp edges.
 
+mod flush;
 mod ground;
 mod particles;
 mod points;
@@ -20,7 +21,7 @@ use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// What is wrong with a file, and what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,8 +39,11 @@ impl Unfit {
 }
 
 /// A body's surface, in the frame of its principal axes.
+#[derive(Clone)]
 pub struct Mesh {
-    triangles: TriMesh,
+    triangles: Arc<TriMesh>,
+    /// The triangles that depths count to, if others cover some.
+    open: Option<Arc<TriMesh>>,
     volume: f64,
     /// Principal moments per mass [m2].
     moments: DVec3,
@@ -189,7 +193,8 @@ impl Mesh {
             .map_err(|e| Unfit::new(format!("{path}: {e}"), "repair the surface"))?;
         let moments = moments / volume;
         Ok(Self {
-            triangles,
+            triangles: Arc::new(triangles),
+            open: None,
             volume,
             moments,
             frame,
@@ -336,7 +341,10 @@ impl Geometry for Mesh {
     }
 
     fn distance(&self, q: DVec3) -> (f64, DVec3) {
-        let (nearest, inside) = self.nearest(q);
+        let (mut nearest, inside) = self.nearest(q);
+        if let Some(open) = self.open.as_ref().filter(|_| inside) {
+            nearest = open.project_local_point(q, false).point;
+        }
         let (way, sign) = (q - nearest, if inside { -1.0 } else { 1.0 });
         let d = way.length();
         // on the surface itself

@@ -7,6 +7,7 @@ mod layer;
 
 use super::areas;
 use super::cells::Cells;
+use super::open;
 use super::surface::Surface;
 use super::thickness::{Surface as Outline, Way, thinnest};
 use super::thin::Thin;
@@ -18,7 +19,7 @@ use std::sync::Mutex;
 const PIECE: f64 = 0.1;
 
 /// A closed line of straight sides in the plane y = 0, and what it encloses.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Polygon {
     /// Corners about the centroid, x and z, with the inside on the left [m].
     corners: Vec<DVec2>,
@@ -30,10 +31,15 @@ pub struct Polygon {
     /// Polar second moment of area about the centroid over the area [m2].
     polar: f64,
     radius: f64,
+    /// The sides that depths count to, if others cover some.
+    open: Option<Vec<[DVec2; 2]>>,
 }
 
 /// A polygon is made once for all solids, scenes and runs of a program that have it, and kept: the corners as they were given.
 static MADE: Mutex<Vec<(Vec<DVec2>, &'static Polygon)>> = Mutex::new(Vec::new());
+
+/// Those of which others cover some sides.
+static OPENED: open::Made<Polygon> = Mutex::new(Vec::new());
 
 impl PartialEq for Polygon {
     fn eq(&self, other: &Self) -> bool {
@@ -57,6 +63,19 @@ pub(crate) fn signed_area(corners: &[DVec2]) -> f64 {
 
 fn sides_of(corners: &[DVec2]) -> impl Iterator<Item = [DVec2; 2]> + '_ {
     (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
+}
+
+/// The nearest point of `sides`, and the normal of the side that it lies on.
+fn nearest_of(sides: impl Iterator<Item = [DVec2; 2]>, q: DVec2) -> (DVec2, DVec2) {
+    let on = sides.map(|[a, b]| {
+        let way = b - a;
+        let share = ((q - a).dot(way) / way.length_squared()).clamp(0.0, 1.0);
+        (a + share * way, -way.normalize().perp())
+    });
+    let nearer = |one: (DVec2, DVec2), other: (DVec2, DVec2)| {
+        if other.0.distance_squared(q) < one.0.distance_squared(q) { other } else { one }
+    };
+    on.reduce(nearer).unwrap_or_default()
 }
 
 impl Polygon {
@@ -89,7 +108,25 @@ impl Polygon {
             corners,
             width,
             area,
+            open: None,
         }
+    }
+
+    /// The same with the sides alone that are not `covered` in full.
+    pub(super) fn uncovered(
+        &self,
+        spacing: f64,
+        covered: &dyn Fn(DVec3, DVec3) -> bool,
+    ) -> Option<&'static Self> {
+        let is_open = |[a, b]: [DVec2; 2]| {
+            let (count, normal) = (open::looks(a.distance(b), spacing), -space((b - a).normalize().perp()));
+            let place = |k: u32| a.lerp(b, (f64::from(k) + 0.5) / f64::from(count));
+            (0..count).any(|k| !covered(space(place(k)), normal))
+        };
+        open::made(&OPENED, self, self.sides().map(is_open).collect(), |is_open| {
+            let left = self.sides().zip(is_open).filter(|(_, open)| **open).map(|(side, _)| side);
+            Self { open: Some(left.collect()), ..self.clone() }
+        })
     }
 
     /// Its centroid in the coordinates that it was given in [m].
@@ -122,15 +159,7 @@ impl Polygon {
 
     /// The nearest point of the outline, and its side's normal.
     fn nearest(&self, q: DVec2) -> (DVec2, DVec2) {
-        let on = self.sides().map(|[a, b]| {
-            let way = b - a;
-            let share = ((q - a).dot(way) / way.length_squared()).clamp(0.0, 1.0);
-            (a + share * way, -way.normalize().perp())
-        });
-        let nearer = |one: (DVec2, DVec2), other: (DVec2, DVec2)| {
-            if other.0.distance_squared(q) < one.0.distance_squared(q) { other } else { one }
-        };
-        on.reduce(nearer).unwrap_or_default()
+        nearest_of(self.sides(), q)
     }
 
     fn holds(&self, q: DVec2) -> bool {
@@ -198,8 +227,12 @@ impl Geometry for Polygon {
 
     fn distance(&self, q: DVec3) -> (f64, DVec3) {
         let q = plane(q);
-        let (nearest, normal) = self.nearest(q);
-        let (way, sign) = (q - nearest, if self.holds(q) { -1.0 } else { 1.0 });
+        let holds = self.holds(q);
+        let (nearest, normal) = match &self.open {
+            Some(open) if holds => nearest_of(open.iter().copied(), q),
+            _ => self.nearest(q),
+        };
+        let (way, sign) = (q - nearest, if holds { -1.0 } else { 1.0 });
         let d = way.length();
         // On the outline itself.
         if d < 1e-12 * self.radius {

@@ -123,7 +123,7 @@ mod tests {
             at([0.0, 0.0, 0.06], [0.1, 0.2, 0.14]),
             at([0.1, 0.0, 0.0], [0.3, 0.2, 0.06]),
         ];
-        let walls = of(fixed(&shapes), &Periodic::default(), 0.02, false);
+        let walls = of(fixed(&shapes), &[], &Periodic::default(), 0.02, false);
         let high = |k: usize| walls[k].center + walls[k].half;
         let low = |k: usize| walls[k].center - walls[k].half;
         assert!((high(0) - DVec3::new(0.09, 0.2, 0.05)).length() < 1e-12, "{}", high(0));
