@@ -16,8 +16,8 @@ use std::path::PathBuf;
 pub struct BenchArgs {
     /// The case; in seixo's repository cases/dam_break_transport.toml if absent.
     case: Option<PathBuf>,
-    /// Spacings l0 [m] to time.
-    #[arg(long, value_delimiter = ',', default_value = "0.03,0.02,0.015,0.01,0.0075,0.006")]
+    /// Spacings l0 [m] to time; if absent, that of the case, and without a case 0.03,0.02,0.015,0.01,0.0075,0.006.
+    #[arg(long, value_delimiter = ',')]
     spacings: Vec<f64>,
     /// Change a value of the case; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -43,6 +43,9 @@ pub struct BenchArgs {
 
 /// The case that is timed where none is named, of a checkout.
 const OWN: &str = "cases/dam_break_transport.toml";
+/// Spacings at which that one is timed [m].
+const OWN_SPACINGS: [Option<f64>; 6] =
+    [Some(0.03), Some(0.02), Some(0.015), Some(0.01), Some(0.0075), Some(0.006)];
 
 impl BenchArgs {
     fn case(&self) -> Result<PathBuf> {
@@ -54,6 +57,15 @@ impl BenchArgs {
             );
             Error::usage("CASE", text)
         })
+    }
+
+    /// Those to time, `None` where it is the case's own.
+    fn spacings(&self) -> Vec<Option<f64>> {
+        match (&self.spacings[..], &self.case) {
+            ([], None) => OWN_SPACINGS.to_vec(),
+            ([], Some(_)) => vec![None],
+            (typed, _) => typed.iter().copied().map(Some).collect(),
+        }
     }
 }
 
@@ -90,11 +102,16 @@ fn choices(args: &DeviceArgs) -> Vec<BackendName> {
     }
 }
 
-fn timed(args: &BenchArgs, backend: BackendName, spacing: f64, bandwidth: f64) -> Result<Option<Row>> {
-    let changes = Changes { spacing: Some(spacing), sets: args.sets.clone(), until: None };
+fn timed(
+    args: &BenchArgs,
+    backend: BackendName,
+    spacing: Option<f64>,
+    bandwidth: f64,
+) -> Result<Option<Row>> {
+    let changes = Changes { spacing, sets: args.sets.clone(), until: None };
     let case = CaseArgs { case: args.case()?, changes };
     let setup = Setup::new(&case, true)?;
-    let end = setup.loaded.case.run.end;
+    let (end, spacing) = (setup.loaded.case.run.end, setup.scene.spacing);
     if !(0.0..=end).contains(&args.from) {
         let from = args.from;
         let text = format!("--from {from} lies outside of the run; allowed: 0 to {end} (run.end)");
@@ -129,7 +146,7 @@ pub fn bench(args: &BenchArgs) -> Exit {
             _ => host,
         };
         let mut own = Vec::new();
-        for &spacing in &args.spacings {
+        for spacing in args.spacings() {
             own.extend(timed(args, backend, spacing, bandwidth)?);
         }
         let name = own.first().map_or_else(|| format!("{backend:?}"), |r: &Row| r.adapter.clone());

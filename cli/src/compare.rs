@@ -46,7 +46,23 @@ pub fn compare(args: &CompareArgs) -> Exit {
     } else {
         tell(&words(&report));
     }
-    Ok(0)
+    Ok(u8::from(!report.stages.iter().all(StageError::is_explained)))
+}
+
+/// What the differences say.
+fn verdict(stages: &[StageError]) -> Option<String> {
+    let beyond: Vec<&StageError> = stages.iter().filter(|s| !s.is_explained()).collect();
+    let first = beyond.first();
+    (!stages.is_empty()).then(|| match first {
+        None => "  all are such as single precision and the tolerance of the solve make".to_owned(),
+        Some(s) => format!(
+            "  {} of {} are larger than single precision and the tolerance of the solve make them, {} of {} first",
+            beyond.len(),
+            stages.len(),
+            s.field,
+            s.stage
+        ),
+    })
 }
 
 fn words(report: &Report) -> String {
@@ -55,11 +71,19 @@ fn words(report: &Report) -> String {
     if report.stages.is_empty() {
         lines.push("  a dry scene has no stages on the GPU".to_string());
     } else {
-        lines.push(format!("  {:<20}{:<16}{:>10}{:>10}", "stage", "field", "largest", "rms"));
+        lines.push(format!(
+            "  {:<20}{:<16}{:>10}{:>10}{:>10}",
+            "stage", "field", "largest", "rms", "rms may be"
+        ));
     }
     lines.extend(report.stages.iter().map(|s| {
-        format!("  {:<20}{:<16}{:>10.1e}{:>10.1e}", s.stage, s.field, s.max_relative, s.l2_relative)
+        let mark = if s.is_explained() { "" } else { "  <-" };
+        format!(
+            "  {:<20}{:<16}{:>10.1e}{:>10.1e}{:>12.0e}{mark}",
+            s.stage, s.field, s.max_relative, s.l2_relative, s.bound
+        )
     }));
+    lines.extend(verdict(&report.stages));
     if let Some(drift) = &report.drift {
         lines.push(format!("\n{} steps from the start", drift.steps));
         lines.push(format!("  {:<28}{:>16}{:>16}{:>10}", "quantity", "CPU", "GPU", "relative"));

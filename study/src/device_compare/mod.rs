@@ -18,6 +18,10 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
 
+mod bound;
+
+use bound::Bounds;
+
 /// Error of a field after a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StageError {
@@ -30,6 +34,23 @@ pub struct StageError {
     pub max_relative: f64,
     /// Root mean square of the difference over that of the field, or over the same scales.
     pub l2_relative: f64,
+    /// That root mean square of the field on the CPU, in its unit, or the scale.
+    pub size: f64,
+    /// Largest `l2_relative` that single precision explains; infinite where nobody has asked (see [`compare_stages`]).
+    pub bound: f64,
+}
+
+impl StageError {
+    /// Of a part that differs.
+    fn part(stage: Stage, field: &'static str, part: f64) -> Self {
+        let (max_relative, l2_relative) = (part, part);
+        Self { stage: stage.name(), field, max_relative, l2_relative, size: 1.0, bound: f64::INFINITY }
+    }
+
+    /// Whether single precision explains it.
+    pub fn is_explained(&self) -> bool {
+        self.l2_relative <= self.bound
+    }
 }
 
 /// Neighbours of a row: those that carry pressure, and dummies.
@@ -102,6 +123,8 @@ fn error(stage: Stage, field: &'static str, pairs: &[(DVec3, DVec3)], scale: Opt
         field,
         max_relative: over(most, largest),
         l2_relative: over(square.sqrt(), reference),
+        size: reference / (pairs.len().max(1) as f64).sqrt(),
+        bound: f64::INFINITY,
     }
 }
 
@@ -116,8 +139,7 @@ fn scalars(a: &[f64], b: &[f64]) -> Vec<(DVec3, DVec3)> {
 /// Part of two lists that differs.
 fn share<T: PartialEq>(stage: Stage, field: &'static str, a: &[T], b: &[T]) -> StageError {
     let differing = a.iter().zip(b).filter(|(a, b)| a != b).count();
-    let part = differing as f64 / a.len().max(1) as f64;
-    StageError { stage: stage.name(), field, max_relative: part, l2_relative: part }
+    StageError::part(stage, field, differing as f64 / a.len().max(1) as f64)
 }
 
 /// Errors of the fields that `stage` writes; both with the fluid [`by_number`].
@@ -217,9 +239,7 @@ impl Pair {
             let a = rows_by_number(self.gpu.neighbours()?, &gpu.id);
             let b = rows_by_number(neighbourhoods(self.cpu.neighbours()), &cpu.id);
             let d = neighbour_differences(&a, &b, cpu.id.len());
-            let part = d.differing as f64 / d.pairs.max(1) as f64;
-            let (max_relative, l2_relative) = (part, part);
-            return Ok(vec![StageError { stage: stage.name(), field: "pairs", max_relative, l2_relative }]);
+            return Ok(vec![StageError::part(stage, "pairs", d.differing as f64 / d.pairs.max(1) as f64)]);
         }
         Ok(differences(stage, &by_number(&gpu), &by_number(&cpu), &self.params))
     }
@@ -232,8 +252,8 @@ fn for_cpu(case: &Case) -> Case {
     case
 }
 
-/// Error of every field after every stage of one step, device (`adapter` as in [`Gpu::new`]) against CPU.
-/// The step starts from the state that `warmup` steps on the CPU lead to, rounded to f32 for both. Errors
+/// Error of every field after every stage of one step, device (`adapter` as in [`Gpu::new`]) against CPU, each with
+/// its bound. The step starts from the state that `warmup` steps on the CPU lead to, rounded to f32 for both. Errors
 /// pass from stage to stage, as they do in a run.
 pub fn compare_stages(
     case: &Case,
@@ -245,6 +265,18 @@ pub fn compare_stages(
     for _ in 0..warmup {
         simulation.step()?;
     }
+    let bounds = Bounds::new(&simulation.params, &simulation.next_step(), simulation.settings().tolerance);
+    let mut errors = stages(&mut simulation, case, scene, adapter)?;
+    errors.iter_mut().for_each(|e| e.bound = bounds.of(e));
+    Ok(errors)
+}
+
+fn stages(
+    simulation: &mut Simulation,
+    case: &Case,
+    scene: &Arc<Scene>,
+    adapter: Option<&str>,
+) -> Result<Vec<StageError>> {
     let (mut plan, params) = (simulation.plan.clone(), simulation.params.clone());
     // The plan may leave contact to the host; here it is the device's that is asked about.
     plan.contact = ContactPlan::on_device(case, scene);
@@ -254,7 +286,7 @@ pub fn compare_stages(
             return Ok(Vec::new());
         }
         let mut gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
-        return contact(&mut simulation, &mut gpu, scene);
+        return contact(simulation, &mut gpu, scene);
     }
     let cpu = Cpu::new(scene, &params, &plan, settings)?;
     let gpu = Gpu::new(scene, &params, &plan, settings, adapter)?;
@@ -308,7 +340,7 @@ pub fn compare_stages(
         }
         out.extend(pair.errors(stage)?);
     }
-    out.extend(contact(&mut simulation, &mut pair.gpu, scene)?);
+    out.extend(contact(simulation, &mut pair.gpu, scene)?);
     Ok(out)
 }
 
@@ -324,8 +356,7 @@ fn contact(simulation: &mut Simulation, gpu: &mut Gpu, scene: &Scene) -> Result<
         missing(&device.candidates, &host.candidates) + missing(&host.candidates, &device.candidates);
     let part = differing as f64 / host.candidates.len().max(1) as f64;
     let stage = Stage::Contact;
-    let pairs = StageError { stage: stage.name(), field: "pairs", max_relative: part, l2_relative: part };
-    let mut out = vec![pairs];
+    let mut out = vec![StageError::part(stage, "pairs", part)];
     // A body that hardly touches has hardly a force; what counts is the noise against its weight.
     let mass = scene.solids.iter().filter_map(|s| match &s.drive {
         Drive::Free(body) => Some(body.mass),
