@@ -35,7 +35,7 @@ impl Standing {
         Self {
             solid: Some(number),
             shape: solid.shape,
-            position,
+            position: position + orientation * solid.shape_offset,
             to_shape: DMat3::from_quat(orientation.inverse()),
             radius: solid.shape.radius(),
             is_free: solid.is_free(),

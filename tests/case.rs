@@ -200,6 +200,22 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ("density = 500.0", "density = -500.0", &["body.0.density: -500 is out of range"]),
     ("locked = [\"y\"]", "locked = [\"y\", \"y\"]", &["body.0.locked.1: listed twice"]),
     ("locked = [\"y\"]", "inertia = [1, 1, 3]", &["body.0.inertia: one moment exceeds"]),
+    (
+        "locked = [\"y\"]",
+        "mass_offset = [0, 0, 5]",
+        &["body.0.mass_offset: the centre of mass", "not its place"],
+    ),
+    (
+        "locked = [\"y\"]",
+        "locked = [\"y\"]\nhinge = { at = [0.8, 0.5, 0.5], axis = \"y\" }",
+        &["body.0.locked: a hinge holds body `cube` already", "remove `locked`"],
+    ),
+    (
+        "locked = [\"y\"]",
+        "motion = [[0, 0, 0, 0], [1, 0, 0, 1]]\nmass_offset = [0, 0, 0.1]",
+        &["body.0.mass_offset: body `cube` follows a given motion"],
+    ),
+    ("locked = [\"y\"]", "pivot = [0, 0, 0]", &["body.0.pivot: nothing turns about it", "`hinge`"]),
     ("locked = [\"y\"]", "orientation = { axis = [0, 0, 0], angle_deg = 10 }", &["body.0.orientation.axis"]),
     (
         "damping = 10.0",

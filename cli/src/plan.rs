@@ -115,8 +115,8 @@ impl BodyLine {
             name: solid.name.clone(),
             mass_kg: free.mass,
             volume_m3: solid.shape.volume(),
-            min_m: (solid.position + lo).to_array(),
-            max_m: (solid.position + hi).to_array(),
+            min_m: (solid.shape_center() + lo).to_array(),
+            max_m: (solid.shape_center() + hi).to_array(),
         })
     }
 }

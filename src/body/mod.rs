@@ -31,7 +31,7 @@ pub(crate) struct Body {
     pub pose: Pose,
     /// Orientation as a matrix, kept beside the quaternion.
     pub rotation: DMat3,
-    /// Angular momentum about the centre of mass [kg m2/s]; zero about locked axes.
+    /// Angular momentum about its position [kg m2/s]; zero about locked axes.
     pub momentum: DVec3,
     /// 1/mass along each world axis [1/kg]; 0 where locked or prescribed.
     pub inverse_mass: DVec3,
@@ -46,8 +46,12 @@ pub(crate) struct Body {
     /// Impulse [N s] and angular impulse [N m s] of contact since they were last taken, whether or not the solid gives
     /// way.
     pub touched: Wrench,
-    /// Shape, in the body's frame.
+    /// Shape.
     pub shape: Shape,
+    /// From the body's position to the centre of `shape`, body's frame [m].
+    pub shape_offset: DVec3,
+    /// From there to the centre of mass, body's frame [m].
+    weight_arm: DVec3,
     /// Place and orientation at the start, and tables of motion, of a prescribed solid.
     motion: Option<(DVec3, DQuat, Motion)>,
     /// The inertia does not depend on the orientation.
@@ -73,6 +77,8 @@ impl Body {
             locked_rotation: [true; 3],
             touched: Wrench::default(),
             shape: solid.shape,
+            shape_offset: solid.shape_offset,
+            weight_arm: DVec3::ZERO,
             motion: None,
             isotropic: false,
         };
@@ -85,6 +91,7 @@ impl Body {
                 let translation = [0, 1, 2].map(|k| free.locked_translation[k] || flat && k == 1);
                 body.locked_rotation = [0, 1, 2].map(|k| free.locked_rotation[k] || flat && k != 1);
                 body.mass = free.mass;
+                body.weight_arm = free.weight_arm;
                 body.principal = free.inertia;
                 body.inverse_mass =
                     DVec3::from_array(translation.map(|locked| if locked { 0.0 } else { 1.0 / free.mass }));
@@ -114,7 +121,23 @@ impl Body {
 
     /// Radius of the sphere about the centre that holds the body [m].
     pub fn radius(&self) -> f64 {
-        self.shape.radius()
+        self.shape.radius() + self.shape_offset.length()
+    }
+
+    /// Centre of the shape [m].
+    pub fn shape_center(&self) -> DVec3 {
+        self.pose.position + self.rotation * self.shape_offset
+    }
+
+    /// Force and torque of `gravity` [m/s2] on it.
+    pub fn weight(&self, gravity: DVec3) -> Wrench {
+        let force = self.mass * gravity;
+        Wrench { force, torque: self.to_mass().cross(force) }
+    }
+
+    /// From its position to the centre of mass [m].
+    pub fn to_mass(&self) -> DVec3 {
+        self.rotation * self.weight_arm
     }
 
     /// World half extents of the bounding box [m].
@@ -150,7 +173,7 @@ impl Body {
         }
     }
 
-    /// Adds an impulse [N s] and an angular impulse about the centre [N m s].
+    /// Adds an impulse [N s] and an angular impulse about the position [N m s].
     pub fn kick(&mut self, impulse: DVec3, angular: DVec3) {
         self.pose.velocity += self.inverse_mass * impulse;
         if !self.is_free() {
@@ -322,6 +345,7 @@ mod tests {
             drive: Drive::Free(FreeBody {
                 mass: 12.0,
                 inertia: DVec3::new(0.2, 0.4, 0.52),
+                weight_arm: DVec3::ZERO,
                 velocity: DVec3::X,
                 angular_velocity: spin,
                 locked_translation: [false; 3],
@@ -329,6 +353,7 @@ mod tests {
             }),
             wall_slots: 0..0,
             dummy_slots: 0..0,
+            shape_offset: DVec3::ZERO,
             wall_offset: vec![],
             dummy_offset: vec![],
             wall_area: vec![],

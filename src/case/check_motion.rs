@@ -279,7 +279,8 @@ impl Checker<'_> {
         if rows.is_empty() {
             if pivot.is_some() {
                 let message = "nothing turns about it: there is no `rotation`";
-                self.add(format!("{path}.pivot"), message, "add `rotation` or remove `pivot`");
+                let remedy = "add `rotation`, a `hinge` for a body that forces turn, or remove `pivot`";
+                self.add(format!("{path}.pivot"), message, remedy);
             }
             return;
         }

@@ -2,7 +2,7 @@
 
 use super::check::{Checker, length};
 use super::section::flaw;
-use super::{Body, BodyShape, Contact, ContactDevice, Form, Law};
+use super::{Axis, Body, BodyShape, Contact, ContactDevice, Form, Law};
 use glam::DMat3;
 
 /// Most sub-steps of a step that a case can ask for.
@@ -65,8 +65,15 @@ impl Checker<'_> {
         }
         let far = body.form().reach();
         self.guided(&format!("body.{k}"), &body.guide(), false, (far, body.center));
+        self.held(&format!("body.{k}"), body);
         if body.is_driven() {
-            for (key, given) in [("locked", !body.locked.is_empty()), ("standing", body.standing)] {
+            let unheard = [
+                ("locked", !body.locked.is_empty()),
+                ("standing", body.standing),
+                ("hinge", body.hinge.is_some()),
+                ("mass_offset", body.mass_offset.is_some()),
+            ];
+            for (key, given) in unheard {
                 if given {
                     self.add(
                         path(key),
@@ -96,6 +103,32 @@ impl Checker<'_> {
         }
         if body.displaces_fluid && self.case.fluid.is_none() {
             self.add(path("displaces_fluid"), "there is no [fluid]", "remove `displaces_fluid`");
+        }
+    }
+
+    /// Where its mass is, and a hinge.
+    fn held(&mut self, path: &str, body: &Body) {
+        let key = |key: &str| format!("{path}.{key}");
+        if let Some(offset) = &body.mass_offset {
+            self.in_plane(&key("mass_offset"), offset);
+            let (far, reach) = (length(offset), body.form().reach());
+            if far > reach {
+                let message = format!(
+                    "the centre of mass would be {far} m from the centre, beyond all of the body ({reach} m)"
+                );
+                self.add(key("mass_offset"), message, "give the way from `center` to it [m], not its place");
+            }
+        }
+        let Some(hinge) = &body.hinge else { return };
+        self.place(&key("hinge.at"), &hinge.at);
+        if self.flat() && hinge.axis != Axis::Y {
+            self.add(key("hinge.axis"), "in two dimensions a solid turns about y alone", "set axis = \"y\"");
+        }
+        for (other, given) in [("locked", !body.locked.is_empty()), ("standing", body.standing)] {
+            if given {
+                let message = format!("a hinge holds body `{}` already: `{other}` has no effect", body.name);
+                self.add(key(other), message, format!("remove `{other}`, or the hinge"));
+            }
         }
     }
 

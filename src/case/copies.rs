@@ -188,6 +188,9 @@ impl Several for Body {
     fn shift(&mut self, way: Vector) {
         self.center = sum(self.center, way);
         add(&mut self.pivot, way);
+        if let Some(hinge) = &mut self.hinge {
+            (0..3).for_each(|k| hinge.at[k] += way[k]);
+        }
     }
 }
 

@@ -44,7 +44,7 @@ pub use output::{Encoding, Output, OutputField, OutputKind, OutputRegion, Series
 pub use scatter::{Scatter, Turned};
 pub use shape::BodyShape;
 pub(crate) use shape::{Form, Place, Wall};
-pub use solid::{Body, Freedom, MovingWall, Turn};
+pub use solid::{Body, Freedom, Hinge, MovingWall, Turn};
 pub(crate) use tank::TANK_FACES;
 pub use tank::{Axis, Face, Obstacle, Plane, Tank};
 pub use water::{Fill, WaterShape};

@@ -1,6 +1,6 @@
 //! What moves: walls by a table or a formula, rigid bodies by forces.
 
-use super::{Array, BodyShape, Face, Scatter, Sine, Swing, Vector, WaveMaker};
+use super::{Array, Axis, BodyShape, Face, Scatter, Sine, Swing, Vector, WaveMaker};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -94,6 +94,16 @@ pub enum Freedom {
     RotationZ,
 }
 
+/// A hinge without friction. It holds where solids do not touch: what is pressed against the floor beside it stays pressed.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hinge {
+    /// A place on its axis at t = 0 [m].
+    pub at: Vector,
+    /// Its axis: y in two dimensions.
+    pub axis: Axis,
+}
+
 /// A rigid body.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -124,7 +134,7 @@ pub struct Body {
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In
     /// two dimensions it is [0, 1, 0].
     pub axis: Option<Vector>,
-    /// Centre of mass at t = 0 [m].
+    /// Centre at t = 0 [m]: of mass, but for `mass_offset`.
     pub center: Vector,
     /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share of it: l0 over size y
     /// or over the cylinder's height.
@@ -133,8 +143,11 @@ pub struct Body {
     /// Density [kg/m3].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: Option<f64>,
-    /// Principal moments of inertia [kg m2], of the same whole body as `mass`; those of a uniform body if absent.
-    /// A cylinder's third axis is its own.
+    /// From `center` to the centre of mass of a body that is not uniform, one with ballast say [m], before
+    /// `orientation` turns it.
+    pub mass_offset: Option<Vector>,
+    /// Principal moments of inertia about the centre of mass [kg m2], of the same whole body as `mass`; those of a
+    /// uniform body about its own if absent. A cylinder's third axis is its own.
     #[schemars(transform = super::bounds::each_positive)]
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.
@@ -149,6 +162,8 @@ pub struct Body {
     #[serde(default)]
     #[schemars(transform = super::bounds::each_once)]
     pub locked: Vec<Freedom>,
+    /// What holds it so that it turns about one axis and does nothing else: a flap, a gate, a pendulum.
+    pub hinge: Option<Hinge>,
     /// Rows of time [s] and displacement x, y, z [m]: the body then follows the table, as a moving wall does,
     /// instead of forces.
     pub motion: Option<Vec<[f64; 4]>>,

@@ -102,7 +102,7 @@ impl Candidates {
             .map(|(k, b)| {
                 // a spacing more: the paper's law reaches d_c - l0 beyond the surfaces
                 let reach = b.extent() + self.skin[k] + 0.5 * spacing;
-                (b.pose.position - reach, b.pose.position + reach)
+                (b.shape_center() - reach, b.shape_center() + reach)
             })
             .collect();
         let way = |turns| self.periodic.way(turns);

@@ -153,8 +153,8 @@ impl Solids {
             if !body.is_free() {
                 return FreeBody::default();
             }
-            let weight = body.mass * gravity;
-            let load = Wrench { force: weight + contact.force, torque: contact.torque };
+            let mut load = body.weight(gravity);
+            load += *contact;
             FreeBody { inverse_mass: body.inverse_mass, inverse_inertia: body.inverse_inertia, load }
         };
         self.bodies.iter().zip(&self.contact).map(of).collect()
@@ -193,7 +193,8 @@ impl Solids {
                 None => {
                     let mut body = body.clone();
                     let contact = if contact { self.contact[k] } else { Wrench::default() };
-                    body.kick(dt * (body.mass * gravity + contact.force), dt * contact.torque);
+                    let weight = body.weight(gravity);
+                    body.kick(dt * (weight.force + contact.force), dt * (weight.torque + contact.torque));
                     body.drift(ahead);
                     body.pose
                 }
@@ -366,8 +367,9 @@ impl Solids {
         for ((body, load), fluid) in self.bodies.iter_mut().zip(&self.load).zip(fluid) {
             body.touched.add(span, load);
             if body.is_free() {
-                let steady = body.mass * self.gravity + fluid.force;
-                body.kick(h * steady + span * load.force, h * fluid.torque + span * load.torque);
+                let mut steady = body.weight(self.gravity);
+                steady += *fluid;
+                body.kick(h * steady.force + span * load.force, h * steady.torque + span * load.torque);
             }
         }
         if let Some(law) = &mut self.law {

@@ -12,7 +12,7 @@ impl Solids {
         let mut energy = Energy::default();
         for (k, body) in self.bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             energy.kinetic += body.kinetic_energy();
-            energy.gravity -= body.mass * self.gravity.dot(self.path(k));
+            energy.gravity -= body.mass * self.gravity.dot(self.path(k) + body.to_mass());
         }
         self.candidates.refresh(&self.bodies, self.spacing, 0.0);
         if let Some(law) = &mut self.law {
@@ -34,7 +34,8 @@ impl Solids {
         for (body, load) in self.bodies.iter().zip(&load).filter(|(b, _)| b.is_free()) {
             let mut body = body.clone();
             energy.kinetic -= body.kinetic_energy();
-            body.kick(half * (body.mass * self.gravity + load.force), half * load.torque);
+            let weight = body.weight(self.gravity);
+            body.kick(half * (weight.force + load.force), half * (weight.torque + load.torque));
             energy.kinetic += body.kinetic_energy();
         }
         energy
@@ -43,7 +44,7 @@ impl Solids {
     /// Momentum [kg m/s] of the free bodies, and angular momentum about the origin [kg m2/s].
     pub fn momentum(&self) -> (DVec3, DVec3) {
         self.bodies.iter().filter(|b| b.is_free()).fold((DVec3::ZERO, DVec3::ZERO), |(p, l), b| {
-            let own = b.mass * b.pose.velocity;
+            let own = b.mass * b.pose.velocity_at(b.pose.position + b.to_mass());
             (p + own, l + b.pose.position.cross(own) + b.momentum)
         })
     }

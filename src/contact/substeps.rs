@@ -241,7 +241,7 @@ impl Limits {
 fn starting_speed(scene: &Scene) -> f64 {
     let start = scene.solids.iter().map(|s| match &s.drive {
         Drive::Free(body) => body.velocity.length(),
-        Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.shape.radius()),
+        Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.radius()),
     });
     start.fold(0.0, f64::max)
 }
@@ -259,7 +259,7 @@ fn fastest_speed(scene: &Scene) -> f64 {
 fn falling_speed(scene: &Scene) -> f64 {
     let up = -scene.gravity.normalize_or_zero();
     let free = scene.solids.iter().filter(|s| s.is_free());
-    let highest = free.map(|s| s.position.dot(up) + s.shape.radius()).fold(f64::NEG_INFINITY, f64::max);
+    let highest = free.map(|s| s.position.dot(up) + s.radius()).fold(f64::NEG_INFINITY, f64::max);
     // of each wall the lowest corner of the face that looks up most
     let floor = |w: &WallShape| {
         let rise = (w.axes.transpose() * up).abs() * w.half;
@@ -267,7 +267,7 @@ fn falling_speed(scene: &Scene) -> f64 {
     };
     let table = |s: &Solid| match &s.drive {
         Drive::Prescribed(_) => {
-            Some(s.position.dot(up) + s.shape.extent(DMat3::from_quat(s.orientation)).dot(up.abs()))
+            Some(s.shape_center().dot(up) + s.shape.extent(DMat3::from_quat(s.orientation)).dot(up.abs()))
         }
         Drive::Free(_) => None,
     };

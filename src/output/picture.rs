@@ -205,6 +205,7 @@ impl Painter {
     }
 
     fn solid(&self, canvas: &mut Canvas, solid: &Solid, pose: (DVec3, DQuat), paint: impl Fn(DVec3) -> Vec3) {
+        let pose = (pose.0 + pose.1 * solid.shape_offset, pose.1);
         match &solid.shape {
             // Its distances are dear to ask for.
             #[cfg(feature = "mesh")]

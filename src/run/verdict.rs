@@ -57,7 +57,7 @@ impl Scale {
         let start = scene.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         // Tables of motion put in any energy: as much as all the water and all the bodies at their speed.
         let driven = scene.solids.iter().filter_map(|s| match &s.drive {
-            Drive::Prescribed(motion) => Some(motion.fastest(0.0, end, s.shape.radius())),
+            Drive::Prescribed(motion) => Some(motion.fastest(0.0, end, s.radius())),
             Drive::Free(_) => None,
         });
         let driven = driven.fold(simulation.openings.fastest(0.0, end), f64::max);
@@ -68,8 +68,8 @@ impl Scale {
             if let Drive::Prescribed(motion) = &solid.drive {
                 for (way, turn) in motion.poses() {
                     risen = risen.max(way.dot(up));
-                    tilted = tilted
-                        .max(2.0 * solid.shape.radius() * (0.5 * turn.angle_between(DQuat::IDENTITY)).sin());
+                    tilted =
+                        tilted.max(2.0 * solid.radius() * (0.5 * turn.angle_between(DQuat::IDENTITY)).sin());
                 }
             }
         }
@@ -118,7 +118,7 @@ impl Scale {
                 (water + bodies) * (g * risen.max(0.0) + 0.5 * driven * driven),
             ],
             stirred: scene.solids.iter().any(|solid| match &solid.drive {
-                Drive::Prescribed(motion) => goes_on(motion, end, solid.shape.radius()),
+                Drive::Prescribed(motion) => goes_on(motion, end, solid.radius()),
                 Drive::Free(_) => false,
             }),
             through: if scene.openings.is_empty() { (0.0, 0.0) } else { through },

@@ -3,9 +3,9 @@
 use super::oriented::Placed;
 use super::walls::motion;
 use super::{Drive, FreeBody, Shape, Solid};
-use crate::case::{self, Freedom};
+use crate::case::{self, Axis, Freedom};
 use crate::error::Problem;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// A body without slots, at the position that the case asks for.
 ///
@@ -20,33 +20,45 @@ pub(super) fn body(
     let plane = dimensions == 2;
     let form = body.form();
     let (shape, share) = form.shape(spacing, plane)?;
-    let mut position: DVec3 = body.center.into();
-    if plane {
-        position.y = 0.0;
-    }
+    let in_plane =
+        |x: case::Vector| if plane { DVec3::from(x) * DVec3::new(1.0, 0.0, 1.0) } else { x.into() };
+    let center = in_plane(body.center);
+    let orientation = form.turn(plane) * shape.frame();
+    let mass = shape.frame().inverse() * body.mass_offset.map_or(DVec3::ZERO, in_plane);
+    // What it moves and turns about, and where that is.
+    let about = body.hinge.as_ref().map_or(mass, |h| orientation.inverse() * (in_plane(h.at) - center));
     let drive = if body.is_driven() {
-        Drive::Prescribed(motion(&body.guide(), None, position, plane))
+        Drive::Prescribed(motion(&body.guide(), None, center, plane))
     } else {
-        Drive::Free(free(body, &shape, share, plane))
+        Drive::Free(free(body, &shape, (mass - about, orientation), share, plane))
     };
     let particles = shape.particles(spacing, dimensions, layers);
+    let from_there = |places: Vec<DVec3>| places.into_iter().map(|x| x - about).collect();
     Ok(Solid {
         name: body.name.clone(),
         is_body: true,
         shape,
-        position,
-        orientation: form.turn(plane) * shape.frame(),
+        position: center + orientation * about,
+        shape_offset: -about,
+        orientation,
         drive,
         wall_slots: 0..0,
         dummy_slots: 0..0,
-        wall_offset: particles.wall,
-        dummy_offset: particles.dummy,
+        wall_offset: from_there(particles.wall),
+        dummy_offset: from_there(particles.dummy),
         wall_area: particles.area,
         wall_to_surface: particles.to_surface,
     })
 }
 
-fn free(body: &case::Body, shape: &Shape, share: f64, plane: bool) -> FreeBody {
+/// `weight_arm` leads from what it moves about to the centre of mass [m], in its frame, which `orientation` turns to the world's.
+fn free(
+    body: &case::Body,
+    shape: &Shape,
+    (weight_arm, orientation): (DVec3, DQuat),
+    share: f64,
+    plane: bool,
+) -> FreeBody {
     let mass = match (body.mass, body.density) {
         (Some(mass), _) => mass * share,
         (None, density) => density.unwrap_or_default() * shape.volume(),
@@ -56,6 +68,7 @@ fn free(body: &case::Body, shape: &Shape, share: f64, plane: bool) -> FreeBody {
     let mut freedom = FreeBody {
         mass,
         inertia: body.inertia.map_or(uniform, |i| DVec3::from(i) * share),
+        weight_arm,
         velocity: body.velocity.into(),
         angular_velocity: body.angular_velocity.into(),
         locked_translation: locked([Freedom::X, Freedom::Y, Freedom::Z]),
@@ -65,6 +78,13 @@ fn free(body: &case::Body, shape: &Shape, share: f64, plane: bool) -> FreeBody {
         freedom.locked_translation[1] = true;
         freedom.locked_rotation[0] = true;
         freedom.locked_rotation[2] = true;
+    }
+    if let Some(hinge) = &body.hinge {
+        freedom.locked_translation = [true; 3];
+        freedom.locked_rotation = [Axis::X, Axis::Y, Axis::Z].map(|axis| axis != hinge.axis);
+        let axis: DVec3 = orientation.inverse() * DVec3::AXES[hinge.axis as usize];
+        let about: f64 = (axis * axis).dot(freedom.inertia) + mass * weight_arm.cross(axis).length_squared();
+        freedom.inertia = DVec3::splat(about);
     }
     // What is locked does not move at the start either.
     for axis in 0..3 {
@@ -81,7 +101,7 @@ fn free(body: &case::Body, shape: &Shape, share: f64, plane: bool) -> FreeBody {
 impl Solid {
     /// The solid's shape in the world.
     pub(super) fn placed(&self) -> Placed {
-        Placed { center: self.position, shape: self.shape, axes: DMat3::from_quat(self.orientation) }
+        Placed { center: self.shape_center(), shape: self.shape, axes: DMat3::from_quat(self.orientation) }
     }
     /// Positions of the wall layer in the world [m].
     pub(super) fn wall_positions(&self) -> impl Iterator<Item = DVec3> {

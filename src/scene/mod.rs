@@ -159,9 +159,12 @@ pub struct WallShape {
 pub struct FreeBody {
     /// Mass [kg].
     pub mass: f64,
-    /// Principal moments of inertia in the body's frame [kg m2].
+    /// Principal moments of inertia about the solid's `position`, in the body's frame [kg m2]; of a hinged body three times the one
+    /// about the hinge.
     pub inertia: DVec3,
-    /// Initial velocity of the centre of mass [m/s].
+    /// From the solid's `position` to the centre of mass, body's frame [m]: 0 but for a hinge.
+    pub weight_arm: DVec3,
+    /// Initial velocity of the solid's `position` [m/s].
     pub velocity: DVec3,
     /// Initial angular velocity, world axes [rad/s].
     pub angular_velocity: DVec3,
@@ -191,8 +194,10 @@ pub struct Solid {
     /// Shape, in the solid's frame. A rank of many is told none: it has the particles, and contact is on the first one.
     #[serde(skip, default = "untold")]
     pub shape: Shape,
-    /// Initial position of the centre of mass [m].
+    /// Initial position of what it moves and turns about [m]: of a free body the centre of mass or a place on its hinge.
     pub position: DVec3,
+    /// From there to the centre of `shape`, solid's frame [m].
+    pub shape_offset: DVec3,
     /// Initial orientation.
     pub orientation: DQuat,
     /// How it moves.
@@ -201,7 +206,7 @@ pub struct Solid {
     pub wall_slots: Range<usize>,
     /// Slots of the inside, counted from the first particle; they lie within the moving-dummy group.
     pub dummy_slots: Range<usize>,
-    /// Offsets of the wall-layer particles from the centre of mass, solid's frame [m].
+    /// Offsets of the wall-layer particles from `position`, solid's frame [m].
     pub wall_offset: Vec<DVec3>,
     /// Offsets of the dummies, solid's frame [m].
     pub dummy_offset: Vec<DVec3>,
@@ -238,9 +243,20 @@ impl Solid {
         }
     }
 
-    /// What of its surface presses into others.
+    /// Centre of the shape at t = 0 [m].
+    pub fn shape_center(&self) -> DVec3 {
+        self.position + self.orientation * self.shape_offset
+    }
+
+    /// Radius of the sphere about `position` that holds it [m].
+    pub fn radius(&self) -> f64 {
+        self.shape.radius() + self.shape_offset.length()
+    }
+
+    /// What of its surface presses into others, from the centre of the shape.
     pub(crate) fn surface(&self, spacing: f64, dimensions: u32) -> Surface {
-        let wall = WallLayer { offset: &self.wall_offset, to_surface: &self.wall_to_surface };
+        let offset: Vec<DVec3> = self.wall_offset.iter().map(|x| *x - self.shape_offset).collect();
+        let wall = WallLayer { offset: &offset, to_surface: &self.wall_to_surface };
         self.shape.surface(&wall, spacing, dimensions)
     }
 }
@@ -265,7 +281,7 @@ impl Scene {
     /// Speed of the fastest thing that drives the water between the times `from` and `to` [m/s]: a solid with a motion, an opening.
     pub fn driven(&self, from: f64, to: f64) -> f64 {
         let solids = self.solids.iter().map(|s| match &s.drive {
-            Drive::Prescribed(motion) => motion.fastest(from, to, s.shape.radius()),
+            Drive::Prescribed(motion) => motion.fastest(from, to, s.radius()),
             Drive::Free(_) => 0.0,
         });
         solids.chain(self.openings.iter().map(|o| o.fastest(from, to))).fold(0.0, f64::max)

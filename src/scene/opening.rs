@@ -264,6 +264,7 @@ impl Builder<'_> {
                 drive: Drive::Prescribed(Motion::still()),
                 wall_slots: 0..0,
                 dummy_slots: 0..0,
+                shape_offset: DVec3::ZERO,
                 wall_offset,
                 dummy_offset: (1..deep).flat_map(offset).collect(),
                 wall_area: vec![-opening.outward * l0 * l0; count],

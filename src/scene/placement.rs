@@ -60,7 +60,7 @@ impl Surroundings<'_> {
             let remedy = format!("set `standing = true`, or raise its center by {more:.6} m against gravity");
             return Err((says, remedy));
         }
-        let from = body.position;
+        let from = body.shape_center();
         body.position += lift * up;
         if let Some(Contact { with, .. }) = self.deepest(body) {
             return Err((says, format!("move it away, lifted by {lift:.6} m it would still overlap {with}")));
@@ -69,7 +69,7 @@ impl Surroundings<'_> {
             "body `{}`: lifted by {lift:.6} m to stand free of contact, center {} becomes {}",
             body.name,
             point(from),
-            point(body.position)
+            point(body.shape_center())
         )))
     }
 

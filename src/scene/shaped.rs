@@ -37,6 +37,7 @@ fn wall(
         drive: Drive::Prescribed(moved.map_or_else(Motion::still, |w| wall_motion(w, case, position))),
         wall_slots: 0..0,
         dummy_slots: 0..0,
+        shape_offset: DVec3::ZERO,
         wall_offset: vec![],
         dummy_offset: vec![],
         wall_area: vec![],

@@ -236,6 +236,7 @@ pub(super) fn moving_wall(
         drive: Drive::Prescribed(wall_motion(wall, case, position)),
         wall_slots: 0..0,
         dummy_slots: 0..0,
+        shape_offset: DVec3::ZERO,
         wall_offset: Vec::new(),
         dummy_offset: Vec::new(),
         wall_area: Vec::new(),

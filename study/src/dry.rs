@@ -125,6 +125,7 @@ impl DryScene {
         let free = FreeBody {
             mass,
             inertia,
+            weight_arm: DVec3::ZERO,
             velocity: body.velocity,
             angular_velocity: body.angular_velocity,
             locked_translation: [false; 3],
@@ -204,6 +205,7 @@ fn lattice_box(
         drive,
         wall_slots: 0..offsets.len(),
         dummy_slots: 0..0,
+        shape_offset: DVec3::ZERO,
         wall_offset: offsets,
         dummy_offset: vec![],
         wall_area: areas,

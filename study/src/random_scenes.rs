@@ -178,7 +178,8 @@ fn lost(scene: &Scene, before: &[DVec3], solids: &Solids) -> Option<String> {
             }
         }
         for (j, other) in solids.poses().iter().enumerate().filter(|(j, _)| *j != k) {
-            let q = other.orientation.inverse() * (pose.position - other.position);
+            let q =
+                other.orientation.inverse() * (pose.position - other.position) - scene.solids[j].shape_offset;
             let shape = &scene.solids[j].shape;
             if shape.distance(q).0 < 0.0 {
                 return Some(format!("the centre of `{}` is in `{}`", solids.name(k), solids.name(j)));

@@ -117,6 +117,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
             Drive::Free(FreeBody {
                 mass: 0.1,
                 inertia: DVec3::splat(1e-4),
+                weight_arm: DVec3::ZERO,
                 velocity: DVec3::ZERO,
                 angular_velocity: DVec3::ZERO,
                 locked_translation: [false; 3],
@@ -130,6 +131,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
             is_body,
             shape: Shape::cuboid(high - low + SPACING),
             position: middle,
+            shape_offset: DVec3::ZERO,
             orientation: DQuat::IDENTITY,
             drive,
             wall_slots: start.0..fluid.len() + moving_wall.len(),

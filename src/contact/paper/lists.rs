@@ -45,7 +45,7 @@ impl Lists {
         let mut pairs: Vec<(Pair, f64)> = vec![];
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             let reach = body.extent() + candidates.skin(a) + distance;
-            if self.walls.grid.meets(&(body.pose.position - reach, body.pose.position + reach)) {
+            if self.walls.grid.meets(&(body.shape_center() - reach, body.shape_center() + reach)) {
                 pairs.push((Pair::new(a, None, DVec3::ZERO), distance + candidates.skin(a)));
             }
         }

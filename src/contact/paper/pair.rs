@@ -95,7 +95,7 @@ impl Pair {
                 // only what lies inside the other's box, widened by the reach
                 let near = |own: (&Body, DVec3), layer: &Layer, other: (&Body, DVec3)| {
                     let inside = |x: &DVec3| {
-                        let q = other.0.rotation.transpose() * (*x - (other.0.pose.position + other.1));
+                        let q = other.0.rotation.transpose() * (*x - (other.0.shape_center() + other.1));
                         other.0.shape.outside(q) < reach
                     };
                     let points = layer.offsets.iter().enumerate();

@@ -218,7 +218,7 @@ impl Smooth {
         let way = dt * (a.pose.velocity - b.map_or(DVec3::ZERO, |b| b.pose.velocity));
         let turned = dt * b.map_or(0.0, |b| b.pose.angular_velocity.length()) * b.map_or(0.0, |b| b.radius());
         let along = other.axes.transpose() * way.normalize_or(DVec3::X);
-        other.shape.line_is_near(other.local(a.pose.position), along, way.length(), a.radius() + turned)
+        other.shape.line_is_near(other.local(a.shape_center()), along, way.length(), a.radius() + turned)
     }
 }
 

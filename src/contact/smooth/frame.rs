@@ -17,7 +17,7 @@ pub(super) struct Frame {
 
 impl Frame {
     pub fn body(body: &Body, faces: Faces) -> Self {
-        Self { center: body.pose.position, axes: body.rotation, shape: body.shape, faces }
+        Self { center: body.shape_center(), axes: body.rotation, shape: body.shape, faces }
     }
 
     pub fn wall(wall: &WallBox) -> Self {

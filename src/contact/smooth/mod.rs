@@ -64,6 +64,11 @@ pub(super) const KIND: Kind = Kind {
         if scene.solids.iter().any(|s| s.shape.as_cuboid().is_none()) {
             return Err("the device has no kernel of law \"smooth\" for bodies that are no boxes");
         }
+        if scene.solids.iter().any(|s| s.shape_offset != DVec3::ZERO) {
+            return Err(
+                "the device has no kernel of law \"smooth\" for bodies with a `mass_offset` or a hinge",
+            );
+        }
         Ok(&device::PROGRAM)
     },
 };
@@ -98,7 +103,10 @@ pub(crate) struct Smooth {
 /// The surface of each solid: of a thousand equal ones there is one, which stays in the processor's caches.
 fn shared(scene: &Scene) -> Vec<Arc<Surface>> {
     let equal = |a: &Solid, b: &Solid| {
-        a.shape == b.shape && a.wall_offset == b.wall_offset && a.wall_to_surface == b.wall_to_surface
+        a.shape == b.shape
+            && a.shape_offset == b.shape_offset
+            && a.wall_offset == b.wall_offset
+            && a.wall_to_surface == b.wall_to_surface
     };
     // what is equal is so in this; a hundred thousand that are not need not all be compared
     let mark = |solid: &Solid| {
@@ -167,7 +175,7 @@ impl Smooth {
         let mut pairs: Vec<(Pair, f64)> = vec![];
         for (a, body) in bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             for (w, wall) in self.walls.iter().enumerate() {
-                let q = wall.axes.transpose() * (body.pose.position - wall.center);
+                let q = wall.axes.transpose() * (body.shape_center() - wall.center);
                 let extent = body.shape.extent(wall.axes.transpose() * body.rotation);
                 if (Cuboid { half: wall.half + extent }).outside(q) < candidates.skin(a) {
                     pairs.push((Pair::new(a, Other::Wall(w), DVec3::ZERO), candidates.skin(a)));

@@ -223,13 +223,13 @@ impl Pair {
         let share = if self.b.solid().is_some() { 0.5 } else { 1.0 };
         let still = a.rotation.transpose();
         let turn = other.axes.transpose() * a.rotation;
-        let shift = other.axes.transpose() * (a.pose.position - other.center);
+        let shift = other.axes.transpose() * (own.center - other.center);
         let b = self.pose_b(bodies);
         let velocity_b = |at: DVec3| b.map_or(DVec3::ZERO, |b| b.velocity_at(at));
         for &k in &self.points_a {
             let p = surfaces[self.a].points[k as usize];
             if let Some(Inside { depth, outward, face }) = other.shape.depth(turn * p + shift, other.faces) {
-                let at = a.pose.position + a.rotation * p;
+                let at = own.center + a.rotation * p;
                 let normal = other.axes * outward;
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);
                 let weight = share * surfaces[self.a].weights[k as usize];
@@ -238,7 +238,7 @@ impl Pair {
             }
         }
         let mut pushed = |at: DVec3, weight: f64, part: f64| {
-            let q = still * (at - a.pose.position);
+            let q = still * (at - own.center);
             if let Some(Inside { depth, outward, face }) = own.shape.depth(q, own.faces) {
                 let normal = -(a.rotation * outward);
                 let speed = (a.pose.velocity_at(at) - velocity_b(at)).dot(normal);

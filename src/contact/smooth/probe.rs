@@ -50,7 +50,7 @@ pub(super) fn fill(law: &Smooth, bodies: &[Body], device: Option<Link>, probe: &
         }
         _ => {
             let place = |s: usize, way: DVec3, k: u32| {
-                bodies[s].pose.position + way + bodies[s].rotation * law.surfaces[s].points[k as usize]
+                bodies[s].shape_center() + way + bodies[s].rotation * law.surfaces[s].points[k as usize]
             };
             let of = |p: &Pair| {
                 let mut all: Vec<[u64; 4]> =

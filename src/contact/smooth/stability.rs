@@ -26,14 +26,21 @@ pub(super) fn lambda(body: &Body, surface: &Surface) -> Lambda {
     if !turns {
         return lambda;
     }
-    let samples = surface.samples();
+    // Arms are those from what the body turns about.
+    let from = body.shape_offset;
+    let samples: Vec<_> = surface.samples().into_iter().map(|(p, w, faces)| (from + p, w, faces)).collect();
+    if surface.is_round() {
+        let give = mass + turning(from, body.principal);
+        take(give, give);
+    }
     for (p, w, _) in &samples {
         let give = mass + turning(*p, body.principal);
         take(share(*w) * give, share(*w).sqrt() * give);
     }
     // of a ring little more than a point may touch
     for ring in &surface.rings {
-        let give = mass + turning(ring.point(0.0).0, body.principal);
+        let farthest = ring.point(from.y.atan2(from.x)).0;
+        let give = mass + turning(from + farthest, body.principal);
         take(share(ring.weight) * give, share(ring.weight).sqrt() * give);
     }
     for face in 0..6_u8 {

@@ -214,7 +214,7 @@ fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
 /// the largest solid.
 fn wrenches(stage: Stage, gpu: &[Wrench], cpu: &[Wrench], solids: &[Solid], weight: f64) -> Vec<StageError> {
     let most = |f: fn(&Wrench) -> DVec3| cpu.iter().map(|w| f(w).length()).fold(0.0, f64::max);
-    let sizes = solids.iter().map(|s| s.shape.radius());
+    let sizes = solids.iter().map(|s| s.radius());
     let force = most(|w| w.force).max(weight);
     let scale = most(|w| w.torque).max(force * sizes.fold(0.0, f64::max));
     let pairs =
