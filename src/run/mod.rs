@@ -9,6 +9,7 @@ mod due;
 pub mod frames;
 pub mod from;
 mod meshes;
+mod options;
 mod pace;
 pub mod resume;
 mod saving;
@@ -16,7 +17,7 @@ pub mod summary;
 pub mod tables;
 pub mod verdict;
 
-use crate::checkpoint::{Archive, Found};
+use crate::checkpoint::Archive;
 use crate::console::remark;
 use crate::error::{Error, Result};
 use crate::gauges::Gauges;
@@ -32,6 +33,7 @@ pub use due::Due;
 use frames::Frames;
 use from::{earlier, fits, stands};
 use meshes::Meshes;
+pub use options::{Options, Start};
 use pace::Pace;
 use saving::{Kept, Saving};
 use std::path::PathBuf;
@@ -39,37 +41,6 @@ use std::time::{Duration, Instant};
 use summary::Totals;
 use tables::Tables;
 use verdict::Scale;
-
-/// Where a run begins.
-#[derive(Debug, Default)]
-pub enum Start {
-    /// At t = 0, or at `run.from`, in a folder of its own.
-    #[default]
-    New,
-    /// The same, in the place of earlier results.
-    Replace,
-    /// Where the run in the folder was when it saved its state.
-    Resume(Box<Found>),
-}
-
-/// What the command line adds to a case.
-#[derive(Debug, Default)]
-pub struct Options {
-    /// Name of the case, for file names and the summary.
-    pub name: String,
-    /// Folder of the results.
-    pub out: PathBuf,
-    /// Where to begin.
-    pub start: Start,
-    /// Stop after this many steps, counted from t = 0.
-    pub steps: Option<u64>,
-    /// Stop at this moment, with the state saved.
-    pub deadline: Option<Instant>,
-    /// Draw a picture of every frame.
-    pub pictures: bool,
-    /// Files that the run was made from; results never take their place.
-    pub inputs: Vec<PathBuf>,
-}
 
 /// Where a run stands.
 #[derive(Clone, Debug, Default)]
