@@ -203,6 +203,29 @@ fn a_hinge_through_the_middle_locks_all_but_its_turn() {
 }
 
 #[test]
+fn the_domain_holds_what_a_pendulum_reaches_and_no_more() {
+    let domain = |body: &str| {
+        let scene = Scene::build(&wet(body)).expect("builds");
+        (scene.domain.0, scene.domain.1)
+    };
+    let body = |center: [f64; 2], at: [f64; 2]| {
+        format!(
+            "[[body]]\nname = \"bob\"\nsize = [0.1, 0.1, 0.1]\ncenter = [{}, 0, {}]\ndensity = 900\n\
+             displaces_fluid = true\nhinge = {{ at = [{}, 0, {}], axis = \"y\" }}\n",
+            center[0], center[1], at[0], at[1]
+        )
+    };
+    // High above the walls it swings beyond them.
+    let (low, high) = domain(&body([1.6, 3.0], [1.0, 3.0]));
+    assert!(low.x < 0.35 && high.x > 1.6 + 0.05 && high.z > 3.6, "{low} {high}");
+    let (low, high) = domain(&body([0.2, 3.0], [1.2, 3.0]));
+    assert!(low.x < 0.15 && high.x > 2.2, "{low} {high}");
+    // On the floor the floor stops it.
+    let (flap, none) = (domain(&body([0.8, 0.2], [0.8, 0.05])), domain(""));
+    assert_eq!(flap, none);
+}
+
+#[test]
 fn a_device_holds_hinges_as_the_cpu_does() {
     if !there_is_a_device("hinges are not compared") {
         return;

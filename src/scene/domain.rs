@@ -1,9 +1,9 @@
 //! The domain: the box that no particle may leave.
 
-use super::Drive;
 use super::build::{AXES, Builder};
 use super::opening::Planned;
 use super::oriented::Placed;
+use super::{Drive, Solid};
 use crate::case::TANK_FACES;
 use crate::error::Problem;
 use crate::extents;
@@ -76,6 +76,10 @@ impl Builder<'_> {
             }
             return self.in_plane(lo, hi);
         }
+        for body in self.bodies.iter().filter(|b| b.is_hinged()) {
+            let (low, high) = self.swing(body);
+            bounds.add("", low, high);
+        }
         let (lo, hi) = bounds.total();
         let held = self.tank.is_some() && !self.water.cell.is_empty();
         let all = extents::Bounds { lo, hi };
@@ -126,6 +130,30 @@ impl Builder<'_> {
             )
         };
         (0..6).filter(walled).filter(gone).map(told).collect()
+    }
+
+    /// The box that a hinged body may reach on its turn, as far as the tank's walls let it: a wall stops what is nowhere
+    /// beyond its edges.
+    fn swing(&self, body: &Solid) -> (DVec3, DVec3) {
+        let (placed, reach) = (body.placed(), body.radius());
+        let (mut low, mut high) = (body.position - reach, body.position + reach);
+        let Some(tank) = &self.case.tank else { return (low, high) };
+        let (bare, now) = (tank.without_wall(), placed.bounds());
+        // The floor first: flaps stand on it.
+        for k in [4, 5, 0, 1, 2, 3].into_iter().filter(|k| !bare.contains(&TANK_FACES[*k].0)) {
+            let axis = k / 2;
+            let beside = |other: usize| other == axis || self.lattice.plane && other == 1;
+            let faces = |other: usize| low[other] >= tank.min[other] && high[other] <= tank.max[other];
+            if !(0..3).all(|other| beside(other) || faces(other)) {
+                continue;
+            }
+            if k.is_multiple_of(2) {
+                low[axis] = low[axis].max(tank.min[axis].min(placed.center[axis] - now[axis]));
+            } else {
+                high[axis] = high[axis].min(tank.max[axis].max(placed.center[axis] + now[axis]));
+            }
+        }
+        (low, high)
     }
 
     /// How far water and bodies fly with their velocity at t = 0 until the end, against and along each axis [m].

@@ -234,6 +234,11 @@ impl Solid {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
     }
 
+    /// Whether a hinge holds it.
+    pub(crate) fn is_hinged(&self) -> bool {
+        matches!(&self.drive, Drive::Free(free) if free.locked_translation == [true; 3])
+    }
+
     /// What it is in a case.
     pub(crate) fn what(&self) -> &'static str {
         match (self.is_body, self.is_still()) {

@@ -33,7 +33,7 @@ impl Simulation {
     pub(super) fn check_bodies(&self, step: &Step) -> Result<()> {
         let (min, max) = (self.params.domain_min, self.params.domain_max);
         for (k, pose) in self.solids.poses().iter().enumerate() {
-            let x = pose.position;
+            let x = pose.point(self.scene.solids[k].shape_offset);
             let name = self.solids.name(k);
             if !(x.is_finite() && pose.velocity.is_finite() && pose.angular_velocity.is_finite()) {
                 return Err(self.diverged(
