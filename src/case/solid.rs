@@ -94,7 +94,7 @@ pub enum Freedom {
     RotationZ,
 }
 
-/// A hinge without friction. It holds where solids do not touch: what is pressed against the floor beside it stays pressed.
+/// A hinge without friction. Contact acts on the body as on any other: leave room between it and what it would rub against.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hinge {
