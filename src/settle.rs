@@ -44,7 +44,11 @@ pub(crate) fn settle(
     }
     let still = Params { gravity: DVec3::ZERO, drive: DVec3::ZERO, ..params.clone() };
     let plan = Plan { ledger: false, ..plan.clone() };
-    let mut part = scene.part(&own, own.len(), &held, None);
+    // Water around that stands still: its outermost is a free surface, as the level of a pressure without one is below zero
+    // where solids displace too much. Water that fills all its room has no level anyway, and dummies around it.
+    let (all, dummies) =
+        if params.filled { (own.clone(), held) } else { ([&own[..], &held[..]].concat(), vec![]) };
+    let mut part = scene.part(&all, all.len(), &dummies, None);
     part.velocity.fill(DVec3::ZERO);
     let mut cpu = Cpu::new(&part, &still, &plan, settings)?;
     // Any time step gives the same places.
@@ -64,19 +68,24 @@ pub(crate) fn settle(
         cpu.run(ParticleStage::Correct, &step)?;
         // What a particle has moved by in a step of one second.
         let fastest = cpu.fields().velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
-        cpu.fields_mut().velocity.fill(DVec3::ZERO);
+        let fields = cpu.fields_mut();
+        fields.velocity.fill(DVec3::ZERO);
+        for (at, &id) in
+            fields.position.iter_mut().zip(&fields.id).filter(|(_, id)| **id as usize >= own.len())
+        {
+            *at = scene.position[all[id as usize]];
+        }
         if fastest * step.dt < ENOUGH * scene.spacing {
             break;
         }
     }
     let mut scene = Arc::unwrap_or_clone(scene);
+    scene.uneven = true;
     let (mut moved, mut farthest) = (0, 0.0_f64);
     let fields = cpu.fields();
     for ((&to, &id), &kind) in fields.position.iter().zip(&fields.id).zip(&fields.kind) {
-        if kind != Kind::Fluid {
-            continue;
-        }
-        let at = &mut scene.position[own[id as usize]];
+        let Some(&slot) = own.get(id as usize).filter(|_| kind == Kind::Fluid) else { continue };
+        let at = &mut scene.position[slot];
         let way = params.periodic.nearest(to - *at).length() / scene.spacing;
         *at = to;
         moved += usize::from(way > ENOUGH);

@@ -19,6 +19,7 @@ use crate::params::{Params, Step};
 use crate::plan::{Arrays, ParticleStage, Plan, Stage};
 use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
+use crate::scheme::Source;
 use crate::settle::settle;
 use crate::slots::Slots;
 use crate::stop::Stop;
@@ -27,6 +28,10 @@ use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Time in which gamma comes up beside solids off the lattice, over sqrt(l0 / g), and in steps where there is no gravity.
+const EASED: f64 = 1.0;
+const EASED_STEPS: f64 = 100.0;
 
 /// What a step did.
 #[derive(Clone, Debug, Default)]
@@ -202,10 +207,26 @@ impl Simulation {
         let dt = time_step(&self.params, typed, adaptive, flow.max(driven));
         let dt = if adaptive { shortened(&self.params, dt, self.fastest) } else { dt };
         // The speed of the collapse is one to be ready for; calm water may never have it.
-        let relaxation = self.params.relaxation(dt, self.speed, driven);
+        let relaxation = self.eased() * self.params.relaxation(dt, self.speed, driven);
         let step = Step { relaxation, ..self.params.step_driven(self.time, dt, flow, driven) };
         // What jumps over its neighbours needs the damping.
         if self.fastest * dt > self.params.spacing { step.whole() } else { step }
+    }
+
+    /// Part of gamma that acts now [-]. Beside solids off its lattice water never starts quite even: what a body displaces is no
+    /// whole number of particles. Undone at once, that took pressures far above those of the water's weight; it is now undone as
+    /// slowly as the weight moves it.
+    fn eased(&self) -> f64 {
+        if !self.scene.uneven || self.params.source != Source::Mixed {
+            return 1.0;
+        }
+        let gravity = self.params.gravity.length();
+        let span = if gravity > 0.0 {
+            EASED * (self.params.spacing / gravity).sqrt()
+        } else {
+            EASED_STEPS * self.case.run.time_step
+        };
+        (self.time / span).powi(2).min(1.0)
     }
 
     fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {

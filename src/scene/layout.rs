@@ -70,6 +70,7 @@ impl Builder<'_> {
             periodic: self.periodic,
             depth: self.depth,
             filled: self.filled,
+            uneven: false,
             notes: self.notes,
         }
     }

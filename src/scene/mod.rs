@@ -352,6 +352,8 @@ pub struct Scene {
     /// Whether the water leaves no room free at the start, nor anything that lets in or out or is driven could: it has no free
     /// surface.
     pub filled: bool,
+    /// Whether water starts beside solids that do not stand on its lattice, where its density is not quite even.
+    pub uneven: bool,
     /// What a user should know that is no error (rounded lengths, removed particles ...).
     pub notes: Vec<String>,
 }

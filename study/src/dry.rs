@@ -65,6 +65,7 @@ impl DryScene {
             periodic: Default::default(),
             depth: 0.0,
             filled: false,
+            uneven: false,
             notes: vec![],
         };
         Self { scene }

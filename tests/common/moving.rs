@@ -194,6 +194,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         periodic: Default::default(),
         depth: f64::from(7 * scale) * SPACING,
         filled: false,
+        uneven: false,
         notes: Vec::new(),
     }
 }
