@@ -103,6 +103,7 @@ pub mod probe;
 pub mod ranks;
 pub mod run;
 pub mod scene;
+pub mod schemas;
 pub mod scheme;
 pub mod sense;
 mod settle;

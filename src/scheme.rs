@@ -1,10 +1,10 @@
 //! The switches of the fluid's scheme, as it is computed with.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Source term of the pressure Poisson equation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// The paper's Eq. (8): deviation of the number density alone.
@@ -15,7 +15,8 @@ pub enum Source {
 }
 
 /// Pressure gradient.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Gradient {
     /// The paper's Eq. (9): against the smallest pressure in the neighbourhood.
@@ -26,7 +27,8 @@ pub enum Gradient {
 }
 
 /// Which particles lie on the free surface (P = 0).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum FreeSurface {
     /// The paper's: n < beta n0.

@@ -288,7 +288,7 @@ fn headings(page: &str) -> BTreeSet<String> {
 
 #[test]
 fn keys_of_the_table_for_dualsphysics_exist() {
-    let schema: serde_json::Value = serde_json::from_str(&Case::schema()).expect("JSON");
+    let schema: serde_json::Value = serde_json::from_str(Case::schema()).expect("JSON");
     let text = schema.to_string();
     let mut tried = 0;
     for line in read("dualsphysics.md").lines().filter(|line| line.starts_with("| ")).skip(1) {

@@ -43,7 +43,7 @@ struct Key {
 }
 
 pub fn keys(args: &KeysArgs) -> Exit {
-    let schema: Value = serde_json::from_str(&Case::schema()).unwrap_or_default();
+    let schema: Value = serde_json::from_str(Case::schema()).unwrap_or_default();
     let tables = Reader { schema: &schema, examples: examples() }.tables();
     if args.markdown {
         say(markdown(&tables).trim_end());

@@ -2,12 +2,12 @@
 
 use super::check::{Checker, face};
 use super::{Case, Face, Vector};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A box in which the water comes to rest, so that waves do not come back from a wall: dv/dt = -rate s^2 v, where s grows
 /// from 0 at the face at which waves come in to 1 at the opposite one.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Absorber {
     /// Lower corner [m].
@@ -18,7 +18,7 @@ pub struct Absorber {
     pub towards: Face,
     /// Largest rate of damping [1/s]; 12 sqrt(g d) over its length if absent, d the water's depth: what goes through it and
     /// back has 2 % of its height left, or less.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub rate: Option<f64>,
 }
 

@@ -2,14 +2,14 @@
 //! too, in the order in which the keys happen to stand in the source: `orientation = [0, 0, 1]` would be told that
 //! its first number should be a list.
 
-use super::Case;
 use super::report::{Message, named};
 use serde_json::Value as Json;
 use std::sync::LazyLock;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-static SCHEMA: LazyLock<Json> = LazyLock::new(|| schemars::schema_for!(Case).to_value());
+static SCHEMA: LazyLock<Json> =
+    LazyLock::new(|| serde_json::from_str(crate::schemas::CASE).unwrap_or_default());
 
 /// The first that is wrong in this way.
 pub(super) fn mistaken(table: &DeTable<'_>) -> Option<Message> {

@@ -1,10 +1,10 @@
 //! The law by which solids touch, and its coefficients.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Contact law.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Law {
     /// Eqs. (10) to (14) over particle pairs, averaged over the pairs.
@@ -16,7 +16,8 @@ pub enum Law {
 }
 
 /// Where contact searches and presses its pairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ContactDevice {
     /// On the GPU backend by the number of surface points: few on the host, many on the GPU.
@@ -29,7 +30,8 @@ pub enum ContactDevice {
 }
 
 /// Contact between solids.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
     /// Contact law.
@@ -37,32 +39,32 @@ pub struct Contact {
     pub law: Law,
     /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none.
     #[serde(default)]
-    #[schemars(range(min = 0, max = 1e18))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 1e18)))]
     pub spring: f64,
     /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub damping: Option<f64>,
     /// Damping over the critical one of the lightest body, C / (2 sqrt(K m)) [-], Eq. (15).
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub damping_ratio: Option<f64>,
     /// Normal restitution e of a free impact [-] (law "smooth"): 1 elastic, 0 plastic. 0.5 if none of the three is
     /// given with law "smooth"; law "paper" is then undamped.
-    #[schemars(range(min = 0, max = 1))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub restitution: Option<f64>,
     /// Numerical friction eta of Eq. (12) [kg/s]: over particle pairs (law "paper") or over the true
     /// surfaces, where it adds to `friction` (law "smooth").
     #[serde(default)]
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub viscous_friction: f64,
     /// Coulomb coefficient mu [-], static and kinetic (law "smooth").
     #[serde(default)]
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub friction: f64,
     /// Let contact forces turn bodies (law "paper"; Eq. (14) says nothing of torque).
     #[serde(default = "Contact::default_torque")]
     pub torque: bool,
     /// Force this many contact sub-steps a step instead of as many as stability asks for.
-    #[schemars(range(min = 1, max = 100_000))]
+    #[cfg_attr(test, schemars(range(min = 1, max = 100_000)))]
     pub substeps: Option<u32>,
     /// Pairs of solids with friction or restitution of their own (law "smooth").
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -73,17 +75,18 @@ pub struct Contact {
 }
 
 /// Two solids, or two kinds of them, that touch otherwise than all others.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ContactPair {
     /// Names of the two: bodies, moving walls, obstacles, planes, faces of the tank such as `tank.z_min`, or `tank` for all of
     /// these. `*` stands for any letters: `"rock*"`. Of pairs that name the same two solids the last one counts.
     pub between: [String; 2],
     /// Coulomb coefficient mu between them [-], static and kinetic; that of `[contact]` if absent.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub friction: Option<f64>,
     /// Normal restitution e between them [-]; that of `[contact]` if absent.
-    #[schemars(range(min = 0, max = 1))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub restitution: Option<f64>,
 }
 

@@ -7,7 +7,6 @@ use super::check::Checker;
 use super::scatter::{Scatter, Standing, scattered};
 use super::{Body, Case, Form, Obstacle, Turn, Vector};
 use crate::error::{CaseError, Problem, Result};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -15,11 +14,12 @@ use std::collections::HashMap;
 pub(super) const MOST: u32 = 20_000;
 
 /// Like solids in rows.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Array {
     /// How many along x, y and z, 1 or more each.
-    #[schemars(transform = super::bounds::each_counted)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_counted))]
     pub count: [u32; 3],
     /// From one to the next along x, y and z [m].
     pub step: Vector,

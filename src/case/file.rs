@@ -3,7 +3,7 @@
 use super::brackets::mistaken;
 use super::check::check;
 use super::copies::lay_out;
-use super::motion_file::{allow_files, inline};
+use super::motion_file::inline;
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
 use super::{Case, overrides};
@@ -270,12 +270,8 @@ impl Case {
     }
 
     /// The JSON schema of a case file, for editors (`#:schema` in the first line) and for `seixo schema`.
-    pub fn schema() -> String {
-        let mut schema = schemars::schema_for!(Case).to_value();
-        allow_files(&mut schema);
-        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
-        text.push('\n');
-        text
+    pub fn schema() -> &'static str {
+        crate::schemas::CASE
     }
 }
 

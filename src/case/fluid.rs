@@ -3,11 +3,11 @@
 use super::{Fill, Matrix, Vector, WaterShape};
 use crate::lattice::Shear;
 use crate::scheme::{FreeSurface, Gradient, Source};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Sets of scheme switches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
     /// The paper's scheme: number_density, minimum, threshold.
@@ -18,7 +18,8 @@ pub enum Preset {
 }
 
 /// Preconditioner of the conjugate gradients.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioner {
     /// Chosen by the plan from the number of unknowns.
@@ -31,20 +32,21 @@ pub enum Preconditioner {
 }
 
 /// The fluid and its scheme.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Fluid {
     /// Density [kg/m3].
     #[serde(default = "Fluid::default_density")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub density: f64,
     /// Kinematic viscosity [m2/s]; 0 leaves the viscous stage out.
     #[serde(default = "Fluid::default_viscosity")]
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub viscosity: f64,
     /// Friction C_f of walls whose boundary layer is thinner than a spacing, tau = rho C_f |u_t| u_t [-]: half the skin
     /// friction coefficient. 0 leaves the stage out. If absent 0.0025, smooth walls; none with the paper's preset.
-    #[schemars(range(min = 0, max = 1))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub wall_friction: Option<f64>,
     /// Set of scheme switches; the keys below override single ones.
     #[serde(default)]
@@ -56,25 +58,25 @@ pub struct Fluid {
     /// Test for the free surface.
     pub free_surface: Option<FreeSurface>,
     /// Relaxation gamma of Eq. (8) [-]. Give this or `sound_speed`.
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 4))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 4)))]
     pub relaxation: Option<f64>,
     /// Reference speed c_s [m/s], gamma = (c_s dt / l0)^2: how fast errors of the density are undone. If neither is given, 2.5 times the fastest water's speed, at most the larger of 10 sqrt(g l0) and 2.5 sqrt(g H), H the depth at the start, and at least half of that (the paper's source: always the most); in any case 2.5 times the speed of the fastest solid or opening. In a viscous fluid its square is at least 3 nu v / l0, so that creeping flow keeps its density.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub sound_speed: Option<f64>,
     /// Artificial compressibility alpha of Eq. (8) [1/Pa]. Derived if absent.
-    #[schemars(range(min = 1e-14))]
+    #[cfg_attr(test, schemars(range(min = 1e-14)))]
     pub compressibility: Option<f64>,
     /// Free-surface threshold beta [-].
     #[serde(default = "Fluid::default_beta")]
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1)))]
     pub free_surface_threshold: f64,
     /// Distance of the collision model over l0, a [-]; Eq. (18).
     #[serde(default = "Fluid::default_collision_distance")]
-    #[schemars(range(min = 0, max = 1))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub collision_distance: f64,
     /// Restitution of the collision model, b [-]; Eq. (18).
     #[serde(default = "Fluid::default_collision_restitution")]
-    #[schemars(range(min = 0, max = 1))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub collision_restitution: f64,
     /// Blocks of water at t = 0.
     #[serde(default)]
@@ -88,14 +90,14 @@ pub struct Fluid {
     /// Largest displacement of a water particle from its lattice at t = 0, along each axis, over the spacing [-];
     /// 0 for none. For ensembles: starts with different `seed` differ in nothing else.
     #[serde(default)]
-    #[schemars(range(min = 0, max = 0.3))]
+    #[cfg_attr(test, schemars(range(min = 0, max = 0.3)))]
     pub jitter: f64,
     /// Which of the jittered starts.
     #[serde(default)]
     pub seed: u32,
     /// Most water at any time where an inflow brings more [m3]; in two dimensions for each metre across [m2]. If absent, all that
     /// comes in by `run.end`, or what the domain holds if that is less.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub max_volume: Option<f64>,
     /// The pressure Poisson equation's solver.
     #[serde(default)]
@@ -137,14 +139,15 @@ impl Fluid {
 }
 
 /// Solver of the pressure Poisson equation.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
     /// Residual over right side at which the iteration stops, ||r|| / ||b|| [-].
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1)))]
     pub tolerance: f64,
     /// Most iterations a step.
-    #[schemars(range(min = 1, max = 1_000_000))]
+    #[cfg_attr(test, schemars(range(min = 1, max = 1_000_000)))]
     pub max_iterations: u32,
     /// Preconditioner.
     pub preconditioner: Preconditioner,
@@ -159,7 +162,8 @@ impl Default for Solver {
 }
 
 /// A block of water.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Lower corner [m].

@@ -1,15 +1,15 @@
 //! What is measured over time.
 
 use super::Vector;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Measurements over time; all go to gauges.csv.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Gauges {
     /// Interval between rows [s]; every step if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub every: Option<f64>,
     /// Pressures and forces of a row are means over the steps since the row before, each with its length, and not those of the last step.
     /// What is read of the water itself (levels, velocities, volumes) is of the moment.
@@ -27,33 +27,36 @@ pub struct Gauges {
 }
 
 /// Pressure at a point on a wall.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PressureGauge {
     /// Name, used in the header.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Point on a wall [m].
     pub point: Vector,
 }
 
 /// Water level on a line along z.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LevelGauge {
     /// Name, used in the header.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// x, y of the line [m].
     pub at: [f64; 2],
 }
 
 /// Force on a solid.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ForceGauge {
     /// Name, used in the header.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. `*` stands for any letters
     /// (`"pile_*"`), `tank` for all of its faces: the gauge then is the sum over all of them. Torque is about
@@ -63,22 +66,24 @@ pub struct ForceGauge {
 }
 
 /// Velocity at a point in the water.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct VelocityGauge {
     /// Name, used in the header.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Point [m]; while there is no water, the cells are empty.
     pub point: Vector,
 }
 
 /// Water in a box, such as what has come over a crest.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct VolumeGauge {
     /// Name, used in the header.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Lower corner of the box [m].
     pub min: Vector,

@@ -3,6 +3,7 @@
 //! The structs here are the schema (`seixo schema` prints it). `file` reads and overrides, `check` judges what serde cannot.
 
 mod absorber;
+#[cfg(test)]
 mod bounds;
 mod brackets;
 pub mod check;
@@ -51,7 +52,6 @@ pub use water::{Fill, WaterShape};
 pub(crate) use wave::Guide;
 pub use wave::{Sine, Swing, WaveMaker};
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A three-component vector as written in a case file.
@@ -61,7 +61,8 @@ pub type Vector = [f64; 3];
 pub type Matrix = [Vector; 3];
 
 /// A case: one experiment. All quantities in SI units.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Case {
     /// Resolution, time and gravity.
@@ -105,34 +106,35 @@ pub struct Case {
 }
 
 /// Resolution, time and gravity.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Run {
     /// Initial distance between particles l0 [m].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub spacing: f64,
     /// Time step [s]; the largest one when `adaptive = true`.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub time_step: f64,
     /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v and
     /// dt <= 0.7 l0 / c_s.
     #[serde(default)]
     pub adaptive: bool,
     /// End of the run [s].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub end: f64,
     /// Gravity [m/s2].
     #[serde(default = "Run::default_gravity")]
     pub gravity: Vector,
     /// 3, or 2 for the plane y = 0 (a slice one spacing wide).
     #[serde(default = "Run::default_dimensions")]
-    #[schemars(extend("enum" = [2, 3]))]
+    #[cfg_attr(test, schemars(extend("enum" = [2, 3])))]
     pub dimensions: u32,
     /// Lower and upper corner of the box that no particle may leave [m]. Derived from the walls if absent.
     pub domain: Option<[Vector; 2]>,
     /// Effective radius over the spacing, re / l0 [-].
     #[serde(default = "Run::default_effective_radius")]
-    #[schemars(range(min = 1.5, max = 4.1))]
+    #[cfg_attr(test, schemars(range(min = 1.5, max = 4.1)))]
     pub effective_radius: f64,
     /// When the state is saved, so that a run that was stopped goes on where it was.
     #[serde(default)]
@@ -144,14 +146,15 @@ pub struct Run {
 }
 
 /// Intervals between checkpoints; there is one at the end, too, and when a signal stops a run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Checkpoint {
     /// Simulated time between checkpoints [s]; none by simulated time if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub every: Option<f64>,
     /// Wall-clock time between checkpoints [s]; 0 for none, nor at the end, unless `every` is given.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub wall: f64,
 }
 

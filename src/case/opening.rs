@@ -2,9 +2,7 @@
 
 use super::check::{Checker, face};
 use super::{Case, Face, TANK_FACES, Tank, Vector};
-use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 
 /// Outflows of a case at most: a device counts what each swallows.
 pub const OUTFLOWS_MAX: usize = 8;
@@ -20,16 +18,17 @@ pub enum Rate {
     Table(Vec<[f64; 2]>),
 }
 
-impl JsonSchema for Rate {
+#[cfg(test)]
+impl schemars::JsonSchema for Rate {
     fn inline_schema() -> bool {
         true
     }
 
-    fn schema_name() -> Cow<'static, str> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
         "Rate".into()
     }
 
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
         schemars::json_schema!({
             "type": ["number", "array"],
             "minimum": 0,
@@ -61,11 +60,12 @@ impl Rate {
 
 /// A rectangle of the tank's wall through which water comes in: a layer of wall particles moves in with the water's velocity,
 /// becomes water when it has gone one spacing, and the next one follows.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Inflow {
     /// Name, for messages and tables.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Face of the tank that it is in.
     pub face: Face,
@@ -82,11 +82,12 @@ pub struct Inflow {
 /// A rectangle of the tank's wall through which water goes out. With `velocity` or `discharge` a wall that draws back and
 /// swallows the water that has followed it by a spacing; with neither a hole, out of
 /// which water falls freely: it is gone half the hole's width outside.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Outflow {
     /// Name, for messages and tables.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Face of the tank that it is in.
     pub face: Face,

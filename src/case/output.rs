@@ -1,11 +1,11 @@
 //! Files to write: which particles, how often, how.
 
 use super::Vector;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which particles an output holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum OutputKind {
     /// Fluid particles, every frame.
@@ -19,7 +19,8 @@ pub enum OutputKind {
 }
 
 /// A field of particles in a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum OutputField {
     /// `Velocity` [m/s].
@@ -52,7 +53,8 @@ impl OutputField {
 }
 
 /// A box of which frames are written.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct OutputRegion {
     /// Its lower corner [m].
@@ -62,7 +64,8 @@ pub struct OutputRegion {
 }
 
 /// Encoding of VTU arrays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// Appended base64, zlib: read by ParaView, meshio and splashsurf.
@@ -73,18 +76,19 @@ pub enum Encoding {
 }
 
 /// Files to write.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// Interval between frames [s]; 0 writes no frames.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub every: f64,
     /// Which particles to write.
-    #[schemars(transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_once))]
     pub kinds: Vec<OutputKind>,
     /// Fields of the particles to write beside their positions; all of them if absent. Files of bodies and moving walls hold `body` and
     /// `id` in any case: their places are read from them.
-    #[schemars(transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_once))]
     pub fields: Vec<OutputField>,
     /// Write only the water and the fixed walls within this box; everywhere if absent. Bodies and moving walls are written whole.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -92,7 +96,7 @@ pub struct Output {
     /// Encoding of the VTU files.
     pub encoding: Encoding,
     /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub table_every: Option<f64>,
     /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.
     pub ledger: bool,
@@ -102,23 +106,24 @@ pub struct Output {
 }
 
 /// Frames of another choice and interval: the folder `series/NAME` of the results holds them as the results hold those of `[output]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Series {
     /// Name of the folder and of the list of frames: letters, digits, `-` and `_`.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Interval between frames [s].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub every: f64,
     /// Which particles to write.
     #[serde(default = "kinds")]
-    #[schemars(transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_once))]
     pub kinds: Vec<OutputKind>,
     /// Fields of the particles to write beside their positions; all of them if absent. Files of bodies and moving walls hold `body` and
     /// `id` in any case.
     #[serde(default = "fields")]
-    #[schemars(transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_once))]
     pub fields: Vec<OutputField>,
     /// Write only the water and the fixed walls within this box; everywhere if absent. Bodies and moving walls are written whole.
     #[serde(skip_serializing_if = "Option::is_none")]

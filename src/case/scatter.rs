@@ -6,7 +6,6 @@ use super::{BodyShape, Form, Place, Turn, Vector, Wall};
 use crate::chance::mixed;
 use crate::shape::Shape;
 use glam::{DMat3, DQuat, DVec3, IVec3};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -16,18 +15,19 @@ const TRIES: u32 = 2000;
 
 /// Like solids at places by chance, in a box about `center`. None reaches out of it, and the boxes around any two of
 /// them, and around bodies whose places are given, are apart, and so are these boxes and obstacles and moving walls.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Scatter {
     /// How many.
-    #[schemars(range(min = 1, max = 20_000))]
+    #[cfg_attr(test, schemars(range(min = 1, max = 20_000)))]
     pub count: u32,
     /// Edge lengths of the box for them, whose middle is `center` [m].
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub size: Vector,
     /// Least distance between two of the boxes around them [m].
     #[serde(default)]
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub gap: f64,
     /// How they are turned, beyond `orientation`.
     #[serde(default)]
@@ -38,7 +38,8 @@ pub struct Scatter {
 }
 
 /// Turns of what is scattered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Turned {
     /// Every way; in two dimensions about y.

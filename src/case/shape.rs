@@ -8,7 +8,6 @@ use crate::shape::{Cylinder, Disc, Polygon, Shape, Sphere};
 #[cfg(feature = "mesh")]
 use crate::shape::{Mesh, Unfit};
 use glam::{DQuat, DVec3};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Length of a mesh without a `scale` from which it is asked about [m].
@@ -17,7 +16,8 @@ const LARGE: f64 = 50.0;
 const LARGE_IN_TANK: f64 = 3.0;
 
 /// Shape of a solid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum BodyShape {
     /// A box of `size`.

@@ -1,15 +1,15 @@
 //! What moves: walls by a table or a formula, rigid bodies by forces.
 
 use super::{Array, Axis, BodyShape, Face, Scatter, Sine, Swing, Vector, WaveMaker};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A solid that follows a table or a formula of motion, e.g. a gate or a piston: a box, or any other shape.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct MovingWall {
     /// Name, for messages and gauges.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Shape. A box from `min` to `max` stands on the lattice of the water; every other one stands where `center` or
     /// `position` puts it.
@@ -21,23 +21,23 @@ pub struct MovingWall {
     pub max: Option<Vector>,
     /// Faces of such a box that need no particles because nothing reaches them.
     #[serde(default)]
-    #[schemars(length(max = 5), transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(length(max = 5), transform = super::bounds::each_once))]
     pub open: Vec<Face>,
     /// Edge lengths of a wedge, or of a box about `center` [m].
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
     pub section: Option<Vec<[f64; 2]>>,
     /// STL or OBJ file of a mesh or terrain; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
     pub axis: Option<Vector>,
@@ -67,7 +67,8 @@ pub struct MovingWall {
 }
 
 /// Orientation as a turn about an axis.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Turn {
     /// Axis (any length).
@@ -77,7 +78,8 @@ pub struct Turn {
 }
 
 /// A degree of freedom.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Freedom {
     /// Translation along x.
@@ -95,7 +97,8 @@ pub enum Freedom {
 }
 
 /// A hinge without friction. Contact acts on the body as on any other: leave room between it and what it would rub against.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Hinge {
     /// A place on its axis at t = 0 [m].
@@ -105,31 +108,32 @@ pub struct Hinge {
 }
 
 /// A rigid body.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Name, for messages and tables.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Shape.
     #[serde(default)]
     pub shape: BodyShape,
     /// Edge lengths of a box or wedge [m].
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out
     /// beside a `density`.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
     pub section: Option<Vec<[f64; 2]>>,
     /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent. In
     /// two dimensions it is [0, 1, 0].
@@ -138,17 +142,17 @@ pub struct Body {
     pub center: Vector,
     /// Mass [kg]. Give this or `density`. In two dimensions the slice l0 wide has its share of it: l0 over size y
     /// or over the cylinder's height.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub mass: Option<f64>,
     /// Density [kg/m3].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub density: Option<f64>,
     /// From `center` to the centre of mass of a body that is not uniform, one with ballast say [m], before
     /// `orientation` turns it.
     pub mass_offset: Option<Vector>,
     /// Principal moments of inertia about the centre of mass [kg m2], of the same whole body as `mass`; those of a
     /// uniform body about its own if absent. A cylinder's third axis is its own.
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.
     pub orientation: Option<Turn>,
@@ -160,7 +164,7 @@ pub struct Body {
     pub angular_velocity: Vector,
     /// Degrees of freedom that are locked.
     #[serde(default)]
-    #[schemars(transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_once))]
     pub locked: Vec<Freedom>,
     /// What holds it so that it turns about one axis and does nothing else: a flap, a gate, a pendulum.
     pub hinge: Option<Hinge>,

@@ -1,11 +1,11 @@
 //! What never moves: the tank, obstacles, planes.
 
 use super::{Array, BodyShape, Scatter, Turn, Vector};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A face of a box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Face {
     /// Smallest x.
@@ -23,7 +23,8 @@ pub enum Face {
 }
 
 /// An axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
     /// Along x.
@@ -35,7 +36,8 @@ pub enum Axis {
 }
 
 /// A rectangular container; walls outside of `min`..`max`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Tank {
     /// Lower inner corner [m].
@@ -44,12 +46,12 @@ pub struct Tank {
     pub max: Vector,
     /// Faces without a wall.
     #[serde(default)]
-    #[schemars(length(max = 5), transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(length(max = 5), transform = super::bounds::each_once))]
     pub open: Vec<Face>,
     /// Axes across whose two faces the water goes on: what leaves through one comes in through the other. There are no walls
     /// there; the length is a whole number of spacings and three effective radii or more.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 3), transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(length(max = 3), transform = super::bounds::each_once))]
     pub periodic: Vec<Axis>,
 }
 
@@ -67,11 +69,12 @@ impl Tank {
 }
 
 /// A fixed solid: a box, or any other shape.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
     /// Name, for messages and gauges.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Shape. A box from `min` to `max` stands on the lattice of the water; every other one stands where `center` or
     /// `position` puts it.
@@ -83,23 +86,23 @@ pub struct Obstacle {
     pub max: Option<Vector>,
     /// Faces of such a box that need no particles because nothing reaches them.
     #[serde(default)]
-    #[schemars(length(max = 5), transform = super::bounds::each_once)]
+    #[cfg_attr(test, schemars(length(max = 5), transform = super::bounds::each_once))]
     pub open: Vec<Face>,
     /// Edge lengths of a wedge, or of a box about `center` [m].
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
     pub section: Option<Vec<[f64; 2]>>,
     /// STL or OBJ file of a mesh or terrain; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
     pub axis: Option<Vector>,
@@ -124,18 +127,19 @@ pub struct Obstacle {
 }
 
 /// A fixed rectangular wall at any angle; its layers lie behind the surface.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Plane {
     /// Name, for messages and gauges.
-    #[schemars(length(min = 1, max = 80))]
+    #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
     /// Centre of the surface [m].
     pub center: Vector,
     /// Normal, into the free space (any length).
     pub normal: Vector,
     /// Edge lengths [m]: along `along`, and across it.
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub size: [f64; 2],
     /// Direction of the first edge; made orthogonal to the normal.
     pub along: Vector,

@@ -4,31 +4,31 @@ use super::check::Checker;
 use super::check_geometry::WallKeys;
 use super::shape::{form, large, place};
 use super::{BodyShape, Face, Form, Matrix, Place, Tank, Turn, Vector};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Water of any shape at t = 0: where the shape and no wall is.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WaterShape {
     /// Shape; a box has `size`.
     #[serde(default)]
     pub shape: BodyShape,
     /// Edge lengths of a box or wedge [m].
-    #[schemars(transform = super::bounds::each_positive)]
+    #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub size: Option<Vector>,
     /// Radius of a sphere, cylinder or cone [m].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub radius: Option<f64>,
     /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.
     pub section: Option<Vec<[f64; 2]>>,
     /// STL or OBJ file of a mesh, a watertight solid; relative to the case.
     pub file: Option<String>,
     /// Metres that the file's unit of length is worth: 0.001 for millimetres; 1 if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub scale: Option<f64>,
     /// Direction of a cylinder's or cone's axis (any length), before `orientation` turns it; [0, 0, 1] if absent.
     pub axis: Option<Vector>,
@@ -46,7 +46,8 @@ pub struct WaterShape {
 }
 
 /// Water that fills what can be reached from a place below a level, through what is free of walls.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Fill {
     /// A place in the water [m].

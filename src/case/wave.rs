@@ -2,12 +2,12 @@
 
 use super::{Body, Case, Face, MovingWall, Vector};
 use crate::waves::{Component, Formula, Profile, Wanted, Wave, WaveKind};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A displacement by a sine, R(t) A sin(2 pi t / T + phase) along an axis.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Sine {
     /// Direction (any length).
@@ -15,19 +15,20 @@ pub struct Sine {
     /// Amplitude A, half of the stroke [m].
     pub amplitude: f64,
     /// Period T [s].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub period: f64,
     /// Phase [degrees].
     #[serde(default)]
     pub phase_deg: f64,
     /// Time over which R grows from 0 to 1, smoothly [s]; 0 for none.
     #[serde(default)]
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub ramp: f64,
 }
 
 /// A turn by a sine, R(t) A sin(2 pi t / T + phase) about an axis through `pivot`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Swing {
     /// Axis (any length); along y in two dimensions.
@@ -35,41 +36,42 @@ pub struct Swing {
     /// Amplitude A [degrees].
     pub amplitude_deg: f64,
     /// Period T [s].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub period: f64,
     /// Phase [degrees].
     #[serde(default)]
     pub phase_deg: f64,
     /// Time over which R grows from 0 to 1, smoothly [s]; 0 for none.
     #[serde(default)]
-    #[schemars(range(min = 0))]
+    #[cfg_attr(test, schemars(range(min = 0)))]
     pub ramp: f64,
 }
 
 /// A wave that a wall makes as a piston.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WaveMaker {
     /// What wave.
     pub kind: WaveKind,
     /// Height from trough to crest [m]: of a solitary wave above still water, of an irregular sea 4 sqrt(m_0).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub height: f64,
     /// Period [s]; of an irregular sea that of the spectrum's peak. A solitary wave has none.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub period: Option<f64>,
     /// Depth of the still water [m]; that of the block of water at the piston's face if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub depth: Option<f64>,
     /// Horizontal direction in which the piston pushes (any length); [1, 0, 0] if absent.
     pub direction: Option<Vector>,
     /// Time over which the motion grows to its size, smoothly [s]; one `period` if absent.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub ramp: Option<f64>,
     /// Which of the irregular seas; 0 if absent. The same one is the same on every machine; it repeats after 128 periods.
     pub seed: Option<u32>,
     /// Peak enhancement gamma of the JONSWAP spectrum [-]; 3.3 if absent.
-    #[schemars(range(min = 1, max = 10))]
+    #[cfg_attr(test, schemars(range(min = 1, max = 10)))]
     pub peak_enhancement: Option<f64>,
     /// Shape of a solitary wave; "boussinesq" if absent.
     pub profile: Option<Profile>,

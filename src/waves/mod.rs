@@ -9,12 +9,12 @@ mod formula;
 pub use formula::{Component, Formula};
 
 use crate::chance::mixed;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// What wave a piston makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum WaveKind {
     /// Waves of one height and period, after Biesel & Suquet (1951) and Madsen (1971).
@@ -37,7 +37,8 @@ impl WaveKind {
 }
 
 /// Which theory's shape a solitary wave has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Profile {
     /// Boussinesq's, k^2 = 3 H / (4 d^3), as Goring used it.

@@ -37,11 +37,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A study file.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Definition {
     /// Name, for files.
-    #[schemars(regex(pattern = r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$"))]
+    #[cfg_attr(test, schemars(regex(pattern = r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$")))]
     pub name: String,
     /// First line of the plots.
     pub title: String,
@@ -93,7 +94,8 @@ fn three() -> u32 {
 }
 
 /// A grid of its own.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Method of its points, instead of the study's.
@@ -106,7 +108,8 @@ pub struct Grid {
 }
 
 /// Something that is varied.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// Name, for tables and plots.
@@ -115,11 +118,11 @@ pub struct Axis {
     pub key: Option<String>,
     /// Values of `key`.
     #[serde(default)]
-    #[schemars(with = "Vec<serde_json::Value>")]
+    #[cfg_attr(test, schemars(with = "Vec<serde_json::Value>"))]
     pub values: Vec<toml::Value>,
     /// Further values, only with `--full`.
     #[serde(default)]
-    #[schemars(with = "Vec<serde_json::Value>")]
+    #[cfg_attr(test, schemars(with = "Vec<serde_json::Value>"))]
     pub full_values: Vec<toml::Value>,
     /// Settings of several keys, instead of `key` and `values`.
     #[serde(default)]
@@ -127,7 +130,8 @@ pub struct Axis {
 }
 
 /// A setting of several keys at once.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Choice {
     /// Name, for tables and plots.
@@ -143,7 +147,8 @@ pub struct Choice {
 }
 
 /// What counts as error.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ErrorMeasure {
     /// A measured value that is an error by itself (against an analytic solution).
@@ -229,9 +234,8 @@ impl Axis {
 impl Definition {
     /// The JSON schema of a study or validation file, for editors (`#:schema` in the first line) and for
     /// `seixo schema study`.
-    pub fn schema() -> String {
-        let text = serde_json::to_string_pretty(&schemars::schema_for!(Self)).unwrap_or_default();
-        text + "\n"
+    pub fn schema() -> &'static str {
+        seixo::schemas::STUDY
     }
 
     /// Read a study; `name` stands for the file in messages.
@@ -445,6 +449,16 @@ value = "e [-]"
             .jobs(&none, &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() })
             .unwrap();
         assert_ne!(other[0].hash("s"), quick[0].hash("s"));
+    }
+
+    #[test]
+    fn the_committed_schema_is_current() {
+        let text = serde_json::to_string_pretty(&schemars::schema_for!(Definition)).unwrap() + "\n";
+        if std::env::var_os("SEIXO_WRITE_SCHEMA").is_some() {
+            let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../schema/study.schema.json");
+            return std::fs::write(file, text).unwrap();
+        }
+        assert!(text == Definition::schema(), "schema/study.schema.json is out of date: .ci/schema");
     }
 
     #[test]

@@ -13,7 +13,8 @@ use seixo::simulation::Simulation;
 use serde::Deserialize;
 
 /// A measure of a study file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Pressure of water at rest, P = rho g z below the surface: rms over all inner fluid particles and the window,
@@ -45,7 +46,8 @@ pub enum Measure {
 }
 
 /// What to measure, and when.
-#[derive(Clone, Debug, Default, Deserialize, PartialEq, schemars::JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Spec {
     /// Measures.

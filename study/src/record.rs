@@ -22,7 +22,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// A coordinate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Coordinate {
     /// x.
@@ -34,7 +35,8 @@ pub enum Coordinate {
 }
 
 /// What a profile shows of the water.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// Velocity along x [m/s].
@@ -59,7 +61,8 @@ impl Quantity {
 }
 
 /// A profile: what the water particles of a region have on average, against a coordinate.
-#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
     /// Name of the curve.

@@ -14,7 +14,8 @@ use seixo::error::{Error, Result};
 use serde::Deserialize;
 
 /// What is told.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ResultNumber {
     /// Name of the column, with its unit.

@@ -215,7 +215,7 @@ fn place(path: &str, inside: &[f64]) -> Option<String> {
 }
 
 fn all() -> Vec<Bounded> {
-    let schema: Value = serde_json::from_str(&Case::schema()).unwrap();
+    let schema: Value = serde_json::from_str(Case::schema()).unwrap();
     let mut found = Vec::new();
     numbers(&schema, &schema, "", &mut found);
     assert!(found.len() > 60, "{}", found.len());

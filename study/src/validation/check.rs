@@ -23,7 +23,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// A check, as in a validation file.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Check {
     /// What is compared, with its unit.
@@ -68,7 +69,7 @@ pub struct Check {
     /// The difference is divided by this; by the reference's size if absent.
     pub per: Option<f64>,
     /// Largest error that is called right [-].
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub tolerance: f64,
     /// What others reach.
     #[serde(default)]
@@ -87,7 +88,8 @@ fn time() -> String {
 }
 
 /// What somebody else reaches: a number, or a curve.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Peer {
     /// Who.
