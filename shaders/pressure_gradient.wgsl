@@ -10,6 +10,41 @@
 @group(0) @binding(5) var<storage, read> neighbour_list: array<u32>;
 @group(0) @binding(6) var<storage, read> neighbour_count: array<u32>;
 @group(0) @binding(7) var<storage, read_write> acceleration: array<vec4f>;
+//#if MIXED
+@group(0) @binding(9) var<storage, read> velocity: array<vec4f>;
+
+// W of a pair, as crate::lattice::smooth_weight.
+fn smooth_weight(distance_squared: f32) -> f32 {
+    let q = 1.0 / (1.0 + weight(distance_squared));
+    let rest = max(1.0 - q, 0.0);
+    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
+}
+
+// Solids about a particle of water, over W0, between which it comes to be caught.
+const CAUGHT = vec2f(0.85, 1.0);
+
+// Room that solids leave fluid slot i at x; 1 where there are no bodies.
+fn room_in_water(i: u32, x: vec3f) -> f32 {
+    if params.body_wall == 0u {
+        return 1.0;
+    }
+    let count = neighbour_count[i];
+    var solids = 1.0;
+    for (var k = 0u; k < near_of(count); k++) {
+        let j = neighbour_list_at(k, i);
+        if j >= params.fluid {
+            let r = offset(x, position[j].xyz);
+            solids += smooth_weight(dot(r, r));
+        }
+    }
+    for (var k = 0u; k < dummies_of(count); k++) {
+        let r = offset(x, position[neighbour_list_at(dummy_plane(k), i)].xyz);
+        solids += smooth_weight(dot(r, r));
+    }
+    return saturate((CAUGHT.y - solids / params.smooth_density) / (CAUGHT.y - CAUGHT.x));
+}
+
+//#endif
 //#if CONSISTENT
 @group(0) @binding(8) var<storage, read_write> imbalance: array<vec4f>;
 
@@ -87,6 +122,11 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
 //#if MIXED
     // Gravity acts together with the pressure that balances it.
     a += params.gravity;
+    // Without room a particle goes nowhere: no pressure carries it.
+    let room = room_in_water(i, x.xyz);
+    if room < 1.0 {
+        a = room * a - (1.0 - room) / now.dt * velocity[i].xyz;
+    }
 //#endif
     acceleration[i] = vec4f(a, 0.0);
 }

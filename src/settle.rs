@@ -42,7 +42,8 @@ pub(crate) fn settle(
     if own.is_empty() {
         return Ok(scene);
     }
-    let still = Params { gravity: DVec3::ZERO, drive: DVec3::ZERO, ..params.clone() };
+    // Without bodies that catch water: what stands inside one has to come out.
+    let still = Params { gravity: DVec3::ZERO, drive: DVec3::ZERO, body_wall: 0, ..params.clone() };
     let plan = Plan { ledger: false, ..plan.clone() };
     // Water around that stands still: its outermost is a free surface, as the level of a pressure without one is below zero
     // where solids displace too much. Water that fills all its room has no level anyway, and dummies around it.

@@ -360,3 +360,27 @@ fn a_raft_of_two_spacings_bears_a_block() {
         assert!((ratio - 1.0).abs() < 0.1 && fastest < 0.15, "{spacings}: {ratio}, {fastest} m/s");
     }
 }
+
+#[test]
+fn what_lands_on_the_floor_presses_no_water_through_it() {
+    // Particles without room between cube and floor carry no pressure. They fell past the wall's: 4 of 720, and 2 to 9 of other heaps. One
+    // is pressed into the floor's first layer now, and stays there.
+    let case = case(
+        "[run]\nspacing = 0.03\ntime_step = 2e-3\nadaptive = true\nend = 2\ngravity = [0, 0, -9.81]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.36, 0.36, 0.6]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.36, 0.36, 0.15]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.2\nfriction = 0.3\n\
+         [[body]]\nname = \"cube\"\nsize = [0.08, 0.08, 0.08]\ncenter = [0.18, 0.18, 0.37]\ndensity = 2200\n\
+         scatter = { count = 4, size = [0.34, 0.34, 0.36], seed = 1 }\n",
+    );
+    let case = case.laid_out().expect("there is room");
+    let mut sim = simulation(&case);
+    while sim.time < 1.3 {
+        sim.step().expect("they come to rest");
+    }
+    let fields = sim.backend.read().expect("readable");
+    let lowest = fields.position[..sim.groups.fluid].iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+    let lost = sim.backend.counters().expect("counted").lost;
+    println!("{lost} lost, lowest at {lowest} m");
+    assert!(lost == 0 && lowest > -0.03, "{lost} lost, lowest at {lowest} m");
+}

@@ -349,7 +349,7 @@ fn the_fast_pressure_gradient_is_the_plain_one() {
         let f = s.cpu.fields();
         let plain = |i: usize| {
             let row = s.cpu.neighbours().parts(i);
-            pressure_gradient::pressure_gradient(i, row, f.state[i], s.particles(), &f.pressure)
+            pressure_gradient::pressure_gradient(i, row, f.state[i], s.particles(), &f.pressure, s.step.dt)
         };
         let plain: Vec<DVec3> = (0..s.groups().fluid).map(plain).collect();
         assert!(close(&f.acceleration, &plain) > 10.0);

@@ -11,6 +11,7 @@
 //! (d / n0) sum (P_j + P_i) e: with P = 0 half a spacing outside, half a neighbourhood then carries the whole weight.
 
 use super::Particles;
+use super::pressure_source::room_in_water;
 use crate::fields::State;
 use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
@@ -40,14 +41,27 @@ pub fn acceleration(gradient: DVec3, params: &Params) -> DVec3 {
     }
 }
 
-/// -grad P / rho at fluid slot `i`, and gravity if it acts here [m/s2]. `all` holds every neighbour, of which the
-/// first `carry` carry pressure.
+/// What is left of `acceleration` to a particle of water that solids catch between them, and what stops it [m/s2]: it
+/// undoes no divergence, so that no pressure carries it, and without room it goes nowhere. Left to its weight it fell
+/// through the floor, past the middle between wall particles.
+#[inline(always)]
+pub fn held(acceleration: DVec3, i: usize, all: Row, on: Particles, dt: f64) -> DVec3 {
+    if on.params.source != Source::Mixed {
+        return acceleration;
+    }
+    let room = room_in_water(i, all, on);
+    if room >= 1.0 { acceleration } else { room * acceleration - (1.0 - room) / dt * on.velocity[i] }
+}
+
+/// -grad P / rho at fluid slot `i`, and gravity if it acts here [m/s2], in a step of `dt` [s]. `all` holds every
+/// neighbour, of which the first `carry` carry pressure.
 pub fn pressure_gradient(
     i: usize,
     (all, carry): (Row, usize),
     state: State,
     on: Particles,
     pressure: &[f64],
+    dt: f64,
 ) -> DVec3 {
     let carriers = || all.iter().take(carry);
     let head = |j: usize| hydrostatic(on.offset(i, j), on.params);
@@ -70,5 +84,5 @@ pub fn pressure_gradient(
             gradient = inverse * gradient;
         }
     }
-    acceleration(gradient, on.params)
+    held(acceleration(gradient, on.params), i, all, on, dt)
 }

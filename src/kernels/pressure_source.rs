@@ -104,6 +104,16 @@ const SLOT: (f64, f64) = (0.35, 0.68);
 /// Link of a caught particle to P = 0, over n0 [-]: small beside links to water that is not caught.
 const LEAK: f64 = 0.1;
 
+/// Room that solids leave a particle of water [-]: 1 where there are no bodies, which are all that catch it.
+#[inline(always)]
+pub fn room_in_water(i: usize, all: Row, on: Particles) -> f64 {
+    if on.params.body_wall == 0 {
+        return 1.0;
+    }
+    let solids = all.iter().filter(|(j, _)| *j >= on.fluid).map(|(_, w)| smooth_weight(reach(w)));
+    room(i, 1.0 + solids.sum::<f64>(), on.fluid, on.params)
+}
+
 /// Room that `solids` leave at slot `i` [-].
 #[inline(always)]
 fn room(i: usize, solids: f64, fluid: usize, params: &Params) -> f64 {

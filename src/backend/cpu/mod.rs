@@ -202,7 +202,7 @@ impl Backend for Cpu {
             ParticleStage::NumberDensity => self.number_density(),
             ParticleStage::SurfacePressure => self.surface_pressure(),
             ParticleStage::PressureSource => self.pressure_source(step),
-            ParticleStage::PressureGradient => self.pressure_gradient(),
+            ParticleStage::PressureGradient => self.pressure_gradient(step.dt),
             ParticleStage::Shift => self.shift(step),
             ParticleStage::Correct => {
                 let own = self.own();

@@ -5,7 +5,7 @@ use super::row_arrays::{Columns, RowArrays, least, sum};
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::pressure_gradient::{acceleration, is_consistent};
+use crate::kernels::pressure_gradient::{acceleration, held, is_consistent};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use crate::params::Params;
@@ -24,6 +24,7 @@ wide! {
         state: &[State],
         pressure: &[f64],
         on: Particles,
+        dt: f64,
         arrays: &mut RowArrays,
     ) {
         for (k, a) in accelerations.iter_mut().enumerate() {
@@ -34,7 +35,7 @@ wide! {
                 let gradient;
                 (gradient, one_side) =
                     pressure_gradient(i, chunk.parts(k), state[k], on, pressure, arrays);
-                *a = acceleration(gradient, on.params);
+                *a = held(acceleration(gradient, on.params), i, chunk.parts(k).0, on, dt);
             }
             if let Some(imbalance) = imbalance.get_mut(k) {
                 *imbalance = one_side;

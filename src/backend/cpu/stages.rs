@@ -261,7 +261,7 @@ impl Cpu {
             });
     }
 
-    pub(super) fn pressure_gradient(&mut self) {
+    pub(super) fn pressure_gradient(&mut self, dt: f64) {
         let Self { fields, neighbours, params, groups, live, ledger, imbalance, .. } = self;
         let Fields { position, velocity, pressure, state, acceleration, .. } = fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
@@ -276,7 +276,7 @@ impl Cpu {
                 .for_each(|(c, (a, imbalance, chunk, state))| {
                     let imbalance = imbalance.unwrap_or_default();
                     RowArrays::with(|arrays| {
-                        gradient_rows(c * CHUNK, live, chunk, a, imbalance, state, pressure, on, arrays);
+                        gradient_rows(c * CHUNK, live, chunk, a, imbalance, state, pressure, on, dt, arrays);
                     });
                 });
         };

@@ -168,7 +168,7 @@ pub(super) fn directed(
 pub(super) fn check(path: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Unfit> {
     let edges = directed(path, vertices, triangles)?;
     let mut open: Vec<_> = edges.iter().filter(|((a, b), _)| !edges.contains_key(&(*b, *a))).collect();
-    open.sort_by_key(|(_, k)| **k);
+    open.sort_by_key(|((a, _), k)| (**k, *a));
     if let Some(((a, _), k)) = open.first() {
         let message = format!(
             "{path}: the surface is open: {} edges have a triangle on one side alone, the first of triangle {} at {} m",
