@@ -280,6 +280,21 @@ fn weight(distance_squared: f32) -> f32 {
     return max(params.effective_radius * inverseSqrt(max(distance_squared, closest * closest)) - 1.0, 0.0);
 }
 
+// W of a pair of weight w, as crate::lattice::smooth_weight.
+fn smooth_weight(w: f32) -> f32 {
+    let q = 1.0 / (1.0 + w);
+    let rest = max(1.0 - q, 0.0);
+    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
+}
+
+// Solids about a particle of water, over W0, between which it comes to be caught.
+const CAUGHT = vec2f(0.85, 1.0);
+
+// Room that solids of the sum W leave a particle of water, itself among them.
+fn room_in_water(solids: f32) -> f32 {
+    return saturate((CAUGHT.y - solids / params.smooth_density) / (CAUGHT.y - CAUGHT.x));
+}
+
 // The sum of w r r^T / r^2 over a neighbourhood: its diagonal, and yz, xz, xy.
 struct Moment {
     diagonal: vec3f,

@@ -13,18 +13,8 @@
 //#if MIXED
 @group(0) @binding(9) var<storage, read> velocity: array<vec4f>;
 
-// W of a pair, as crate::lattice::smooth_weight.
-fn smooth_weight(distance_squared: f32) -> f32 {
-    let q = 1.0 / (1.0 + weight(distance_squared));
-    let rest = max(1.0 - q, 0.0);
-    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
-}
-
-// Solids about a particle of water, over W0, between which it comes to be caught.
-const CAUGHT = vec2f(0.85, 1.0);
-
 // Room that solids leave fluid slot i at x; 1 where there are no bodies.
-fn room_in_water(i: u32, x: vec3f) -> f32 {
+fn room_of(i: u32, x: vec3f) -> f32 {
     if params.body_wall == 0u {
         return 1.0;
     }
@@ -34,14 +24,14 @@ fn room_in_water(i: u32, x: vec3f) -> f32 {
         let j = neighbour_list_at(k, i);
         if j >= params.fluid {
             let r = offset(x, position[j].xyz);
-            solids += smooth_weight(dot(r, r));
+            solids += smooth_weight(weight(dot(r, r)));
         }
     }
     for (var k = 0u; k < dummies_of(count); k++) {
         let r = offset(x, position[neighbour_list_at(dummy_plane(k), i)].xyz);
-        solids += smooth_weight(dot(r, r));
+        solids += smooth_weight(weight(dot(r, r)));
     }
-    return saturate((CAUGHT.y - solids / params.smooth_density) / (CAUGHT.y - CAUGHT.x));
+    return room_in_water(solids);
 }
 
 //#endif
@@ -123,7 +113,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
     // Gravity acts together with the pressure that balances it.
     a += params.gravity;
     // Without room a particle goes nowhere: no pressure carries it.
-    let room = room_in_water(i, x.xyz);
+    let room = room_of(i, x.xyz);
     if room < 1.0 {
         a = room * a - (1.0 - room) / now.dt * velocity[i].xyz;
     }

@@ -24,13 +24,6 @@ struct Sums {
     normal: vec3f,   // e of those solids
 }
 
-// W of a pair of weight w, as crate::lattice::smooth_weight.
-fn smooth_weight(w: f32) -> f32 {
-    let q = 1.0 / (1.0 + w);
-    let rest = max(1.0 - q, 0.0);
-    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
-}
-
 fn add_neighbour(sums: Sums, w: f32, r: vec3f, v: vec3f, is_solid: bool, slips: bool) -> Sums {
     var out = sums;
     let even = smooth_weight(w);
@@ -62,8 +55,6 @@ fn divergence(sums: Sums) -> f32 {
 
 //#endif
 //#if MIXED
-// Solids about a particle of water, over W0, between which it comes to be caught.
-const CAUGHT = vec2f(0.85, 1.0);
 // Room before a row at a body, over that of a flat wall, between which it comes to undo all.
 const SLOT = vec2f(0.35, 0.68);
 // Link of a caught particle to P = 0, over n0.
@@ -71,9 +62,8 @@ const LEAK: f32 = 0.1;
 
 // Room that solids leave at a slot.
 fn room_of(solids: f32, is_fluid: bool) -> f32 {
-    let water = (CAUGHT.y - solids / params.smooth_density) / (CAUGHT.y - CAUGHT.x);
     let row = ((params.smooth_density - solids) / params.wall_room - SLOT.x) / (SLOT.y - SLOT.x);
-    return saturate(select(row, water, is_fluid));
+    return select(saturate(row), room_in_water(solids), is_fluid);
 }
 
 // Whether a slot is one of a body's wall layer.

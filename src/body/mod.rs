@@ -51,7 +51,7 @@ pub(crate) struct Body {
     pub shape: Shape,
     /// From the body's position to the centre of `shape`, body's frame [m].
     pub shape_offset: DVec3,
-    /// From there to the centre of mass, body's frame [m].
+    /// From the body's position to the centre of mass, body's frame [m].
     weight_arm: DVec3,
     /// Place and orientation at the start, and tables of motion, of a prescribed solid.
     motion: Option<(DVec3, DQuat, Motion)>,
@@ -120,7 +120,7 @@ impl Body {
         Some((*position + motion.displacement(t) - self.pose.position).length() + turned * self.radius())
     }
 
-    /// Radius of the sphere about the centre that holds the body [m].
+    /// Radius of the sphere about its position that holds the body [m].
     pub fn radius(&self) -> f64 {
         self.shape.radius() + self.shape_offset.length()
     }

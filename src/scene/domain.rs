@@ -4,7 +4,7 @@ use super::build::{AXES, Builder};
 use super::opening::Planned;
 use super::oriented::Placed;
 use super::{Drive, Solid};
-use crate::case::TANK_FACES;
+use crate::case::{TANK_FACES, Tank};
 use crate::error::Problem;
 use crate::extents;
 use glam::{DMat3, DVec3, IVec3};
@@ -87,11 +87,16 @@ impl Builder<'_> {
         self.in_plane(lo, hi)
     }
 
+    /// Which of the tank's faces have a wall, by their numbers.
+    fn walled(&self, tank: &Tank) -> impl Fn(&usize) -> bool {
+        let (bare, plane) = (tank.without_wall(), self.lattice.plane);
+        move |&k| !(bare.contains(&TANK_FACES[k].0) || plane && k / 2 == 1)
+    }
+
     /// What there is to say of a driven solid that reaches from `low` to `high` [m]: walls that it is taken through.
     fn through_walls(&self, label: &str, low: DVec3, high: DVec3) -> Vec<String> {
         let Some(tank) = &self.case.tank else { return vec![] };
-        let bare = tank.without_wall();
-        let walled = |k: &usize| !(bare.contains(&TANK_FACES[*k].0) || self.lattice.plane && *k / 2 == 1);
+        let walled = self.walled(tank);
         let beyond = |k: usize| {
             let axis = k / 2;
             if k.is_multiple_of(2) { tank.min[axis] - low[axis] } else { high[axis] - tank.max[axis] }
@@ -111,8 +116,7 @@ impl Builder<'_> {
     /// which its motion takes all of it.
     fn out_of_tank(&self, label: &str, (lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)) -> Vec<String> {
         let Some(tank) = &self.case.tank else { return vec![] };
-        let bare = tank.without_wall();
-        let walled = |k: &usize| !(bare.contains(&TANK_FACES[*k].0) || self.lattice.plane && *k / 2 == 1);
+        let walled = self.walled(tank);
         let gone = |k: &usize| {
             let (axis, size) = (k / 2, hi - lo);
             let (min, max) = (tank.min[axis], tank.max[axis]);
@@ -138,9 +142,9 @@ impl Builder<'_> {
         let (placed, reach) = (body.placed(), body.radius());
         let (mut low, mut high) = (body.position - reach, body.position + reach);
         let Some(tank) = &self.case.tank else { return (low, high) };
-        let (bare, now) = (tank.without_wall(), placed.bounds());
+        let now = placed.bounds();
         // The floor first: flaps stand on it.
-        for k in [4, 5, 0, 1, 2, 3].into_iter().filter(|k| !bare.contains(&TANK_FACES[*k].0)) {
+        for k in [4, 5, 0, 1, 2, 3].into_iter().filter(self.walled(tank)) {
             let axis = k / 2;
             let beside = |other: usize| other == axis || self.lattice.plane && other == 1;
             let faces = |other: usize| low[other] >= tank.min[other] && high[other] <= tank.max[other];

@@ -234,7 +234,7 @@ impl Solid {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
     }
 
-    /// Whether a hinge holds it.
+    /// Whether it turns where it is: on a hinge, or with all of its translations locked.
     pub(crate) fn is_hinged(&self) -> bool {
         matches!(&self.drive, Drive::Free(free) if free.locked_translation == [true; 3])
     }

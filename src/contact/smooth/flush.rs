@@ -39,27 +39,29 @@ fn stands(scene: &Scene, k: usize) -> bool {
     scene.solids[k].is_still() && k < scene.followed()
 }
 
-fn of(solid: &Solid) -> Still {
-    Still::new(solid.position, DMat3::from_quat(solid.orientation), solid.shape)
+/// The solids of `scene` that stand still for ever, with their numbers.
+fn standing(scene: &Scene) -> impl Iterator<Item = (usize, Still)> {
+    let of =
+        |solid: &Solid| Still::new(solid.shape_center(), DMat3::from_quat(solid.orientation), solid.shape);
+    let solids = scene.solids.iter().enumerate();
+    solids.filter(|(k, _)| stands(scene, *k)).map(move |(k, solid)| (k, of(solid)))
 }
 
 /// Still solids of `scene` that are no boxes.
 pub(super) fn no_boxes(scene: &Scene) -> Vec<Still> {
-    let solids = scene.solids.iter().enumerate();
-    solids.filter(|(k, s)| stands(scene, *k) && s.shape.as_cuboid().is_none()).map(|(_, s)| of(s)).collect()
+    standing(scene).map(|(_, still)| still).filter(|still| still.shape.as_cuboid().is_none()).collect()
 }
 
 /// Takes the sides of still solids that others cover out of their `surfaces`, one for each solid of `scene`: what is
 /// left is their open shape, and the points that others do not touch. A corner of two that are flush is none of both
 /// together.
 pub(super) fn take_covered(scene: &Scene, surfaces: &mut [Arc<Surface>]) {
+    let solids: Vec<(usize, Still)> = standing(scene).collect();
     let wall = |w: &WallShape| Still::new(w.center, w.axes, Shape::Box(Cuboid { half: w.half }));
     let walls: Vec<Still> = scene.walls.iter().map(wall).collect();
-    let is_one = |k: usize| stands(scene, k) && scene.solids[k].shape.as_cuboid().is_none();
-    for k in (0..scene.solids.len()).filter(|&k| is_one(k)) {
-        let own = of(&scene.solids[k]);
-        let solids = scene.solids.iter().enumerate().filter(|(j, _)| *j != k && stands(scene, *j));
-        let mut near: Vec<Still> = solids.map(|(_, solid)| of(solid)).chain(walls.iter().copied()).collect();
+    for &(k, own) in solids.iter().filter(|(_, own)| own.shape.as_cuboid().is_none()) {
+        let others = solids.iter().filter(|(j, _)| *j != k).map(|(_, other)| *other);
+        let mut near: Vec<Still> = others.chain(walls.iter().copied()).collect();
         near.retain(|s| s.center.distance(own.center) < s.radius + own.radius + scene.spacing);
         let covered = |q: DVec3, normal: DVec3| {
             let (x, normal) = (own.center + own.axes * q, own.axes * normal);
