@@ -52,8 +52,7 @@ pub fn compare(args: &CompareArgs) -> Exit {
 /// What the differences say.
 fn verdict(stages: &[StageError]) -> Option<String> {
     let beyond: Vec<&StageError> = stages.iter().filter(|s| !s.is_explained()).collect();
-    let first = beyond.first();
-    (!stages.is_empty()).then(|| match first {
+    (!stages.is_empty()).then(|| match beyond.first() {
         None => "  all are such as single precision and the tolerance of the solve make".to_owned(),
         Some(s) => format!(
             "  {} of {} are larger than single precision and the tolerance of the solve make them, {} of {} first",
@@ -72,7 +71,7 @@ fn words(report: &Report) -> String {
         lines.push("  a dry scene has no stages on the GPU".to_string());
     } else {
         lines.push(format!(
-            "  {:<20}{:<16}{:>10}{:>10}{:>10}",
+            "  {:<20}{:<16}{:>10}{:>10}{:>12}",
             "stage", "field", "largest", "rms", "rms may be"
         ));
     }
