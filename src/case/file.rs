@@ -6,6 +6,7 @@ use super::copies::lay_out;
 use super::motion_file::inline;
 use super::report::{Message, closest, explain, render, span_of};
 use super::surplus::surplus;
+use super::values::from_table;
 use super::{Case, overrides};
 use crate::error::{CaseError, Error, Problem, Result};
 use std::path::{Path, PathBuf};
@@ -162,11 +163,28 @@ fn with_sets(name: &str, text: String, sets: &[String]) -> Result<String> {
     let text = text.replace("\r\n", "\n");
     // Broken TOML is reported on the text as it stands in the file.
     if let Err(error) = DeTable::parse(&text) {
-        let message = explain(&error, None);
+        let message = explain(error.message(), error.span(), None);
         let problem = message.problem(name, &text);
         return Err(CaseError::new(vec![problem], render(name, &text, &[message])).into());
     }
     if sets.is_empty() { Ok(text) } else { overrides::apply(&text, sets) }
+}
+
+/// What a file beside cases says in TOML, a study's, with messages as those of a case; `name` stands for the file in
+/// them.
+///
+/// # Errors
+/// [`Error::Case`] with line and column.
+pub fn parse_as<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T> {
+    let wrong = |message: Message| {
+        // `seixo keys` knows those of cases.
+        let remedy = message.remedy.clone().filter(|r| !r.contains("`seixo "));
+        let message = Message { remedy, ..message };
+        let problem = message.problem(name, text);
+        Error::from(CaseError::new(vec![problem], render(name, text, &[message])))
+    };
+    let table = DeTable::parse(text).map_err(|e| wrong(explain(e.message(), e.span(), None)))?;
+    from_table(&table).map_err(|e| wrong(explain(e.message(), e.span(), Some(table.get_ref()))))
 }
 
 /// [`parse`], of a text that is `overridden` already, or not.
@@ -182,11 +200,12 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
         let problem = message.problem(name, &text);
         CaseError::new(vec![problem], wrong(&[message]))
     };
-    let table = DeTable::parse(&text).map_err(|e| unread(explain(&e, None)))?;
+    let table = DeTable::parse(&text).map_err(|e| unread(explain(e.message(), e.span(), None)))?;
     if let Some(message) = mistaken(table.get_ref()) {
         return Err(unread(message).into());
     }
-    let mut case: Case = toml::from_str(&text).map_err(|e| unread(explain(&e, Some(table.get_ref()))))?;
+    let mut case: Case =
+        from_table(&table).map_err(|e| unread(explain(e.message(), e.span(), Some(table.get_ref()))))?;
     let located = |p: &Problem| Message {
         span: span_of(&table, &p.key),
         key: p.key.clone(),

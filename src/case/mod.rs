@@ -29,6 +29,7 @@ mod shape;
 mod solid;
 mod surplus;
 mod tank;
+mod values;
 mod water;
 mod wave;
 

@@ -57,11 +57,11 @@ pub(super) fn render(path: &str, text: &str, messages: &[Message]) -> String {
     texts.collect::<Vec<_>>().join("\n\n")
 }
 
-/// Turns what the TOML reader says into a message: adds the key's path and a remedy.
-pub(super) fn explain(error: &toml::de::Error, table: Option<&DeTable<'_>>) -> Message {
-    let span = error.span().unwrap_or(0..0);
+/// Turns what a reader has `said` of `span` into a message: adds the key's path and a remedy.
+pub(super) fn explain(said: &str, span: Option<Range<usize>>, table: Option<&DeTable<'_>>) -> Message {
+    let span = span.unwrap_or(0..0);
     let key = table.and_then(|t| path_at(t, &span));
-    let said = tidy(&plain(error.message().trim()));
+    let said = tidy(&plain(said.trim()));
     // What is allowed is told once, as the remedy.
     let brief = short(&said);
     let title = match &key {
@@ -95,7 +95,7 @@ fn plain(said: &str) -> String {
         Some((how, found, wanted))
     });
     let Some((how, found, wanted)) = found else {
-        return said.replace("wanted string or table", "expected one of its names in quotes");
+        return said.to_owned();
     };
     let wanted = match wanted {
         "f64" | "f32" | "a float" => "a number".to_owned(),
@@ -104,7 +104,6 @@ fn plain(said: &str) -> String {
         "a boolean" => "true or false".to_owned(),
         "a sequence" => "a list".to_owned(),
         "a string" => "words in quotes".to_owned(),
-        "string or table" => "one of its names in quotes".to_owned(),
         w if w.starts_with("enum ") => "one of its names in quotes".to_owned(),
         w if w.starts_with("struct ") || w == "a map" => "a table".to_owned(),
         w => match w.strip_prefix("an array of length ") {

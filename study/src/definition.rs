@@ -30,7 +30,7 @@ use super::measure::Spec;
 use super::result_number::ResultNumber;
 use super::run_point::{Point, run};
 use super::validation::check::Check;
-use seixo::case::file::parse;
+use seixo::case::file::{parse, parse_as};
 use seixo::error::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -245,7 +245,7 @@ impl Definition {
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let wrong =
             |key: &str, what: &dyn std::fmt::Display| Error::file(name, key, format!("{name}: {what}"));
-        let study: Self = toml::from_str(text).map_err(|e| wrong("", &e))?;
+        let study: Self = parse_as(name, text)?;
         for e in &study.error {
             let whole =
                 matches!((&e.value, &e.curve, &e.against), (Some(_), None, None) | (None, Some(_), Some(_)));
@@ -483,6 +483,12 @@ value = "e [-]"
         {
             assert!(Definition::parse("s.toml", &STUDY.replacen(from, to, 1)).is_err(), "{to}");
         }
+        let slip = Definition::parse("s.toml", &STUDY.replacen("title", "tilte", 1)).unwrap_err().to_string();
+        assert!(slip.contains("s.toml:") && slip.contains("did you mean `title`?"), "{slip}");
+        let text =
+            Definition::parse("s.toml", &format!("repetitions = []\n{STUDY}")).unwrap_err().to_string();
+        let told = "repetitions: a list, expected a whole number, 0 or more\n --> s.toml:1:15";
+        assert!(text.contains(told) && !text.contains("seixo keys"), "{text}");
         let text = STUDY.replace("key = \"run.end\"\nvalues = [1.0, 2.0]\nfull_values = [3.0]\n", "");
         let study = Definition::parse("s.toml", &text).unwrap();
         assert!(study.jobs(&|_| unreachable!(), &Setup::default()).is_err());
