@@ -81,11 +81,19 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ("end = 1.0", "end = 1.0\nend = 2.0", &["test.toml:5:1", "duplicate key"]),
     ("[tank]", "[tank", &["test.toml:6:6"]),
     ("\"smooth\"", "\"smoth\"", &["contact.law: unknown variant `smoth`", "did you mean `smooth`?", "paper"]),
-    ("[\"z_max\"]", "[\"top\"]", &["tank.open.0: unknown variant `top`", "allowed: x_min", "z_max"]),
+    (
+        "[\"z_max\"]",
+        "[\"top\"]",
+        &["tank.open.0: unknown variant `top`", "did you mean `z_max`?", "allowed: x_min"],
+    ),
     ("[0.2, 0.2, 0.2]", "[0.2, 0.2]", &["body.0.size: a list of 2, expected a list of 3"]),
     ("end = 1.0", "end = {a = 1}", &["run.end: a table, expected a number"]),
     ("law = \"smooth\"", "law = 3", &["contact.law: expected one of its names in quotes"]),
     ("[contact]", "[contcat]", &["unknown field `contcat`", "did you mean `contact`?"]),
+    // words of other programs
+    ("spacing = 0.1", "dp = 0.1", &["run.dp: unknown field `dp`", "did you mean `spacing`?"]),
+    ("[[body]]", "[[floating]]", &["unknown field `floating`", "did you mean `body`?"]),
+    ("spacing = 0.1", "spacing = .1", &["test.toml:2:11", "a digit on both sides of its point"]),
     // numbers
     ("end = 1.0", "end = 1e-300", &["is longer than the whole run of 1e-300 s"]),
     ("spacing = 0.1", "spacing = nan", &["test.toml:2:1", "run.spacing: NaN is not a finite number"]),

@@ -80,6 +80,9 @@ pub(super) fn explain(said: &str, span: Option<Range<usize>>, table: Option<&DeT
             }
             None => format!("add a table [{name}]; `seixo init` writes a case to begin with"),
         }),
+        _ if said.starts_with("invalid mantissa") || said.starts_with("invalid fraction") => {
+            Some("a number has a digit on both sides of its point: 0.5, 2.0".to_owned())
+        }
         _ if said.contains("expected ") => key
             .as_ref()
             .map(|key| format!("`seixo keys {}` tells what it takes, with an example", named(key))),
@@ -137,9 +140,52 @@ pub(super) fn named(key: &str) -> String {
     key.split('.').filter(|part| part.parse::<usize>().is_err()).collect::<Vec<_>>().join(".")
 }
 
-/// The name most like a mistyped one: few slips of the finger, or the same beginning.
+/// What keys and tables are called elsewhere: words that newcomers bring, and the names here, of which those that
+/// a place has are meant.
+const ELSEWHERE: &[(&[&str], &[&str])] = &[
+    (&["mesh", "stl", "obj", "path", "filename"], &["file"]),
+    (&["dp", "dx", "l0", "h", "resolution", "particle_spacing"], &["spacing"]),
+    (&["dt", "timestep"], &["time_step"]),
+    (&["duration", "t_end", "tmax", "t_max", "until", "end_time", "time"], &["end"]),
+    (&["g"], &["gravity"]),
+    (&["rho", "rhop"], &["density"]),
+    (&["nu", "kinematic_viscosity"], &["viscosity"]),
+    (&["mu", "friction_coefficient"], &["friction"]),
+    (&["stiffness", "k", "kn"], &["spring"]),
+    (&["position", "origin", "pos", "centre"], &["center", "at", "position"]),
+    (&["length", "dimensions", "extent", "edge"], &["size"]),
+    (&["rotation", "angle", "rotate"], &["orientation"]),
+    (&["omega"], &["angular_velocity"]),
+    (&["point"], &["at"]),
+    (&["solid", "solids", "rigid", "rigid_body", "floating", "object"], &["body"]),
+    (&["wall", "box", "column", "pile"], &["obstacle"]),
+    (&["gate", "piston", "wavemaker"], &["moving_wall"]),
+    (&["domain", "walls"], &["tank"]),
+    (&["water", "liquid"], &["fluid"]),
+    (&["inlet", "source"], &["inflow"]),
+    (&["outlet", "sink"], &["outflow"]),
+    (&["probe", "probes", "sensor"], &["gauge"]),
+    (&["damping_zone", "sponge", "beach"], &["absorber"]),
+    (&["left"], &["x_min"]),
+    (&["right"], &["x_max"]),
+    (&["front"], &["y_min"]),
+    (&["back"], &["y_max"]),
+    (&["bottom", "floor"], &["z_min"]),
+    (&["top", "lid"], &["z_max"]),
+    (&["rx", "roll"], &["rotation_x"]),
+    (&["ry", "pitch"], &["rotation_y"]),
+    (&["rz", "yaw"], &["rotation_z"]),
+];
+
+/// The name most like a mistyped one, few slips of the finger or the same beginning; or what is meant by a word from
+/// elsewhere.
 pub(super) fn closest<'a>(wrong: &str, names: &[&'a str]) -> Option<&'a str> {
     let wrong = wrong.to_lowercase();
+    let translated = ELSEWHERE.iter().filter(|(words, _)| words.contains(&wrong.as_str()));
+    let meant = translated.flat_map(|(_, here)| *here).find_map(|n| names.iter().find(|name| *name == n));
+    if meant.is_some() {
+        return meant.copied();
+    }
     let slips = |name: &str| strsim::damerau_levenshtein(&wrong, &name.to_lowercase());
     let alike = |name: &&&str| {
         slips(name) <= (wrong.chars().count() / 3).max(1)
