@@ -80,6 +80,7 @@ struct Constants {
     drive: vec3f,          // what of gravity lies along periodic axes; `gravity` is the rest
     dynamic_viscosity: f32, // rho nu, Pa s
     wall_room: f32,        // sum W of a particle of a flat wall's layer with the water above it
+    wall_depth: f32,       // of the wall's middle below a particle of a flat wall's layer, over l0
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
@@ -284,7 +285,14 @@ fn weight(distance_squared: f32) -> f32 {
 fn smooth_weight(w: f32) -> f32 {
     let q = 1.0 / (1.0 + w);
     let rest = max(1.0 - q, 0.0);
-    return rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q);
+    return rest * rest * rest * (1.0 + 3.0 * q - 2.6 * q * q);
+}
+
+// Weight of neighbours at a boundary, as crate::lattice::boundary_weight.
+fn boundary_weight(w: f32) -> f32 {
+    let q = 1.0 / (1.0 + w);
+    let square = (1.0 - q) * (1.0 - q);
+    return square * square * (1.0 + q);
 }
 
 // Solids about a particle of water, over W0, between which it comes to be caught.

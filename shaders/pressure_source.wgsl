@@ -14,47 +14,92 @@
 //#endif
 
 //#if MIXED
-// What a row sums over all its neighbours.
-struct Sums {
-    density: f32,    // W, the particle itself among them
-    solids: f32,     // W of solids, the particle itself among them
-    moment: Moment,
-    inner: mat3x3f,  // e (v_j - v_i)^T, column c with component c of the velocity
-    solid: mat3x3f,  // the same of the solids around a fluid particle
-    normal: vec3f,   // e of those solids
+// Whether a slot is one of a body's wall layer.
+fn is_body(i: u32) -> bool {
+    return i >= params.fluid && i < params.fluid + params.body_wall;
 }
 
-fn add_neighbour(sums: Sums, w: f32, r: vec3f, v: vec3f, is_solid: bool, slips: bool) -> Sums {
+// Water against solids, as a row of either sees it.
+struct Boundary {
+    solids: vec3f,      // r of the solids, with their weight
+    solid_weight: f32,
+    velocity: vec3f,    // v_j - v_i of those across the boundary, with their weight
+    weight: f32,
+    vector: vec3f,      // e of those
+    bodies: bool,       // among the solids
+}
+
+// What a row sums over all its neighbours.
+struct Sums {
+    density: f32,   // W, the particle itself among them
+    solids: f32,    // W of solids, the particle itself among them
+    moment: Moment,
+    rate: mat3x3f,  // e (v_j - v_i)^T, column c with component c of the velocity
+    boundary: Boundary,
+}
+
+fn add_neighbour(sums: Sums, j: u32, w: f32, r: vec3f, v: vec3f, is_fluid: bool) -> Sums {
     var out = sums;
     let even = smooth_weight(w);
     let e = pair_vector(w, r);
-    let rate = mat3x3f(e * v.x, e * v.y, e * v.z);
     out.density += even;
-    out.solids += select(0.0, even, is_solid);
     out.moment = add_moment(out.moment, e, r);
-    if slips {
-        out.solid += rate;
-        out.normal += e;
-    } else {
-        out.inner += rate;
+    out.rate += mat3x3f(e * v.x, e * v.y, e * v.z);
+    let is_solid = j >= params.fluid;
+    if is_fluid && !is_solid {
+        return out;
+    }
+    let weight = boundary_weight(w);
+    if is_solid {
+        out.solids += even;
+        out.boundary.solids += weight * r;
+        out.boundary.solid_weight += weight;
+        out.boundary.bodies = out.boundary.bodies || is_body(j);
+    }
+    if is_solid == is_fluid {
+        out.boundary.velocity += weight * v;
+        out.boundary.weight += weight;
+        out.boundary.vector += e;
     }
     return out;
 }
 
-// sum v . M^-1 e, of solids with their velocity along the mean normal alone.
-fn divergence(sums: Sums) -> f32 {
-    let inverse = inverse_moment(sums.moment);
-    var sum = dot(inverse[0], sums.inner[0]) + dot(inverse[1], sums.inner[1]) + dot(inverse[2], sums.inner[2]);
-    let squared = dot(sums.normal, sums.normal);
-    if squared > 0.0 {
-        let normal = sums.normal * inverseSqrt(squared);
-        sum += dot(inverse * normal, sums.solid * normal);
+// Distance from the middle of the solids about a particle of water, over l0, from which on it is at one side of them.
+const ONE_SIDED: f32 = 0.02;
+// Depth of a wall below its row, over that of a flat and thick one, between which water comes to slide past it.
+const THICK = vec2f(0.5, 0.9);
+
+// Part of the divergence of row i that the mean velocity along the boundary makes up.
+fn slide(i: u32, boundary: Boundary, inverse: mat3x3f) -> f32 {
+    if boundary.weight <= 0.0 || boundary.solid_weight <= 0.0 || is_body(i) {
+        return 0.0;
     }
-    return sum;
+    var normal = boundary.solids / boundary.solid_weight;
+    var least = ONE_SIDED * params.spacing;
+    var part = 1.0;
+    if i >= params.fluid {
+        let depth = length(normal) / (params.wall_depth * params.spacing);
+        part = saturate((depth - THICK.x) / (THICK.y - THICK.x));
+    } else if boundary.bodies {
+        let squared = dot(boundary.vector, boundary.vector);
+        normal = select(vec3f(0.0), boundary.vector * inverseSqrt(squared), squared > 0.0);
+        least = 0.0;
+    }
+    let squared = dot(normal, normal) + least * least;
+    if squared <= 0.0 {
+        return 0.0;
+    }
+    let along = cross(normal, cross(boundary.velocity / boundary.weight, normal));
+    return part / squared * dot(inverse * along, boundary.vector);
 }
 
-//#endif
-//#if MIXED
+// sum v . M^-1 e, without what slides along a boundary.
+fn divergence(i: u32, sums: Sums) -> f32 {
+    let inverse = inverse_moment(sums.moment);
+    let sum = dot(inverse[0], sums.rate[0]) + dot(inverse[1], sums.rate[1]) + dot(inverse[2], sums.rate[2]);
+    return sum - slide(i, sums.boundary, inverse);
+}
+
 // Room before a row at a body, over that of a flat wall, between which it comes to undo all.
 const SLOT = vec2f(0.35, 0.68);
 // Link of a caught particle to P = 0, over n0.
@@ -64,11 +109,6 @@ const LEAK: f32 = 0.1;
 fn room_of(solids: f32, is_fluid: bool) -> f32 {
     let row = ((params.smooth_density - solids) / params.wall_room - SLOT.x) / (SLOT.y - SLOT.x);
     return select(saturate(row), room_in_water(solids), is_fluid);
-}
-
-// Whether a slot is one of a body's wall layer.
-fn is_body(i: u32) -> bool {
-    return i >= params.fluid && i < params.fluid + params.body_wall;
 }
 
 //#endif
@@ -98,7 +138,9 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let v = velocity[i].xyz;
     var first_moment = vec3f(0.0);
     let zero = mat3x3f(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    var sums = Sums(1.0, 1.0, Moment(vec3f(0.0), vec3f(0.0)), zero, zero, vec3f(0.0));
+    let nothing = Boundary(vec3f(0.0), 0.0, vec3f(0.0), 0.0, vec3f(0.0), false);
+    var sums = Sums(1.0, 1.0, Moment(vec3f(0.0), vec3f(0.0)), zero, nothing);
+    let is_fluid = i < params.fluid;
 //#endif
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list_at(k, i);
@@ -110,8 +152,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
 //#endif
 //#if MIXED
         first_moment += w * r;
-        let is_solid = j >= params.fluid;
-        sums = add_neighbour(sums, w, r, velocity[j].xyz - v, is_solid, is_solid && i < params.fluid);
+        sums = add_neighbour(sums, j, w, r, velocity[j].xyz - v, is_fluid);
 //#endif
     }
     if links <= 0.0 {
@@ -119,22 +160,20 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
 //#if MIXED
-    // Whether a wall's row is a body's or lies at one. Rows of walls have other walls among the dummies.
-    var at_body = is_body(i);
     let dummies = dummies_of(count);
     for (var k = 0u; k < dummies; k++) {
         let j = neighbour_list_at(dummy_plane(k), i);
-        at_body = at_body || is_body(j);
         let r = offset(x, position[j].xyz);
-        sums = add_neighbour(sums, weight(dot(r, r)), r, velocity[j].xyz - v, true, i < params.fluid);
+        sums = add_neighbour(sums, j, weight(dot(r, r)), r, velocity[j].xyz - v, is_fluid);
     }
     // A wall's row undoes as much as there is water before it.
+    let at_body = is_body(i) || sums.boundary.bodies;
     let share = links / params.wall_contact;
-    let room = room_of(sums.solids, i < params.fluid);
+    let room = room_of(sums.solids, is_fluid);
     let row = select(saturate(share), min(saturate(2.0 * share - 1.0), room), at_body);
-    let wet = select(row, room, i < params.fluid);
+    let wet = select(row, room, is_fluid);
     var b = wet * now.source_density * (sums.density - params.smooth_density) / params.smooth_density
-        - wet * now.source_divergence * divergence(sums)
+        - wet * now.source_divergence * divergence(i, sums)
         - params.density * dot(params.gravity, first_moment);
 //#else
     var b = now.source_density * (number_density[i] - params.number_density) / params.number_density;
@@ -144,7 +183,7 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
 //#endif
     var diagonal = links + now.compressibility;
 //#if MIXED
-    diagonal += select(0.0, LEAK * (1.0 - wet) * params.number_density, i < params.fluid);
+    diagonal += select(0.0, LEAK * (1.0 - wet) * params.number_density, is_fluid);
 //#endif
     source_diagonal[i] = vec2f(b, diagonal);
 }

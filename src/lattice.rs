@@ -12,13 +12,22 @@ pub(crate) fn reach(w: f64) -> f64 {
     1.0 / (1.0 + w)
 }
 
-/// Weight W of the smooth density sum, (1 - q)^3 (1 + 3 q - 3 q^2) at `q` = r / re [-]. Of (1 - q)^3 (1 + 3 q - 4 a q^2),
-/// which is Wendland's C2 of one dimension for a = 0 and of two and three for a = 1, a = 3/4 keeps its sum best on
-/// stretched and on other lattices of the same volume.
+/// Weight W of the smooth density sum, (1 - q)^3 (1 + 3 q - 2.6 q^2) at `q` = r / re [-]. Of (1 - q)^3 (1 + 3 q - 4 a q^2),
+/// which is Wendland's C2 of one dimension for a = 0 and of two and three for a = 1, a = 0.65 keeps its sum well on
+/// stretched, on melted and on other lattices of the same volume: what it rises there swells the water.
 #[inline(always)]
 pub(crate) fn smooth_weight(q: f64) -> f64 {
     let rest = (1.0 - q).max(0.0);
-    rest * rest * rest * (1.0 + 3.0 * q - 3.0 * q * q)
+    rest * rest * rest * (1.0 + 3.0 * q - 2.6 * q * q)
+}
+
+/// Weight of neighbours in the direction of a boundary and in the velocity past it, (1 - q)^4 (1 + q) at `q` = r / re
+/// [-]. What slides along a flat wall sees its direction turn from particle to particle of the wall: with this weight by
+/// 0.003 at most between 0.4 and 0.7 spacings from its surface, with that of Eq. (3) over r^2 by 0.03 to 0.04.
+#[inline(always)]
+pub(crate) fn boundary_weight(q: f64) -> f64 {
+    let square = (1.0 - q) * (1.0 - q);
+    square * square * (1.0 + q)
 }
 
 /// Weight of a pair in explicit viscosity of the accurate scheme, 1 / q - 1 + 32 (1 - q)^4 at `q` = r / re [-]: that of Eq. (3) and
@@ -110,13 +119,15 @@ pub struct Lattice {
     pub wall_contact: f64,
     /// Sum of `smooth_weight` of a particle of a flat wall's layer with the water above [-].
     pub wall_room: f64,
+    /// How deep the middle of the wall, with `boundary_weight`, lies below a particle of a flat wall's layer, over l0 [-].
+    pub wall_depth: f64,
 }
 
 impl Lattice {
     /// Sums for an effective radius of `radius` spacings in `dimensions` dimensions.
     pub fn new(dimensions: u32, radius: f64) -> Self {
         let (mut n, mut s, mut smooth, mut count) = (0.0, 0.0, smooth_weight(0.0), 0);
-        let (mut contact, mut room) = (0.0, 0.0);
+        let (mut contact, mut room, mut depth, mut wall) = (0.0, 0.0, 0.0, 0.0);
         for (r2, z) in around(dimensions, radius) {
             let (w, even) = (weight(r2.sqrt(), radius), smooth_weight(r2.sqrt() / radius));
             n += w;
@@ -125,6 +136,10 @@ impl Lattice {
             if z > 0 {
                 contact += w;
                 room += even;
+            } else {
+                let weight = boundary_weight(r2.sqrt() / radius);
+                wall += weight;
+                depth -= weight * f64::from(z);
             }
             count += 1;
         }
@@ -135,6 +150,7 @@ impl Lattice {
             neighbours: count,
             wall_contact: contact,
             wall_room: room,
+            wall_depth: depth / wall,
         }
     }
 }

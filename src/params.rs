@@ -107,6 +107,8 @@ pub struct Params {
     pub wall_contact: f64,
     /// [`Lattice::wall_room`].
     pub wall_room: f64,
+    /// [`Lattice::wall_depth`].
+    pub wall_depth: f64,
     /// Wall-layer particles of bodies; their slots follow those of the fluid.
     pub body_wall: usize,
     /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
@@ -239,6 +241,7 @@ impl Params {
             shear: fluid.map_or_else(|| Shear::paper(d, re), |f| f.shear(d, re)),
             wall_contact: lattice.wall_contact,
             wall_room: lattice.wall_room,
+            wall_depth: lattice.wall_depth,
             body_wall: scene.solids.iter().filter(|s| s.is_body).map(|s| s.wall_slots.len()).sum(),
             wall_friction: friction / (l0 * lattice.wall_contact),
             free_surface_threshold: if filled {

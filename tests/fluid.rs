@@ -463,12 +463,13 @@ fn dam_break_accurate() {
     let near = |value: f64, expected: f64, part: f64| {
         assert!((value / expected - 1.0).abs() < part, "{value} for {expected}");
     };
-    near(rows[0][0], 1.110, 0.02);
-    near(rows[0][1], 100.3, 0.02);
-    near(rows[0][2], 61.4, 0.02);
-    near(rows[1][0], 1.747, 0.03);
-    let left = (rows[1][1] + rows[1][2]) / 165.3;
-    assert!((left - 0.933).abs() < 0.02, "{left}");
+    near(rows[0][0], 1.133, 0.01);
+    near(rows[0][1], 99.5, 0.005);
+    near(rows[1][0], 1.809, 0.015);
+    for (row, least) in rows.iter().zip([0.992, 0.983]) {
+        let left = (row[1] + row[2]) / 165.3;
+        assert!(left > least, "{left}");
+    }
 }
 
 #[test]
@@ -504,7 +505,7 @@ fn deviation_of_stretched(factors: DVec3) -> f64 {
 
 #[test]
 fn water_stretched_at_constant_volume_keeps_its_density() {
-    for (stretch, most) in [(1.1_f64, 0.001), (1.2, 0.002), (1.3, 0.012)] {
+    for (stretch, most) in [(1.1_f64, 0.0015), (1.2, 0.003), (1.3, 0.007)] {
         let (squeeze, root) = (1.0 / stretch, 1.0 / stretch.sqrt());
         for factors in [
             DVec3::new(stretch, 1.0, squeeze),
@@ -667,4 +668,44 @@ fn a_plate_that_moves_along_drags_water_to_the_line_between_the_surfaces() {
     let rms = middle.iter().map(|(x, u)| (u - x).powi(2)).sum::<f64>() / middle.len() as f64;
     println!("{} particles, rms {:.4} of the plate's speed", middle.len(), rms.sqrt());
     assert!(middle.len() > 80 && rms.sqrt() < 0.01, "rms {}", rms.sqrt());
+}
+
+/// Standard deviation of the force on the floor over its mean, from step to step, of a stream at `speed` [m/s] without friction: what
+/// the water's momentum does not gain of its weight. From 0.1 to 0.2 s.
+fn scatter_on_the_floor(dimensions: u32, speed: f64) -> f64 {
+    let (spacing, [x, y, z], sides) = if dimensions == 2 {
+        (0.01, [0.5, 0.01, 0.3], "\"x\"")
+    } else {
+        (0.02, [0.2, 0.2, 0.3], "\"x\", \"y\"")
+    };
+    let mut sim = simulation(&case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ndimensions = {dimensions}\ngravity = [0, 0, -9.81]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [{x}, {y}, 0.5]\nperiodic = [{sides}]\nopen = [\"z_max\"]\n\
+         [fluid]\nwall_friction = 0\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{x}, {y}, {z}]\nvelocity = [{speed}, 0, 0]\n"
+    )));
+    let mut forces = vec![];
+    let mut last = (0.0, 0.0);
+    while sim.time < 0.2 {
+        sim.step().unwrap();
+        let fluid = sim.groups.fluid;
+        let rise =
+            sim.backend.read().unwrap().velocity[..fluid].iter().map(|v| v.z).sum::<f64>() / fluid as f64;
+        if last.0 > 0.1 {
+            forces.push(1.0 + (rise - last.1) / (sim.time - last.0) / 9.81);
+        }
+        last = (sim.time, rise);
+    }
+    let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+    let scatter =
+        (forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / forces.len() as f64).sqrt() / mean;
+    println!("{dimensions}D, {speed} m/s: mean {mean:.3}, scatter {scatter:.4}");
+    assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    scatter
+}
+
+#[test]
+fn a_stream_does_not_feel_the_particles_of_the_floor() {
+    // 0.31 and 0.50 with what slides past the floor's particles in the divergence of its rows.
+    assert!(scatter_on_the_floor(2, 0.5) < 0.04);
+    assert!(scatter_on_the_floor(3, 1.0) < 0.1);
 }

@@ -291,6 +291,7 @@ fn structs_lie_the_same_on_both_sides() {
             drive,
             dynamic_viscosity,
             wall_room,
+            wall_depth,
         }
     );
     same_layout!(

@@ -14,7 +14,7 @@
 //! along it.
 
 use super::Particles;
-use crate::lattice::{reach, smooth_weight};
+use crate::lattice::{boundary_weight, reach, smooth_weight};
 use crate::neighbourhood::{inverse, moment, pair_vector};
 use crate::neighbours::Row;
 use crate::params::{Params, Step};
@@ -83,8 +83,7 @@ pub fn wet_share(i: usize, links: f64, solids: f64, neighbour: &[u32], on: Parti
     if share.min(room) >= 1.0 {
         return 1.0;
     }
-    let bodies = on.fluid..on.fluid + on.params.body_wall;
-    let at_body = bodies.contains(&i) || neighbour.iter().any(|&j| bodies.contains(&(j as usize)));
+    let at_body = is_body(i, on) || neighbour.iter().any(|&j| is_body(j as usize, on));
     if at_body { (2.0 * share - 1.0).max(0.0).min(room) } else { share }
 }
 
@@ -132,19 +131,92 @@ pub fn leak_of(i: usize, wet: f64, on: Particles) -> f64 {
     if i < on.fluid { LEAK * (1.0 - wet) * on.params.number_density } else { 0.0 }
 }
 
-/// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Solids count with their
-/// velocity along their mean normal: that past them moves no volume.
+/// Water against solids, as a row of either sees it.
+#[derive(Default)]
+pub struct Boundary {
+    /// Sum of the solids' r_j - r_i [m], and of their weights [-], [`boundary_weight`].
+    solids: DVec3,
+    solid_weight: f64,
+    /// Whether bodies are among them.
+    bodies: bool,
+    /// Sum of the weights of those across the boundary [-], and with them of v_j - v_i [m/s].
+    weight: f64,
+    velocity: DVec3,
+    /// Sum of their [`pair_vector`].
+    vector: DVec3,
+}
+
+/// Distance from the middle of the solids about a particle of water, over l0, from which on it is at one side of them:
+/// not between two plates.
+const ONE_SIDED: f64 = 0.02;
+/// Depth of a wall below its row, over that of a flat and thick one, from which on water slides past it, and at which it
+/// wholly does. Two layers with a hollow between them have no direction to slide along.
+const THICK: (f64, f64) = (0.5, 0.9);
+
+impl Boundary {
+    /// The neighbour `j`, a solid, at `r` with weight `w`.
+    #[inline(always)]
+    pub fn add_solid(&mut self, j: usize, w: f64, r: DVec3, on: Particles) {
+        let weight = boundary_weight(reach(w));
+        self.solid_weight += weight;
+        self.solids += weight * r;
+        self.bodies |= is_body(j, on);
+    }
+
+    /// A neighbour across it of weight `w` and pair vector `e`, at the relative velocity `v`.
+    #[inline(always)]
+    pub fn add_across(&mut self, w: f64, e: DVec3, v: DVec3) {
+        let weight = boundary_weight(reach(w));
+        self.weight += weight;
+        self.velocity += weight * v;
+        self.vector += e;
+    }
+
+    /// Part of the corrected divergence of row `i` that the mean velocity along the boundary makes up.
+    #[inline(always)]
+    pub fn slide(&self, i: usize, inverse: DMat3, on: Particles) -> f64 {
+        if self.weight <= 0.0 || self.solid_weight <= 0.0 || is_body(i, on) {
+            return 0.0;
+        }
+        let (mut normal, mean) = (self.solids / self.solid_weight, self.velocity / self.weight);
+        let (mut least, mut part) = (ONE_SIDED * on.params.spacing, 1.0);
+        if i >= on.fluid {
+            let depth = normal.length() / (on.params.wall_depth * on.params.spacing);
+            part = ((depth - THICK.0) / (THICK.1 - THICK.0)).clamp(0.0, 1.0);
+        } else if self.bodies {
+            (normal, least) = (self.vector.normalize_or_zero(), 0.0);
+        }
+        let squared = normal.length_squared() + least * least;
+        if squared <= 0.0 {
+            return 0.0;
+        }
+        part / squared * normal.cross(mean.cross(normal)).dot(inverse * self.vector)
+    }
+}
+
+/// Whether slot `i` is one of a body's wall layer.
+#[inline(always)]
+fn is_body(i: usize, on: Particles) -> bool {
+    i >= on.fluid && i < on.fluid + on.params.body_wall
+}
+
+/// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Water that slides past solids
+/// counts without that velocity, in its own rows and in those of walls: it moves no volume, but on particles in rows it
+/// would seem to, now inwards and now outwards.
 fn divergence(i: usize, all: Row, on: Particles) -> f64 {
     let inverse = inverse(moment(i, all, on), on.params.dimensions).unwrap_or(DMat3::IDENTITY);
-    let slips = |j: usize| i < on.fluid && j >= on.fluid;
-    let solids = all.iter().filter(|&(j, _)| slips(j));
-    let normal = solids.map(|(j, w)| pair_vector(i, j, w, on)).sum::<DVec3>().normalize_or_zero();
+    let mut boundary = Boundary::default();
     let pair = |(j, w): (usize, f64)| {
-        let mut v = on.velocity[j] - on.velocity[i];
-        if slips(j) {
-            v = v.dot(normal) * normal;
+        let (e, v) = (pair_vector(i, j, w, on), on.velocity[j] - on.velocity[i]);
+        let is_solid = j >= on.fluid;
+        if is_solid {
+            boundary.add_solid(j, w, on.offset(i, j), on);
         }
-        v.dot(inverse * pair_vector(i, j, w, on))
+        if is_solid == (i < on.fluid) {
+            boundary.add_across(w, e, v);
+        }
+        v.dot(inverse * e)
     };
-    all.iter().map(pair).sum()
+    let whole: f64 = all.iter().map(pair).sum();
+    whole - boundary.slide(i, inverse, on)
 }

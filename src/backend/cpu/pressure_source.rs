@@ -5,13 +5,15 @@ use super::row_arrays::{Columns, RowArrays, sum};
 use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
-use crate::kernels::pressure_source::{laplacian_coefficient, leak_of, number_density_source, wet_share};
+use crate::kernels::pressure_source::{
+    Boundary, laplacian_coefficient, leak_of, number_density_source, wet_share,
+};
 use crate::lattice::{reach, smooth_weight};
 use crate::neighbourhood::{inverse, scale};
 use crate::neighbours::{Chunk, Row};
 use crate::params::Step;
 use crate::scheme::Source;
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 
 wide! {
     /// Right sides and diagonals of the slots from `first` on, whose number densities and states are given.
@@ -78,43 +80,30 @@ fn mixed_source(
     // The filling has no weight and no part in the smooth sum either.
     s.iter_mut().zip(&*w).for_each(|(s, &w)| *s = smooth_weight(reach(w)));
     let deviation = (1.0 + sum(s)) / params.smooth_density - 1.0;
-    // Fluid comes first in a row.
     let solids = all.neighbour.partition_point(|&j| (j as usize) < on.fluid);
-    let solids = 1.0 + sum(&s[solids..]);
+    let room = 1.0 + sum(&s[solids..]);
     pair_vectors(r, w, params.effective_radius, e);
     let m = moment(r, e, filled, scale(on), params.dimensions);
     let inverse = inverse(m, params.dimensions).unwrap_or(DMat3::IDENTITY);
     v.differences(i, all.neighbour, on.velocity);
-    if i < on.fluid {
-        slip(all.neighbour, on.fluid, e, v);
+    // Fluid comes first in a row.
+    let mut boundary = Boundary::default();
+    if i >= on.fluid || solids < n {
+        (solids..n).for_each(|k| boundary.add_solid(all.neighbour[k] as usize, w[k], r.at(k), on));
+        let across = if i < on.fluid { solids..n } else { 0..solids };
+        across.for_each(|k| boundary.add_across(w[k], e.at(k), v.at(k)));
     }
     s.copy_from_slice(w);
     s[carry..].fill(0.0);
-    let wet = wet_share(i, sum(s), solids, all.neighbour, on);
+    let wet = wet_share(i, sum(s), room, all.neighbour, on);
     let first_moment = r.weighted_sum(s);
     corrected_products(inverse, e, v, s);
-    let divergence = scale(on) * sum(s);
+    let divergence = scale(on) * (sum(s) - boundary.slide(i, inverse, on));
     let per_time = params.density / step.dt;
     let source = wet * step.relaxation * per_time / step.dt * deviation
         - wet * (1.0 - step.relaxation) * per_time * divergence
         - laplacian_coefficient(params) * params.density * params.gravity.dot(first_moment);
     (source, leak_of(i, wet, on))
-}
-
-/// Leaves of the relative velocity `v` of solid neighbours only what lies along their mean normal. Fluid comes first
-/// in a row.
-#[inline(always)]
-fn slip(neighbour: &[u32], fluid: usize, e: &Columns, v: &mut Columns) {
-    let first = neighbour.partition_point(|&j| (j as usize) < fluid);
-    let mut normal = DVec3::ZERO;
-    for k in first..neighbour.len() {
-        normal += DVec3::new(e.x[k], e.y[k], e.z[k]);
-    }
-    let normal = normal.normalize_or_zero();
-    for k in first..neighbour.len() {
-        let along = DVec3::new(v.x[k], v.y[k], v.z[k]).dot(normal) * normal;
-        (v.x[k], v.y[k], v.z[k]) = (along.x, along.y, along.z);
-    }
 }
 
 /// out_k <- v_k . (inverse e_k), with a symmetric `inverse`.

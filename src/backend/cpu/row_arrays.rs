@@ -31,6 +31,12 @@ pub struct Columns {
 }
 
 impl Columns {
+    /// Vector of neighbour `k`.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> DVec3 {
+        DVec3::new(self.x[k], self.y[k], self.z[k])
+    }
+
     /// f_j - f_i of `field` for each neighbour j; returns the length with the filling.
     #[inline(always)]
     pub fn differences(&mut self, i: usize, neighbour: &[u32], field: &[DVec3]) -> usize {
@@ -61,7 +67,7 @@ impl Columns {
     #[inline(never)]
     fn bring_near(&mut self, n: usize, periodic: &Periodic) {
         for k in 0..n {
-            let r = periodic.nearest(DVec3::new(self.x[k], self.y[k], self.z[k]));
+            let r = periodic.nearest(self.at(k));
             (self.x[k], self.y[k], self.z[k]) = (r.x, r.y, r.z);
         }
     }

@@ -107,8 +107,9 @@ pub struct Constants {
     pub drive: [f32; 3],
     pub dynamic_viscosity: f32,
     pub wall_room: f32,
+    pub wall_depth: f32,
     /// To a multiple of 16 bytes.
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -322,7 +323,8 @@ impl Constants {
             zero: 0.0,
             dynamic_viscosity: (params.density * params.viscosity) as f32,
             wall_room: params.wall_room as f32,
-            pad: [0; 3],
+            wall_depth: params.wall_depth as f32,
+            pad: [0; 2],
         }
     }
 }
