@@ -51,10 +51,11 @@ pub fn pressure_source(
             let density = |from: usize| -> f64 {
                 all.iter().filter(|&(j, _)| j >= from).map(|(_, w)| smooth_weight(reach(w))).sum()
             };
-            let wet = wet_share(i, links, 1.0 + density(on.fluid), all.neighbour, on);
+            let boundary = Boundary::of(i, all, on);
+            let wet = wet_share(i, links, 1.0 + density(on.fluid), boundary.bodies, on);
             leak = c * leak_of(i, wet, on);
             wet * step.relaxation * per_time / step.dt * ((1.0 + density(0)) / params.smooth_density - 1.0)
-                - wet * (1.0 - step.relaxation) * per_time * divergence(i, all, on)
+                - wet * (1.0 - step.relaxation) * per_time * divergence(i, all, &boundary, on)
                 - c * params.density * params.gravity.dot(first_moment)
         }
     };
@@ -67,14 +68,15 @@ pub fn pressure_source(
 }
 
 /// Part of divergence and deviation that slot `i` undoes [-]: all of them in water and on a flat wall under it. Its
-/// weights with neighbours that carry pressure sum to `links`, and solids, itself among them, to `solids` = 1 + sum W.
+/// weights with neighbours that carry pressure sum to `links`, and solids, itself among them, to `solids` = 1 + sum W;
+/// `bodies` are among them or not.
 /// A row in a slot between solids meets hardly any water, of which a little that is left to be undone, as of solids
 /// that touch, would ask a large pressure. At a body a row undoes nothing below half of a flat wall's water, as at the
 /// edge that a body stands on: the rest would press a tenth too much into the slot under it. Solids that come to touch
 /// catch particles of water between them, which have no room and no way out: to undo that would take pressures without
 /// bound in a pocket of a few rows.
 #[inline(always)]
-pub fn wet_share(i: usize, links: f64, solids: f64, neighbour: &[u32], on: Particles) -> f64 {
+pub fn wet_share(i: usize, links: f64, solids: f64, bodies: bool, on: Particles) -> f64 {
     let room = room(i, solids, on.fluid, on.params);
     if i < on.fluid {
         return room;
@@ -83,8 +85,7 @@ pub fn wet_share(i: usize, links: f64, solids: f64, neighbour: &[u32], on: Parti
     if share.min(room) >= 1.0 {
         return 1.0;
     }
-    let at_body = is_body(i, on) || neighbour.iter().any(|&j| is_body(j as usize, on));
-    if at_body { (2.0 * share - 1.0).max(0.0).min(room) } else { share }
+    if bodies || is_body(i, on) { (2.0 * share - 1.0).max(0.0).min(room) } else { share }
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).
@@ -138,7 +139,7 @@ pub struct Boundary {
     solids: DVec3,
     solid_weight: f64,
     /// Whether bodies are among them.
-    bodies: bool,
+    pub bodies: bool,
     /// Sum of the weights of those across the boundary [-], and with them of v_j - v_i [m/s].
     weight: f64,
     velocity: DVec3,
@@ -154,6 +155,21 @@ const ONE_SIDED: f64 = 0.02;
 const THICK: (f64, f64) = (0.5, 0.9);
 
 impl Boundary {
+    /// Of row `i` with the neighbours `all`.
+    fn of(i: usize, all: Row, on: Particles) -> Self {
+        let mut boundary = Self::default();
+        for (j, w) in all.iter() {
+            let is_solid = j >= on.fluid;
+            if is_solid {
+                boundary.add_solid(j, w, on.offset(i, j), on);
+            }
+            if is_solid == (i < on.fluid) {
+                boundary.add_across(w, pair_vector(i, j, w, on), on.velocity[j] - on.velocity[i]);
+            }
+        }
+        boundary
+    }
+
     /// The neighbour `j`, a solid, at `r` with weight `w`.
     #[inline(always)]
     pub fn add_solid(&mut self, j: usize, w: f64, r: DVec3, on: Particles) {
@@ -203,20 +219,9 @@ fn is_body(i: usize, on: Particles) -> bool {
 /// (d / n0) sum w (v_j - v_i) . M^-1 r / r^2 [1/s]; without M where it cannot be inverted. Water that slides past solids
 /// counts without that velocity, in its own rows and in those of walls: it moves no volume, but on particles in rows it
 /// would seem to, now inwards and now outwards.
-fn divergence(i: usize, all: Row, on: Particles) -> f64 {
+fn divergence(i: usize, all: Row, boundary: &Boundary, on: Particles) -> f64 {
     let inverse = inverse(moment(i, all, on), on.params.dimensions).unwrap_or(DMat3::IDENTITY);
-    let mut boundary = Boundary::default();
-    let pair = |(j, w): (usize, f64)| {
-        let (e, v) = (pair_vector(i, j, w, on), on.velocity[j] - on.velocity[i]);
-        let is_solid = j >= on.fluid;
-        if is_solid {
-            boundary.add_solid(j, w, on.offset(i, j), on);
-        }
-        if is_solid == (i < on.fluid) {
-            boundary.add_across(w, e, v);
-        }
-        v.dot(inverse * e)
-    };
-    let whole: f64 = all.iter().map(pair).sum();
-    whole - boundary.slide(i, inverse, on)
+    let pair =
+        |(j, w): (usize, f64)| (on.velocity[j] - on.velocity[i]).dot(inverse * pair_vector(i, j, w, on));
+    all.iter().map(pair).sum::<f64>() - boundary.slide(i, inverse, on)
 }

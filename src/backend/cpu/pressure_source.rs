@@ -95,7 +95,7 @@ fn mixed_source(
     }
     s.copy_from_slice(w);
     s[carry..].fill(0.0);
-    let wet = wet_share(i, sum(s), room, all.neighbour, on);
+    let wet = wet_share(i, sum(s), room, boundary.bodies, on);
     let first_moment = r.weighted_sum(s);
     corrected_products(inverse, e, v, s);
     let divergence = scale(on) * (sum(s) - boundary.slide(i, inverse, on));
