@@ -4,7 +4,7 @@
 // Twin: src/kernels/body_force.rs
 
 @group(0) @binding(2) var<storage, read> pressure: array<f32>;
-@group(0) @binding(3) var<storage, read_write> reaction: array<vec4f>;
+@group(0) @binding(3) var<storage, read> reaction: array<vec4f>;
 //#if MIXED
 @group(0) @binding(4) var<storage, read> excess: array<f32>; // of the walls' rows, the moving ones first
 //#else
@@ -54,7 +54,6 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         }
 //#if REACTION
         force += reaction[k].xyz;
-        reaction[k] = vec4f(0.0);
 //#endif
         torque = cross(rotate(pose.orientation, wall.arm.xyz), force);
 //#if COUPLED

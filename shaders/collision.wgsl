@@ -1,7 +1,7 @@
 // Collision of particles that come too close (Lee et al. 2011), Eq. (18): pairs closer than a l0 that still approach each
 // other rebound, dv = -(1 + b) (v_i - v_j).r r / r^2, half of it each for two fluid particles. With SHARED_COLLISIONS a
 // particle takes part in each of its pairs with an equal part of its mass, one of a free body's wall layer with its part
-// of the body's. Written as an acceleration; the reaction on wall layers of moving solids as a force.
+// of the body's. Written as an acceleration; the reaction on walls as a force.
 // Twin: src/kernels/collision.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -10,7 +10,7 @@
 @group(0) @binding(5) var<storage, read> neighbour_count: array<u32>;
 @group(0) @binding(6) var<storage, read_write> acceleration: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> reaction: array<vec4f>;
-//#if REACTION
+//#if FORCE
 @group(0) @binding(8) var<storage, read> wall_layer: array<WallParticle>;
 //#endif
 
@@ -34,7 +34,7 @@ fn parts(i: u32) -> f32 {
     let is_fluid = i < params.fluid;
     var own = f32(is_fluid);
 //#if SHARED_COLLISIONS
-//#if REACTION
+//#if FORCE
     if !is_fluid && i < params.fluid + params.moving_wall {
         own = wall_layer[i - params.fluid].area.w;
     }
@@ -63,7 +63,7 @@ fn parts(i: u32) -> f32 {
 @compute @workgroup_size(WORKGROUP)
 fn collision(@builtin(global_invocation_id) id: vec3u) {
     let i = thread(id);
-    if i >= params.fluid + params.moving_wall {
+    if i >= params.fluid + params.reacting {
         return;
     }
     let count = neighbour_count[i];
@@ -95,12 +95,17 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
     }
 //#if REACTION
     else {
+        let k = i - params.fluid;
+        var before = vec4f(0.0);
+//#if ALONG
+        before = reaction[k];
+//#endif
 //#if RANKS
         if position[i].w == FOREIGN {
-            return;
+            change = vec3f(0.0);
         }
 //#endif
-        reaction[i - params.fluid] += vec4f(params.particle_mass / now.dt * change, 0.0);
+        reaction[k] = before + vec4f(params.particle_mass / now.dt * change, 0.0);
     }
 //#endif
 }

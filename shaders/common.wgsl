@@ -81,6 +81,7 @@ struct Constants {
     dynamic_viscosity: f32, // rho nu, Pa s
     wall_room: f32,        // sum W of a particle of a flat wall's layer with the water above it
     wall_depth: f32,       // of the wall's middle below a particle of a flat wall's layer, over l0
+    reacting: u32,         // wall-layer slots that keep a reaction; they follow the fluid
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the

@@ -1,5 +1,5 @@
-// Viscous acceleration, Eqs. (2) and (6), a_i = nu 2 d / (sum w r^2) sum w_ij (v_j - v_i), and its reaction on the wall
-// layers of moving solids. w is that of Eq. (3) in the paper's scheme, else 1 / q - 1 + 32 (1 - q)^4. Pairs of fluid and wall weigh params.wall_shear. Positions and neighbours are those of the last step.
+// Viscous acceleration, Eqs. (2) and (6), a_i = nu 2 d / (sum w r^2) sum w_ij (v_j - v_i), and its reaction on
+// walls. w is that of Eq. (3) in the paper's scheme, else 1 / q - 1 + 32 (1 - q)^4. Pairs of fluid and wall weigh params.wall_shear. Positions and neighbours are those of the last step.
 // Twin: src/kernels/viscosity.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -43,7 +43,7 @@ fn viscosity(@builtin(global_invocation_id) id: vec3u) {
         acceleration[i] = vec4f(shear(i, params.pressure_slots), 0.0);
     }
 //#if REACTION
-    else if i < params.fluid + params.moving_wall {
+    else if i < params.fluid + params.reacting {
         reaction[i - params.fluid] = vec4f(params.particle_mass * shear(i, params.fluid), 0.0);
 //#if RANKS
         if position[i].w == FOREIGN {

@@ -1,6 +1,6 @@
 // Friction of the fluid on walls whose boundary layer is thinner than a spacing, tau = rho C_f |u_t| u_t, implicit:
 // a_i = -k |u_t| u_t / (1 + dt k |u_t|), k = C_f sum w / (l0 sum w above a flat wall), u_t what lies along the wall of the
-// velocity over it; and its reaction on the wall layers of moving solids. Written as an acceleration.
+// velocity over it; and its reaction on walls. Written as an acceleration.
 // Twin: src/kernels/wall_friction.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -53,17 +53,22 @@ fn wall_friction(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// What the water loses to the wall layers of moving solids.
+// What the water loses to walls.
 @compute @workgroup_size(WORKGROUP)
 fn react(@builtin(global_invocation_id) id: vec3u) {
 //#if REACTION
     let k = thread(id);
     let i = params.fluid + k;
-    if k >= params.moving_wall {
+    if k >= params.reacting {
         return;
     }
+    var before = vec4f(0.0);
+//#if VISCOSITY
+    before = reaction[k];
+//#endif
 //#if RANKS
     if position[i].w == FOREIGN {
+        reaction[k] = before;
         return;
     }
 //#endif
@@ -80,6 +85,6 @@ fn react(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
-    reaction[k] -= vec4f(params.particle_mass * taken, 0.0);
+    reaction[k] = before - vec4f(params.particle_mass * taken, 0.0);
 //#endif
 }

@@ -57,8 +57,8 @@ pub struct Fields {
     pub diagonal: Vec<f64>,
     /// Acceleration of the stage in progress (viscosity, collision, pressure gradient) [m/s2], F.
     pub acceleration: Vec<DVec3>,
-    /// Force of viscosity and collisions on the wall layer of moving solids [N], moving-wall slots; empty where the
-    /// plan leaves it out.
+    /// Force of viscosity, friction and collisions of the last step on walls [N], moving-wall slots and, where a gauge asks, those that never move;
+    /// empty where the plan leaves it out.
     pub reaction: Vec<DVec3>,
     /// What the last step left of the excess of free bodies' rows beside what their equations told ([`crate::kernels::wall_excess`]) [Pa],
     /// moving-wall slots; empty where the plan leaves it out.
@@ -132,7 +132,7 @@ impl Fields {
             state,
             source,
             diagonal,
-            // Of water, or of solids that move.
+            // Of water, or of solids that move; the backend knows whether it keeps it of others.
             id: _,
             acceleration: _,
             reaction: _,

@@ -11,7 +11,6 @@ use crate::case::{Case, is_pattern, stands_for};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::output::table::{Cell, vector_cells, vector_columns};
-use crate::params::Params;
 use crate::scene::{Scene, wall_at};
 use crate::simulation::Simulation;
 use glam::DVec3;
@@ -66,7 +65,7 @@ pub struct Gauges {
 struct Readings {
     /// One a pressure gauge [Pa].
     pressure: Vec<f64>,
-    /// One a force gauge, on a fixed wall without what the water does along it [N, N m].
+    /// One a force gauge [N, N m].
     wrench: Vec<Wrench>,
     /// What other solids press on the same, if a body moves [N, N m].
     contact: Vec<Wrench>,
@@ -141,13 +140,10 @@ impl Gauges {
         let mut header = vec!["time [s]".to_string()];
         header.extend(self.pressure.iter().map(|g| format!("{} [Pa]", g.name)));
         header.extend(self.water.iter().flat_map(InWater::columns));
-        for Force { name, on, .. } in &self.force {
+        for Force { name, .. } in &self.force {
             if self.wet {
                 header.extend(vector_columns(&format!("{name}_force"), "N"));
                 header.extend(vector_columns(&format!("{name}_torque"), "N m"));
-            }
-            if self.wet && on.iter().any(Target::is_fixed) {
-                header.extend(vector_columns(&format!("{name}_viscous"), "N"));
             }
             if self.contact {
                 header.extend(vector_columns(&format!("{name}_contact_force"), "N"));
@@ -183,8 +179,8 @@ impl Gauges {
     }
 
     /// A row of gauges.csv: pressures and forces of the last step, or their means over the steps that the gauges [`Self::follow`]ed. Before the
-    /// first step there is neither pressure nor force: these cells are empty. A gauge of the water itself and, in a viscous fluid, a force gauge on a
-    /// fixed wall read all particles back, which costs more than the others; what the water does along a fixed wall is that of the moment.
+    /// first step there is neither pressure nor force: these cells are empty. A gauge of the water itself reads all particles back, which costs more
+    /// than the others.
     ///
     /// # Errors
     /// What the backend says when it is read.
@@ -196,27 +192,15 @@ impl Gauges {
         };
         let mut row = vec![Cell::time(simulation.time)];
         row.extend(pressure.into_iter().map(|p| Cell::from(if known { p } else { f64::NAN })));
-        let Params { viscosity, wall_friction, .. } = simulation.params;
-        let any_fixed = self.wet && self.fixed().next().is_some();
-        let viscous = viscosity + wall_friction > 0.0 && any_fixed;
-        let fields = if viscous || !self.water.is_empty() { Some(simulation.fields()?) } else { None };
+        let fields = if self.water.is_empty() { None } else { Some(simulation.fields()?) };
         let params = &simulation.params;
         for gauge in &self.water {
             row.extend(fields.iter().flat_map(|f| gauge.cells(f, &simulation.groups, params)));
         }
-        for (k, gauge) in self.force.iter().enumerate() {
-            let along = gauge.on.iter().any(Target::is_fixed).then(|| {
-                let along = |f| -> DVec3 {
-                    let walls = gauge.on.iter().filter_map(Target::fixed);
-                    walls.map(|wall| wall.viscous_force(f, &simulation.groups, params)).sum()
-                };
-                fields.as_ref().filter(|_| viscous).map_or(DVec3::ZERO, along)
-            });
-            let of_water = wrench.get(k).map(|w| {
-                [Some(w.force + along.unwrap_or_default()), Some(w.torque), along].into_iter().flatten()
-            });
-            let of_solids = contact.get(k).map(|w| [w.force, w.torque]);
-            for vector in of_water.into_iter().flatten().chain(of_solids.into_iter().flatten()) {
+        let of_water = wrench.iter().map(Some).chain(std::iter::repeat(None));
+        let of_solids = contact.iter().map(Some).chain(std::iter::repeat(None));
+        for ((_, of_water), of_solids) in self.force.iter().zip(of_water).zip(of_solids) {
+            for vector in [of_water, of_solids].into_iter().flatten().flat_map(|w| [w.force, w.torque]) {
                 row.extend(vector_cells(if known { vector } else { DVec3::NAN }));
             }
         }
@@ -255,7 +239,7 @@ impl Gauges {
             Target::Solid(solid) => simulation.fluid_force[*solid],
             Target::Fixed(wall) => {
                 let areas = wall.areas(&simulation.scene, simulation.solids.poses());
-                let mut sum = wall.pressure_force(next(wall.slots.len()), &areas, params);
+                let mut sum = wall.force(next(wall.slots.len()), &areas, params);
                 sum += wall.slot_force(&pushes, &simulation.scene);
                 sum
             }
@@ -307,9 +291,5 @@ impl Target {
             Self::Fixed(wall) => Some(wall),
             Self::Solid(_) => None,
         }
-    }
-
-    fn is_fixed(&self) -> bool {
-        self.fixed().is_some()
     }
 }

@@ -1,7 +1,7 @@
 //! Which stages and arrays a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{self, Case, ContactDevice};
+use crate::case::{self, Case, ContactDevice, stands_for};
 use crate::compute::Program;
 use crate::contact;
 use crate::params::Params;
@@ -110,7 +110,7 @@ pub enum Arrays {
     Level,
     /// Of the fluid's force on solids.
     Force,
-    /// Force of viscosity, friction and collisions on the wall layer of moving solids, which the fluid's force takes in.
+    /// Force of viscosity, friction and collisions on walls, which the fluid's force takes in.
     Reaction,
     /// What walls' pressures are above those on their surface.
     Excess,
@@ -179,18 +179,18 @@ impl ContactPlan {
     }
 }
 
-/// Walls of which the pressure on the surface is told, where it is not that of their rows.
+/// Walls of which something is told beside the pressure of their rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Excess {
+pub enum Told {
     /// None.
     None,
-    /// Those that move: bodies are pressed by it.
+    /// Those that move: bodies are moved by it.
     Moving,
     /// All: gauges ask.
     All,
 }
 
-impl Excess {
+impl Told {
     /// Rows of them in a scene of `walls`, of which the first `moving` move.
     pub fn rows(self, walls: usize, moving: usize) -> usize {
         match self {
@@ -200,6 +200,9 @@ impl Excess {
         }
     }
 }
+
+/// The stages that act on walls beside the pressure, in their order.
+const REACTING: [Stage; 3] = [Stage::Viscosity, Stage::WallFriction, Stage::Collision];
 
 /// What a scene needs.
 #[derive(Clone, Debug)]
@@ -212,7 +215,9 @@ pub struct Plan {
     /// they follow the pressure a step later, as in the paper.
     pub coupled: bool,
     /// Of which walls the pressure on the surface is told, where their rows undo a divergence.
-    pub excess: Excess,
+    pub excess: Told,
+    /// Of which walls it is told what viscosity, friction and collisions of the water do to them.
+    pub reaction: Told,
     /// Where the pairs of contact are computed.
     pub contact: ContactPlan,
     /// Whether the water fills all its room, so that the pressure needs a level.
@@ -229,9 +234,10 @@ impl Plan {
         let fluid = scene.groups.fluid > 0;
         let moving = !scene.solids.is_empty();
         let free = scene.solids.iter().any(Solid::is_free);
-        let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| s.name == g.on));
+        let gauged = |name: &str| case.gauge.force.iter().any(|g| stands_for(&g.on, name));
+        let gauged_solid = scene.solids.iter().any(|s| gauged(&s.name));
         // Of a body that is driven the tables tell the force as of one that is free.
-        let told = free || gauged || !case.body.is_empty();
+        let told = free || gauged_solid || !case.body.is_empty();
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
@@ -285,15 +291,25 @@ impl Plan {
         let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
         let pressed = fluid && moving && (told || ledger);
         let excess = match params.source {
-            Source::Mixed if gauges => Excess::All,
-            Source::Mixed if pressed => Excess::Moving,
-            _ => Excess::None,
+            Source::Mixed if gauges => Told::All,
+            Source::Mixed if pressed => Told::Moving,
+            _ => Told::None,
+        };
+        // A rank's part of the scene has no names of fixed walls: what is none of a solid that moves, or stands for several, may be one.
+        let of_solid = |on: &str| scene.solids.iter().any(|s| s.name == on);
+        let gauges_fixed = case.gauge.force.iter().any(|g| !of_solid(&g.on));
+        let runs = |stage| reasons.iter().any(|(s, why)| *s == stage && why.is_ok());
+        let reaction = match REACTING.into_iter().any(runs) {
+            true if fixed_walls && gauges_fixed => Told::All,
+            true if runs(Stage::BodyForce) => Told::Moving,
+            _ => Told::None,
         };
         Self {
             reasons: reasons.to_vec(),
             preconditioner,
             coupled,
             excess,
+            reaction,
             contact,
             filled,
             ledger,
@@ -306,6 +322,11 @@ impl Plan {
         self.reasons.iter().any(|(s, why)| *s == stage && why.is_ok())
     }
 
+    /// The first stage of a step that tells what the water does to walls beside its pressure: what the last step told is forgotten then.
+    pub fn first_reacting(&self) -> Option<Stage> {
+        REACTING.into_iter().find(|&stage| self.has(stage))
+    }
+
     /// Whether the scene has `arrays`.
     pub fn needs(&self, arrays: Arrays) -> bool {
         match arrays {
@@ -316,13 +337,9 @@ impl Plan {
             Arrays::SurfacePressure => self.has(Stage::SurfacePressure),
             Arrays::Level => self.filled,
             Arrays::Force => self.has(Stage::BodyForce),
-            Arrays::Reaction => {
-                let acts = |stage| self.has(stage);
-                self.has(Stage::BodyForce)
-                    && [Stage::Viscosity, Stage::WallFriction, Stage::Collision].into_iter().any(acts)
-            }
+            Arrays::Reaction => self.reaction != Told::None,
             Arrays::Coupling => self.coupled,
-            Arrays::Excess => self.wet() && self.excess != Excess::None,
+            Arrays::Excess => self.wet() && self.excess != Told::None,
             Arrays::Ledger => self.wet() && self.ledger,
             Arrays::Openings => self.has(Stage::Openings),
             Arrays::Absorber => self.has(Stage::Absorber),

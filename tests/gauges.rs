@@ -128,10 +128,7 @@ fn means_are_those_of_every_step_and_begin_anew_after_a_row() {
         "[[moving_wall]]\nname = \"lid\"\nmin = [0.08, 0.08, 0.1]\nmax = [0.16, 0.16, 0.3]\n\
                           motion = [[0, 0, 0, 0], [1, 0, 0, 0.05]]\n[[gauge.force]]\nname = \"lid\"\non = \"lid\"\n",
     );
-    let fluid = case.fluid.as_mut().expect("water");
-    fluid.block[0].velocity = [-0.5, 0.0, 0.0];
-    // Along fixed walls a force is of the moment.
-    (fluid.viscosity, fluid.wall_friction) = (0.0, Some(0.0));
+    case.fluid.as_mut().expect("water").block[0].velocity = [-0.5, 0.0, 0.0];
     case.run.adaptive = true;
     let mut mean = case.clone();
     mean.gauge.mean = true;
@@ -155,8 +152,7 @@ fn means_are_those_of_every_step_and_begin_anew_after_a_row() {
             let (told, last) = (row(&over, &mut sim), row(&each, &mut sim));
             over.begin();
             let mut differ = 0;
-            for (name, sum) in sum.iter().filter(|(name, _)| !name.contains("viscous") && *name != "time [s]")
-            {
+            for (name, sum) in sum.iter().filter(|(name, _)| *name != "time [s]") {
                 let wanted = sum / seconds;
                 let apart = (told[name] - wanted).abs();
                 assert!(apart < 1e-9 * (1.0 + wanted.abs()), "{name}: {} for {wanted}", told[name]);
@@ -182,9 +178,8 @@ fn a_wall_under_pressure_feels_it_where_water_can_be() {
         ("pillar", [0.0, 0.0, -0.08 * 0.08]),
     ] {
         let wall = FixedWall::find(&scene, name).expect("the wall is there");
-        let one = RowPressure { pressure: 1.0, excess: 0.0 };
-        let force =
-            wall.pressure_force(&vec![one; wall.slots.len()], &wall.areas(&scene, &[]), &params).force;
+        let one = RowPressure { pressure: 1.0, ..RowPressure::default() };
+        let force = wall.force(&vec![one; wall.slots.len()], &wall.areas(&scene, &[]), &params).force;
         assert!(force.distance(expected.into()) < 1e-12, "{name}: {force} for {expected:?}");
     }
     assert!(FixedWall::find(&scene, "tank.z_max").is_none());
@@ -205,8 +200,8 @@ fn faces(more: &str, way: DVec3) -> impl Fn(&str) -> (DVec3, DVec3) {
     poses.iter_mut().for_each(|pose| pose.position += way);
     move |name| {
         let wall = FixedWall::find(&scene, name).expect("the wall is there");
-        let one = vec![RowPressure { pressure: 1.0, excess: 0.0 }; wall.slots.len()];
-        let sum = wall.pressure_force(&one, &wall.areas(&scene, &poses), &params);
+        let one = vec![RowPressure { pressure: 1.0, ..RowPressure::default() }; wall.slots.len()];
+        let sum = wall.force(&one, &wall.areas(&scene, &poses), &params);
         (sum.force / scene.spacing, sum.torque / scene.spacing)
     }
 }
@@ -323,7 +318,7 @@ fn the_viscous_force_on_a_floor_is_the_momentum_that_the_water_loses() {
     let start = sim.backend.monitor().expect("the monitor").momentum[0];
     sim.step().expect("a step");
     let lost = (start - sim.backend.monitor().expect("the monitor").momentum[0]) / 1e-5;
-    let force = row(&gauges, &mut sim)["floor_viscous_x [N]"];
+    let force = row(&gauges, &mut sim)["floor_force_x [N]"];
     println!("{force:.4} N on the floor, {lost:.4} N lost by the water");
     assert!(lost > 0.0 && (force / lost - 1.0).abs() < 0.03, "{force} for {lost}");
 }
@@ -390,6 +385,59 @@ fn a_jet_presses_on_a_wall_with_the_momentum_that_it_loses() {
             lost / steady
         );
         assert!((pressed / lost - 1.0).abs() < 0.08, "{pressed} N s for {lost}");
+    }
+}
+
+#[test]
+fn a_wall_that_moves_is_found_by_letters_as_by_its_name() {
+    // Nothing else asks for what the water does to it.
+    let on = |on: &str| {
+        let case = case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\n[fluid]\n\
+             [[fluid.block]]\nmin = [0.1, 0, 0]\nmax = [0.6, 0, 0.2]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.4]\nopen = [\"z_max\"]\n\
+             [[moving_wall]]\nname = \"piston\"\nmin = [0, 0, 0]\nmax = [0.1, 0, 0.4]\n\
+             motion = [[0, 0, 0, 0], [1, 0.1, 0, 0]]\n[[gauge.force]]\nname = \"f\"\non = \"{on}\"\n"
+        ));
+        let scene = Arc::new(Scene::build(&case).expect("it builds"));
+        let gauges = Gauges::new(&case, &scene).expect("a gauge");
+        let mut sim = cpu_simulation(&case, scene);
+        (0..5).for_each(|_| drop(sim.step().expect("a step")));
+        row(&gauges, &mut sim)["f_force_x [N]"]
+    };
+    let (name, letters) = (on("piston"), on("pist*"));
+    assert!(name < -1.0 && name == letters, "{name} N, {letters} N");
+}
+
+#[test]
+fn a_block_of_water_that_falls_on_a_floor_presses_with_the_momentum_that_it_loses() {
+    // Its layers hit the floor one after the other: a tenth of the impulse is that of collisions.
+    let case = case(
+        "[run]\nspacing = 0.02\ntime_step = 2e-3\nadaptive = true\nend = 1.0\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+         [fluid]\nwall_friction = 0\n[[fluid.block]]\nmin = [-0.1, 0, 0.1]\nmax = [0.1, 0, 0.3]\nvelocity = [0, 0, -4]\n\
+         [tank]\nmin = [-1, 0, 0]\nmax = [1, 0, 0.8]\nopen = [\"z_max\"]\n\
+         [[gauge.force]]\nname = \"f\"\non = \"tank.z_min\"\n",
+    );
+    let scene = Arc::new(Scene::build(&case).expect("it builds"));
+    let gauges = Gauges::new(&case, &scene).expect("a gauge");
+    let mut processors = vec![Processor::Cpu];
+    if there_is_a_device("the force of what falls on a floor") {
+        processors.push(Processor::Gpu { adapter: None });
+    }
+    for processor in processors {
+        let mut sim = Simulation::on(&case, scene.clone(), &processor).expect("it starts");
+        let momentum = |sim: &mut Simulation| sim.backend.monitor().expect("measured").momentum[2];
+        let (first, mut pressed) = (momentum(&mut sim), 0.0);
+        while sim.time < 0.11 {
+            let dt = sim.step().expect("a step").dt;
+            pressed -= dt * row(&gauges, &mut sim)["f_force_z [N]"];
+        }
+        let weight = 1000.0 * 0.2 * 0.2 * 0.02 * 9.81 * sim.time;
+        let left = momentum(&mut sim);
+        let lost = left - first + weight;
+        println!("{pressed:.3} N s for {lost:.3}, {:.3} of what fell is left", left / first);
+        assert!(left.abs() < 0.1 * first.abs(), "most of it has come down");
+        assert!((pressed / lost - 1.0).abs() < 0.05, "{pressed} N s for {lost}");
     }
 }
 

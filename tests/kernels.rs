@@ -261,7 +261,8 @@ fn water_gives_solids_what_friction_takes_and_never_turns_round() {
                     (i as usize) < g.fluid && !row(i as usize).iter().any(|&k| k as usize >= walls.end)
                 };
                 let carriers: Vec<u32> = row(j).iter().filter(|i| alone(i)).copied().collect();
-                gained += wall_friction::reaction(j, &carriers, row, on, dt);
+                let friction = |i| wall_friction::wall_friction(i, row(i), on, dt);
+                gained += wall_friction::reaction(j, &carriers, friction, on);
             }
             println!("{seen} particles, {lost} N lost, {gained} N gained");
             assert!(seen > 10 && lost.length() > 0.0);

@@ -299,7 +299,7 @@ fn channel(gravity: &str, tank: &str, time: f64, processor: &Processor) -> (Simu
 /// The viscous force along x on the floor [N].
 fn drag(sim: &mut Simulation, gauges: &Gauges) -> f64 {
     let header = gauges.header();
-    let at = header.iter().position(|h| h.starts_with("floor_viscous_x")).expect("there is such a column");
+    let at = header.iter().position(|h| h.starts_with("floor_force_x")).expect("there is such a column");
     let row = gauges.row(sim).expect("a row");
     format!("{}", row[at]).parse().expect("a number")
 }

@@ -292,6 +292,7 @@ fn structs_lie_the_same_on_both_sides() {
             dynamic_viscosity,
             wall_room,
             wall_depth,
+            reacting,
         }
     );
     same_layout!(

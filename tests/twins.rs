@@ -18,7 +18,7 @@ use seixo::kernels::body_force;
 use seixo::kernels::pressure_source::laplacian_coefficient;
 use seixo::kernels::wall_excess as kernels;
 use seixo::params::{Params, Step};
-use seixo::plan::{Excess, ParticleStage, Plan, Stage};
+use seixo::plan::{ParticleStage, Plan, Stage, Told};
 use seixo::pressure::cg::System;
 use seixo::pressure::multigrid::Multigrid;
 use seixo::pressure::{Outcome, Settings};
@@ -76,8 +76,10 @@ impl Pair {
         // No lattice plane on a border of cells: f32 and f64 would disagree about the side.
         scene.domain.0 -= 0.003 * DVec3::new(1.0, if dimensions == 2 { 0.0 } else { 1.0 }, 1.0);
         let params = Params::new(&case, &scene).expect("valid");
-        let excess = if params.source == Source::Mixed { Excess::All } else { Excess::None };
-        let plan = Plan { preconditioner, excess, ..Plan::new(&case, &scene, &params) };
+        let excess = if params.source == Source::Mixed { Told::All } else { Told::None };
+        // As where gauges are on a body and a fixed wall.
+        let reaction = Told::All;
+        let plan = Plan { preconditioner, excess, reaction, ..Plan::new(&case, &scene, &params) };
         let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
         let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
         let gpu = Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
@@ -342,6 +344,38 @@ fn collision() {
         assert!(moved(&before, &after, |f| flat(&f.reaction)) > 1e-3);
         pair.check(Stage::Collision);
     });
+}
+
+#[test]
+fn the_first_stage_that_acts_on_walls_forgets_the_step_before() {
+    for (first, left_out) in [
+        (Stage::Viscosity, ""),
+        (Stage::WallFriction, "viscosity = 0"),
+        (Stage::Collision, "viscosity = 0\nwall_friction = 0"),
+    ] {
+        let Some(mut pair) = Pair::new(3, &format!("preset = \"accurate\"\n{left_out}")) else { continue };
+        pair.run_all(&LISTS);
+        let mut fields = pair.gpu.read().expect("readable");
+        let walls = pair.scene.groups.pressure() - pair.scene.groups.fluid;
+        assert_eq!(fields.reaction.len(), walls, "of those that never move as well");
+        let before = DVec3::splat(1e6);
+        fields.reaction.fill(before);
+        pair.gpu.write(&fields).expect("writable");
+        pair.cpu.write(&fields).expect("writable");
+        // What is written has no lists.
+        pair.run_all(&LISTS);
+        assert_eq!(pair.plan.first_reacting(), Some(first));
+        for stage in [Stage::Viscosity, Stage::WallFriction, Stage::Collision] {
+            if pair.plan.has(stage) {
+                pair.run(stage);
+                pair.check(stage);
+                let (gpu, _) = pair.fields();
+                let most = gpu.reaction.iter().map(|f| f.length()).fold(0.0, f64::max);
+                println!("{first:?}: after {stage:?} at most {most:.1e} N");
+                assert!(most > 1e-6 && most < 1e3, "{stage:?}: {most} N");
+            }
+        }
+    }
 }
 
 #[test]
@@ -958,8 +992,6 @@ fn body_force() {
             assert!((g.force - c.force).length() < SOLVE * c.force.length().max(1.0));
             assert!((g.torque - c.torque).length() < SOLVE * arm * c.force.length().max(1.0));
         }
-        // The reaction is spent.
-        assert!(pair.gpu.read().expect("readable").reaction.iter().all(|&f| f == DVec3::ZERO));
     });
 }
 

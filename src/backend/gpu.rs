@@ -124,11 +124,6 @@ impl Gpu {
         Ok(())
     }
 
-    /// Wall-layer particles that keep what viscosity, friction and collisions do to them.
-    fn felt(&self) -> u64 {
-        if self.plan.needs(Arrays::Reaction) { self.sizes.moving_wall } else { 0 }
-    }
-
     fn cell_list(&mut self) -> Result<()> {
         let Sizes { fluid, moving, .. } = self.sizes;
         let particles = groups(fluid + moving);
@@ -172,12 +167,12 @@ impl Backend for Gpu {
         let s = self.sizes;
         let threads = match over {
             Over::Fluid | Over::Own => s.fluid,
-            Over::FluidAndReaction => s.fluid + self.felt(),
+            Over::FluidAndReaction => s.fluid + s.reacting,
             Over::Rows => s.pressure,
         };
         self.context.pass([(kernel, groups(threads))])?;
-        if stage == ParticleStage::WallFriction && self.felt() > 0 {
-            self.context.pass([(kernels::wall_friction::react, groups(self.felt()))])?;
+        if stage == ParticleStage::WallFriction && s.reacting > 0 {
+            self.context.pass([(kernels::wall_friction::react, groups(s.reacting))])?;
         }
         if matches!(stage, ParticleStage::WallFriction | ParticleStage::Collision) {
             self.book_kick(stage)?;

@@ -34,7 +34,9 @@ use std::collections::BTreeMap;
 fn start(scene: &Scene, plan: &Plan) -> Fields {
     let mut fields = Fields::new(scene);
     if plan.needs(Arrays::Reaction) {
-        fields.reaction = vec![DVec3::ZERO; scene.groups.moving_wall];
+        let groups = scene.groups;
+        let rows = plan.reaction.rows(groups.pressure() - groups.fluid, groups.moving_wall);
+        fields.reaction = vec![DVec3::ZERO; rows];
     }
     if plan.needs(Arrays::Coupling) {
         fields.inertia_head = vec![0.0; scene.groups.moving_wall];

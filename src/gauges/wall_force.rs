@@ -1,22 +1,16 @@
-//! Force of the fluid on a fixed wall: pressure on the surface ([`crate::kernels::wall_excess`]) times area over its wall layer, and the reactions of viscosity ([`crate::kernels::viscosity`]) and of the friction of
-//! unresolved boundary layers ([`crate::kernels::wall_friction`]). Faces behind solids see no water; under a body that stands on the wall the water of the slot presses
-//! ([`crate::slots`]).
-//!
-//! Collisions of particles with the wall, Eq. (18), are not in it.
+//! Force of the fluid on a fixed wall, as on a solid that moves: pressure on the surface ([`crate::kernels::wall_excess`]) times area over its wall layer, and the reactions of
+//! viscosity ([`crate::kernels::viscosity`]), of the friction of unresolved boundary layers ([`crate::kernels::wall_friction`]) and of collisions
+//! ([`crate::kernels::collision`]). Faces behind solids see no water; under a body that stands on the wall the water of the slot presses ([`crate::slots`]).
 
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::PointGrid;
 use crate::cover::{self, CELL, Standing, Tiles};
-use crate::fields::Fields;
 use crate::kernels::body_force::RowPressure;
-use crate::kernels::number_density::pair_weight;
-use crate::kernels::viscosity;
-use crate::neighbourhood::weight_over_square;
 use crate::params::Params;
-use crate::scene::{Groups, Kind, Scene};
+use crate::scene::Scene;
 use crate::slots::{Opposite, Push};
 use glam::{DMat3, DVec3, IVec3};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 /// A face of a row, of the size of a particle.
 #[derive(Clone, Debug)]
@@ -136,11 +130,11 @@ impl FixedWall {
         areas
     }
 
-    /// Force and torque of the pressures of its slots on their bare `areas` [N, N m].
-    pub fn pressure_force(&self, pressures: &[RowPressure], areas: &[DVec3], params: &Params) -> Wrench {
+    /// Force and torque of what its slots tell: pressures on their bare `areas`, and reactions [N, N m].
+    pub fn force(&self, told: &[RowPressure], areas: &[DVec3], params: &Params) -> Wrench {
         let mut sum = Wrench::default();
-        for (k, (p, area)) in pressures.iter().zip(areas).enumerate() {
-            let force = -p.on_surface(self.to_surface[k], params) * *area;
+        for (k, (row, area)) in told.iter().zip(areas).enumerate() {
+            let force = row.reaction - row.on_surface(self.to_surface[k], params) * *area;
             sum.force += force;
             sum.torque += (self.position[k] + self.to_surface[k] - self.about).cross(force);
         }
@@ -155,37 +149,5 @@ impl FixedWall {
             sum += Wrench { force: push.force, torque: (push.at - self.about).cross(push.force) };
         }
         sum
-    }
-
-    /// Force of the water that flows along [N]: of viscosity, m 2 d nu / (sum w r^2) sum w v over the water near its
-    /// particles, and of friction, m C_f / l0 |u_t| u_t with the share of its particles in a flat wall's weights.
-    pub(crate) fn viscous_force(&self, fields: &Fields, groups: &Groups, params: &Params) -> DVec3 {
-        let re = params.effective_radius;
-        let cell = |x: DVec3| (x / re).floor().as_ivec3();
-        let mut cells: HashMap<IVec3, Vec<usize>> = HashMap::new();
-        let images = |(k, &x)| params.periodic.images(x, re).map(move |image| (image, k));
-        let images: Vec<(DVec3, usize)> = self.position.iter().enumerate().flat_map(images).collect();
-        for (k, (x, _)) in images.iter().enumerate() {
-            cells.entry(cell(*x)).or_default().push(k);
-        }
-        let (mut viscous, mut friction) = (DVec3::ZERO, DVec3::ZERO);
-        for i in (0..groups.fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
-            let (x, at) = (fields.position[i], cell(fields.position[i]));
-            let (mut shear, mut weights, mut normal) = (0.0, 0.0, DVec3::ZERO);
-            let around = (0..27).map(|k| at + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
-            for &k in around.filter_map(|c| cells.get(&c)).flatten() {
-                let r = images[k].0 - x;
-                let w = pair_weight(r.length_squared(), params);
-                shear += viscosity::pair_weight(r.length_squared(), params);
-                weights += w;
-                normal += weight_over_square(w, re) * r;
-            }
-            let (v, normal) = (fields.velocity[i], normal.normalize_or_zero());
-            let along = v - v.dot(normal) * normal;
-            viscous += shear * v;
-            friction += weights * along.length() * along;
-        }
-        let coefficient = viscosity::coefficient(params) * params.shear.wall;
-        params.particle_mass() * (coefficient * viscous + params.wall_friction * friction)
     }
 }

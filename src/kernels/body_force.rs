@@ -13,6 +13,8 @@ pub struct RowPressure {
     pub pressure: f64,
     /// What that is above the pressure on the surface, but for the weight of the water between [Pa].
     pub excess: f64,
+    /// What viscosity, friction and collisions of the last step did to it [N], of a fixed wall where a gauge asks.
+    pub reaction: DVec3,
 }
 
 impl RowPressure {

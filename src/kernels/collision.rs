@@ -52,7 +52,7 @@ pub fn collision(i: usize, among: Colliding) -> DVec3 {
     among.rows.all(i).neighbour.iter().map(pair).sum()
 }
 
-/// Force of colliding fluid on wall-layer particle `i` of a moving solid [N]: the reaction.
+/// Force of colliding fluid on wall-layer particle `i` [N]: the reaction.
 pub fn reaction(i: usize, among: Colliding, dt: f64) -> DVec3 {
     let own = parts(i, among);
     let pair = |&j: &u32| {

@@ -49,7 +49,7 @@ pub mod device {
     pub enum Over {
         /// Fluid particles.
         Fluid,
-        /// Fluid particles, then the wall layer of moving solids if it keeps a reaction.
+        /// Fluid particles, then the walls that keep a reaction.
         FluidAndReaction,
         /// Rows of the neighbour lists.
         Rows,

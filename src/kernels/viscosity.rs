@@ -4,7 +4,7 @@
 //! The paper's scheme weighs pairs by Eq. (3) and takes lambda n0 of the lattice. The accurate one has a
 //! weight whose second moments keep to the lattice's on other arrangements (`crate::lattice::viscous_weight`).
 //!
-//! Walls act through their wall layer alone, so that the force on a moving solid is exactly the reaction. A pair of
+//! Walls act through their wall layer alone, so that the force on a solid is exactly the reaction. A pair of
 //! fluid and wall weighs `params.shear.wall`: the wall's velocity holds on its surface, half a spacing before its layer.
 
 use super::Particles;
@@ -37,7 +37,7 @@ pub fn viscosity(i: usize, carriers: &[u32], on: Particles) -> DVec3 {
     coefficient(on.params) * carriers.iter().map(|&j| exchange(i, j as usize, on)).sum::<DVec3>()
 }
 
-/// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
+/// Force of the fluid's viscosity on wall-layer particle `i` [N].
 pub fn reaction(i: usize, carriers: &[u32], on: Particles) -> DVec3 {
     let wet = carriers.iter().filter(|&&j| (j as usize) < on.fluid);
     let sum: DVec3 = wet.map(|&j| exchange(i, j as usize, on)).sum();

@@ -38,17 +38,16 @@ pub fn wall_friction(i: usize, carriers: &[u32], on: Particles, dt: f64) -> (DVe
     (-rate / (1.0 + dt * rate) * along, sum)
 }
 
-/// Force on wall-layer particle `j` of a moving solid [N]: what its `carriers` of water lose to it.
-pub fn reaction<'a>(
+/// Force on wall-layer particle `j` [N]: what its `carriers` of water lose to it, of each of which [`wall_friction`] is known.
+pub fn reaction(
     j: usize,
     carriers: &[u32],
-    row: impl Fn(usize) -> &'a [u32],
+    friction: impl Fn(usize) -> (DVec3, f64),
     on: Particles,
-    dt: f64,
 ) -> DVec3 {
     let wet = carriers.iter().map(|&i| i as usize).filter(|&i| i < on.fluid);
     let taken = wet.map(|i| {
-        let (acceleration, sum) = wall_friction(i, row(i), on, dt);
+        let (acceleration, sum) = friction(i);
         let w = pair_weight(on.offset(i, j).length_squared(), on.params);
         if sum > 0.0 { -w / sum * acceleration } else { DVec3::ZERO }
     });

@@ -294,7 +294,10 @@ impl Share {
 
     /// Each of `forces` and of `rows`, which all but one rank know as zero, summed over the ranks at once.
     pub fn sum_forces(&self, forces: &mut [Wrench], rows: &mut [RowPressure]) {
-        let told = rows.iter().flat_map(|row| [row.pressure, row.excess]);
+        let told = rows.iter().flat_map(|row| {
+            let [x, y, z] = row.reaction.to_array();
+            [row.pressure, row.excess, x, y, z]
+        });
         let parts = forces.iter().flat_map(|w| [w.force, w.torque]).flat_map(|v| v.to_array());
         let mut numbers: Vec<f64> = parts.chain(told).collect();
         self.sum(&mut numbers);
@@ -302,8 +305,8 @@ impl Share {
         for (wrench, n) in forces.iter_mut().zip(parts.chunks_exact(6)) {
             *wrench = Wrench { force: DVec3::from_slice(n), torque: DVec3::from_slice(&n[3..]) };
         }
-        for (row, n) in rows.iter_mut().zip(told.chunks_exact(2)) {
-            *row = RowPressure { pressure: n[0], excess: n[1] };
+        for (row, n) in rows.iter_mut().zip(told.chunks_exact(5)) {
+            *row = RowPressure { pressure: n[0], excess: n[1], reaction: DVec3::from_slice(&n[2..]) };
         }
     }
 

@@ -185,7 +185,8 @@ impl Share {
             diagonal: Vec::new(),
             // Zero between two steps.
             acceleration: vec![DVec3::ZERO; all.fluid],
-            reaction: vec![DVec3::ZERO; fields.reaction.len()],
+            // Begun anew in every step.
+            reaction: Vec::new(),
             inertia_head: vec![0.0; fields.inertia_head.len()],
         }
     }

@@ -25,9 +25,10 @@ pub fn noise_vector(k: usize, dimensions: u32) -> DVec3 {
 
 /// The case of [`scene`], with further lines for `[fluid]`.
 pub fn case(dimensions: u32, fluid: &str) -> Case {
+    let viscosity = if fluid.contains("viscosity") { "" } else { "viscosity = 1e-3\n" };
     let text = format!(
         "[run]\nspacing = {SPACING}\ntime_step = 1e-3\nend = 1.0\ndimensions = {dimensions}\n\
-         [fluid]\nviscosity = 1e-3\nsolver = {{ tolerance = 1e-4, preconditioner = \"jacobi\" }}\n{fluid}\n"
+         [fluid]\n{viscosity}solver = {{ tolerance = 1e-4, preconditioner = \"jacobi\" }}\n{fluid}\n"
     );
     toml::from_str(&text).expect("the case of the tests is valid")
 }

@@ -28,6 +28,8 @@ impl Cpu {
             // Follows from the case.
             params,
             settings: _,
+            still_reacts: _,
+            first_reacting: _,
             // Found by every solve.
             excess: _,
             lightness: _,
@@ -51,6 +53,7 @@ impl Cpu {
             work: _,
             multigrid: _,
             imbalance: _,
+            wall_weights: _,
             // The state.
             fields,
             neighbours,
@@ -104,8 +107,8 @@ impl Saved<'_> {
             surface_pressure: _,
             source: _,
             diagonal: _,
+            reaction: _,
             acceleration,
-            reaction,
             inertia_head,
         } = fields;
         archive.array("position", position, true)?;
@@ -114,7 +117,6 @@ impl Saved<'_> {
         archive.array("pressure", pressure, true)?;
         archive.array("number_density", number_density, true)?;
         archive.array("acceleration", acceleration, true)?;
-        archive.array_of_some("reaction", reaction)?;
         archive.array_of_some("inertia_head", inertia_head)?;
         codes(archive, "kind", kind, |k| k as u8, Kind::from_code)?;
         codes(archive, "state", state, |s| s as u8, State::from_code)?;

@@ -35,7 +35,7 @@ use crate::ledger::{Entry, Ledger};
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{Chunk, Neighbours};
 use crate::params::{Params, Step};
-use crate::plan::{Arrays, ParticleStage, Plan};
+use crate::plan::{Arrays, ParticleStage, Plan, Stage, Told};
 use crate::pressure::cg::Workspace;
 use crate::pressure::multigrid::Multigrid;
 use crate::pressure::{PressureReport, Settings};
@@ -82,8 +82,13 @@ pub struct Cpu {
     ledger: Option<Box<WaterLedger>>,
     /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
     imbalance: Vec<DVec3>,
+    /// Weights of the walls beside each particle of water, summed by the friction on them.
+    wall_weights: Vec<f64>,
     dt: f64,
     excess: WallExcess,
+    /// Whether [`Fields::reaction`] is kept of walls that never move, and which stage of a step begins it.
+    still_reacts: bool,
+    first_reacting: Option<Stage>,
     /// What of it this rank computes, where there are others.
     share: Option<Box<Share>>,
 }
@@ -132,8 +137,11 @@ impl Cpu {
             counters: Counters::new(super::outflows(scene)),
             ledger: (wet && plan.ledger).then(Box::default),
             imbalance: vec![DVec3::ZERO; if plan.needs(Arrays::Imbalance) { groups.fluid } else { 0 }],
+            wall_weights: Vec::new(),
             dt: 0.0,
             excess: WallExcess::new(scene, params, plan),
+            still_reacts: plan.reaction == Told::All,
+            first_reacting: plan.first_reacting(),
             share: None,
         }
     }

@@ -33,7 +33,7 @@ impl Cpu {
         }
     }
 
-    /// Force of the water on this rank's part of each solid; what it felt besides pressure is forgotten.
+    /// Force of the water on this rank's part of each solid.
     pub(super) fn sum_forces(&mut self) -> Vec<Wrench> {
         let (params, share) = (&self.params, self.share.as_deref());
         let (fields, fluid) = (&mut self.fields, self.groups.fluid);
@@ -62,7 +62,6 @@ impl Cpu {
             total
         });
         let wrenches: Vec<Wrench> = wrenches.collect();
-        fields.reaction.fill(DVec3::ZERO);
         wrenches
     }
 
@@ -71,6 +70,11 @@ impl Cpu {
         let of = |i: usize| RowPressure {
             pressure: self.fields.pressure[i],
             excess: i.checked_sub(self.groups.fluid).map_or(0.0, |wall| self.excess.of(wall)),
+            reaction: i
+                .checked_sub(self.groups.fluid)
+                .and_then(|wall| self.fields.reaction.get(wall))
+                .copied()
+                .unwrap_or(DVec3::ZERO),
         };
         let own = |&s: &usize| match &self.share {
             None => of(s),

@@ -18,10 +18,19 @@ use crate::kernels::{
 use crate::ledger::Entry;
 use crate::neighbours::{CHUNK, capacity};
 use crate::params::Step;
+use crate::plan::Stage;
 use crate::scene::Kind;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// Tells a wall's particle what a stage does to it, if anything [N]; the `first` stage of a step forgets what the last step told.
+fn react(force: &mut DVec3, told: Option<DVec3>, first: bool) {
+    if first {
+        *force = DVec3::ZERO;
+    }
+    *force += told.unwrap_or(DVec3::ZERO);
+}
 
 impl Cpu {
     pub(super) fn viscosity(&mut self) {
@@ -161,23 +170,28 @@ impl Cpu {
 
     pub(super) fn wall_friction(&mut self, step: &Step) {
         let own = self.own();
-        let Self { fields, neighbours, params, groups, live, share, .. } = self;
-        let (position, velocity) = (&fields.position, &fields.velocity);
+        let Self { fields, neighbours, params, groups, live, share, first_reacting, wall_weights, .. } = self;
+        let Fields { position, velocity, acceleration, reaction, .. } = fields;
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let carriers = |i: usize| neighbours.pressure(i).neighbour;
         let at_wall = |i: usize| neighbours.chunks[i / CHUNK].walls[i % CHUNK];
-        fields.acceleration.par_iter_mut().enumerate().for_each(|(i, a)| {
+        wall_weights.resize(acceleration.len(), 0.0);
+        (&mut *acceleration, &mut *wall_weights).into_par_iter().enumerate().for_each(|(i, (a, weights))| {
             let near = i < *live && at_wall(i);
-            *a = if near { wall_friction::wall_friction(i, carriers(i), on, step.dt).0 } else { DVec3::ZERO };
+            let none = (DVec3::ZERO, 0.0);
+            (*a, *weights) =
+                if near { wall_friction::wall_friction(i, carriers(i), on, step.dt) } else { none };
         });
-        fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
+        let first = *first_reacting == Some(Stage::WallFriction);
+        let friction = |i: usize| (acceleration[i], wall_weights[i]);
+        reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if owns(share.as_deref(), i) {
-                *f += wall_friction::reaction(i, carriers(i), carriers, on, step.dt);
-            }
+            let told =
+                owns(share.as_deref(), i).then(|| wall_friction::reaction(i, carriers(i), friction, on));
+            react(f, told, first);
         });
         if let Some(ledger) = &mut self.ledger {
-            ledger.kick(Entry::Friction, own, on, &fields.acceleration, step);
+            ledger.kick(Entry::Friction, own, on, acceleration, step);
         }
         self.apply(step, correct::kick);
         self.show_motion();
@@ -185,7 +199,7 @@ impl Cpu {
 
     pub(super) fn collision(&mut self, step: &Step) {
         let own = self.own();
-        let Self { fields, neighbours, params, groups, lightness, share, .. } = self;
+        let Self { fields, neighbours, params, groups, lightness, share, first_reacting, .. } = self;
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };
         let among = collision::Colliding { on, rows: neighbours, lightness };
@@ -194,11 +208,11 @@ impl Cpu {
             let change = if close(i) { collision::collision(i, among) } else { DVec3::ZERO };
             *a = change / step.dt;
         });
+        let first = *first_reacting == Some(Stage::Collision);
         fields.reaction.par_iter_mut().enumerate().for_each(|(k, f)| {
             let i = groups.fluid + k;
-            if close(i) && owns(share.as_deref(), i) {
-                *f += collision::reaction(i, among, step.dt);
-            }
+            let collides = close(i) && owns(share.as_deref(), i);
+            react(f, collides.then(|| collision::reaction(i, among, step.dt)), first);
         });
         if let Some(ledger) = &mut self.ledger {
             ledger.kick(Entry::Collision, own, on, &fields.acceleration, step);

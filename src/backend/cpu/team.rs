@@ -118,7 +118,13 @@ impl Cpu {
         let [from, to] = [before, self.groups].map(|g| g.moving_dummy_range().start as isize);
         self.solids.iter_mut().for_each(|solid| solid.move_slots(0, to - from));
         self.fixed = Self::index_fixed(&self.grid, self.groups, &self.fields.position, &mut self.scratch);
-        self.excess.lay_still(self.groups.pressure() - self.groups.fluid);
+        let carriers = self.groups.pressure() - self.groups.fluid;
+        self.excess.lay_still(carriers);
+        if self.still_reacts {
+            // What viscosity has told of them in the step that deals them out anew is lost.
+            self.fields.reaction.truncate(self.groups.moving_wall);
+            self.fields.reaction.resize(carriers, DVec3::ZERO);
+        }
         // Made anew right after.
         self.neighbours = Neighbours::new(self.groups.pressure());
         self.share.iter_mut().for_each(|share| share.groups_are(self.groups));

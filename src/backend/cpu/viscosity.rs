@@ -27,7 +27,7 @@ wide! {
     }
 }
 
-/// Force of the fluid's viscosity on wall-layer particle `i` of a moving solid [N].
+/// Force of the fluid's viscosity on wall-layer particle `i` [N].
 #[inline(always)]
 pub fn reaction(i: usize, carriers: &[u32], on: Particles, arrays: &mut RowArrays) -> DVec3 {
     let wet = |j| if j < on.fluid { share(i, j, on) } else { 0.0 };

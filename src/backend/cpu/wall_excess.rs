@@ -8,7 +8,7 @@ use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::wall_excess::{cut_share, known_excess, wall_excess};
 use crate::neighbours::{CHUNK, Neighbours};
 use crate::params::Params;
-use crate::plan::{Arrays, Excess, Plan};
+use crate::plan::{Arrays, Plan, Told};
 use crate::scene::{Scene, Solid};
 use crate::share::{OfWalls, Share};
 use rayon::prelude::*;
@@ -68,7 +68,7 @@ impl WallExcess {
         Self {
             of: vec![0.0; plan.excess.rows(groups.pressure() - groups.fluid, groups.moving_wall)],
             moving: groups.moving_wall,
-            of_still: plan.excess == Excess::All,
+            of_still: plan.excess == Told::All,
             solved: vec![Solved::default(); cut_share.len()],
             cut_share,
         }

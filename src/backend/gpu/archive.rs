@@ -15,7 +15,7 @@ const PLANES_BYTES: usize = 64 << 20;
 
 /// Buffers that hold the state between two steps.
 #[cfg(test)]
-const SAVED: [&str; 11] = [
+const SAVED: [&str; 10] = [
     "ledger_sum",
     "position",
     "velocity",
@@ -23,7 +23,6 @@ const SAVED: [&str; 11] = [
     "number_density",
     "state",
     "acceleration",
-    "reaction",
     "inertia_head",
     "neighbour_list",
     "neighbour_count",
@@ -31,7 +30,7 @@ const SAVED: [&str; 11] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 47] = [
+const MADE_ANEW: [&str; 48] = [
     "unclipped",
     "clipped",
     "surface_pressure",
@@ -74,6 +73,7 @@ const MADE_ANEW: [&str; 47] = [
     "wall_layer",
     "force_chunk",
     "wrench",
+    "reaction",
     "free_body",
     "coupling",
     "excess",
@@ -92,17 +92,9 @@ impl Gpu {
             self.buffer(archive, buffers::number_density, g.pressure())?;
             self.buffer(archive, buffers::state, g.pressure())?;
             self.buffer(archive, buffers::acceleration, g.fluid)?;
-            // Another case of the scene may have had neither: they are zeros then, as at t = 0.
-            let moving = |archive: &Archive, of: Arrays, name: &str| {
-                if self.plan.needs(of) && (archive.is_saving() || archive.holds(name)) {
-                    g.moving_wall
-                } else {
-                    0
-                }
-            };
-            let felt = moving(archive, Arrays::Reaction, buffers::reaction.id().name());
-            let heads = moving(archive, Arrays::Coupling, buffers::inertia_head.id().name());
-            self.buffer(archive, buffers::reaction, felt)?;
+            // Another case of the scene may have had none: they are zeros then, as at t = 0.
+            let held = archive.is_saving() || archive.holds(buffers::inertia_head.id().name());
+            let heads = if self.plan.needs(Arrays::Coupling) && held { g.moving_wall } else { 0 };
             self.buffer(archive, buffers::inertia_head, heads)?;
             // The lists of the last step serve viscosity, at the start of the next one. A state of many ranks has none.
             let listed = archive.is_saving() || archive.sections.contains_key(LISTED);

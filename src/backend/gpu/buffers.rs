@@ -131,7 +131,7 @@ table! {
         params: Constants, Uniform, Fluid, |_, _| 1;
         now: Coefficients, Uniform, Fluid, |_, _| 1;
         counters: u32, Both, Fluid, |_, _| counter::WORDS as u64;
-        reaction: [f32; 4], Both, Reaction, |s, _| s.moving_wall;
+        reaction: [f32; 4], Both, Reaction, |s, _| s.reacting;
         solid_offset: [f32; 4], Writes, Solids, |s, _| s.moving;
         /// Where the wall layer faces, in the solid's frame.
         facing: f32, Writes, Solids, |s, _| s.moving_wall;

@@ -52,7 +52,7 @@ impl Fitted {
             return Err(GpuError::TooSmall { limit: "fluid particles", needs, has, text }.into());
         }
         let grid = grid(params, plan)?;
-        let mut sizes = Sizes::new(scene, params, &grid);
+        let mut sizes = Sizes::new(scene, params, &grid, plan);
         sizes.pressure_of_all = all.map_or(0, |all| all.pressure() as u64);
         if info.device_type == "cpu" {
             sizes.rows_per_thread = 4;

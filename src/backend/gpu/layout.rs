@@ -108,8 +108,9 @@ pub struct Constants {
     pub dynamic_viscosity: f32,
     pub wall_room: f32,
     pub wall_depth: f32,
+    pub reacting: u32,
     /// To a multiple of 16 bytes.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -324,7 +325,8 @@ impl Constants {
             dynamic_viscosity: (params.density * params.viscosity) as f32,
             wall_room: params.wall_room as f32,
             wall_depth: params.wall_depth as f32,
-            pad: [0; 2],
+            reacting: sizes.reacting as u32,
+            pad: 0,
         }
     }
 }

@@ -27,6 +27,8 @@ pub struct Sizes {
     pub fluid: u64,
     /// Wall-layer particles of moving solids.
     pub moving_wall: u64,
+    /// Wall-layer particles that keep what viscosity, friction and collisions do to them, the first of all.
+    pub reacting: u64,
     /// All particles of moving solids.
     pub moving: u64,
     /// Particles that never move.
@@ -54,12 +56,13 @@ pub struct Sizes {
 
 impl Sizes {
     /// Of `scene`.
-    pub fn new(scene: &Scene, params: &Params, grid: &Grid) -> Self {
+    pub fn new(scene: &Scene, params: &Params, grid: &Grid, plan: &Plan) -> Self {
         let g = scene.groups;
         Self {
             total: g.total() as u64,
             fluid: g.fluid as u64,
             moving_wall: g.moving_wall as u64,
+            reacting: plan.reaction.rows(g.pressure() - g.fluid, g.moving_wall) as u64,
             moving: (g.moving_wall + g.moving_dummy) as u64,
             fixed: g.static_range().len() as u64,
             pressure: g.pressure() as u64,
@@ -89,6 +92,7 @@ impl Sizes {
             total: fluid + moving + fixed,
             fluid,
             moving_wall: surface(self.moving_wall),
+            reacting: surface(self.reacting),
             moving,
             fixed,
             pressure: fluid + surface(self.pressure - self.fluid),
@@ -231,6 +235,7 @@ mod tests {
             total: 577_000 * k,
             fluid: 211_000 * k,
             moving_wall: 6_000 * k,
+            reacting: 6_000 * k,
             moving: 9_000 * k,
             fixed: 357_000 * k,
             pressure: 340_000 * k,
@@ -248,7 +253,8 @@ mod tests {
             reasons,
             preconditioner: Preconditioner::Multigrid,
             coupled: true,
-            excess: crate::plan::Excess::All,
+            excess: crate::plan::Told::All,
+            reaction: crate::plan::Told::Moving,
             contact: Default::default(),
             fixed_walls: true,
             filled: false,
@@ -270,7 +276,8 @@ mod tests {
             reasons,
             preconditioner: Preconditioner::Jacobi,
             coupled: false,
-            excess: crate::plan::Excess::None,
+            excess: crate::plan::Told::None,
+            reaction: crate::plan::Told::None,
             contact: Default::default(),
             fixed_walls: false,
             filled: false,

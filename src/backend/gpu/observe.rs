@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
 use crate::kernels::monitor::{speed_most, speed_range};
 use crate::monitor::{FluidMonitor, SPEED_BINS};
-use crate::plan::Arrays;
+use crate::plan::{Arrays, Told};
 use glam::{DVec3, Vec3};
 
 impl Gpu {
@@ -115,18 +115,23 @@ impl Gpu {
         if self.plan.needs(Arrays::Excess) {
             parts.extend(of(buffers::excess.id(), buffers::excess.size(), self.groups.fluid));
         }
+        if self.plan.reaction == Told::All {
+            parts.extend(of(buffers::reaction.id(), buffers::reaction.size(), self.groups.fluid));
+        }
         parts
     }
 
     /// Pressures of the particles in `slots` from what was `read` of them.
     pub(super) fn wall_told(&self, slots: &[usize], stretches: &Stretches, read: &[u8]) -> Vec<RowPressure> {
         let values: Vec<f32> = bytemuck::pod_collect_to_vec(read);
-        let (pressure, excess) = values.split_at(stretches.len());
+        let (pressure, rest) = values.split_at(stretches.len());
         let over = self.plan.needs(Arrays::Excess);
+        let (excess, reaction) = rest.split_at(if over { stretches.len() } else { 0 });
         let told = |&slot: &usize| {
             let at = stretches.place(slot);
             let excess = if over && excess[at] < layout::DRY { excess[at].into() } else { 0.0 };
-            RowPressure { pressure: pressure[at].into(), excess }
+            let reaction = reaction.get(4 * at..4 * at + 3).map_or(Vec3::ZERO, Vec3::from_slice).as_dvec3();
+            RowPressure { pressure: pressure[at].into(), excess, reaction }
         };
         slots.iter().map(told).collect()
     }

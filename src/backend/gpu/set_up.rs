@@ -23,7 +23,7 @@ use glam::{DVec3, Vec3};
 /// # Errors
 /// A domain with more cells than can be numbered.
 pub fn sizes(scene: &Scene, params: &Params, plan: &Plan) -> Result<Sizes> {
-    Ok(Sizes::new(scene, params, &grid(params, plan)?))
+    Ok(Sizes::new(scene, params, &grid(params, plan)?, plan))
 }
 
 /// What `scene` takes on a device, without one.

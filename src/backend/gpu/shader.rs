@@ -12,11 +12,13 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
 /// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 16] = [
+pub const SWITCHES: [&str; 18] = [
     "ABSORBER",
+    "ALONG",
     "CONSISTENT",
     "COUPLED",
     "FILLED",
+    "FORCE",
     "MIXED",
     "MOVING",
     "MULTIGRID",
@@ -35,9 +37,12 @@ pub const SWITCHES: [&str; 16] = [
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
     let on = [
         plan.needs(Arrays::Absorber),
+        // Viscosity or friction acts before collisions.
+        plan.has(Stage::Viscosity) || plan.has(Stage::WallFriction),
         params.gradient != Gradient::Minimum,
         plan.needs(Arrays::Coupling),
         plan.needs(Arrays::Level),
+        plan.needs(Arrays::Force),
         params.source == Source::Mixed,
         plan.needs(Arrays::Solids),
         plan.needs(Arrays::Multigrid),

@@ -35,7 +35,7 @@ impl Gpu {
         let rows = self.rows()?;
         let s = self.sizes;
         let (pairs, p, f) = (rows.near + rows.dummies, s.pressure, s.fluid);
-        let (followed, keys) = (self.felt(), s.keys());
+        let (followed, keys) = (s.reacting, s.keys());
         // A vector, a number, an index into a list.
         let (v, n, k) = (buffers::position.size(), buffers::pressure.size(), buffers::neighbour_list.size());
         // Position and velocity in and out, acceleration in and out.

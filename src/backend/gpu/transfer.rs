@@ -108,7 +108,7 @@ impl Gpu {
         if self.plan.needs(Arrays::SurfacePressure) {
             context.upload(buffers::surface_pressure, &scalar(&fields.surface_pressure))?;
         }
-        if self.plan.needs(Arrays::Reaction) {
+        if self.sizes.reacting > 0 && !fields.reaction.is_empty() {
             context.upload(buffers::reaction, &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
         }
         if self.plan.needs(Arrays::Coupling) {
@@ -155,7 +155,7 @@ impl Gpu {
         let known = if self.plan.needs(Arrays::SurfacePressure) { g.pressure() } else { 0 };
         let surface_pressure =
             wide(if known > 0 { context.download(buffers::surface_pressure, known)? } else { Vec::new() });
-        let felt = if self.plan.needs(Arrays::Reaction) { g.moving_wall } else { 0 };
+        let felt = self.sizes.reacting as usize;
         let reaction = if felt > 0 { context.download(buffers::reaction, felt)? } else { Vec::new() };
         let heads = if self.plan.needs(Arrays::Coupling) { g.moving_wall } else { 0 };
         let inertia_head =

@@ -118,9 +118,6 @@ impl Ranked for GpuRank {
         let mut state: Vec<u32> = fields.state.iter().map(|&s| s as u32).collect();
         archive.array(buffers::state.id().name(), &mut state, false)?;
         archive.array(buffers::acceleration.id().name(), &mut still(&fields.acceleration), false)?;
-        if plan.needs(Arrays::Reaction) && !fields.reaction.is_empty() {
-            archive.array(buffers::reaction.id().name(), &mut still(&fields.reaction), false)?;
-        }
         if plan.needs(Arrays::Coupling) && !fields.inertia_head.is_empty() {
             archive.array(buffers::inertia_head.id().name(), &mut scalar(&fields.inertia_head), false)?;
         }
@@ -200,7 +197,6 @@ impl Ranked for GpuRank {
         self.share.take_over(&portion, &mut local);
         // Zero between two steps.
         local.acceleration.fill(DVec3::ZERO);
-        local.reaction.fill(DVec3::ZERO);
         self.gpu.write_fields(&local)?;
         self.share.begin(self.gpu.groups, own, &local, &grid);
         self.walls.are_at(&local.position[super::wall_slots(&self.gpu)]);
