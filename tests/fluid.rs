@@ -695,9 +695,8 @@ fn scatter_on_the_floor(dimensions: u32, speed: f64) -> f64 {
         }
         last = (sim.time, rise);
     }
-    let mean = forces.iter().sum::<f64>() / forces.len() as f64;
-    let scatter =
-        (forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / forces.len() as f64).sqrt() / mean;
+    let (mean, deviation) = mean_and_deviation(&forces);
+    let scatter = deviation / mean;
     println!("{dimensions}D, {speed} m/s: mean {mean:.3}, scatter {scatter:.4}");
     assert!((mean - 1.0).abs() < 0.02, "{mean}");
     scatter

@@ -259,8 +259,7 @@ fn a_small_cube_does_not_swing_itself_out_of_the_water() {
             heights.push(sim.solids.poses()[0].position.z);
         }
     }
-    let mean = heights.iter().sum::<f64>() / heights.len() as f64;
-    let swing = (heights.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
+    let (mean, swing) = mean_and_deviation(&heights);
     let expected = 0.135 + 0.027 - 0.4636 * 0.054;
     println!("height {mean:.4} m for {expected:.4}, rms {:.2} mm", 1e3 * swing);
     // 13 mm where still water rocked itself; jittered starts differ by some tenths of a millimetre.

@@ -1,7 +1,7 @@
 //! Prisms, in space and as sections in the plane: the water around them, the force on them, their contact, what is wrong with them.
 
 use crate::common::dry::{Dry, G};
-use crate::common::{case, cpu_simulation};
+use crate::common::{case, cpu_simulation, mean_and_deviation};
 use glam::DVec3;
 use seixo::backend::Processor;
 use seixo::error::Error;
@@ -99,9 +99,8 @@ fn a_section_held_under_water_is_lifted_by_what_it_displaces_on_both_processors(
                     forces.push(sim.fluid_force[0].force.z);
                 }
             }
-            let mean = forces.iter().sum::<f64>() / forces.len() as f64;
-            let scatter = forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / forces.len() as f64;
-            scatters.push(scatter.sqrt() / mean);
+            let (mean, scatter) = mean_and_deviation(&forces);
+            scatters.push(scatter / mean);
             lifts.push(mean);
         }
         println!("{keys}: lift {lifts:.4?} N for {exact:.4} N, scatter {scatters:.4?}");
@@ -303,8 +302,7 @@ fn plates_of_any_thickness_feel_still_water() {
             }
         }
         let exact = 1000.0 * G * 0.4 * up * L0;
-        let mean = forces.iter().sum::<f64>() / forces.len() as f64;
-        let scatter = (forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / forces.len() as f64).sqrt();
+        let (mean, scatter) = mean_and_deviation(&forces);
         println!("{thick} spacings: {:.3} of its displacement, scatter {:.3}", mean / exact, scatter / exact);
         assert!(
             (mean / exact - 1.0).abs() < 0.05 && scatter < 0.1 * exact,

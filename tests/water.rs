@@ -71,6 +71,8 @@ fn a_seed_fills_its_basin_up_to_the_level_and_no_other() {
     assert!((volume(&low) / (0.4 * 0.4 * 0.14) - 1.0).abs() < 1e-9, "{}", volume(&low));
     assert!((0..low.groups.fluid).all(|i| low.position[i].x < 0.4 && low.position[i].z < 0.14));
     assert!((low.depth - 0.14).abs() < 1e-9);
+    let note = "particles of water, x 0.0000..0.4000, y 0.0000..0.4000, z 0.0000..0.1400 m";
+    assert!(low.notes.iter().any(|n| n.ends_with(note)), "{:?}", low.notes);
     // Over the weir both basins fill.
     let high = scene(&tank(&fill(0.3), WEIR));
     assert!((volume(&high) / (0.8 * 0.4 * 0.3 - 0.04 * 0.4 * 0.2) - 1.0).abs() < 1e-9, "{}", volume(&high));

@@ -250,10 +250,12 @@ impl<'a> Builder<'a> {
             }
         }
         for (k, fill) in fluid.fill.iter().enumerate() {
+            let from = self.water.clear;
             match self.water.flood(fill, &self.lattice, &mut self.grid, self.tank) {
                 Ok(()) => {
                     let count = self.beside_walls();
-                    self.notes.push(format!("fluid.fill.{k}: {count} particles of water"));
+                    let reach = self.reach_of_water(from);
+                    self.notes.push(format!("fluid.fill.{k}: {count} particles of water{reach}"));
                 }
                 Err(problem) => {
                     let key = format!("fluid.fill.{k}.{}", problem.key);
@@ -267,6 +269,20 @@ impl<'a> Builder<'a> {
         let gravity = self.periodic.across(self.gravity());
         self.depth = self.water.depth(gravity, &self.lattice);
         self.depth = self.depth_with_inflows(gravity);
+    }
+
+    /// Where the water from particle `from` on lies, for a note: a fill that stops at a wall, or runs round it, is seen by that.
+    fn reach_of_water(&self, from: usize) -> String {
+        let Self { water, lattice, .. } = self;
+        let cells = &water.cell[from..];
+        let Some(ends) = cells.iter().map(|&c| (c, c)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
+            return String::new();
+        };
+        let half = DVec3::splat(0.5 * lattice.spacing);
+        let (low, high) = (lattice.center(ends.0) - half, lattice.center(ends.1) + half);
+        let axes = (0..3).filter(|&k| !(lattice.plane && k == 1));
+        let reach = axes.map(|k| format!("{} {:.4}..{:.4}", AXES[k], low[k], high[k]));
+        format!(", {} m", reach.collect::<Vec<_>>().join(", "))
     }
 
     /// Takes away what of the water laid last stands where walls do that are no boxes of the lattice; returns how many particles it has then.
@@ -325,7 +341,7 @@ impl<'a> Builder<'a> {
             if wet > 0 && body.displaces_fluid {
                 self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
             } else if wet > 0 {
-                let place = point(solid.position);
+                let place = point(solid.shape_center());
                 let message =
                     format!("body `{}` at {place} overlaps {wet} fluid particles at t = 0", body.name);
                 let remedy = "set `displaces_fluid = true`, or move it out of the water";

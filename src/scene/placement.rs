@@ -15,6 +15,9 @@ use std::collections::HashMap;
 /// Contact distance over the spacing, d_c / l0, section 3 of the paper.
 pub(crate) const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
 
+/// Overlap that is no more than a touch, over the spacing [-].
+const TOUCHING: f64 = 1e-4;
+
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {
     pub fixed: &'a Fixed,
@@ -47,7 +50,7 @@ impl Surroundings<'_> {
             .up
             .map(|up| (self.lift(body, up), up))
             .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
-        let says = format!("body `{}` overlaps {with} by {overlap:.6} m at t = 0", body.name);
+        let says = format!("body `{}` overlaps {with} by {} m at t = 0", body.name, metres(overlap));
         let Some((lift, up)) = lift else {
             let away = out.map_or("move it away".into(), |n| {
                 let n = point(n);
@@ -107,8 +110,9 @@ impl Surroundings<'_> {
 
     fn deepest(&self, body: &Solid) -> Option<Contact> {
         let own = body.placed();
-        // Lattices need not be in register, so that "paper" lets true surfaces overlap a little.
-        let tolerance = if self.law == Law::Paper { 0.5 } else { 1e-6 } * self.spacing;
+        // Lattices need not be in register, so that "paper" lets true surfaces overlap a little. Otherwise what touches is written with as many
+        // digits as anyone writes: K gives no body more than sqrt(K / m) times this.
+        let tolerance = if self.law == Law::Paper { 0.5 } else { TOUCHING } * self.spacing;
         let solid = self
             .obstructions(body, DVec3::ZERO, 0.0)
             .into_iter()
@@ -320,6 +324,11 @@ enum Partner {
 
 fn solid_name(solid: &Solid) -> String {
     format!("{} `{}`", solid.what(), solid.name)
+}
+
+/// A length for a message.
+fn metres(length: f64) -> String {
+    if length < 1e-3 { format!("{length:.2e}") } else { format!("{length:.6}") }
 }
 
 /// A point for messages.

@@ -50,6 +50,13 @@ pub fn there_is_a_device(untested: &str) -> bool {
     there
 }
 
+/// Mean of `values`, and their standard deviation.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt())
+}
+
 pub fn case(text: &str) -> Case {
     alone();
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
