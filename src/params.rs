@@ -369,16 +369,8 @@ impl Params {
         if self.depth > 0.0 { (REACH * self.depth).min(farthest) } else { farthest }
     }
 
-    /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected of the water, and `driven` the largest of
-    /// solids and openings [m/s].
-    pub fn step_driven(&self, time: f64, dt: f64, speed: f64, driven: f64) -> Step {
-        let step = self.step(time, dt, speed.max(driven));
-        // A slam: for a wedge of 10 degrees 40 rho v^2.
-        let slam = 5.0 * self.density * (SOUND_OVER_FLOW * driven).powi(2);
-        Step { pressure_max: step.pressure_max.max(slam), ..step }
-    }
-
-    /// The same where nothing is driven.
+    /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected of the water, of solids that are driven and of
+    /// openings [m/s].
     pub fn step(&self, time: f64, dt: f64, speed: f64) -> Step {
         let relaxation = self.relaxation(dt, speed, 0.0);
         let head = self.gravity.length() * self.depth;
@@ -393,14 +385,17 @@ impl Params {
             dt
         };
         let c = self.sound_speed(dt);
-        let pressure_max = if head > 0.0 {
+        // A slam: 40 rho v^2 for a wedge of 10 degrees, more for what falls flat.
+        let slam = (SOUND_OVER_FLOW * speed).powi(2);
+        let most = if head > 0.0 {
             // Viscosity: over the length of the domain in gaps of a spacing.
             let viscous = self.viscosity * speed * self.extent() / self.spacing.powi(2);
-            5.0 * self.density * (c * c).max(speed * speed).max(head).max(viscous)
+            (c * c).max(head).max(viscous)
         } else {
             // Without weight a jolt makes the pressure, rho v L / dt, or what drives the flow along a periodic axis.
-            5.0 * self.density * self.extent() * (speed / dt + self.drive.length())
+            self.extent() * (speed / dt + self.drive.length())
         };
+        let pressure_max = 5.0 * self.density * most.max(slam);
         let fastest = if self.filled { speed } else { 0.0 };
         let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
         Step { time, dt, ahead, relaxation, compressibility, pressure_max, shift_speed }
