@@ -375,6 +375,14 @@ fn the_first_stage_that_acts_on_walls_forgets_the_step_before() {
                 assert!(most > 1e-6 && most < 1e3, "{stage:?}: {most} N");
             }
         }
+        // Where the water has gone nothing acts on any more.
+        fields.kind[..pair.scene.groups.fluid].fill(Kind::Ghost);
+        pair.gpu.write(&fields).expect("writable");
+        pair.cpu.write(&fields).expect("writable");
+        pair.run_all(&LISTS);
+        pair.run(first);
+        let (gpu, cpu) = pair.fields();
+        assert!(gpu.reaction.iter().chain(&cpu.reaction).all(|&f| f == DVec3::ZERO), "{first:?}");
     }
 }
 

@@ -36,7 +36,8 @@ impl Cpu {
     pub(super) fn viscosity(&mut self) {
         let Self { fields, neighbours, params, groups, share, .. } = self;
         if neighbours.pairs() == 0 {
-            return;
+            // As at the start, and where the water has gone.
+            return fields.reaction.fill(DVec3::ZERO);
         }
         let (position, velocity) = (&fields.position, &fields.velocity);
         let on = Particles { params, position, velocity, fluid: groups.fluid };

@@ -70,7 +70,7 @@ impl Gpu {
             (Stage::PressureGradient, f * (gradient + n + 2 * k) + lists * f / rows.used.max(1) + walls),
             (Stage::Correct, update),
             (Stage::Shift, f * 4 * v),
-            (Stage::BodyForce, s.moving_wall * (buffers::wall_layer.size() + 2 * v + n + k + slots)),
+            (Stage::BodyForce, s.moving_wall * (buffers::wall_layer.size() + v + n + k + slots)),
         ];
         let unknowns = self.unknowns()?;
         Ok(Traffic {
