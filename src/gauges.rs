@@ -197,10 +197,10 @@ impl Gauges {
         for gauge in &self.water {
             row.extend(fields.iter().flat_map(|f| gauge.cells(f, &simulation.groups, params)));
         }
-        let of_water = wrench.iter().map(Some).chain(std::iter::repeat(None));
-        let of_solids = contact.iter().map(Some).chain(std::iter::repeat(None));
-        for ((_, of_water), of_solids) in self.force.iter().zip(of_water).zip(of_solids) {
-            for vector in [of_water, of_solids].into_iter().flatten().flat_map(|w| [w.force, w.torque]) {
+        for k in 0..self.force.len() {
+            // Of the water, and of other solids.
+            let told = [wrench.get(k), contact.get(k)].into_iter().flatten();
+            for vector in told.flat_map(|w| [w.force, w.torque]) {
                 row.extend(vector_cells(if known { vector } else { DVec3::NAN }));
             }
         }

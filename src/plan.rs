@@ -204,11 +204,19 @@ impl Told {
 /// The stages that act on walls beside the pressure, in their order.
 const REACTING: [Stage; 3] = [Stage::Viscosity, Stage::WallFriction, Stage::Collision];
 
+/// Why a stage runs, or why it is left out.
+type Reason = (Stage, Result<&'static str, &'static str>);
+
+/// Whether `stage` runs by the `reasons` of all.
+fn runs(reasons: &[Reason], stage: Stage) -> bool {
+    reasons.iter().any(|(s, why)| *s == stage && why.is_ok())
+}
+
 /// What a scene needs.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// For each stage of [`Stage::ALL`]: why it runs (`Ok`) or why it is left out (`Err`).
-    pub reasons: Vec<(Stage, Result<&'static str, &'static str>)>,
+    pub reasons: Vec<Reason>,
     /// Preconditioner of the PPE.
     pub preconditioner: Preconditioner,
     /// Whether bodies move in the fluid as its pressure acts on them. With the paper's source, the number density alone,
@@ -234,10 +242,9 @@ impl Plan {
         let fluid = scene.groups.fluid > 0;
         let moving = !scene.solids.is_empty();
         let free = scene.solids.iter().any(Solid::is_free);
-        let gauged = |name: &str| case.gauge.force.iter().any(|g| stands_for(&g.on, name));
-        let gauged_solid = scene.solids.iter().any(|s| gauged(&s.name));
+        let gauged = case.gauge.force.iter().any(|g| scene.solids.iter().any(|s| stands_for(&g.on, &s.name)));
         // Of a body that is driven the tables tell the force as of one that is free.
-        let told = free || gauged_solid || !case.body.is_empty();
+        let told = free || gauged || !case.body.is_empty();
         let wet = |why| if fluid { Ok(why) } else { Err("no fluid") };
         let reasons = Stage::ALL.map(|stage| {
             let reason = match stage {
@@ -298,10 +305,10 @@ impl Plan {
         // A rank's part of the scene has no names of fixed walls: what is none of a solid that moves, or stands for several, may be one.
         let of_solid = |on: &str| scene.solids.iter().any(|s| s.name == on);
         let gauges_fixed = case.gauge.force.iter().any(|g| !of_solid(&g.on));
-        let runs = |stage| reasons.iter().any(|(s, why)| *s == stage && why.is_ok());
-        let reaction = match REACTING.into_iter().any(runs) {
+        let has = |stage| runs(&reasons, stage);
+        let reaction = match REACTING.into_iter().any(has) {
             true if fixed_walls && gauges_fixed => Told::All,
-            true if runs(Stage::BodyForce) => Told::Moving,
+            true if has(Stage::BodyForce) => Told::Moving,
             _ => Told::None,
         };
         Self {
@@ -319,7 +326,7 @@ impl Plan {
 
     /// Whether `stage` runs.
     pub fn has(&self, stage: Stage) -> bool {
-        self.reasons.iter().any(|(s, why)| *s == stage && why.is_ok())
+        runs(&self.reasons, stage)
     }
 
     /// The first stage of a step that tells what the water does to walls beside its pressure: what the last step told is forgotten then.

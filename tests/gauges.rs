@@ -132,10 +132,7 @@ fn means_are_those_of_every_step_and_begin_anew_after_a_row() {
     case.run.adaptive = true;
     let mut mean = case.clone();
     mean.gauge.mean = true;
-    let mut processors = vec![Processor::Cpu];
-    if crate::common::there_is_a_device("means on a device are not tested") {
-        processors.push(Processor::Gpu { adapter: None });
-    }
+    let processors = processors("means on a device are not tested");
     for processor in processors {
         let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
         let each = Gauges::new(&case, &scene).expect("the gauges find their walls");
@@ -420,10 +417,7 @@ fn a_block_of_water_that_falls_on_a_floor_presses_with_the_momentum_that_it_lose
     );
     let scene = Arc::new(Scene::build(&case).expect("it builds"));
     let gauges = Gauges::new(&case, &scene).expect("a gauge");
-    let mut processors = vec![Processor::Cpu];
-    if there_is_a_device("the force of what falls on a floor") {
-        processors.push(Processor::Gpu { adapter: None });
-    }
+    let processors = processors("the force of what falls on a floor");
     for processor in processors {
         let mut sim = Simulation::on(&case, scene.clone(), &processor).expect("it starts");
         let momentum = |sim: &mut Simulation| sim.backend.monitor().expect("measured").momentum[2];

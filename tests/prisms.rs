@@ -1,9 +1,8 @@
 //! Prisms, in space and as sections in the plane: the water around them, the force on them, their contact, what is wrong with them.
 
 use crate::common::dry::{Dry, G};
-use crate::common::{case, cpu_simulation, mean_and_deviation};
+use crate::common::{case, cpu_simulation, mean_and_deviation, processors};
 use glam::DVec3;
-use seixo::backend::Processor;
 use seixo::error::Error;
 use seixo::scene::{Kind, Scene};
 use seixo::shape::Shape;
@@ -77,10 +76,7 @@ fn a_section_held_under_water_is_lifted_by_what_it_displaces_on_both_processors(
     let rhomb = "shape = \"prism\"\nsection = [[0, 0.08], [0.12, 0], [0.24, 0.08], [0.12, 0.16]]\nheight = 0.16\nposition = [0.3, 0, 0.04]";
     let wedge = "shape = \"wedge\"\nsize = [0.24, 0.16, 0.12]\ncenter = [0.4, 0.08, 0.1]";
     let same = "shape = \"prism\"\nsection = [[-0.16, -0.04], [0.08, -0.04], [0.08, 0.08]]\nheight = 0.16\nposition = [0.4, 0, 0.1]";
-    let mut processors = vec![Processor::Cpu];
-    if !seixo::backend::gpu::adapters().is_empty() {
-        processors.push(Processor::Gpu { adapter: None });
-    }
+    let processors = processors("the lift of still prisms and wedges");
     let mut of_wedges = vec![];
     for (keys, area) in [(rhomb, 0.0192), (wedge, 0.0144), (same, 0.0144)] {
         let case = case(&still(

@@ -1,10 +1,9 @@
 //! Obstacles and moving walls of any shape, from files too: water around them, forces, gauges, contact; ground.
 
 use crate::common::dry::{Dry, G};
-use crate::common::{case, cpu_simulation};
+use crate::common::{case, cpu_simulation, processors};
 use crate::meshes::{Triangles, ball, cuboid, file, stl};
 use glam::DVec3;
-use seixo::backend::Processor;
 use seixo::error::Error;
 use seixo::scene::{Kind, Scene};
 use seixo::simulation::Simulation;
@@ -146,10 +145,7 @@ fn a_ball_from_a_file_that_is_held_under_water_is_lifted_by_the_water_it_displac
          [[gauge.force]]\nname = \"f\"\non = \"it\"\n"
     ));
     let case = case(&text);
-    let mut processors = vec![Processor::Cpu];
-    if !seixo::backend::gpu::adapters().is_empty() {
-        processors.push(Processor::Gpu { adapter: None });
-    }
+    let processors = processors("the lift of a still ball from a mesh");
     let exact = 1000.0 * G * 4.0 / 3.0 * std::f64::consts::PI * 0.07_f64.powi(3);
     let mut lifts = vec![];
     for processor in processors {

@@ -57,6 +57,12 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt())
 }
 
+/// The CPU, and a device if there is one; loud if not, as [`there_is_a_device`].
+pub fn processors(untested: &str) -> Vec<Processor> {
+    let device = there_is_a_device(untested).then_some(Processor::Gpu { adapter: None });
+    [Processor::Cpu].into_iter().chain(device).collect()
+}
+
 pub fn case(text: &str) -> Case {
     alone();
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))

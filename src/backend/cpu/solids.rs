@@ -9,6 +9,11 @@ use crate::kernels::body_force::{self, RowPressure};
 use crate::kernels::move_solids;
 use glam::DVec3;
 
+/// [`crate::fields::Fields::reaction`] of a wall, 0 where it is not kept [N].
+pub(super) fn reaction_on(reaction: &[DVec3], wall: usize) -> DVec3 {
+    reaction.get(wall).copied().unwrap_or_default()
+}
+
 impl Cpu {
     /// Moves the particles of solids to `poses`.
     pub(super) fn place_solids(&mut self, poses: &[Pose]) {
@@ -34,9 +39,9 @@ impl Cpu {
     }
 
     /// Force of the water on this rank's part of each solid.
-    pub(super) fn sum_forces(&mut self) -> Vec<Wrench> {
+    pub(super) fn sum_forces(&self) -> Vec<Wrench> {
         let (params, share) = (&self.params, self.share.as_deref());
-        let (fields, fluid) = (&mut self.fields, self.groups.fluid);
+        let (fields, fluid) = (&self.fields, self.groups.fluid);
         let wrenches = self.solids.iter().zip(&self.poses).enumerate().map(|(n, (solid, pose))| {
             let mut slot = slots::of(&self.slots, n);
             let mut total = Wrench::default();
@@ -47,7 +52,7 @@ impl Cpu {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
                 let mut pressure = 0.0;
-                let mut reaction = fields.reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
+                let mut reaction = reaction_on(&fields.reaction, i - fluid);
                 if own && fields.state[i] == State::Inner {
                     total.add(fields.pressure[i], &slot.per_pascal);
                     total += slot.head;
@@ -61,20 +66,17 @@ impl Cpu {
             }
             total
         });
-        let wrenches: Vec<Wrench> = wrenches.collect();
-        wrenches
+        wrenches.collect()
     }
 
     /// Pressures of the wall particles `slots` as far as they are this rank's, else zero.
     pub(super) fn own_pressures(&self, slots: &[usize]) -> Vec<RowPressure> {
-        let of = |i: usize| RowPressure {
-            pressure: self.fields.pressure[i],
-            excess: i.checked_sub(self.groups.fluid).map_or(0.0, |wall| self.excess.of(wall)),
-            reaction: i
-                .checked_sub(self.groups.fluid)
-                .and_then(|wall| self.fields.reaction.get(wall))
-                .copied()
-                .unwrap_or(DVec3::ZERO),
+        let of = |i: usize| {
+            let pressure = self.fields.pressure[i];
+            i.checked_sub(self.groups.fluid).map_or(RowPressure { pressure, ..Default::default() }, |wall| {
+                let (excess, reaction) = (self.excess.of(wall), reaction_on(&self.fields.reaction, wall));
+                RowPressure { pressure, excess, reaction }
+            })
         };
         let own = |&s: &usize| match &self.share {
             None => of(s),

@@ -1,6 +1,7 @@
 //! The pressure equation: bodies in it, the solve, and what is cut off after it.
 
 use super::Cpu;
+use super::solids::reaction_on;
 use super::team::owns;
 use super::wall_excess::{Rows, WallExcess};
 use crate::body::slots;
@@ -37,7 +38,7 @@ impl Cpu {
             let wall = |(k, i): (usize, usize)| {
                 let to_surface = pose.orientation * solid.wall_to_surface[k];
                 let arm = pose.orientation * solid.wall_offset[k] + to_surface;
-                let reaction = reaction.get(i - fluid).copied().unwrap_or(DVec3::ZERO);
+                let reaction = reaction_on(reaction, i - fluid);
                 let slot = slot(k);
                 if !owns(share, i) || state[i] != State::Inner {
                     // Of the step's beginning, when it was this rank's.
