@@ -1,11 +1,12 @@
 //! A closed surface of triangles: a solid from an STL or OBJ file, ground below an open one, a cone or a wedge.
 //!
-//! Volume, moments and distances are those of the triangles (parry). Particles stand in layers half a
+//! Volume, moments and distances (parry) are those of the triangles. Particles stand in layers half a
 //! spacing, one and a half and so on below the surface. Points of the surface press into others: those above the
 //! wall layer, the vertices and the sharp edges.
 
 mod flush;
 mod ground;
+mod mass;
 mod particles;
 mod points;
 mod primitives;
@@ -17,7 +18,7 @@ mod thickness;
 use super::surface::Surface;
 use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
 use glam::{DQuat, DVec3};
-use parry3d_f64::mass_properties::MassProperties;
+use mass::Mass;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 use std::collections::HashMap;
@@ -75,8 +76,6 @@ pub struct Thickness {
 
 /// Angle between the normals of two triangles from which their edge presses by itself [rad].
 const SHARP: f64 = 0.5;
-/// Share of the inertia beside the diagonal that is round-off.
-const ROUND_OFF: f64 = 1e-6;
 
 /// A mesh is made once for all solids, scenes and runs of a program that have it, and kept: by what it is made from, and
 /// its lengths.
@@ -156,9 +155,8 @@ impl Mesh {
     /// A mesh of `vertices` [m]; `path` stands for it in messages.
     fn new(path: &str, mut vertices: Vec<DVec3>, mut triangles: Vec<[u32; 3]>) -> Result<Self, Unfit> {
         read::check(path, &vertices, &triangles)?;
-        let mass = MassProperties::from_trimesh(1.0, &vertices, &triangles);
-        let signed: f64 = triangles.iter().map(|t| tetrahedron(t.map(|k| vertices[k as usize]))).sum();
-        let volume = mass.mass();
+        let Mass { volume: signed, center, moments, frame } = Mass::of(&vertices, &triangles);
+        let volume = signed.abs();
         let size = vertices.iter().map(|v| v.distance(vertices[0])).fold(0.0, f64::max);
         if volume.is_nan() || volume < 1e-9 * size.powi(3) {
             let message = format!("{path}: its surface encloses no volume");
@@ -168,16 +166,6 @@ impl Mesh {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
         shells::check(path, &vertices, &triangles)?;
-        let tensor = mass.reconstruct_inertia_matrix();
-        let beside = [tensor.y_axis.x, tensor.z_axis.x, tensor.z_axis.y];
-        let diagonal = DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z);
-        let straight = beside.iter().all(|b| b.abs() < ROUND_OFF * diagonal.max_element());
-        let (moments, frame) = if straight {
-            (diagonal, DQuat::IDENTITY)
-        } else {
-            (mass.principal_inertia(), mass.principal_inertia_local_frame)
-        };
-        let center = mass.local_com;
         let to_own = frame.inverse();
         let around =
             |all: &[DVec3]| all.iter().fold((DVec3::MAX, DVec3::MIN), |(a, b), &v| (a.min(v), b.max(v)));
@@ -191,7 +179,6 @@ impl Mesh {
         let radius = hull.iter().map(|v| v.length()).fold(0.0, f64::max);
         let triangles = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
             .map_err(|e| Unfit::new(format!("{path}: {e}"), "repair the surface"))?;
-        let moments = moments / volume;
         Ok(Self {
             triangles: Arc::new(triangles),
             open: None,
@@ -279,11 +266,6 @@ impl Mesh {
         }
         out
     }
-}
-
-/// Volume of the tetrahedron with the origin, positive if the triangle is turned outwards [m3].
-fn tetrahedron([a, b, c]: [DVec3; 3]) -> f64 {
-    a.dot(b.cross(c)) / 6.0
 }
 
 /// The triangle of each edge, which runs the way that the triangle turns.
