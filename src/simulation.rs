@@ -153,7 +153,7 @@ impl Simulation {
             } else {
                 DrivenFaces::default()
             },
-            slots: plan.needs(Arrays::Coupling).then(|| Slots::new(&scene, params.density)),
+            slots: plan.needs(Arrays::Coupling).then(|| Slots::new(&scene, &params)),
             enclosed: vec![],
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,

@@ -1,8 +1,8 @@
 //! Slots between a free body and another solid, too narrow for a particle of water: a body on the floor, against a wall, on
-//! another body. Rows of the wall layer deep in one meet no water and would press nothing on the body, although water stands
-//! in any such slot. It is taken to press there as it does at the slot's rim, its outermost rows: linear between what it is
-//! there, with the weight of the water between, and nothing where the rim is dry (the uplift under a dam, as practice has
-//! it).
+//! another body. Rows of the wall layer in one meet no water, or few particles that have no room, and would press nothing on the body or anything,
+//! although water stands in any such slot. It is taken to press there as it does at the slot's rim, the rows beside it: linear
+//! between what it is there, with the weight of the water between, and nothing where the rim is dry (the uplift under a dam, as
+//! practice has it).
 //!
 //! The rows at the rim then carry what the slot passes on: with xi = (x - c) / l0, c the rim's middle, and
 //! C = sum_r xi xi^T + 0.1 N over its N rows,
@@ -29,6 +29,7 @@ use crate::body::{Pose, Wrench};
 use crate::contact::broad::{Bounds, PointGrid, fixed_walls, meeting_images};
 use crate::error::Result;
 use crate::kernels::coupling::row;
+use crate::params::Params;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
@@ -36,8 +37,9 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
-/// at all: gaps of a half and of 1.1 spacings. Water comes in between.
-const FACING: (f64, f64) = (1.5, 2.1);
+/// at all: gaps of 0.9 and of 1.1 spacings. Particles of water come in between from 0.85 on; in narrower gaps they stay where they
+/// are, and what lies behind them is no void.
+const FACING: (f64, f64) = (1.9, 2.1);
 /// Another solid's particle is faced by a row if it lies this near its outward direction (cosine of the angle).
 const AHEAD: f64 = 0.5;
 /// Edge of the cells that points lie in, over l0: twice the reach, so that two an axis are looked into.
@@ -84,8 +86,8 @@ impl Layer {
         }
     }
 
-    /// Slots whose rows hang together, by how much of each row lies in one: their rims and what lies deep in them,
-    /// either of which may be empty.
+    /// Slots whose rows hang together, by how much of each row lies in one: what lies in them, and their rims, which may
+    /// be empty.
     fn slots(&self, solid: usize, shares: &[f64]) -> Vec<Slot> {
         let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
         let mut out = vec![];
@@ -103,10 +105,12 @@ impl Layer {
                 at += 1;
             }
             rows.sort_unstable();
-            let is_rim = |&n: &usize| self.adjacent[n].iter().any(|&m| shares[m as usize] == 0.0);
-            let (rim, deep): (Vec<usize>, Vec<usize>) = rows.into_iter().partition(is_rim);
-            let deep = deep.into_iter().map(|n| (n, shares[n])).collect();
-            out.push(Slot { solid, rim, deep });
+            let beside = rows.iter().flat_map(|&n| &self.adjacent[n]).map(|&m| m as usize);
+            let mut rim: Vec<usize> = beside.filter(|&m| shares[m] == 0.0).collect();
+            rim.sort_unstable();
+            rim.dedup();
+            let inside = rows.into_iter().map(|n| (n, shares[n])).collect();
+            out.push(Slot { solid, rim, inside });
         }
         out
     }
@@ -120,9 +124,11 @@ impl Layer {
 /// A slot between a free body and other solids: rows of the body's layer.
 struct Slot {
     solid: usize,
+    /// Those beside it, in open water. A row at its mouth is none: what a particle that is caught there does would be taken for the
+    /// pressure in all of it.
     rim: Vec<usize>,
-    /// Rows deep in it, and how much of each [-].
-    deep: Vec<(usize, f64)>,
+    /// Rows in it, and how much of each [-].
+    inside: Vec<(usize, f64)>,
 }
 
 /// How a row lies before what is near it.
@@ -170,14 +176,14 @@ pub struct Slots {
 }
 
 impl Slots {
-    /// The slots of the free bodies of `scene`, in water of `density` [kg/m3].
-    pub fn new(scene: &Scene, density: f64) -> Self {
+    /// The slots of the free bodies of `scene`, in the water of `params`.
+    pub fn new(scene: &Scene, params: &Params) -> Self {
         let l0 = scene.spacing;
         let (fixed, fixed_of) = fixed_walls(scene);
         Self {
             periodic: scene.periodic,
             spacing: l0,
-            weight: density * scene.gravity,
+            weight: params.density * params.gravity,
             fixed: PointGrid::new(fixed, CELL * l0),
             fixed_of,
             layers: scene.solids.iter().map(|solid| Layer::new(solid, l0)).collect(),
@@ -292,7 +298,7 @@ impl Slots {
         Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0) }
     }
 
-    /// The rows that lie deep in `slot`, and those at its rim with what they pass on; their `pressure` in the last step.
+    /// The rows that lie in `slot`, and those at its rim with what they pass on; their `pressure` in the last step.
     fn passed_on(&self, slot: &Slot, pose: &Pose, pressure: &[f64]) -> Vec<SlotRow> {
         let layer = &self.layers[slot.solid];
         // Relative to the centre of mass, world axes.
@@ -306,7 +312,7 @@ impl Slots {
         let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
-        for &(n, share) in slot.deep.iter().filter(|row| under_water(row.0)) {
+        for &(n, share) in slot.inside.iter().filter(|row| under_water(row.0)) {
             let row = row(pose.orientation * layer.area[n], on_surface(n));
             let head = self.weight.dot(on_surface(n) - middle);
             let along = xi(n).to_array();
@@ -344,7 +350,7 @@ impl Slots {
         };
         let inside =
             |&(n, taken): &(usize, f64)| SlotRow { solid, row: n as u32, taken, ..SlotRow::default() };
-        wet.into_iter().chain(dry_rows).map(at_rim).chain(slot.deep.iter().map(inside)).collect()
+        wet.into_iter().chain(dry_rows).map(at_rim).chain(slot.inside.iter().map(inside)).collect()
     }
 
     /// Pressure of the `field` of a slot on a body's surface, at `x` by a row at `place` [Pa].

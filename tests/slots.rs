@@ -7,6 +7,7 @@ use seixo::body::{Pose, Wrench};
 use seixo::case::Case;
 use seixo::contact::Solids;
 use seixo::kernels::coupling::row;
+use seixo::params::Params;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use seixo::slots::Slots;
@@ -30,13 +31,13 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
     let scene = Scene::build(&case).expect("the scene builds");
     let start = Solids::new(&scene, case.contact.as_ref()).expect("one body").poses()[0];
     let at = |position: DVec3| [Pose { position, ..start }];
-    let slots = Slots::new(&scene, 1000.0);
+    let slots = Slots::new(&scene, &Params::new(&case, &scene).expect("valid"));
     let solid = &scene.solids[0];
     let still = |slots: &[usize]| Ok(vec![0.0; slots.len()]);
     let rows = slots.rows(&at(solid.position), still).expect("nothing is read");
-    // Eight an edge: six by six deep under it.
-    let deep = rows.iter().filter(|slot| slot.taken == 1.0).count();
-    assert_eq!((deep, rows.len()), (36, 64));
+    // Eight an edge: all of them under it, and those beside these at its sides.
+    let inside = rows.iter().filter(|slot| slot.taken == 1.0).count();
+    assert_eq!((inside, rows.len()), (64, 64 + 28));
     for (slope, allowed) in
         [(DVec3::new(0.0, 0.0, -9810.0), 1e-9), (DVec3::new(500.0, -300.0, -9810.0), 0.03)]
     {
@@ -51,8 +52,11 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
             there.add(slot.taken * p(x + to_surface), &row(solid.wall_area[k], x + to_surface));
         }
         println!("force {} for {}, torque {} for {}", passed.force, there.force, passed.torque, there.torque);
-        assert!((there.force.z - 0.5625 * 0.01 * p(DVec3::new(0.0, 0.0, -0.05))).abs() < 1e-9);
-        assert!((passed.force - there.force).length() < 1e-9 * there.force.length());
+        assert!((there.force.z - 0.01 * p(DVec3::new(0.0, 0.0, -0.05))).abs() < 1e-9);
+        let off = passed.force - there.force;
+        assert!(off.z.abs() < 1e-9 * there.force.length());
+        // The corners' own sides, by the slope, which is held at bay a little.
+        assert!(off.truncate().length() < 1e-9 + 5.0 * allowed * there.force.truncate().length());
         let size = 1e-9 * there.force.length() + allowed * there.torque.length();
         assert!((passed.torque - there.torque).length() < size);
     }
@@ -62,7 +66,7 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
             slots.rows(&at(solid.position + gap * scene.spacing * DVec3::Z), still).expect("nothing is read");
         rows.iter().map(|slot| slot.taken).fold(0.0, f64::max)
     };
-    let faded = [0.0, 0.4, 0.8, 1.2].map(part);
+    let faded = [0.0, 0.89, 1.0, 1.2].map(part);
     assert!(
         faded[0] == 1.0 && faded[1] == 1.0 && (0.4..0.6).contains(&faded[2]) && faded[3] == 0.0,
         "{faded:?}"
@@ -246,4 +250,55 @@ fn water_that_a_body_catches_on_the_ground_asks_no_pressure_without_bound() {
     println!("{cut} cut, {lift:.3} of the water that it displaces");
     assert!(cut < 10, "{cut}");
     assert!((lift - 1.0).abs() < 0.1, "{lift}");
+}
+
+/// Water 0.5 m deep in the plane with a block of 0.2 x 0.1 m, `low` above the floor, and what `more` says.
+fn block_under_water(spacing: f64, density: f64, low: f64, more: &str) -> Simulation {
+    simulation(&case(&format!(
+        "[run]\nspacing = {spacing}\ntime_step = 2e-3\nadaptive = true\nend = 3\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.1, 0.7]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.1, 0.5]\n\
+         [contact]\nspring = 1e5\nrestitution = 0.2\nfriction = 0.3\n\
+         [[body]]\nname = \"block\"\nsize = [0.2, 0.1, 0.1]\ncenter = [0.4, 0.05, {}]\ndensity = {density}\ndisplaces_fluid = true\n{more}",
+        low + 0.05
+    )))
+}
+
+#[test]
+fn a_light_body_leaves_the_floor() {
+    // It hung 0.6 spacings above it for ever, by a void behind the particles that it had caught under its edges.
+    for (density, reached) in [(300.0, 0.15), (700.0, 0.03)] {
+        let mut simulation = block_under_water(0.02, density, 0.0, "");
+        while simulation.time < 0.6 {
+            simulation.step().expect("it rises");
+        }
+        let risen = simulation.solids.poses()[0].position.z - 0.05;
+        println!("{density} kg/m3: {risen:.4} m after 0.6 s");
+        assert!(risen > reached, "{density}: {risen}");
+    }
+}
+
+#[test]
+fn what_has_landed_is_lifted_by_the_water_that_it_displaces() {
+    // 0.74 and 1.16 of it, and 0.72 under a ledge, by particles that it had caught at its mouth.
+    let ledge = "[[obstacle]]\nname = \"ledge\"\nmin = [0.2, 0, 0.3]\nmax = [0.6, 0.1, 0.4]\n";
+    for (density, low, more) in [(1600.0, 0.02, ""), (1600.0, 0.05, ""), (400.0, 0.16, ledge)] {
+        let mut simulation = block_under_water(0.02, density, low, more);
+        let (mut impulse, mut time, mut contact) = (0.0, 0.0, 0.0);
+        while simulation.time < 1.5 {
+            let dt = simulation.step().expect("it lands").dt;
+            if simulation.time > 1.0 {
+                let [water, solids] = [simulation.fluid_force[0], simulation.solids.contact_wrenches()[0]];
+                (impulse, contact, time) =
+                    (impulse + dt * water.force.z, contact + dt * solids.force.z, time + dt);
+            }
+        }
+        let displaced = 9810.0 * 0.02 * 0.02;
+        let (lift, held) = (impulse / time / displaced, contact / time / displaced);
+        println!(
+            "{density} kg/m3 from {low} m: {lift:.3}, held by {held:.3}, of the water that it displaces"
+        );
+        assert!((lift - 1.0).abs() < 0.15, "{density} from {low}: {lift}");
+        assert!((lift + held - density / 1000.0).abs() < 0.03, "it is at rest: {lift} {held}");
+    }
 }

@@ -10,7 +10,7 @@ pub struct SlotRow {
     pub solid: u32,
     /// Index of the row in the solid's wall layer.
     pub row: u32,
-    /// Part of the row's own area that lies deep in a slot [-]; what presses there comes from the rim.
+    /// Part of the row's own area that lies in a slot [-]; what presses there comes from the rim.
     pub taken: f64,
     /// What one pascal on this row does to the body through slots: force [m2] and torque [m3], world axes.
     pub per_pascal: Wrench,

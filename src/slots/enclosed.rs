@@ -20,8 +20,7 @@ pub struct Pressed {
     pub loads: Vec<(usize, Wrench)>,
 }
 
-/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a rim alone that
-/// lends nothing.
+/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot.
 pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
     if found.iter().any(|f| f.slot.rim.is_empty()) {
         let beside = beside(&found);
@@ -31,11 +30,7 @@ pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
             }
         }
     }
-    let lending: BTreeSet<usize> = found.iter().flat_map(|f| f.lenders.iter().copied()).collect();
-    let is_slot = |(k, f): &(usize, &Found)| match f.slot.rim.is_empty() {
-        true => !f.lenders.is_empty(),
-        false => !f.slot.deep.is_empty() || lending.contains(k),
-    };
+    let is_slot = |(_, f): &(usize, &Found)| !f.slot.rim.is_empty() || !f.lenders.is_empty();
     let kept: Vec<usize> = found.iter().enumerate().filter(is_slot).map(|(k, _)| k).collect();
     let place = |k: usize| kept.partition_point(|&other| other < k);
     for f in &mut found {
@@ -48,7 +43,7 @@ pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
 
 /// Which slots face each other.
 fn beside(found: &[Found]) -> Vec<BTreeSet<usize>> {
-    let rows = |f: &Found| f.slot.rim.iter().copied().chain(f.slot.deep.iter().map(|row| row.0)).collect();
+    let rows = |f: &Found| f.slot.inside.iter().map(|row| row.0).collect();
     let all: Vec<Vec<usize>> = found.iter().map(rows).collect();
     let of = |(k, (f, rows)): (usize, (&Found, &Vec<usize>))| {
         rows.iter().map(|&n| ((f.slot.solid, n), k)).collect::<Vec<_>>()
@@ -99,12 +94,21 @@ impl Slots {
             }
         };
         let mut rows: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
-        rows.sort_unstable_by_key(|slot| (slot.solid, slot.row));
+        rows.sort_by_key(|slot| (slot.solid, slot.row));
+        // A row may lie at the rim of several.
+        rows.dedup_by(|next, first| {
+            let same = (next.solid, next.row) == (first.solid, first.row);
+            if same {
+                first.per_pascal += next.per_pascal;
+                first.head += next.head;
+            }
+            same
+        });
         let load = |f: &Found| {
             let (k, pose) = (f.slot.solid, &poses[f.slot.solid]);
             let field = self.lent(&found, &pressure, f, poses)?;
             let mut load = Wrench::default();
-            for &(n, share) in &f.slot.deep {
+            for &(n, share) in &f.slot.inside {
                 let (p, at) = self.on_row(&field, k, pose, n);
                 load.add(share * p, &row(pose.orientation * self.layers[k].area[n], at));
             }
@@ -118,7 +122,7 @@ impl Slots {
     fn without_rim(f: &Found) -> Vec<SlotRow> {
         let solid = f.slot.solid as u32;
         let inside = |&(n, taken)| SlotRow { solid, row: n as u32, taken, ..SlotRow::default() };
-        f.slot.deep.iter().map(inside).collect()
+        f.slot.inside.iter().map(inside).collect()
     }
 
     /// Pressure of the `field` of a slot of solid `k` on the surface before row `n` [Pa], and where that is, from the

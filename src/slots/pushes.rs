@@ -34,8 +34,8 @@ impl Slots {
         meet.into_iter().any(|(a, b, _)| self.layers[a].free != self.layers[b].free)
     }
 
-    /// Forces of the water in slots on walls and solids with the solids at `poses`: equal and opposite to what it presses on the bodies there, and what rows at
-    /// the rim press on their own beside it. `read` tells pressures of slots of particles [Pa]; a slot with a dry rim presses nothing.
+    /// Forces of the water in slots on walls and solids with the solids at `poses`: equal and opposite to what it presses on the bodies
+    /// there. `read` tells pressures of slots of particles [Pa]; a slot with a dry rim presses nothing.
     ///
     /// # Errors
     /// Those of `read`.
@@ -68,16 +68,20 @@ impl Slots {
             let on = faced[n].opposite?;
             Some(Push { on, at: pose.position + on_surface, force: faced[n].share * p * area })
         };
-        // A row of the rim looks out as well: what of it looks into the slot is what looks as its neighbours deep in there do.
-        let is_deep = |n: &usize| slot.deep.binary_search_by_key(n, |row| row.0).is_ok();
-        let all: DVec3 = slot.deep.iter().map(|row| area(row.0)).sum();
+        // A row at the mouth looks out as well: what of it looks into the slot is what looks as its neighbours deep in there do.
+        let at_mouth =
+            |n: usize| layer.adjacent[n].iter().any(|m| slot.rim.binary_search(&(*m as usize)).is_ok());
+        let is_deep = |n: usize| slot.inside.binary_search_by_key(&n, |row| row.0).is_ok() && !at_mouth(n);
+        let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
         let inwards = |n: usize| {
-            let near = layer.adjacent[n].iter().map(|&m| m as usize).filter(is_deep);
+            if !at_mouth(n) {
+                return area(n);
+            }
+            let near = layer.adjacent[n].iter().map(|&m| m as usize).filter(|&m| is_deep(m));
             let near: DVec3 = near.map(area).sum();
             let way = if near == DVec3::ZERO { all } else { near }.normalize_or_zero();
             area(n).dot(way).max(0.0) * way
         };
-        let rim = slot.rim.iter().filter_map(|&n| push(n, inwards(n)));
-        slot.deep.iter().filter_map(|row| push(row.0, area(row.0))).chain(rim).collect()
+        slot.inside.iter().filter_map(|row| push(row.0, inwards(row.0))).collect()
     }
 }
