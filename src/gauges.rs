@@ -81,11 +81,12 @@ impl Gauges {
     /// [`Error::Case`] for a pressure gauge that is not on a wall and for a force gauge on nothing.
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
         let reach = 0.5 * case.run.effective_radius * scene.spacing;
-        let contact = case.contact.is_some() && scene.solids.iter().any(|s| s.is_free());
+        let contact = case.contact.is_some() && scene.solids.iter().any(|s| s.gives_way());
         let (wet, means) = (case.fluid.is_some(), case.gauge.mean.then(Means::default));
         let mut out = Self { means, wet, contact, ..Self::default() };
         // Walls that never move, those of solids of any shape among them.
-        let still = scene.solids.iter().filter(|s| s.is_still()).flat_map(|s| s.wall_slots.clone());
+        let still = (0..scene.solids.len()).filter(|&k| scene.stands(k));
+        let still = still.flat_map(|k| scene.solids[k].wall_slots.clone());
         let slots: Vec<usize> = scene.groups.static_wall_range().chain(still).collect();
         let wall: Vec<DVec3> = slots.iter().map(|&slot| scene.position[slot]).collect();
         for (k, gauge) in case.gauge.pressure.iter().enumerate() {

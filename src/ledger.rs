@@ -93,8 +93,11 @@ impl Ledger {
         self.0[entry as usize] += work;
     }
 
-    /// Save the work so far under `name`, or take it over.
+    /// Save the work so far under `name`, or take it over; that of another run it leaves to that.
     pub(crate) fn exchange(&mut self, archive: &mut Archive, name: &str) -> Result<()> {
+        if archive.is_of_another() {
+            return Ok(());
+        }
         let mut entries = Entry::ALL.iter().zip(&mut self.0);
         entries.try_for_each(|(entry, work)| archive.number(&format!("{name}.{}", entry.name()), work))
     }

@@ -385,7 +385,7 @@ impl Params {
             dt
         };
         let c = self.sound_speed(dt);
-        // A slam: 40 rho v^2 for a wedge of 10 degrees, more for what falls flat.
+        // A slam: up to 31 rho v^2. A wedge of 10 degrees comes to 40, what falls flat to more: such peaks are cut, and counted.
         let slam = (SOUND_OVER_FLOW * speed).powi(2);
         let most = if head > 0.0 {
             // Viscosity: over the length of the domain in gaps of a spacing.

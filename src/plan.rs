@@ -4,6 +4,7 @@
 use crate::case::{self, Case, ContactDevice, stands_for};
 use crate::compute::Program;
 use crate::contact;
+use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::scene::{Scene, Solid};
 use crate::scheme::{Gradient, Preconditioner, Source};
@@ -153,9 +154,22 @@ impl ContactPlan {
         Self::judge(case, scene, ContactDevice::Gpu)
     }
 
+    /// Refuses a case that asks for a device which has no kernel for its contact: `plan` and `run` ask the same.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Case`] with the reason.
+    pub fn refuse(&self, case: &Case, scene: &Scene) -> Result<()> {
+        let asked = case.contact.as_ref().is_some_and(|c| c.device == ContactDevice::Gpu);
+        if !asked || self.program.is_some() || !scene.solids.iter().any(Solid::gives_way) {
+            return Ok(());
+        }
+        let message = format!("contact.device = \"gpu\": {}", self.reason);
+        Err(Error::key("contact.device", message, "leave `device` out: contact is on the host then"))
+    }
+
     fn judge(case: &Case, scene: &Scene, asked: ContactDevice) -> Self {
         let host = |reason: &str| Self { program: None, reason: reason.into() };
-        let free = |s: &&Solid| s.is_free();
+        let free = |s: &&Solid| s.gives_way();
         let points: usize = scene.solids.iter().filter(free).map(|s| s.wall_offset.len()).sum();
         let program = match case.contact.as_ref().map(|c| c.law) {
             None => return host("no contact"),
@@ -205,7 +219,7 @@ impl Told {
 const REACTING: [Stage; 3] = [Stage::Viscosity, Stage::WallFriction, Stage::Collision];
 
 /// Why a stage runs, or why it is left out.
-type Reason = (Stage, Result<&'static str, &'static str>);
+type Reason = (Stage, std::result::Result<&'static str, &'static str>);
 
 /// Whether `stage` runs by the `reasons` of all.
 fn runs(reasons: &[Reason], stage: Stage) -> bool {

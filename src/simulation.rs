@@ -132,6 +132,7 @@ impl Simulation {
         let settings = settings(case);
         let mut solids = Solids::new(&scene, case.contact.as_ref())?;
         crate::sense::refuse(case, &scene, &params, &solids)?;
+        plan.contact.refuse(case, &scene)?;
         let scene = settle(scene, &params, &plan, settings)?;
         let mut backend = make(&scene, &params, &plan, settings)?;
         let device = case.contact.as_ref().map_or(ContactDevice::Host, |c| c.device);

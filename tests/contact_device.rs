@@ -314,6 +314,13 @@ fn two_runs_give_the_same_bits_and_two_solids_exchange_momentum_exactly() {
 
 /// A dry case of `count` cubes of 0.1 m (152 surface points) with `line` in its contact section.
 fn cubes(count: usize, line: &str) -> (Case, Scene) {
+    let case: Case = toml::from_str(&cubes_text(count, line)).expect("valid");
+    let scene = Scene::build(&case).expect("it builds");
+    (case, scene)
+}
+
+/// The same as a file.
+fn cubes_text(count: usize, line: &str) -> String {
     let mut text = format!(
         "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n[tank]\nmin = [0, 0, 0]\nmax = [{}, 0.2, 0.3]\n\
          [contact]\nspring = 1e5\n{line}\n",
@@ -325,9 +332,7 @@ fn cubes(count: usize, line: &str) -> (Case, Scene) {
             "[[body]]\nname = \"cube {k}\"\nsize = [0.1, 0.1, 0.1]\ncenter = [{x:.3}, 0.1, 0.05]\ndensity = 500\n"
         );
     }
-    let case: Case = toml::from_str(&text).expect("valid");
-    let scene = Scene::build(&case).expect("the scene builds");
-    (case, scene)
+    text
 }
 
 #[test]
@@ -336,7 +341,7 @@ fn the_plan_leaves_few_points_to_the_host_and_many_to_the_device() {
         (1, "", None, "98 surface points, below 20000"),
         (210, "", Some("contact_smooth"), "20580 surface points, 20000 or more"),
         (210, "law = \"paper\"", Some("contact_paper"), "20580 surface points"),
-        (210, "law = \"pressure\"", None, "baseline"),
+        (210, "law = \"pressure\"", None, "law \"pressure\""),
         (210, "device = \"host\"", None, "contact.device = \"host\""),
         (1, "device = \"gpu\"", Some("contact_smooth"), "contact.device = \"gpu\""),
     ] {
@@ -349,6 +354,30 @@ fn the_plan_leaves_few_points_to_the_host_and_many_to_the_device() {
         let bytes = gpu::memory(&scene, &params, &plan).expect("it can be counted").total();
         assert_eq!(bytes > 0, kernel.is_some(), "{count} {line}: {bytes} bytes");
         assert_eq!(gpu::kernels::planned(&plan).map(|p| p.name).collect::<Vec<_>>(), Vec::from_iter(kernel));
+    }
+}
+
+#[test]
+fn a_device_that_is_asked_for_and_has_no_kernel_is_refused() {
+    for (line, more, why) in [
+        ("law = \"pressure\"", "", "law \"pressure\""),
+        (
+            "",
+            "[[obstacle]]\nname = \"post\"\nshape = \"cylinder\"\nradius = 0.05\nheight = 0.1\ncenter = [0.3, 0.1, 0.2]\n",
+            "no boxes",
+        ),
+        (
+            "",
+            "[[body]]\nname = \"keel\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.3, 0.1, 0.2]\ndensity = 500\nmass_offset = [0, 0, -0.02]\n",
+            "mass_offset",
+        ),
+    ] {
+        let text = format!("{}{more}", cubes_text(2, &format!("device = \"gpu\"\n{line}")));
+        let case: Case = toml::from_str(&text).expect("valid");
+        let scene = Scene::build(&case).expect("builds");
+        let told = Simulation::on(&case, scene, &Processor::Cpu).err().expect("refused").to_string();
+        assert!(told.contains("contact.device") && told.contains(why), "{told}");
+        assert!(!told.contains("--backend gpu"), "{told}");
     }
 }
 

@@ -138,6 +138,24 @@ fn what_is_scattered_keeps_clear_of_slopes_and_grounds() {
 }
 
 #[test]
+fn scattered_bodies_keep_clear_of_scattered_obstacles() {
+    for seed in 0..5 {
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [2, 1, 1]\n\
+             [contact]\nspring = 1e5\n\
+             [[obstacle]]\nname = \"pile\"\nshape = \"cylinder\"\nradius = 0.1\nheight = 0.9\ncenter = [1, 0.5, 0.5]\n\
+             scatter = {{ count = 6, size = [1.9, 0.9, 0.9], seed = {seed}, turned = \"no\" }}\n\
+             [[body]]\nname = \"rock\"\nsize = [0.2, 0.1, 0.1]\ncenter = [1, 0.5, 0.5]\ndensity = 500\n\
+             scatter = {{ count = 30, size = [1.9, 0.9, 0.9], seed = {seed} }}\n"
+        );
+        let case: Case = text.parse().unwrap_or_else(|e: Error| panic!("{e}"));
+        // That none overlaps another is what the scene looks at.
+        let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{seed}: {e}"));
+        assert_eq!(scene.solids.len(), 36);
+    }
+}
+
+#[test]
 fn what_is_wrong_with_many_is_told_where_it_was_written() {
     let six = "array = { count = [3, 1, 2], step = [0.3, 0, 0.1001] }\n";
     let thrice = |text: &str, part: &str| assert_eq!(text.matches(part).count(), 1, "{text}");

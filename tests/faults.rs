@@ -174,6 +174,7 @@ fn pressures_that_are_cut_are_judged() {
     let scale = Scale::new(&simulation, &simulation.scene);
     let mut summary = Summary { steps: 100, ..Summary::default() };
     summary.particles.fluid = 1000;
+    summary.pressure.solves = 100;
     summary.pressure.unknowns_mean = 2000.0;
     for (clamps, grade) in [(0, Grade::Fine), (10, Grade::Fine), (400, Grade::Degraded)] {
         summary.pressure.clamps = clamps;

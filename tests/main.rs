@@ -29,6 +29,7 @@ mod frames;
 mod fuzz;
 mod gauges;
 mod guide;
+mod held;
 mod hinges;
 mod hulls;
 mod immersed;

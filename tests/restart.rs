@@ -387,6 +387,55 @@ fn a_body_that_is_driven_in_a_state_is_free_from_then_on() {
     }
 }
 
+/// A state may be gone on with under other laws, masses and freedoms: what follows from those is made anew.
+#[test]
+fn another_run_takes_over_how_things_move_and_nothing_that_followed_from_laws() {
+    let body = |more: &str| format!("body=[{{name=\"wheel\",size=[0.2,0.05,0.1],center=[1.5,0,0.7]{more}}}]");
+    let (turned, free) = (
+        body(",rotation=[[0,0,0,0],[1,0,90,0]]"),
+        body(",density=500,velocity=[0.5,0,0],angular_velocity=[0,2,0]"),
+    );
+    let dry = ["run.gravity=[0,0,0]", "run.adaptive=false", "run.time_step=1e-3"];
+    let soft = "contact.spring=1e5";
+    let end = |sets: &[&str], name: &str, from: Option<&Case>| {
+        let from = from.map(|case| format!("run.from=\"{}\"", case.root("run").display()));
+        let end = if from.is_some() { "run.end=0.1" } else { "run.end=0.05" };
+        let sets: Vec<&str> =
+            dry.iter().chain(sets).chain(from.as_deref().iter()).chain([&end]).copied().collect();
+        let case = Case::new(&sets, "cpu");
+        let ran = case.run("run", &[]);
+        assert_eq!(ran.code, 0, "{name}: {}", ran.err);
+        let result = json(&std::fs::read_to_string(case.root("run").join("result.json")).unwrap());
+        (case, result)
+    };
+    let of =
+        |result: &serde_json::Value, key: &str, axis: usize| result["bodies"][0][key][axis].as_f64().unwrap();
+    // Driven round and let go, it turns on; it is high above the water.
+    let (driven, _) = end(&[&turned, soft], "driven", None);
+    let (_, freed) = end(&[&body(",density=500"), soft], "freed", Some(&driven));
+    let spin = of(&freed, "angular_velocity_rad_s", 1);
+    assert!((spin / (std::f64::consts::FRAC_PI_2) - 1.0).abs() < 1e-6, "{spin}");
+    // Locked from then on, it stands; heavier, it goes on as fast.
+    let (moving, before) = end(&[&free, soft], "free", None);
+    let more = |more: &str| body(&format!(",velocity=[0.5,0,0],angular_velocity=[0,2,0],{more}"));
+    let (_, heavy) = end(&[&more("density=5000"), soft], "heavy", Some(&moving));
+    assert!((of(&heavy, "angular_velocity_rad_s", 1) - 2.0).abs() < 1e-9, "{heavy}");
+    assert!((of(&heavy, "velocity_m_s", 0) - 0.5).abs() < 1e-9, "{heavy}");
+    let (_, held) = end(&[&more("density=500,locked=[\"x\"]"), soft], "held", Some(&moving));
+    let way = |r: &serde_json::Value| of(r, "position_m", 0) - of(&before, "position_m", 0);
+    assert!((way(&heavy) - 0.025).abs() < 1e-6 && way(&held) == 0.0, "{} {}", way(&heavy), way(&held));
+    assert_eq!(of(&held, "velocity_m_s", 0), 0.0);
+    // A harder spring is cut into more sub-steps; a ledger begins with the run.
+    let (_, hard) = end(&[&free, "contact.spring=1e7", "output.ledger=true"], "hard", Some(&moving));
+    let substeps = |r: &serde_json::Value| r["monitors"]["contact_substeps_max"].as_u64().unwrap();
+    assert!(substeps(&hard) > substeps(&before), "{} {}", substeps(&hard), substeps(&before));
+    let left = hard["ledger_J"]["unaccounted"].as_f64().unwrap();
+    assert!(left.abs() < 1e-9, "{left}");
+    // Solves are those of the run.
+    let steps = |r: &serde_json::Value| r["steps"].as_u64().unwrap();
+    assert_eq!(hard["pressure"]["solves"].as_u64().unwrap(), steps(&hard) - steps(&before));
+}
+
 #[cfg(unix)]
 #[test]
 fn signals_and_the_clock_stop_a_run_with_its_state_saved() {

@@ -252,6 +252,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         // What `run` refuses.
         let solids = Solids::new(scene, case.contact.as_ref())?;
         seixo::sense::refuse(case, scene, &params, &solids)?;
+        plan.contact.refuse(case, scene)?;
         Gauges::new(case, scene)?;
         advice.extend(if free { solids.advice(dt).words } else { Vec::new() });
     } else if plan.has(Stage::Contact) {

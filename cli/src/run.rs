@@ -264,7 +264,8 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
         ));
         let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
         words.iter().for_each(|line| remark(line));
-        let advice = simulation.solids.advice(simulation.case.run.time_step);
+        let step = shortest(&simulation.case, &setup.scene, &simulation.params);
+        let advice = simulation.solids.advice(step);
         advice.words.iter().for_each(|line| remark(line));
     }
     let mut display = Display::new(args.quiet, simulation.plan.wet());

@@ -114,7 +114,9 @@ impl Counters {
         }
         archive.count("counters.lost", lost)?;
         archive.count("counters.displacement_clamps", displacement_clamps)?;
-        archive.count("counters.pressure_clamps", pressure_clamps)?;
+        if !archive.is_of_another() {
+            archive.count("counters.pressure_clamps", pressure_clamps)?;
+        }
         archive.count("counters.negative_pressures", negative_pressures)?;
         archive.small("counters.neighbours_max", neighbours_max)?;
         let mut none = non_finite.unwrap_or(u32::MAX);

@@ -87,6 +87,10 @@ impl Body {
             Drive::Prescribed(motion) => {
                 body.motion = Some((solid.position, body.pose.orientation, motion.clone()));
             }
+            // What is held in all that it could do is a wall to others.
+            Drive::Free(free) if !free.gives_way() => {
+                body.motion = Some((solid.position, body.pose.orientation, Motion::still()));
+            }
             Drive::Free(free) => {
                 let flat = dimensions == 2;
                 let translation = [0, 1, 2].map(|k| free.locked_translation[k] || flat && k == 1);
@@ -98,11 +102,8 @@ impl Body {
                     DVec3::from_array(translation.map(|locked| if locked { 0.0 } else { 1.0 / free.mass }));
                 body.isotropic =
                     free.inertia == DVec3::splat(free.inertia.x) && body.locked_rotation == [false; 3];
-                body.pose.velocity = free.velocity * body.inverse_mass * free.mass;
-                let spin = body.free_axes() * free.angular_velocity;
-                body.momentum = body.free_axes() * (body.inertia(body.rotation) * spin);
-                body.inverse_inertia = body.inverse_inertia_at(body.rotation);
-                body.pose.angular_velocity = body.inverse_inertia * body.momentum;
+                let (velocity, angular_velocity) = (free.velocity, free.angular_velocity);
+                body.take_over(Pose { velocity, angular_velocity, ..body.pose }, DVec3::ZERO);
             }
         }
         body
@@ -255,6 +256,20 @@ impl Body {
         self.momentum = momentum;
         if self.is_free() {
             self.inverse_inertia = self.inverse_inertia_at(self.rotation);
+        }
+    }
+
+    /// Moves on from `pose` as far as its freedom goes, with `momentum` [kg m2/s] if that is still what turns it so.
+    pub fn take_over(&mut self, pose: Pose, momentum: DVec3) {
+        self.restore(pose, momentum);
+        if self.is_free() && self.inverse_inertia * momentum != pose.angular_velocity {
+            let spin = self.free_axes() * pose.angular_velocity;
+            self.momentum = self.free_axes() * (self.inertia(self.rotation) * spin);
+            self.pose.angular_velocity = self.inverse_inertia * self.momentum;
+        }
+        if self.is_free() {
+            let open = self.inverse_mass.to_array().map(|give| if give > 0.0 { 1.0 } else { 0.0 });
+            self.pose.velocity *= DVec3::from_array(open);
         }
     }
 

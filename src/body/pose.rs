@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 /// Position and velocity of a solid, world axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Centre of mass [m].
+    /// What it moves and turns about [m]: the centre of mass, or a place on its hinge.
     pub position: DVec3,
     /// Orientation: turns the solid's frame into the world's.
     pub orientation: DQuat,
-    /// Velocity of the centre of mass [m/s].
+    /// Velocity of `position` [m/s].
     pub velocity: DVec3,
     /// Angular velocity [rad/s].
     pub angular_velocity: DVec3,
@@ -36,12 +36,12 @@ impl Pose {
     }
 }
 
-/// Force [N] and torque about the centre of mass [N m], world axes.
+/// Force [N] and torque about the position of the solid [N m], world axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     /// Force [N].
     pub force: DVec3,
-    /// Torque about the centre of mass [N m].
+    /// Torque about the position of the solid [N m].
     pub torque: DVec3,
 }
 

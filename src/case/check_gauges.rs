@@ -18,7 +18,7 @@ impl Checker<'_> {
             ("velocity", names(&mut gauges.velocity.iter().map(|g| &g.name))),
             ("volume", names(&mut gauges.volume.iter().map(|g| &g.name))),
         ];
-        let moves = case.body.iter().any(|b| b.can_move());
+        let moves = case.body.iter().any(|b| b.can_move(self.flat()));
         for (kind, names) in &kinds {
             // what bodies press there is without water, too
             let known = case.fluid.is_some() || *kind == "force" && moves;

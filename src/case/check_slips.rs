@@ -64,6 +64,9 @@ impl Checker<'_> {
         for (k, shape) in fluid.shape.iter().enumerate() {
             self.speed(&format!("fluid.shape.{k}.velocity"), length(&shape.velocity), most);
         }
+        for (k, fill) in fluid.fill.iter().enumerate() {
+            self.speed(&format!("fluid.fill.{k}.velocity"), length(&fill.velocity), most);
+        }
     }
 
     /// Warns of a speed at the start above `most`, refuses one that nothing has [m/s].
@@ -103,8 +106,8 @@ impl Checker<'_> {
             }
             // Of all masses within the radius, the most that any has about any axis.
             let most = mass * radius * radius / share;
-            let moments = body.inertia.unwrap_or_default();
-            let about = if flat { vec![moments[1]] } else { moments.to_vec() };
+            let moments = body.moments(flat).unwrap_or_default();
+            let about = if flat { vec![moments.y] } else { moments.to_array().to_vec() };
             if let Some(moment) = about.into_iter().find(|&i| i > 1.001 * most) {
                 let message = format!(
                     "a moment of {moment} kg m2 is more than any mass of {:.4e} kg within {radius:.4} m has",

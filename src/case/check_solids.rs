@@ -2,7 +2,7 @@
 
 use super::check::{Checker, length};
 use super::section::flaw;
-use super::{Axis, Body, BodyShape, Contact, ContactDevice, Form, Law};
+use super::{Axis, Body, BodyShape, Contact, Form, Freedom, Law};
 use glam::DMat3;
 
 /// Most sub-steps of a step that a case can ask for.
@@ -33,7 +33,7 @@ impl Checker<'_> {
             &format!("body.{k}"),
             &[("mass", body.mass.is_some()), ("density", body.density.is_some())],
         );
-        if given == 0 && !body.is_driven() {
+        if given == 0 && body.can_move(self.flat()) {
             self.add(
                 format!("body.{k}"),
                 format!("body `{}` has neither mass nor density", body.name),
@@ -92,6 +92,7 @@ impl Checker<'_> {
                 }
             }
         }
+        self.unmoved(&format!("body.{k}"), body);
         self.in_plane(&path("velocity"), &body.velocity);
         self.about_y(&path("angular_velocity"), &body.angular_velocity);
         if body.standing && length(&self.case.run.gravity) == 0.0 {
@@ -106,15 +107,43 @@ impl Checker<'_> {
         }
     }
 
+    /// What it starts with along freedoms that it has not.
+    fn unmoved(&mut self, path: &str, body: &Body) {
+        // A state says how it moves, and may be of a run in which it was free.
+        if self.case.run.from.is_some() {
+            return;
+        }
+        let hinged = body.hinge.as_ref().map(|hinge| hinge.axis as usize);
+        let turns = [Freedom::RotationX, Freedom::RotationY, Freedom::RotationZ];
+        let held = |axis: usize, freedom: Freedom, turns: bool| match hinged {
+            Some(free) => !turns || axis != free,
+            None => body.locked.contains(&freedom),
+        };
+        let speeds = [
+            ("velocity", [Freedom::X, Freedom::Y, Freedom::Z], body.velocity, false),
+            ("angular_velocity", turns, body.angular_velocity, true),
+        ];
+        for (key, freedoms, speed, turns) in speeds {
+            if let Some(axis) = (0..3).find(|&k| speed[k] != 0.0 && held(k, freedoms[k], turns)) {
+                let (what, axis) =
+                    (if hinged.is_some() { "its hinge" } else { "`locked`" }, ["x", "y", "z"][axis]);
+                let message =
+                    format!("{what} holds body `{}`: it cannot have `{key}` along {axis}", body.name);
+                self.add(format!("{path}.{key}"), message, "set that number to 0, or let it go");
+            }
+        }
+    }
+
     /// Where its mass is, and a hinge.
     fn held(&mut self, path: &str, body: &Body) {
         let key = |key: &str| format!("{path}.{key}");
         if let Some(offset) = &body.mass_offset {
             self.in_plane(&key("mass_offset"), offset);
-            let (far, reach) = (length(offset), body.form().reach());
+            let shape = self.spacing().and_then(|l0| body.form().shape(l0, self.flat()).ok());
+            let (far, reach) = (length(offset), shape.map_or(f64::INFINITY, |(shape, _)| shape.radius()));
             if far > reach {
                 let message = format!(
-                    "the centre of mass would be {far} m from the centre, beyond all of the body ({reach} m)"
+                    "the centre of mass would be {far} m from the centre, beyond all of the body ({reach:.4} m)"
                 );
                 self.add(key("mass_offset"), message, "give the way from `center` to it [m], not its place");
             }
@@ -157,7 +186,7 @@ impl Checker<'_> {
             let lengths = [x, if flat { x } else { y }, z].map(|l| if l > 0.0 { l } else { f64::INFINITY });
             lengths.into_iter().fold(f64::INFINITY, f64::min)
         };
-        let free = self.case.body.iter().filter(|b| b.can_move());
+        let free = self.case.body.iter().filter(|b| b.can_move(flat));
         if spring == 0.0 {
             let stiff = free.map(|b| 100.0 * weight(b) / smallest(b)).fold(0.0, f64::max);
             let stiff = if stiff > 0.0 {
@@ -285,13 +314,14 @@ impl Checker<'_> {
 
     pub(super) fn contact(&mut self) {
         let Some(contact) = &self.case.contact else {
-            if let Some(body) = self.case.body.iter().find(|b| b.can_move()) {
+            let flat = self.flat();
+            if let Some(body) = self.case.body.iter().find(|b| b.can_move(flat)) {
                 let message = format!("body `{}` can move, but there is no [contact]", body.name);
                 self.add(
                     "contact",
                     message,
                     "add [contact] with `spring` [N/m], e.g. 1e5 (`seixo plan` then tells what the bodies ask for), or \
-                     lock all six of the body's freedoms",
+                     lock all of the body's freedoms",
                 );
             }
             return;
@@ -328,20 +358,6 @@ impl Checker<'_> {
                 format!("allowed: 1 to {MOST_SUBSTEPS}, or leave it out for as many as stability asks for"),
             ),
             _ => {}
-        }
-        if contact.device == ContactDevice::Gpu && contact.law == Law::Pressure {
-            let remedy = "leave `device` out or set law = \"smooth\" or \"paper\"";
-            self.add("contact.device", "law = \"pressure\" runs on the host only", remedy);
-        }
-        let round = self.case.body.iter().find(|b| b.shape != BodyShape::Box);
-        if let Some(body) =
-            round.filter(|_| contact.device == ContactDevice::Gpu && contact.law == Law::Smooth)
-        {
-            let message = format!(
-                "body `{}` is round: its contact by law = \"smooth\" runs on the host only",
-                body.name
-            );
-            self.add("contact.device", message, "leave `device` out");
         }
         if contact.viscous_friction != 0.0 && contact.law == Law::Pressure {
             let message = "`viscous_friction` belongs to law = \"paper\" or \"smooth\"";

@@ -80,12 +80,13 @@ pub struct Contact {
 #[serde(deny_unknown_fields)]
 pub struct ContactPair {
     /// Names of the two: bodies, moving walls, obstacles, planes, faces of the tank such as `tank.z_min`, or `tank` for all of
-    /// these. `*` stands for any letters: `"rock*"`. Of pairs that name the same two solids the last one counts.
+    /// these. `*` stands for any letters: `"rock*"`. Of pairs that name the same two solids the last one that gives
+    /// a number counts for it.
     pub between: [String; 2],
-    /// Coulomb coefficient mu between them [-], static and kinetic; that of `[contact]` if absent.
+    /// Coulomb coefficient mu between them [-], static and kinetic; that of an earlier pair or of `[contact]` if absent.
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub friction: Option<f64>,
-    /// Normal restitution e between them [-]; that of `[contact]` if absent.
+    /// Normal restitution e between them [-]; that of an earlier pair or of `[contact]` if absent.
     #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub restitution: Option<f64>,
 }

@@ -261,19 +261,18 @@ pub(super) fn lay_out(case: &mut Case) -> Vec<Problem> {
         return problems;
     }
     let run = &case.run;
-    let mut room = Standing::new(run.spacing, run.dimensions == 2);
+    let nothing = || Standing::new(run.spacing, run.dimensions == 2);
+    // Scattered obstacles keep clear of each other; other ones may well be the ground that they stand in.
+    let obstacle = rows(&case.obstacle, &mut nothing(), &mut problems);
+    let mut room = nothing();
     if case.body.iter().any(|body| body.scatter.is_some()) {
-        // What is written down stands before what finds itself a place.
+        // What is written down stands before what finds itself a place, and walls before bodies.
         case.body.iter().flat_map(placed).for_each(|one| room.add(&one.form(), one.center));
         let tank = case.tank.as_ref();
         let walls = case.moving_wall.iter().map(|wall| wall.wall(tank));
-        let fixed: Vec<Obstacle> = case.obstacle.iter().flat_map(placed).collect();
-        walls.chain(fixed.iter().map(|one| one.wall(tank))).for_each(|wall| room.add_wall(&wall));
+        walls.chain(obstacle.iter().map(|(_, one)| one.wall(tank))).for_each(|wall| room.add_wall(&wall));
     }
     let body = rows(&case.body, &mut room, &mut problems);
-    // Scattered obstacles keep clear of each other; other ones may well be the ground that they stand in.
-    let mut room = Standing::new(run.spacing, run.dimensions == 2);
-    let obstacle = rows(&case.obstacle, &mut room, &mut problems);
     if problems.is_empty() {
         let mut typed = Typed::default();
         (case.written.body, typed.body) = body.into_iter().unzip();
@@ -384,7 +383,8 @@ impl Checker<'_> {
             let (key, _) = one.place();
             if key != "center" || one.form().shape.has_origin() && T::TABLE == "obstacle" {
                 let message = "what is scattered needs a `center`, the middle of the box for it";
-                let remedy = "give `size` and `center`, or make it a [[body]] with all six freedoms locked";
+                let remedy =
+                    "give `size` and `center`, or make it a [[body]] with all of its freedoms locked";
                 self.add(format!("{path}.scatter"), message, remedy);
             }
         }

@@ -2,7 +2,7 @@
 //! arm in `src/shape` all that a new one takes.
 
 use super::section::flaw;
-use super::{Body, MovingWall, Obstacle, Tank, Turn, Vector};
+use super::{Body, Freedom, MovingWall, Obstacle, Tank, Turn, Vector};
 use crate::error::Problem;
 use crate::shape::{Cylinder, Disc, Polygon, Shape, Sphere};
 #[cfg(feature = "mesh")]
@@ -194,14 +194,21 @@ impl Body {
         guide.motion.is_some() || guide.sine.is_some() || guide.turns()
     }
 
-    /// Whether forces can move it.
-    pub(crate) fn can_move(&self) -> bool {
-        !self.is_driven() && self.locked.len() < 6
+    /// Whether forces can move it, in the `plane` or in space.
+    pub(crate) fn can_move(&self, plane: bool) -> bool {
+        let held = || Freedom::all(plane).iter().all(|freedom| self.locked.contains(freedom));
+        !self.is_driven() && (self.hinge.is_some() || !held())
     }
 
     /// The keys that make its shape.
     pub(crate) fn form(&self) -> Form<'_> {
         form!(self, LARGE)
+    }
+
+    /// Its `inertia` in the frame of its shape: in the `plane` a cylinder's own axis, the third of it, is y.
+    pub(crate) fn moments(&self, plane: bool) -> Option<DVec3> {
+        let lies = plane && self.shape == BodyShape::Cylinder;
+        self.inertia.map(|i| if lies { DVec3::new(i[0], i[2], i[1]) } else { i.into() })
     }
 }
 
@@ -252,13 +259,18 @@ impl Form<'_> {
 
     /// Turn of the shape's frame, [`Shape::frame`] left aside; a cylinder stands along the z axis of its own.
     pub(crate) fn turn(&self, plane: bool) -> DQuat {
-        let turn = self.orientation.map_or(DQuat::IDENTITY, |turn| {
-            DQuat::from_axis_angle(DVec3::from(turn.axis).normalize(), turn.angle_deg.to_radians())
-        });
+        let turn = self.orientation();
         match self.axis {
             Some(axis) if !plane => turn * DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
             _ => turn,
         }
+    }
+
+    /// What `orientation` says, an `axis` left aside.
+    pub(crate) fn orientation(&self) -> DQuat {
+        self.orientation.map_or(DQuat::IDENTITY, |turn| {
+            DQuat::from_axis_angle(DVec3::from(turn.axis).normalize(), turn.angle_deg.to_radians())
+        })
     }
 
     /// The corners of a section that encloses something.

@@ -96,6 +96,16 @@ pub enum Freedom {
     RotationZ,
 }
 
+impl Freedom {
+    /// Those that a body has, in the `plane` or in space.
+    pub(crate) fn all(plane: bool) -> &'static [Self] {
+        match plane {
+            true => &[Self::X, Self::Z, Self::RotationY],
+            false => &[Self::X, Self::Y, Self::Z, Self::RotationX, Self::RotationY, Self::RotationZ],
+        }
+    }
+}
+
 /// A hinge without friction. Contact acts on the body as on any other: leave room between it and what it would rub against.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -151,7 +161,8 @@ pub struct Body {
     /// `orientation` turns it.
     pub mass_offset: Option<Vector>,
     /// Principal moments of inertia about the centre of mass [kg m2], of the same whole body as `mass`; those of a
-    /// uniform body about its own if absent. A cylinder's third axis is its own.
+    /// uniform body about its own if absent. A cylinder's third axis is its own, those of a mesh are in the order of the file's
+    /// axes that they lie nearest.
     #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]
     pub inertia: Option<Vector>,
     /// Orientation at t = 0.

@@ -124,6 +124,7 @@ impl Checker<'_> {
         }
         for (k, fill) in fills.iter().enumerate() {
             let path = format!("fluid.fill.{k}");
+            self.in_plane(&format!("{path}.velocity"), &fill.velocity);
             self.place(&format!("{path}.seed"), &fill.seed);
             self.place(&format!("{path}.level"), &[fill.level]);
             if fill.seed[2] >= fill.level {

@@ -22,6 +22,8 @@ pub struct Archive {
     saving: bool,
     /// It goes to the disk, and so must the files that it belongs to.
     lasting: bool,
+    /// It is of another run, see [`Self::is_of_another`].
+    of_another: bool,
     /// Single numbers, bit by bit.
     pub numbers: BTreeMap<String, u64>,
     /// Arrays.
@@ -41,7 +43,7 @@ impl Archive {
 
     /// A state that was read, to be taken over.
     pub fn read(numbers: BTreeMap<String, u64>, sections: BTreeMap<String, Section>) -> Self {
-        Self { saving: false, lasting: false, numbers, sections }
+        Self { numbers, sections, ..Self::default() }
     }
 
     /// The same state, to be taken over.
@@ -54,9 +56,20 @@ impl Archive {
         Self { saving: false, lasting: false, ..self }
     }
 
+    /// The state itself, to be taken over by another run.
+    pub fn into_beginning(self) -> Self {
+        Self { of_another: true, ..self.into_restore() }
+    }
+
     /// Whether values go into the state (or come out of it).
     pub fn is_saving(&self) -> bool {
         self.saving
+    }
+
+    /// Whether another run takes it over (`run.from`): where things are and how they move is the state's; what followed from the old
+    /// run's laws and constants, and its sums, are not.
+    pub fn is_of_another(&self) -> bool {
+        self.of_another
     }
 
     /// Whether the state goes to the disk.

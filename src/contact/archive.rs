@@ -11,6 +11,10 @@ use glam::{DQuat, DVec3};
 
 /// A pose as numbers.
 const POSE: usize = 13;
+/// Names of what another run takes over, too.
+const POSES: &str = "solids.pose";
+const MOMENTA: &str = "solids.momentum";
+const TURNS: &str = "solids.turns";
 
 fn numbers(pose: &Pose) -> [f64; POSE] {
     let Pose { position, orientation, velocity, angular_velocity } = *pose;
@@ -59,6 +63,7 @@ impl Solids {
             candidates,
             planned,
             substep,
+            whole,
         } = self;
         let Limits {
             spring: _,
@@ -71,6 +76,9 @@ impl Solids {
             falling: _,
             longest_step,
         } = limits;
+        if archive.is_of_another() {
+            return self.take_over(archive);
+        }
         archive.number("solids.longest_step", longest_step)?;
         let (mut dt, mut cut) = planned.unwrap_or((-1.0, Cut::new(1, 1, 0.0)));
         // of what is planned nothing is cut through as yet
@@ -83,15 +91,16 @@ impl Solids {
         let substeps = *substeps;
         *planned = Some((dt, cut)).filter(|p| p.0 > 0.0);
         archive.number("solids.substep", substep)?;
+        archive.number("solids.whole_substep", whole)?;
         let mut now: Vec<[f64; POSE]> = bodies.iter().map(|b| numbers(&b.pose)).collect();
         let mut momenta: Vec<DVec3> = bodies.iter().map(|b| b.momentum).collect();
         let mut wrenches: Vec<[DVec3; 2]> = contact.iter().map(|w| [w.force, w.torque]).collect();
-        archive.array("solids.pose", &mut now, true)?;
-        archive.array("solids.momentum", &mut momenta, true)?;
+        archive.array(POSES, &mut now, true)?;
+        archive.array(MOMENTA, &mut momenta, true)?;
         archive.array("solids.contact", &mut wrenches, true)?;
         fixed.exchange(archive)?;
         if periodic.is_any() {
-            archive.array("solids.turns", turns, true)?;
+            archive.array(TURNS, turns, true)?;
         }
         let Candidates { travel, skin: _, valid, generation: _, close: _, made, made_dt, periodic: _ } =
             candidates;
@@ -119,6 +128,26 @@ impl Solids {
             body.restore(pose(&now[k]), momenta[k]);
             self.poses[k] = body.pose;
             self.contact[k] = Wrench { force: wrenches[k][0], torque: wrenches[k][1] };
+        }
+        Ok(())
+    }
+
+    /// Takes the poses over from another run, in which the solids may have had other masses, freedoms, motions and laws.
+    fn take_over(&mut self, archive: &mut Archive) -> Result<()> {
+        let mut now: Vec<[f64; POSE]> = self.bodies.iter().map(|b| numbers(&b.pose)).collect();
+        let mut momenta: Vec<DVec3> = self.bodies.iter().map(|b| b.momentum).collect();
+        archive.array(POSES, &mut now, true)?;
+        archive.array(MOMENTA, &mut momenta, true)?;
+        if self.periodic.is_any() {
+            archive.array(TURNS, &mut self.turns, true)?;
+        }
+        self.candidates.forget();
+        if let Some(law) = &mut self.law {
+            law.moved();
+        }
+        for (k, body) in self.bodies.iter_mut().enumerate() {
+            body.take_over(pose(&now[k]), momenta[k]);
+            self.poses[k] = body.pose;
         }
         Ok(())
     }

@@ -127,7 +127,7 @@ const MOST_NAMES: usize = 20;
 
 /// Whether forces move something of one end that can touch something of the other.
 fn can_touch(scene: &Scene, ends: &[Named; 2]) -> bool {
-    let free = |k: usize| scene.solids[k].is_free();
+    let free = |k: usize| scene.solids[k].gives_way();
     let moves = |end: &Named| end.solids.iter().enumerate().any(|(k, &is)| is && free(k));
     let all = |end: &Named| end.solids.iter().chain(&end.walls).filter(|is| **is).count();
     // a body does not touch itself

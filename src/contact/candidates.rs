@@ -124,7 +124,13 @@ pub(crate) fn image(body: &Body, way: DVec3) -> Pose {
     Pose { position: body.pose.position + way, ..body.pose }
 }
 
-/// Mass of the relative motion of two solids [kg]; `None` is a wall.
+/// Mass of the relative motion of two solids [kg]; `None` is a wall. Where they are locked in some directions it is that of
+/// those in which it is largest; where forces move neither, of what they would be without.
 pub(crate) fn reduced_mass(bodies: &[Body], a: usize, b: Option<usize>) -> f64 {
-    1.0 / (1.0 / bodies[a].mass + b.map_or(0.0, |b| 1.0 / bodies[b].mass))
+    let give = bodies[a].inverse_mass + b.map_or(DVec3::ZERO, |b| bodies[b].inverse_mass);
+    let least = give.to_array().into_iter().filter(|&give| give > 0.0).fold(f64::INFINITY, f64::min);
+    match least.is_finite() {
+        true => 1.0 / least,
+        false => 1.0 / (1.0 / bodies[a].mass + b.map_or(0.0, |b| 1.0 / bodies[b].mass)),
+    }
 }

@@ -78,6 +78,8 @@ pub struct Solids {
     planned: Option<(f64, Cut)>,
     /// Sub-step [s] of the last step; 0 before the first.
     substep: f64,
+    /// The one that the constants of its contacts are for [s]: that itself, or what it is a part of.
+    whole: f64,
 }
 
 impl Solids {
@@ -118,6 +120,7 @@ impl Solids {
             limits,
             planned: None,
             substep: 0.0,
+            whole: 0.0,
         })
     }
 
@@ -263,7 +266,7 @@ impl Solids {
                     self.candidates.travelled(k, body, h);
                 }
                 report.substeps += 1;
-                self.substep = h;
+                (self.substep, self.whole) = (h, whole);
             }
         }
         report.penetration_max_over_l0 /= self.spacing;

@@ -45,7 +45,7 @@ pub struct SolidState {
     pub pose: Pose,
     /// Whole lengths that it has gone over periodic sides.
     pub turns: IVec3,
-    /// Angular momentum about the centre of mass [kg m2/s].
+    /// Angular momentum about its position [kg m2/s].
     pub angular_momentum: DVec3,
     /// Mean contact wrench of the last step.
     pub contact: Wrench,

@@ -17,7 +17,7 @@ impl Solids {
         self.candidates.refresh(&self.bodies, self.spacing, 0.0);
         if let Some(law) = &mut self.law {
             let Self { bodies, candidates, limits, .. } = self;
-            energy.contact = law.energy(Now { bodies, candidates, limits, substep: self.substep });
+            energy.contact = law.energy(Now { bodies, candidates, limits, substep: self.whole });
         }
         energy
     }

@@ -179,10 +179,10 @@ impl Limits {
         }
         let wanted = (worst.wanted - 1e-9).ceil().max(1.0);
         if wanted > f64::from(ABSURD_SUBSTEPS) {
-            let what = if worst.omega_dt / OMEGA_STEP >= worst.damping_dt {
-                format!("contact.spring = {:.3e} N/m", self.spring)
+            let (key, what) = if worst.omega_dt / OMEGA_STEP >= worst.damping_dt {
+                ("contact.spring", format!("contact.spring = {:.3e} N/m", self.spring))
             } else {
-                "what damps contact (damping, damping_ratio, viscous_friction)".into()
+                ("contact", "what damps contact (damping, damping_ratio, viscous_friction)".into())
             };
             let message = format!(
                 "{what} asks for {wanted} contact sub-steps a step, more than {ABSURD_SUBSTEPS}, and law = \"paper\" \
@@ -190,7 +190,7 @@ impl Limits {
             );
             let remedy = "lower it or run.time_step, or use law = \"smooth\"";
             let text = format!("{message}: {remedy}");
-            return Err(CaseError::new(vec![Problem::new("contact.spring", message, remedy)], text));
+            return Err(CaseError::new(vec![Problem::new(key, message, remedy)], text));
         }
         Ok(wanted as u32)
     }
@@ -240,7 +240,7 @@ impl Limits {
 /// Largest speed of a solid at t = 0, or by its table [m/s].
 fn starting_speed(scene: &Scene) -> f64 {
     let start = scene.solids.iter().map(|s| match &s.drive {
-        Drive::Free(body) => body.velocity.length(),
+        Drive::Free(body) => body.velocity.length() + body.angular_velocity.length() * s.radius(),
         Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.radius()),
     });
     start.fold(0.0, f64::max)
@@ -258,7 +258,7 @@ fn fastest_speed(scene: &Scene) -> f64 {
 /// Speed [m/s] of a body that falls from where it starts to the lowest wall, or of water that falls its depth.
 fn falling_speed(scene: &Scene) -> f64 {
     let up = -scene.gravity.normalize_or_zero();
-    let free = scene.solids.iter().filter(|s| s.is_free());
+    let free = scene.solids.iter().filter(|s| s.gives_way());
     let highest = free.map(|s| s.position.dot(up) + s.radius()).fold(f64::NEG_INFINITY, f64::max);
     // of each wall the lowest corner of the face that looks up most
     let floor = |w: &WallShape| {

@@ -35,7 +35,7 @@ pub struct Colliding<'a> {
 /// if no force moves it, or if every pair acts alone.
 pub fn lightness(solid: &Solid, params: &Params) -> f64 {
     match (&solid.drive, params.collision) {
-        (Drive::Free(body), Collision::Shared) => {
+        (Drive::Free(body), Collision::Shared) if body.gives_way() => {
             params.particle_mass() * solid.wall_slots.len() as f64 / body.mass
         }
         _ => 0.0,

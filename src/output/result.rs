@@ -78,6 +78,8 @@ pub struct Particles {
 pub struct Pressure {
     /// Preconditioner that ran: `jacobi` or `multigrid`; nothing for a scene without fluid.
     pub preconditioner: Option<&'static str>,
+    /// Solves of the run, one a step; those before a state of `run.from` are another run's.
+    pub solves: u64,
     /// Mean number of unknowns.
     pub unknowns_mean: f64,
     /// Mean number of iterations a solve.
@@ -132,7 +134,7 @@ pub struct Monitors {
 pub struct Body {
     /// Name.
     pub name: String,
-    /// Centre of mass [m].
+    /// Centre of mass [m]; of a hinged body a place on its hinge.
     pub position_m: [f64; 3],
     /// Orientation, unit quaternion w, x, y, z.
     pub orientation_wxyz: [f64; 4],

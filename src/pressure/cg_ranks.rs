@@ -136,7 +136,9 @@ pub(super) fn solve_on_ranks(
                 system.step(alpha, beta, x, work);
                 // Of the new q = w + beta q.
                 let (r_new, new_new) = (rw + beta * rq, ww + 2.0 * beta * wq + beta * beta * qq);
-                rr = (rr_now - 2.0 * alpha * r_new + alpha * alpha * new_new).max(0.0);
+                let left = rr_now - 2.0 * alpha * r_new + alpha * alpha * new_new;
+                // What is no number stays none.
+                rr = if left < 0.0 { 0.0 } else { left };
                 report.iterations += 1;
                 continue;
             }

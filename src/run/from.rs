@@ -17,7 +17,7 @@ use std::path::Path;
 pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
     let Some(found) = named(&simulation.case)? else { return Ok(None) };
     fits(simulation, &found).map_err(|e| Error::misfit(format!("run.from: {e}")))?;
-    Ok(Some(Found { archive: found.archive.into_restore(), ..found }))
+    Ok(Some(Found { archive: found.archive.into_beginning(), ..found }))
 }
 
 /// The state that `run.from` of `case` names, whatever it is of: the newest that is whole.

@@ -63,6 +63,7 @@ impl Totals {
         // Means are made at the end.
         let Pressure {
             preconditioner: _,
+            solves: _,
             unknowns_mean: _,
             iterations_mean: _,
             iterations_max,
@@ -161,6 +162,7 @@ impl Totals {
         let mut pressure = self.pressure;
         let preconditioner = simulation.plan.preconditioner.name();
         pressure.preconditioner = simulation.plan.wet().then_some(preconditioner);
+        pressure.solves = self.solves;
         pressure.unknowns_mean = per(self.unknowns, self.solves);
         pressure.iterations_mean = per(self.iterations, self.solves);
         let mut monitors = self.monitors;
@@ -184,15 +186,13 @@ impl Totals {
             ..Summary::default()
         }
     }
-}
 
-impl Totals {
-    /// What came in and went out, of a scene with openings.
     /// Particles of water when last looked at.
     pub fn particles(&self) -> u64 {
         self.water.0
     }
 
+    /// What came in and went out, of a scene with openings.
     fn water(&self, simulation: &Simulation) -> Option<Water> {
         let openings = &simulation.openings;
         let volume = simulation.params.spacing.powi(3);

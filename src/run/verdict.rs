@@ -80,7 +80,7 @@ impl Scale {
                 turning += (body.inertia * body.angular_velocity * body.angular_velocity).element_sum();
             }
         }
-        let water = scene.groups.fluid as f64 * params.particle_mass();
+        let water = scene.water() as f64 * params.particle_mass();
         let moved = start.max(driven);
         let speed = moved + drawn;
         // A wedge of 30 degrees that plunges throws water up at five times its speed, a flatter one faster.
@@ -166,7 +166,7 @@ impl Judge {
 pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     let (p, m) = (&summary.pressure, &summary.monitors);
     let mut judge = Judge(Vec::new());
-    let solves = summary.steps.max(1) as f64;
+    let solves = p.solves.max(1) as f64;
     let wet = (summary.particles.fluid > 0 || summary.water.is_some()) && summary.steps > 0;
     if wet {
         let came = summary.water.iter().flat_map(|w| &w.inflow).map(|i| i.particles).sum::<u64>();
@@ -174,7 +174,7 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
         judge.bound(p.failures as f64 / solves, FAILURES, || {
             format!(
                 "{} of {} pressure solves missed fluid.solver.tolerance (largest residual {:.1e})",
-                p.failures, summary.steps, p.relative_residual_max
+                p.failures, p.solves, p.relative_residual_max
             )
         });
         let cut = p.clamps as f64 / (p.unknowns_mean * solves).max(1.0);

@@ -24,7 +24,8 @@ pub(super) fn body(
         |x: case::Vector| if plane { DVec3::from(x) * DVec3::new(1.0, 0.0, 1.0) } else { x.into() };
     let center = in_plane(body.center);
     let orientation = form.turn(plane) * shape.frame();
-    let mass = shape.frame().inverse() * body.mass_offset.map_or(DVec3::ZERO, in_plane);
+    // `orientation` turns it, an `axis` does not.
+    let mass = orientation.inverse() * (form.orientation() * body.mass_offset.map_or(DVec3::ZERO, in_plane));
     // What it moves and turns about, and where that is.
     let about = body.hinge.as_ref().map_or(mass, |h| orientation.inverse() * (in_plane(h.at) - center));
     let drive = if body.is_driven() {
@@ -67,7 +68,7 @@ fn free(
     let locked = |axes: [Freedom; 3]| axes.map(|f| body.locked.contains(&f));
     let mut freedom = FreeBody {
         mass,
-        inertia: body.inertia.map_or(uniform, |i| DVec3::from(i) * share),
+        inertia: body.moments(plane).map_or(uniform, |i| i * share),
         weight_arm,
         velocity: body.velocity.into(),
         angular_velocity: body.angular_velocity.into(),

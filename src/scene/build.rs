@@ -358,7 +358,8 @@ impl<'a> Builder<'a> {
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     fn gauges(&mut self) {
         let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
-        let still = self.moving_walls.iter().filter(|s| s.is_still()).flat_map(Solid::wall_positions);
+        let solids = self.moving_walls.iter().chain(&self.bodies);
+        let still = solids.filter(|s| s.is_still()).flat_map(Solid::wall_positions);
         let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
         for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
             let mut at: DVec3 = gauge.point.into();

@@ -174,6 +174,13 @@ pub struct FreeBody {
     pub locked_rotation: [bool; 3],
 }
 
+impl FreeBody {
+    /// Whether it is free to move in any way at all.
+    pub fn gives_way(&self) -> bool {
+        self.locked_translation != [true; 3] || self.locked_rotation != [true; 3]
+    }
+}
+
 /// How a moving solid moves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Drive {
@@ -232,6 +239,11 @@ impl Solid {
     /// Whether it stands still for ever: an obstacle that is no box of the lattice.
     pub fn is_still(&self) -> bool {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
+    }
+
+    /// Whether forces move it: it is free, and not held in all that it could do.
+    pub fn gives_way(&self) -> bool {
+        matches!(&self.drive, Drive::Free(free) if free.gives_way())
     }
 
     /// Whether it turns where it is: on a hinge, or with all of its translations locked.
@@ -301,6 +313,11 @@ impl Scene {
             solid.wall_area.iter().map(move |area| closed * area.normalize_or_zero()).collect::<Vec<_>>()
         };
         walls.flat_map(of).collect()
+    }
+
+    /// Whether solid `k` stands still for ever. The layer in an opening goes and comes with the water that passes.
+    pub fn stands(&self, k: usize) -> bool {
+        self.solids[k].is_still() && k < self.followed()
     }
 
     /// Solids that tables follow: all but the walls in openings, which come last.

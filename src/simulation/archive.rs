@@ -24,8 +24,7 @@ impl Simulation {
             wait_for_stages: _,
             threads: _,
             stop: _,
-            // Looked up when it matters.
-            gone: _,
+            gone,
             // Follows from the case.
             slots: _,
             enclosed: _,
@@ -61,10 +60,19 @@ impl Simulation {
         }
         if let Some((ledger, energy)) = solids_ledger {
             ledger.exchange(archive, "ledger.solids")?;
-            archive.number("ledger.energy", energy)?;
+            if !archive.is_of_another() {
+                archive.number("ledger.energy", energy)?;
+            }
         }
         openings.exchange(archive)?;
         solids.exchange(archive, backend.compute())?;
+        if !archive.is_saving() {
+            // Looked up when it matters.
+            *gone = 0;
+        }
+        if let Some((_, energy)) = solids_ledger.as_mut().filter(|_| archive.is_of_another()) {
+            *energy = solids.energy().total();
+        }
         // Lists that are made anew ask where solids face.
         if !archive.is_saving() && plan.has(Stage::MoveSolids) {
             backend.move_solids(&openings.place(solids.poses()))?;

@@ -81,8 +81,19 @@ const PLANE: &str = "[[plane]]\nname = \"plane\"\ncenter = [0, 0, 0]\nnormal = [
 /// Largest gain of energy over what there is to lose, and how far above the start a body came.
 fn gain(run: &mut Run, time: f64, energy: f64) -> Result<(f64, f64)> {
     let start = run.solids.energy().total();
-    let mut most = 0.0_f64;
-    run.until(time, |s| most = most.max(s.centred_energy().total() - start))?;
+    let (mut most, mut touched) = (0.0_f64, false);
+    run.until(time, |s| {
+        most = most.max(s.centred_energy().total() - start);
+        touched |= s.contact_wrenches().iter().any(|wrench| wrench.force.length_squared() > 0.0);
+    })?;
+    // What misses gains nothing, and shows nothing.
+    if !touched {
+        return Err(Error::key(
+            "measure",
+            "nothing was touched: the scene is no longer what it was made for",
+            "",
+        ));
+    }
     Ok((most / energy, 0.0))
 }
 

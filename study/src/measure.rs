@@ -113,9 +113,15 @@ impl Sampler {
             None if has(Measure::Sensor) => return Err(needs("a gauge.pressure")),
             None => None,
             Some(gauge) => {
-                let point = DVec3::from(gauge.point);
+                let mut point = DVec3::from(gauge.point);
+                if scene.dimensions == 2 {
+                    point.y = 0.0;
+                }
                 let distance = |s: &usize| scene.position[*s].distance(point);
-                scene.groups.static_wall_range().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                let still = (0..scene.solids.len()).filter(|&k| scene.stands(k));
+                let still = still.flat_map(|k| scene.solids[k].wall_slots.clone());
+                let walls = scene.groups.static_wall_range().chain(still);
+                walls.min_by(|a, b| distance(a).total_cmp(&distance(b)))
             }
         };
         let params = &simulation.params;

@@ -2,6 +2,7 @@
 
 use seixo::error::Error;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 /// Version of the files of finished points. A change of meaning of any measure raises it, so that older points
@@ -123,7 +124,10 @@ impl Measured {
 
     /// Degraded if `name` was measured above `most`.
     pub fn limit(&mut self, name: &str, most: f64) {
-        if let Some(&value) = self.values.get(name).filter(|v| **v > most) {
+        // What is no number is within no limit.
+        if let Some(&value) =
+            self.values.get(name).filter(|v| v.partial_cmp(&&most).is_none_or(Ordering::is_gt))
+        {
             self.degrade(&format!("{name} = {value:.3e} > {most:.3e}"));
         }
     }

@@ -101,7 +101,7 @@ impl Gpu {
             if self.params.viscosity > 0.0 && listed {
                 self.lists(archive)?;
             }
-            if self.plan.needs(Arrays::Ledger) {
+            if self.plan.needs(Arrays::Ledger) && !archive.is_of_another() {
                 self.buffer(archive, buffers::ledger_sum, self.ledger_length())?;
             }
             if archive.is_saving() {

@@ -23,7 +23,7 @@ use crate::scene::Scene;
 pub(super) const KIND: Kind = Kind {
     make: |_, scene, _, _| Ok(Box::new(Pressure::new(scene))),
     gap: |_| 0.0,
-    program: |_| Err("the baseline's impulses follow one another"),
+    program: |_| Err("the impulses of law \"pressure\" follow one another, on the host"),
 };
 
 /// Restitution b of Eq. (18) [-].

@@ -33,18 +33,12 @@ impl Still {
     }
 }
 
-/// Whether solid `k` of `scene` stands still for ever. The layer in an opening goes and comes with the water that
-/// passes.
-fn stands(scene: &Scene, k: usize) -> bool {
-    scene.solids[k].is_still() && k < scene.followed()
-}
-
 /// The solids of `scene` that stand still for ever, with their numbers.
 fn standing(scene: &Scene) -> impl Iterator<Item = (usize, Still)> {
     let of =
         |solid: &Solid| Still::new(solid.shape_center(), DMat3::from_quat(solid.orientation), solid.shape);
     let solids = scene.solids.iter().enumerate();
-    solids.filter(|(k, _)| stands(scene, *k)).map(move |(k, solid)| (k, of(solid)))
+    solids.filter(|(k, _)| scene.stands(*k)).map(move |(k, solid)| (k, of(solid)))
 }
 
 /// Still solids of `scene` that are no boxes.

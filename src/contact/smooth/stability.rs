@@ -16,7 +16,7 @@ pub(super) fn lambda(body: &Body, surface: &Surface) -> Lambda {
         return Lambda::default();
     }
     let share = |sum: f64| sum.powf(2.0 / EXPONENT);
-    let mass = 1.0 / body.mass;
+    let mass = body.inverse_mass.max_element();
     let turns = body.locked_rotation != [true; 3];
     let mut lambda = Lambda { spring: mass, damping: mass };
     let mut take = |spring: f64, damping: f64| {

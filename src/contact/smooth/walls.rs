@@ -76,7 +76,7 @@ const MOST_LOOKS: f64 = 40.0;
 /// goes and comes with the water that passes, and has all its faces.
 pub(super) fn still_box(scene: &Scene, k: usize) -> Option<&Cuboid> {
     let solid = &scene.solids[k];
-    solid.shape.as_cuboid().filter(|_| solid.is_still() && k < scene.followed())
+    solid.shape.as_cuboid().filter(|_| scene.stands(k))
 }
 
 /// The walls and still boxes of a scene.

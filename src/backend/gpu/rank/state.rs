@@ -148,7 +148,7 @@ impl Ranked for GpuRank {
             vec![0.0; heads]
         };
         self.gpu.context.upload(buffers::counters, &counter::START)?;
-        if plan.needs(Arrays::Ledger) {
+        if plan.needs(Arrays::Ledger) && !archive.is_of_another() {
             let sums = archive::read(archive, buffers::ledger_sum, self.ledger_length_of_all())?;
             let width = LEDGER_WIDTH as usize;
             let mut total = vec![0.0; width];
