@@ -169,7 +169,8 @@ fn result_json_has_the_agreed_keys_whatever_happened() {
         (
             "monitors",
             "density_error_max density_error_mean courant_max energy_start_J energy_end_J lost_particles \
-             neighbours_max penetration_max_over_l0 contact_omega_dt contact_substeps_max",
+             neighbours_max penetration_max_over_l0 contact_omega_dt contact_substeps_max \
+             driven_contact_work_J",
         ),
     ] {
         for key in keys.split_whitespace() {

@@ -165,7 +165,8 @@ fn a_verdict_knows_what_energy_a_scene_has_at_hand() {
 #[test]
 fn pressures_that_are_cut_are_judged() {
     use seixo::output::result::{Grade, Summary};
-    use seixo::run::verdict::{Scale, judge};
+    use seixo::run::scale::Scale;
+    use seixo::run::verdict::judge;
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(small_case(folder.path())).unwrap();
     let case: seixo::Case = text.parse().unwrap();
@@ -181,6 +182,36 @@ fn pressures_that_are_cut_are_judged() {
         let verdict = judge(&summary, scale);
         assert_eq!(verdict.grade, grade, "{clamps}: {verdict}");
         assert_eq!(clamps == 400, verdict.to_string().contains("were cut at their upper bound"), "{verdict}");
+    }
+}
+
+/// Walls that close in on a ball give it speed, a piston that drives a bore does so to water: both are as they should be.
+#[test]
+fn what_driven_walls_do_is_no_gain() {
+    let folder = tempfile::tempdir().unwrap();
+    let dry = "[run]\nspacing = 0.02\ntime_step = 2e-4\nend = 1.4\ngravity = [0, 0, 0]\n\
+               [[moving_wall]]\nname = \"A\"\nmin = [-0.1, -0.1, -0.2]\nmax = [0, 0.1, 0.2]\nmotion = [[0, 0, 0, 0], [10, 2, 0, 0]]\n\
+               [[moving_wall]]\nname = \"B\"\nmin = [1, -0.1, -0.2]\nmax = [1.1, 0.1, 0.2]\nmotion = [[0, 0, 0, 0], [10, -2, 0, 0]]\n\
+               [[body]]\nname = \"ball\"\nshape = \"sphere\"\nradius = 0.05\ncenter = [0.5, 0, 0]\nvelocity = [1, 0, 0]\ndensity = 1000\n\
+               [contact]\nspring = 1e6\nrestitution = 1\n[output]\nevery = 0\n";
+    let wet = "[run]\nspacing = 0.02\ntime_step = 2e-3\nadaptive = true\nend = 1.5\ndimensions = 2\n\
+               [tank]\nmin = [0, 0, 0]\nmax = [4, 0.1, 0.5]\nopen = [\"z_max\"]\n\
+               [fluid]\n[[fluid.block]]\nmin = [0.1, 0, 0]\nmax = [4, 0.1, 0.1]\n\
+               [[moving_wall]]\nname = \"piston\"\nmin = [0.04, 0, 0]\nmax = [0.1, 0.1, 0.5]\n\
+               motion = [[0, 0, 0, 0], [5, 4, 0, 0]]\n[output]\nevery = 0\n";
+    for (name, text, grown) in [("walls", dry, 2.5), ("piston", wet, 1.5)] {
+        let path = folder.path().join(format!("{name}.toml"));
+        std::fs::write(&path, text).unwrap();
+        let (path, out) = (path.display().to_string(), folder.path().join(name).display().to_string());
+        let run = ran(&["run", &path, "--backend", "cpu", "-q", "--json", "-o", &out]);
+        assert_eq!(run.code, 0, "{name}: {}", run.err);
+        let result = json(&run.out);
+        assert_eq!(result["verdict"]["grade"], "fine", "{name}: {}", result["verdict"]);
+        let energy = |key: &str| result["monitors"][key].as_f64().unwrap();
+        assert!(energy("energy_end_J") > grown * energy("energy_start_J"), "{name}: {result}");
+        let work = energy("driven_contact_work_J");
+        let gain = energy("energy_end_J") - energy("energy_start_J");
+        assert!(name == "piston" || (work / gain - 1.0).abs() < 0.02, "{work} J for {gain} J");
     }
 }
 

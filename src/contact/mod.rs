@@ -179,6 +179,15 @@ impl Solids {
         &self.contact
     }
 
+    /// Power that driven solids gave to bodies by contact over the last step [W].
+    pub fn driven_contact_power(&self) -> f64 {
+        let driven = self.bodies.iter().zip(&self.contact).filter(|(body, _)| !body.is_free());
+        let power = |(body, felt): (&Body, &Wrench)| {
+            -felt.force.dot(body.pose.velocity) - felt.torque.dot(body.pose.angular_velocity)
+        };
+        driven.map(power).sum()
+    }
+
     /// Mean wrench of contact over the last step on each of [`Scene::walls`], about its `middle`; `None` if no solid moves
     /// freely, or if a device has pressed them that does not tell walls apart.
     pub fn wall_contact_wrenches(&self) -> Option<&[Wrench]> {

@@ -127,6 +127,9 @@ pub struct Monitors {
     pub contact_omega_dt: f64,
     /// Most contact sub-steps of a step.
     pub contact_substeps_max: u32,
+    /// Work that driven solids did on bodies by contact [J].
+    #[serde(rename = "driven_contact_work_J")]
+    pub driven_contact_work: f64,
 }
 
 /// A body or moving wall at the end.

@@ -13,6 +13,7 @@ mod options;
 mod pace;
 pub mod resume;
 mod saving;
+pub mod scale;
 pub mod summary;
 pub mod tables;
 pub mod verdict;
@@ -36,11 +37,11 @@ use meshes::Meshes;
 pub use options::{Options, Start};
 use pace::Pace;
 use saving::{Kept, Saving};
+use scale::Scale;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use summary::Totals;
 use tables::Tables;
-use verdict::Scale;
 
 /// Where a run stands.
 #[derive(Clone, Debug, Default)]

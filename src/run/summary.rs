@@ -89,6 +89,7 @@ impl Totals {
             penetration_max_over_l0,
             contact_omega_dt,
             contact_substeps_max,
+            driven_contact_work,
         } = monitors;
         for (name, value) in [
             ("density_error_max", density_error_max),
@@ -100,6 +101,7 @@ impl Totals {
             ("energy_max", energy_max),
             ("penetration_max_over_l0", penetration_max_over_l0),
             ("contact_omega_dt", contact_omega_dt),
+            ("driven_contact_work", driven_contact_work),
         ] {
             archive.number(&format!("totals.{name}"), value)?;
         }
@@ -126,6 +128,7 @@ impl Totals {
             monitors.penetration_max_over_l0.max(contact.penetration_max_over_l0);
         monitors.contact_omega_dt = monitors.contact_omega_dt.max(contact.omega_dt);
         monitors.contact_substeps_max = monitors.contact_substeps_max.max(contact.substeps);
+        monitors.driven_contact_work += report.dt * simulation.solids.driven_contact_power();
     }
 
     /// Count in what a table row shows: the fluid, the guards and the bodies' energy [J].
