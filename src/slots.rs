@@ -109,8 +109,10 @@ impl Layer {
             let mut rim: Vec<usize> = beside.filter(|&m| shares[m] == 0.0).collect();
             rim.sort_unstable();
             rim.dedup();
+            let at_rim = |n: &usize| self.adjacent[*n].iter().any(|&m| shares[m as usize] == 0.0);
+            let mouth = rows.iter().copied().filter(at_rim).collect();
             let inside = rows.into_iter().map(|n| (n, shares[n])).collect();
-            out.push(Slot { solid, rim, inside });
+            out.push(Slot { solid, rim, mouth, inside });
         }
         out
     }
@@ -127,6 +129,8 @@ struct Slot {
     /// Those beside it, in open water. A row at its mouth is none: what a particle that is caught there does would be taken for the
     /// pressure in all of it.
     rim: Vec<usize>,
+    /// Rows in it that lie beside those.
+    mouth: Vec<usize>,
     /// Rows in it, and how much of each [-].
     inside: Vec<(usize, f64)>,
 }
@@ -233,20 +237,32 @@ impl Slots {
         enclosed::lend(layers.flat_map_iter(of).collect())
     }
 
-    /// Pressures at the rims of the slots `found`, which `read` tells.
+    /// The rims of the slots `found` and the pressures there, which `read` tells: rows beside a slot, and in shallow water, where all of
+    /// those are dry that a row at its mouth has, that row.
     fn at_rims(
         &self,
         found: &[Found],
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
-    ) -> Result<Vec<Vec<f64>>> {
-        let places = |found: &Found| {
-            let first = self.layers[found.slot.solid].first;
-            found.slot.rim.iter().map(|&n| first + n).collect::<Vec<_>>()
+    ) -> Result<Vec<Vec<(usize, f64)>>> {
+        let both = |slot: &Slot| slot.rim.iter().chain(&slot.mouth).copied().collect::<Vec<usize>>();
+        let places = |Found { slot, .. }: &Found| {
+            let first = self.layers[slot.solid].first;
+            both(slot).into_iter().map(move |n| first + n)
         };
         let rows: Vec<usize> = found.iter().flat_map(places).collect();
         let pressure = if rows.is_empty() { vec![] } else { read(&rows)? };
-        let mut rest = &pressure[..];
-        Ok(found.iter().filter_map(|f| rest.split_off(..f.slot.rim.len()).map(<[f64]>::to_vec)).collect())
+        let mut rest = pressure.into_iter();
+        let of = |Found { slot, .. }: &Found| {
+            let mut beside: Vec<(usize, f64)> = slot.rim.iter().copied().zip(&mut rest).collect();
+            let at_mouth: Vec<(usize, f64)> = slot.mouth.iter().copied().zip(&mut rest).collect();
+            let is_wet = |m: &u32| slot.rim.binary_search(&(*m as usize)).is_ok_and(|at| beside[at].1 > 0.0);
+            let alone =
+                |(n, p): &(usize, f64)| *p > 0.0 && !self.layers[slot.solid].adjacent[*n].iter().any(is_wet);
+            let shallow: Vec<(usize, f64)> = at_mouth.into_iter().filter(alone).collect();
+            beside.extend(shallow);
+            beside
+        };
+        Ok(found.iter().map(of).collect())
     }
 
     /// Whether a fixed wall lies within `margin` [m] of the sphere about `layer`.
@@ -298,13 +314,14 @@ impl Slots {
         Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0) }
     }
 
-    /// The rows that lie in `slot`, and those at its rim with what they pass on; their `pressure` in the last step.
-    fn passed_on(&self, slot: &Slot, pose: &Pose, pressure: &[f64]) -> Vec<SlotRow> {
+    /// The rows that lie in `slot`, and those at its rim with what they pass on; `told` are the rim and its
+    /// pressures in the last step.
+    fn passed_on(&self, slot: &Slot, pose: &Pose, told: &[(usize, f64)]) -> Vec<SlotRow> {
         let layer = &self.layers[slot.solid];
         // Relative to the centre of mass, world axes.
         let place = |n: usize| pose.orientation * layer.offset[n];
         let on_surface = |n: usize| place(n) + pose.orientation * layer.to_surface[n];
-        let passing = self.passing(slot.rim.iter().copied().zip(pressure.iter().copied()).collect(), place);
+        let passing = self.passing(told.to_vec(), place);
         let count = passing.len() as f64;
         let field = self.field(&passing, place);
         let Field { middle, inverse, any_wet, .. } = field;

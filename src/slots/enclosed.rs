@@ -86,7 +86,7 @@ impl Slots {
     pub fn press(&self, poses: &[Pose], read: impl FnOnce(&[usize]) -> Result<Vec<f64>>) -> Result<Pressed> {
         let found = self.find(poses);
         let pressure = self.at_rims(&found, read)?;
-        let of_slot = |(f, told): (&Found, &Vec<f64>)| {
+        let of_slot = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             let slot = &f.slot;
             match slot.rim.is_empty() {
                 true => Self::without_rim(f),
@@ -95,12 +95,13 @@ impl Slots {
         };
         let mut rows: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
         rows.sort_by_key(|slot| (slot.solid, slot.row));
-        // A row may lie at the rim of several.
+        // A row may lie at the rim of several, and in one.
         rows.dedup_by(|next, first| {
             let same = (next.solid, next.row) == (first.solid, first.row);
             if same {
                 first.per_pascal += next.per_pascal;
                 first.head += next.head;
+                first.taken = first.taken.max(next.taken);
             }
             same
         });
@@ -137,7 +138,7 @@ impl Slots {
     pub(super) fn lent(
         &self,
         found: &[Found],
-        pressure: &[Vec<f64>],
+        pressure: &[Vec<(usize, f64)>],
         f: &Found,
         poses: &[Pose],
     ) -> Option<Field> {
@@ -148,7 +149,7 @@ impl Slots {
                 self.periodic.nearest(pose.position - center)
                     + pose.orientation * self.layers[slot.solid].offset[n]
             };
-            slot.rim.iter().zip(&pressure[k]).map(move |(&n, &p)| (place(n), p)).collect::<Vec<_>>()
+            pressure[k].iter().map(move |&(n, p)| (place(n), p)).collect::<Vec<_>>()
         };
         let (places, told): (Vec<DVec3>, Vec<f64>) = f.lenders.iter().flat_map(of).unzip();
         let passing = self.passing(told.into_iter().enumerate().collect(), |n| places[n]);

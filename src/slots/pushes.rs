@@ -46,13 +46,14 @@ impl Slots {
     ) -> Result<Vec<Push>> {
         let found = self.find(poses);
         let pressure = self.at_rims(&found, read)?;
-        let of = |(f, told): (&Found, &Vec<f64>)| {
+        let of = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             let (slot, pose) = (&f.slot, &poses[f.slot.solid]);
             let place = |n: usize| pose.orientation * self.layers[slot.solid].offset[n];
-            let rows = || slot.rim.iter().copied().zip(told.iter().copied()).collect();
             let field = match slot.rim.is_empty() {
                 true => self.lent(&found, &pressure, f, poses),
-                false => Some(self.field(&self.passing(rows(), place), place)).filter(|field| field.any_wet),
+                false => {
+                    Some(self.field(&self.passing(told.clone(), place), place)).filter(|field| field.any_wet)
+                }
             };
             field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, pose))
         };
@@ -69,8 +70,7 @@ impl Slots {
             Some(Push { on, at: pose.position + on_surface, force: faced[n].share * p * area })
         };
         // A row at the mouth looks out as well: what of it looks into the slot is what looks as its neighbours deep in there do.
-        let at_mouth =
-            |n: usize| layer.adjacent[n].iter().any(|m| slot.rim.binary_search(&(*m as usize)).is_ok());
+        let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
         let is_deep = |n: usize| slot.inside.binary_search_by_key(&n, |row| row.0).is_ok() && !at_mouth(n);
         let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
         let inwards = |n: usize| {
