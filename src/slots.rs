@@ -117,6 +117,25 @@ impl Layer {
         out
     }
 
+    /// Of each row in `slot`, the area that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
+    /// is what looks as its neighbours deep in there do.
+    fn areas(&self, slot: &Slot, pose: &Pose) -> Vec<DVec3> {
+        let area = |n: usize| pose.orientation * self.area[n];
+        let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
+        let is_deep = |n: &usize| slot.inside.binary_search_by_key(n, |row| row.0).is_ok() && !at_mouth(*n);
+        let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
+        let inwards = |n: usize| {
+            if !at_mouth(n) {
+                return area(n);
+            }
+            let near = self.adjacent[n].iter().map(|&m| m as usize).filter(is_deep);
+            let near: DVec3 = near.map(area).sum();
+            let way = if near == DVec3::ZERO { all } else { near }.normalize_or_zero();
+            area(n).dot(way).max(0.0) * way
+        };
+        slot.inside.iter().map(|row| inwards(row.0)).collect()
+    }
+
     fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {
         let reach = DVec3::splat(self.radius + margin);
         (pose.position - reach, pose.position + reach)
@@ -329,8 +348,9 @@ impl Slots {
         let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
-        for &(n, share) in slot.inside.iter().filter(|row| under_water(row.0)) {
-            let row = row(pose.orientation * layer.area[n], on_surface(n));
+        let areas = layer.areas(slot, pose);
+        for (&(n, share), &area) in slot.inside.iter().zip(&areas).filter(|(row, _)| under_water(row.0)) {
+            let row = row(area, on_surface(n));
             let head = self.weight.dot(on_surface(n) - middle);
             let along = xi(n).to_array();
             for (factor, (mean, slope)) in [1.0, head].into_iter().zip(mean.iter_mut().zip(&mut slope)) {
@@ -365,9 +385,21 @@ impl Slots {
             }
             SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head }
         };
-        let inside =
-            |&(n, taken): &(usize, f64)| SlotRow { solid, row: n as u32, taken, ..SlotRow::default() };
-        wet.into_iter().chain(dry_rows).map(at_rim).chain(slot.inside.iter().map(inside)).collect()
+        // A row at the mouth keeps what of it looks out: its own pressure there.
+        let inside = |(&(n, share), &area): (&(usize, f64), &DVec3)| {
+            let mut out = SlotRow { solid, row: n as u32, taken: share, ..SlotRow::default() };
+            if slot.mouth.binary_search(&n).is_ok() {
+                let outwards = pose.orientation * layer.area[n] - area;
+                out.per_pascal.add(share, &row(outwards, on_surface(n)));
+                out.head.add(self.weight.dot(on_surface(n) - place(n)), &out.per_pascal);
+            }
+            out
+        };
+        wet.into_iter()
+            .chain(dry_rows)
+            .map(at_rim)
+            .chain(slot.inside.iter().zip(&areas).map(inside))
+            .collect()
     }
 
     /// Pressure of the `field` of a slot on a body's surface, at `x` by a row at `place` [Pa].

@@ -39,7 +39,7 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
     let inside = rows.iter().filter(|slot| slot.taken == 1.0).count();
     assert_eq!((inside, rows.len()), (64, 64 + 28));
     for (slope, allowed) in
-        [(DVec3::new(0.0, 0.0, -9810.0), 1e-9), (DVec3::new(500.0, -300.0, -9810.0), 0.03)]
+        [(DVec3::new(0.0, 0.0, -9810.0), 1e-9), (DVec3::new(500.0, -300.0, -9810.0), 0.04)]
     {
         // Pressure at x relative to the centre of mass.
         let p = |x: DVec3| 2000.0 + slope.dot(x);
@@ -55,7 +55,7 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
         assert!((there.force.z - 0.01 * p(DVec3::new(0.0, 0.0, -0.05))).abs() < 1e-9);
         let off = passed.force - there.force;
         assert!(off.z.abs() < 1e-9 * there.force.length());
-        // The corners' own sides, by the slope, which is held at bay a little.
+        // What looks out at the mouth has the pressure where the row is, half a spacing in, and the weight of the water alone from there.
         assert!(off.truncate().length() < 1e-9 + 5.0 * allowed * there.force.truncate().length());
         let size = 1e-9 * there.force.length() + allowed * there.torque.length();
         assert!((passed.torque - there.torque).length() < size);

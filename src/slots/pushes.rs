@@ -62,26 +62,12 @@ impl Slots {
 
     fn pushes_of(&self, found: &Found, field: &Field, pose: &Pose) -> Vec<Push> {
         let Found { slot, faced, .. } = found;
-        let layer = &self.layers[slot.solid];
-        let area = |n: usize| pose.orientation * layer.area[n];
         let push = |n: usize, area: DVec3| {
             let (p, on_surface) = self.on_row(field, slot.solid, pose, n);
             let on = faced[n].opposite?;
             Some(Push { on, at: pose.position + on_surface, force: faced[n].share * p * area })
         };
-        // A row at the mouth looks out as well: what of it looks into the slot is what looks as its neighbours deep in there do.
-        let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
-        let is_deep = |n: usize| slot.inside.binary_search_by_key(&n, |row| row.0).is_ok() && !at_mouth(n);
-        let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
-        let inwards = |n: usize| {
-            if !at_mouth(n) {
-                return area(n);
-            }
-            let near = layer.adjacent[n].iter().map(|&m| m as usize).filter(|&m| is_deep(m));
-            let near: DVec3 = near.map(area).sum();
-            let way = if near == DVec3::ZERO { all } else { near }.normalize_or_zero();
-            area(n).dot(way).max(0.0) * way
-        };
-        slot.inside.iter().filter_map(|row| push(row.0, inwards(row.0))).collect()
+        let areas = self.layers[slot.solid].areas(slot, pose);
+        slot.inside.iter().zip(areas).filter_map(|(row, area)| push(row.0, area)).collect()
     }
 }
