@@ -360,10 +360,11 @@ fn number(x: f64) -> String {
     if x == 0.0 || (1e-6..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
-/// Units in brackets, each once: [m], [kg m2], [-]; not examples such as [0, 0, 1].
+/// Units in brackets, each once: [m], [kg m2], [-]; not examples such as [0, 0, 1], nor what stands between backticks.
 fn unit(words: &str) -> String {
     let mut units: Vec<&str> = Vec::new();
-    for part in words.split('[').skip(1) {
+    let plain = words.split('`').step_by(2);
+    for part in plain.flat_map(|words| words.split('[').skip(1)) {
         let inside = part.split(']').next().unwrap_or_default();
         let is_unit = !inside.is_empty()
             && !inside.contains(',')

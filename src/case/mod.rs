@@ -117,8 +117,8 @@ pub struct Run {
     /// Time step [s]; the largest one when `adaptive = true`.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub time_step: f64,
-    /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v and
-    /// dt <= 0.7 l0 / c_s.
+    /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v, but for the fastest thousandth of the
+    /// water, and dt <= 0.7 l0 / c_s.
     #[serde(default)]
     pub adaptive: bool,
     /// End of the run [s].

@@ -55,8 +55,8 @@ pub fn named(case: &Case) -> Result<Option<Found>> {
     }
     let more = if scene.len() > TOLD { format!(" and {} more", scene.len() - TOLD) } else { String::new() };
     Err(Error::misfit(format!(
-        "run.from: the state in {from} is of another scene: {}{more}; leave as they were what says where things are at t = 0 \
-         and how they begin to move, for the state says it now",
+        "run.from: the state in {from} is of another scene: {}{more}; leave places, orientations and velocities at t = 0 \
+         as they were: these come from the saved state",
         scene[..scene.len().min(TOLD)].join(", "),
     )))
 }
