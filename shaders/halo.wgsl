@@ -2,7 +2,7 @@
 // what lies in the columns of cells next to the slab. Every kernel that changes what the next one reads across a cut is followed by one that packs
 // the border into `halo`, and one that takes the copies from there; on the way the host swaps what is in it.
 // Slots that are copies, of water and of walls, are FOREIGN: they are neighbours, and nothing is computed for them.
-// Twin: src/share/border.rs, and of the levels `join_cells` and `coarsen` of src/pressure/multigrid.rs
+// Twin: src/share/border.rs, and of the levels src/pressure/multigrid
 
 @group(0) @binding(2) var<storage, read_write> position: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> velocity: array<vec4f>;

@@ -426,6 +426,26 @@ fn constant(text: &str, name: &str) -> f64 {
     value.trim_end_matches('u').parse().expect("it is a number")
 }
 
+/// A pair of numbers in the text of a shader.
+fn pair(text: &str, name: &str) -> (f64, f64) {
+    let line =
+        text.lines().find(|l| l.starts_with(&format!("const {name} = vec2f("))).expect("the pair exists");
+    let inside = line.split(['(', ')']).nth(1).expect("it has values");
+    let mut values = inside.split(", ").map(|value| value.parse().expect("it is a number"));
+    (values.next().expect("a first"), values.next().expect("a second"))
+}
+
+#[test]
+fn what_rows_undo_is_the_same_on_both_sides() {
+    use seixo::kernels::pressure_source::{CAUGHT, LEAK, ONE_SIDED, SLOT, THICK};
+    let source = text("pressure_source");
+    assert_eq!(pair(shader::COMMON, "CAUGHT"), CAUGHT);
+    assert_eq!(pair(source, "SLOT"), SLOT);
+    assert_eq!(pair(source, "THICK"), THICK);
+    assert_eq!(constant(source, "LEAK"), LEAK);
+    assert_eq!(constant(source, "ONE_SIDED"), ONE_SIDED);
+}
+
 #[test]
 fn constants_are_the_same_on_both_sides() {
     use seixo::backend::gpu::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};

@@ -65,6 +65,10 @@ impl Lead {
 
     /// Have all ranks do `order`, this one by `own`.
     fn all<T>(&mut self, order: &Order, own: impl FnOnce(&mut dyn Ranked) -> Result<T>) -> Result<T> {
+        if self.lost {
+            // The others wait for what was given up.
+            return Err(Error::gpu("its device is lost, and with it the run of all ranks"));
+        }
         self.order(order);
         let done = own(&mut *self.own);
         self.lost |= matches!(done, Err(Error::Gpu(_)));

@@ -97,12 +97,12 @@ pub fn number_density_source(n: f64, params: &Params, step: &Step) -> f64 {
 
 /// Solids about a particle of water, over W0, from which on it is caught between them, and at which it wholly is, as in
 /// a hole of one particle: gaps of 0.85 and 0.6 spacings in the plane, of 0.6 and 0.4 in space.
-const CAUGHT: (f64, f64) = (0.85, 1.0);
+pub const CAUGHT: (f64, f64) = (0.85, 1.0);
 /// Room before a row at a body, over that of a flat wall, at which it undoes nothing, and from which on as much as it
 /// meets water: gaps of some 0.14 and 0.31 spacings. A corner has 0.73 and more.
-const SLOT: (f64, f64) = (0.35, 0.68);
+pub const SLOT: (f64, f64) = (0.35, 0.68);
 /// Link of a caught particle to P = 0, over n0 [-]: small beside links to water that is not caught.
-const LEAK: f64 = 0.1;
+pub const LEAK: f64 = 0.1;
 
 /// Room that solids leave a particle of water [-]: 1 where there are no bodies, which are all that catch it.
 #[inline(always)]
@@ -149,10 +149,10 @@ pub struct Boundary {
 
 /// Distance from the middle of the solids about a particle of water, over l0, from which on it is at one side of them:
 /// not between two plates.
-const ONE_SIDED: f64 = 0.02;
+pub const ONE_SIDED: f64 = 0.02;
 /// Depth of a wall below its row, over that of a flat and thick one, from which on water slides past it, and at which it
 /// wholly does. Two layers with a hollow between them have no direction to slide along.
-const THICK: (f64, f64) = (0.5, 0.9);
+pub const THICK: (f64, f64) = (0.5, 0.9);
 
 impl Boundary {
     /// Of row `i` with the neighbours `all`.

@@ -304,7 +304,8 @@ impl Run {
         summary.frames = self.frames.written();
         summary.series = self.frames.written_by_name();
         summary.memory_peak_bytes = memory_peak();
-        summary.ranks = simulation.backend.ranks()?;
+        // A device that is lost tells nothing more.
+        summary.ranks = simulation.backend.ranks().unwrap_or_default();
         summary.stages.insert("output", self.totals.output.as_secs_f64());
         // Where the disk is full this makes room for the last word.
         folder.release();

@@ -13,7 +13,7 @@ use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::{Flow, Water};
 use super::{Scene, Solid, wall_at};
-use crate::case::{Case, Law};
+use crate::case::{Case, Law, stands_for};
 use crate::error::{CaseError, Problem, Result};
 use crate::periodic::Periodic;
 use glam::{DMat3, DVec3, IVec3};
@@ -172,6 +172,12 @@ impl<'a> Builder<'a> {
             let taken = self.fixed.obstacle(obstacle, corners, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
+            let gauged = case.gauge.force.iter().any(|gauge| stands_for(&gauge.on, &obstacle.name));
+            let size = (DVec3::from(corners.1) - DVec3::from(corners.0)).abs();
+            if gauged && self.is_thin(size) {
+                let why = "where water stands on both sides these share one pressure, and its force gauge tells next to nothing";
+                self.notes.push(format!("{label}: one particle thick: {why}; two spacings would do"));
+            }
         }
         for (k, wall) in case.moving_wall.iter().enumerate() {
             let Some(corners) = wall.corners() else { continue };
@@ -182,9 +188,7 @@ impl<'a> Builder<'a> {
             let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
             self.taken(&label, taken);
-            let half = solid.shape.extent(DMat3::IDENTITY);
-            let thin = (0..3).any(|k| 2.0 * half[k] < 1.5 * lattice.spacing && !(lattice.plane && k == 1));
-            if thin {
+            if self.is_thin(2.0 * solid.shape.extent(DMat3::IDENTITY)) {
                 self.notes
                     .push(format!("{label}: one particle thick, so that its two sides share one pressure"));
             }
@@ -353,6 +357,11 @@ impl<'a> Builder<'a> {
         self.water.keep_what_is_left(&self.grid);
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
+    }
+
+    /// Whether a box of the lattice of this `size` [m] is one particle thick.
+    fn is_thin(&self, size: DVec3) -> bool {
+        (0..3).any(|k| size[k] < 1.5 * self.lattice.spacing && !(self.lattice.plane && k == 1))
     }
 
     /// A pressure gauge averages over the wall particles near its point: there must be some.

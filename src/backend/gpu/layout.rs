@@ -155,7 +155,7 @@ pub struct Pose {
     pub angular_velocity: [f32; 4],
 }
 
-/// A wall-layer particle of a moving solid; see `WallParticle` in shaders/body_force.wgsl.
+/// A wall-layer particle of a moving solid; see `WallParticle` in shaders/common.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -207,7 +207,7 @@ impl Outlet {
     }
 }
 
-/// A box in which the water comes to rest; see `AbsorberZone` in shaders/absorber.wgsl.
+/// A box in which the water comes to rest; see `AbsorberZone` in shaders/common.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
