@@ -179,7 +179,7 @@ impl Solids {
         &self.contact
     }
 
-    /// Power that driven solids gave to bodies by contact over the last step [W].
+    /// Power that driven solids gave to bodies by contact over the last step [J/s].
     pub fn driven_contact_power(&self) -> f64 {
         let driven = self.bodies.iter().zip(&self.contact).filter(|(body, _)| !body.is_free());
         let power = |(body, felt): (&Body, &Wrench)| {
