@@ -94,8 +94,10 @@ impl Checker<'_> {
                  in its way"
             );
             let adaptive = if adapts { "" } else { ", or run.adaptive = true" };
-            let remedy =
-                format!("lengthen the period, or use run.time_step = {:.1e} or less{adaptive}", l0 / speed);
+            let remedy = format!(
+                "check its period [s] and how far it goes, or use run.time_step = {:.1e} or less{adaptive}",
+                l0 / speed
+            );
             self.add(path, message, remedy);
         }
     }

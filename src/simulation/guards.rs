@@ -73,11 +73,26 @@ impl Simulation {
     /// An error if the guards have seen something that ends a run.
     pub fn check(&self, counters: &Counters, step: &Step) -> Result<()> {
         if let Some((slot, neighbours)) = counters.overflow {
-            let what = format!(
-                "particle slot {slot} has {neighbours} neighbours, more than the lists hold (a full lattice has {}): \
-                 the fluid has collapsed onto itself; use a smaller time step or a larger fluid.sound_speed",
-                self.params.neighbours
-            );
+            let lists = format!("more than the lists hold (a full lattice has {})", self.params.neighbours);
+            // Slots of many ranks are their own; a backend of theirs gives no step up.
+            let is_wall = slot as usize >= self.groups.fluid && self.backend.gives_up();
+            // Walls alone can make it so many.
+            let what = match self.scene.solid.get(slot as usize).filter(|_| is_wall) {
+                Some(&of) => {
+                    let name = match of.checked_sub(1) {
+                        Some(k) => format!("`{}`", self.scene.solids[k as usize].name),
+                        None => "a fixed wall".to_owned(),
+                    };
+                    format!(
+                        "a particle of {name} has {neighbours} neighbours, {lists}: solids reach into each other there, or \
+                         water is pressed into it; let driven solids end where others begin"
+                    )
+                }
+                None => format!(
+                    "particle slot {slot} has {neighbours} neighbours, {lists}: the fluid has collapsed onto itself; use a \
+                     smaller time step or a larger fluid.sound_speed"
+                ),
+            };
             return Err(self.diverged(step, Stage::NeighbourList, what));
         }
         if let Some(particle) = counters.non_finite {
@@ -88,8 +103,14 @@ impl Simulation {
         if counters.lost as f64 > (LOST_MAX * fluid as f64).max(10.0) {
             let what = format!(
                 "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began, and \
-                 enlarge run.domain if they may go there",
-                counters.lost, fluid
+                 enlarge run.domain if they may go there{}",
+                counters.lost,
+                fluid,
+                if self.openings.total_emitted() > 0 {
+                    "; a tank that overflows needs an [[outflow]], or an earlier run.end"
+                } else {
+                    ""
+                }
             );
             return Err(self.diverged(step, Stage::CellList, what));
         }

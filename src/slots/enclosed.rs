@@ -20,7 +20,8 @@ pub struct Pressed {
     pub loads: Vec<(usize, Wrench)>,
 }
 
-/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot.
+/// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a mouth alone
+/// that lends nothing.
 pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
     if found.iter().any(|f| f.slot.rim.is_empty()) {
         let beside = beside(&found);
@@ -30,7 +31,11 @@ pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
             }
         }
     }
-    let is_slot = |(_, f): &(usize, &Found)| !f.slot.rim.is_empty() || !f.lenders.is_empty();
+    let lending: BTreeSet<usize> = found.iter().flat_map(|f| f.lenders.iter().copied()).collect();
+    let is_slot = |(k, f): &(usize, &Found)| match f.slot.rim.is_empty() {
+        true => !f.lenders.is_empty(),
+        false => f.slot.inside.len() > f.slot.mouth.len() || lending.contains(k),
+    };
     let kept: Vec<usize> = found.iter().enumerate().filter(is_slot).map(|(k, _)| k).collect();
     let place = |k: usize| kept.partition_point(|&other| other < k);
     for f in &mut found {
