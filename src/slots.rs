@@ -263,12 +263,11 @@ impl Slots {
         found: &[Found],
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<Vec<(usize, f64)>>> {
-        let both = |slot: &Slot| slot.rim.iter().chain(&slot.mouth).copied().collect::<Vec<usize>>();
-        let places = |Found { slot, .. }: &Found| {
+        let mut rows = vec![];
+        for Found { slot, .. } in found {
             let first = self.layers[slot.solid].first;
-            both(slot).into_iter().map(move |n| first + n)
-        };
-        let rows: Vec<usize> = found.iter().flat_map(places).collect();
+            rows.extend(slot.rim.iter().chain(&slot.mouth).map(|n| first + n));
+        }
         let pressure = if rows.is_empty() { vec![] } else { read(&rows)? };
         let mut rest = pressure.into_iter();
         let of = |Found { slot, .. }: &Found| {

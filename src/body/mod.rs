@@ -262,15 +262,16 @@ impl Body {
     /// Moves on from `pose` as far as its freedom goes, with `momentum` [kg m2/s] if that is still what turns it so.
     pub fn take_over(&mut self, pose: Pose, momentum: DVec3) {
         self.restore(pose, momentum);
-        if self.is_free() && self.inverse_inertia * momentum != pose.angular_velocity {
+        if !self.is_free() {
+            return;
+        }
+        if self.inverse_inertia * momentum != pose.angular_velocity {
             let spin = self.free_axes() * pose.angular_velocity;
             self.momentum = self.free_axes() * (self.inertia(self.rotation) * spin);
             self.pose.angular_velocity = self.inverse_inertia * self.momentum;
         }
-        if self.is_free() {
-            let open = self.inverse_mass.to_array().map(|give| if give > 0.0 { 1.0 } else { 0.0 });
-            self.pose.velocity *= DVec3::from_array(open);
-        }
+        let open = self.inverse_mass.to_array().map(|give| if give > 0.0 { 1.0 } else { 0.0 });
+        self.pose.velocity *= DVec3::from_array(open);
     }
 
     /// Kinetic energy [J]; 0 for a prescribed solid.

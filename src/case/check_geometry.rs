@@ -1,7 +1,7 @@
 //! The part of the check that judges shapes: edges, lengths against the spacing, motion, names.
 
 use super::check::{Checker, face, length};
-use super::names::is_pattern;
+use super::names::{is_pattern, stands_for};
 use super::{BodyShape, Face, Form, Tank, Vector};
 use crate::periodic::CELLS_MIN;
 use std::collections::HashMap;
@@ -330,18 +330,10 @@ impl Checker<'_> {
             .chain(case.openings().map(|o| (format!("{}.name", o.path()), o.name.to_owned())))
             .collect();
         self.unique(&names, "solid");
-        for (path, name) in &names {
-            let why = if is_pattern(name) || name.starts_with("tank.") {
-                "stands for the tank, or for several solids, wherever a case names one"
-            } else {
-                continue;
-            };
-            let message = format!("the name `{name}` {why}");
-            self.add(
-                path.clone(),
-                message,
-                "choose another name, without `*` and none of `tank` and `tank. ...`",
-            );
+        for (path, name) in names.iter().filter(|(_, name)| is_pattern(name) || stands_for("tank", name)) {
+            let why = "stands for the tank, or for several solids, wherever a case names one";
+            let remedy = "choose another name, without `*` and none of `tank` and `tank. ...`";
+            self.add(path.clone(), format!("the name `{name}` {why}"), remedy);
         }
     }
 
