@@ -84,10 +84,7 @@ impl Gauges {
         let contact = case.contact.is_some() && scene.solids.iter().any(|s| s.gives_way());
         let (wet, means) = (case.fluid.is_some(), case.gauge.mean.then(Means::default));
         let mut out = Self { means, wet, contact, ..Self::default() };
-        // Walls that never move, those of solids of any shape among them.
-        let still = (0..scene.solids.len()).filter(|&k| scene.stands(k));
-        let still = still.flat_map(|k| scene.solids[k].wall_slots.clone());
-        let slots: Vec<usize> = scene.groups.static_wall_range().chain(still).collect();
+        let slots: Vec<usize> = scene.still_slots().collect();
         let wall: Vec<DVec3> = slots.iter().map(|&slot| scene.position[slot]).collect();
         for (k, gauge) in case.gauge.pressure.iter().enumerate() {
             if scene.groups.fluid == 0 {

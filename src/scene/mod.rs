@@ -320,6 +320,12 @@ impl Scene {
         self.solids[k].is_still() && k < self.followed()
     }
 
+    /// Slots of the wall layers that never move: of fixed walls, then of the solids that stand still for ever.
+    pub fn still_slots(&self) -> impl Iterator<Item = usize> {
+        let solids = self.solids.iter().enumerate().filter(|(k, _)| self.stands(*k));
+        self.groups.static_wall_range().chain(solids.flat_map(|(_, solid)| solid.wall_slots.clone()))
+    }
+
     /// Solids that tables follow: all but the walls in openings, which come last.
     pub fn followed(&self) -> usize {
         self.solids.len() - self.openings.iter().filter(|o| o.solid.is_some()).count()

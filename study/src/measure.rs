@@ -118,10 +118,7 @@ impl Sampler {
                     point.y = 0.0;
                 }
                 let distance = |s: &usize| scene.position[*s].distance(point);
-                let still = (0..scene.solids.len()).filter(|&k| scene.stands(k));
-                let still = still.flat_map(|k| scene.solids[k].wall_slots.clone());
-                let walls = scene.groups.static_wall_range().chain(still);
-                walls.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                scene.still_slots().min_by(|a, b| distance(a).total_cmp(&distance(b)))
             }
         };
         let params = &simulation.params;
