@@ -46,14 +46,9 @@ fn parts(i: u32) -> f32 {
     let v = velocity[i].xyz;
     let count = neighbour_count[i];
     var pairs = 0u;
-    for (var k = 0u; k < near_of(count); k++) {
-        let j = neighbour_list_at(k, i);
+    for (var k = 0u; k < all_of(count); k++) {
+        let j = neighbour_list_at(all_plane(k, count), i);
         pairs += u32((is_fluid || j < params.fluid) && any(rebound(x, v, j) != vec3f(0.0)));
-    }
-    if is_fluid {
-        for (var k = 0u; k < dummies_of(count); k++) {
-            pairs += u32(any(rebound(x, v, neighbour_list_at(dummy_plane(k), i)) != vec3f(0.0)));
-        }
     }
     own *= max(f32(pairs), 1.0);
 //#endif
@@ -71,22 +66,15 @@ fn collision(@builtin(global_invocation_id) id: vec3u) {
     if is_close(count) {
         let x = position[i].xyz;
         let v = velocity[i].xyz;
-        let near = near_of(count);
         let own = parts(i);
-        for (var k = 0u; k < near; k++) {
-            let j = neighbour_list_at(k, i);
+        for (var k = 0u; k < all_of(count); k++) {
+            let j = neighbour_list_at(all_plane(k, count), i);
             if i >= params.fluid && j >= params.fluid {
                 continue;
             }
             let full = rebound(x, v, j);
             if any(full != vec3f(0.0)) {
                 change += full / (own + parts(j));
-            }
-        }
-        if i < params.fluid {
-            let dummies = dummies_of(count);
-            for (var k = 0u; k < dummies; k++) {
-                change += rebound(x, v, neighbour_list_at(dummy_plane(k), i)) / own;
             }
         }
     }

@@ -376,10 +376,20 @@ fn sees_wall(word: u32) -> bool {
     return (word & 0x2000000u) != 0u;
 }
 
+fn all_of(word: u32) -> u32 {
+    return near_of(word) + dummies_of(word);
+}
+
 // `neighbour_list` has a plane for each place in a row, so that neighbouring threads read neighbouring words: those that carry
 // pressure from the front, dummies from the back.
 fn dummy_plane(k: u32) -> u32 {
     return params.capacity - 1u - k;
+}
+
+// Of all of a row whose word is `word`: first those that carry pressure, then the dummies.
+fn all_plane(k: u32, word: u32) -> u32 {
+    let near = near_of(word);
+    return select(dummy_plane(k - near), k, k < near);
 }
 
 fn cell_coordinates(x: vec3f) -> vec3u {

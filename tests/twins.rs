@@ -346,6 +346,28 @@ fn collision() {
     });
 }
 
+/// As behind a thin body, where lists have it among the dummies.
+#[test]
+fn collision_behind_a_moving_wall() {
+    each(|pair| {
+        let mut fields = pair.gpu.read().expect("readable");
+        let body = &pair.scene.solids[1];
+        let (k, out) = (body.wall_slots.start - pair.scene.groups.fluid, body.wall_area[0].normalize());
+        let wall = body.wall_slots.start;
+        fields.position[20] = fields.position[wall] - 0.4 * pair.params.spacing * out;
+        fields.velocity[20] = fields.velocity[wall] + out;
+        pair.gpu.write(&fields).expect("writable");
+        pair.sync();
+        pair.run_all(&LISTS);
+        pair.run(Stage::Collision);
+        let (gpu, cpu) = pair.fields();
+        for fields in [&gpu, &cpu] {
+            assert!(fields.reaction[k].dot(out) > 1e-3, "the wall does not feel it: {}", fields.reaction[k]);
+        }
+        pair.check(Stage::Collision);
+    });
+}
+
 #[test]
 fn the_first_stage_that_acts_on_walls_forgets_the_step_before() {
     for (first, left_out) in [
