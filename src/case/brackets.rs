@@ -99,6 +99,36 @@ fn with_keys(schema: &Json, path: &str) -> String {
     )
 }
 
+/// All tables of a case: path, whether there may be many, and schema.
+fn tables<'a>(schema: &'a Json, path: &str, found: &mut Vec<(String, bool, &'a Json)>) {
+    for (key, value) in schema["properties"].as_object().into_iter().flatten() {
+        let (value, path) =
+            (bare(value), if path.is_empty() { key.clone() } else { format!("{path}.{key}") });
+        let items = bare(&value["items"]);
+        for (of, many) in [(value, false), (items, true)] {
+            if is(of, "object") {
+                found.push((path.clone(), many, of));
+                tables(of, &path, found);
+            }
+        }
+    }
+}
+
+/// The tables with a key of this name, as they are written, where these are few: where it belongs that was written elsewhere.
+pub(super) fn homes(key: &str) -> Option<String> {
+    let mut all = vec![];
+    tables(&SCHEMA, "", &mut all);
+    all.retain(|(_, _, schema)| schema["properties"].get(key).is_some());
+    let names =
+        all.iter().map(|(path, many, _)| if *many { format!("[[{path}]]") } else { format!("[{path}]") });
+    let names: Vec<String> = names.collect();
+    match names.as_slice() {
+        [] => None,
+        [one] => Some(one.clone()),
+        [first @ .., last] => (all.len() <= 4).then(|| format!("{} and {last}", first.join(", "))),
+    }
+}
+
 /// A schema without what says that it may be left out, and where it is written down.
 fn bare(schema: &Json) -> &Json {
     let parts = schema["anyOf"].as_array().into_iter().flatten();
@@ -124,27 +154,12 @@ mod tests {
         mistaken(table.get_ref()).map(|m| format!("{} | {}", m.title, m.remedy.unwrap_or_default()))
     }
 
-    /// Paths of all tables of a case, and whether there may be many.
-    fn tables(schema: &Json, path: &str, found: &mut Vec<(String, bool)>) {
-        for (key, value) in schema["properties"].as_object().into_iter().flatten() {
-            let (value, path) =
-                (bare(value), if path.is_empty() { key.clone() } else { format!("{path}.{key}") });
-            let items = bare(&value["items"]);
-            for (of, many) in [(value, false), (items, true)] {
-                if is(of, "object") {
-                    found.push((path.clone(), many));
-                    tables(of, &path, found);
-                }
-            }
-        }
-    }
-
     #[test]
     fn lists_for_tables_are_told_in_every_table_of_a_case() {
         let mut all = Vec::new();
         tables(&SCHEMA, "", &mut all);
-        assert!(all.len() > 30 && all.contains(&("body.orientation".into(), false)), "{all:?}");
-        for (path, many) in all {
+        assert!(all.len() > 30 && all.iter().any(|(path, many, _)| path == "body.orientation" && !many));
+        for (path, many, _) in all {
             // Outer tables of which there may be many, written as one.
             let (mut text, mut way) = (String::new(), String::new());
             let parts: Vec<&str> = path.split('.').collect();
@@ -166,6 +181,16 @@ mod tests {
             let words = if many { format!("[[{path}]]") } else { format!("[{path}], in single") };
             assert!(other.contains(&words), "{other}");
         }
+    }
+
+    #[test]
+    fn keys_have_homes() {
+        assert_eq!(homes("spring").as_deref(), Some("[contact]"));
+        assert_eq!(homes("gravity").as_deref(), Some("[run]"));
+        assert_eq!(homes("friction").as_deref(), Some("[contact] and [[contact.pair]]"));
+        // Too many to be of help, and none.
+        assert_eq!(homes("name"), None);
+        assert_eq!(homes("colour"), None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Messages about a case file: file, line and column, the line itself, what is allowed, a remedy.
 
+use super::brackets::homes;
 use crate::error::{Problem, tidy};
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::ops::Range;
@@ -72,7 +73,12 @@ pub(super) fn explain(said: &str, span: Option<Range<usize>>, table: Option<&DeT
     let remedy = match quoted.as_slice() {
         [wrong, allowed @ ..] if said.starts_with("unknown") => Some(match closest(wrong, allowed) {
             Some(name) => format!("did you mean `{name}`? allowed: {}", allowed.join(", ")),
-            None => format!("allowed: {}", allowed.join(", ")),
+            None => match homes(wrong) {
+                Some(tables) => {
+                    format!("`{wrong}` is a key of {tables}; allowed here: {}", allowed.join(", "))
+                }
+                None => format!("allowed: {}", allowed.join(", ")),
+            },
         }),
         [name, ..] if said.starts_with("missing field") => Some(match &key {
             Some(key) => {
