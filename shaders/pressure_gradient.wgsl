@@ -13,25 +13,24 @@
 //#if MIXED
 @group(0) @binding(9) var<storage, read> velocity: array<vec4f>;
 
-// Room that solids leave fluid slot i at x; 1 where there are no bodies.
-fn room_of(i: u32, x: vec3f) -> f32 {
+// Mean velocity of the solids about fluid slot i at x, and the room that they leave it; 1 where there are no bodies.
+fn solids_about(i: u32, x: vec3f) -> vec4f {
     if params.body_wall == 0u {
-        return 1.0;
+        return vec4f(0.0, 0.0, 0.0, 1.0);
     }
     let count = neighbour_count[i];
-    var solids = 1.0;
-    for (var k = 0u; k < near_of(count); k++) {
-        let j = neighbour_list_at(k, i);
+    var sum = 0.0;
+    var moving = vec3f(0.0);
+    for (var k = 0u; k < all_of(count); k++) {
+        let j = neighbour_list_at(all_plane(k, count), i);
         if j >= params.fluid {
             let r = offset(x, position[j].xyz);
-            solids += smooth_weight(weight(dot(r, r)));
+            let w = smooth_weight(weight(dot(r, r)));
+            sum += w;
+            moving += w * velocity[j].xyz;
         }
     }
-    for (var k = 0u; k < dummies_of(count); k++) {
-        let r = offset(x, position[neighbour_list_at(dummy_plane(k), i)].xyz);
-        solids += smooth_weight(weight(dot(r, r)));
-    }
-    return room_in_water(solids);
+    return vec4f(select(vec3f(0.0), moving / sum, sum > 0.0), room_in_water(1.0 + sum));
 }
 
 //#endif
@@ -112,10 +111,11 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
 //#if MIXED
     // Gravity acts together with the pressure that balances it.
     a += params.gravity;
-    // Without room a particle goes nowhere: no pressure carries it.
-    let room = room_of(i, x.xyz);
+    // Without room a particle goes where the solids go: no pressure carries it.
+    let about = solids_about(i, x.xyz);
+    let room = about.w;
     if room < 1.0 {
-        a = room * a - (1.0 - room) / now.dt * velocity[i].xyz;
+        a = room * a + (1.0 - room) / now.dt * (about.xyz - velocity[i].xyz);
     }
 //#endif
     acceleration[i] = vec4f(a, 0.0);

@@ -41,16 +41,17 @@ pub fn acceleration(gradient: DVec3, params: &Params) -> DVec3 {
     }
 }
 
-/// What is left of `acceleration` to a particle of water that solids catch between them, and what stops it [m/s2]: it
-/// undoes no divergence, so that no pressure carries it, and without room it goes nowhere. Left to its weight it fell
-/// through the floor, past the middle between wall particles.
+/// What is left of `acceleration` to a particle of water that solids catch between them, and what takes it with them [m/s2]:
+/// it undoes no divergence, so that no pressure carries it, and without room it goes where they go, by their mean velocity.
+/// Left to its weight it fell through the floor, past the middle between wall particles; held in its place it was left behind
+/// in a body that moved on.
 #[inline(always)]
 pub fn held(acceleration: DVec3, i: usize, all: Row, on: Particles, dt: f64) -> DVec3 {
     if on.params.source != Source::Mixed {
         return acceleration;
     }
-    let room = room_in_water(i, all, on);
-    if room >= 1.0 { acceleration } else { room * acceleration - (1.0 - room) / dt * on.velocity[i] }
+    let (room, with) = room_in_water(i, all, on);
+    if room >= 1.0 { acceleration } else { room * acceleration + (1.0 - room) / dt * (with - on.velocity[i]) }
 }
 
 /// -grad P / rho at fluid slot `i`, and gravity if it acts here [m/s2], in a step of `dt` [s]. `all` holds every

@@ -104,14 +104,17 @@ pub const SLOT: (f64, f64) = (0.35, 0.68);
 /// Link of a caught particle to P = 0, over n0 [-]: small beside links to water that is not caught.
 pub const LEAK: f64 = 0.1;
 
-/// Room that solids leave a particle of water [-]: 1 where there are no bodies, which are all that catch it.
+/// Room that solids leave a particle of water [-], and their mean velocity [m/s]: 1 where there are no bodies, which are all
+/// that catch it.
 #[inline(always)]
-pub fn room_in_water(i: usize, all: Row, on: Particles) -> f64 {
+pub fn room_in_water(i: usize, all: Row, on: Particles) -> (f64, DVec3) {
     if on.params.body_wall == 0 {
-        return 1.0;
+        return (1.0, DVec3::ZERO);
     }
-    let solids = all.iter().filter(|(j, _)| *j >= on.fluid).map(|(_, w)| smooth_weight(reach(w)));
-    room(i, 1.0 + solids.sum::<f64>(), on.fluid, on.params)
+    let solids =
+        all.iter().filter(|(j, _)| *j >= on.fluid).map(|(j, w)| (smooth_weight(reach(w)), on.velocity[j]));
+    let (sum, moving) = solids.fold((0.0, DVec3::ZERO), |(sum, moving), (w, v)| (sum + w, moving + w * v));
+    (room(i, 1.0 + sum, on.fluid, on.params), if sum > 0.0 { moving / sum } else { DVec3::ZERO })
 }
 
 /// Room that `solids` leave at slot `i` [-].
