@@ -11,7 +11,7 @@
 @group(0) @binding(5) var<storage, read> free_body: array<FreeBody>;
 @group(0) @binding(6) var<storage, read_write> source_diagonal: array<vec2f>;
 // Of each moving-wall slot what slots between solids bring it (of a pascal force and the part of its own area that is taken,
-// torque; force and torque of the water's weight); then of each force and the place of its y, torque and what it adds to the
+// torque and the link through which water seeps; force of the water's weight and that link times the pressure behind it, torque); then of each force and the place of its y, torque and what it adds to the
 // diagonal; then y of each body.
 @group(0) @binding(7) var<storage, read_write> coupling: array<vec4f>;
 @group(0) @binding(8) var<storage, read> preconditioned: array<vec4f>;
@@ -97,10 +97,13 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
             row.torque = cross(arm, row.force);
             force = (surface_head(pose, wall) - excess[k]) * row.force
                 + params.dynamic_viscosity * cross(pose.angular_velocity.xyz, row.force);
+            let of_torque = coupling[4u * k + 1u];
+            let head = coupling[4u * k + 2u];
             row.force += slot.xyz;
-            row.torque += coupling[4u * k + 1u].xyz;
-            known.force += coupling[4u * k + 2u].xyz;
+            row.torque += of_torque.xyz;
+            known.force += head.xyz;
             known.torque += coupling[4u * k + 3u].xyz;
+            source_diagonal[params.fluid + k] += vec2f(head.w, of_torque.w);
         }
 //#if REACTION
         force += reaction[k].xyz;

@@ -16,15 +16,17 @@
 //! level P / rho g of all that are under water are none of it, and where P_f is negative there is air. Which rows that are the last
 //! step's pressures say. Slots that do not hang together have a field each.
 //!
-//! A body that others enclose has slots without a rim (`slots/enclosed.rs`).
+//! A body that others enclose has slots without a rim (`slots/enclosed.rs`); water that solids and their slots enclose has the pressure
+//! that comes through them (`slots/pockets.rs`).
 
 mod enclosed;
+mod pockets;
 mod pushes;
 
 pub use enclosed::Pressed;
 pub use pushes::{Opposite, Push};
 
-use crate::body::slots::SlotRow;
+use crate::body::slots::{Seep, SlotRow};
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::{Bounds, PointGrid, fixed_walls, meeting_images};
 use crate::error::Result;
@@ -110,11 +112,21 @@ impl Layer {
             rim.sort_unstable();
             rim.dedup();
             let at_rim = |n: &usize| self.adjacent[*n].iter().any(|&m| shares[m as usize] == 0.0);
-            let mouth = rows.iter().copied().filter(at_rim).collect();
+            let mouth: Vec<usize> = rows.iter().copied().filter(at_rim).collect();
+            let edge = rim.iter().map(|&m| self.edge(m, &mouth)).collect();
             let inside = rows.into_iter().map(|n| (n, shares[n])).collect();
-            out.push(Slot { solid, rim, mouth, inside });
+            out.push(Slot { solid, rim, edge, mouth, inside });
         }
         out
+    }
+
+    /// Where the slot ends before row `m` of its rim, on the surface of the rows at its `mouth`.
+    fn edge(&self, m: usize, mouth: &[usize]) -> DVec3 {
+        let beside = self.adjacent[m].iter().map(|&n| n as usize).filter(|n| mouth.binary_search(n).is_ok());
+        let (sum, count) = beside.fold((DVec3::ZERO, 0.0), |(sum, count), n| {
+            (sum + self.offset[n] + self.to_surface[n], count + 1.0)
+        });
+        sum / count
     }
 
     /// Of each row in `slot`, the area that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
@@ -148,6 +160,8 @@ struct Slot {
     /// Those beside it, in open water. A row at its mouth is none: what a particle that is caught there does would be taken for the
     /// pressure in all of it.
     rim: Vec<usize>,
+    /// Where the slot ends before each of them, in the solid's frame [m].
+    edge: Vec<DVec3>,
     /// Rows in it that lie beside those.
     mouth: Vec<usize>,
     /// Rows in it, and how much of each [-].
@@ -191,6 +205,11 @@ pub struct Slots {
     spacing: f64,
     /// Weight of the water [N/m3].
     weight: DVec3,
+    /// Whether the water has no surface, and pressures are known up to a constant.
+    closed: bool,
+    flat: bool,
+    /// Lowest and highest corner of the domain [m].
+    domain: Bounds,
     fixed: PointGrid,
     /// Which of the walls' particles each point of theirs is.
     fixed_of: Vec<usize>,
@@ -207,6 +226,9 @@ impl Slots {
             periodic: scene.periodic,
             spacing: l0,
             weight: params.density * params.gravity,
+            closed: params.filled,
+            flat: scene.dimensions == 2,
+            domain: scene.domain,
             fixed: PointGrid::new(fixed, CELL * l0),
             fixed_of,
             layers: scene.solids.iter().map(|solid| Layer::new(solid, l0)).collect(),
@@ -333,15 +355,15 @@ impl Slots {
     }
 
     /// The rows that lie in `slot`, and those at its rim with what they pass on; `told` are the rim and its
-    /// pressures in the last step.
-    fn passed_on(&self, slot: &Slot, pose: &Pose, told: &[(usize, f64)]) -> Vec<SlotRow> {
+    /// pressures in the last step, `seeps` what comes through the slot to rows of the rim.
+    fn passed_on(&self, slot: &Slot, pose: &Pose, told: &[(usize, f64)], seeps: &[Seep]) -> Vec<SlotRow> {
         let layer = &self.layers[slot.solid];
         // Relative to the centre of mass, world axes.
-        let place = |n: usize| pose.orientation * layer.offset[n];
-        let on_surface = |n: usize| place(n) + pose.orientation * layer.to_surface[n];
-        let passing = self.passing(told.to_vec(), place);
+        let place = self.places(slot, pose, told);
+        let on_surface = |n: usize| pose.orientation * (layer.offset[n] + layer.to_surface[n]);
+        let passing = self.passing(told.to_vec(), |n| pose.orientation * layer.offset[n]);
         let count = passing.len() as f64;
-        let field = self.field(&passing, place);
+        let field = self.field(&passing, &place);
         let Field { middle, inverse, any_wet, .. } = field;
         let xi = |n: usize| (place(n) - middle) / self.spacing;
         let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
@@ -382,7 +404,9 @@ impl Slots {
             } else {
                 head = Wrench::default();
             }
-            SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head }
+            let seep =
+                slot.rim.binary_search(&n).ok().and_then(|at| seeps.get(at)).copied().unwrap_or_default();
+            SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head, seep }
         };
         // A row at the mouth keeps what of it looks out: its own pressure there.
         let inside = |(&(n, share), &area): (&(usize, f64), &DVec3)| {
@@ -399,6 +423,22 @@ impl Slots {
             .map(at_rim)
             .chain(slot.inside.iter().zip(&areas).map(inside))
             .collect()
+    }
+
+    /// Where the pressures are that a slot's field goes through, `told` as in [`Self::passed_on`]: at the rows, and P = 0 of a dry rim where the
+    /// slot ends there.
+    fn places<'a>(
+        &'a self,
+        slot: &'a Slot,
+        pose: &'a Pose,
+        told: &'a [(usize, f64)],
+    ) -> impl Fn(usize) -> DVec3 + 'a {
+        let any_wet = told.iter().any(|&(_, p)| p > 0.0);
+        let offset = &self.layers[slot.solid].offset;
+        move |n| {
+            let dry = slot.rim.binary_search(&n).ok().filter(|&at| any_wet && told[at].1 <= 0.0);
+            pose.orientation * dry.map_or(offset[n], |at| slot.edge[at])
+        }
     }
 
     /// Pressure of the `field` of a slot on a body's surface, at `x` by a row at `place` [Pa].

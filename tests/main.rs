@@ -45,6 +45,7 @@ mod output;
 mod output_fields;
 mod packages;
 mod periodic;
+mod pockets;
 mod prisms;
 mod ranks;
 mod ranks_gpu;

@@ -302,3 +302,32 @@ fn what_has_landed_is_lifted_by_the_water_that_it_displaces() {
         assert!((lift + held - density / 1000.0).abs() < 0.03, "it is at rest: {lift} {held}");
     }
 }
+
+/// Between solids no pressure carries a particle, and it stayed where it was while the body that had caught it moved on: deep in
+/// its wall it then asked for pressures that threw both.
+#[test]
+fn a_particle_that_a_body_catches_goes_with_it() {
+    let mut simulation = simulation(&case(
+        "[run]\nspacing = 0.015\ntime_step = 1.4e-3\nend = 1\ngravity = [0, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.3, 0.3, 0.3]\nopen = [\"z_max\"]\n\
+         [fluid]\nsound_speed = 10\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.015, 0.015, 0.015]\n\
+         [contact]\nspring = 1e4\n\
+         [[body]]\nname = \"cube\"\nsize = [0.06, 0.06, 0.06]\ncenter = [0.08, 0.15, 0.15]\nmass = 0.1\n\
+         velocity = [0.6, 0.3, 0.2]\n",
+    ));
+    let start = DVec3::new(0.6, 0.3, 0.2);
+    let mut fields = simulation.backend.read().expect("readable");
+    // In its wall layer, in the middle of four particles of it.
+    fields.position[0] = DVec3::new(0.08, 0.15, 0.15 + 0.03 - 0.0075);
+    fields.velocity[0] = start;
+    simulation.backend.write(&fields).expect("written");
+    while simulation.time < 0.12 {
+        simulation.step().expect("it flies");
+    }
+    let fields = simulation.backend.read().expect("readable");
+    let pose = simulation.solids.poses()[0];
+    let (water, body) = (fields.velocity[0] - start, pose.velocity - start);
+    let way = fields.position[0] - pose.position;
+    println!("water {water}, cube {body}, apart by {way}");
+    assert!(water.length() < 0.05 && body.length() < 0.02, "thrown: {water} {body}");
+}

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Caps, Gpu};
 use seixo::backend::{Backend, Processor};
-use seixo::body::slots::SlotRow;
+use seixo::body::slots::{Seep, SlotRow};
 use seixo::body::{FreeBody, Pose, Wrench};
 use seixo::fields::{Fields, State};
 use seixo::kernels::Particles;
@@ -704,7 +704,7 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
     }
 }
 
-/// Rows of the body as if half of each third one lay in a slot and the next ones were its rim.
+/// Rows of the body as if half of each third one lay in a slot and the next ones were its rim, before a pocket.
 fn rows_at_slots(pair: &Pair) -> Vec<SlotRow> {
     let l0 = pair.params.spacing;
     let push = |k: f64| Wrench {
@@ -717,7 +717,8 @@ fn rows_at_slots(pair: &Pair) -> Vec<SlotRow> {
         1 => {
             let mut head = Wrench::default();
             head.add(200.0, &push(1.0));
-            Some(SlotRow { solid: 1, row: k as u32, taken: 0.0, per_pascal: push(k as f64), head })
+            let seep = Seep { link: 0.5, known: 0.5 * 400.0 };
+            Some(SlotRow { solid: 1, row: k as u32, taken: 0.0, per_pascal: push(k as f64), head, seep })
         }
         _ => None,
     };

@@ -16,6 +16,17 @@ pub struct SlotRow {
     pub per_pascal: Wrench,
     /// The weight of the water between this row and the slots, as long as the row is under water [N], [N m].
     pub head: Wrench,
+    /// What seeps through a slot from this row to the rest of its rim: its link to P = `seep.level`.
+    pub seep: Seep,
+}
+
+/// A link of a row to a pressure that is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seep {
+    /// Weight of the link over n0 [-].
+    pub link: f64,
+    /// That weight times the pressure [Pa].
+    pub known: f64,
 }
 
 /// Of `rows`, those of `solid`: in turn what each row of its wall layer has, nothing for one that is at no slot.

@@ -2,6 +2,7 @@
 //! slots of other bodies which they face, and of those that these face. What it presses is known from the pressures of
 //! the last step: the enclosed body has no row that the equation could couple it by.
 
+use super::pockets::Closures;
 use super::{Faced, Field, Found, Opposite, Slots};
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
@@ -91,12 +92,13 @@ impl Slots {
     pub fn press(&self, poses: &[Pose], read: impl FnOnce(&[usize]) -> Result<Vec<f64>>) -> Result<Pressed> {
         let found = self.find(poses);
         let pressure = self.at_rims(&found, read)?;
+        let solids = Closures::new(self, poses, &found);
         let of_slot = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             let slot = &f.slot;
-            match slot.rim.is_empty() {
-                true => Self::without_rim(f),
-                false => self.passed_on(slot, &poses[slot.solid], told),
+            if slot.rim.is_empty() {
+                return Self::without_rim(f);
             }
+            self.passed_on(slot, &poses[slot.solid], told, &solids.seeps(slot, told))
         };
         let mut rows: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
         rows.sort_by_key(|slot| (slot.solid, slot.row));
@@ -107,6 +109,8 @@ impl Slots {
                 first.per_pascal += next.per_pascal;
                 first.head += next.head;
                 first.taken = first.taken.max(next.taken);
+                first.seep.link += next.seep.link;
+                first.seep.known += next.seep.known;
             }
             same
         });

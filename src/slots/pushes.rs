@@ -48,11 +48,12 @@ impl Slots {
         let pressure = self.at_rims(&found, read)?;
         let of = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             let (slot, pose) = (&f.slot, &poses[f.slot.solid]);
-            let place = |n: usize| pose.orientation * self.layers[slot.solid].offset[n];
+            let row_place = |n: usize| pose.orientation * self.layers[slot.solid].offset[n];
             let field = match slot.rim.is_empty() {
                 true => self.lent(&found, &pressure, f, poses),
                 false => {
-                    Some(self.field(&self.passing(told.clone(), place), place)).filter(|field| field.any_wet)
+                    let passing = self.passing(told.clone(), row_place);
+                    Some(self.field(&passing, self.places(slot, pose, told))).filter(|field| field.any_wet)
                 }
             };
             field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, pose))

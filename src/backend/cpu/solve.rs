@@ -23,7 +23,15 @@ impl Cpu {
     fn couple(&mut self) -> Vec<CoupledBody> {
         let (params, fluid, share) = (&self.params, self.groups.fluid, self.share.as_deref());
         let density_over_volume = params.density / params.spacing.powi(3);
-        let Fields { state, reaction, source, .. } = &mut self.fields;
+        let Fields { state, reaction, source, diagonal, .. } = &mut self.fields;
+        let link = laplacian_coefficient(params) * params.number_density;
+        for slot in self.slots.iter().filter(|slot| slot.seep.link > 0.0) {
+            let i = self.solids[slot.solid as usize].wall_slots.start + slot.row as usize;
+            if owns(share, i) && state[i] == State::Inner {
+                diagonal[i] += link * slot.seep.link;
+                source[i] += link * slot.seep.known;
+            }
+        }
         let excess = &self.excess;
         let answers =
             |body: &FreeBody| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO;

@@ -48,7 +48,11 @@ impl Gpu {
             }
         };
         let of = bodies.iter().zip(&self.wall_layers).enumerate();
-        let free = of.filter(|(_, (b, _))| b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO);
+        // Through slots of a body that is held water seeps as well.
+        let seeps = |k: usize| slots.iter().any(|slot| slot.solid as usize == k && slot.seep.link > 0.0);
+        let free = of.filter(|(k, (b, _))| {
+            b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO || seeps(*k)
+        });
         let mut free: Vec<_> = free.map(device).collect();
         let count = free.len() as u32;
         free.iter_mut().for_each(|body| body.bodies = count);
@@ -61,8 +65,12 @@ impl Gpu {
         let device = |slot: &SlotRow| {
             [
                 slot.per_pascal.force.as_vec3().extend(slot.taken as f32).to_array(),
-                four(slot.per_pascal.torque),
-                four(slot.head.force),
+                slot.per_pascal
+                    .torque
+                    .as_vec3()
+                    .extend((p.number_density * slot.seep.link) as f32)
+                    .to_array(),
+                slot.head.force.as_vec3().extend((p.number_density * slot.seep.known) as f32).to_array(),
                 four(slot.head.torque),
             ]
         };
