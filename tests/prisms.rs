@@ -306,3 +306,26 @@ fn plates_of_any_thickness_feel_still_water() {
         );
     }
 }
+
+/// The floor is seen through a groove that comes down to it in one line, between the places at which it is looked at whether it is covered.
+#[test]
+fn a_corner_stands_in_a_groove_that_ends_on_the_floor() {
+    for (spacing, apex) in [(0.02, 0.0), (0.01, 0.0), (0.01, 1e-5)] {
+        let side = 0.15;
+        let low = 0.5 * side * 2.0_f64.sqrt() + apex + 5e-4;
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [1.2, 0.1, 0.8]\nopen = [\"z_max\"]\n\
+             [[obstacle]]\nname = \"v\"\nshape = \"prism\"\n\
+             section = [[0, -0.04], [1.2, -0.04], [1.2, 0.4], [1.0, 0.4], [0.6, {apex}], [0.2, 0.4], [0, 0.4]]\n\
+             [[body]]\nname = \"square\"\nsize = [{side}, 0.1, {side}]\norientation = {{ axis = [0, 1, 0], angle_deg = 45 }}\n\
+             center = [0.6, 0, {low}]\ndensity = 2000\n\
+             [contact]\nspring = 2e5\nrestitution = 0.3\nfriction = 0\n"
+        ));
+        dry.run(0.8);
+        let weight = 2000.0 * side * side * spacing * 9.81;
+        let held = dry.solids.contact_wrenches()[0].force.z / weight;
+        println!("{spacing} m: held by {held:.4} of its weight");
+        assert!((held - 1.0).abs() < 1e-2, "{held}");
+    }
+}

@@ -69,8 +69,11 @@ impl WallBox {
 
 /// Gap over the spacing up to which a wall covers what it faces: nothing fits in between.
 pub(super) const COVERED: f64 = 2e-3;
+/// Height over the spacing up to which what covers a face must fill the place before it: at the bottom of a groove it does not, and
+/// a corner that comes down there finds the face.
+const GROOVE: f64 = 0.5;
 /// Most points along an edge of a face at which it is looked at whether it is covered.
-const MOST_LOOKS: f64 = 40.0;
+const MOST_LOOKS: f64 = 1000.0;
 
 /// The box of solid `k` of `scene`, if it is pressed as walls are: it stands still for ever. The layer in an opening only does so for contact: it
 /// goes and comes with the water that passes, and has all its faces.
@@ -161,11 +164,12 @@ fn is_closed(walls: &[WallBox], beside: &[Still], k: usize, face: u8, spacing: f
         let near = |x: DVec3| Cuboid { half: w.half }.outside(w.local(x)) < COVERED * spacing;
         near(x) && (near(x + 1.5 * COVERED * spacing * normal) || w.is_open_towards(normal))
     };
+    let filled = |x: DVec3| beside.iter().any(|still| still.fills(x, normal, spacing));
     let places = |axis: usize| looks(walls[k].half[axis], spacing, flat && axis == 1);
     all_places(walls, k, face, 0.5 * COVERED * spacing, places, |q| {
         let x = walls[k].world(q);
         walls.iter().enumerate().any(|(other, w)| other != k && covers(w, x))
-            || beside.iter().any(|still| still.fills(x, normal, spacing))
+            || filled(x) && filled(x + GROOVE * spacing * normal)
     })
 }
 
