@@ -35,6 +35,8 @@ struct Gate {
     area: f64,
     /// Particles that it had swallowed when they were last counted.
     taken: u64,
+    /// Volume that its discharge has asked for so far [m3]: the discharge may have been another before `run.from`.
+    asked: f64,
 }
 
 /// The openings of a scene.
@@ -67,6 +69,7 @@ impl Openings {
             layers: 0,
             area: opening.area * (opening.wet.max(1) as f64 / opening.layer as f64).max(0.25),
             taken: 0,
+            asked: 0.0,
             opening: opening.clone(),
         };
         Self { gates: scene.openings.iter().map(gate).collect(), spacing: scene.spacing, reached: 0.0 }
@@ -95,7 +98,9 @@ impl Openings {
                 }
                 Passes::Drawn(discharge) => {
                     gate.speed = discharge.value(to) / gate.area;
-                    discharge.integral(from, to) / gate.area
+                    let volume = discharge.integral(from, to);
+                    gate.asked += volume;
+                    volume / gate.area
                 }
                 Passes::Free => 0.0,
             };
@@ -135,17 +140,16 @@ impl Openings {
 
     /// Takes in what the outflows have swallowed since the start: walls that follow a discharge hurry or wait.
     pub fn count(&mut self, passage: &Passage, swallowed: &[u64]) {
-        let (l0, t) = (self.spacing, self.reached);
+        let l0 = self.spacing;
         let outflows = self.gates.iter_mut().filter(|g| !g.opening.is_inflow());
         for ((gate, outlet), &total) in outflows.zip(&passage.outlets).zip(swallowed) {
-            let Passes::Drawn(discharge) = &gate.opening.passes else { continue };
-            if outlet.is_closed() {
+            if !matches!(gate.opening.passes, Passes::Drawn(_)) || outlet.is_closed() {
                 continue;
             }
             let full = gate.opening.area;
             let wet = (total - gate.taken) as f64 * l0 * l0;
             gate.taken = total;
-            let behind = discharge.integral(0.0, t) - total as f64 * l0.powi(3);
+            let behind = gate.asked - total as f64 * l0.powi(3);
             // A wall that has met no water goes on as if there were.
             let wet = if wet > 0.0 { wet } else { full };
             gate.area =
@@ -199,10 +203,11 @@ impl Openings {
     /// [`crate::error::Error::Checkpoint`] if the state has none.
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         for (k, gate) in self.gates.iter_mut().enumerate() {
-            let Gate { opening: _, wall: _, travel, speed, layers, area, taken } = gate;
+            let Gate { opening: _, wall: _, travel, speed, layers, area, taken, asked } = gate;
             archive.number(&format!("openings.{k}.travel"), travel)?;
             archive.number(&format!("openings.{k}.speed"), speed)?;
             archive.number(&format!("openings.{k}.area"), area)?;
+            archive.number(&format!("openings.{k}.asked"), asked)?;
             archive.count(&format!("openings.{k}.layers"), layers)?;
             archive.count(&format!("openings.{k}.taken"), taken)?;
         }
