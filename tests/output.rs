@@ -330,7 +330,8 @@ fn a_picture_shows_water_bodies_and_what_stands_behind_walls() {
     let blue = |[r, g, b]: [u8; 3]| b > r && b > g && b - g > 20;
     let turned = |(scene, case): &(Scene, Case), turn: DQuat| {
         let solids = seixo::contact::Solids::new(scene, Some(&contact())).unwrap();
-        let poses: Vec<_> = placed(solids.poses()).into_iter().map(|(x, q)| (x, turn * q)).collect();
+        let poses: Vec<_> =
+            placed(solids.poses()).into_iter().map(|pose| pose.map(|(x, q)| (x, turn * q))).collect();
         let params = Params::new(case, scene).unwrap();
         let painter = Painter::new(scene, &Style::of(3), &params);
         painter.paint(scene, 0.0, &poses, drops(scene, Some(&Fields::new(scene)))).png()

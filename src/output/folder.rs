@@ -218,7 +218,9 @@ impl Folder {
             }
         }
         self.remove(&self.pictures(), |file| {
-            numbered(file, "frame_", ".png") || file.starts_with(UNFINISHED)
+            numbered(file, "frame_", ".png")
+                || ["sheet.png", "animation.png"].contains(&file)
+                || file.starts_with(UNFINISHED)
         })?;
         self.remove(&self.checkpoints(), |file| is_checkpoint(file) || file.starts_with(UNFINISHED))?;
         self.remove(&self.file(MESHES), |file| is_mesh(file) || file.starts_with(UNFINISHED))?;

@@ -136,7 +136,9 @@ impl Painter {
         let flat = scene.dimensions == 2;
         let groups = &scene.groups;
         let drawn = (0..groups.pressure()).chain(groups.moving_dummy_range());
+        // Slots that wait for water that comes in stand somewhere.
         let (min, max) = drawn
+            .filter(|&slot| scene.kind[slot] != Kind::Ghost)
             .map(|slot| scene.position[slot])
             .filter(|x| x.is_finite())
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), x| (min.min(x), max.max(x)));
@@ -164,18 +166,20 @@ impl Painter {
         Self { camera, style: style.clone(), range, number_density: params.number_density, walls }
     }
 
-    /// The picture at `time` [s] with the solids of `scene` in `poses` (positions and orientations) and this water.
+    /// The picture at `time` [s] with the solids of `scene` in `poses` (positions and orientations; none for one that is
+    /// left out) and this water.
     pub fn paint(
         &self,
         scene: &Scene,
         time: f64,
-        poses: &[(DVec3, DQuat)],
+        poses: &[Option<(DVec3, DQuat)>],
         drops: impl Iterator<Item = Drop>,
     ) -> Picture {
         let (mut fluid, mut bodies, mut walls) =
             (Canvas::new(&self.camera), Canvas::new(&self.camera), self.walls.clone());
         let l0 = scene.spacing;
-        for (solid, &pose) in scene.solids.iter().zip(poses) {
+        for (solid, pose) in scene.solids.iter().zip(poses) {
+            let Some(pose) = *pose else { continue };
             if solid.is_body {
                 // A pattern that is fixed to it, so that one sees it turn.
                 let octant = |q: DVec3| (q.x > 0.0) ^ (q.y > 0.0) ^ (q.z > 0.0);
@@ -240,13 +244,13 @@ pub fn drops_of(particles: &Particles) -> impl Iterator<Item = Drop> {
 }
 
 /// Positions and orientations of solids in motion.
-pub fn placed(poses: &[Pose]) -> Vec<(DVec3, DQuat)> {
-    poses.iter().map(|p| (p.position, p.orientation)).collect()
+pub fn placed(poses: &[Pose]) -> Vec<Option<(DVec3, DQuat)>> {
+    poses.iter().map(|p| Some((p.position, p.orientation))).collect()
 }
 
-/// Positions and orientations of the solids of `scene` from their `particles` in a frame; as at t = 0 where a frame has
-/// none of a solid.
-pub fn placed_by(scene: &Scene, particles: &Particles) -> Vec<(DVec3, DQuat)> {
+/// Positions and orientations of the solids of `scene` from their `particles` in a frame. Of what does not move, and of the
+/// walls in openings, a frame needs none; where another solid is, nobody knows if the frame holds nothing of it.
+pub fn placed_by(scene: &Scene, particles: &Particles) -> Vec<Option<(DVec3, DQuat)>> {
     let mut pairs: Vec<Vec<(DVec3, DVec3)>> = vec![Vec::new(); scene.solids.len()];
     for ((&body, &id), &x) in particles.body.iter().zip(&particles.id).zip(&particles.position) {
         let Some(k) = (body as usize).checked_sub(1).filter(|&k| k < pairs.len()) else { continue };
@@ -264,12 +268,18 @@ pub fn placed_by(scene: &Scene, particles: &Particles) -> Vec<(DVec3, DQuat)> {
         };
         pairs[k].extend(offset.map(|o| (o, Vec3::from(x).as_dvec3())));
     }
-    let fitted = scene
-        .solids
-        .iter()
-        .zip(&pairs)
-        .map(|(solid, pairs)| fit(pairs).unwrap_or((solid.position, solid.orientation)));
+    let fitted = scene.solids.iter().zip(&pairs).enumerate().map(|(k, (solid, pairs))| {
+        let moves = k < scene.followed() && (solid.gives_way() || !(solid.is_free() || solid.is_still()));
+        let start = (solid.position, solid.orientation);
+        fit(pairs).or_else(|| shifted(pairs, start)).or((!moves).then_some(start))
+    });
     fitted.collect()
+}
+
+/// The pose `start` moved to where the points of `pairs` are, for points that tell no orientation.
+fn shifted(pairs: &[(DVec3, DVec3)], start: (DVec3, DQuat)) -> Option<(DVec3, DQuat)> {
+    let sum: DVec3 = pairs.iter().map(|&(o, x)| x - start.1 * o).sum();
+    (!pairs.is_empty()).then(|| (sum / pairs.len() as f64, start.1))
 }
 
 /// Position and orientation that bring the first points of `pairs` nearest to the second ones: the rotation is the
