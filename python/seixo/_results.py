@@ -122,7 +122,7 @@ class Run:
         Raises FileNotFoundError if the run wrote none: there is no bodies.csv without solids, no gauges.csv without gauges.
         """
         headers, rows = self._rows(name)
-        columns = [_column([row[k] for row in rows]) for k in range(len(headers))]
+        columns = [_column(header, [row[k] for row in rows]) for k, header in enumerate(headers)]
         names = _names(headers)
         try:
             import pandas
@@ -415,8 +415,10 @@ def _damaged(path: Path, line: int, why: str) -> FileError:
     return FileError(f"{path}: line {line}: {why}; this is no table of seixo's, or somebody changed it: run the case again", 5)
 
 
-def _column(cells: list[str]) -> Array:
-    """Numbers, if all are; what is empty is none."""
+def _column(header: str, cells: list[str]) -> Array:
+    """Numbers, if all are; what is empty is none. Names stay names: a body may be called `1`."""
+    if header == "body":
+        return np.array(cells, dtype=object)
     try:
         return np.array([float(cell) if cell else np.nan for cell in cells])
     except ValueError:

@@ -124,6 +124,13 @@ def _whole(name: str, value: Any) -> int | None:
         raise TypeError(f"{name}: a whole number, not {value!r}") from None
 
 
+def _number(name: str, value: Any) -> float:
+    """A number of Python's or numpy's."""
+    if isinstance(value, numbers.Real) and not isinstance(value, bool):
+        return float(value)
+    raise TypeError(f"{name}: a number, not {_named(value)}")
+
+
 def _named(value: Any) -> str:
     return "None" if value is None else f"a value of type {type(value).__name__}"
 
@@ -132,9 +139,9 @@ def _changes(spacing: float | None, until: float | None, sets: Mapping[str, Any]
     """Options that change the case."""
     changes = []
     if spacing is not None:
-        changes.append(f"--spacing={spacing!r}")
+        changes.append(f"--spacing={_number("spacing", spacing)!r}")
     if until is not None:
-        changes.append(f"--until={until!r}")
+        changes.append(f"--until={_number("until", until)!r}")
     changes += [f"--set={change}" for change in value_sets(sets)]
     return changes
 
