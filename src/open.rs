@@ -93,9 +93,9 @@ impl Simulation {
         if self.plan.wet() { self.backend.read() } else { Ok(Fields::default()) }
     }
 
-    /// Bodies and moving walls as they are now, in the order of [`Scene::solids`].
+    /// Bodies and moving walls as they are now, in the order of [`Scene::solids`], without the walls in openings.
     pub fn solids(&self) -> impl Iterator<Item = SolidState<'_>> {
-        let of_scene = self.scene.solids.iter().zip(self.solids.poses());
+        let of_scene = self.scene.solids.iter().zip(self.solids.poses()).take(self.scene.followed());
         of_scene.zip(&self.fluid_force).map(|((solid, pose), &fluid)| SolidState {
             name: &solid.name,
             is_body: solid.is_body,

@@ -31,6 +31,8 @@ pub struct Tables {
     since: Since,
     /// Step of the last row.
     last: Option<u64>,
+    /// Step of the last row of gauges.
+    gauged: Option<u64>,
 }
 
 /// What happened since the last row.
@@ -119,6 +121,7 @@ impl Tables {
             stages,
             since: Since::default(),
             last: None,
+            gauged: None,
         })
     }
 
@@ -127,7 +130,7 @@ impl Tables {
     /// # Errors
     /// [`crate::error::Error::Folder`] if one is shorter than that, [`crate::error::Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self { monitors, bodies, gauges, due, gauges_due, stages: _, since, last } = self;
+        let Self { monitors, bodies, gauges, due, gauges_due, stages: _, since, last, gauged } = self;
         monitors.exchange(archive)?;
         for table in bodies.iter_mut().chain(gauges.as_mut().map(|(_, table)| table)) {
             table.exchange(archive)?;
@@ -135,9 +138,11 @@ impl Tables {
         due.exchange("tables", archive)?;
         gauges_due.exchange("gauges", archive)?;
         gauges.iter_mut().try_for_each(|(gauges, _)| gauges.exchange(archive))?;
-        let mut step = last.unwrap_or(u64::MAX);
-        archive.count("tables.last", &mut step)?;
-        *last = Some(step).filter(|&s| s != u64::MAX);
+        for (name, step) in [("tables.last", last), ("gauges.last", gauged)] {
+            let mut number = step.unwrap_or(u64::MAX);
+            archive.count(name, &mut number)?;
+            *step = Some(number).filter(|&n| n != u64::MAX);
+        }
         since.exchange(archive)
     }
 
@@ -198,6 +203,9 @@ impl Tables {
         simulation: &mut Simulation,
         totals: &mut Totals,
     ) -> Result<()> {
+        if self.gauged != Some(simulation.steps) {
+            self.write_gauges(simulation)?;
+        }
         if self.last == Some(simulation.steps) {
             return Ok(());
         }
@@ -300,6 +308,7 @@ impl Tables {
     }
 
     fn write_gauges(&mut self, simulation: &mut Simulation) -> Result<()> {
+        self.gauged = Some(simulation.steps);
         if let Some((gauges, table)) = &mut self.gauges {
             table.row(&gauges.row(simulation)?)?;
             gauges.begin();

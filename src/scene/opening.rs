@@ -315,16 +315,17 @@ impl Builder<'_> {
         let room = match most {
             Some(volume) => {
                 let most = (volume * slice / l0.powi(3) - 1e-6).ceil();
+                let unit = if self.lattice.plane { "m2" } else { "m3" };
                 if (there as f64) > most {
                     let message = format!(
-                        "fluid.max_volume: {there} particles of water at t = 0 are more than the {most} of {volume} m3"
+                        "fluid.max_volume: {there} particles of water at t = 0 are more than the {most} of {volume} {unit}"
                     );
                     let remedy = "make it larger, or leave it out";
                     self.problems.push(Problem::new("fluid.max_volume", message, remedy));
                 }
                 if most > holds.max(there as f64) {
                     self.notes.push(format!(
-                        "fluid.max_volume: {volume} m3 are more than the domain holds, which is the most that is kept room for"
+                        "fluid.max_volume: {volume} {unit} are more than the domain holds, which is the most that is kept room for"
                     ));
                 }
                 most.min(holds) - there as f64

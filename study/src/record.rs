@@ -191,7 +191,8 @@ impl Recorder {
             gauges.begin();
         }
         if self.bodies {
-            for (k, pose) in simulation.solids.poses().iter().enumerate() {
+            let followed = simulation.scene.followed();
+            for (k, pose) in simulation.solids.poses().iter().take(followed).enumerate() {
                 let name = simulation.solids.name(k);
                 for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
                     put(format!("{name} {letter} [m]"), simulation.solids.path(k)[axis]);
