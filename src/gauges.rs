@@ -183,7 +183,7 @@ impl Gauges {
     /// # Errors
     /// What the backend says when it is read.
     pub fn row(&self, simulation: &mut Simulation) -> Result<Vec<Cell>> {
-        let known = simulation.steps > 0;
+        let known = simulation.has_stepped();
         let Readings { pressure, wrench, contact } = match self.means.as_ref().and_then(Means::value) {
             Some(mean) => mean,
             None => self.read(simulation)?,

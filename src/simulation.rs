@@ -70,6 +70,8 @@ pub struct Simulation {
     pub time: f64,
     /// Steps done.
     pub steps: u64,
+    /// Of these, steps of the run that it goes on from with `run.from`: what acts at its end is not known here.
+    began: u64,
     /// Seconds a stage since the start: by the host's clock, or by the device's as of the last look. Of a device
     /// without a clock only what the host computes, unless `wait_for_stages`.
     pub stages: BTreeMap<Stage, f64>,
@@ -168,6 +170,7 @@ impl Simulation {
             plan,
             time: 0.0,
             steps: 0,
+            began: 0,
             stages: BTreeMap::new(),
             wait_for_stages: false,
             speed: fastest,

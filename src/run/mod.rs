@@ -280,6 +280,8 @@ impl Run {
                 let mut reason = error.to_string();
                 if diverged {
                     reason.push_str(&self.keep_last(simulation, scene));
+                } else if matches!(error, Error::Gpu(_)) {
+                    reason.push_str(&self.keep_good(simulation));
                 }
                 let status = if diverged { Status::Diverged } else { Status::Failed };
                 (status, reason, Some(error), None)
@@ -320,15 +322,22 @@ impl Run {
             Ok(()) => "; the state is in vtu/last_*.vtu".to_owned(),
             Err(e) => format!("; its state could not be written: {e}"),
         };
+        said.push_str(&self.keep_good(simulation));
+        said
+    }
+
+    /// Keep the last good state, which is in memory and needs no device; says where.
+    fn keep_good(&mut self, simulation: &mut Simulation) -> String {
         if let Some((step, time, mut archive)) = self.saving.good.take()
             && let Err(e) =
                 complete(simulation, &mut archive).and_then(|()| self.saving.write(step, time, &archive))
         {
-            said.push_str(&format!("; the last good state could not be written: {e}"));
+            format!("; the last good state could not be written: {e}")
         } else if let Some(step) = self.saving.step {
-            said.push_str(&format!("; the last good state, of step {step}, is in checkpoint/"));
+            format!("; the last good state, of step {step}, is in checkpoint/")
+        } else {
+            String::new()
         }
-        said
     }
 
     fn advance(

@@ -36,6 +36,7 @@ impl Simulation {
             fluid_force,
             time,
             steps,
+            began,
             speed,
             fastest,
             solids_ledger,
@@ -50,6 +51,11 @@ impl Simulation {
         archive.same("solids that move", fluid_force.len() as u64)?;
         archive.number("time", time)?;
         archive.count("steps", steps)?;
+        if archive.is_of_another() {
+            *began = *steps;
+        } else {
+            archive.count("began", began)?;
+        }
         archive.number("speed", speed)?;
         archive.number("fastest", fastest)?;
         let vectors = fluid_force.iter().flat_map(|w| [w.force, w.torque]);

@@ -29,6 +29,11 @@ impl Simulation {
         })
     }
 
+    /// Whether a step was done, so that pressures and forces are known.
+    pub fn has_stepped(&self) -> bool {
+        self.steps > self.began
+    }
+
     /// Whether [`Self::fluid_force`] is what acts: it is left at zero where nothing asks for the force on walls that move.
     pub fn knows_fluid_force(&self) -> bool {
         !self.plan.wet() || self.plan.has(Stage::BodyForce)

@@ -197,7 +197,8 @@ pub(super) fn limits(
             );
             return Err(GpuError::TooSmall { limit: what, needs: bytes, has: Some(available), text }.into());
         }
-        *limit = (*limit).max(bytes).min(available);
+        // Contact's buffers grow with what touches.
+        *limit = (*limit).max(most).min(available);
     }
     let groups = u64::from(width(have));
     if memory.strided > groups {
