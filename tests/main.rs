@@ -64,6 +64,7 @@ mod slips;
 mod slots;
 mod stability;
 mod study;
+mod study_files;
 mod surface;
 mod twins;
 mod wall_layers;

@@ -67,6 +67,14 @@ fn copy(path: &Path, bytes: &[u8]) -> String {
     format!("{stem}-{sum}.{end}")
 }
 
+/// The TOML `text` of `case` as it is kept beside results: each mesh is named by what it holds, wherever it lies.
+///
+/// # Errors
+/// [`Error::Io`] if a mesh is gone.
+pub fn named_by_content(case: &Case, text: &str) -> Result<String> {
+    Ok(Meshes::read(case, text)?.text)
+}
+
 /// `case` with each mesh by what it holds instead of its place; one that is gone stays as it is.
 pub(super) fn by_content(mut case: Case) -> Case {
     for (_, file) in case.files() {

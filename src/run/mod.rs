@@ -34,6 +34,7 @@ pub use due::Due;
 use frames::Frames;
 use from::{earlier, fits, stands};
 use meshes::Meshes;
+pub use meshes::named_by_content;
 pub use options::{Options, Start};
 use pace::Pace;
 use saving::{Kept, Saving};

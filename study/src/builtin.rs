@@ -6,6 +6,8 @@ use super::{
     needs, pressure_size, pressure_solve, stability, wall_of_cubes, work_precision,
 };
 use seixo::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A built-in study: name, what it asks, in one line.
 pub struct Entry {
@@ -140,7 +142,8 @@ pub fn find(name: &str, setup: &Setup) -> Result<Study> {
     };
     match entry.make {
         Maker::File(file) => {
-            from_file(name, &cases::text("study", file)?, &|file| cases::text("study", file), setup)
+            let files = |file: &str| cases::text("study", file);
+            from_file(name, &cases::text("study", file)?, &files, Path::new(""), setup)
         }
         Maker::Function(make) if setup.sets.is_empty() => Ok(make(setup)),
         Maker::Function(_) => {
@@ -149,18 +152,29 @@ pub fn find(name: &str, setup: &Setup) -> Result<Study> {
     }
 }
 
-/// A study from the text of a file.
+/// A study from the text of a file that lies in `folder`.
 ///
 /// # Errors
 /// [`Error::Case`] for what is wrong with it.
-pub fn from_file(name: &str, text: &str, files: &Files, setup: &Setup) -> Result<Study> {
+pub fn from_file(name: &str, text: &str, files: &Files, folder: &Path, setup: &Setup) -> Result<Study> {
     let definition = Definition::parse(name, text)?;
-    let jobs = definition.jobs(files, setup)?;
+    let jobs = definition.jobs(files, folder, setup)?;
     // References are read before anything runs: a sweep must not end in a missing file.
-    let mut references = std::collections::BTreeMap::new();
-    for against in definition.error.iter().filter_map(|e| e.against.as_ref()).filter(|a| *a != "finest") {
-        references.insert(against.clone(), files(against)?);
-    }
+    let references = references(&definition, files)?;
+    Ok(Study { jobs, ..of_points(definition, references) })
+}
+
+/// The texts of the files that a study is held against, by name.
+///
+/// # Errors
+/// Those of `files`.
+pub fn references(definition: &Definition, files: &Files) -> Result<BTreeMap<String, String>> {
+    let named = definition.error.iter().filter_map(|e| e.against.as_ref()).filter(|a| *a != "finest");
+    named.map(|against| Ok((against.clone(), files(against)?))).collect()
+}
+
+/// What `definition` makes of points that are there: a study with none to compute.
+pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -> Study {
     let (name, title, question) =
         (definition.name.clone(), definition.title.clone(), definition.question.clone());
     let finish = Box::new(move |rows: &mut [super::row::Row], wanted| {
@@ -176,7 +190,7 @@ pub fn from_file(name: &str, text: &str, files: &Files, setup: &Setup) -> Result
         report.charts.extend(compare::charts(&definition, rows, &read)?);
         Ok(report)
     });
-    Ok(Study { name, title, question, jobs, finish })
+    Study { name, title, question, jobs: Vec::new(), finish }
 }
 
 #[cfg(test)]

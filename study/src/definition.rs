@@ -28,13 +28,15 @@
 use super::engine::{Job, Processor};
 use super::measure::Spec;
 use super::result_number::ResultNumber;
+use super::row::Measured;
 use super::run_point::{Point, run};
 use super::validation::check::Check;
-use seixo::case::file::{parse, parse_as};
+use seixo::case::file::{load_text, parse_as};
 use seixo::error::{Error, Result};
+use seixo::run::named_by_content;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A study file.
 #[derive(Clone, Debug, Deserialize)]
@@ -276,29 +278,30 @@ impl Definition {
         Ok(study)
     }
 
-    /// The text of the case.
+    /// The case of a study that lies in `folder`: the file that it stands for, beside which are those that it names, and its text.
     ///
     /// # Errors
     /// Those of `files`.
-    fn case_text(&self, files: &Files) -> Result<String> {
+    fn case_text(&self, files: &Files, folder: &Path) -> Result<(PathBuf, String)> {
         match (&self.text, &self.case) {
-            (Some(text), _) => Ok(text.clone()),
-            (None, Some(case)) => files(case),
+            (Some(text), _) => Ok((folder.join(&self.name), text.clone())),
+            (None, Some(case)) => Ok((folder.join(case), files(case)?)),
             (None, None) => Err(Error::key("case", format!("study `{}` has no case", self.name), "")),
         }
     }
 
-    /// The points. Overrides of the command line come after those of the study and before those of the axes. A
+    /// The points of a study that lies in `folder`. Overrides of the command line come after those of the study and before those of the axes. A
     /// point whose case is refused is a point that fails.
     ///
     /// # Errors
     /// [`Error::Case`] for a case that cannot be read, an axis without values, a method that names what is no axis, and if
     /// every point is refused: that is a mistake in the study, and not a finding.
-    pub fn jobs(&self, files: &Files, setup: &Setup) -> Result<Vec<Job>> {
+    pub fn jobs(&self, files: &Files, folder: &Path, setup: &Setup) -> Result<Vec<Job>> {
         let full = setup.full;
-        let text = self.case_text(files)?;
+        let (path, text) = self.case_text(files, folder)?;
+        let case = (path.as_path(), text.as_str());
         // A dry scene has nothing to jitter.
-        let wet = parse(&self.name, text.clone(), &self.set).is_ok_and(|(case, _, _)| case.fluid.is_some());
+        let wet = load_text(&path, text.clone(), None, &self.set).is_ok_and(|read| read.case.fluid.is_some());
         let runs = if wet { setup.runs } else { 0 };
         let mut jobs: Vec<(Job, Option<Error>)> = Vec::new();
         let main = Grid { method: None, full: false, axis: self.axis.clone() };
@@ -319,7 +322,7 @@ impl Definition {
             }
             for picks in points {
                 if runs == 0 {
-                    jobs.push(self.job(&text, method, &picks, setup));
+                    jobs.push(self.job(case, method, &picks, setup));
                 }
                 for seed in 1..=runs {
                     let start = Pick {
@@ -328,7 +331,7 @@ impl Definition {
                         set: vec![format!("fluid.jitter={JITTER}"), format!("fluid.seed={seed}")],
                         processor: None,
                     };
-                    jobs.push(self.job(&text, method, &[picks.clone(), vec![start]].concat(), setup));
+                    jobs.push(self.job(case, method, &[picks.clone(), vec![start]].concat(), setup));
                 }
             }
         }
@@ -358,8 +361,14 @@ impl Definition {
         }
     }
 
-    /// A point, and why its case is refused, if it is.
-    fn job(&self, text: &str, method: &str, picks: &[Pick], setup: &Setup) -> (Job, Option<Error>) {
+    /// A point of the case with this path and text, and why it is refused, if it is.
+    fn job(
+        &self,
+        (path, text): (&Path, &str),
+        method: &str,
+        picks: &[Pick],
+        setup: &Setup,
+    ) -> (Job, Option<Error>) {
         let all = self.set.iter().chain(&setup.sets).chain(picks.iter().flat_map(|p| &p.set));
         let all: Vec<String> = all.cloned().collect();
         let mut method = method.to_owned();
@@ -367,22 +376,24 @@ impl Definition {
             method = method.replace(&format!("{{{}}}", pick.axis), &pick.name);
         }
         let processor = picks.iter().find_map(|p| p.processor).unwrap_or(setup.processor);
-        let parsed = parse(&self.name, text.to_owned(), &all);
+        // The text to run names meshes by their place, that which the result depends on by what they hold.
+        let read = load_text(path, text.to_owned(), None, &all)
+            .and_then(|read| Ok((named_by_content(&read.case, &read.text)?, read)));
         // Particles go with the spacing to the power of the dimensions; steps with the end over the time step.
-        let weight = parsed.as_ref().map_or(0.0, |(case, _, _)| {
-            let run = &case.run;
+        let weight = read.as_ref().map_or(0.0, |(_, read)| {
+            let run = &read.case.run;
             let steps = run.end / run.time_step;
             steps * run.spacing.powi(-(run.dimensions as i32))
         });
-        let (effective, refused) = match parsed {
-            Ok((_, text, _)) => (Ok(text), None),
+        let (effective, refused) = match read {
+            Ok((content, read)) => (Ok((content, read.text)), None),
             Err(e) => (Err(e.to_string()), Some(e)),
         };
         let parameters = picks.iter().map(|p| (p.axis.clone(), p.name.clone())).collect();
         let identity = match &effective {
-            Ok(text) => {
+            Ok((content, _)) => {
                 let told = if self.result.is_empty() { String::new() } else { format!(" {:?}", self.result) };
-                format!("{text}\n{:?} {processor:?} {:?}{told}", self.measure, self.limit)
+                format!("{content}\n{:?} {processor:?} {:?}{told}", self.measure, self.limit)
             }
             Err(error) => format!("{error} {all:?}"),
         };
@@ -395,11 +406,14 @@ impl Definition {
             weight,
             task: Box::new(move |context| {
                 let text = match &effective {
-                    Ok(text) => text.clone(),
+                    Ok((_, text)) => text.clone(),
                     Err(error) => return Err(Error::file("case", "", error)),
                 };
                 let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
-                results.iter().try_for_each(|result| result.put(&mut out))?;
+                // A mistake of the study and not of the case: the run need not be repeated before the study is another.
+                if let Err(error) = results.iter().try_for_each(|result| result.put(&mut out)) {
+                    return Ok(Measured::failed(&error));
+                }
                 limits.iter().for_each(|(name, most)| out.limit(name, *most));
                 Ok(out)
             }),
@@ -411,6 +425,7 @@ impl Definition {
 #[cfg(test)]
 mod tests {
     use super::{Definition, Setup};
+    use std::path::Path;
 
     const STUDY: &str = r#"
 name = "s"
@@ -435,10 +450,10 @@ value = "e [-]"
     fn the_grid_is_the_product_of_the_axes_and_each_point_has_its_own_hash() {
         let study = Definition::parse("s.toml", STUDY).unwrap();
         let none = |_: &str| unreachable!();
-        let quick = study.jobs(&none, &Setup::default()).unwrap();
+        let quick = study.jobs(&none, Path::new(""), &Setup::default()).unwrap();
         let methods: Vec<&str> = quick.iter().map(|j| j.method.as_str()).collect();
         assert_eq!(methods, ["1.0 at x", "2.0 at x"]);
-        let full = study.jobs(&none, &Setup { full: true, ..Setup::default() }).unwrap();
+        let full = study.jobs(&none, Path::new(""), &Setup { full: true, ..Setup::default() }).unwrap();
         assert_eq!(full.len(), 6);
         let mut hashes: Vec<String> = full.iter().map(|j| j.hash("s")).collect();
         assert!(hashes.contains(&quick[0].hash("s")), "--full computes the quick points again");
@@ -446,7 +461,11 @@ value = "e [-]"
         hashes.dedup();
         assert_eq!(hashes.len(), 6);
         let other = study
-            .jobs(&none, &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() })
+            .jobs(
+                &none,
+                Path::new(""),
+                &Setup { sets: vec!["run.gravity=[0,0,0]".into()], ..Setup::default() },
+            )
             .unwrap();
         assert_ne!(other[0].hash("s"), quick[0].hash("s"));
     }
@@ -469,7 +488,7 @@ value = "e [-]"
                 let definition = Definition::parse(name, &text).unwrap();
                 let file = |file: &str| crate::cases::text(folder, file);
                 let setup = Setup { full: true, runs: 2, ..Setup::default() };
-                for job in definition.jobs(&file, &setup).unwrap() {
+                for job in definition.jobs(&file, Path::new(""), &setup).unwrap() {
                     assert!(job.weight > 0.0, "{folder}/{name}, {:?}: its case is refused", job.parameters);
                 }
             }
@@ -491,6 +510,6 @@ value = "e [-]"
         assert!(text.contains(told) && !text.contains("seixo keys"), "{text}");
         let text = STUDY.replace("key = \"run.end\"\nvalues = [1.0, 2.0]\nfull_values = [3.0]\n", "");
         let study = Definition::parse("s.toml", &text).unwrap();
-        assert!(study.jobs(&|_| unreachable!(), &Setup::default()).is_err());
+        assert!(study.jobs(&|_| unreachable!(), Path::new(""), &Setup::default()).is_err());
     }
 }

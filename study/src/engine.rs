@@ -152,34 +152,31 @@ pub struct Options {
     pub collect: Option<Vec<PathBuf>>,
 }
 
+/// The version of the program, as rows have it.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// Rows of the points that are there at the end, in the order of `jobs`.
 ///
 /// # Errors
-/// [`Error::Io`]. A point that fails is a row.
+/// [`Error::Io`]. A point that fails is a row. With `options.collect` as [`gather`].
 pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) -> Result<Vec<Row>> {
+    let hashes: Vec<String> = jobs.iter().map(|job| job.hash(study)).collect();
+    if let Some(others) = &options.collect {
+        return gather(&hashes, &options.out, others);
+    }
     let folder = options.out.join("points");
     std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
-    let mine = |k: &usize| options.collect.is_none() && options.shard.is_none_or(|s| s.has(*k));
-    let mut rows: Vec<Option<Row>> = Vec::new();
-    for (k, job) in jobs.iter().enumerate() {
-        let hash = job.hash(study);
-        let mut row = read(&point(&folder, &hash), &hash);
-        for other in options.collect.iter().flatten() {
-            if row.is_some() {
-                break;
-            }
-            row = read(&point(&other.join("points"), &hash), &hash);
-            if let Some(row) = &row {
-                write_whole(&point(&folder, &hash), json(row).as_bytes())?;
-            }
-        }
-        rows.push(row.map(|row| Row { index: k, ..row }));
-    }
+    let mine = |k: &usize| options.shard.is_none_or(|s| s.has(*k));
+    // What was refused is tried again: a file may be there now.
+    let kept = |(k, hash): (usize, &String)| {
+        let row = read(&point(&folder, hash), hash).filter(|row| !row.measured.refused)?;
+        Some(Row { index: k, ..row })
+    };
+    let mut rows: Vec<Option<Row>> = hashes.iter().enumerate().map(kept).collect();
     let open: Vec<usize> = (0..jobs.len()).filter(mine).filter(|&k| rows[k].is_none()).collect();
     let total: f64 = open.iter().map(|&k| jobs[k].weight).sum();
-    let found = rows.iter().flatten().count();
-    if found > 0 && !options.quiet {
-        remark(&format!("{study}: {found} of {} points are finished already", jobs.len()));
+    if !options.quiet {
+        told_of_kept(study, jobs.len(), &rows.iter().flatten().collect::<Vec<_>>(), context.repetitions);
     }
     let (start, mut done) = (Instant::now(), 0.0);
     for (n, &k) in open.iter().enumerate() {
@@ -187,7 +184,7 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
         if context.stop.is_asked() {
             return Err(Error::Interrupted);
         }
-        let states = options.out.join("states").join(job.hash(study));
+        let states = options.out.join("states").join(&hashes[k]);
         let here = Context {
             states: Some(states.clone()),
             stop: context.stop.clone(),
@@ -199,7 +196,8 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
             format: FORMAT,
             study: study.into(),
             index: k,
-            hash: job.hash(study),
+            hash: hashes[k].clone(),
+            version: VERSION.into(),
             method: job.method.clone(),
             parameters: job.parameters.iter().cloned().collect(),
             measured: attempt(job, &here)?,
@@ -227,6 +225,61 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
     Ok(rows.into_iter().flatten().collect())
 }
 
+/// Says how many of `all` points are `kept`, and which of them are not what a new one would be.
+fn told_of_kept(study: &str, all: usize, kept: &[&Row], repetitions: u32) {
+    if !kept.is_empty() {
+        remark(&format!("{study}: {} of {all} points are finished already", kept.len()));
+    }
+    let another = kept.iter().filter(|row| row.version != VERSION).count();
+    if another > 0 {
+        remark(&format!(
+            "note: {another} of them are of another version of seixo, as the report says: remove points/ to compute them again"
+        ));
+    }
+    let fewer = |row: &&&Row| row.measured.timing.is_some_and(|t| t.repetitions < repetitions);
+    let fewer = kept.iter().filter(fewer).count();
+    if fewer > 0 {
+        remark(&format!(
+            "note: {fewer} of them were timed over fewer runs than --repetitions {repetitions}: remove points/ to time them again"
+        ));
+    }
+}
+
+/// Rows of the points with these `hashes` that are finished in the folder `out` or in `others`, in this order; those of the others
+/// are copied to `out`.
+///
+/// # Errors
+/// [`Error::Usage`] if none of them is, before anything is written; [`Error::Io`].
+pub fn gather(hashes: &[String], out: &Path, others: &[PathBuf]) -> Result<Vec<Row>> {
+    let places: Vec<&Path> = std::iter::once(out).chain(others.iter().map(PathBuf::as_path)).collect();
+    let find = |hash: &String| {
+        let rows =
+            places.iter().enumerate().map(|(k, place)| (k, read(&point(&place.join("points"), hash), hash)));
+        let mut rows: Vec<(usize, Row)> = rows.filter_map(|(k, row)| Some((k, row?))).collect();
+        // One that was refused in one part may be whole in another.
+        rows.sort_by_key(|(k, row)| (row.measured.refused, *k));
+        rows.into_iter().next()
+    };
+    let found: Vec<Option<(usize, Row)>> = hashes.iter().map(find).collect();
+    if found.iter().all(Option::is_none) {
+        let names: Vec<String> = others.iter().map(|o| o.display().to_string()).collect();
+        let text = format!(
+            "none of the {} points of this study is finished in {}: nothing is joined, and what {} holds stays as it is",
+            hashes.len(),
+            names.join(", "),
+            out.display()
+        );
+        return Err(Error::usage("collect", text));
+    }
+    let folder = out.join("points");
+    std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
+    for (_, row) in found.iter().flatten().filter(|(place, _)| *place > 0) {
+        write_whole(&point(&folder, &row.hash), json(row).as_bytes())?;
+    }
+    let numbered = found.into_iter().enumerate();
+    Ok(numbered.filter_map(|(k, row)| row.map(|(_, row)| Row { index: k, ..row })).collect())
+}
+
 /// First line of `text`.
 pub(crate) fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
@@ -237,7 +290,10 @@ fn attempt(job: &Job, context: &Context) -> Result<Measured> {
     Ok(match catch_unwind(AssertUnwindSafe(|| (job.task)(context))) {
         Ok(Ok(measured)) => measured,
         Ok(Err(Error::Interrupted)) => return Err(Error::Interrupted),
-        Ok(Err(error)) => Measured::failed(&error),
+        Ok(Err(error)) => {
+            let refused = matches!(error, Error::Case(_) | Error::Io { .. });
+            Measured { refused, ..Measured::failed(&error) }
+        }
         Err(panic) => {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
@@ -335,6 +391,36 @@ mod tests {
         std::fs::write(&file, "{\"format\": 1, \"stu").unwrap();
         assert_eq!(run(folder.path(), None, None, &calls), first);
         assert_eq!(calls.load(Relaxed), 6);
+    }
+
+    #[test]
+    fn what_was_refused_is_tried_again_and_the_version_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let sweep = |there: bool| {
+            let task = move |_: &Context| match there {
+                true => Ok(Measured::default()),
+                false => Err(Error::io("hull.stl")(std::io::ErrorKind::NotFound.into())),
+            };
+            let options = Options { out: folder.path().into(), quiet: true, ..Options::default() };
+            let job = Job::new("m", &[], 1.0, task);
+            super::sweep("test", &[job], &options, &Context::new(&cpu_only)).unwrap()
+        };
+        let row = &sweep(false)[0];
+        assert!(row.measured.refused && row.measured.class == Class::Failed && row.version == VERSION);
+        assert_eq!(sweep(true)[0].measured.class, Class::Ok);
+        // Of another version it is kept, and says so.
+        let file = folder.path().join("points").join(format!("{}.json", row.hash));
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, text.replace(&format!("\"{VERSION}\""), "\"0.0.1\"")).unwrap();
+        assert_eq!(sweep(false)[0].version, "0.0.1");
+    }
+
+    #[test]
+    fn nothing_is_written_where_nothing_is_found() {
+        let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let [a, out] = folders.each_ref().map(|f| f.path().to_path_buf());
+        let error = gather(&["0".into()], &out, &[a]).unwrap_err().to_string();
+        assert!(error.contains("none of the 1 points") && !out.join("points").exists(), "{error}");
     }
 
     #[test]

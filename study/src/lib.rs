@@ -7,6 +7,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `points/HASH.json` | a finished point; the hash is that of everything it depends on |
+//! | `study.json` | what the study is and which points it has, for `collect` |
 //! | `results.csv`, `results.json` | all points |
 //! | `report.md` | findings in words, charts, the table |
 //! | `NAME.svg` | charts |
@@ -33,6 +34,7 @@ pub mod engine;
 pub mod gallery;
 pub mod gallery_scenes;
 pub mod incline;
+mod manifest;
 pub mod measure;
 pub mod needs;
 pub mod pareto;
@@ -52,6 +54,7 @@ pub mod spring_static;
 pub mod stability;
 pub mod stability_contact;
 pub mod stability_fluid;
+pub mod time_mean;
 pub mod validation;
 pub mod wall_of_cubes;
 mod work_precision;
@@ -60,6 +63,7 @@ use engine::{Context, Job, Options};
 use report::Report;
 use row::Row;
 use seixo::error::Result;
+use std::path::Path;
 
 /// Makes a report of the rows, for a wanted error; may add values to them.
 pub type Finish = Box<dyn Fn(&mut [Row], Option<f64>) -> Result<Report>>;
@@ -89,9 +93,22 @@ impl Study {
         context: &Context,
         wanted: Option<f64>,
     ) -> Result<(Vec<Row>, String)> {
-        let mut rows = engine::sweep(&self.name, &self.jobs, options, context)?;
+        let rows = engine::sweep(&self.name, &self.jobs, options, context)?;
+        self.conclude(&options.out, rows, wanted)
+    }
+
+    /// Write the results of `rows` into `out`. Returns them and the findings.
+    ///
+    /// # Errors
+    /// As [`Study::run`].
+    pub fn conclude(
+        &self,
+        out: &Path,
+        mut rows: Vec<Row>,
+        wanted: Option<f64>,
+    ) -> Result<(Vec<Row>, String)> {
         let report = (self.finish)(&mut rows, wanted)?;
-        let text = report::write(&options.out, &self.name, &self.title, &self.question, &rows, &report)?;
+        let text = report::write(out, &self.name, &self.title, &self.question, &rows, &report)?;
         Ok((rows, text))
     }
 }

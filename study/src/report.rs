@@ -1,12 +1,13 @@
 //! What a study leaves: results.csv, results.json, report.md, and its charts as SVG.
 
+use super::engine::VERSION;
 use super::row::{Class, Row};
 use crate::plot::Chart;
 use seixo::error::{Error, Result};
 use seixo::output::table::{Cell, Table};
 use seixo::output::write_whole;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -53,6 +54,7 @@ pub fn write_table(path: &Path, rows: &[Row]) -> Result<()> {
         "wall longest [s]",
         "repetitions",
         "machine",
+        "version",
         "hash",
     ]);
     let head: Vec<String> = head.map(str::to_owned).collect();
@@ -72,7 +74,7 @@ pub fn write_table(path: &Path, rows: &[Row]) -> Result<()> {
         let time = m.timing.map_or([f64::NAN; 3], |t| [t.median_s, t.shortest_s, t.longest_s]);
         cells.extend(time.map(Cell::from));
         cells.push(m.timing.map_or(0, |t| u64::from(t.repetitions)).into());
-        cells.extend([Cell::from(m.machine.as_str()), row.hash.as_str().into()]);
+        cells.extend([m.machine.as_str(), row.version.as_str(), row.hash.as_str()].map(Cell::from));
         table.row(&cells)?;
     }
     table.flush()?;
@@ -121,6 +123,18 @@ fn markdown(rows: &[Row]) -> String {
     text
 }
 
+/// The versions of the program that computed `rows`, with what each one did where there are several.
+fn versions(rows: &[Row]) -> String {
+    let mut points: BTreeMap<&str, usize> = BTreeMap::new();
+    rows.iter().for_each(|row| *points.entry(row.version.as_str()).or_default() += 1);
+    let several = points.len() > 1;
+    let told = points.iter().map(|(version, count)| {
+        let count = if several { format!(" ({count} of {} points)", rows.len()) } else { String::new() };
+        format!("seixo {version}{count}")
+    });
+    told.collect::<Vec<_>>().join(", ")
+}
+
 /// Write everything into `out`. Returns the findings and what did not end well, for the terminal.
 ///
 /// # Errors
@@ -134,8 +148,7 @@ pub fn write(
     report: &Report,
 ) -> Result<String> {
     write_table(&out.join("results.csv"), rows)?;
-    let version = env!("CARGO_PKG_VERSION");
-    let json = Json { study: name, title, version, findings: &report.findings, rows };
+    let json = Json { study: name, title, version: VERSION, findings: &report.findings, rows };
     let json = serde_json::to_string_pretty(&json).unwrap_or_default() + "\n";
     write_whole(&out.join("results.json"), json.as_bytes())?;
     let mut text = format!("# {title}\n\n");
@@ -149,7 +162,7 @@ pub fn write(
     machines.retain(|m| !m.is_empty());
     machines.sort_unstable();
     machines.dedup();
-    let _ = writeln!(text, "\nseixo {version}; computed on: {}.\n", machines.join("; "));
+    let _ = writeln!(text, "\n{}; computed on: {}.\n", versions(rows), machines.join("; "));
     for (file, chart) in &report.charts {
         if chart.write(&out.join(file))? {
             let _ = writeln!(text, "![{}]({file}.svg)\n", chart.title);
@@ -176,7 +189,16 @@ pub fn write(
 
 #[cfg(test)]
 mod tests {
-    use super::short;
+    use super::{short, versions};
+    use crate::row::Row;
+
+    #[test]
+    fn points_of_several_versions_are_told_apart() {
+        let row = |version: &str| Row { version: version.into(), ..Row::default() };
+        assert_eq!(versions(&[row("0.1.0"), row("0.1.0")]), "seixo 0.1.0");
+        let told = versions(&[row("0.2.0"), row("0.1.0"), row("0.2.0")]);
+        assert_eq!(told, "seixo 0.1.0 (1 of 3 points), seixo 0.2.0 (2 of 3 points)");
+    }
 
     #[test]
     fn four_digits_are_enough_for_people() {

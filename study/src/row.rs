@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Version of the files of finished points. A change of meaning of any measure raises it, so that older points
 /// are computed again.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// How a point ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -82,6 +82,9 @@ pub struct Measured {
     pub class: Class,
     /// Why it is not `ok`.
     pub reason: String,
+    /// Whether it failed because the case was refused, or a file could not be read or written: it is tried again.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refused: bool,
     /// Numbers by name, `name [unit]`; only finite ones.
     pub values: BTreeMap<String, f64>,
     /// Curves by name.
@@ -147,8 +150,11 @@ pub struct Row {
     pub study: String,
     /// Place in the sweep, from 0.
     pub index: usize,
-    /// Hash of everything that the result depends on.
+    /// Hash of everything that the result depends on but for the program itself.
     pub hash: String,
+    /// Version of the program that computed it.
+    #[serde(default)]
+    pub version: String,
     /// Line of the plot that it belongs to.
     pub method: String,
     /// What was varied.

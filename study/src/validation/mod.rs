@@ -56,10 +56,10 @@ impl Suite {
                 let path = Path::new(name);
                 let text = std::fs::read_to_string(path)
                     .map_err(|e| Error::usage("validate", format!("validation file `{name}`: {e}")))?;
-                let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-                suite.add(name, &text, &files_of(folder), setup)?;
+                let folder = path.parent().unwrap_or(Path::new(""));
+                suite.add(name, &text, &files_of(folder), folder, setup)?;
             } else if all.contains(&name.as_str()) {
-                suite.add(name, &built_in(&format!("{name}.toml"))?, &built_in, setup)?;
+                suite.add(name, &built_in(&format!("{name}.toml"))?, &built_in, Path::new(""), setup)?;
             } else {
                 let closest = all
                     .iter()
@@ -74,14 +74,14 @@ impl Suite {
             for name in all {
                 let text = built_in(&format!("{name}.toml"))?;
                 if setup.full || !Definition::parse(name, &text)?.full {
-                    suite.add(name, &text, &built_in, setup)?;
+                    suite.add(name, &text, &built_in, Path::new(""), setup)?;
                 }
             }
         }
         Ok(suite)
     }
 
-    fn add(&mut self, name: &str, text: &str, files: &Files, setup: &Setup) -> Result<()> {
+    fn add(&mut self, name: &str, text: &str, files: &Files, folder: &Path, setup: &Setup) -> Result<()> {
         let definition = Definition::parse(name, text)?;
         if definition.check.is_empty() {
             return Err(Error::file(name, "check", format!("{name}: a validation needs a [[check]]")));
@@ -89,7 +89,7 @@ impl Suite {
         let references = definition.check.iter().map(|c| c.read(files)).collect::<Result<Vec<_>>>();
         let references = references.map_err(|e| Error::file(name, "check", format!("{name}: {e}")))?;
         let first = self.jobs.len();
-        for mut job in definition.jobs(files, setup)? {
+        for mut job in definition.jobs(files, folder, setup)? {
             job.parameters.insert(0, ("case".into(), definition.name.clone()));
             job.identity = format!("{}\n{}", definition.name, job.identity);
             self.jobs.push(job);
