@@ -397,10 +397,8 @@ mod tests {
     fn what_was_refused_is_tried_again_and_the_version_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let sweep = |there: bool| {
-            let task = move |_: &Context| match there {
-                true => Ok(Measured::default()),
-                false => Err(Error::io("hull.stl")(std::io::ErrorKind::NotFound.into())),
-            };
+            let gone = || Error::io("hull.stl")(std::io::ErrorKind::NotFound.into());
+            let task = move |_: &Context| if there { Ok(Measured::default()) } else { Err(gone()) };
             let options = Options { out: folder.path().into(), quiet: true, ..Options::default() };
             let job = Job::new("m", &[], 1.0, task);
             super::sweep("test", &[job], &options, &Context::new(&cpu_only)).unwrap()

@@ -2,6 +2,7 @@
 
 use super::record::{Profile, Recorder};
 use super::row::Measured;
+use super::time_mean::{TimeMean, deviation, mean};
 use glam::DVec3;
 use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
@@ -60,6 +61,19 @@ pub struct Spec {
     pub profile: Vec<Profile>,
 }
 
+/// Places among the means over the window: of the kinetic energy [J],
+const KINETIC: usize = 0;
+/// the error of the particle number density [-],
+const DENSITY_ERROR: usize = 1;
+/// the particles of water,
+const PARTICLES: usize = 2;
+/// the depth, from the centroid, over that at the start [-],
+const DEPTH: usize = 3;
+/// the square of the pressure's error [-],
+const SQUARE: usize = 4;
+/// and the pressure's slope [-].
+const SLOPE: usize = 5;
+
 /// Sums and curves of a run.
 pub struct Sampler {
     spec: Spec,
@@ -70,20 +84,15 @@ pub struct Sampler {
     left: f64,
     weight: f64,
     sensor: Option<usize>,
-    samples: f64,
-    square: f64,
-    slope: f64,
-    kinetic: f64,
-    depth: f64,
-    sensed: Vec<f64>,
-    draft: Vec<[f64; 2]>,
+    means: TimeMean,
+    sensed: Vec<[f64; 2]>,
+    draft: Vec<[f64; 3]>,
     tilt: f64,
     speed_body: f64,
     energy_start: f64,
     rise: f64,
     /// Whether the water has energy from outside: from openings, or from what follows a motion.
     fed: bool,
-    density_error: f64,
     iterations_max: u32,
     front: Vec<[f64; 2]>,
     energy: Vec<[f64; 2]>,
@@ -131,11 +140,7 @@ impl Sampler {
             weight: params.density * params.gravity.length(),
             spec: spec.clone(),
             sensor,
-            samples: 0.0,
-            square: 0.0,
-            slope: 0.0,
-            kinetic: 0.0,
-            depth: 0.0,
+            means: TimeMean::default(),
             sensed: Vec::new(),
             draft: Vec::new(),
             tilt: 0.0,
@@ -144,7 +149,6 @@ impl Sampler {
             rise: 0.0,
             fed: !scene.openings.is_empty()
                 || scene.solids.iter().any(|s| matches!(s.drive, Drive::Prescribed(_)) && !s.is_still()),
-            density_error: 0.0,
             iterations_max: 0,
             front: Vec::new(),
             energy: Vec::new(),
@@ -169,18 +173,13 @@ impl Sampler {
             // What was measured.
             recorder,
             due,
-            samples,
-            square,
-            slope,
-            kinetic,
-            depth,
+            means,
             sensed,
             draft,
             tilt,
             speed_body,
             energy_start,
             rise,
-            density_error,
             iterations_max,
             front,
             energy,
@@ -188,16 +187,11 @@ impl Sampler {
         } = self;
         recorder.exchange(archive)?;
         due.exchange("measure", archive)?;
-        archive.number("measure.samples", samples)?;
-        archive.number("measure.square", square)?;
-        archive.number("measure.slope", slope)?;
-        archive.number("measure.kinetic", kinetic)?;
-        archive.number("measure.depth", depth)?;
+        means.exchange("measure.means", archive)?;
         archive.number("measure.tilt", tilt)?;
         archive.number("measure.speed_body", speed_body)?;
         archive.number("measure.energy_start", energy_start)?;
         archive.number("measure.rise", rise)?;
-        archive.number("measure.density_error", density_error)?;
         archive.small("measure.iterations_max", iterations_max)?;
         archive.array("measure.sensed", sensed, false)?;
         archive.array("measure.draft", draft, false)?;
@@ -255,20 +249,21 @@ impl Sampler {
         if !in_window {
             return Ok(());
         }
-        self.samples += 1.0;
-        self.kinetic += monitor.kinetic;
-        self.density_error += monitor.density_error_mean;
+        let mut now = vec![0.0; 6];
+        (now[KINETIC], now[DENSITY_ERROR]) = (monitor.kinetic, monitor.density_error_mean);
+        now[PARTICLES] = monitor.particles as f64;
         let centroid = monitor.centroid[2] - self.floor;
-        self.depth += 2.0 * centroid / depth;
+        now[DEPTH] = 2.0 * centroid / depth;
         if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::HydrostaticPressure)) {
             let surface = self.floor + 2.0 * centroid - simulation.params.zero_pressure_depth();
             let (rms, slope) = hydrostatics(fields, simulation.groups.fluid, surface, self.weight);
-            self.square += (rms / (self.weight * depth)).powi(2);
-            self.slope += slope;
+            now[SQUARE] = (rms / (self.weight * depth)).powi(2);
+            now[SLOPE] = slope;
         }
+        self.means.add(t, now);
         if let Some(slot) = self.sensor {
             let p = simulation.backend.wall_pressures(&[slot])?;
-            self.sensed.push(p.first().map_or(f64::NAN, |p| p.pressure / (self.weight * depth)));
+            self.sensed.push([t, p.first().map_or(f64::NAN, |p| p.pressure / (self.weight * depth))]);
         }
         if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::Draft)) {
             self.sample_draft(simulation, fields);
@@ -287,7 +282,7 @@ impl Sampler {
             .map_or([0.0, 0.0], |t| [0, 1].map(|k| t.min[k] + 0.125 * (t.max[k] - t.min[k])));
         let (reach, l0) = (params.effective_radius, params.spacing);
         let level = level(fields, &simulation.groups, at, params.dimensions, reach, l0, &params.periodic);
-        self.draft.push([level.unwrap_or(f64::NAN), pose.position.z]);
+        self.draft.push([simulation.time, level.unwrap_or(f64::NAN), pose.position.z]);
         let up = pose.orientation * DVec3::Z;
         self.tilt = self.tilt.max(up.z.clamp(-1.0, 1.0).acos().to_degrees());
         self.speed_body = self.speed_body.max(pose.velocity.length());
@@ -299,7 +294,7 @@ impl Sampler {
     /// What the backend says when it is read.
     pub fn finish(mut self, simulation: &mut Simulation) -> Result<Measured> {
         let mut out = Measured::default();
-        let mean = |sum: f64| sum / self.samples;
+        let mean_of = |what: usize| self.means.mean(what);
         let (depth, gravity) = (simulation.params.depth, simulation.params.gravity.length());
         if simulation.plan.wet() {
             let counters = simulation.backend.counters()?;
@@ -310,32 +305,31 @@ impl Sampler {
             if self.energy_start != 0.0 && !self.fed {
                 out.put("energy rise [-]", self.rise);
             }
-            out.put("density error [-]", mean(self.density_error).abs());
+            out.put("density error [-]", mean_of(DENSITY_ERROR).abs());
             out.limit("lost particles [-]", 0.0);
         }
         if self.has(Measure::HydrostaticPressure) {
-            out.put("pressure error [-]", mean(self.square).sqrt());
-            out.put("slope error [-]", (mean(self.slope) - 1.0).abs());
-            out.put("slope [-]", mean(self.slope));
+            out.put("pressure error [-]", mean_of(SQUARE).sqrt());
+            out.put("slope error [-]", (mean_of(SLOPE) - 1.0).abs());
+            out.put("slope [-]", mean_of(SLOPE));
         }
         if self.has(Measure::Sensor) {
             let n = self.sensed.len() as f64;
-            let average = self.sensed.iter().sum::<f64>() / n;
-            let square = self.sensed.iter().map(|p| (p - average).powi(2)).sum::<f64>() / n;
-            let jumps = self.sensed.windows(2).map(|p| (p[1] - p[0]).powi(2)).sum::<f64>() / (n - 1.0);
-            out.put("sensor mean [-]", average);
-            out.put("sensor noise [-]", square.sqrt());
+            let jumps = self.sensed.windows(2).map(|p| (p[1][1] - p[0][1]).powi(2)).sum::<f64>() / (n - 1.0);
+            out.put("sensor mean [-]", mean(&self.sensed));
+            out.put("sensor noise [-]", deviation(&self.sensed));
             out.put("sensor jump [-]", jumps.sqrt());
         }
         if self.has(Measure::KineticEnergy) {
-            let mass = simulation.groups.fluid as f64 * simulation.params.particle_mass();
-            let speed = (2.0 * mean(self.kinetic) / mass).sqrt();
-            out.put("kinetic energy [J]", mean(self.kinetic));
+            // Of the water that there was, without slots for what an inflow brings.
+            let mass = mean_of(PARTICLES) * simulation.params.particle_mass();
+            let speed = (2.0 * mean_of(KINETIC) / mass).sqrt();
+            out.put("kinetic energy [J]", mean_of(KINETIC));
             out.put("spurious speed [-]", speed / (gravity * depth).sqrt());
         }
         if self.has(Measure::Volume) {
-            out.put("volume [-]", mean(self.depth));
-            out.put("volume error [-]", (mean(self.depth) - 1.0).abs());
+            out.put("volume [-]", mean_of(DEPTH));
+            out.put("volume error [-]", (mean_of(DEPTH) - 1.0).abs());
         }
         if self.has(Measure::Draft) {
             self.finish_draft(simulation, &mut out);
@@ -363,10 +357,9 @@ impl Sampler {
     fn finish_draft(&self, simulation: &Simulation, out: &mut Measured) {
         let Some(body) = simulation.case.body.first() else { return };
         let Some(size) = body.size else { return };
-        let n = self.draft.len() as f64;
-        let level = self.draft.iter().map(|d| d[0]).sum::<f64>() / n;
-        let centre = self.draft.iter().map(|d| d[1]).sum::<f64>() / n;
-        let swing = self.draft.iter().map(|d| (d[1] - centre).abs()).fold(0.0, f64::max);
+        let over_time = |k: usize| self.draft.iter().map(|d| [d[0], d[k]]).collect::<Vec<_>>();
+        let (level, centre) = (mean(&over_time(1)), mean(&over_time(2)));
+        let swing = self.draft.iter().map(|d| (d[2] - centre).abs()).fold(0.0, f64::max);
         let height = size[2];
         let density = simulation.params.density;
         let volume: f64 = size.iter().product();

@@ -10,6 +10,7 @@
 
 use super::measure::{Measure, Spec};
 use super::row::Measured;
+use super::time_mean::TimeMean;
 use glam::DVec3;
 use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
@@ -77,32 +78,35 @@ pub struct Profile {
     pub bins: usize,
 }
 
-/// Sums of a profile: of coordinate, quantity and particles, one a bin.
+/// Sums of a profile: of coordinate, quantity and particles, three numbers a bin, as a mean over time.
 #[derive(Debug)]
 struct Sums {
     profile: Profile,
-    bins: Vec<[f64; 3]>,
+    bins: TimeMean,
 }
 
 impl Sums {
-    fn add(&mut self, fields: &Fields, fluid: usize) {
+    fn add(&mut self, fields: &Fields, fluid: usize, t: f64) {
         let p = &self.profile;
+        let mut sums = vec![0.0; 3 * p.bins];
         let axis = p.along as usize;
         let (low, high) = (DVec3::from(p.within[0]), DVec3::from(p.within[1]));
         for i in (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
             let x = fields.position[i];
             if x.cmpge(low).all() && x.cmplt(high).all() {
                 let part = (x[axis] - low[axis]) / (high[axis] - low[axis]);
-                let bin = &mut self.bins[((part * p.bins as f64) as usize).min(p.bins - 1)];
-                bin[0] += x[axis];
-                bin[1] += p.of.of(fields, i);
-                bin[2] += 1.0;
+                let bin = 3 * ((part * p.bins as f64) as usize).min(p.bins - 1);
+                sums[bin] += x[axis];
+                sums[bin + 1] += p.of.of(fields, i);
+                sums[bin + 2] += 1.0;
             }
         }
+        self.bins.add(t, sums);
     }
 
     fn curve(&self) -> Vec<[f64; 2]> {
-        self.bins.iter().filter(|b| b[2] > 0.0).map(|b| [b[0] / b[2], b[1] / b[2]]).collect()
+        let bins = (0..self.profile.bins).map(|k| [0, 1, 2].map(|part| self.bins.mean(3 * k + part)));
+        bins.filter(|b| b[2] > 0.0).map(|b| [b[0] / b[2], b[1] / b[2]]).collect()
     }
 }
 
@@ -115,6 +119,8 @@ pub struct Recorder {
     spread: bool,
     profiles: Vec<Sums>,
     curves: BTreeMap<String, Vec<[f64; 2]>>,
+    /// When they were sampled [s].
+    times: Vec<f64>,
 }
 
 impl Recorder {
@@ -131,7 +137,7 @@ impl Recorder {
                 "",
             ));
         }
-        let sums = |p: &Profile| Sums { profile: p.clone(), bins: vec![[0.0; 3]; p.bins] };
+        let sums = |p: &Profile| Sums { profile: p.clone(), bins: TimeMean::default() };
         Ok(Self {
             gauges: if has(Measure::Gauges) { Some(Gauges::new(&simulation.case, scene)?) } else { None },
             bodies: has(Measure::Bodies),
@@ -139,6 +145,7 @@ impl Recorder {
             spread: has(Measure::Spread) && simulation.plan.wet(),
             profiles: spec.profile.iter().map(sums).collect(),
             curves: BTreeMap::new(),
+            times: Vec::new(),
         })
     }
 
@@ -148,11 +155,12 @@ impl Recorder {
     /// [`Error::Checkpoint`] if the state holds none of them.
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         // What is recorded follows from study and case.
-        let Self { gauges, bodies: _, fluid: _, spread: _, profiles, curves } = self;
+        let Self { gauges, bodies: _, fluid: _, spread: _, profiles, curves, times } = self;
         gauges.iter_mut().try_for_each(|gauges| gauges.exchange(archive))?;
         for Sums { profile, bins } in profiles {
-            archive.array(&format!("profile.{}", profile.name), bins, true)?;
+            bins.exchange(&format!("profile.{}", profile.name), archive)?;
         }
+        archive.array("curves.times", times, false)?;
         let names: Vec<&str> = curves.keys().map(String::as_str).collect();
         let mut names = names.join("\n").into_bytes();
         archive.array("curves", &mut names, false)?;
@@ -176,6 +184,7 @@ impl Recorder {
     /// What the backend says when it is read.
     pub fn sample(&mut self, simulation: &mut Simulation, in_window: bool) -> Result<()> {
         let t = simulation.time;
+        self.times.push(t);
         let mut put = |name: String, value: f64| {
             // A gauge that sees no water, or no pressure before the first step, leaves a gap.
             if value.is_finite() {
@@ -222,13 +231,19 @@ impl Recorder {
             put("fluid spread z [m]".into(), z);
         }
         if profiled {
-            self.profiles.iter_mut().for_each(|p| p.add(&fields, simulation.groups.fluid));
+            self.profiles.iter_mut().for_each(|p| p.add(&fields, simulation.groups.fluid, t));
         }
         Ok(())
     }
 
     /// The curves of the whole run.
     pub fn finish(self, out: &mut Measured) {
+        // Points that follow each other among the times have nothing left out between them.
+        let place = |t: f64| self.times.partition_point(|at| *at < t);
+        let broken = |c: &Vec<[f64; 2]>| c.windows(2).any(|w| place(w[1][0]) - place(w[0][0]) > 1);
+        if self.curves.values().any(broken) {
+            out.sampled.clone_from(&self.times);
+        }
         out.curves.extend(self.curves);
         out.curves.extend(self.profiles.iter().map(|p| (p.profile.name.clone(), p.curve())));
     }
@@ -267,8 +282,8 @@ mod tests {
             fields.velocity.push(DVec3::new(u, 0.0, 0.0));
             fields.kind.push(kind);
         }
-        let mut sums = Sums { bins: vec![[0.0; 3]; 2], profile };
-        sums.add(&fields, 5);
+        let mut sums = Sums { bins: TimeMean::default(), profile };
+        sums.add(&fields, 5, 0.0);
         let curve = sums.curve();
         assert!(
             (curve[0][0] - 0.2).abs() < 1e-12 && curve[0][1] == 1.5 && curve[1] == [0.9, 7.0],

@@ -61,14 +61,14 @@ impl ResultNumber {
         if measured.class > Class::Degraded {
             return Ok(());
         }
-        let Some(curve) = measured.curves.get(&self.curve) else {
+        let Some(curve) = measured.curve(&self.curve) else {
             let known: Vec<&str> = measured.curves.keys().map(String::as_str).collect();
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             let text =
                 format!("result `{}`: there is no curve `{}`; there are: {known}", self.name, self.curve);
             return Err(Error::key("result", text, "name a curve that [measure] takes"));
         };
-        let curve = prepared(curve.clone(), self.since_moved, self.smooth);
+        let curve = prepared(curve, self.since_moved, self.smooth);
         let number =
             |(curve, _): (Curve, f64)| reduce(self.take, &cut(&curve, self.window), [self.level, self.to]);
         if let Some(value) = curve.and_then(number) {

@@ -63,7 +63,7 @@ impl Timing {
 /// What a point cost, in units that do not depend on the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
-    /// Particles of all kinds.
+    /// Particles of all kinds at the start.
     pub particles: u64,
     /// Steps.
     pub steps: u64,
@@ -90,6 +90,9 @@ pub struct Measured {
     /// Curves by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub curves: BTreeMap<String, Vec<[f64; 2]>>,
+    /// Times at which curves over time were sampled [s], if one of them has gaps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sampled: Vec<f64>,
     /// Wall-clock time.
     pub timing: Option<Timing>,
     /// Work.
@@ -133,6 +136,23 @@ impl Measured {
         {
             self.degrade(&format!("{name} = {value:.3e} > {most:.3e}"));
         }
+    }
+
+    /// A curve, with a row that has no number wherever it was sampled between its points and had no value.
+    pub fn curve(&self, name: &str) -> Option<Vec<[f64; 2]>> {
+        let (curve, mut places) = (self.curves.get(name)?, self.sampled.iter());
+        let mut marked = Vec::with_capacity(curve.len());
+        for point in curve {
+            for t in places.by_ref().take_while(|t| **t != point[0]) {
+                if !marked.is_empty() {
+                    marked.push([*t, f64::NAN]);
+                }
+            }
+            marked.push(*point);
+        }
+        // One over places, or over other times, has none of these.
+        let over_time = curve.iter().all(|p| self.sampled.binary_search_by(|t| t.total_cmp(&p[0])).is_ok());
+        Some(if over_time { marked } else { curve.clone() })
     }
 
     /// A value.
@@ -217,6 +237,16 @@ mod tests {
         let row = Row { study: "s".into(), measured, ..Row::default() };
         let text = serde_json::to_string(&row).unwrap();
         assert_eq!(serde_json::from_str::<Row>(&text).unwrap(), row);
+    }
+
+    #[test]
+    fn a_curve_has_gaps_where_it_was_sampled_without_a_value() {
+        let mut measured = Measured { sampled: vec![0.0, 0.1, 0.2, 0.3], ..Measured::default() };
+        measured.curves.insert("level".into(), vec![[0.1, 1.0], [0.3, 2.0]]);
+        measured.curves.insert("profile".into(), vec![[0.1, 1.0], [0.25, 2.0]]);
+        let level = measured.curve("level").unwrap();
+        assert!(level.len() == 3 && level[1][0] == 0.2 && level[1][1].is_nan(), "{level:?}");
+        assert_eq!(measured.curve("profile").unwrap(), measured.curves["profile"]);
     }
 
     #[test]

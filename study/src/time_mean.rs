@@ -10,7 +10,10 @@ pub fn weights(curve: &[[f64; 2]]) -> Vec<f64> {
     let told = |k: usize| curve[k][1].is_finite();
     let half = |k: usize| if told(k) && told(k + 1) { 0.5 * (curve[k + 1][0] - curve[k][0]) } else { 0.0 };
     let last = curve.len().saturating_sub(1);
-    let of = |k: usize| if k > 0 { half(k - 1) } else { 0.0 } + if k < last { half(k) } else { 0.0 };
+    let of = |k: usize| {
+        let (before, after) = ((k > 0).then(|| half(k - 1)), (k < last).then(|| half(k)));
+        before.unwrap_or(0.0) + after.unwrap_or(0.0)
+    };
     let weights: Vec<f64> = (0..curve.len()).map(of).collect();
     if weights.iter().any(|w| *w > 0.0) {
         return weights;

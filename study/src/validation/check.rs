@@ -238,7 +238,7 @@ impl Check {
 
     /// The measured curve as it is compared, and the moment from which its time counts.
     pub fn prepared(&self, measured: &Measured) -> Option<(Curve, f64)> {
-        let curve = measured.curves.get(self.curve.as_ref()?)?;
+        let curve = measured.curve(self.curve.as_ref()?)?;
         let curve: Curve = curve.iter().map(|p| [p[0], (p[1] + self.plus) * self.times]).collect();
         prepared(curve, self.since_moved, self.smooth)
     }
@@ -280,7 +280,7 @@ impl Check {
         }
         let (curve, origin) = self.prepared(measured)?;
         if let Some(first) = &self.behind {
-            let first = smooth(measured.curves.get(first)?, self.smooth);
+            let first = smooth(&measured.curve(first)?, self.smooth);
             let late = lag(&cut(&curve, self.window), &cut(&first, self.window))?;
             return self.of_numbers(late, self.reference?);
         }

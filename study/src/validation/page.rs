@@ -2,7 +2,7 @@
 
 use super::check::{Check, Reference};
 use super::groups::{Group, Spread};
-use super::reduce::Curve;
+use super::reduce::{Curve, told};
 use super::{Suite, Validation, error_name};
 use crate::engine::first_line;
 use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
@@ -271,6 +271,7 @@ fn curves(title: &str, check: &Check, reference: &Reference, groups: &[Group]) -
         let stroke = if finest { Stroke::Solid } else { Stroke::Dashed };
         for (k, row) in group.rows.iter().enumerate() {
             let Some((curve, _)) = check.prepared(&row.measured) else { continue };
+            let curve = told(&curve);
             least = curve.first().map_or(least, |p| least.min(p[0]));
             most = curve.last().map_or(most, |p| most.max(p[0]));
             let name = if k == 0 { format!("{} {}", group.method, group.setting) } else { String::new() };

@@ -1,5 +1,6 @@
 //! A curve as one number: what a measured and a reference curve are compared by.
 
+use crate::time_mean::{deviation, mean};
 use serde::Deserialize;
 
 /// What is taken from a curve.
@@ -10,7 +11,8 @@ pub enum Take {
     /// Rms distance from the reference curve, at the reference's points.
     #[default]
     Distance,
-    /// Mean over the window.
+    /// Mean over the window, over time: short steps weigh no more than long ones. Where the curve has gaps they are left out, here
+    /// and of integral and deviation.
     Mean,
     /// Largest value.
     Largest,
@@ -43,7 +45,7 @@ pub enum Take {
     Decay,
 }
 
-/// A curve: time or place against a value.
+/// A curve: time or place against a value. A row whose value is no number is a gap.
 pub type Curve = Vec<[f64; 2]>;
 
 /// The part of `curve` in `window`, ends included.
@@ -54,24 +56,43 @@ pub fn cut(curve: &[[f64; 2]], window: Option<[f64; 2]>) -> Curve {
     curve.iter().copied().filter(|p| p[0] >= from - slack && p[0] <= to + slack).collect()
 }
 
-/// Moving mean over `width`, centred; as it is if `width` is 0.
+/// Rows that have numbers.
+pub fn told(curve: &[[f64; 2]]) -> Curve {
+    curve.iter().copied().filter(|p| p[1].is_finite()).collect()
+}
+
+/// Moving mean over `width`, centred, of the curve as straight lines between its points, within each unbroken stretch; as it is if
+/// `width` is 0.
 pub fn smooth(curve: &[[f64; 2]], width: f64) -> Curve {
     if width <= 0.0 {
         return curve.to_vec();
     }
-    let (mut from, mut to, mut sum) = (0, 0, 0.0);
-    let mut mean = |x: f64| {
-        while to < curve.len() && curve[to][0] <= x + 0.5 * width {
-            sum += curve[to][1];
-            to += 1;
-        }
-        while curve[from][0] < x - 0.5 * width {
-            sum -= curve[from][1];
-            from += 1;
-        }
-        sum / (to - from) as f64
-    };
-    curve.iter().map(|p| [p[0], mean(p[0])]).collect()
+    let mut smoothed = Curve::new();
+    for stretch in curve.chunk_by(|a, b| a[1].is_finite() && b[1].is_finite()) {
+        let integral = integral(stretch);
+        let upto = |x: f64| {
+            let k = stretch.partition_point(|p| p[0] <= x).saturating_sub(1);
+            let end = at(stretch, x).unwrap_or(stretch[k][1]);
+            integral[k] + 0.5 * (stretch[k][1] + end) * (x - stretch[k][0])
+        };
+        let (first, last) = (stretch[0][0], stretch[stretch.len() - 1][0]);
+        smoothed.extend(stretch.iter().map(|&[x, y]| {
+            let (from, to) = ((x - 0.5 * width).max(first), (x + 0.5 * width).min(last));
+            [x, if to > from { (upto(to) - upto(from)) / (to - from) } else { y }]
+        }));
+    }
+    smoothed
+}
+
+/// Integral of a curve from its first point to each of them.
+fn integral(curve: &[[f64; 2]]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let parts = curve.windows(2).map(|w| 0.5 * (w[0][1] + w[1][1]) * (w[1][0] - w[0][0]));
+    let sums = parts.map(|part| {
+        sum += part;
+        sum
+    });
+    std::iter::once(0.0).chain(sums).collect()
 }
 
 /// The curve as numbers are taken from it: its time counted from when it has moved by `since`, if that is asked for, and a moving mean
@@ -93,10 +114,18 @@ pub fn since_moved(curve: &[[f64; 2]], distance: f64) -> Option<(Curve, f64)> {
         curve[0][0]
     } else {
         let (a, b) = (curve[moved - 1], curve[moved]);
+        if !a[1].is_finite() {
+            return Some((later(curve, b[0]), b[0]));
+        }
         let part = (distance - (a[1] - start).abs()) / ((b[1] - start).abs() - (a[1] - start).abs());
         a[0] + part * (b[0] - a[0])
     };
-    Some((curve.iter().map(|p| [p[0] - origin, p[1]]).collect(), origin))
+    Some((later(curve, origin), origin))
+}
+
+/// The curve with its time counted from `origin`.
+fn later(curve: &[[f64; 2]], origin: f64) -> Curve {
+    curve.iter().map(|p| [p[0] - origin, p[1]]).collect()
 }
 
 /// First x at which the curve crosses `level` upwards.
@@ -153,10 +182,6 @@ fn fit<const N: usize>(curve: &[[f64; 2]]) -> Option<[f64; N]> {
     out.iter().all(|c| c.is_finite()).then_some(out)
 }
 
-fn mean(curve: &[[f64; 2]]) -> f64 {
-    curve.iter().map(|p| p[1]).sum::<f64>() / curve.len() as f64
-}
-
 /// Times at which the oscillation about the mean passes it upwards, and the largest excursion of each half swing
 /// between passages of either direction. Passages closer than a tenth of the range are noise.
 fn oscillation(curve: &[[f64; 2]]) -> (Vec<f64>, Vec<f64>) {
@@ -194,19 +219,21 @@ fn range(curve: &[[f64; 2]]) -> f64 {
 /// `take` of a curve that is cut and smoothed already, with the levels `level` and `to`; `None` where the curve does
 /// not have it.
 pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
-    let [level, to] = levels;
+    let ([level, to], marked) = (levels, curve);
+    let curve = &told(marked)[..];
     if curve.is_empty() {
         return None;
     }
     let values = || curve.iter().map(|p| p[1]);
     match take {
         Take::Distance | Take::Lag => None,
-        Take::Mean => Some(mean(curve)),
+        Take::Mean => Some(mean(marked)),
         Take::Largest => values().reduce(f64::max),
         Take::Smallest => values().reduce(f64::min),
         Take::Range => Some(range(curve)),
         Take::Integral => {
-            Some(curve.windows(2).map(|w| 0.5 * (w[0][1] + w[1][1]) * (w[1][0] - w[0][0])).sum())
+            let stretches = marked.split(|p| !p[1].is_finite());
+            Some(stretches.filter_map(|stretch| integral(stretch).pop()).sum())
         }
         Take::FirstAbove => first_above(curve, level),
         Take::FirstBelow => {
@@ -215,10 +242,7 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
         }
         Take::Passage => Some(first_above(curve, to)? - first_above(curve, level)?),
         Take::At => at(curve, level),
-        Take::Deviation => {
-            let middle = mean(curve);
-            Some((values().map(|v| (v - middle).powi(2)).sum::<f64>() / curve.len() as f64).sqrt())
-        }
+        Take::Deviation => Some(deviation(marked)),
         Take::Slope => fit::<2>(curve).map(|c| c[1]),
         Take::Acceleration => fit::<3>(curve).map(|c| 2.0 * c[2]),
         Take::Period => {
@@ -241,7 +265,7 @@ pub fn lag(curve: &[[f64; 2]], behind: &[[f64; 2]]) -> Option<f64> {
     let step = (last - first) / (curve.len().checked_sub(1).filter(|n| *n > 7)?) as f64;
     let correlation = |shift: f64| {
         let pairs = curve.iter().filter_map(|p| at(behind, p[0] - shift).map(|y| [y, p[1]]));
-        let pairs: Curve = pairs.collect();
+        let pairs: Curve = pairs.filter(|p| p[0].is_finite() && p[1].is_finite()).collect();
         let n = pairs.len() as f64;
         let [a, b] = [0, 1].map(|k| pairs.iter().map(|p| p[k]).sum::<f64>() / n);
         let product = |i: usize, j: usize| -> f64 {
@@ -266,8 +290,8 @@ pub fn lag(curve: &[[f64; 2]], behind: &[[f64; 2]]) -> Option<f64> {
 /// Rms distance of `curve` from the points of `reference` that it covers, and how many these are; `None` for fewer
 /// than two.
 pub fn distance(curve: &[[f64; 2]], reference: &[[f64; 2]]) -> Option<(f64, usize)> {
-    let squares: Vec<f64> =
-        reference.iter().filter_map(|r| at(curve, r[0]).map(|y| (y - r[1]).powi(2))).collect();
+    let there = reference.iter().filter_map(|r| at(curve, r[0]).map(|y| (y - r[1]).powi(2)));
+    let squares: Vec<f64> = there.filter(|square| square.is_finite()).collect();
     let n = squares.len();
     (n > 1).then(|| ((squares.iter().sum::<f64>() / n as f64).sqrt(), n))
 }
@@ -350,6 +374,27 @@ mod tests {
         let noise: Curve = (0..100).map(|k| [f64::from(k), if k % 2 == 0 { 1.0 } else { -1.0 }]).collect();
         assert!(smooth(&noise, 9.0)[10..90].iter().all(|p| p[1].abs() < 0.2));
         assert_eq!(smooth(&noise, 0.0), noise);
+    }
+
+    #[test]
+    fn means_are_over_time_and_leave_gaps_out() {
+        // One second at 0, in ten steps, and one at 1, in a hundred.
+        let slow = (0..10).map(|k| [0.1 * f64::from(k), 0.0]);
+        let curve: Curve = slow.chain((0..=100).map(|k| [1.0 + 0.01 * f64::from(k), 1.0])).collect();
+        let take = |curve: &[[f64; 2]], take| reduce(take, curve, [0.0; 2]).unwrap();
+        // Half of the step between them is at 1.
+        assert!((take(&curve, Take::Mean) - 1.05 / 2.0).abs() < 1e-9);
+        assert!((take(&curve, Take::Deviation) - 0.5).abs() < 2e-3);
+        assert!((at(&smooth(&curve, 1.0), 1.0).unwrap() - 0.55).abs() < 1e-9);
+        let gap = [[0.0, 2.0], [1.0, 2.0], [1.5, f64::NAN], [5.0, 4.0], [6.0, 4.0]];
+        let of = |what| take(&gap, what);
+        assert_eq!([of(Take::Mean), of(Take::Integral), of(Take::Deviation)], [3.0, 6.0, 1.0]);
+        assert_eq!([of(Take::Largest), of(Take::Smallest), of(Take::Range)], [4.0, 2.0, 2.0]);
+        let smoothed = smooth(&gap, 9.0);
+        assert_eq!(told(&smoothed), told(&gap));
+        assert!(smoothed.len() == gap.len() && smoothed[2][1].is_nan());
+        assert_eq!(since_moved(&gap, 1.0).unwrap().1, 5.0);
+        assert_eq!(distance(&gap, &[[0.5, 2.0], [3.0, 0.0], [5.5, 4.0]]), Some((0.0, 2)));
     }
 
     #[test]
