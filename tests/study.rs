@@ -332,6 +332,35 @@ fn energy_that_is_put_in_is_no_rise() {
     }
 }
 
+/// Slots for what an inflow will bring are no particles: those of a point and of `bench` are those of `run` and `plan`.
+#[test]
+fn slots_for_what_comes_in_are_no_particles() {
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.02\ndimensions = 2\n\
+                [tank]\nmin = [0, 0, 0]\nmax = [0.4, 1, 0.4]\nopen = [\"z_max\"]\n\
+                [fluid]\nmax_volume = 0.2\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 1, 0.2]\n\
+                [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 1, 0.1]\nvelocity = 1\n";
+    let case: seixo::case::Case = text.parse().expect("a case");
+    let scene = seixo::scene::Scene::build(&case).expect("a scene");
+    let there = scene.groups.total() - scene.reserve;
+    assert!(scene.reserve > 50, "{} slots in reserve", scene.reserve);
+    let spec = toml::from_str("of = [\"kinetic_energy\"]\nevery = 0.001\n").expect("measures");
+    let point = Point { text: text.into(), spec, processor: Default::default(), repetitions: 1 };
+    let measured = run_point(&point, &Context::new(&cpu_only)).expect("it runs");
+    assert_eq!(measured.work.particles, there as u64);
+    assert_eq!(measured.work.particle_steps, there as u64 * measured.work.steps);
+    // K = N m v^2 / 2 with the water that there was.
+    let of = |name: &str| measured.value(name).expect("measured");
+    let square = of("spurious speed [-]").powi(2) * 9.80665 * 0.2;
+    let particles = 2.0 * of("kinetic energy [J]") / (1000.0 * 0.02_f64.powi(3) * square);
+    let water = scene.water() as f64;
+    assert!(particles > 0.99 * water && particles < 1.05 * water, "{particles} of {water}");
+    let make = |s: &_, p: &_, plan: &_, settings| cpu_only(Default::default(), s, p, plan, settings);
+    let row = seixo_study::bench::measure(&case, 0.0, 2, 1e10, &make).expect("it runs");
+    // No more than what five steps have brought.
+    assert!((scene.water()..scene.water() + 10).contains(&row.fluid), "{} of {water}", row.fluid);
+    assert_eq!(row.particles - row.fluid, there - scene.water());
+}
+
 /// Killed in the middle of a point, the sweep goes on with the point's own state.
 #[test]
 fn a_sweep_that_is_killed_within_a_point_goes_on_within_it() {

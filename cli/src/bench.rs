@@ -117,7 +117,7 @@ fn timed(
         let text = format!("--from {from} lies outside of the run; allowed: 0 to {end} (run.end)");
         return Err(Error::usage("--from", text));
     }
-    let particles = setup.scene.groups.total();
+    let particles = setup.scene.groups.total() - setup.scene.reserve;
     let device = DeviceArgs { backend, ..args.device.clone() };
     let software = backend == BackendName::Gpu && !adapters().iter().any(|a| a.is_hardware());
     if software && particles > 1000 * args.software_limit {

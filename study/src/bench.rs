@@ -104,9 +104,9 @@ pub struct Row {
     pub precision: &'static str,
     /// Spacing l0 [m].
     pub spacing: f64,
-    /// All particles.
+    /// All particles at the end, without slots for what is to come in.
     pub particles: usize,
-    /// Fluid particles.
+    /// Fluid particles at the end.
     pub fluid: usize,
     /// Unknowns of the last solve.
     pub unknowns: usize,
@@ -243,13 +243,14 @@ pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) 
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
     times.sort_by(f64::total_cmp);
     let quartile = |q: f64| times.get((q * times.len() as f64) as usize).copied().unwrap_or(mean);
-    let total = sim.groups.total();
+    let fluid = monitor.particles as usize;
+    let total = sim.groups.total() - sim.groups.fluid + fluid;
     Ok(Row {
         adapter: sim.backend.description(),
         precision: sim.backend.precision(),
         spacing: case.run.spacing,
         particles: total,
-        fluid: sim.groups.fluid,
+        fluid,
         unknowns: last.unknowns,
         pairs: traffic.pairs,
         from: started,

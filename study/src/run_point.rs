@@ -173,7 +173,9 @@ fn play(point: &Point, context: &Context, course: &mut Course, state: Option<Arc
         course.seconds = 0.0;
         sampler.iter_mut().try_for_each(|s| s.sample(&mut simulation, 0, 0.0))?;
         if sampler.is_some() {
-            course.work = Work { particles: scene.groups.total() as u64, ..Work::default() };
+            // Slots for what is to come in hold no particles yet.
+            let particles = (scene.groups.total() - scene.reserve) as u64;
+            course.work = Work { particles, ..Work::default() };
         }
     }
     simulation.stop_with(&context.stop);
