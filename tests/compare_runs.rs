@@ -112,6 +112,30 @@ fn known_differences_are_found_with_their_time() {
 }
 
 #[test]
+fn full_turns_count_and_say_which_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = run(folder.path(), "a", &[]);
+    let b = folder.path().join("b");
+    copy(&a, &b);
+    // Seven degrees a row about y, the one way and the other; q and -q are one orientation.
+    for (root, way) in [(&a, 7.0_f64), (&b, -7.0)] {
+        edit(root, "bodies.csv", |k, row| {
+            let half = (0.5 * way * k as f64).to_radians();
+            let sign = if k % 3 == 0 { -1.0 } else { 1.0 };
+            let mut row = row.to_vec();
+            let q = [sign * half.cos(), 0.0, sign * half.sin(), 0.0];
+            row[5..9].iter_mut().zip(q).for_each(|(cell, q)| *cell = q.to_string());
+            Some(row)
+        });
+    }
+    let (answer, _) = compared(folder.path(), &[&a, &b], &[]);
+    let turn = of(&answer, "gate: turn_y [degrees]");
+    assert!((turn["largest"].as_f64().unwrap() - 700.0).abs() < 1e-6, "{turn}");
+    assert!((turn["range"].as_f64().unwrap() - 350.0).abs() < 1e-6, "{turn}");
+    assert!(!answer.to_string().contains("turn_x"), "{answer}");
+}
+
+#[test]
 fn other_time_steps_and_cases_are_interpolated_and_told() {
     let folder = tempfile::tempdir().unwrap();
     let a = run(folder.path(), "a", &[]);

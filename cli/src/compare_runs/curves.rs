@@ -1,7 +1,7 @@
 //! The curves of a run: what its tables hold, under names that other runs share.
 
 use crate::report::table::Table;
-use glam::DQuat;
+use glam::{DQuat, DVec3};
 use seixo::case::file::load;
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
@@ -63,7 +63,7 @@ impl Run {
             let before = format!("{solid}: ");
             let mut of_solid = columns("bodies", &before, &table);
             let place = of_solid.iter().take_while(|q| q.name.ends_with("[m]")).count();
-            of_solid.splice(place..place, turn(&before, &table));
+            of_solid.splice(place..place, turns(&before, &table));
             curves.append(&mut of_solid);
         }
         curves.append(&mut columns("monitors", "", &monitors));
@@ -94,7 +94,7 @@ impl Run {
 fn columns(from: &'static str, before: &str, table: &Table) -> Vec<Quantity> {
     let told = |c: &&String| {
         let (clock, count) = (c.starts_with("wall_"), ["time [s]", "step [-]"].contains(&c.as_str()));
-        // Components of a quaternion say little one by one: `turn` stands for them.
+        // Components of a quaternion say little one by one: `turns` stand for them.
         let text = ["body", "outcome"].contains(&c.as_str()) || (from == "bodies" && c.starts_with('q'));
         !(from == "monitors" && clock || count || text)
     };
@@ -105,14 +105,33 @@ fn columns(from: &'static str, before: &str, table: &Table) -> Vec<Quantity> {
     table.columns().iter().filter(told).filter_map(curve).collect()
 }
 
-/// The angle by which a solid has turned since its first row.
-fn turn(before: &str, table: &Table) -> Option<Quantity> {
+/// The angles about the axes of space by which a solid has turned since its first row: the rotations from row to row, summed, which
+/// is the integral of its angular velocity. Full turns count; between two rows it is taken to turn by less than half of one.
+fn turns(before: &str, table: &Table) -> Vec<Quantity> {
+    let Some(way) = way_turned(table) else { return Vec::new() };
+    let about = |(axis, letter): (usize, &str)| Quantity {
+        table: "bodies",
+        name: format!("{before}turn_{letter} [degrees]"),
+        points: way.iter().map(|(t, turn)| [*t, turn[axis].to_degrees()]).collect(),
+    };
+    ["x", "y", "z"].into_iter().enumerate().map(about).collect()
+}
+
+/// Times [s] and the sum of the rotations from row to row until then [rad].
+fn way_turned(table: &Table) -> Option<Vec<(f64, DVec3)>> {
     let [w, x, y, z] = ["qw [-]", "qx [-]", "qy [-]", "qz [-]"].map(|c| table.curve(c));
     let (w, x, y, z) = (w?, x?, y?, z?);
     let q = |k: usize| DQuat::from_xyzw(x[k][1], y[k][1], z[k][1], w[k][1]).normalize();
-    let first = (!w.is_empty()).then(|| q(0))?;
-    let points = (0..w.len()).map(|k| [w[k][0], first.angle_between(q(k)).to_degrees()]).collect();
-    Some(Quantity { table: "bodies", name: format!("{before}turn from the start [degrees]"), points })
+    let mut sum = DVec3::ZERO;
+    let until = |k: usize| {
+        if k > 0 {
+            // q and -q are one orientation: the one that is less than half a turn away.
+            let step = q(k) * q(k - 1).conjugate();
+            sum += if step.w < 0.0 { -step } else { step }.to_scaled_axis();
+        }
+        (w[k][0], sum)
+    };
+    Some((0..w.len()).map(until).collect())
 }
 
 /// Seconds a step, from the sum over all stages and the steps between two rows.

@@ -1,5 +1,6 @@
 //! How far one curve is from another.
 
+use seixo_study::time_mean::mean_of;
 use serde::Serialize;
 
 /// What the difference of two curves comes to.
@@ -7,7 +8,7 @@ use serde::Serialize;
 pub struct Difference {
     /// Moments that were compared.
     pub points: usize,
-    /// Root of the mean square over the time compared, in the curve's unit.
+    /// Root of the mean square over the time compared, without gaps of one of the two, in the curve's unit.
     pub rms: f64,
     /// The largest, in the curve's unit.
     pub largest: f64,
@@ -28,9 +29,12 @@ impl Difference {
     pub fn of(reference: &[[f64; 2]], other: &[[f64; 2]], window: [f64; 2]) -> Option<Self> {
         let mut interpolated = false;
         let mut met: Vec<[f64; 3]> = Vec::new();
+        // As rows of the reference, also where there is none: a gap.
+        let mut apart: Vec<[f64; 2]> = Vec::new();
         for &[t, value] in reference.iter().filter(|p| p[0] >= window[0] && p[0] <= window[1]) {
             let Some((there, exact)) = at(other, t) else { continue };
             let difference = there - value;
+            apart.push([t, difference]);
             if difference.is_finite() {
                 interpolated |= !exact;
                 met.push([t, value, difference]);
@@ -38,21 +42,9 @@ impl Difference {
         }
         let largest = met.iter().max_by(|a, b| a[2].abs().total_cmp(&b[2].abs()))?;
         let fold = |f: fn(f64, f64) -> f64, start| met.iter().map(|m| m[1]).fold(start, f);
-        // Each moment counts for half of the time to its neighbours, so that short steps weigh no more than long ones.
-        let weight = |k: usize| {
-            let (before, after) = (met[k.saturating_sub(1)][0], met[(k + 1).min(met.len() - 1)][0]);
-            0.5 * (after - before)
-        };
-        let total: f64 = (0..met.len()).map(weight).sum();
-        let square = |k: usize| met[k][2] * met[k][2];
-        let mean = if total > 0.0 {
-            (0..met.len()).map(|k| weight(k) / total * square(k)).sum::<f64>()
-        } else {
-            (0..met.len()).map(square).sum::<f64>() / met.len() as f64
-        };
         Some(Self {
             points: met.len(),
-            rms: mean.sqrt(),
+            rms: mean_of(&apart, |difference| difference * difference).sqrt(),
             largest: largest[2].abs(),
             at: largest[0],
             range: fold(f64::max, f64::NEG_INFINITY) - fold(f64::min, f64::INFINITY),
@@ -126,6 +118,17 @@ mod tests {
         let off: Vec<[f64; 2]> = fine.iter().map(|&[t, _]| [t, f64::from(u8::from(t > 0.995))]).collect();
         let d = Difference::of(&fine, &off, ALL).unwrap();
         assert!((d.rms * d.rms - 0.5).abs() < 0.01, "{d:?}");
+        // A gauge that is dry from 0.2 to 0.8: the rows beside the gap count for a step each, and not for half of the gap.
+        let a = sampled(0.1, 11, |_| 0.0);
+        let b: Vec<[f64; 2]> = a.iter().map(|&[t, _]| [t, if t < 0.25 { 1.0 } else { 2.0 }]).collect();
+        let dry = |mut c: Vec<[f64; 2]>| {
+            c.iter_mut().filter(|p| p[0] > 0.25 && p[0] < 0.75).for_each(|p| p[1] = f64::NAN);
+            c
+        };
+        for [one, two] in [[dry(a.clone()), b.clone()], [a.clone(), dry(b.clone())]] {
+            let d = Difference::of(&one, &two, ALL).unwrap();
+            assert!((d.rms - 2.5_f64.sqrt()).abs() < 1e-9, "{d:?}");
+        }
     }
 
     trait Later {
