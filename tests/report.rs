@@ -68,6 +68,21 @@ fn a_report_holds_everything_and_fetches_nothing() {
 }
 
 #[test]
+fn a_report_of_a_run_in_parts_says_whose_times_the_stages_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, text) = page(folder.path(), &["--steps", "20"]);
+    assert!(text.contains("<h3>seconds of each stage</h3>"), "{text}");
+    let shown = path.parent().unwrap().display().to_string();
+    assert_eq!(ran(&["run", "--resume", &shown, "--backend", "cpu", "-q"]).code, 0);
+    assert_eq!(ran(&["report", &shown, "-q"]).code, 0);
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        text.contains("resumed 1 time")
+            && text.contains("<h3>seconds of each stage, since it was last resumed</h3>")
+    );
+}
+
+#[test]
 fn a_report_tells_of_runs_that_failed_and_of_those_that_have_not_ended() {
     let folder = tempfile::tempdir().unwrap();
     let none = ["--set", "fluid.solver.max_iterations=1", "--set", "fluid.solver.tolerance=1e-9"];

@@ -48,7 +48,30 @@ fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
     (first..=last.min(first + 20)).map(|k| k as f64 * step).collect()
 }
 
-/// A number as an axis has it.
+/// What stands at the `ticks` of an axis: as many digits as tell them apart.
+fn labels(ticks: &[f64]) -> Vec<String> {
+    let most = ticks.iter().fold(0.0_f64, |most, t| most.max(t.abs()));
+    let step = ticks.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+    // Steps are 1, 2 or 5 times a power of ten, but for what rounding leaves.
+    let power = |x: f64| (x.log10() + 1e-6).floor() as i32;
+    if !step.is_finite() || most == 0.0 {
+        return ticks.iter().map(|&t| short(t)).collect();
+    }
+    let (decimals, digits) = ((-power(step)).max(0) as usize, (power(most) - power(step)).max(0) as usize);
+    let plain = |t: f64| {
+        let text = format!("{t:.decimals$}");
+        if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    };
+    let label = |&t: &f64| match t {
+        // Sums of steps may miss it.
+        _ if t.abs() < 1e-6 * step => "0".to_owned(),
+        _ if most < 1e5 && step > 1e-5 => plain(t),
+        _ => format!("{t:.digits$e}"),
+    };
+    ticks.iter().map(label).collect()
+}
+
+/// A number as words have it.
 fn short(x: f64) -> String {
     let x = if x.abs() < 1e-300 { 0.0 } else { x };
     if x == 0.0 || (1e-3..1e5).contains(&x.abs()) {
@@ -99,36 +122,38 @@ impl Chart {
             (low - room, high + room)
         };
         let ((t0, t1), (y0, y1)) = (range(0), range(1));
-        let x = |t: f64| LEFT + (t - t0) / (t1 - t0) * (SIZE[0] - LEFT - RIGHT);
+        let (levels, times) = (ticks(y0, y1, 4.0), ticks(t0, t1, 5.0));
+        let named = labels(&levels);
+        let left = named.iter().map(|l| 6.5 * l.len() as f64 + 14.0).fold(LEFT, f64::max);
+        let x = |t: f64| left + (t - t0) / (t1 - t0) * (SIZE[0] - left - RIGHT);
         let y = |v: f64| SIZE[1] - BOTTOM - (v - y0) / (y1 - y0) * (SIZE[1] - TOP - BOTTOM);
         let mut svg = String::new();
-        for v in ticks(y0, y1, 4.0) {
-            let (at, label) = (y(v), short(v));
+        for (v, label) in levels.into_iter().zip(named) {
+            let at = y(v);
             let _ = write!(
                 svg,
-                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>\
+                "<line class=\"grid\" x1=\"{left}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>\
                  <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
                 SIZE[0] - RIGHT,
-                LEFT - 6.0,
+                left - 6.0,
                 at + 4.0
             );
         }
-        for t in ticks(t0, t1, 5.0) {
+        for (&t, label) in times.iter().zip(labels(&times)) {
             let _ = write!(
                 svg,
-                "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+                "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{label}</text>",
                 x(t),
-                SIZE[1] - BOTTOM + 17.0,
-                short(t)
+                SIZE[1] - BOTTOM + 17.0
             );
         }
         let _ = write!(
             svg,
-            "<line class=\"axis\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{1}\" y2=\"{1}\"/>\
+            "<line class=\"axis\" x1=\"{left}\" x2=\"{}\" y1=\"{1}\" y2=\"{1}\"/>\
              <text x=\"{2}\" y=\"{3}\" text-anchor=\"middle\">t [s]</text>",
             SIZE[0] - RIGHT,
             SIZE[1] - BOTTOM,
-            0.5 * (LEFT + SIZE[0] - RIGHT),
+            0.5 * (left + SIZE[0] - RIGHT),
             SIZE[1] - 4.0
         );
         let mut key = String::new();
@@ -234,6 +259,29 @@ mod tests {
         assert_eq!(ticks(-3.0, 7.0, 5.0).len(), 5);
         for (x, text) in [(0.5, "0.5"), (1000.0, "1000"), (2e6, "2.0e6"), (-0.02, "-0.02")] {
             assert_eq!(short(x), text);
+        }
+    }
+
+    #[test]
+    fn labels_of_an_axis_are_told_apart() {
+        for (low, high, expected) in [
+            (0.0, 1.0, vec!["0", "0.5", "1"]),
+            (613.12, 613.13, vec!["613.12", "613.125", "613.13"]),
+            (0.0, 2e-5, vec!["0", "1e-5", "2e-5"]),
+            (101_325.0, 101_325.45, vec!["1.013250e5", "1.013252e5", "1.013254e5"]),
+            (-0.0021, 0.0021, vec!["-0.002", "0", "0.002"]),
+            (0.0, 4e6, vec!["0", "1e6", "2e6", "3e6", "4e6"]),
+        ] {
+            assert_eq!(labels(&ticks(low, high, 4.0)), expected);
+        }
+        for exponent in -12..12 {
+            for offset in [0.0, 1.0, 123.0, -7.5e4] {
+                let unit = 10_f64.powi(exponent);
+                let mut told = labels(&ticks(offset * unit * 1e3, offset * unit * 1e3 + unit, 4.0));
+                let count = told.len();
+                told.dedup();
+                assert!(told.len() == count && count > 1, "{offset} {exponent}: {told:?}");
+            }
         }
     }
 

@@ -410,6 +410,9 @@ fn times(run: &Run) -> String {
         .filter_map(|(name, s)| Some((name.replace('_', " "), s.as_f64()?)))
         .filter(|s| s.1 > 0.0)
         .collect();
-    let chart = bars("seconds of each stage", "s", &stages);
+    // Each process has a clock of its own: what those before spent is in the run time alone.
+    let resumed = run.result["parts"].as_u64().is_some_and(|n| n > 1);
+    let of = if resumed { ", since it was last resumed" } else { "" };
+    let chart = bars(&format!("seconds of each stage{of}"), "s", &stages);
     if chart.is_empty() { chart } else { format!("<div class=\"charts\">\n{chart}</div>\n") }
 }
