@@ -96,4 +96,7 @@ fn a_time_that_is_far_from_all_frames_is_told() {
     }
     let told = ran(&["measure", &out, "--point", "0.2,0.1,0.1", "--times", "0,0.0101,0.02"]);
     assert_eq!((told.code, told.err.as_str()), (0, ""));
+    // A frame that is asked for twice is read once.
+    let told = ran(&["measure", &out, "--point", "0.2,0.1,0.1", "--times", "0.02,0.01,0.0101,0.02"]);
+    assert_eq!((told.code, told.out.lines().count()), (0, 1 + 2), "{}", told.out);
 }

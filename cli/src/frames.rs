@@ -93,8 +93,8 @@ fn list_of(root: &Path, series: Option<&str>) -> PathBuf {
     place(root, series).join(format!("{name}.pvd"))
 }
 
-/// The frames of `all` nearest to each of `times`, or every `every`th, with their numbers; says so where a time is
-/// far from all of them.
+/// The frames of `all` nearest to each of `times`, each once, or every `every`th, with their numbers; says so where a
+/// time is far from all of them.
 pub fn chosen(case: &Case, all: &[Frame], times: &[f64], every: u32) -> Vec<(usize, Frame)> {
     let nearest = |t: &f64| {
         let distance = |k: &usize| (all[*k].time - t).abs();
@@ -114,7 +114,9 @@ pub fn chosen(case: &Case, all: &[Frame], times: &[f64], every: u32) -> Vec<(usi
         let (asked, there) = (listed(asked), listed(there));
         remark(&format!("note: no frame is at {asked} s (--times): the nearest is taken, at {there} s"));
     }
-    let there = picked.into_iter().filter(|&k| is_there(k, &all[k]));
+    let mut taken = std::collections::HashSet::new();
+    let once = picked.into_iter().filter(|&k| taken.insert(k));
+    let there = once.filter(|&k| is_there(k, &all[k]));
     there.map(|k| (k, all[k].clone())).collect()
 }
 
