@@ -3,7 +3,8 @@
 use super::builtin::ENTRIES;
 use super::computers::ComputerArgs;
 use super::definition::Setup;
-use super::engine::{Context, Make, Options, Shard, gather};
+use super::engine::{Context, Make, Options, Shard};
+use super::kept::gather;
 use super::manifest::{Listed, Manifest};
 use seixo::console::say;
 use seixo::error::{Error, Result};

@@ -4,6 +4,7 @@
 //! depends on. A sweep that was killed goes on where it stopped, shards of one sweep share the folder or are
 //! joined later, and a changed case computes only what changed.
 
+use super::kept::{VERSION, gather, json, point, read, told_of_kept};
 use super::row::{FORMAT, Measured, Row, hash};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -152,13 +153,10 @@ pub struct Options {
     pub collect: Option<Vec<PathBuf>>,
 }
 
-/// The version of the program, as rows have it.
-pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
-
 /// Rows of the points that are there at the end, in the order of `jobs`.
 ///
 /// # Errors
-/// [`Error::Io`]. A point that fails is a row. With `options.collect` as [`gather`].
+/// [`Error::Io`]. A point that fails is a row. With `options.collect` nothing is computed, and [`Error::Usage`] if no point is there.
 pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) -> Result<Vec<Row>> {
     let hashes: Vec<String> = jobs.iter().map(|job| job.hash(study)).collect();
     if let Some(others) = &options.collect {
@@ -225,61 +223,6 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
     Ok(rows.into_iter().flatten().collect())
 }
 
-/// Says how many of `all` points are `kept`, and which of them are not what a new one would be.
-fn told_of_kept(study: &str, all: usize, kept: &[&Row], repetitions: u32) {
-    if !kept.is_empty() {
-        remark(&format!("{study}: {} of {all} points are finished already", kept.len()));
-    }
-    let another = kept.iter().filter(|row| row.version != VERSION).count();
-    if another > 0 {
-        remark(&format!(
-            "note: {another} of them are of another version of seixo, as the report says: remove points/ to compute them again"
-        ));
-    }
-    let fewer = |row: &&&Row| row.measured.timing.is_some_and(|t| t.repetitions < repetitions);
-    let fewer = kept.iter().filter(fewer).count();
-    if fewer > 0 {
-        remark(&format!(
-            "note: {fewer} of them were timed over fewer runs than --repetitions {repetitions}: remove points/ to time them again"
-        ));
-    }
-}
-
-/// Rows of the points with these `hashes` that are finished in the folder `out` or in `others`, in this order; those of the others
-/// are copied to `out`.
-///
-/// # Errors
-/// [`Error::Usage`] if none of them is, before anything is written; [`Error::Io`].
-pub fn gather(hashes: &[String], out: &Path, others: &[PathBuf]) -> Result<Vec<Row>> {
-    let places: Vec<&Path> = std::iter::once(out).chain(others.iter().map(PathBuf::as_path)).collect();
-    let find = |hash: &String| {
-        let rows =
-            places.iter().enumerate().map(|(k, place)| (k, read(&point(&place.join("points"), hash), hash)));
-        let mut rows: Vec<(usize, Row)> = rows.filter_map(|(k, row)| Some((k, row?))).collect();
-        // One that was refused in one part may be whole in another.
-        rows.sort_by_key(|(k, row)| (row.measured.refused, *k));
-        rows.into_iter().next()
-    };
-    let found: Vec<Option<(usize, Row)>> = hashes.iter().map(find).collect();
-    if found.iter().all(Option::is_none) {
-        let names: Vec<String> = others.iter().map(|o| o.display().to_string()).collect();
-        let text = format!(
-            "none of the {} points of this study is finished in {}: nothing is joined, and what {} holds stays as it is",
-            hashes.len(),
-            names.join(", "),
-            out.display()
-        );
-        return Err(Error::usage("collect", text));
-    }
-    let folder = out.join("points");
-    std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
-    for (_, row) in found.iter().flatten().filter(|(place, _)| *place > 0) {
-        write_whole(&point(&folder, &row.hash), json(row).as_bytes())?;
-    }
-    let numbered = found.into_iter().enumerate();
-    Ok(numbered.filter_map(|(k, row)| row.map(|(_, row)| Row { index: k, ..row })).collect())
-}
-
 /// First line of `text`.
 pub(crate) fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
@@ -317,23 +260,6 @@ fn forget(states: &Path) -> Result<()> {
         let _ = std::fs::remove_dir(folder);
     }
     Ok(())
-}
-
-fn point(folder: &Path, hash: &str) -> PathBuf {
-    folder.join(format!("{hash}.json"))
-}
-
-/// A finished point; what is not whole or of another format is computed again.
-fn read(path: &Path, hash: &str) -> Option<Row> {
-    let row: Row = serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()?;
-    // Without a GPU a point is skipped, which another machine may change.
-    let kept = row.measured.class != super::row::Class::Skipped;
-    (row.format == FORMAT && row.hash == hash && kept).then_some(row)
-}
-
-fn json(row: &Row) -> String {
-    // Only finite numbers are kept in rows, so that this cannot fail.
-    serde_json::to_string_pretty(row).unwrap_or_default() + "\n"
 }
 
 #[cfg(test)]
@@ -411,14 +337,6 @@ mod tests {
         let text = std::fs::read_to_string(&file).unwrap();
         std::fs::write(&file, text.replace(&format!("\"{VERSION}\""), "\"0.0.1\"")).unwrap();
         assert_eq!(sweep(false)[0].version, "0.0.1");
-    }
-
-    #[test]
-    fn nothing_is_written_where_nothing_is_found() {
-        let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
-        let [a, out] = folders.each_ref().map(|f| f.path().to_path_buf());
-        let error = gather(&["0".into()], &out, &[a]).unwrap_err().to_string();
-        assert!(error.contains("none of the 1 points") && !out.join("points").exists(), "{error}");
     }
 
     #[test]

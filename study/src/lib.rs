@@ -34,6 +34,7 @@ pub mod engine;
 pub mod gallery;
 pub mod gallery_scenes;
 pub mod incline;
+mod kept;
 mod manifest;
 pub mod measure;
 pub mod needs;

@@ -1,6 +1,6 @@
 //! What a study leaves: results.csv, results.json, report.md, and its charts as SVG.
 
-use super::engine::VERSION;
+use super::kept::VERSION;
 use super::row::{Class, Row};
 use crate::plot::Chart;
 use seixo::error::{Error, Result};
