@@ -124,7 +124,10 @@ fn markdown(rows: &[Row]) -> String {
 }
 
 /// The versions of the program that computed `rows`, with what each one did where there are several.
-fn versions(rows: &[Row]) -> String {
+pub(crate) fn versions(rows: &[Row]) -> String {
+    if rows.is_empty() {
+        return format!("seixo {VERSION}");
+    }
     let mut points: BTreeMap<&str, usize> = BTreeMap::new();
     rows.iter().for_each(|row| *points.entry(row.version.as_str()).or_default() += 1);
     let several = points.len() > 1;
@@ -196,6 +199,7 @@ mod tests {
     fn points_of_several_versions_are_told_apart() {
         let row = |version: &str| Row { version: version.into(), ..Row::default() };
         assert_eq!(versions(&[row("0.1.0"), row("0.1.0")]), "seixo 0.1.0");
+        assert!(versions(&[]).starts_with("seixo "));
         let told = versions(&[row("0.2.0"), row("0.1.0"), row("0.2.0")]);
         assert_eq!(told, "seixo 0.1.0 (1 of 3 points), seixo 0.2.0 (2 of 3 points)");
     }

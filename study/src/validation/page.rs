@@ -6,7 +6,7 @@ use super::reduce::{Curve, told};
 use super::{Suite, Validation, error_name};
 use crate::engine::first_line;
 use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
-use crate::report::short;
+use crate::report::{short, versions};
 use crate::row::Row;
 use crate::work_precision::{self, Cost};
 use seixo::error::{Error, Result};
@@ -47,7 +47,7 @@ pub fn write(path: &Path, suite: &Suite, rows: &[Row]) -> Result<()> {
     std::fs::create_dir_all(&images).map_err(Error::io(&images))?;
     let mut text = format!("{MARK}{HEAD}");
     let machines = work_precision::machines(rows);
-    let _ = writeln!(text, "\nseixo {}; computed on: {machines}.\n", env!("CARGO_PKG_VERSION"));
+    let _ = writeln!(text, "\n{}; computed on: {machines}.\n", versions(rows));
     let missing = suite.len() - rows.len();
     if missing > 0 {
         let _ = writeln!(text, "{missing} of {} points are still to be computed.\n", suite.len());
