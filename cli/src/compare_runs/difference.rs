@@ -34,6 +34,13 @@ impl Difference {
         for &[t, value] in reference.iter().filter(|p| p[0] >= window[0] && p[0] <= window[1]) {
             let Some((there, exact)) = at(other, t) else { continue };
             let difference = there - value;
+            // A gap of the other between two rows of the reference.
+            let from = apart.last().map_or(t, |p| p[0]);
+            let mut between =
+                other[other.partition_point(|p| p[0] <= from)..].iter().take_while(|p| p[0] < t);
+            if between.any(|p| !p[1].is_finite()) {
+                apart.push([t, f64::NAN]);
+            }
             apart.push([t, difference]);
             if difference.is_finite() {
                 interpolated |= !exact;
@@ -129,6 +136,12 @@ mod tests {
             let d = Difference::of(&one, &two, ALL).unwrap();
             assert!((d.rms - 2.5_f64.sqrt()).abs() < 1e-9, "{d:?}");
         }
+        // A gap that lies between two rows of the reference.
+        let mut b = vec![[0.0, 0.0], [1.0, 1.0], [1.5, 2.0], [2.0, 2.0], [3.0, 2.0]];
+        let rms = |b: &[[f64; 2]]| Difference::of(&sampled(1.0, 4, |_| 0.0), b, ALL).unwrap().rms;
+        assert!((rms(&b) - (7.0_f64 / 3.0).sqrt()).abs() < 1e-9);
+        b[2][1] = f64::NAN;
+        assert!((rms(&b) - 1.5).abs() < 1e-9);
     }
 
     trait Later {
