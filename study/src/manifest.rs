@@ -131,10 +131,9 @@ impl Manifest {
             Some(format!("the one was computed with {}, the other with {}", place(self), place(other)))
         } else if self.references != other.references {
             Some("a file that it is held against was another one".into())
-        } else if let Some(point) = less.points.iter().find(|p| !more.points.contains(p)) {
-            Some(format!("the case, or a file that it names, was another one, e.g. of {}", point.point))
         } else {
-            None
+            let point = less.points.iter().find(|p| !more.points.contains(p))?;
+            Some(format!("the case, or a file that it names, was another one, e.g. of {}", point.point))
         }
     }
 
