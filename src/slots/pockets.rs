@@ -21,6 +21,8 @@ const BLOCKED: f64 = 0.8;
 const STEP: f64 = 0.5;
 /// From a row to the water before it, over l0.
 const BEFORE: f64 = 1.35;
+/// Distance over l0 from which on water is open.
+const FAR: f64 = 100.0;
 /// Places looked at before water counts as open: a pocket of 2,000 particles in space, of 4,000 in the plane.
 const MOST: usize = 16_000;
 
@@ -46,8 +48,9 @@ impl<'a> Closures<'a> {
             return vec![];
         }
         let looks_out = |first: usize| {
-            let rows = || (0..part.len()).filter(|&at| part[at] == first).map(|at| slot.rim[at]);
-            rows().any(|n| self.is_under_the_sky(layer, pose, n)) || self.is_open(layer, pose, rows())
+            let rows = (0..part.len()).filter(|&at| part[at] == first).map(|at| slot.rim[at]);
+            let before = self.before(slot, rows);
+            before.iter().any(|&x| self.is_under_the_sky(x)) || self.is_open(&before)
         };
         let mut firsts = part.clone();
         firsts.sort_unstable();
@@ -67,16 +70,22 @@ impl<'a> Closures<'a> {
         (0..part.len()).map(seep).collect()
     }
 
-    /// Where the water before row `n` is [m].
-    fn before(&self, layer: &Layer, pose: &Pose, n: usize) -> DVec3 {
-        let outward = layer.area[n].normalize_or_zero();
-        pose.position + pose.orientation * (layer.offset[n] + BEFORE * self.slots.spacing * outward)
+    /// Where the water before these `rows` of a rim is [m], and before those beside them: in the wedge above a slope there is no room for it
+    /// before the first one.
+    fn before(&self, slot: &Slot, rows: impl Iterator<Item = usize>) -> Vec<DVec3> {
+        let (layer, pose) = (&self.slots.layers[slot.solid], &self.poses[slot.solid]);
+        let out = |n: &usize| slot.inside.binary_search_by_key(n, |row| row.0).is_err();
+        let beside = |n: usize| layer.adjacent[n].iter().map(|&m| m as usize).chain([n]).filter(out);
+        let water = |n: usize| {
+            let outward = layer.area[n].normalize_or_zero();
+            pose.position + pose.orientation * (layer.offset[n] + BEFORE * self.slots.spacing * outward)
+        };
+        rows.flat_map(beside).map(water).filter(|&x| !self.is_blocked(x)).collect()
     }
 
-    /// Whether nothing stands above the water before row `n`.
-    fn is_under_the_sky(&self, layer: &Layer, pose: &Pose, n: usize) -> bool {
+    /// Whether nothing stands above `x` [m].
+    fn is_under_the_sky(&self, mut x: DVec3) -> bool {
         let up = -self.slots.weight.normalize_or(-DVec3::Z);
-        let mut x = self.before(layer, pose, n);
         while self.is_within(x) {
             if self.is_blocked(x) {
                 return false;
@@ -86,18 +95,19 @@ impl<'a> Closures<'a> {
         true
     }
 
-    /// Whether a way leads from the water before the `rows` out of the domain, or farther than pockets are.
-    fn is_open(&self, layer: &Layer, pose: &Pose, rows: impl Iterator<Item = usize>) -> bool {
+    /// Whether a way leads from one of these places out of the domain, or farther than pockets are. Along x first, as
+    /// far as there is room: in a long tank with a lid it is far soon.
+    fn is_open(&self, starts: &[DVec3]) -> bool {
+        let Some(&from) = starts.first() else { return false };
         let step = STEP * self.slots.spacing;
-        let starts: Vec<DVec3> = rows.map(|n| self.before(layer, pose, n)).collect();
-        let from = starts[0];
         let place = |cell: IVec3| from + step * cell.as_dvec3();
         let mut open: Vec<IVec3> = starts.iter().map(|&x| ((x - from) / step).round().as_ivec3()).collect();
         open.retain(|&cell| !self.is_blocked(place(cell)));
         let mut seen: HashSet<IVec3> = open.iter().copied().collect();
-        let axes = if self.slots.flat { &[IVec3::X, IVec3::Z][..] } else { &IVec3::AXES };
+        let axes = if self.slots.flat { &[IVec3::Z, IVec3::X][..] } else { &[IVec3::Z, IVec3::Y, IVec3::X] };
         while let Some(cell) = open.pop() {
-            if seen.len() > MOST || !self.is_within(place(cell)) {
+            let far = cell.as_dvec3().length() * STEP > FAR;
+            if far || seen.len() > MOST || !self.is_within(place(cell)) {
                 return true;
             }
             for next in axes.iter().flat_map(|&axis| [cell + axis, cell - axis]) {
