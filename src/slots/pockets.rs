@@ -8,7 +8,8 @@ use crate::body::Pose;
 use crate::body::slots::Seep;
 use crate::contact::broad::PointGrid;
 use glam::{DVec3, IVec3};
-use std::collections::HashSet;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet};
 use std::sync::OnceLock;
 
 /// Weight over n0 of the link to the pressure outside. A lid of 2.5 times the water's density that its contact lets sag by a thousandth of the
@@ -21,10 +22,34 @@ const BLOCKED: f64 = 0.8;
 const STEP: f64 = 0.5;
 /// From a row to the water before it, over l0.
 const BEFORE: f64 = 1.35;
-/// Distance over l0 from which on water is open.
-const FAR: f64 = 100.0;
-/// Places looked at before water counts as open: a pocket of 2,000 particles in space, of 4,000 in the plane.
+/// Places looked at from either end before water counts as joined: a pocket of 2,000 particles in space, of 4,000 in the plane.
 const MOST: usize = 16_000;
+
+/// How a search for a way between two places ended: they are joined, or one of them has no more room.
+enum Meeting {
+    Met,
+    FirstEnds,
+    SecondEnds,
+}
+
+/// A search from one place, nearest to its goal first.
+struct Way {
+    goal: IVec3,
+    seen: HashSet<IVec3>,
+    open: BinaryHeap<Reverse<(i32, [i32; 3])>>,
+}
+
+impl Way {
+    fn see(&mut self, cell: IVec3) {
+        if self.seen.insert(cell) {
+            self.open.push(Reverse(((cell - self.goal).abs().element_sum(), cell.to_array())));
+        }
+    }
+
+    fn next(&mut self) -> Option<IVec3> {
+        self.open.pop().map(|Reverse((_, cell))| IVec3::from_array(cell))
+    }
+}
 
 /// What closes the water in: solids where they are, and slots between them.
 pub(super) struct Closures<'a> {
@@ -47,15 +72,19 @@ impl<'a> Closures<'a> {
         if self.slots.closed || part.iter().all(|&p| p == part[0]) {
             return vec![];
         }
-        let looks_out = |first: usize| {
-            let rows = (0..part.len()).filter(|&at| part[at] == first).map(|at| slot.rim[at]);
-            let before = self.before(slot, rows);
-            before.iter().any(|&x| self.is_under_the_sky(x)) || self.is_open(&before)
-        };
         let mut firsts = part.clone();
         firsts.sort_unstable();
         firsts.dedup();
-        let open: Vec<usize> = firsts.into_iter().filter(|&first| looks_out(first)).collect();
+        let water = |first: usize| {
+            self.before(slot, (0..part.len()).filter(|&at| part[at] == first).map(|at| slot.rim[at]))
+        };
+        let places: Vec<Vec<DVec3>> = firsts.iter().map(|&first| water(first)).collect();
+        let open = self.open(&places);
+        if open.iter().all(|&open| open) {
+            return vec![];
+        }
+        let open: Vec<usize> =
+            firsts.into_iter().zip(open).filter(|part| part.1).map(|part| part.0).collect();
         let is_open = |at: usize| open.binary_search(&part[at]).is_ok();
         let height = |at: usize| self.slots.weight.dot(pose.orientation * layer.offset[slot.rim[at]]);
         let wet = (0..part.len()).filter(|&at| is_open(at) && told[at].1 > 0.0);
@@ -95,29 +124,64 @@ impl<'a> Closures<'a> {
         true
     }
 
-    /// Whether a way leads from one of these places out of the domain, or farther than pockets are. Along x first, as
-    /// far as there is room: in a long tank with a lid it is far soon.
-    fn is_open(&self, starts: &[DVec3]) -> bool {
-        let Some(&from) = starts.first() else { return false };
+    /// Which of the parts of a rim, with water at `places` before each, look into open water: those under the sky, and those from which a way
+    /// leads to one of them or on for longer than pockets have room.
+    fn open(&self, places: &[Vec<DVec3>]) -> Vec<bool> {
+        let sky: Vec<bool> = places.iter().map(|all| all.iter().any(|&x| self.is_under_the_sky(x))).collect();
+        let mut open = vec![true; places.len()];
+        let mut known = sky.iter().position(|&sky| sky).unwrap_or(0);
+        for k in (0..places.len()).filter(|&k| !sky[k]) {
+            if k == known {
+                continue;
+            }
+            match self.meet(&places[known], &places[k]) {
+                Meeting::Met => {}
+                // Without a sky the larger room is the open one.
+                Meeting::FirstEnds if !sky[known] => {
+                    open[..k].fill(false);
+                    known = k;
+                }
+                _ => open[k] = false,
+            }
+        }
+        open
+    }
+
+    /// Looks for a way between the water at two places, from both ends at once and towards each other.
+    fn meet(&self, first: &[DVec3], second: &[DVec3]) -> Meeting {
+        let [Some(&from), Some(&to)] = [first.first(), second.first()] else {
+            return if first.is_empty() { Meeting::FirstEnds } else { Meeting::SecondEnds };
+        };
         let step = STEP * self.slots.spacing;
         let place = |cell: IVec3| from + step * cell.as_dvec3();
-        let mut open: Vec<IVec3> = starts.iter().map(|&x| ((x - from) / step).round().as_ivec3()).collect();
-        open.retain(|&cell| !self.is_blocked(place(cell)));
-        let mut seen: HashSet<IVec3> = open.iter().copied().collect();
-        let axes = if self.slots.flat { &[IVec3::Z, IVec3::X][..] } else { &[IVec3::Z, IVec3::Y, IVec3::X] };
-        while let Some(cell) = open.pop() {
-            let far = cell.as_dvec3().length() * STEP > FAR;
-            if far || seen.len() > MOST || !self.is_within(place(cell)) {
-                return true;
-            }
-            for next in axes.iter().flat_map(|&axis| [cell + axis, cell - axis]) {
-                if !seen.contains(&next) && !self.is_blocked(place(next)) {
-                    seen.insert(next);
-                    open.push(next);
+        let cell = |x: DVec3| ((x - from) / step).round().as_ivec3();
+        let axes = if self.slots.flat { &[IVec3::X, IVec3::Z][..] } else { &IVec3::AXES };
+        let mut ways = [(first, cell(to)), (second, IVec3::ZERO)].map(|(starts, goal)| {
+            let mut way = Way { goal, seen: HashSet::new(), open: BinaryHeap::new() };
+            starts
+                .iter()
+                .map(|&x| cell(x))
+                .filter(|&cell| !self.is_blocked(place(cell)))
+                .for_each(|cell| way.see(cell));
+            way
+        });
+        for _ in 0..MOST {
+            for k in [0, 1] {
+                let Some(here) = ways[k].next() else {
+                    return if k == 0 { Meeting::FirstEnds } else { Meeting::SecondEnds };
+                };
+                if ways[1 - k].seen.contains(&here) {
+                    return Meeting::Met;
+                }
+                for next in axes.iter().flat_map(|&axis| [here + axis, here - axis]) {
+                    let x = place(next);
+                    if !ways[k].seen.contains(&next) && self.is_within(x) && !self.is_blocked(x) {
+                        ways[k].see(next);
+                    }
                 }
             }
         }
-        false
+        Meeting::Met
     }
 
     fn is_within(&self, x: DVec3) -> bool {
