@@ -169,9 +169,10 @@ pub(super) fn width(have: &wgpu::Limits) -> u32 {
 }
 
 /// Limits to ask of an adapter with limits `have` for kernels of up to `bindings` storage buffers, or what it lacks. Nothing is
-/// allocated before this.
+/// allocated before this. Where something `grows`, the buffers of contact with what touches, it is all that there is.
 pub(super) fn limits(
     memory: &Memory,
+    grows: bool,
     bindings: u32,
     have: &wgpu::Limits,
     name: &str,
@@ -197,8 +198,7 @@ pub(super) fn limits(
             );
             return Err(GpuError::TooSmall { limit: what, needs: bytes, has: Some(available), text }.into());
         }
-        // Contact's buffers grow with what touches.
-        *limit = (*limit).max(most).min(available);
+        *limit = (*limit).max(if grows { most } else { bytes }).min(available);
     }
     let groups = u64::from(width(have));
     if memory.strided > groups {
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn what_an_adapter_lacks_is_named() {
         let have = wgpu::Limits::default();
-        let refusal = |m: &Memory| limits(m, 8, &have, "small").expect_err("too large");
+        let refusal = |m: &Memory| limits(m, false, 8, &have, "small").expect_err("too large");
         let text = |m: &Memory| refusal(m).to_string();
         match refusal(&memory(300 << 20, 1)) {
             Error::Gpu(GpuError::TooSmall { limit, needs, has, .. }) => {
@@ -259,7 +259,7 @@ mod tests {
         }
         let many = text(&memory(1 << 20, 70_000));
         assert!(many.contains("70000 workgroups") && many.contains("65535"), "{many}");
-        let bound = limits(&memory(1 << 20, 1), 9, &have, "small").expect_err("too many").to_string();
+        let bound = limits(&memory(1 << 20, 1), false, 9, &have, "small").expect_err("too many").to_string();
         for part in
             ["9 storage buffers", "small allows 8", "max_storage_buffers_per_shader_stage", "run.spacing"]
         {
@@ -267,7 +267,7 @@ mod tests {
         }
         let low =
             Caps { binding: Some(1 << 20), workgroups: Some(100), ..Caps::default() }.lower(have.clone());
-        let asked = limits(&memory(1 << 20, 100), 8, &low, "small").expect("fits");
+        let asked = limits(&memory(1 << 20, 100), false, 8, &low, "small").expect("fits");
         assert_eq!((asked.max_storage_buffer_binding_size, asked.max_buffer_size), (1 << 20, 1 << 20));
         assert_eq!(asked.max_compute_workgroups_per_dimension, 100);
     }
@@ -279,9 +279,11 @@ mod tests {
             max_buffer_size: 1 << 31,
             ..Default::default()
         };
-        let asked = limits(&memory(300 << 20, 1), 8, &have, "large").expect("fits");
+        let asked = limits(&memory(300 << 20, 1), false, 8, &have, "large").expect("fits");
         assert_eq!((asked.max_storage_buffer_binding_size, asked.max_buffer_size), (300 << 20, 300 << 20));
-        let asked = limits(&memory(1 << 20, 1), 8, &have, "large").expect("fits");
+        let asked = limits(&memory(1 << 20, 1), true, 8, &have, "large").expect("fits");
+        assert_eq!(asked.max_storage_buffer_binding_size, 1 << 30);
+        let asked = limits(&memory(1 << 20, 1), false, 8, &have, "large").expect("fits");
         let usual = wgpu::Limits::default();
         assert_eq!(asked.max_storage_buffer_binding_size, usual.max_storage_buffer_binding_size);
     }

@@ -78,7 +78,8 @@ impl Fitted {
         if let Some(levels) = &levels {
             shaders.iter_mut().for_each(|shader| shader.leave_out(&levels.idle()));
         }
-        let limits = adapter::limits(&memory, Shader::bindings(&shaders), &have, &info.name)?;
+        let grows = plan.contact.program.is_some();
+        let limits = adapter::limits(&memory, grows, Shader::bindings(&shaders), &have, &info.name)?;
         Ok(Self { grid, sizes, memory, division, shaders, levels, most, limits })
     }
 }
