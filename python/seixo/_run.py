@@ -139,9 +139,9 @@ def _changes(spacing: float | None, until: float | None, sets: Mapping[str, Any]
     """Options that change the case."""
     changes = []
     if spacing is not None:
-        changes.append(f"--spacing={_number("spacing", spacing)!r}")
+        changes.append(f"--spacing={_number('spacing', spacing)!r}")
     if until is not None:
-        changes.append(f"--until={_number("until", until)!r}")
+        changes.append(f"--until={_number('until', until)!r}")
     changes += [f"--set={change}" for change in value_sets(sets)]
     return changes
 

@@ -201,6 +201,15 @@ def test_numbers_and_times_of_other_types_are_taken(tmp_path: Path) -> None:
     assert stopped.status == "interrupted"
 
 
+def test_numbers_of_numpy_and_bodies_called_by_a_number(tmp_path: Path) -> None:
+    case = {**CASE, "body": [{**CASE["body"][0], "name": "007"}], "moving_wall": [], "gauge": {}}
+    run = seixo.run(case, tmp_path / "out", until=np.float64(0.002), spacing=np.float64(0.05), backend="cpu")
+    assert run.result["time_s"] == pytest.approx(0.002)
+    assert set(run.bodies.body) == {"007"} and len(run.body("007").x) == 3
+    with pytest.raises(TypeError, match="until: a number, not a value of type str"):
+        seixo.run(CASE, tmp_path / "other", until=cast(Any, "0.1"))
+
+
 def test_options_change_the_case_and_the_run(tmp_path: Path) -> None:
     file = tmp_path / "a case.toml"
     file.write_text((ROOT / "cases/resting_cube.toml").read_text(), encoding="utf-8")
