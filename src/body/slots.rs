@@ -16,7 +16,7 @@ pub struct SlotRow {
     pub per_pascal: Wrench,
     /// The weight of the water between this row and the slots, as long as the row is under water [N], [N m].
     pub head: Wrench,
-    /// What seeps through a slot from this row to the rest of its rim: its link to P = `seep.level`.
+    /// What seeps through a slot from this row to the rest of its rim: its link to a pressure that is known.
     pub seep: Seep,
 }
 

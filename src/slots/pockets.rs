@@ -67,14 +67,15 @@ impl<'a> Closures<'a> {
 
     /// What seeps through `slot` to the rows of its rim, whose pressures are `told`: nothing but to pockets.
     pub fn seeps(&self, slot: &Slot, told: &[(usize, f64)]) -> Vec<Seep> {
-        let (layer, pose) = (&self.slots.layers[slot.solid], &self.poses[slot.solid]);
-        let part = parts(layer, &slot.rim);
-        if self.slots.closed || part.iter().all(|&p| p == part[0]) {
+        if self.slots.closed {
             return vec![];
         }
-        let mut firsts = part.clone();
-        firsts.sort_unstable();
-        firsts.dedup();
+        let (layer, pose) = (&self.slots.layers[slot.solid], &self.poses[slot.solid]);
+        let part = parts(layer, &slot.rim);
+        let firsts: Vec<usize> = (0..part.len()).filter(|&at| part[at] == at).collect();
+        if firsts.len() == 1 {
+            return vec![];
+        }
         let water = |first: usize| {
             self.before(slot, (0..part.len()).filter(|&at| part[at] == first).map(|at| slot.rim[at]))
         };

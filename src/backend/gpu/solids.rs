@@ -31,7 +31,8 @@ impl Gpu {
     pub(super) fn show_free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
         let p = &self.params;
         let factor = p.density / p.spacing.powi(3) / layout::laplacian_coefficient(p);
-        let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+        let with = |v: DVec3, w: f64| v.as_vec3().extend(w as f32).to_array();
+        let four = |v: DVec3| with(v, 0.0);
         let device = |(solid, (body, &(first, count))): (usize, (&FreeBody, &(usize, usize)))| {
             let inertia = factor * body.inverse_inertia;
             layout::FreeBody {
@@ -64,13 +65,9 @@ impl Gpu {
         // Water in slots presses on a body that is held as well.
         let device = |slot: &SlotRow| {
             [
-                slot.per_pascal.force.as_vec3().extend(slot.taken as f32).to_array(),
-                slot.per_pascal
-                    .torque
-                    .as_vec3()
-                    .extend((p.number_density * slot.seep.link) as f32)
-                    .to_array(),
-                slot.head.force.as_vec3().extend((p.number_density * slot.seep.known) as f32).to_array(),
+                with(slot.per_pascal.force, slot.taken),
+                with(slot.per_pascal.torque, p.number_density * slot.seep.link),
+                with(slot.head.force, p.number_density * slot.seep.known),
                 four(slot.head.torque),
             ]
         };
