@@ -13,7 +13,7 @@ fn absorber(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w != FLUID {
+    if !is_water(x.w) {
         return;
     }
     var rate = 0.0;

@@ -52,9 +52,9 @@ fn count(@builtin(global_invocation_id) id: vec3u) {
     if k >= params.fluid {
         key = moving_key() + cell_index(cell_coordinates(x.xyz));
 //#if RANKS
-    } else if x.w == FLUID || x.w == FOREIGN {
+    } else if is_water(x.w) || x.w == FOREIGN {
 //#else
-    } else if x.w == FLUID {
+    } else if is_water(x.w) {
 //#endif
         if in_domain(wrapped(x.xyz), velocity[k].xyz) {
             key = cell_index(cell_coordinates(x.xyz));

@@ -9,9 +9,13 @@ const WORKGROUP: u32 = 256u;
 // Fluid slots whose ghosts share a key of the counting sort; as crate::backend::gpu::layout::GHOST_BLOCK.
 const GHOST_BLOCK: u32 = 64u;
 
-// Kind of a particle, in position.w; as crate::scene::Kind.
+// Kind of a particle, in position.w; as crate::scene::Kind. To that of water the rest of its place is added, see `moved`.
 const FLUID: f32 = 0.0;
 const GHOST: f32 = 5.0;
+// Of 2^k: a 256th of the gap between the numbers from there on; and what makes three bytes less than a half. As
+// crate::backend::gpu::layout::Remainder.
+const QUANTUM: f32 = 0x1p-31;
+const REMAINDER: f32 = 0x1p25;
 //#if RANKS
 // Of a copy of what another rank computes, water or wall: a neighbour, of which nothing is computed here. No kind of the scene.
 const FOREIGN: f32 = 6.0;
@@ -229,6 +233,34 @@ fn longer(v: vec3f, longest: f32) -> bool {
 // v, no longer than `longest`.
 fn shortened(v: vec3f, longest: f32) -> vec3f {
     return select(v, v * (longest * inverseSqrt(dot(v, v))), longer(v, longest));
+}
+
+// Whether the kind is water's; the others are 1 and more.
+fn is_water(kind: f32) -> bool {
+    return kind < 0.5;
+}
+
+// x, a particle of water, after `way`. What f32 cannot hold of its place stays beside its kind, three signed bytes in 256ths of the
+// widest gap between the numbers of the domain, as crate::backend::gpu::layout::Remainder: a way of less than such a gap, that of slow
+// water in a long flume, is not lost but sums up. What the bytes cannot hold counts as one more with the chance of its size.
+fn moved(x: vec4f, way: vec3f) -> vec4f {
+    let far = max(max(params.upper.x, params.upper.y), params.upper.z);
+    let quantum = bitcast<f32>(bitcast<u32>(far) & 0x7f800000u) * QUANTUM;
+    let held = i32(x.w * REMAINDER);
+    let asked = way + quantum * vec3f(vec3i(extractBits(held, 0u, 8u), extractBits(held, 8u, 8u), extractBits(held, 16u, 8u)));
+    let end = x.xyz + asked;
+    let gone = vec3f(exactly(end.x), exactly(end.y), exactly(end.z)) - x.xyz;
+    let die = scrambled(scrambled(scrambled(scrambled(u32(held)) ^ bitcast<u32>(x.x)) ^ bitcast<u32>(x.y)) ^ bitcast<u32>(x.z));
+    let chance = vec3f(vec3u(die, die >> 10u, die >> 20u) & vec3u(1023u)) / 1024.0;
+    let rest = vec3i(clamp(floor((asked - gone) / quantum + chance), vec3f(-128.0), vec3f(127.0))) & vec3i(255);
+    return vec4f(end, FLUID + f32(rest.x | (rest.y << 8u) | (rest.z << 16u)) / REMAINDER);
+}
+
+// A number as if by chance, always the same of the same one (PCG: O'Neill 2014; Jarzynski and Olano 2020).
+fn scrambled(number: u32) -> u32 {
+    let state = number * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
 }
 
 // Longest way of a particle in the part `time` of the step.

@@ -21,11 +21,11 @@ fn change(i: u32, x: vec4f, old: vec4f, a: vec3f, last: bool) {
     acceleration[i] = vec4f(0.0);
     let rest = now.dt - now.ahead;
     if rest == 0.0 {
-        position[i] = vec4f(x.xyz + now.dt * change, x.w);
+        position[i] = moved(x, now.dt * change);
     } else if last {
         let way = rest * v;
         clamped = clamped || longer(way, longest_way(rest));
-        position[i] = vec4f(x.xyz + shortened(way, longest_way(rest)), x.w);
+        position[i] = moved(x, shortened(way, longest_way(rest)));
     }
     if clamped {
         atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
@@ -46,7 +46,7 @@ fn kick(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w == FLUID {
+    if is_water(x.w) {
         change(i, x, old, a, false);
     }
 }
@@ -58,7 +58,7 @@ fn correct(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w == FLUID {
+    if is_water(x.w) {
         change(i, x, velocity[i], acceleration[i].xyz, true);
     }
 }

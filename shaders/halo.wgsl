@@ -71,7 +71,7 @@ fn columns(@builtin(global_invocation_id) id: vec3u) {
     }
     let x = position[i];
     var column = NO_PARTICLE;
-    if x.w == FLUID {
+    if is_water(x.w) {
         // What is about to be taken out is counted where it is.
         column = select(TAKEN_OUT, cell_coordinates(x.xyz).x, in_domain(wrapped(x.xyz), velocity[i].xyz));
     }

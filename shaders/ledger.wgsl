@@ -99,7 +99,7 @@ fn absorber_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
     var sum = vec4f(0.0);
     for (var i = id.x; i < params.fluid; i += stride(groups.x)) {
         let x = position[i];
-        if x.w == FLUID {
+        if is_water(x.w) {
             var rate = 0.0;
             for (var k = 0u; k < arrayLength(&absorber_zone); k++) {
                 rate += absorber_rate(absorber_zone[k], wrapped(x.xyz));
@@ -119,7 +119,7 @@ fn predict_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocat
                 @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
     var sum = vec4f(0.0);
     for (var i = id.x; i < params.fluid; i += stride(groups.x)) {
-        if position[i].w == FLUID {
+        if is_water(position[i].w) {
             let v = velocity[i].xyz;
 //#if MIXED
             var total = vec3f(0.0);
@@ -154,7 +154,7 @@ fn lost_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation
         let kind = position[i].w;
         let x = wrapped(position[i].xyz);
         let v = velocity[i].xyz;
-        if kind == FLUID && !in_domain(x, v) && finite_vector(x + v) {
+        if is_water(kind) && !in_domain(x, v) && finite_vector(x + v) {
             sum += vec4f(dot(params.gravity, x) - 0.5 * dot(v, v), 1.0, 0.0, 0.0);
         }
     }
@@ -165,7 +165,7 @@ fn kick(entry: u32, first: u32, t: u32, group: u32, groups: u32) {
     var sum = vec4f(0.0);
     for (var i = first; i < params.fluid; i += stride(groups)) {
         let a = acceleration[i].xyz;
-        if position[i].w == FLUID && any(a != vec3f(0.0)) {
+        if is_water(position[i].w) && any(a != vec3f(0.0)) {
             let v = velocity[i].xyz;
             sum += vec4f(kick_work(v, a, a), clamp_work(v, a, 0.0), 0.0, 0.0);
         }
@@ -195,7 +195,7 @@ fn pressure_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
 //#endif
     var sum = vec4f(0.0);
     for (var i = id.x; i < params.fluid; i += stride(groups.x)) {
-        if position[i].w == FLUID {
+        if is_water(position[i].w) {
             let v = velocity[i].xyz;
             let a = acceleration[i].xyz;
             let solved = unclipped[i].xyz;
@@ -214,7 +214,7 @@ fn shift_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocatio
               @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
     var sum = vec4f(0.0);
     for (var i = id.x; i < params.fluid; i += stride(groups.x)) {
-        if position[i].w == FLUID {
+        if is_water(position[i].w) {
             sum.x -= dot(params.gravity, shift_way(imbalance[i].xyz, velocity[i].xyz));
         }
     }

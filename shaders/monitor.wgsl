@@ -57,7 +57,7 @@ fn monitor(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_i
     sum.extent_max = vec3f(-3.4e38);
     for (var i = id.x; i < params.fluid; i += groups.x * WIDTH) {
         let x = position[i];
-        if x.w == FLUID {
+        if is_water(x.w) {
             let v = velocity[i].xyz;
             let squared = dot(v, v);
             sum.momentum += v;

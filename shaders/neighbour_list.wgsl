@@ -109,7 +109,7 @@ fn neighbour_list_main(@builtin(global_invocation_id) id: vec3u) {
     let cell = cell_coordinates(me.xyz);
     let low = lowest_around(cell);
     let high = highest_around(cell);
-    var searched = me.w == FLUID;
+    var searched = is_water(me.w);
 //#if RANKS
     searched = searched || me.w == FOREIGN;
 //#endif

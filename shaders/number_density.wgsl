@@ -22,7 +22,7 @@ fn number_density_main(@builtin(global_invocation_id) id: vec3u) {
     let dummies = dummies_of(count);
     var n = 0.0;
     var centroid = vec3f(0.0);
-    var wet = i < params.fluid && me.w == FLUID;
+    var wet = i < params.fluid && is_water(me.w);
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list_at(k, i);
         let r = offset(me.xyz, position[j].xyz);

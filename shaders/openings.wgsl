@@ -34,7 +34,7 @@ fn swallow(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w != FLUID {
+    if !is_water(x.w) {
         return;
     }
     let place = wrapped(x.xyz);

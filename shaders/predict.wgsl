@@ -15,7 +15,7 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w != FLUID {
+    if !is_water(x.w) {
         return;
     }
 //#if MIXED
@@ -38,6 +38,6 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     if longer(way, longest) {
         atomicAdd(&counters[DISPLACEMENT_CLAMPS], 1u);
     }
-    position[i] = vec4f(x.xyz + shortened(way, longest), x.w);
+    position[i] = moved(x, shortened(way, longest));
     velocity[i] = vec4f(v, old.w);
 }

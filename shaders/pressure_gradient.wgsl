@@ -50,7 +50,7 @@ fn pressure_gradient(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    if x.w != FLUID {
+    if !is_water(x.w) {
         acceleration[i] = vec4f(0.0);
 //#if CONSISTENT
         imbalance[i] = vec4f(0.0);

@@ -18,5 +18,5 @@ fn shift(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = position[i];
-    position[i] = vec4f(x.xyz + shift_way(sum, velocity[i].xyz), x.w);
+    position[i] = moved(x, shift_way(sum, velocity[i].xyz));
 }

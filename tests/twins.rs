@@ -8,7 +8,7 @@ use crate::common::moving as common;
 
 use glam::{DMat3, DVec3};
 use seixo::backend::cpu::Cpu;
-use seixo::backend::gpu::{self, Caps, Gpu};
+use seixo::backend::gpu::{self, Caps, Gpu, layout};
 use seixo::backend::{Backend, Processor};
 use seixo::body::slots::{Seep, SlotRow};
 use seixo::body::{FreeBody, Pose, Wrench};
@@ -122,9 +122,13 @@ impl Pair {
         Some(pair)
     }
 
-    /// Give the CPU the device's state.
+    /// Give the CPU the device's state, with places as its kernels see them: what is beside them in f32 is for the next move.
     fn sync(&mut self) {
-        let fields = self.gpu.read().expect("the device can be read");
+        let mut fields = self.gpu.read().expect("the device can be read");
+        let middle = layout::middle(&self.params);
+        for x in &mut fields.position {
+            *x = (*x - middle).as_vec3().as_dvec3() + middle;
+        }
         self.cpu.write(&fields).expect("the CPU can be written");
     }
 

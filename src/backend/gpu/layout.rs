@@ -10,7 +10,7 @@ use crate::params::{Params, Step, Zone};
 use crate::pressure::Settings;
 use crate::scene::Groups;
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Fluid slots whose ghosts share a key of the counting sort; `GHOST_BLOCK` in shaders/common.wgsl.
 pub const GHOST_BLOCK: u64 = 64;
@@ -280,6 +280,44 @@ pub fn middle(params: &Params) -> DVec3 {
     if params.dimensions == 2 { DVec3::new(m.x, 0.0, m.z) } else { m }
 }
 
+/// What of a place of water f32 cannot hold: three signed bytes, in 256ths of the widest gap between the numbers of the domain,
+/// which stand beside the kind of the water as a number below a half. `moved` in shaders/common.wgsl.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Remainder {
+    /// [m]
+    quantum: f64,
+}
+
+impl Remainder {
+    /// Of three bytes, as the number that stands for them.
+    const SCALE: f32 = (1 << 25) as f32;
+
+    /// In the domain of `params`.
+    pub fn new(params: &Params) -> Self {
+        let far = (params.domain_max - middle(params)).as_vec3().max_element();
+        Self { quantum: f64::from(f32::from_bits(far.to_bits() & 0x7f80_0000)) * (-31.0_f64).exp2() }
+    }
+
+    /// A particle of water at `place` from the middle of the domain, as the device keeps it.
+    pub fn pack(self, place: DVec3) -> [f32; 4] {
+        let at = place.as_vec3();
+        let rest = ((place - at.as_dvec3()) / self.quantum).round().to_array();
+        let byte = |k: usize| u32::from(rest[k].clamp(-128.0, 127.0) as i8 as u8) << (8 * k);
+        [at.x, at.y, at.z, (byte(0) | byte(1) | byte(2)) as f32 / Self::SCALE]
+    }
+
+    /// Where a particle is, from the middle of the domain [m]; of one that is no water the fourth number is its kind.
+    pub fn place(self, x: &[f32; 4]) -> DVec3 {
+        let at = Vec3::new(x[0], x[1], x[2]).as_dvec3();
+        if x[3] >= 0.5 {
+            return at;
+        }
+        let bits = (x[3] * Self::SCALE) as u32;
+        let rest = |k: u32| f64::from((bits >> (8 * k)) as u8 as i8);
+        at + self.quantum * DVec3::new(rest(0), rest(1), rest(2))
+    }
+}
+
 impl Constants {
     /// In f64 as far as possible, rounded once.
     pub fn new(params: &Params, groups: &Groups, grid: &Grid, settings: &Settings, sizes: &Sizes) -> Self {
@@ -364,5 +402,23 @@ mod tests {
         }
         assert_eq!(word_of(last), f32::MAX);
         assert_eq!(number_of(0.0), 0);
+    }
+
+    #[test]
+    fn a_place_of_water_keeps_eight_bits_more_than_f32() {
+        let remainder = Remainder { quantum: 256.0 * (-31.0_f64).exp2() };
+        let gap = 256.0 * (-23.0_f64).exp2();
+        for place in [DVec3::new(301.0 + 1e-6, -477.3, 3e-9), DVec3::new(-256.123_456_7, 0.0, 511.999_99)] {
+            let x = remainder.pack(place);
+            assert_eq!([x[0], x[1], x[2]], place.as_vec3().to_array());
+            assert!((0.0..0.5).contains(&x[3]));
+            let off = (remainder.place(&x) - place).abs().max_element();
+            assert!(off <= gap / 512.0 + 1e-14, "{off} of {gap}");
+            assert_eq!(remainder.pack(remainder.place(&x)), x);
+        }
+        // Half a gap is a tie, and the larger number may be the one that is kept.
+        let tie = DVec3::new(300.0 + 0.5 * gap, 300.0 + 1.5 * gap, 0.0);
+        assert!((remainder.place(&remainder.pack(tie)) - tie).abs().max_element() <= gap / 256.0);
+        assert_eq!(remainder.place(&[1.0, 2.0, 3.0, 5.0]), DVec3::new(1.0, 2.0, 3.0));
     }
 }

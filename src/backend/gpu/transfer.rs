@@ -1,6 +1,6 @@
 //! Fields between host (f64, absolute) and device (f32, relative to the middle of the domain).
 
-use super::layout::{counter, laplacian_coefficient, number_of, word_of};
+use super::layout::{Remainder, counter, laplacian_coefficient, number_of, word_of};
 use super::{Gpu, buffers};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
@@ -11,15 +11,24 @@ use crate::scene::Kind;
 use glam::{DVec3, Vec3};
 
 /// Vectors with a fourth component.
-pub(super) fn packed(values: &[DVec3], offset: DVec3, fourth: impl Fn(usize) -> f32) -> Vec<[f32; 4]> {
+pub(super) fn packed(values: &[DVec3], fourth: impl Fn(usize) -> f32) -> Vec<[f32; 4]> {
     values
         .iter()
         .enumerate()
         .map(|(i, &v)| {
-            let v = (v - offset).as_vec3();
+            let v = v.as_vec3();
             [v.x, v.y, v.z, fourth(i)]
         })
         .collect()
+}
+
+/// Places of particles as a device keeps them, relative to `middle`.
+pub(super) fn packed_places(fields: &Fields, middle: DVec3, remainder: Remainder) -> Vec<[f32; 4]> {
+    let place = |(&x, &kind): (&DVec3, &Kind)| {
+        let [x, y, z, rest] = remainder.pack(x - middle);
+        [x, y, z, if kind == Kind::Fluid { rest } else { f32::from(kind as u8) }]
+    };
+    fields.position.iter().zip(&fields.kind).map(place).collect()
 }
 
 pub(super) fn vector(v: &[f32; 4]) -> DVec3 {
@@ -68,7 +77,7 @@ impl Gpu {
         if fields.position.len() != g.total() || fields.pressure.len() != g.pressure() {
             return Err(Error::gpu("the fields are those of another scene"));
         }
-        let position = packed(&fields.position, self.middle, |i| f32::from(fields.kind[i] as u8));
+        let position = packed_places(fields, self.middle, Remainder::new(&self.params));
         // Moving solids stay where they are, and face there.
         let moving = g.moving_wall_range();
         let facing = if self.plan.needs(Arrays::Solids) {
@@ -80,7 +89,7 @@ impl Gpu {
             Some(&id) => word_of(id),
             None => facing.get(i - moving.start).map_or(0.0, |v| v[3]),
         };
-        let velocity = packed(&fields.velocity, DVec3::ZERO, number);
+        let velocity = packed(&fields.velocity, number);
         let c = laplacian_coefficient(&self.params);
         let equation = |i: usize| {
             let inner = fields.state[i] == State::Inner;
@@ -104,12 +113,12 @@ impl Gpu {
         context.upload(buffers::number_density, &scalar(&fields.number_density))?;
         context.upload(buffers::state, &state)?;
         context.upload(buffers::source_diagonal, &equations)?;
-        context.upload(buffers::acceleration, &packed(&fields.acceleration, DVec3::ZERO, |_| 0.0))?;
+        context.upload(buffers::acceleration, &packed(&fields.acceleration, |_| 0.0))?;
         if self.plan.needs(Arrays::SurfacePressure) {
             context.upload(buffers::surface_pressure, &scalar(&fields.surface_pressure))?;
         }
         if self.sizes.reacting > 0 && !fields.reaction.is_empty() {
-            context.upload(buffers::reaction, &packed(&fields.reaction, DVec3::ZERO, |_| 0.0))?;
+            context.upload(buffers::reaction, &packed(&fields.reaction, |_| 0.0))?;
         }
         if self.plan.needs(Arrays::Coupling) {
             context.upload(buffers::inertia_head, &scalar(&fields.inertia_head))?;
@@ -162,9 +171,10 @@ impl Gpu {
             wide(if heads > 0 { context.download(buffers::inertia_head, heads)? } else { Vec::new() });
         let c = laplacian_coefficient(&self.params);
         let diagonal = |e: &[f32; 2]| if e[1] > 0.0 { f64::from(e[1]) * c } else { 1.0 };
+        let remainder = Remainder::new(&self.params);
         let mut fields = Fields {
             kind: position.iter().map(|x| kind(x[3])).collect(),
-            position: position.iter().map(|x| vector(x) + self.middle).collect(),
+            position: position.iter().map(|x| remainder.place(x) + self.middle).collect(),
             id: velocity[..g.fluid].iter().map(|v| number_of(v[3])).collect(),
             velocity: velocity.iter().map(vector).collect(),
             pressure,

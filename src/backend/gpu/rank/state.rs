@@ -1,9 +1,9 @@
 //! The particles of all ranks in one place, and back: fields, frames, states. A state is that of a run on one device, which goes on with it.
 
 use super::{Came, GpuRank, Lists};
-use crate::backend::gpu::layout::{self, LEDGER_WIDTH, counter, word_of};
+use crate::backend::gpu::layout::{self, LEDGER_WIDTH, Remainder, counter, word_of};
 use crate::backend::gpu::memory::Sizes;
-use crate::backend::gpu::transfer::{kind, packed, vector};
+use crate::backend::gpu::transfer::{kind, packed, packed_places, vector};
 use crate::backend::gpu::{archive, buffers};
 use crate::backend::{Backend, Counters, Ranked};
 use crate::checkpoint::Archive;
@@ -101,18 +101,13 @@ impl Ranked for GpuRank {
         let plan = &self.gpu.plan;
         let scalar = |values: &[f64]| values.iter().map(|&v| v as f32).collect::<Vec<f32>>();
         let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| word_of(id));
-        let code = |i: usize| f32::from(fields.kind[i] as u8);
-        let still = |values: &[DVec3]| packed(values, DVec3::ZERO, |_| 0.0);
+        let still = |values: &[DVec3]| packed(values, |_| 0.0);
         archive.array(
             buffers::position.id().name(),
-            &mut packed(&fields.position, self.gpu.middle, code),
+            &mut packed_places(&fields, self.gpu.middle, Remainder::new(&self.gpu.params)),
             false,
         )?;
-        archive.array(
-            buffers::velocity.id().name(),
-            &mut packed(&fields.velocity, DVec3::ZERO, number),
-            false,
-        )?;
+        archive.array(buffers::velocity.id().name(), &mut packed(&fields.velocity, number), false)?;
         archive.array(buffers::pressure.id().name(), &mut scalar(&fields.pressure), false)?;
         archive.array(buffers::number_density.id().name(), &mut scalar(&fields.number_density), false)?;
         let mut state: Vec<u32> = fields.state.iter().map(|&s| s as u32).collect();
@@ -164,9 +159,10 @@ impl Ranked for GpuRank {
         }
         self.gpu.counters.exchange(archive)?;
         archive.number("dt", &mut self.gpu.dt)?;
+        let remainder = Remainder::new(&self.gpu.params);
         Ok(Fields {
             kind: position.iter().map(|x| kind(x[3])).collect(),
-            position: position.iter().map(|x| vector(x) + self.gpu.middle).collect(),
+            position: position.iter().map(|x| remainder.place(x) + self.gpu.middle).collect(),
             id: velocity[..all.fluid].iter().map(|v| layout::number_of(v[3])).collect(),
             velocity: velocity.iter().map(vector).collect(),
             pressure,
