@@ -141,6 +141,7 @@ fn mistakes_are_told_before_anything_runs() {
     };
     mistake("key.toml", "run.spacing", "run.spacings");
     mistake("method.toml", "{preset}", "{nope}");
+    mistake("from.toml", "end = 0.3", "end = 0.3\nfrom = \"out/earlier\"");
     for (arguments, expected) in [
         (&["hydrostatik"][..], "did you mean `hydrostatic`"),
         (&["none.toml"][..], "no study file"),
@@ -148,6 +149,7 @@ fn mistakes_are_told_before_anything_runs() {
         (&["collect"][..], "name the folders"),
         (&["collect", "."][..], "holds no study"),
         (&["key.toml"][..], "the case of every point is refused"),
+        (&["from.toml"][..], "run.from: a point of a study begins at t = 0"),
         (&["method.toml"][..], "method: there is no axis `nope`"),
         (&["gallery", "--set", "run.end=1"][..], "--set does not apply"),
     ] {

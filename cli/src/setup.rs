@@ -4,6 +4,7 @@ use super::{CaseArgs, DeviceArgs, device};
 use seixo::case::file::{Loaded, load, load_text, read_text};
 use seixo::console::remark;
 use seixo::error::{Error, Result};
+use seixo::run::from;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use std::collections::HashMap;
@@ -21,12 +22,14 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Read the case and build its scene; warnings and notes go to stderr unless `quiet`.
+    /// Read the case of a command that begins at t = 0 and build its scene; warnings and notes go to stderr unless `quiet`.
     ///
     /// # Errors
     /// What is wrong with the case.
     pub fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
-        Self::build(read(args)?, name(&args.case), quiet)
+        let loaded = read(args)?;
+        from::refuse(&loaded.case, "this command", "leave it out").map_err(|e| loaded.placed(e))?;
+        Self::build(loaded, name(&args.case), quiet)
     }
 
     /// Build the scene of a case that was read.

@@ -82,10 +82,8 @@ fn open(
         // Paths count from the working directory.
         (_, text) => load_text(Path::new("the case"), text.unwrap_or_default(), spacing, sets)?,
     };
-    if loaded.case.run.from.is_some() {
-        let remedy = "leave it out, or run the case with `seixo.run`";
-        return Err(Error::key("run.from", "run.from: a simulation that is stepped starts at t = 0", remedy));
-    }
+    let remedy = "leave it out, or run the case with `seixo.run`";
+    seixo::run::from::refuse(&loaded.case, "a simulation that is stepped", remedy)?;
     Ok((seixo::Simulation::open(&loaded.case, options)?, loaded.warnings))
 }
 

@@ -427,7 +427,7 @@ def test_what_is_wrong_is_an_exception_of_stepping_too(tmp_path: Path) -> None:
         seixo.open(CASE, backend="quantum")
     with pytest.raises(seixo.CaseError, match="chooses a GPU"):
         seixo.open(CASE, backend="cpu", adapter=0)
-    with pytest.raises(seixo.CaseError, match="starts at t = 0"):
+    with pytest.raises(seixo.CaseError, match="begins at t = 0"):
         seixo.open(CASE, set={"run.from": str(tmp_path)})
     fast = {**CASE, "fluid": {"block": [{**CASE["fluid"]["block"][0], "velocity": [0, 0, 3000]}]}}
     with pytest.raises(seixo.DivergedError, match="stage"):

@@ -20,6 +20,17 @@ pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
     Ok(Some(Found { archive: found.archive.into_beginning(), ..found }))
 }
 
+/// What always begins at t = 0 refuses a case that names a state to go on from: it would be passed over in silence.
+///
+/// # Errors
+/// [`Error::Case`] that tells of `what`, with a `remedy`, if there is a `run.from`.
+pub fn refuse(case: &Case, what: &str, remedy: &str) -> Result<()> {
+    match case.run.from {
+        Some(_) => Err(Error::key("run.from", format!("run.from: {what} begins at t = 0"), remedy)),
+        None => Ok(()),
+    }
+}
+
 /// The state that `run.from` of `case` names, whatever it is of: the newest that is whole.
 ///
 /// # Errors

@@ -33,7 +33,7 @@ use super::run_point::{Point, run};
 use super::validation::check::Check;
 use seixo::case::file::{load_text, parse_as};
 use seixo::error::{Error, Result};
-use seixo::run::named_by_content;
+use seixo::run::{from, named_by_content};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -378,7 +378,10 @@ impl Definition {
         let processor = picks.iter().find_map(|p| p.processor).unwrap_or(setup.processor);
         // The text to run names meshes by their place, that which the result depends on by what they hold.
         let read = load_text(path, text.to_owned(), None, &all)
-            .and_then(|read| Ok((named_by_content(&read.case, &read.text)?, read)));
+            .and_then(|read| {
+                from::refuse(&read.case, "a point of a study", "leave it out").map_err(|e| read.placed(e))?;
+                Ok((named_by_content(&read.case, &read.text)?, read))
+            });
         // Particles go with the spacing to the power of the dimensions; steps with the end over the time step.
         let weight = read.as_ref().map_or(0.0, |(_, read)| {
             let run = &read.case.run;
