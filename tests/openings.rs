@@ -317,6 +317,37 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
     }
 }
 
+/// What the old discharge has asked for was met, or was not, by the old run: the new one follows its own from there on.
+#[test]
+fn a_run_that_goes_on_with_another_discharge_owes_nothing_for_the_time_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.toml");
+    let outflow = "[[outflow]]\nname = \"out\"\nface = \"x_max\"\ndischarge = 0.01\n";
+    std::fs::write(&path, tank(0.2, outflow)).unwrap();
+    let path = path.display().to_string();
+    let root = |name: &str| folder.path().join(name).display().to_string();
+    // Particles that have gone out by the end of each run.
+    let run = |name: &str, end: &str, sets: &[&str]| {
+        let out = root(name);
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let args = ["run", &path, "--backend", "cpu", "--threads", "1", "-q", "-o", &out, "--until", end];
+        let ran = ran(&args.into_iter().chain(sets).collect::<Vec<_>>());
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let result = json(&std::fs::read_to_string(Path::new(&out).join("result.json")).unwrap());
+        result["water"]["outflow"][0]["particles"].as_u64().unwrap()
+    };
+    let first = run("first", "0.4", &[]);
+    let from = format!("run.from=\"{}\"", root("first"));
+    for discharge in [0.002, 0.02] {
+        let set = format!("outflow.0.discharge={discharge}");
+        let out = run(&format!("second {discharge}"), "0.8", &[&from, &set]);
+        let asked = discharge * 0.4 / 1e-4;
+        println!("{first} out by 0.4 s, {} of {asked} from there on with {discharge} m2/s", out - first);
+        // A layer goes at a time, of at most 20 particles.
+        assert!(((out - first) as f64 - asked).abs() <= 20.0, "{discharge}: {first}, then {out}");
+    }
+}
+
 /// A log that drifts down the channel stays there: to bodies an opening is a wall.
 #[test]
 fn a_body_does_not_leave_through_an_opening() {

@@ -315,6 +315,13 @@ fn a_state_starts_another_case() {
     assert_eq!(last("long", "fluid_0004.vtu"), last("second", "fluid_0001.vtu"), "the same water at 0.08 s");
     let gauges = std::fs::read_to_string(case.root("second").join("gauges.csv")).unwrap();
     assert!(gauges.lines().nth(1).unwrap().starts_with("0.05"), "{gauges}");
+    // The last row is of the end of a run, which need not be a multiple.
+    let odd = case.run("odd", &["--until", "0.07", "--set", &from, "--set", "gauge.every=0.015"]);
+    assert_eq!(odd.code, 0, "{}", odd.err);
+    let gauges = std::fs::read_to_string(case.root("odd").join("gauges.csv")).unwrap();
+    let times: Vec<f64> =
+        gauges.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
+    assert!(times.len() >= 3 && (times[times.len() - 1] - 0.07).abs() < 1e-9, "{gauges}");
     let other = case.run("third", &["--until", "0.08", "--set", &from, "--spacing", "0.04"]);
     assert!(other.code == 2 && other.err.contains("run.spacing was 0.05, is 0.04"), "{}", other.err);
     for (sets, words) in [

@@ -377,11 +377,10 @@ impl Definition {
         }
         let processor = picks.iter().find_map(|p| p.processor).unwrap_or(setup.processor);
         // The text to run names meshes by their place, that which the result depends on by what they hold.
-        let read = load_text(path, text.to_owned(), None, &all)
-            .and_then(|read| {
-                from::refuse(&read.case, "a point of a study", "leave it out").map_err(|e| read.placed(e))?;
-                Ok((named_by_content(&read.case, &read.text)?, read))
-            });
+        let read = load_text(path, text.to_owned(), None, &all).and_then(|read| {
+            from::refuse(&read.case, "a point of a study", "leave it out").map_err(|e| read.placed(e))?;
+            Ok((named_by_content(&read.case, &read.text)?, read))
+        });
         // Particles go with the spacing to the power of the dimensions; steps with the end over the time step.
         let weight = read.as_ref().map_or(0.0, |(_, read)| {
             let run = &read.case.run;
