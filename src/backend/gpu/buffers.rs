@@ -67,7 +67,7 @@ const OF_STENCILS: Split = Split::Planes { length: |_, l| l.capacity, pitch: "hi
 // there may be more than particles.
 table! {
     "particles" {
-        /// x, y, z and kind.
+        /// x, y, z and kind, of water with what f32 cannot hold of its place.
         position: [f32; 4], Both, Fluid, |s, _| s.total;
         /// u, v, w and, of the fluid, the word of its number, of moving wall layers where they face.
         velocity: [f32; 4], Both, Fluid, |s, _| s.total;
