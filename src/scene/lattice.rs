@@ -2,6 +2,7 @@
 
 use super::oriented::Placed;
 use crate::error::{CaseError, Problem, Result};
+use crate::shape::blocks;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
@@ -161,17 +162,30 @@ impl Grid {
         let reach = shape.bounds() + near * l0;
         let range = lattice.cells(shape.center - reach, shape.center + reach);
         let (lo, hi) = (range.lo.max(self.cells.lo), range.hi.min(self.cells.hi));
-        // A slice at a time: a dry shape may be as large as the grid.
-        for x in lo.x..hi.x {
-            let slice = Cells { lo: IVec3 { x, ..lo }, hi: IVec3 { x: x + 1, ..hi } };
-            let free: Vec<IVec3> = slice.iter().filter(|c| self.get(*c) == FREE).collect();
-            let state = |c: IVec3| {
-                let off = shape.distance(lattice.center(c)) / l0;
-                (off < near).then_some((c, if off < SLACK - 0.5 { BLOCKED } else { FACE }))
-            };
-            let taken: Vec<(IVec3, u8)> = free.into_par_iter().filter_map(state).collect();
-            taken.into_iter().for_each(|(c, state)| self.set(c, state));
+        let state = |off: f64| if off < SLACK - 0.5 { BLOCKED } else { FACE };
+        // A dry shape may be as large as the grid: of most blocks of cells the middle tells that the surface is far from all of them.
+        let mut inside = vec![];
+        let left = blocks::small([lo, hi], |block| {
+            let middle = 0.5 * (lattice.center(block[0]) + lattice.center(block[1] - 1));
+            let (off, half) = (shape.distance(middle) / l0, blocks::half(block, DVec3::ONE) + SLACK);
+            if off + half < -0.5 {
+                inside.push(block);
+            }
+            off + half < -0.5 || off - half >= near
+        });
+        let free = |c: &IVec3| self.get(*c) == FREE;
+        let taken = left.into_par_iter().flat_map_iter(|block| {
+            let off = move |c: IVec3| (c, shape.distance(lattice.center(c)) / l0);
+            let offs = blocks::cells(block).filter(free).map(off);
+            offs.filter(move |(_, off)| *off < near).map(move |(c, off)| (c, state(off)))
+        });
+        let taken: Vec<(IVec3, u8)> = taken.collect();
+        for c in inside.into_iter().flat_map(blocks::cells) {
+            if self.get(c) == FREE {
+                self.set(c, BLOCKED);
+            }
         }
+        taken.into_iter().for_each(|(c, state)| self.set(c, state));
     }
     /// Whether a cell lies beyond a periodic side.
     pub fn is_beyond(&self, c: IVec3) -> bool {

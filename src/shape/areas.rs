@@ -45,8 +45,7 @@ pub(super) fn share(
         if some.is_empty() {
             break;
         }
-        let found: Vec<_> =
-            some.par_iter().map(|(at, area)| tree.to(seen(*at, area.normalize_or_zero()))).collect();
+        let found = tree.to_each(&some, |(at, area)| seen(*at, area.normalize_or_zero()));
         for ((at, area), k) in some.into_iter().zip(found).filter_map(|(piece, k)| Some((piece, k?))) {
             particles.area[k] += area;
             if area.dot(normals[k]) > ALIKE * area.length() {

@@ -4,6 +4,7 @@
 //! for its depth below a point and for what of its surface presses into others ([`Surface`]).
 
 mod areas;
+pub(crate) mod blocks;
 mod cells;
 mod convex;
 mod cuboid;

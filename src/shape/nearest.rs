@@ -1,7 +1,11 @@
 //! The nearest of many points, however far it is: a k-d tree.
 
+use rayon::prelude::*;
+
 /// Points of which no more are looked through one by one.
 const FEW: usize = 8;
+/// Places that a thread looks up in a row.
+const IN_ROW: usize = 256;
 
 /// Points of `D` coordinates.
 pub(super) struct Nearest<const D: usize> {
@@ -19,11 +23,26 @@ impl<const D: usize> Nearest<D> {
         Self { points, order, axes }
     }
 
-    /// The number of the nearest to `x`, the first of those that are as near; `None` if there is none at all.
-    pub fn to(&self, x: [f64; D]) -> Option<usize> {
+    /// The number of the nearest to `x`, the first of those that are as near; `None` if there is none at all. One that may be it, as that of a
+    /// place beside `x` is, leaves little to look through.
+    pub fn to(&self, x: [f64; D], guess: Option<usize>) -> Option<usize> {
         let mut found = (f64::INFINITY, usize::MAX);
+        guess.into_iter().for_each(|k| self.compare(x, k, &mut found));
         self.look(x, 0, self.order.len(), &mut found);
         (found.1 < self.points.len()).then_some(found.1)
+    }
+
+    /// [`Nearest::to`] each of `places`, most of which lie beside the one before them.
+    pub fn to_each<T: Sync>(&self, places: &[T], at: impl Fn(&T) -> [f64; D] + Sync) -> Vec<Option<usize>> {
+        let of_some = |some: &[T]| {
+            let mut last = None;
+            let next = |place| {
+                last = self.to(at(place), last);
+                last
+            };
+            some.iter().map(next).collect::<Vec<_>>()
+        };
+        places.par_chunks(IN_ROW).flat_map_iter(of_some).collect()
     }
 
     fn look(&self, x: [f64; D], from: usize, to: usize, found: &mut (f64, usize)) {
@@ -32,7 +51,6 @@ impl<const D: usize> Nearest<D> {
             return;
         }
         let middle = from + (to - from) / 2;
-        self.compare(x, self.order[middle], found);
         let axis = self.axes[middle];
         let beyond = x[axis] - self.points[self.order[middle]][axis];
         let (near, far) = if beyond < 0.0 {
@@ -42,6 +60,7 @@ impl<const D: usize> Nearest<D> {
         };
         self.look(x, near.0, near.1, found);
         if beyond * beyond <= found.0 {
+            self.compare(x, self.order[middle], found);
             self.look(x, far.0, far.1, found);
         }
     }
@@ -108,10 +127,12 @@ mod tests {
             let x = place(k).map(|c| if k % 2 == 0 { c } else { 100.0 * c });
             let off = |p: &[f64; 3]| p.iter().zip(x).map(|(p, x)| (p - x).powi(2)).sum::<f64>();
             let nearest = (0..points.len()).min_by(|&a, &b| off(&points[a]).total_cmp(&off(&points[b])));
-            assert_eq!(tree.to(x), nearest, "{x:?}");
+            for guess in [None, Some(k % points.len()), nearest] {
+                assert_eq!(tree.to(x, guess), nearest, "{x:?}");
+            }
             let least = nearest.map_or(f64::NAN, |k| off(&points[k]).sqrt());
             assert!(tree.has_within(x, 1.000_001 * least) && !tree.has_within(x, 0.999_999 * least), "{x:?}");
         }
-        assert_eq!(Nearest::<3>::new(vec![]).to([0.0; 3]), None);
+        assert_eq!(Nearest::<3>::new(vec![]).to([0.0; 3], None), None);
     }
 }

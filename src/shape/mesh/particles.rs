@@ -1,12 +1,13 @@
 //! Particles that fill a mesh.
 
 use super::super::areas::{self, Piece};
+use super::super::blocks;
 use super::super::cells::Cells;
 use super::super::thin::Thin;
 use super::super::{ALL_FACES, APART, Geometry, Particles};
 use super::Mesh;
 use super::skin::Skin;
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 /// A lattice fits a surface whose wall layer is moved by no more, over the spacing.
@@ -53,32 +54,37 @@ impl Place {
     }
 }
 
-/// The places inside `mesh` of a lattice of about `spacing` [m] along the axes of the file, each with its depth [m] and the way out of the solid there, and
-/// its largest step [m].
-fn cells(mesh: &Mesh, spacing: f64) -> (Vec<(DVec3, f64, DVec3)>, f64) {
+/// The places inside `mesh` of a lattice of about `spacing` [m] along the axes of the file, as deep as `layers` of it go, each with its depth [m] and the
+/// way out of the solid there, and its largest step [m].
+fn cells(mesh: &Mesh, spacing: f64, layers: i32) -> (Vec<(DVec3, f64, DVec3)>, f64) {
     let (low, high) = mesh.along_file;
     let to_own = mesh.frame.inverse();
     let count = ((high - low) / spacing).round().max(DVec3::ONE);
     let step = (high - low) / count;
-    let [nx, ny, nz] = count.to_array().map(|n| n as usize);
-    let found = (0..nx * ny * nz)
-        .into_par_iter()
-        .filter_map(|k| {
-            let cell = DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64);
-            let at = to_own * (low + (cell + 0.5) * step);
-            let inside = mesh.depth(at, ALL_FACES)?;
-            Some((at, inside.depth, inside.outward))
-        })
-        .collect();
     // A lattice that fits has its layers at odd halves of its step.
-    (found, step.max_element().max(spacing) * (1.0 + 1e-6))
+    let border = step.max_element().max(spacing) * (1.0 + 1e-6);
+    let deepest = f64::from(layers) * border;
+    let at = |cell: DVec3| to_own * (low + (cell + 0.5) * step);
+    let left = blocks::small([IVec3::ZERO, count.as_ivec3()], |block| {
+        let distance = mesh.distance(at(0.5 * (block[0] + block[1] - 1).as_dvec3())).0;
+        let half = blocks::half(block, step) + 1e-6 * spacing;
+        distance > half || -distance > deepest + half
+    });
+    let mut left: Vec<IVec3> = left.into_iter().flat_map(blocks::cells).collect();
+    left.sort_unstable_by_key(|c| (c.z, c.y, c.x));
+    let found = left.into_par_iter().filter_map(|cell| {
+        let at = at(cell.as_dvec3());
+        let inside = mesh.depth(at, ALL_FACES)?;
+        Some((at, inside.depth, inside.outward))
+    });
+    (found.collect(), border)
 }
 
 /// Layers of particles at half a spacing, one and a half and so on below the surface of `mesh`, `layers` of them: those of a lattice of about
 /// `spacing` [m] along the axes of the file where that fits, and else layers of their own, each pushed apart until it lies evenly. Water that
 /// slides over the steps of a lattice is held back.
 pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
-    let (found, border) = cells(mesh, spacing);
+    let (found, border) = cells(mesh, spacing, layers);
     let off = |depth: f64| (depth - 0.5 * spacing).abs();
     let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing);
     let skin = (!fits).then(|| Skin::new(mesh, spacing));
@@ -178,11 +184,9 @@ pub(super) fn pieces(mesh: &Mesh, spacing: f64) -> impl Iterator<Item = Piece> +
         std::iter::from_fn(move || {
             loop {
                 let [a, b, c] = open.pop()?;
-                let edges = [[a, b, c], [b, c, a], [c, a, b]];
-                let longer =
-                    |s: &[DVec3; 3], t: &[DVec3; 3]| s[0].distance(s[1]).total_cmp(&t[0].distance(t[1]));
-                let [from, to, apex] = edges.into_iter().max_by(longer)?;
-                if from.distance(to) <= PIECE * spacing {
+                let edges = [[a, b, c], [b, c, a], [c, a, b]].map(|edge| (edge[0].distance(edge[1]), edge));
+                let (length, [from, to, apex]) = edges.into_iter().max_by(|s, t| s.0.total_cmp(&t.0))?;
+                if length <= PIECE * spacing {
                     return Some(((a + b + c) / 3.0, 0.5 * (b - a).cross(c - a)));
                 }
                 let middle = 0.5 * (from + to);

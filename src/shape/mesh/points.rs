@@ -6,7 +6,6 @@ use super::super::{ALL_FACES, Faces, Geometry, Surface, WallLayer};
 use super::particles::pieces;
 use super::{Mesh, face};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Distance of points along a sharp edge, over the spacing, and how near another one of an edge may be.
 const ALONG: f64 = 0.5;
@@ -58,8 +57,7 @@ pub(super) fn surface(mesh: &Mesh, particles: &WallLayer, spacing: f64) -> Surfa
 
 /// Area [m2] of the surface to which each of `points` is the nearest.
 fn parts(mesh: &Mesh, points: &[DVec3], spacing: f64) -> Vec<f64> {
-    let seen = |at: DVec3| [at.x, at.y, at.z, 0.0, 0.0, 0.0];
-    let tree = Nearest::new(points.iter().map(|&at| seen(at)).collect());
+    let tree = Nearest::new(points.iter().map(|at| at.to_array()).collect());
     let mut parts = vec![0.0; points.len()];
     let mut pieces = pieces(mesh, spacing);
     loop {
@@ -67,7 +65,7 @@ fn parts(mesh: &Mesh, points: &[DVec3], spacing: f64) -> Vec<f64> {
         if some.is_empty() {
             return parts;
         }
-        let found: Vec<_> = some.par_iter().map(|&(at, _)| tree.to(seen(at))).collect();
+        let found = tree.to_each(&some, |(at, _)| at.to_array());
         for ((_, area), k) in some.iter().zip(found).filter_map(|(piece, k)| Some((piece, k?))) {
             parts[k] += area.length();
         }
