@@ -12,10 +12,6 @@ const GHOST_BLOCK: u32 = 64u;
 // Kind of a particle, in position.w; as crate::scene::Kind. To that of water the rest of its place is added, see `moved`.
 const FLUID: f32 = 0.0;
 const GHOST: f32 = 5.0;
-// Of 2^k: a 256th of the gap between the numbers from there on; and what makes three bytes less than a half. As
-// crate::backend::gpu::layout::Remainder.
-const QUANTUM: f32 = 0x1p-31;
-const REMAINDER: f32 = 0x1p25;
 //#if RANKS
 // Of a copy of what another rank computes, water or wall: a neighbour, of which nothing is computed here. No kind of the scene.
 const FOREIGN: f32 = 6.0;
@@ -239,6 +235,11 @@ fn shortened(v: vec3f, longest: f32) -> vec3f {
 fn is_water(kind: f32) -> bool {
     return kind < 0.5;
 }
+
+// Of 2^k: a 256th of the gap between the numbers from there on; and what makes three bytes less than a half. As
+// crate::backend::gpu::layout::Remainder.
+const QUANTUM: f32 = 0x1p-31;
+const REMAINDER: f32 = 0x1p25;
 
 // x, a particle of water, after `way`. What f32 cannot hold of its place stays beside its kind, three signed bytes in 256ths of the
 // widest gap between the numbers of the domain, as crate::backend::gpu::layout::Remainder: a way of less than such a gap, that of slow

@@ -28,7 +28,7 @@ impl Setup {
     /// What is wrong with the case.
     pub fn new(args: &CaseArgs, quiet: bool) -> Result<Self> {
         let loaded = read(args)?;
-        from::refuse(&loaded.case, "this command", "leave it out").map_err(|e| loaded.placed(e))?;
+        from::refuse(&loaded, "this command", "leave it out")?;
         Self::build(loaded, name(&args.case), quiet)
     }
 

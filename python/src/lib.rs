@@ -83,7 +83,7 @@ fn open(
         (_, text) => load_text(Path::new("the case"), text.unwrap_or_default(), spacing, sets)?,
     };
     let remedy = "leave it out, or run the case with `seixo.run`";
-    seixo::run::from::refuse(&loaded.case, "a simulation that is stepped", remedy)?;
+    seixo::run::from::refuse(&loaded, "a simulation that is stepped", remedy)?;
     Ok((seixo::Simulation::open(&loaded.case, options)?, loaded.warnings))
 }
 

@@ -2,7 +2,7 @@
 
 use super::resume::changed;
 use crate::case::Case;
-use crate::case::file::parse;
+use crate::case::file::{Loaded, parse};
 use crate::checkpoint::{Found, file};
 use crate::error::{Error, Result};
 use crate::output::folder::checkpoints;
@@ -23,10 +23,13 @@ pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
 /// What always begins at t = 0 refuses a case that names a state to go on from: it would be passed over in silence.
 ///
 /// # Errors
-/// [`Error::Case`] that tells of `what`, with a `remedy`, if there is a `run.from`.
-pub fn refuse(case: &Case, what: &str, remedy: &str) -> Result<()> {
-    match case.run.from {
-        Some(_) => Err(Error::key("run.from", format!("run.from: {what} begins at t = 0"), remedy)),
+/// [`Error::Case`] that tells of `what`, with its place and a `remedy`, if there is a `run.from`.
+pub fn refuse(loaded: &Loaded, what: &str, remedy: &str) -> Result<()> {
+    match loaded.case.run.from {
+        Some(_) => {
+            let error = Error::key("run.from", format!("run.from: {what} begins at t = 0"), remedy);
+            Err(loaded.placed(error))
+        }
         None => Ok(()),
     }
 }

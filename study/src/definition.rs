@@ -378,7 +378,7 @@ impl Definition {
         let processor = picks.iter().find_map(|p| p.processor).unwrap_or(setup.processor);
         // The text to run names meshes by their place, that which the result depends on by what they hold.
         let read = load_text(path, text.to_owned(), None, &all).and_then(|read| {
-            from::refuse(&read.case, "a point of a study", "leave it out").map_err(|e| read.placed(e))?;
+            from::refuse(&read, "a point of a study", "leave it out")?;
             Ok((named_by_content(&read.case, &read.text)?, read))
         });
         // Particles go with the spacing to the power of the dimensions; steps with the end over the time step.
