@@ -7,6 +7,7 @@ use seixo::case::Case;
 use seixo::kernels::body_force;
 use seixo::params::Params;
 use seixo::scene::Scene;
+use seixo::simulation::Simulation;
 
 /// A cube of 0.1 m and relative density `s` in a tank of 0.4 m, its centre at `z`.
 fn tank_with_cube(s: f64, z: f64, fluid: &str) -> Case {
@@ -382,4 +383,30 @@ fn what_lands_on_the_floor_presses_no_water_through_it() {
     let lost = sim.backend.counters().expect("counted").lost;
     println!("{lost} lost, lowest at {lowest} m");
     assert!(lost == 0 && lowest > -0.03, "{lost} lost, lowest at {lowest} m");
+}
+
+#[test]
+fn water_rests_on_what_is_driven_beside_a_free_body() {
+    // A shut gate 2 m under water, and a box that floats far from it. Driven solids answer no pressure, on spacings at which 1 kg m2 is
+    // little, too.
+    let case = case(
+        "[run]\nspacing = 0.1\ntime_step = 5e-3\nend = 1.0\ndimensions = 2\n[fluid]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [3, 1, 3]\nopen = [\"z_max\"]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [2.4, 1, 2]\n\
+         [[moving_wall]]\nname = \"gate\"\nmin = [2.4, 0, 0]\nmax = [2.8, 1, 3]\nmotion = [[10, 0, 0, 0], [11, 0, 0, 2.5]]\n\
+         [[body]]\nname = \"box\"\nsize = [0.4, 1, 0.4]\ncenter = [0.6, 0, 2.0]\ndensity = 500\ndisplaces_fluid = true\n\
+         [contact]\nspring = 1e6\n",
+    );
+    for processor in processors("the gate beside a box on the GPU") {
+        let scene = Scene::build(&case).expect("the scene builds");
+        let mut sim = Simulation::on(&case, scene, &processor).expect("the simulation starts");
+        let gate = (0..2).find(|&k| !sim.solids.is_free(k)).expect("the gate");
+        let (mut force, steps) = (0.0, 100);
+        for k in 0..steps {
+            sim.step().expect("still water");
+            force += if 2 * k < steps { 0.0 } else { 2.0 * sim.fluid_force[gate].force.x / f64::from(steps) };
+        }
+        let expected = 0.5 * 1000.0 * 9.81 * 2.0 * 2.0 * 0.1;
+        println!("{processor:?}: {:.4} of the water's weight on the gate", force / expected);
+        assert!((force / expected - 1.0).abs() < 0.02, "{processor:?}: {force} N for {expected}");
+    }
 }

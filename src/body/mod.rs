@@ -16,7 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A solid as the pressure equation sees it: how it answers forces, and those that act on it beside the fluid's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FreeBody {
     /// 1/mass along each world axis [1/kg]; 0 where locked or prescribed.
     pub inverse_mass: DVec3,
@@ -24,6 +24,14 @@ pub struct FreeBody {
     pub inverse_inertia: DMat3,
     /// Weight and contact.
     pub load: Wrench,
+}
+
+impl Default for FreeBody {
+    /// A solid that nothing moves.
+    fn default() -> Self {
+        // A matrix is by default the identity, which would let it turn.
+        Self { inverse_mass: DVec3::ZERO, inverse_inertia: DMat3::ZERO, load: Wrench::default() }
+    }
 }
 
 /// A solid that moves, with what its motion needs.
