@@ -399,6 +399,10 @@ fn results_do_not_depend_on_the_number_of_threads() {
 fn the_baseline_stops_the_first_impact_and_is_no_contact_law() {
     let row = Drop { law: Law::Pressure, ..Drop::new(CASES[2], 1.0) }.run(true).unwrap();
     assert!(row.collisions > 1 && row.rise_over_l0 > 1.0 && !row.returns, "{row:?}");
+    // A spring, a damping and sub-steps of the case have no part in it, and the plan says so.
+    let (solids, dt) = dam_break_cube(Law::Pressure, None);
+    let words = solids.advice(dt).words;
+    assert!(words.len() == 1 && words[0].contains("collisions alone"), "{words:?}");
 }
 
 #[test]

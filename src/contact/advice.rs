@@ -42,6 +42,9 @@ impl Solids {
             worst.omega_dt, worst.damping_dt
         );
         match &substeps {
+            Ok(_) if recommended.is_none() => words.push(
+                "contact: this law knows collisions alone; a spring, damping and sub-steps have no part in it".into(),
+            ),
             Ok(n) => {
                 let hardest = self.limits.hardest(&worst, *n);
                 let more = if hardest > *n {
