@@ -3,6 +3,7 @@
 use super::oriented::Placed;
 use crate::error::{CaseError, Problem, Result};
 use crate::shape::blocks;
+pub(super) use crate::shape::blocks::Cells;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
@@ -23,30 +24,6 @@ pub(super) const FACE: u8 = 5;
 const SLACK: f64 = 1e-6;
 /// More cells than this do not fit into memory beside the particles.
 const MOST_CELLS: f64 = 1.0e9;
-
-/// A box of cells, `lo` included, `hi` not.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Cells {
-    pub lo: IVec3,
-    pub hi: IVec3,
-}
-
-impl Cells {
-    pub fn iter(self) -> impl Iterator<Item = IVec3> {
-        let Self { lo, hi } = self;
-        (lo.x..hi.x)
-            .flat_map(move |i| (lo.y..hi.y).flat_map(move |j| (lo.z..hi.z).map(move |k| IVec3::new(i, j, k))))
-    }
-    pub(crate) fn grown(self, by: IVec3) -> Self {
-        Self { lo: self.lo - by, hi: self.hi + by }
-    }
-    pub(crate) fn union(self, other: Self) -> Self {
-        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
-    }
-    pub fn contains(self, c: IVec3) -> bool {
-        c.cmpge(self.lo).all() && c.cmplt(self.hi).all()
-    }
-}
 
 /// Origin and spacing: cell i spans origin + i l0 .. origin + (i + 1) l0, its particle stands in the middle.
 #[derive(Clone, Copy, Debug)]
@@ -165,9 +142,9 @@ impl Grid {
         let state = |off: f64| if off < SLACK - 0.5 { BLOCKED } else { FACE };
         // A dry shape may be as large as the grid: of most blocks of cells the middle tells that the surface is far from all of them.
         let mut inside = vec![];
-        let left = blocks::small([lo, hi], |block| {
-            let middle = 0.5 * (lattice.center(block[0]) + lattice.center(block[1] - 1));
-            let (off, half) = (shape.distance(middle) / l0, blocks::half(block, DVec3::ONE) + SLACK);
+        let left = blocks::small(Cells { lo, hi }, |block| {
+            let middle = 0.5 * (lattice.center(block.lo) + lattice.center(block.hi - 1));
+            let (off, half) = (shape.distance(middle) / l0, block.half(DVec3::ONE) + SLACK);
             if off + half < -0.5 {
                 inside.push(block);
             }
@@ -176,11 +153,11 @@ impl Grid {
         let free = |c: &IVec3| self.get(*c) == FREE;
         let taken = left.into_par_iter().flat_map_iter(|block| {
             let off = move |c: IVec3| (c, shape.distance(lattice.center(c)) / l0);
-            let offs = blocks::cells(block).filter(free).map(off);
+            let offs = block.iter().filter(free).map(off);
             offs.filter(move |(_, off)| *off < near).map(move |(c, off)| (c, state(off)))
         });
         let taken: Vec<(IVec3, u8)> = taken.collect();
-        for c in inside.into_iter().flat_map(blocks::cells) {
+        for c in inside.into_iter().flat_map(Cells::iter) {
             if self.get(c) == FREE {
                 self.set(c, BLOCKED);
             }

@@ -65,12 +65,12 @@ fn cells(mesh: &Mesh, spacing: f64, layers: i32) -> (Vec<(DVec3, f64, DVec3)>, f
     let border = step.max_element().max(spacing) * (1.0 + 1e-6);
     let deepest = f64::from(layers) * border;
     let at = |cell: DVec3| to_own * (low + (cell + 0.5) * step);
-    let left = blocks::small([IVec3::ZERO, count.as_ivec3()], |block| {
-        let distance = mesh.distance(at(0.5 * (block[0] + block[1] - 1).as_dvec3())).0;
-        let half = blocks::half(block, step) + 1e-6 * spacing;
+    let left = blocks::small(blocks::Cells { lo: IVec3::ZERO, hi: count.as_ivec3() }, |block| {
+        let distance = mesh.distance(at(0.5 * (block.lo + block.hi - 1).as_dvec3())).0;
+        let half = block.half(step) + 1e-6 * spacing;
         distance > half || -distance > deepest + half
     });
-    let mut left: Vec<IVec3> = left.into_iter().flat_map(blocks::cells).collect();
+    let mut left: Vec<IVec3> = left.into_iter().flat_map(blocks::Cells::iter).collect();
     left.sort_unstable_by_key(|c| (c.z, c.y, c.x));
     let found = left.into_par_iter().filter_map(|cell| {
         let at = at(cell.as_dvec3());
