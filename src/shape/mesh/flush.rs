@@ -1,7 +1,7 @@
 //! Meshes of which others cover some triangles.
 
 use super::super::open;
-use super::Mesh;
+use super::{Mesh, Planes};
 use glam::DVec3;
 use parry3d_f64::shape::TriMesh;
 use std::sync::{Arc, Mutex};
@@ -27,6 +27,10 @@ impl Mesh {
         let left = self.triangles.indices().iter().zip(&is_open).filter(|(_, open)| **open);
         let left: Vec<[u32; 3]> = left.map(|(t, _)| *t).collect();
         let left = TriMesh::new(self.vertices().to_vec(), left).ok()?;
-        open::made(&OPENED, self, is_open, |_| Self { open: Some(Arc::new(left)), ..self.clone() })
+        open::made(&OPENED, self, is_open, |is_open| Self {
+            open: Some(Arc::new(left)),
+            planes: self.planes.as_ref().map(|planes| Arc::new(Planes::clone(planes).with(is_open))),
+            ..self.clone()
+        })
     }
 }

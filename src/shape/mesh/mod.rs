@@ -8,6 +8,7 @@ mod flush;
 mod ground;
 mod mass;
 mod particles;
+mod planes;
 mod points;
 mod primitives;
 mod read;
@@ -21,6 +22,7 @@ use glam::{DQuat, DVec3};
 use mass::Mass;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
+use planes::Planes;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
@@ -45,6 +47,8 @@ pub struct Mesh {
     triangles: Arc<TriMesh>,
     /// The triangles that depths count to, if others cover some.
     open: Option<Arc<TriMesh>>,
+    /// Those of a convex mesh with few faces.
+    planes: Option<Arc<Planes>>,
     volume: f64,
     /// Principal moments per mass [m2].
     moments: DVec3,
@@ -180,6 +184,7 @@ impl Mesh {
         let triangles = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
             .map_err(|e| Unfit::new(format!("{path}: {e}"), "repair the surface"))?;
         Ok(Self {
+            planes: Planes::of(&triangles, radius).map(Arc::new),
             triangles: Arc::new(triangles),
             open: None,
             volume,
@@ -252,6 +257,11 @@ impl Mesh {
 
     /// Places along the line where it goes through the surface, in order.
     fn crossings(&self, start: DVec3, along: DVec3, length: f64) -> Vec<f64> {
+        if let Some(planes) = &self.planes {
+            let inside = planes.inside(start, along, length);
+            let ends = inside.into_iter().flat_map(|(from, to)| [from, to]);
+            return ends.filter(|&s| s > 0.0 && s < length).collect();
+        }
         let step = 1e-9 * self.radius;
         let (mut out, mut from) = (vec![], 0.0);
         while let Some(way) =
@@ -323,6 +333,9 @@ impl Geometry for Mesh {
     }
 
     fn distance(&self, q: DVec3) -> (f64, DVec3) {
+        if let Some(known) = self.planes.as_ref().and_then(|planes| planes.distance(q)) {
+            return known;
+        }
         let (mut nearest, inside) = self.nearest(q);
         if let Some(open) = self.open.as_ref().filter(|_| inside) {
             nearest = open.project_local_point(q, false).point;
