@@ -351,12 +351,13 @@ impl Params {
         self.density * self.spacing.powi(3)
     }
 
-    /// alpha of Eq. (8) for a step of `dt` [s] [1/Pa]; never 0, or the pressure of a closed pocket has no level.
+    /// alpha of Eq. (8) for a step of `dt` [s] [1/Pa]; never 0, or the pressure of a closed pocket has no level, and as small as the relaxation
+    /// lets it be, or the weight of the water presses it together in short steps.
     fn derived_compressibility(&self, dt: f64, relaxation: f64) -> f64 {
         let head = self.gravity.length() * self.depth;
         match self.source {
             // 0.1 % bulk compression.
-            Source::NumberDensity if head > 0.0 => (1e-3 * relaxation / (self.density * head)).max(1e-9),
+            Source::NumberDensity if head > 0.0 => 1e-3 * relaxation / (self.density * head),
             Source::NumberDensity => 1e-9,
             Source::Mixed => (dt / self.pressure_reach()).powi(2) / self.density,
         }
@@ -390,7 +391,8 @@ impl Params {
         let most = if head > 0.0 {
             // Viscosity: over the length of the domain in gaps of a spacing.
             let viscous = self.viscosity * speed * self.extent() / self.spacing.powi(2);
-            (c * c).max(head).max(viscous)
+            let driven = self.extent() * self.drive.length();
+            (c * c).max(head).max(viscous).max(driven)
         } else {
             // Without weight a jolt makes the pressure, rho v L / dt, or what drives the flow along a periodic axis.
             self.extent() * (speed / dt + self.drive.length())

@@ -373,6 +373,13 @@ fn what_lies_where_no_water_comes_is_warned_of() {
         let (_, _, warnings) = file::parse("test.toml", text.clone(), &[]).unwrap_or_else(|e| panic!("{e}"));
         assert!(warnings.len() == 1 && warnings[0].contains(words), "{words}: {warnings:?}");
     }
+    // Gravity along a periodic axis makes no waves whose speed would give a rate.
+    let driven = absorber(0.5)
+        .replace("\nrate = 1\n", "\n")
+        .replace("open = [\"z_max\"]", "open = [\"z_max\"]\nperiodic = [\"x\"]");
+    let still = driven.replace("[run]\n", "[run]\ngravity = [1, 0, 0]\n");
+    let refused = file::parse("test.toml", still, &[]).map(|_| ()).expect_err("no rate");
+    assert!(refused.to_string().contains("without gravity across walls"), "{refused}");
     for text in
         [gauge(0.7), absorber(0.8), gauge(1.2).replace("open = [\"z_max\"]", "open = [\"z_max\", \"x_max\"]")]
     {

@@ -708,3 +708,29 @@ fn a_stream_does_not_feel_the_particles_of_the_floor() {
     assert!(scatter_on_the_floor(2, 0.5) < 0.04);
     assert!(scatter_on_the_floor(3, 1.0) < 0.1);
 }
+
+#[test]
+fn short_steps_do_not_let_water_fall_under_its_own_weight_with_the_paper_s_preset() {
+    // alpha of itself is what lets the floor of still water be pressed together by 0.1 %, alpha rho g H / gamma, whatever the step.
+    for dt in [1e-3, 1e-5, 1e-7] {
+        let case = hydrostatic(0.025, dt, "preset = \"paper\"");
+        let params = Params::new(&case, &Scene::build(&case).expect("it builds")).expect("valid");
+        let step = params.step(0.0, dt, 0.1);
+        let pressed = step.compressibility * 1000.0 * 9.81 * 0.5 / step.relaxation;
+        assert!((pressed - 1e-3).abs() < 1e-4, "dt = {dt}: {pressed}");
+    }
+}
+
+#[test]
+fn water_that_rests_on_a_plug_is_pressed_by_all_that_drives_it() {
+    // Periodic along x, where most of gravity is: rho 5 m/s2 1.55 m at the plug, and a bound that lies above it.
+    let case = case(
+        "[run]\nspacing = 0.01\ntime_step = 1e-3\nend = 1\ndimensions = 2\ngravity = [5.0, 0, -0.5]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1.6, 0.1, 0.1]\nperiodic = [\"x\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0.05, 0, 0]\nmax = [1.6, 0.1, 0.1]\n\
+         [[obstacle]]\nname = \"plug\"\nmin = [0, 0, 0]\nmax = [0.05, 0.1, 0.1]\n",
+    );
+    let params = Params::new(&case, &Scene::build(&case).expect("it builds")).expect("valid");
+    let most = params.step(0.0, 1e-3, 0.0).pressure_max;
+    assert!(most > 1000.0 * 5.0 * 1.55, "{most} Pa");
+}

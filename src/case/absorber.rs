@@ -1,7 +1,7 @@
 //! Boxes in which the water's velocity is damped.
 
 use super::check::{Checker, face};
-use super::{Case, Face, Vector};
+use super::{Case, Face, Tank, Vector};
 use serde::{Deserialize, Serialize};
 
 /// A box in which the water comes to rest, so that waves do not come back from a wall: dv/dt = -rate s^2 v, where s grows
@@ -45,6 +45,9 @@ impl Absorber {
 impl Checker<'_> {
     pub(super) fn absorbers(&mut self) {
         let case: &Case = self.case;
+        // What of gravity lies along periodic axes makes no depth, and no waves.
+        let periodic = case.tank.as_ref().map_or([false; 3], Tank::periodic);
+        let is_weightless = (0..3).all(|axis| periodic[axis] || case.run.gravity[axis] == 0.0);
         for (k, absorber) in case.absorber.iter().enumerate() {
             let path = format!("absorber.{k}");
             if case.fluid.is_none() {
@@ -52,8 +55,8 @@ impl Checker<'_> {
             }
             if let Some(rate) = absorber.rate {
                 self.positive(&format!("{path}.rate"), rate, "1/s");
-            } else if case.run.gravity.iter().all(|&g| g == 0.0) {
-                let message = "without gravity there are no waves to take the rate from";
+            } else if is_weightless {
+                let message = "without gravity across walls there are no waves to take the rate from";
                 self.add(path.clone(), message, "add `rate` [1/s]");
             }
             if self.flat() && absorber.way().0 == 1 {
