@@ -287,6 +287,19 @@ fn a_beach_gives_way_to_the_tank() {
             assert!(p.distance(*q) > 0.049, "{p} and {q}");
         }
     }
+    // However far it goes on beyond the tank, its rows end at the tank's walls.
+    let wider = pool("[\"z_max\"]", &beach.replace("[0.6, 1.0]", "[1.0, 1.4]")).unwrap();
+    let sorted = |scene: &Scene| {
+        let near = scene
+            .position
+            .iter()
+            .filter(|p| p.cmpgt(DVec3::splat(-0.3)).all() && p.cmplt(DVec3::splat(1.3)).all());
+        let mut rows: Vec<String> = near.map(|p| format!("{p:.6}")).collect();
+        rows.sort();
+        rows
+    };
+    let here = sorted(&pool("[\"z_max\"]", &beach.replace("[0.6, 1.0]", "[0.8, 1.2]")).unwrap());
+    assert!(sorted(&wider) == here, "{} and {}", wider.position.len(), here.len());
 }
 
 #[test]

@@ -123,7 +123,6 @@ impl Fixed {
         let slab = frame.slab(layers);
         let l0 = lattice.spacing;
         let earlier: Vec<Placed> = self.shapes[..].iter().map(Placed::from).collect();
-        let on_lattice: Vec<bool> = self.shapes.iter().map(|s| s.axes == DMat3::IDENTITY).collect();
         let of = self.shapes.len() as u32;
         self.shapes.push(WallShape {
             name: plane.name.clone(),
@@ -143,9 +142,9 @@ impl Fixed {
                     if lattice.plane {
                         p.y = 0.0;
                     }
-                    let in_plane =
-                        earlier.iter().zip(&on_lattice).any(|(b, &on)| !on && b.holds(p, 1e-6 * l0));
-                    if in_plane || grid.is_beyond(lattice.cell(p)) || near_solid(lattice, grid, p) {
+                    // Rows behind the face of another wall would make it denser, and what they bear is no part of the plane.
+                    let in_wall = earlier.iter().any(|b| b.holds(p, 1e-6 * l0));
+                    if in_wall || grid.is_beyond(lattice.cell(p)) || near_solid(lattice, grid, p) {
                         left_out += 1;
                     } else if depth > 0 {
                         self.dummy.push(p);
