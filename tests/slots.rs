@@ -331,3 +331,34 @@ fn a_particle_that_a_body_catches_goes_with_it() {
     println!("water {water}, cube {body}, apart by {way}");
     assert!(water.length() < 0.05 && body.length() < 0.02, "thrown: {water} {body}");
 }
+
+#[test]
+fn a_held_body_feels_its_slot_once_whatever_stands_elsewhere() {
+    // A cube stands on it. With a third one on a post that is off the lattice, far away, it was pressed down by 2.0 N.
+    let body = |name: &str, x: f64, z: f64, more: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nsize = [0.1, 0.1, 0.1]\ncenter = [{x}, 0, {z}]\ndensity = 2000\n\
+             displaces_fluid = true\nstanding = true\n{more}"
+        )
+    };
+    let mut simulation = simulation(&case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.5]\nopen = [\"z_max\"]\n[contact]\nspring = 1e5\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.4]\n\
+         [[obstacle]]\nname = \"post\"\nshape = \"box\"\ncenter = [0.6, 0, 0.05]\nsize = [0.12, 0.1, 0.1]\n{}{}{}",
+        body("held", 0.2, 0.15, "locked = [\"x\", \"z\", \"rotation_y\"]\n"),
+        body("top", 0.2, 0.25, ""),
+        body("far", 0.6, 0.15, ""),
+    )));
+    let held = simulation.scene.solids.iter().position(|solid| solid.name == "held").expect("it is there");
+    let (mut sum, mut steps) = (0.0, 0.0);
+    while simulation.time < 0.1 {
+        simulation.step().expect("they stand");
+        if simulation.time > 0.05 {
+            (sum, steps) = (sum + simulation.fluid_force[held].force.z, steps + 1.0);
+        }
+    }
+    let lift = sum / steps / (9810.0 * 0.1 * 0.1 * 0.02);
+    println!("{lift:.3} of the water that it displaces");
+    assert!((lift - 1.0).abs() < 0.05, "{lift}");
+}

@@ -104,7 +104,7 @@ impl Simulation {
     }
 
     /// Force of the water on each solid: the sum over its rows, and what that does not know of driven solids. No water presses where another solid
-    /// stands, and under a free body that of its slot does.
+    /// stands, and under a free body that of its slot does. A body that is held has slots as a free one, and their part in its sum.
     fn force_of_water(&mut self) -> Result<Vec<Wrench>> {
         let (scene, poses, backend) = (&self.scene, self.solids.predicted(), &mut *self.backend);
         let covered = self.driven_faces.covered(scene, poses);
@@ -135,7 +135,7 @@ impl Simulation {
         }
         for push in pushes {
             let Opposite::Solid(k) = push.on else { continue };
-            if !self.solids.is_free(k) {
+            if !scene.solids[k].is_free() {
                 let arm = self.params.periodic.nearest(push.at - poses[k].position);
                 sum[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
             }
