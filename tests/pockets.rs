@@ -3,8 +3,11 @@
 use crate::common::{case, simulation, there_is_a_device};
 use seixo::backend::Processor;
 use seixo::case::Case;
+use seixo::contact::Solids;
+use seixo::params::Params;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use seixo::slots::Slots;
 
 /// A lid of 0.36 x 0.08 m over a pit full of water, under water, in the plane.
 fn lid(spacing: f64, density: f64, spring: f64, above: f64, more: &str) -> Case {
@@ -84,4 +87,66 @@ fn an_arch_of_blocks_is_not_driven_apart() {
     let across = simulation.fluid_force[0].force.x / (9810.0 * 0.1 * 0.12 * 0.02);
     println!("lintel {lintel:.3}, a pier is pushed by {across:.3}");
     assert!((lintel - 1.0).abs() < 0.2 && across.abs() < 0.4, "{lintel} {across}");
+}
+
+/// Rows of rims that look into pockets, and the sum of what comes to them [Pa], with the first body moved along x by `moved` [m].
+fn pockets(case: &Case, moved: f64) -> (usize, f64) {
+    let scene = Scene::build(case).expect("it builds");
+    let mut poses = Solids::new(&scene, case.contact.as_ref()).expect("bodies").poses().to_vec();
+    poses[0].position.x += moved;
+    let slots = Slots::new(&scene, &Params::new(case, &scene).expect("valid"));
+    let rows = slots.rows(&poses, |rows| Ok(vec![1000.0; rows.len()])).expect("nothing is read");
+    let linked = rows.iter().filter(|row| row.seep.link > 0.0);
+    linked.fold((0, 0.0), |(count, sum), row| (count + 1, sum + row.seep.known))
+}
+
+#[test]
+fn a_pocket_at_a_seam_is_one_as_in_the_middle() {
+    // A lid over a pit of 0.2 m, moved there from where it may start.
+    let pit = |at: f64, lid: f64, ledges: &[[f64; 2]]| {
+        let ledges: String = ledges
+            .iter()
+            .enumerate()
+            .map(|(k, [low, high])| {
+                format!("[[obstacle]]\nname = \"{k}\"\nmin = [{low}, 0, 0]\nmax = [{high}, 0, 0.2]\n")
+            })
+            .collect();
+        pockets(
+            &case(&format!(
+                "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.5]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n\
+                 [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.4]\n[contact]\nspring = 1e5\n{ledges}\
+                 [[body]]\nname = \"lid\"\nsize = [0.36, 0.1, 0.08]\ncenter = [{lid}, 0, 0.24]\ndensity = 2500\n\
+                 displaces_fluid = true\nstanding = true\n"
+            )),
+            at - lid,
+        )
+    };
+    let middle = pit(0.4, 0.4, &[[0.0, 0.3], [0.5, 0.8]]);
+    assert_eq!(middle.0, 2, "the rims at both sides of the pit");
+    // Right on the seam, from either side, and beside it: none of it was found there.
+    for (at, ledges) in [(0.0, vec![[0.1, 0.7]]), (0.8, vec![[0.1, 0.7]]), (0.74, vec![[0.04, 0.64]])] {
+        let seam = pit(at, 0.4, &ledges);
+        println!("at {at} m: {seam:?}, in the middle {middle:?}");
+        assert!(seam.0 == middle.0 && (seam.1 / middle.1 - 1.0).abs() < 1e-9, "{at}: {seam:?} {middle:?}");
+    }
+    // Lids end to end over a trench that goes round the tank: a room without an end, and yet closed.
+    let lid = |name: &str, y: f64| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nsize = [0.6, 0.4, 0.15]\ncenter = [0.5, {y}, 0.275]\ndensity = 2500\n\
+             displaces_fluid = true\nstanding = true\n"
+        )
+    };
+    let trench = case(&format!(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -9.81]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1, 0.8, 0.6]\nopen = [\"z_max\"]\nperiodic = [\"y\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0.8, 0.5]\n[contact]\nspring = 1e5\n\
+         [[obstacle]]\nname = \"left\"\nmin = [0, 0, 0]\nmax = [0.4, 0.8, 0.2]\n\
+         [[obstacle]]\nname = \"right\"\nmin = [0.6, 0, 0]\nmax = [1, 0.8, 0.2]\n{}{}",
+        lid("a", 0.2),
+        lid("b", 0.6)
+    ));
+    let found = pockets(&trench, 0.0);
+    println!("a trench: {found:?}");
+    assert!(found.0 > 16, "{found:?}");
 }

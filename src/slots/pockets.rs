@@ -35,14 +35,24 @@ enum Meeting {
 /// A search from one place, nearest to its goal first.
 struct Way {
     goal: IVec3,
+    /// Cells round each periodic axis, 0 along others.
+    round: IVec3,
     seen: HashSet<IVec3>,
     open: BinaryHeap<Reverse<(i32, [i32; 3])>>,
+}
+
+/// `cell` as it is counted where there are `round` cells along periodic axes.
+fn wrapped(mut cell: IVec3, round: IVec3) -> IVec3 {
+    (0..3).filter(|&k| round[k] > 0).for_each(|k| cell[k] = cell[k].rem_euclid(round[k]));
+    cell
 }
 
 impl Way {
     fn see(&mut self, cell: IVec3) {
         if self.seen.insert(cell) {
-            self.open.push(Reverse(((cell - self.goal).abs().element_sum(), cell.to_array())));
+            let (way, round) = ((cell - self.goal).abs(), self.round);
+            let apart = IVec3::select(round.cmpgt(IVec3::ZERO), way.min(round - way), way);
+            self.open.push(Reverse((apart.element_sum(), cell.to_array())));
         }
     }
 
@@ -56,13 +66,20 @@ pub(super) struct Closures<'a> {
     slots: &'a Slots,
     poses: &'a [Pose],
     found: &'a [Found],
+    standing: OnceLock<Standing>,
+}
+
+/// What stands between the periodic sides, with its images.
+struct Standing {
+    /// Layers, and where they are [m].
+    solids: Vec<(usize, DVec3)>,
     /// Places in slots.
-    between: OnceLock<PointGrid>,
+    between: PointGrid,
 }
 
 impl<'a> Closures<'a> {
     pub fn new(slots: &'a Slots, poses: &'a [Pose], found: &'a [Found]) -> Self {
-        Self { slots, poses, found, between: OnceLock::new() }
+        Self { slots, poses, found, standing: OnceLock::new() }
     }
 
     /// What seeps through `slot` to the rows of its rim, whose pressures are `told`: nothing but to pockets.
@@ -113,9 +130,12 @@ impl<'a> Closures<'a> {
         rows.flat_map(beside).map(water).filter(|&x| !self.is_blocked(x)).collect()
     }
 
-    /// Whether nothing stands above `x` [m].
+    /// Whether nothing stands above `x` [m]. Where that goes round a periodic axis there is no sky.
     fn is_under_the_sky(&self, mut x: DVec3) -> bool {
-        let up = -self.slots.weight.normalize_or(-DVec3::Z);
+        let up = self.slots.periodic.across(-self.slots.weight.normalize_or(-DVec3::Z));
+        if up == DVec3::ZERO {
+            return false;
+        }
         while self.is_within(x) {
             if self.is_blocked(x) {
                 return false;
@@ -155,10 +175,12 @@ impl<'a> Closures<'a> {
         };
         let step = STEP * self.slots.spacing;
         let place = |cell: IVec3| from + step * cell.as_dvec3();
-        let cell = |x: DVec3| ((x - from) / step).round().as_ivec3();
+        // The length is a whole number of spacings.
+        let round = (self.slots.periodic.length() / step).round().as_ivec3();
+        let cell = |x: DVec3| wrapped(((x - from) / step).round().as_ivec3(), round);
         let axes = if self.slots.flat { &[IVec3::X, IVec3::Z][..] } else { &IVec3::AXES };
         let mut ways = [(first, cell(to)), (second, IVec3::ZERO)].map(|(starts, goal)| {
-            let mut way = Way { goal, seen: HashSet::new(), open: BinaryHeap::new() };
+            let mut way = Way { goal, round, seen: HashSet::new(), open: BinaryHeap::new() };
             starts
                 .iter()
                 .map(|&x| cell(x))
@@ -175,6 +197,7 @@ impl<'a> Closures<'a> {
                     return Meeting::Met;
                 }
                 for next in axes.iter().flat_map(|&axis| [here + axis, here - axis]) {
+                    let next = wrapped(next, round);
                     let x = place(next);
                     if !ways[k].seen.contains(&next) && self.is_within(x) && !self.is_blocked(x) {
                         ways[k].see(next);
@@ -185,26 +208,33 @@ impl<'a> Closures<'a> {
         Meeting::Met
     }
 
+    /// Whether `x` [m] is in the domain, which has no end along periodic axes.
     fn is_within(&self, x: DVec3) -> bool {
         let (low, high) = self.slots.domain;
-        let flat = self.slots.flat;
-        (0..3).all(|k| (flat && k == 1) || (x[k] >= low[k] && x[k] <= high[k]))
+        let endless = |k: usize| (self.slots.flat && k == 1) || self.slots.periodic.is_along(k);
+        (0..3).all(|k| endless(k) || (x[k] >= low[k] && x[k] <= high[k]))
     }
 
     /// Whether a solid or a slot is at `x` [m].
     fn is_blocked(&self, x: DVec3) -> bool {
         let slots = self.slots;
-        let near = BLOCKED * slots.spacing;
-        let at_solid = |(layer, pose): (&Layer, &Pose)| {
-            let way = slots.periodic.nearest(x - pose.position);
-            way.length() < layer.radius + near && layer.grid.is_near(pose.orientation.inverse() * way, near)
+        let (x, near) = (slots.periodic.wrap(x), BLOCKED * slots.spacing);
+        let Standing { solids, between } = self.standing.get_or_init(|| self.standing(near));
+        let at_solid = |&(k, position): &(usize, DVec3)| {
+            let (layer, turn, way) = (&slots.layers[k], self.poses[k].orientation, x - position);
+            way.length() < layer.radius + near && layer.grid.is_near(turn.inverse() * way, near)
         };
-        slots.fixed.is_near(x, near)
-            || slots.layers.iter().zip(self.poses).any(at_solid)
-            || self.between.get_or_init(|| self.places_between()).is_near(x, near)
+        slots.fixed.is_near(x, near) || solids.iter().any(at_solid) || between.is_near(x, near)
     }
 
-    fn places_between(&self) -> PointGrid {
+    /// What stands within `near` [m] of what lies between the periodic sides.
+    fn standing(&self, near: f64) -> Standing {
+        let periodic = self.slots.periodic;
+        let images = |(k, (layer, pose)): (usize, (&Layer, &Pose))| {
+            let (low, high) = layer.bounds(pose, near);
+            let position = pose.position;
+            periodic.turns(low, high).map(move |turns| (k, position + periodic.way(turns)))
+        };
         let of = |f: &'a Found| {
             let (layer, pose) = (&self.slots.layers[f.slot.solid], &self.poses[f.slot.solid]);
             let place = move |&(n, _): &(usize, f64)| {
@@ -212,7 +242,12 @@ impl<'a> Closures<'a> {
             };
             f.slot.inside.iter().map(place)
         };
-        PointGrid::new(self.found.iter().flat_map(of).collect(), CELL * self.slots.spacing)
+        let places = self.found.iter().flat_map(of);
+        let places = places.flat_map(|x| periodic.images(periodic.wrap(x), near)).collect();
+        Standing {
+            solids: self.slots.layers.iter().zip(self.poses).enumerate().flat_map(images).collect(),
+            between: PointGrid::new(places, CELL * self.slots.spacing),
+        }
     }
 }
 
