@@ -11,6 +11,7 @@ use seixo::kernels::body_force::RowPressure;
 use seixo::output::table::Cell;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
+use seixo::slots::{Opposite, Push};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -261,6 +262,27 @@ fn a_floor_carries_the_water_under_a_block_too() {
     println!("floor {floor:.5} m2 for -0.03, block {lift:.5} m2 for 0.005");
     assert!((floor / -0.03 - 1.0).abs() < 0.01 && (lift / 0.005 - 1.0).abs() < 0.015, "{floor} {lift}");
     assert!(mean["floor_torque_y [N m]"].abs() < 0.01 * slice * 0.03 * 0.15, "{mean:?}");
+}
+
+#[test]
+fn what_a_slot_presses_on_a_floor_beyond_a_seam_acts_where_its_image_is() {
+    let mut case = still("");
+    case.tank.as_mut().expect("a tank").periodic = vec![seixo::case::Axis::X];
+    case.gauge.force.truncate(1);
+    case.gauge.pressure.clear();
+    let scene = Scene::build(&case).expect("it builds");
+    let floor = FixedWall::find(&scene, "tank.z_min").expect("a floor");
+    let own = |&k: &usize| scene.static_wall_shape[k] as usize == floor.shape();
+    let on = (0..scene.static_wall_shape.len()).find(own).map(Opposite::Wall).expect("its particles");
+    let torque = |x: f64| {
+        let push = Push { on, at: DVec3::new(x, 0.12, 0.0), force: -2.0 * DVec3::Z };
+        floor.slot_force(&[push], &scene).torque
+    };
+    // By a body that lies over the side; the arm was longer by the tank.
+    for (beyond, image) in [(0.27, 0.03), (-0.05, 0.19)] {
+        let (found, expected) = (torque(beyond), torque(image));
+        assert!((found - expected).length() < 1e-12 && expected.y.abs() > 0.1, "{found} for {expected}");
+    }
 }
 
 #[test]

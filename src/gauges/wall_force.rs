@@ -146,7 +146,8 @@ impl FixedWall {
         let own = |push: &&Push| matches!(push.on, Opposite::Wall(k) if scene.static_wall_shape[k] as usize == self.shape);
         let mut sum = Wrench::default();
         for push in pushes.iter().filter(own) {
-            sum += Wrench { force: push.force, torque: (push.at - self.about).cross(push.force) };
+            let arm = scene.periodic.nearest(push.at - self.about);
+            sum += Wrench { force: push.force, torque: arm.cross(push.force) };
         }
         sum
     }
