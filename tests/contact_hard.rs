@@ -294,6 +294,29 @@ fn a_piston_that_cannot_move_on_is_an_error_that_names_it() {
 }
 
 #[test]
+fn what_stands_still_drives_nothing_into_a_body_that_falls_on_it() {
+    // On springs too soft for it a cube sinks in by more than a spacing. On what is no box, and on what is held, that was an error about a table.
+    let held = "locked = [\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\"]";
+    for post in [
+        "[[obstacle]]\nname = \"post\"\nmin = [0.2, 0.2, 0]\nmax = [0.6, 0.6, 0.2]".to_owned(),
+        "[[obstacle]]\nname = \"post\"\nshape = \"cylinder\"\nradius = 0.2\nheight = 0.2\ncenter = [0.4, 0.4, 0.1]".into(),
+        format!("[[body]]\nname = \"post\"\nsize = [0.4, 0.4, 0.2]\ncenter = [0.4, 0.4, 0.1]\n{held}"),
+    ] {
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-2\nend = 1\ngravity = [0, 0, -9.81]\n{post}\n\
+             [[body]]\nname = \"cube\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.4, 0.4, 0.42]\ndensity = 2500\n\
+             [contact]\nspring = 1.5e4\nrestitution = 0.3\nsubsteps = 1\n"
+        ));
+        let mut deepest = 0.0_f64;
+        while dry.time() < 0.4 {
+            let report = dry.try_step().unwrap_or_else(|error| panic!("{post}: {error}"));
+            deepest = deepest.max(report.penetration_max_over_l0);
+        }
+        assert!(deepest > 1.1, "{post}: {deepest}");
+    }
+}
+
+#[test]
 fn a_block_sticks_on_a_tray_that_swings_below_its_friction() {
     // amplitude and frequency such that the tray's acceleration is 0.8 mu g
     let (friction, frequency): (f64, f64) = (0.3, 2.0);

@@ -122,6 +122,11 @@ impl Body {
         self.motion.is_none()
     }
 
+    /// Whether a table or a formula moves it: what is held, or an obstacle, stands still.
+    pub fn is_driven(&self) -> bool {
+        self.motion.as_ref().is_some_and(|(.., motion)| !motion.is_still())
+    }
+
     /// How far [m] a prescribed solid's pose is, at most and anywhere on it, from where its motion has it at time `t` [s].
     pub(crate) fn off_motion(&self, t: f64) -> Option<f64> {
         let (position, orientation, motion) = self.motion.as_ref()?;

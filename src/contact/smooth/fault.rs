@@ -102,7 +102,7 @@ impl Smooth {
             let [middle_a, middle_b] = self.middles.of(pair);
             let (in_a, in_b) = pair.deepest();
             let closing = Self::closing(pair, now);
-            let driven = pair.b.solid().is_some_and(|b| !now.bodies[b].is_free());
+            let driven = pair.b.solid().is_some_and(|b| now.bodies[b].is_driven());
             let fault = |what: String| Fault { a: pair.a, b: self.against(pair.b), what };
             let grown = 2.0 * closing * now.substep + little;
             if pair.depth > pair.before + grown {
