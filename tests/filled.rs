@@ -257,3 +257,22 @@ fn a_cavity_in_which_a_paddle_turns_stays_full_and_one_that_a_piston_narrows_doe
     assert!(monitor.density_error_mean.abs() < 0.02 && monitor.density_error_max < 0.15, "{monitor:?}");
     assert_eq!(sim.backend.counters().expect("counted").lost, 0);
 }
+
+#[test]
+fn a_full_tank_stays_full_when_a_driven_disc_crosses_its_seam() {
+    // What of it lay beyond the side was taken for room that the water had gained.
+    let filled = |at: f64, way: f64| {
+        let case = case(&format!(
+            "[run]\nspacing = 0.01\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\ngravity = [0, 0, 0]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.2]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.2]\nperiodic = [\"x\"]\n[contact]\nspring = 1e5\n\
+             [[body]]\nname = \"disc\"\nshape = \"cylinder\"\nradius = 0.04\ndensity = 1000\ncenter = [{at}, 0, 0.1]\n\
+             displaces_fluid = true\nmotion = [[0, 0, 0, 0], [1, {way}, 0, 0]]\n"
+        ));
+        Scene::build(&case).expect("it builds").filled
+    };
+    assert!(filled(0.1, 0.2));
+    for (at, way) in [(0.35, 0.2), (0.05, -0.9), (0.35, 1.3)] {
+        assert!(filled(at, way), "from {at} by {way}");
+    }
+}

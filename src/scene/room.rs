@@ -4,6 +4,7 @@ use super::build::Builder;
 use super::lattice::{FACE, FLUID, FREE};
 use super::oriented::Placed;
 use super::{Drive, Solid};
+use crate::periodic::Periodic;
 use glam::{DMat3, DVec3, IVec3};
 use rayon::prelude::*;
 
@@ -20,22 +21,26 @@ struct Barrier {
 }
 
 impl Barrier {
-    fn new(shape: Placed) -> Self {
-        let reach = shape.bounds();
-        Self { low: shape.center - reach, high: shape.center + reach, shape }
-    }
-
-    /// A driven solid where it stands at time `t` [s].
-    fn driven(solid: &Solid, t: f64) -> Option<Self> {
-        let Drive::Prescribed(motion) = &solid.drive else { return None };
-        let start = solid.placed();
-        let axes = DMat3::from_quat(motion.turn(t)) * start.axes;
-        Some(Self::new(Placed { center: start.center + motion.displacement(t), axes, ..start }))
+    /// Those of its images that reach between the periodic sides, itself included if it does.
+    fn images(shape: Placed, periodic: &Periodic) -> impl Iterator<Item = Self> + use<> {
+        let (reach, periodic) = (shape.bounds(), *periodic);
+        periodic.turns(shape.center - reach, shape.center + reach).map(move |turns| {
+            let center = shape.center + periodic.way(turns);
+            Self { low: center - reach, high: center + reach, shape: Placed { center, ..shape } }
+        })
     }
 
     fn holds(&self, p: DVec3) -> bool {
         p.cmpge(self.low).all() && p.cmple(self.high).all() && self.shape.holds(p, 0.0)
     }
+}
+
+/// A driven solid where it stands at time `t` [s].
+fn driven(solid: &Solid, t: f64) -> Option<Placed> {
+    let Drive::Prescribed(motion) = &solid.drive else { return None };
+    let start = solid.placed();
+    let axes = DMat3::from_quat(motion.turn(t)) * start.axes;
+    Some(Placed { center: start.center + motion.displacement(t), axes, ..start })
 }
 
 impl Builder<'_> {
@@ -53,13 +58,16 @@ impl Builder<'_> {
     fn keeps_room(&self) -> bool {
         let (still, solids): (Vec<&Solid>, Vec<&Solid>) =
             self.moving_walls.iter().chain(&self.bodies).partition(|s| s.is_still());
-        let at = |t: f64| -> Vec<Barrier> { solids.iter().filter_map(|s| Barrier::driven(s, t)).collect() };
+        let images = |shape: Placed| Barrier::images(shape, &self.periodic);
+        let at = |t: f64| -> Vec<Barrier> {
+            solids.iter().filter_map(|s| driven(s, t)).flat_map(images).collect()
+        };
         let start = at(0.0);
         if start.is_empty() {
             return true;
         }
         let fixed = self.fixed.shapes.iter().map(Placed::from).chain(still.iter().map(|s| s.placed()));
-        let fixed: Vec<Barrier> = fixed.map(Barrier::new).collect();
+        let fixed: Vec<Barrier> = fixed.flat_map(images).collect();
         let room = |t: f64, most: usize| {
             let now = at(t);
             let within = |all: &[Barrier], p: DVec3| all.iter().any(|b| b.holds(p));
