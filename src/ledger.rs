@@ -13,7 +13,7 @@ use crate::error::Result;
 pub enum Entry {
     /// What absorbers take from the water.
     Absorber,
-    /// Kicks by gravity less what the water falls: what the time integration makes or loses.
+    /// Kicks by gravity less what the water falls: what the time integration makes or loses; and what gravity along periodic axes does to water and bodies.
     Gravity,
     /// Explicit viscosity, friction on solids included.
     Viscosity,

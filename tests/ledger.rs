@@ -143,3 +143,32 @@ fn without_being_asked_for_nothing_is_kept() {
     assert!(sim.backend.ledger().expect("no device").is_none());
     assert!(!sim.plan.ledger && !sim.plan.has(Stage::BodyForce));
 }
+
+#[test]
+fn gravity_along_a_seam_is_work_on_bodies_and_no_height() {
+    // A block that slides over the seam, of half of all the mass.
+    let at = |x: f64| {
+        case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\ngravity = [1.5, 0, -9.8]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.3]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.1]\n[contact]\nspring = 1e5\n\
+             [[body]]\nname = \"block\"\nsize = [0.08, 0.1, 0.08]\ncenter = [{x}, 0, 0.04]\ndensity = 5000\n\
+             displaces_fluid = true\nstanding = true\n"
+        ))
+    };
+    let start = |x: f64| simulation(&at(x)).solids.energy().gravity;
+    assert!((start(0.1) / start(0.3) - 1.0).abs() < 1e-12, "{} {}", start(0.1), start(0.3));
+    let (ledger, _) = closes(&at(0.34), 300, 0);
+    let mut sim = simulation(&at(0.34));
+    let mut driven = [0.0; 2];
+    for _ in 0..300 {
+        sim.step().expect("a step");
+        let of_water = sim.backend.monitor().expect("measured").momentum[0];
+        let of_block = sim.solids.momentum().0.x;
+        driven = [driven[0] + 1.5e-3 * of_water, driven[1] + 1.5e-3 * of_block];
+    }
+    assert!(sim.solids.path(0).x > 0.4 && sim.solids.poses()[0].position.x < 0.2, "it is over the seam");
+    let (all, booked) = (driven[0] + driven[1], ledger.get(Entry::Gravity));
+    println!("driven {driven:.5?} J, booked {booked:.5}");
+    assert!(driven[1] > 0.3 * all && (booked / all - 1.0).abs() < 0.1, "{booked} J of {driven:?}");
+}

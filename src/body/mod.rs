@@ -155,6 +155,11 @@ impl Body {
         self.rotation * self.weight_arm
     }
 
+    /// The same in another `pose` [m].
+    pub fn to_mass_at(&self, pose: &Pose) -> DVec3 {
+        pose.orientation * self.weight_arm
+    }
+
     /// World half extents of the bounding box [m].
     pub fn extent(&self) -> DVec3 {
         self.shape.extent(self.rotation)

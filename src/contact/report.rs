@@ -25,7 +25,7 @@ pub struct ContactReport {
 pub struct Energy {
     /// Of motion [J].
     pub kinetic: f64,
-    /// Of height [J], zero at the origin.
+    /// Of height [J], zero at the origin; nothing along periodic axes.
     pub gravity: f64,
     /// In contact springs [J].
     pub contact: f64,

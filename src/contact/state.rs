@@ -2,17 +2,17 @@
 
 use super::law::Now;
 use super::{Energy, SolidState, Solids};
-use crate::body::{Body, Wrench};
+use crate::body::{Body, Pose, Wrench};
 use crate::error::{Error, Result};
 use glam::{DVec3, IVec3};
 
 impl Solids {
-    /// Energy of the free bodies now.
+    /// Energy of the free bodies now. Gravity along periodic axes drives them, and has no part in it.
     pub fn energy(&mut self) -> Energy {
-        let mut energy = Energy::default();
+        let (mut energy, gravity) = (Energy::default(), self.periodic.across(self.gravity));
         for (k, body) in self.bodies.iter().enumerate().filter(|(_, b)| b.is_free()) {
             energy.kinetic += body.kinetic_energy();
-            energy.gravity -= body.mass * self.gravity.dot(self.path(k) + body.to_mass());
+            energy.gravity -= body.mass * gravity.dot(self.path(k) + body.to_mass());
         }
         self.candidates.refresh(&self.bodies, self.spacing, 0.0);
         if let Some(law) = &mut self.law {
@@ -20,6 +20,16 @@ impl Solids {
             energy.contact = law.energy(Now { bodies, candidates, limits, substep: self.whole });
         }
         energy
+    }
+
+    /// Work of gravity along periodic axes on the free bodies on their way from the poses `before` [J].
+    pub(crate) fn drawn(&self, before: &[Pose]) -> f64 {
+        let along = self.gravity - self.periodic.across(self.gravity);
+        let work = |(body, before): (&Body, &Pose)| {
+            let way = self.periodic.nearest(body.pose.position - before.position);
+            body.mass * along.dot(way + body.to_mass() - body.to_mass_at(before))
+        };
+        self.bodies.iter().zip(before).filter(|(body, _)| body.is_free()).map(work).sum()
     }
 
     /// As [`Solids::energy`], with the velocities at the time of the positions. A sub-step leaves them half of it behind,

@@ -151,8 +151,9 @@ impl Simulation {
         for (k, ((told, before), after)) in poses.enumerate() {
             ledger.solid(dt, solids.is_free(k), &self.fluid_force[k], [told, before, after]);
         }
-        let now = self.solids.energy().total();
-        ledger.add(Entry::Contact, now - *energy);
+        let (now, drawn) = (self.solids.energy().total(), self.solids.drawn(before));
+        ledger.add(Entry::Gravity, drawn);
+        ledger.add(Entry::Contact, now - *energy - drawn);
         *energy = now;
     }
 }
