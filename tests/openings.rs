@@ -363,6 +363,70 @@ fn a_body_does_not_leave_through_an_opening() {
     }
 }
 
+/// The depth that is derived from, of a tank 1 m long and 0.4 m high with water up to 0.1 m, an inflow of 0.03 m2/s and what is added.
+fn derived(end: f64, max_volume: &str, more: &str) -> f64 {
+    let text = format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = {end}\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1, 0.1, 0.4]\nopen = [\"z_max\"]\n\
+         [fluid]\n{max_volume}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 0.1, 0.1]\n\
+         [[fluid.block]]\nmin = [0.6, 0, 0]\nmax = [1, 0.1, 0.1]\n\
+         [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.3\n{more}"
+    );
+    let case: Case = text.parse().unwrap_or_else(|e| panic!("{e}"));
+    Scene::build(&case).unwrap_or_else(|e| panic!("{e}")).depth
+}
+
+#[test]
+fn the_depth_that_is_derived_from_is_that_of_the_balance_of_what_comes_in_and_goes_out() {
+    let out = |rate: &str, top: f64| {
+        format!(
+            "[[outflow]]\nname = \"out\"\nface = \"x_max\"\nmin = [1, 0, 0]\nmax = [1, 0.1, {top}]\n{rate}\n"
+        )
+    };
+    let weir =
+        |top: f64| format!("[[obstacle]]\nname = \"weir\"\nmin = [0.5, 0, 0]\nmax = [0.6, 0.1, {top}]\n");
+    let near = |depth: f64, expected: f64| (depth - expected).abs() < 1e-6;
+    // A weir 0.1 m high or lower changes nothing; the volume is less by what it takes of that.
+    for (more, low, high) in [
+        (out("velocity = 0.3", 0.1), 0.1, 0.1),
+        (out("velocity = 0.3", 0.4), 0.1, 0.1),
+        (out("discharge = 0.03", 0.4), 0.1, 0.1),
+        // Deeper by what is missing, until the opening takes all.
+        (out("velocity = 0.2", 0.4), 0.1, 0.16),
+        // In the first second alone more comes in.
+        (out("velocity = [[1, 0], [1.001, 0.3]]", 0.1), 0.102, 0.13),
+        // Nothing goes out, what goes out is not known, or what comes in does not get there.
+        (String::new(), 0.102, 0.4),
+        (out("", 0.1), 0.102, 0.4),
+        (out("velocity = 0.3", 0.1) + &weir(0.3), 0.102, 0.3),
+        (out("velocity = 0.3", 0.1) + &weir(0.4), 0.102, 0.4),
+    ] {
+        let more = if more.contains("weir") { more } else { more + &weir(0.04) };
+        let [start, soon, late] = [0.2, 50.0, 60.0].map(|end| derived(end, "", &more));
+        assert!(
+            start >= 0.1 - 1e-9 && start <= low + 4e-3 && near(soon, late),
+            "{more}: {start} {soon} {late}"
+        );
+        assert!(late < high * 1.05 && late > high * 0.95, "{more}: {late} for {high}");
+    }
+    let filled = [0.2, 60.0].map(|end| derived(end, "max_volume = 0.2", &weir(0.04)));
+    assert!(filled[0] < 0.11 && near(filled[1], 0.2), "{filled:?}");
+}
+
+#[test]
+fn a_force_on_a_face_says_that_it_leaves_the_opening_out() {
+    let noted = |on: &str| {
+        let more = format!(
+            "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.1\n\
+             [[gauge.force]]\nname = \"F\"\non = \"{on}\"\n"
+        );
+        let scene = Scene::build(&tank(0.1, &more).parse().unwrap()).unwrap_or_else(|e| panic!("{e}"));
+        scene.notes.iter().any(|n| n.starts_with("gauge.force `F` leaves out") && n.contains("inflow `in`"))
+    };
+    let told = ["tank.x_min", "tank", "tank.x_max", "*", "in"].map(noted);
+    assert_eq!(told, [true, true, false, false, false]);
+}
+
 #[test]
 fn plan_knows_how_fast_water_will_come_in() {
     let folder = tempfile::tempdir().expect("a folder");

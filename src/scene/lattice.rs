@@ -6,6 +6,7 @@ use crate::shape::blocks;
 pub(super) use crate::shape::blocks::Cells;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// What stands in a cell.
 pub(super) const FREE: u8 = 0;
@@ -180,6 +181,33 @@ impl Grid {
     fn index(&self, c: IVec3) -> usize {
         let d = c - self.cells.lo;
         (d.x as usize * self.n[1] + d.y as usize) * self.n[2] + d.z as usize
+    }
+    /// The rank that no way by steps of `ways` from the `seeds` to a `target` stays below; cells without a rank are closed. `None` if there
+    /// is no way.
+    pub fn lowest_way(
+        &self,
+        seeds: impl Iterator<Item = IVec3>,
+        ways: impl Iterator<Item = IVec3> + Clone,
+        rank: impl Fn(IVec3) -> Option<i32>,
+        target: impl Fn(IVec3) -> bool,
+    ) -> Option<i32> {
+        let mut seen = vec![false; self.state.len()];
+        let mut waiting: BTreeMap<i32, Vec<IVec3>> = BTreeMap::new();
+        let mut look = |c: IVec3, least: i32, waiting: &mut BTreeMap<i32, Vec<IVec3>>| {
+            if self.cells.contains(c) && !std::mem::replace(&mut seen[self.index(c)], true) {
+                rank(c).into_iter().for_each(|r| waiting.entry(r.max(least)).or_default().push(c));
+            }
+        };
+        seeds.for_each(|c| look(c, i32::MIN, &mut waiting));
+        while let Some(mut lowest) = waiting.first_entry() {
+            let rank = *lowest.key();
+            match lowest.get_mut().pop() {
+                Some(c) if target(c) => return Some(rank),
+                Some(c) => ways.clone().for_each(|way| look(self.wrap(c + way), rank, &mut waiting)),
+                None => drop(lowest.remove()),
+            }
+        }
+        None
     }
     /// How many open cells there are to which steps of `ways` lead from the open ones of some `seeds`; more than `most` are not
     /// counted on.

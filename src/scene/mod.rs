@@ -16,6 +16,7 @@ mod build;
 mod curve;
 mod domain;
 mod fits;
+mod inflow_depth;
 mod jitter;
 mod lattice;
 mod layout;

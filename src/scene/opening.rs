@@ -3,7 +3,7 @@
 use super::build::{AXES, Builder};
 use super::lattice::{BLOCKED, Cells, SOLID};
 use super::{Drive, Motion, Shape, Solid};
-use crate::case::{HURRY, OpeningKeys, Rate, room_behind};
+use crate::case::{HURRY, OpeningKeys, Rate, TANK_FACES, room_behind, stands_for};
 use crate::error::Problem;
 use glam::{DQuat, DVec3, IVec3};
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,11 @@ impl Course {
             (Some(a), None) => a[1],
             (None, first) => first.map_or(0.0, |r| r[1]),
         }
+    }
+
+    /// Times of the rows [s].
+    pub fn times(&self) -> impl Iterator<Item = f64> {
+        self.rows.iter().map(|r| r[0])
     }
 
     /// Integral over time between `from` and `to` [s].
@@ -102,7 +107,7 @@ impl Opening {
 pub(super) struct Planned {
     pub opening: Opening,
     /// Cells of the tank's wall layer that it takes.
-    cells: Cells,
+    pub cells: Cells,
     /// Place of its wall among the moving walls.
     pub wall: Option<usize>,
 }
@@ -135,6 +140,7 @@ impl Builder<'_> {
                 continue;
             }
             self.rounded_opening(&keys, cells, axis);
+            self.not_measured(&keys);
             let planned = self.plan_opening(&keys, cells, (axis, side));
             self.openings.push(planned);
         }
@@ -150,6 +156,19 @@ impl Builder<'_> {
                 let state = if hole { BLOCKED } else { SOLID };
                 cells.iter().for_each(|c| self.grid.set(c, state));
             }
+        }
+    }
+
+    /// Notes which force gauges on its face leave an opening's wall out: it is a solid of its own.
+    fn not_measured(&mut self, keys: &OpeningKeys) {
+        let (axis, side) = keys.side();
+        let face = TANK_FACES[2 * axis + side].1;
+        let omits = |on: &str| stands_for(on, face) && !stands_for(on, keys.name);
+        for gauge in self.case.gauge.force.iter().filter(|g| !keys.is_hole() && omits(&g.on)) {
+            self.notes.push(format!(
+                "gauge.force `{}` leaves out what the water does to {} `{}` in {face}: a gauge.force on that tells it",
+                gauge.name, keys.key, keys.name
+            ));
         }
     }
 
@@ -336,31 +355,6 @@ impl Builder<'_> {
         let room = room.clamp(0.0, 4e9) as usize + layers;
         self.notes.push(format!("water: {there} particles at the start, room for {room} more that come in"));
         room
-    }
-
-    /// Depth of the water that the scene comes to, along gravity [m]: at the start, up to the upper edge of an inflow above
-    /// the tank's floor, or where what comes in fills the tank to.
-    pub(super) fn depth_with_inflows(&self, gravity: DVec3) -> f64 {
-        let (Some(tank), true) = (self.tank, gravity.length() > 0.0) else { return self.depth };
-        let down = gravity.normalize();
-        let (low, high) = (self.lattice.corner(tank.lo), self.lattice.corner(tank.hi));
-        let size = high - low;
-        let height = size.dot(down.abs());
-        // The corner of the tank that lies deepest.
-        let deepest = DVec3::select(down.cmpgt(DVec3::ZERO), high, low);
-        let mut depth = self.depth;
-        let mut volume = self.water.cell.len() as f64 * self.lattice.spacing.powi(3);
-        for planned in &self.openings {
-            let Passes::In(speed) = &planned.opening.passes else { continue };
-            let (lo, hi) = (self.lattice.corner(planned.cells.lo), self.lattice.corner(planned.cells.hi));
-            let top = DVec3::select(down.cmpgt(DVec3::ZERO), lo, hi).clamp(low, high);
-            depth = depth.max((deepest - top).dot(down));
-            volume += speed.integral(0.0, self.case.run.end) * planned.opening.area;
-        }
-        if self.openings.iter().any(|o| o.opening.is_inflow()) {
-            depth = depth.max((volume / (size.x * size.y * size.z) * height).min(height));
-        }
-        depth
     }
 }
 
