@@ -268,14 +268,9 @@ impl Params {
         })
     }
 
-    /// Depth below the water's surface at which P = 0 holds [m]. With the source of Eq. (8) that is at the centres of the
-    /// surface particles. The balanced source carries the whole weight of the water, theirs too, which rests on a
-    /// pressure half a spacing higher.
+    /// Depth below the water's surface at which P = 0 holds [m].
     pub fn zero_pressure_depth(&self) -> f64 {
-        match self.source {
-            Source::NumberDensity => 0.5 * self.spacing,
-            Source::Mixed => 0.0,
-        }
+        self.source.zero_pressure_depth(self.spacing)
     }
 
     /// Slots below this carry pressure to a wall, of `fluid` slots of water and `pressure` with the walls: in the paper's

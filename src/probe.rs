@@ -1,5 +1,6 @@
 //! What the water does between its particles.
 
+use crate::case::Case;
 use crate::periodic::Periodic;
 use glam::{DMat3, DVec3};
 
@@ -23,12 +24,36 @@ pub struct Probe {
     pub flat: bool,
     /// Sides across which the water goes on.
     pub periodic: Periodic,
+    /// What the pressure of the particles lacks at the water's surface [Pa] ([`crate::kernels::body_force::missing_head`]).
+    pub surface_head: f64,
 }
 
 impl Probe {
+    /// For the water of `case`.
+    pub fn of(case: &Case) -> Self {
+        let (run, flat) = (&case.run, case.run.dimensions == 2);
+        let (low, high) = case.tank.as_ref().map_or(([0.0; 3], [0.0; 3]), |t| (t.min, t.max));
+        let along = case.tank.as_ref().map_or([false; 3], |t| t.periodic());
+        let periodic = Periodic::new(along, low.into(), high.into());
+        let mut gravity = periodic.across(run.gravity.into());
+        if flat {
+            gravity.y = 0.0;
+        }
+        let head =
+            case.fluid.as_ref().map_or(0.0, |f| f.density * f.source().zero_pressure_depth(run.spacing));
+        Self {
+            spacing: run.spacing,
+            radius: run.effective_radius * run.spacing,
+            flat,
+            periodic,
+            surface_head: head * gravity.length(),
+        }
+    }
+
     /// Velocity and pressure at `x` [m] of the water whose particles have `values`, position first: those of the linear function that comes
     /// nearest to the particles within the effective radius, by least squares with the weight (1 - r^2 / re^2)^2; where they do not span
-    /// space, their mean. Exact for linear fields, on walls and at the surface, too. Nothing where no particle is nearer than the middle of a
+    /// space, their mean. Exact for linear fields, on walls and at the surface, too. The pressure is that of gauges: with what it lacks at the
+    /// surface, but for water without any, such as drops in the air. Nothing where no particle is nearer than the middle of a
     /// cube of eight may be, and a tenth.
     pub fn at(&self, values: impl Iterator<Item = (DVec3, Value)>, x: DVec3) -> Option<Value> {
         let mut near: Vec<(f64, DVec3, Value)> = Vec::new();
@@ -56,6 +81,8 @@ impl Probe {
             mean.velocity += w / total * value.velocity;
             mean.pressure += w / total * value.pressure;
         }
+        let pressed = near.iter().any(|(_, _, value)| value.pressure != 0.0);
+        let head = if pressed { self.surface_head } else { 0.0 };
         // Moments of the particles about their middle, over those of a full neighbourhood.
         let mut moment = DMat3::ZERO;
         // Of velocity and pressure with the place: rows x, y, z of the velocity, then the pressure.
@@ -72,11 +99,11 @@ impl Probe {
         }
         // In a full neighbourhood the determinant is total^3 times 0.1 or so.
         if moment.determinant() < 1e-3 * total.powi(3) {
-            return Some(mean);
+            return Some(Value { pressure: mean.pressure + head, ..mean });
         }
         let inverse = moment.inverse();
         let [vx, vy, vz, p] = with.map(|sum| (inverse * sum).dot(-middle));
-        Some(Value { velocity: mean.velocity + DVec3::new(vx, vy, vz), pressure: mean.pressure + p })
+        Some(Value { velocity: mean.velocity + DVec3::new(vx, vy, vz), pressure: mean.pressure + p + head })
     }
 }
 
@@ -85,7 +112,7 @@ mod tests {
     use super::*;
 
     fn probe(flat: bool) -> Probe {
-        Probe { spacing: 0.02, radius: 0.042, flat, periodic: Periodic::default() }
+        Probe { spacing: 0.02, radius: 0.042, flat, periodic: Periodic::default(), surface_head: 0.0 }
     }
 
     /// Water below z = 0.3 on a lattice that is shaken, with linear fields.

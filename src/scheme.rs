@@ -14,6 +14,18 @@ pub enum Source {
     Mixed,
 }
 
+impl Source {
+    /// Depth below the water's surface at which P = 0 holds [m], of particles `spacing` [m] apart. With the source of Eq. (8) that is at
+    /// the centres of the surface particles. The balanced source carries the whole weight of the water, theirs too, which rests on a
+    /// pressure half a spacing higher.
+    pub fn zero_pressure_depth(self, spacing: f64) -> f64 {
+        match self {
+            Self::NumberDensity => 0.5 * spacing,
+            Self::Mixed => 0.0,
+        }
+    }
+}
+
 /// Pressure gradient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]

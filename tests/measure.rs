@@ -138,3 +138,34 @@ fn pressures_along_a_line_are_those_of_water_at_rest() {
     let (code, _, err) = measured(folder.path(), &["--file", "points.csv"]);
     assert!(code == 2 && err.contains("points.csv:2") && err.contains("`0.5,0,x`"), "{err}");
 }
+
+#[test]
+fn with_either_preset_points_tell_the_pressure_that_gauges_do() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("still.toml"), STILL).unwrap();
+    for preset in ["paper", "accurate"] {
+        let (preset, gauge) =
+            (format!("fluid.preset=\"{preset}\""), "gauge.pressure=[{name=\"p\",point=[0,0,0.25]}]");
+        let run = [
+            "run",
+            "still.toml",
+            "-o",
+            "out",
+            "--backend",
+            "cpu",
+            "-q",
+            "--force",
+            "--set",
+            &preset,
+            "--set",
+            gauge,
+        ];
+        seixo().current_dir(folder.path()).args(run).assert().success();
+        let gauges = std::fs::read_to_string(folder.path().join("out/gauges.csv")).unwrap();
+        let gauge = rows(&gauges).pop().and_then(|row| row[1]).unwrap();
+        let (code, out, err) = measured(folder.path(), &["--point", "0,0,0.25", "--times", "0.02"]);
+        let point = rows(&out).pop().and_then(|row| row[7]).unwrap();
+        // Of 2500 Pa half a spacing is 125.
+        assert!(code == 0 && (point - gauge).abs() < 30.0, "{preset}: {point} for {gauge}\n{out}{err}");
+    }
+}

@@ -12,7 +12,6 @@ use seixo::error::{Error, Result};
 use seixo::output::particles::Particles;
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
-use seixo::periodic::Periodic;
 use seixo::probe::{Probe, Value};
 use std::path::{Path, PathBuf};
 
@@ -82,15 +81,7 @@ pub fn measure(args: &MeasureArgs) -> Exit {
         );
         return Err(Error::usage("DIR", text));
     }
-    let run = &case.run;
-    let (low, high) = case.tank.as_ref().map_or(([0.0; 3], [0.0; 3]), |t| (t.min, t.max));
-    let along = case.tank.as_ref().map_or([false; 3], |t| t.periodic());
-    let probe = Probe {
-        spacing: run.spacing,
-        radius: run.effective_radius * run.spacing,
-        flat: run.dimensions == 2,
-        periodic: Periodic::new(along, low.into(), high.into()),
-    };
+    let probe = Probe::of(&case);
     let chosen = chosen(&case, &frames, &args.times, args.every);
     let mut table = csv::Writer::from_writer(Vec::new());
     let unwritten = |e: csv::Error| Error::io("table")(e.into());

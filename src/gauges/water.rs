@@ -3,6 +3,7 @@
 use super::level;
 use crate::case::Case;
 use crate::fields::Fields;
+use crate::kernels::body_force::missing_head;
 use crate::output::table::{Cell, vector_cells, vector_columns};
 use crate::params::Params;
 use crate::probe::{Probe, Value};
@@ -58,6 +59,7 @@ impl InWater {
                     radius: params.effective_radius,
                     flat,
                     periodic: params.periodic,
+                    surface_head: missing_head(params),
                 };
                 let values = water().map(|i| {
                     let value = Value { velocity: fields.velocity[i], pressure: fields.pressure[i] };
