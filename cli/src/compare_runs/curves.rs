@@ -6,6 +6,7 @@ use seixo::case::file::load;
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
 use serde_json::Value;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// A quantity of a run over time.
@@ -30,6 +31,8 @@ pub struct Run {
     pub keys: Vec<(String, String)>,
     /// Its curves, in the order gauges, solids, monitors.
     pub curves: Vec<Quantity>,
+    /// Where they are among these, by table and name.
+    places: HashMap<&'static str, HashMap<String, usize>>,
     /// Seconds that each step took.
     pub pace: Vec<[f64; 2]>,
     /// Its spacing [m].
@@ -69,7 +72,8 @@ impl Run {
         curves.append(&mut columns("monitors", "", &monitors));
         let result = result.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
         let (spacing, flat) = (case.run.spacing, case.run.dimensions == 2);
-        Ok(Self { name, result, keys, curves, pace: pace(&monitors), spacing, flat })
+        let places = places(&curves);
+        Ok(Self { name, result, keys, curves, places, pace: pace(&monitors), spacing, flat })
     }
 
     /// Energies, forces, momenta and volumes of the slice for each metre across, which slices of other widths share.
@@ -82,12 +86,22 @@ impl Run {
                 quantity.points.iter_mut().for_each(|p| p[1] /= self.spacing);
             }
         }
+        self.places = places(&self.curves);
     }
 
-    /// The curve `name` of `table`.
+    /// The curve that is called as `of` is, of the same table.
     pub fn curve(&self, of: &Quantity) -> Option<&Quantity> {
-        self.curves.iter().find(|q| q.table == of.table && q.name == of.name)
+        self.places.get(of.table)?.get(&of.name).map(|&k| &self.curves[k])
     }
+}
+
+/// Where the `curves` are, by table and name: a run of many bodies has tens of thousands.
+fn places(curves: &[Quantity]) -> HashMap<&'static str, HashMap<String, usize>> {
+    let mut places: HashMap<&'static str, HashMap<String, usize>> = HashMap::new();
+    for (k, quantity) in curves.iter().enumerate() {
+        places.entry(quantity.table).or_default().entry(quantity.name.clone()).or_insert(k);
+    }
+    places
 }
 
 /// The columns of a table that tell what the water and the solids do, those alone.

@@ -13,7 +13,7 @@ use seixo::error::{Error, Result};
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use serde::Serialize;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -455,16 +455,13 @@ const LONG_VALUE: usize = 60;
 
 /// Keys that are not the same in all cases.
 fn keys(runs: &[Run]) -> Vec<Vec<String>> {
-    let mut names: Vec<&String> = Vec::new();
-    for (key, _) in runs.iter().flat_map(|r| &r.keys) {
-        if !names.contains(&key) {
-            names.push(key);
-        }
-    }
-    let value = |r: &Run, key: &String| r.keys.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone());
+    let mut seen = HashSet::new();
+    let names = runs.iter().flat_map(|r| &r.keys).map(|(key, _)| key).filter(|key| seen.insert(*key));
+    let of = |r: &Run| r.keys.iter().cloned().collect::<HashMap<String, String>>();
+    let all: Vec<HashMap<String, String>> = runs.iter().map(of).collect();
     let mut rows = vec![std::iter::once(String::new()).chain(runs.iter().map(|r| r.name.clone())).collect()];
     for key in names {
-        let values: Vec<Option<String>> = runs.iter().map(|r| value(r, key)).collect();
+        let values: Vec<Option<String>> = all.iter().map(|keys| keys.get(key).cloned()).collect();
         if values.iter().any(|v| *v != values[0]) {
             let shown = values.into_iter().map(|v| match v {
                 Some(v) if v.chars().count() > LONG_VALUE => {

@@ -2,6 +2,7 @@
 
 use csv::{ErrorKind, ReaderBuilder, StringRecord};
 use seixo::error::{Error, Result};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// The column of times, which each table has.
@@ -46,6 +47,7 @@ impl Table {
         let time = place(TIME)?;
         let key = if by.is_empty() { None } else { Some(place(by)?) };
         let mut tables: Vec<(String, Self)> = Vec::new();
+        let mut places: HashMap<String, usize> = HashMap::new();
         let mut rows = reader.records().peekable();
         while let Some(row) = rows.next() {
             let row = match row.map_err(|e| unread(path, e)).and_then(|row| whole(path, row, &columns, time))
@@ -56,10 +58,11 @@ impl Table {
             };
             let name = key.and_then(|k| row.get(k)).unwrap_or_default();
             let numbers = row.iter().map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-            match tables.iter_mut().find(|(n, _)| n == name) {
-                Some((_, table)) => table.rows.push(numbers),
+            match places.get(name) {
+                Some(&k) => tables[k].1.rows.push(numbers),
                 None => {
-                    tables.push((name.to_owned(), Self { columns: columns.clone(), rows: vec![numbers] }))
+                    places.insert(name.to_owned(), tables.len());
+                    tables.push((name.to_owned(), Self { columns: columns.clone(), rows: vec![numbers] }));
                 }
             }
         }
