@@ -101,6 +101,27 @@ impl Series {
 /// Colours that readers with any colour vision can tell apart (Okabe and Ito).
 pub const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#666666"];
 
+/// Points of a curve; more would not be seen.
+const POINTS: usize = 600;
+
+/// As many points of a curve as are seen: of each stretch the lowest and the highest. Points that are no numbers are left out.
+pub fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let points: Vec<[f64; 2]> =
+        points.iter().copied().filter(|p| p[0].is_finite() && p[1].is_finite()).collect();
+    if points.len() <= POINTS {
+        return points;
+    }
+    let stretch = points.len().div_ceil(POINTS / 2);
+    let ends = points.chunks(stretch).flat_map(|part| {
+        let by = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
+        let (low, high) = (part.iter().min_by(by), part.iter().max_by(by));
+        let mut both: Vec<[f64; 2]> = low.into_iter().chain(high).copied().collect();
+        both.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        both
+    });
+    ends.collect()
+}
+
 /// A chart.
 #[derive(Clone, Debug, Default)]
 pub struct Chart {
@@ -142,7 +163,15 @@ impl Chart {
 
 #[cfg(test)]
 mod tests {
-    use super::{Axis, Chart, Mark, Series};
+    use super::{Axis, Chart, Mark, POINTS, Series, thinned};
+
+    #[test]
+    fn peaks_survive_the_thinning() {
+        let mut points: Vec<[f64; 2]> = (0..100_000).map(|k| [f64::from(k), 0.0]).collect();
+        points[54_321][1] = 9.0;
+        let thin = thinned(&points);
+        assert!(thin.len() <= POINTS + 2 && thin.contains(&[54_321.0, 9.0]), "{}", thin.len());
+    }
 
     #[test]
     fn what_a_logarithmic_axis_cannot_show_is_left_out_and_an_empty_chart_is_none() {

@@ -1,6 +1,7 @@
 //! Curves over time and bars as SVG that takes the colours of the page.
 
 use super::page::escape;
+use seixo_study::plot::thinned;
 use std::fmt::Write;
 
 /// Size of a chart and what is left free around it [pixels].
@@ -9,8 +10,6 @@ const LEFT: f64 = 62.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 10.0;
 const BOTTOM: f64 = 38.0;
-/// Points of a curve; more would not be seen.
-const POINTS: usize = 600;
 /// Colours of the page.
 const COLORS: usize = 6;
 
@@ -79,24 +78,6 @@ fn short(x: f64) -> String {
         return text.trim_end_matches('0').trim_end_matches('.').to_owned();
     }
     format!("{x:.1e}")
-}
-
-/// As many points as are seen: of each stretch the lowest and the highest.
-fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let points: Vec<[f64; 2]> =
-        points.iter().copied().filter(|p| p[0].is_finite() && p[1].is_finite()).collect();
-    if points.len() <= POINTS {
-        return points;
-    }
-    let stretch = points.len().div_ceil(POINTS / 2);
-    let ends = points.chunks(stretch).flat_map(|part| {
-        let by = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
-        let (low, high) = (part.iter().min_by(by), part.iter().max_by(by));
-        let mut both: Vec<[f64; 2]> = low.into_iter().chain(high).copied().collect();
-        both.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        both
-    });
-    ends.collect()
 }
 
 impl Chart {
@@ -283,14 +264,6 @@ mod tests {
                 assert!(told.len() == count && count > 1, "{offset} {exponent}: {told:?}");
             }
         }
-    }
-
-    #[test]
-    fn peaks_survive_the_thinning() {
-        let mut points: Vec<[f64; 2]> = (0..100_000).map(|k| [f64::from(k), 0.0]).collect();
-        points[54_321][1] = 9.0;
-        let thin = thinned(&points);
-        assert!(thin.len() <= POINTS + 2 && thin.contains(&[54_321.0, 9.0]), "{}", thin.len());
     }
 
     #[test]

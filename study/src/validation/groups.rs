@@ -21,19 +21,32 @@ pub struct Spread {
     pub mean: f64,
     /// Standard deviation of a single run; 0 of a single one.
     pub deviation: f64,
-    /// How many.
+    /// How many runs have it.
     pub count: usize,
+    /// Out of how many.
+    pub runs: usize,
 }
 
 impl Spread {
-    /// Of `values`; `None` without any.
-    pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let values: Vec<f64> = values.collect();
+    /// Of `values`, one a run, where there are any; `None` without a single one.
+    pub fn of(values: impl Iterator<Item = Option<f64>>) -> Option<Self> {
+        let runs: Vec<Option<f64>> = values.collect();
+        let values: Vec<f64> = runs.iter().flatten().copied().collect();
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
         let deviation = (squares / (n - 1.0).max(1.0)).sqrt();
-        (n > 0.0).then_some(Self { mean, deviation, count: values.len() })
+        (n > 0.0).then_some(Self { mean, deviation, count: values.len(), runs: runs.len() })
+    }
+
+    /// Whether every run has it.
+    pub fn whole(&self) -> bool {
+        self.count == self.runs
+    }
+
+    /// How many runs have it, in words: `3`, or `1 of 3`.
+    pub fn told(&self) -> String {
+        if self.whole() { self.count.to_string() } else { format!("{} of {}", self.count, self.runs) }
     }
 }
 
@@ -54,9 +67,9 @@ impl<'a> Group<'a> {
         groups
     }
 
-    /// A value of its runs that ended well.
+    /// A value of its runs; one that failed has none.
     fn value(&self, name: &str) -> Option<Spread> {
-        Spread::of(self.rows.iter().filter_map(|r| r.measured.value(name)))
+        Spread::of(self.rows.iter().map(|r| r.measured.value(name)))
     }
 
     /// Whether `check` is for its runs.
@@ -76,7 +89,7 @@ impl<'a> Group<'a> {
 
     /// Wall-clock time of a run [s].
     pub fn seconds(&self) -> Option<f64> {
-        Spread::of(self.rows.iter().filter_map(|r| r.measured.timing).map(|t| t.median_s)).map(|s| s.mean)
+        Spread::of(self.rows.iter().map(|r| r.measured.timing.map(|t| t.median_s))).map(|s| s.mean)
     }
 
     /// Particles of all kinds.
@@ -104,9 +117,10 @@ mod tests {
 
     #[test]
     fn mean_and_deviation() {
-        let spread = Spread::of([1.0, 2.0, 3.0].into_iter()).unwrap();
-        assert_eq!(spread, Spread { mean: 2.0, deviation: 1.0, count: 3 });
-        assert_eq!(Spread::of([5.0].into_iter()).unwrap().deviation, 0.0);
-        assert!(Spread::of(std::iter::empty()).is_none());
+        let spread = Spread::of([Some(1.0), None, Some(2.0), Some(3.0)].into_iter()).unwrap();
+        assert_eq!(spread, Spread { mean: 2.0, deviation: 1.0, count: 3, runs: 4 });
+        assert!(!spread.whole() && Spread::of([Some(5.0)].into_iter()).unwrap().whole());
+        assert_eq!(Spread::of([Some(5.0)].into_iter()).unwrap().deviation, 0.0);
+        assert!(Spread::of([None, None].into_iter()).is_none());
     }
 }

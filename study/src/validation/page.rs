@@ -5,7 +5,7 @@ use super::groups::{Group, Spread};
 use super::reduce::{Curve, told};
 use super::{Suite, Validation, error_name};
 use crate::engine::first_line;
-use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
+use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke, thinned};
 use crate::report::{short, versions};
 use crate::row::Row;
 use crate::work_precision::{self, Cost};
@@ -13,9 +13,6 @@ use seixo::error::{Error, Result};
 use seixo::output::write_whole;
 use std::fmt::Write;
 use std::path::Path;
-
-/// Most points of a curve in a chart.
-const CHART_POINTS: usize = 600;
 
 /// How the page begins, and nobody else's.
 pub(super) const MARK: &str = "# Validation
@@ -34,7 +31,8 @@ seixo validate spheric-2 -o DIR      # one of them
 
 The error is the difference over the size of the reference, or over what the check states; `within` says whether it is
 below the tolerance that was written down with the check. Run times are those of the time steps alone. Where a setting
-ran from several starts, results are mean and standard deviation of a run.
+ran from several starts, results are mean and standard deviation of a run, and `1 of 3` says that the others have no number:
+then the check is not met.
 ";
 
 /// Writes the page to `path`, its charts into `img` beside it.
@@ -92,8 +90,15 @@ pub fn lines(validation: &Validation, rows: &[Row]) -> Vec<String> {
     let of = |check: &Check, group: &Group| {
         let error = group.error(&check.name);
         let sign = if within(error, check) == "yes" { "ok    " } else { "BEYOND" };
-        let missing = || group.rows.first().map_or(String::new(), |r| check.missing(&r.measured));
-        let error = if error.is_some() { percent(error) } else { format!("none ({})", missing()) };
+        let missing = || {
+            let without = group.rows.iter().find(|r| r.measured.value(&error_name(&check.name)).is_none());
+            without.map_or(String::new(), |r| check.missing(&r.measured))
+        };
+        let error = match error {
+            Some(e) if e.whole() => percent(error),
+            Some(_) => format!("{}, else none ({})", percent(error), missing()),
+            None => format!("none ({})", missing()),
+        };
         let most = short(100.0 * check.tolerance);
         let who = format!("{} {}", group.method, group.setting);
         format!("{sign} {}: {}, {}: error {error}, tolerance {most} %", d.name, check.name, who.trim())
@@ -123,8 +128,9 @@ fn line(text: &mut String, cells: &[String]) {
 fn number(spread: Option<Spread>) -> String {
     match spread {
         None => "-".into(),
-        Some(s) if s.count == 1 => short(s.mean),
-        Some(s) => format!("{} ± {} ({})", short(s.mean), short(s.deviation), s.count),
+        Some(s) if s.runs == 1 => short(s.mean),
+        Some(s) if s.count == 1 => format!("{} ({})", short(s.mean), s.told()),
+        Some(s) => format!("{} ± {} ({})", short(s.mean), short(s.deviation), s.told()),
     }
 }
 
@@ -133,17 +139,19 @@ fn percent(error: Option<Spread>) -> String {
     error.map_or("-".into(), |e| {
         let e = scaled(e);
         let of = |x: f64| if x < 10.0 { format!("{x:.2}") } else { format!("{x:.0}") };
+        let told = if e.whole() { String::new() } else { format!(" ({})", e.told()) };
         if e.count == 1 {
-            format!("{} %", of(e.mean))
+            format!("{} %{told}", of(e.mean))
         } else {
-            format!("{} ± {} %", of(e.mean), of(e.deviation))
+            format!("{} ± {} %{told}", of(e.mean), of(e.deviation))
         }
     })
 }
 
+/// Whether the mean is within the tolerance, of runs that all have a number: one that failed meets nothing.
 fn within(error: Option<Spread>, check: &Check) -> &'static str {
     match error {
-        Some(e) if e.mean <= check.tolerance => "yes",
+        Some(e) if e.whole() && e.mean <= check.tolerance => "yes",
         _ => "**no**",
     }
 }
@@ -184,7 +192,7 @@ fn section(text: &mut String, validation: &Validation, rows: &[Row], images: &Pa
         }
         for (k, peer) in check.peers.iter().enumerate() {
             let Some(verdict) = check.judge_peer(k, reference) else { continue };
-            let error = Spread::of([verdict.error].into_iter());
+            let error = Spread::of([Some(verdict.error)].into_iter());
             let cells = [
                 check.name.clone(),
                 peer.name.clone(),
@@ -319,7 +327,64 @@ fn level(check: &Check) -> bool {
     matches!(check.take, Take::Mean | Take::Largest | Take::Smallest | Take::At)
 }
 
-fn thinned(curve: &[[f64; 2]]) -> Curve {
-    let stride = curve.len().div_ceil(CHART_POINTS).max(1);
-    curve.iter().copied().step_by(stride).collect()
+#[cfg(test)]
+mod tests {
+    use super::{Validation, lines, section, summary};
+    use crate::definition::Definition;
+    use crate::row::{Class, Row};
+    use crate::validation::Suite;
+
+    /// A validation of one setting from three starts, in which the first `good` end well.
+    fn ran(good: usize) -> (Suite, Vec<Row>) {
+        let text = "name = 'tiny'\ntitle = 'tiny'\n[[check]]\nname = 'level [m]'\nvalue = 'H [m]'\nreference = 0.1\n\
+                    tolerance = 0.1\n";
+        let definition = Definition::parse("tiny", text).unwrap();
+        let references = vec![Default::default()];
+        let validation = Validation { definition, references, points: 0..3 };
+        let row = |index: usize| {
+            let mut row = Row { index, method: "own".into(), ..Row::default() };
+            row.parameters.insert("run".into(), index.to_string());
+            row.measured.put("H [m]", 0.1 + 0.001 * index as f64);
+            if index >= good {
+                row.measured.class = Class::Failed;
+                row.measured.reason = "it blew up".into();
+            }
+            validation.judge(&mut row);
+            row
+        };
+        let rows = (0..3).map(row).collect();
+        (Suite { validations: vec![validation], ..Suite::default() }, rows)
+    }
+
+    #[test]
+    fn a_setting_of_which_a_run_failed_does_not_meet_its_check() {
+        for (good, line, result) in [
+            (
+                3,
+                "ok     tiny: level [m], own: error 1.00 ± 1.00 %, tolerance",
+                "| 0.101 ± 0.001 (3) | 0.1 | 1.00 ± 1.00 % |",
+            ),
+            (
+                2,
+                "BEYOND tiny: level [m], own: error 0.50 ± 0.71 % (2 of 3), else none (it blew up)",
+                "(2 of 3) | 0.1 | 0.50 ± 0.71 % (2 of 3) |",
+            ),
+            (
+                1,
+                "BEYOND tiny: level [m], own: error 0.00 % (1 of 3), else none (it blew up)",
+                "| 0.1 (1 of 3) | 0.1 | 0.00 % (1 of 3) |",
+            ),
+            (0, "BEYOND tiny: level [m], own: error none (it blew up)", "| - | - | - |"),
+        ] {
+            let (suite, rows) = ran(good);
+            let told = lines(&suite.validations[0], &rows).concat();
+            assert!(told.starts_with(line), "{told}");
+            let mut page = String::new();
+            summary(&mut page, &suite, &rows);
+            // There are no charts to write.
+            section(&mut page, &suite.validations[0], &rows, "".as_ref()).unwrap();
+            let within = if good == 3 { "| yes |" } else { "| **no** |" };
+            assert!(page.contains(result) && page.matches(within).count() == 2, "{good}: {page}");
+        }
+    }
 }
