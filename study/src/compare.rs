@@ -2,6 +2,7 @@
 
 use super::definition::{Definition, ErrorMeasure, Files};
 use super::row::{Class, Row};
+use super::validation::reduce::distance;
 use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use seixo::error::{Error, Result};
 
@@ -36,22 +37,10 @@ pub fn table(name: &str, text: &str) -> Result<Vec<[f64; 2]>> {
     Ok(rows)
 }
 
-/// `curve` at `x`, linear between its points; `None` outside.
-fn at(curve: &[[f64; 2]], x: f64) -> Option<f64> {
-    let k = curve.iter().position(|p| p[0] >= x)?;
-    if k == 0 {
-        return (curve[0][0] == x).then_some(curve[0][1]);
-    }
-    let ([x0, y0], [x1, y1]) = (curve[k - 1], curve[k]);
-    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
-}
-
 /// Rms difference of `curve` from `reference` at the points of `reference` that `curve` covers. `None` if they
-/// share fewer than two points.
+/// share fewer than two points. In gaps of either there is nothing to compare.
 pub fn difference(curve: &[[f64; 2]], reference: &[[f64; 2]]) -> Option<f64> {
-    let squares: Vec<f64> =
-        reference.iter().filter_map(|r| at(curve, r[0]).map(|y| (y - r[1]).powi(2))).collect();
-    (squares.len() > 1).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    distance(curve, reference).map(|(rms, _)| rms)
 }
 
 /// The row to compare with: the one with the most particles, and of those the most steps, that has `curve`.
@@ -130,15 +119,15 @@ pub fn curves(study: &Definition, rows: &mut [Row], files: &Files) -> Result<()>
         let name = error.name();
         let (reference, own) = if against == "finest" {
             let Some(row) = finest(rows, curve) else { continue };
-            (row.measured.curves[curve].clone(), Some(row.index))
+            (row.measured.curve(curve).unwrap_or_default(), Some(row.index))
         } else {
             (table(against, &files(against)?)?, None)
         };
         let range = reference.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
         for row in rows.iter_mut().filter(|r| Some(r.index) != own) {
-            let Some(points) = row.measured.curves.get(curve) else { continue };
-            let inside = if own.is_some() { reference.clone() } else { within(curve, &reference, points) };
-            if let Some(rms) = difference(points, &inside) {
+            let Some(points) = row.measured.curve(curve) else { continue };
+            let inside = if own.is_some() { reference.clone() } else { within(curve, &reference, &points) };
+            if let Some(rms) = difference(&points, &inside) {
                 row.measured.put(&name, rms / range);
             }
         }

@@ -72,7 +72,7 @@ pub struct Profile {
     pub of: Quantity,
     /// Against what.
     pub along: Coordinate,
-    /// Lower and upper corner of the region [m].
+    /// Lower and upper corner of the region [m]; in two dimensions y does not count.
     pub within: [[f64; 3]; 2],
     /// Number of bins along the coordinate.
     pub bins: usize,
@@ -82,6 +82,8 @@ pub struct Profile {
 #[derive(Debug)]
 struct Sums {
     profile: Profile,
+    /// In two dimensions, where y is that of the particles.
+    flat: bool,
     bins: TimeMean,
 }
 
@@ -93,7 +95,8 @@ impl Sums {
         let (low, high) = (DVec3::from(p.within[0]), DVec3::from(p.within[1]));
         for i in (0..fluid).filter(|&i| fields.kind[i] == Kind::Fluid) {
             let x = fields.position[i];
-            if x.cmpge(low).all() && x.cmplt(high).all() {
+            let within = x.cmpge(low) & x.cmplt(high);
+            if within.x && within.z && (self.flat || within.y) {
                 let part = (x[axis] - low[axis]) / (high[axis] - low[axis]);
                 let bin = 3 * ((part * p.bins as f64) as usize).min(p.bins - 1);
                 sums[bin] += x[axis];
@@ -137,7 +140,13 @@ impl Recorder {
                 "",
             ));
         }
-        let sums = |p: &Profile| Sums { profile: p.clone(), bins: TimeMean::default() };
+        let flat = simulation.case.run.dimensions == 2;
+        if let Some(p) = spec.profile.iter().find(|p| flat && p.along == Coordinate::Y) {
+            let text =
+                format!("measure.profile `{}`: a case in two dimensions has no profile along y", p.name);
+            return Err(Error::key("measure.profile.along", text, "take x or z"));
+        }
+        let sums = |p: &Profile| Sums { profile: p.clone(), flat, bins: TimeMean::default() };
         Ok(Self {
             gauges: if has(Measure::Gauges) { Some(Gauges::new(&simulation.case, scene)?) } else { None },
             bodies: has(Measure::Bodies),
@@ -157,7 +166,7 @@ impl Recorder {
         // What is recorded follows from study and case.
         let Self { gauges, bodies: _, fluid: _, spread: _, profiles, curves, times } = self;
         gauges.iter_mut().try_for_each(|gauges| gauges.exchange(archive))?;
-        for Sums { profile, bins } in profiles {
+        for Sums { profile, flat: _, bins } in profiles {
             bins.exchange(&format!("profile.{}", profile.name), archive)?;
         }
         archive.array("curves.times", times, false)?;
@@ -245,7 +254,15 @@ impl Recorder {
             out.sampled.clone_from(&self.times);
         }
         out.curves.extend(self.curves);
-        out.curves.extend(self.profiles.iter().map(|p| (p.profile.name.clone(), p.curve())));
+        for sums in &self.profiles {
+            let (name, curve) = (&sums.profile.name, sums.curve());
+            if curve.is_empty() {
+                out.degrade(&format!(
+                    "profile `{name}` is empty: no water was in its region (measure.profile.within)"
+                ));
+            }
+            out.curves.insert(name.clone(), curve);
+        }
     }
 }
 
@@ -282,9 +299,14 @@ mod tests {
             fields.velocity.push(DVec3::new(u, 0.0, 0.0));
             fields.kind.push(kind);
         }
-        let mut sums = Sums { bins: TimeMean::default(), profile };
+        // In two dimensions y does not count.
+        let beside = Profile { within: [[0.0, 2.0, 0.0], [1.0, 3.0, 1.0]], ..profile.clone() };
+        let mut flat = Sums { bins: TimeMean::default(), flat: true, profile: beside };
+        let mut sums = Sums { bins: TimeMean::default(), flat: false, profile };
+        flat.add(&fields, 5, 0.0);
         sums.add(&fields, 5, 0.0);
         let curve = sums.curve();
+        assert_eq!(flat.curve(), curve);
         assert!(
             (curve[0][0] - 0.2).abs() < 1e-12 && curve[0][1] == 1.5 && curve[1] == [0.9, 7.0],
             "{curve:?}"

@@ -67,7 +67,7 @@ pub struct Work {
     pub particles: u64,
     /// Steps.
     pub steps: u64,
-    /// Particles times steps.
+    /// Particles of the start times steps; what comes in later does not count.
     pub particle_steps: u64,
     /// Iterations of the pressure solver, all steps.
     pub iterations: u64,

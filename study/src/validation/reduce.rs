@@ -22,13 +22,13 @@ pub enum Take {
     Range,
     /// Integral over the window, e.g. an impulse.
     Integral,
-    /// Time at which the curve first rises above `level`.
+    /// Time at which the curve first rises above `level`. Where it does so over a gap, and with the next two, the end of the gap.
     FirstAbove,
     /// Time at which the curve first falls below `level`.
     FirstBelow,
     /// Time from when the curve first rises above `level` to when it first rises above `to`.
     Passage,
-    /// Value at the time `level`.
+    /// Value at the time `level`; none in a gap.
     At,
     /// Standard deviation over the window.
     Deviation,
@@ -128,25 +128,25 @@ fn later(curve: &[[f64; 2]], origin: f64) -> Curve {
     curve.iter().map(|p| [p[0] - origin, p[1]]).collect()
 }
 
-/// First x at which the curve crosses `level` upwards.
+/// First x at which the curve crosses `level` upwards; over a gap the far end of that, which alone is known.
 fn first_above(curve: &[[f64; 2]], level: f64) -> Option<f64> {
-    if curve.first()?[1] >= level {
-        return Some(curve[0][0]);
-    }
-    let pair = curve.windows(2).find(|w| w[1][1] >= level)?;
-    let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
-    Some(x0 + (x1 - x0) * (level - y0) / (y1 - y0))
+    let above = curve.iter().position(|p| p[1] >= level)?;
+    let [x1, y1] = curve[above];
+    let before = above.checked_sub(1).map(|k| curve[k]).filter(|p| p[1].is_finite());
+    Some(before.map_or(x1, |[x0, y0]| x0 + (x1 - x0) * (level - y0) / (y1 - y0)))
 }
 
-/// The curve at `x`, linear between its points; `None` outside.
+/// The curve at `x`, linear between its points; `None` outside and in a gap.
 pub fn at(curve: &[[f64; 2]], x: f64) -> Option<f64> {
     let k = curve.partition_point(|p| p[0] < x);
-    if k == 0 || k == curve.len() {
-        let end = curve.get(k.min(curve.len().checked_sub(1)?))?;
-        return ((end[0] - x).abs() < 1e-9 * (1.0 + x.abs())).then_some(end[1]);
+    let (before, after) = (k.checked_sub(1).map(|k| curve[k]), curve.get(k).copied());
+    // Sums of time steps miss a point by rounding errors.
+    let beside = |p: &[f64; 2]| (p[0] - x).abs() < 1e-9 * (1.0 + x.abs()) && p[1].is_finite();
+    if let Some(point) = after.filter(beside).or(before.filter(beside)) {
+        return Some(point[1]);
     }
-    let ([x0, y0], [x1, y1]) = (curve[k - 1], curve[k]);
-    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+    let ([x0, y0], [x1, y1]) = (before?, after?);
+    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0)).filter(|y| y.is_finite())
 }
 
 /// Coefficients of the polynomial of `N` terms through `curve`, about its first x, by least squares.
@@ -235,13 +235,13 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
             let stretches = marked.split(|p| !p[1].is_finite());
             Some(stretches.filter_map(|stretch| integral(stretch).pop()).sum())
         }
-        Take::FirstAbove => first_above(curve, level),
+        Take::FirstAbove => first_above(marked, level),
         Take::FirstBelow => {
-            let mirrored: Curve = curve.iter().map(|p| [p[0], -p[1]]).collect();
+            let mirrored: Curve = marked.iter().map(|p| [p[0], -p[1]]).collect();
             first_above(&mirrored, -level)
         }
-        Take::Passage => Some(first_above(curve, to)? - first_above(curve, level)?),
-        Take::At => at(curve, level),
+        Take::Passage => Some(first_above(marked, to)? - first_above(marked, level)?),
+        Take::At => at(marked, level),
         Take::Deviation => Some(deviation(marked)),
         Take::Slope => fit::<2>(curve).map(|c| c[1]),
         Take::Acceleration => fit::<3>(curve).map(|c| 2.0 * c[2]),
@@ -395,6 +395,32 @@ mod tests {
         assert!(smoothed.len() == gap.len() && smoothed[2][1].is_nan());
         assert_eq!(since_moved(&gap, 1.0).unwrap().1, 5.0);
         assert_eq!(distance(&gap, &[[0.5, 2.0], [3.0, 0.0], [5.5, 4.0]]), Some((0.0, 2)));
+    }
+
+    #[test]
+    fn what_comes_to_pass_over_a_gap_counts_at_its_end() {
+        let gap = f64::NAN;
+        let curve = [
+            [0.0, 2.0],
+            [1.0, 2.0],
+            [2.0, gap],
+            [8.0, gap],
+            [9.0, 6.0],
+            [10.0, 6.0],
+            [11.0, gap],
+            [12.0, 1.0],
+        ];
+        let take = |take, level| reduce(take, &curve, [level, 5.0]);
+        assert_eq!([take(Take::FirstAbove, 4.0), take(Take::FirstAbove, 7.0)], [Some(9.0), None]);
+        assert_eq!([take(Take::FirstBelow, 1.5), take(Take::Passage, 2.0)], [Some(12.0), Some(9.0)]);
+        assert_eq!(
+            reduce(Take::FirstAbove, &curve[2..], [1.0; 2]),
+            Some(9.0),
+            "a window that begins in the gap"
+        );
+        let (inside, ends) =
+            ([1.5, 3.0, 8.0, 8.5].map(|x| take(Take::At, x)), [1.0, 9.0].map(|x| take(Take::At, x)));
+        assert_eq!((inside, ends), ([None; 4], [Some(2.0), Some(6.0)]));
     }
 
     #[test]
