@@ -392,13 +392,13 @@ fn the_depth_that_is_derived_from_is_that_of_the_balance_of_what_comes_in_and_go
         (out("velocity = 0.3", 0.4), 0.1, 0.1),
         (out("discharge = 0.03", 0.4), 0.1, 0.1),
         // Deeper by what is missing, until the opening takes all.
-        (out("velocity = 0.2", 0.4), 0.1, 0.16),
+        (out("velocity = 0.2", 0.4), 0.1, 0.15),
         // In the first second alone more comes in.
         (out("velocity = [[1, 0], [1.001, 0.3]]", 0.1), 0.102, 0.13),
         // Nothing goes out, what goes out is not known, or what comes in does not get there.
         (String::new(), 0.102, 0.4),
         (out("", 0.1), 0.102, 0.4),
-        (out("velocity = 0.3", 0.1) + &weir(0.3), 0.102, 0.3),
+        (out("velocity = 0.3", 0.1) + &weir(0.3), 0.102, 0.32),
         (out("velocity = 0.3", 0.1) + &weir(0.4), 0.102, 0.4),
     ] {
         let more = if more.contains("weir") { more } else { more + &weir(0.04) };

@@ -145,6 +145,8 @@ mod tests {
         assert_eq!(difference(&curve, &[[0.5, 1.0], [1.0, 2.0], [9.0, 100.0]]), Some(0.0));
         assert_eq!(difference(&curve, &[[0.0, 1.0], [1.0, 3.0]]), Some(1.0));
         assert_eq!(difference(&curve, &[[5.0, 1.0], [1.0, 3.0]]), None);
+        let gap = [[0.0, 0.0], [1.0, f64::NAN], [2.0, 4.0], [3.0, 4.0]];
+        assert_eq!(difference(&gap, &[[0.0, 0.0], [1.5, 9.0], [2.5, 4.0], [3.0, f64::NAN]]), Some(0.0));
     }
 
     #[test]

@@ -277,6 +277,7 @@ fn spread(fields: &Fields, fluid: usize) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::row::Class;
 
     #[test]
     fn a_profile_is_the_mean_of_its_bins() {
@@ -307,6 +308,20 @@ mod tests {
         sums.add(&fields, 5, 0.0);
         let curve = sums.curve();
         assert_eq!(flat.curve(), curve);
+        // In space no water is there, and that is told.
+        let mut recorder = Recorder {
+            gauges: None,
+            bodies: false,
+            fluid: false,
+            spread: false,
+            profiles: vec![Sums { bins: TimeMean::default(), flat: false, ..flat }],
+            curves: BTreeMap::new(),
+            times: Vec::new(),
+        };
+        recorder.profiles[0].add(&fields, 5, 0.0);
+        let mut measured = Measured::default();
+        recorder.finish(&mut measured);
+        assert!(measured.class == Class::Degraded && measured.reason.contains("profile `u` is empty"));
         assert!(
             (curve[0][0] - 0.2).abs() < 1e-12 && curve[0][1] == 1.5 && curve[1] == [0.9, 7.0],
             "{curve:?}"
