@@ -56,6 +56,18 @@ fn obj(triangles: &Triangles) -> String {
     out
 }
 
+fn binary(header: &[u8], triangles: &Triangles) -> Vec<u8> {
+    let mut bytes = header.to_vec();
+    bytes.resize(80, b' ');
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        bytes.extend([0; 12]);
+        bytes.extend(triangle.iter().flat_map(|v| v.as_vec3().to_array()).flat_map(f32::to_le_bytes));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
 /// A file in a folder that goes with the test.
 pub fn file(folder: &TempDir, name: &str, text: &str) -> String {
     let path = folder.path().join(name);
@@ -469,6 +481,61 @@ fn what_is_wrong_with_a_file_is_said_with_the_key_and_the_place() {
     assert!(why.contains("/no/such/hull.stl"), "{why}");
 }
 
+/// The scene of a body from the file `path`.
+fn alone(path: &str) -> Scene {
+    let text = format!(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\n[[body]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"{path}\"\n\
+         center = [0, 0, 0]\ndensity = 500\n[contact]\nspring = 1e5\n"
+    );
+    Scene::build(&case(&text)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// An L, its ends faces of seven corners, of which one lies on a straight side.
+#[test]
+fn a_face_that_is_not_convex_is_cut_whichever_corner_it_begins_with() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let corners = [[0.0, 0.0], [0.1, 0.0], [0.4, 0.0], [0.4, 0.2], [0.2, 0.2], [0.2, 0.4], [0.0, 0.4]];
+    for first in 0..7 {
+        let mut text = String::new();
+        for y in [0.0, 0.2] {
+            corners.iter().for_each(|[x, z]| writeln!(text, "v {x} {y} {z}").expect("written"));
+        }
+        let ring: Vec<usize> = (0..7).map(|k| (first + k) % 7 + 1).collect();
+        let list = |ring: &mut dyn Iterator<Item = usize>| ring.map(|k| format!(" {k}")).collect::<String>();
+        let (near, far) = (list(&mut ring.iter().copied()), list(&mut ring.iter().rev().map(|k| k + 7)));
+        writeln!(text, "f{near}\nf{far}").expect("written");
+        for k in 1..=7 {
+            let next = k % 7 + 1;
+            writeln!(text, "f {next} {k} {} {}", k + 7, next + 7).expect("written");
+        }
+        let scene = alone(&file(&folder, &format!("l{first}.obj"), &text));
+        let (_, mass, _) = body(&scene);
+        assert!((mass / (500.0 * 0.12 * 0.2) - 1.0).abs() < 1e-9, "from {first}: {mass} kg");
+    }
+}
+
+#[test]
+fn coordinates_of_a_site_are_read_to_their_last_digit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let away = DVec3::new(453_123.127, 5_412_345.303, 12.5);
+    let there: Triangles = cuboid(DVec3::splat(0.2)).into_iter().map(|t| t.map(|v| v + away)).collect();
+    for path in [file(&folder, "site.obj", &obj(&there)), file(&folder, "site.stl", &stl(&there))] {
+        let scene = alone(&path);
+        assert!((body(&scene).1 / 4.0 - 1.0).abs() < 1e-6, "{path}: {} kg", body(&scene).1);
+        assert!(!scene.notes.iter().any(|n| n.contains("single precision")), "{:?}", scene.notes);
+    }
+    // A binary file has no more than single precision, half a metre there: places that it can tell are told of.
+    for (edge, noted) in [(1.0, true), (0.0, false)] {
+        let there: Triangles =
+            cuboid(DVec3::ONE).into_iter().map(|t| t.map(|v| v + edge * away.trunc())).collect();
+        let path = file(&folder, "binary.stl", "");
+        std::fs::write(&path, binary(b"made by hand", &there)).expect("written");
+        let notes = alone(&path).notes;
+        let told = notes.iter().any(|n| n.contains("binary.stl") && n.contains("steps of 6.5e-1 m"));
+        assert_eq!(told, noted, "{notes:?}");
+    }
+}
+
 #[test]
 fn an_stl_file_may_be_written_in_any_of_the_usual_ways() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -481,17 +548,6 @@ fn an_stl_file_may_be_written_in_any_of_the_usual_ways() {
         .map(|l| if l.contains("solid") { l.split_whitespace().next().unwrap_or(l) } else { l })
         .flat_map(|l| [l, "\n"])
         .collect();
-    let binary = |header: &[u8]| {
-        let mut bytes = header.to_vec();
-        bytes.resize(80, b' ');
-        bytes.extend((solid.len() as u32).to_le_bytes());
-        for triangle in &solid {
-            bytes.extend([0; 12]);
-            bytes.extend(triangle.iter().flat_map(|v| v.as_vec3().to_array()).flat_map(f32::to_le_bytes));
-            bytes.extend([0; 2]);
-        }
-        bytes
-    };
     for (name, bytes) in [
         ("whole.stl", whole.clone().into_bytes()),
         ("faces.stl", faces.into_bytes()),
@@ -499,8 +555,8 @@ fn an_stl_file_may_be_written_in_any_of_the_usual_ways() {
         ("marked.stl", format!("\u{feff}{whole}").into_bytes()),
         ("shouted.stl", whole.to_uppercase().into_bytes()),
         ("windows.stl", whole.replace('\n', "\r\n").into_bytes()),
-        ("binary.stl", binary(b"made by hand")),
-        ("binary-solid.stl", binary(b"solid made by a program that does not know better")),
+        ("binary.stl", binary(b"made by hand", &solid)),
+        ("binary-solid.stl", binary(b"solid made by a program that does not know better", &solid)),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).expect("a file");

@@ -34,6 +34,7 @@ impl Scene {
         builder.bodies();
         builder.room();
         builder.gauges();
+        builder.coarse();
         let domain = builder.domain();
         let reserve = builder.reserve(domain);
         if !builder.problems.is_empty() {
@@ -367,7 +368,9 @@ impl<'a> Builder<'a> {
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     fn gauges(&mut self) {
         let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
-        let solids = self.moving_walls.iter().chain(&self.bodies);
+        // Of the solids in openings, which come last, no gauge tells anything.
+        let own = self.moving_walls.len() - self.openings.iter().filter(|o| o.wall.is_some()).count();
+        let solids = self.moving_walls[..own].iter().chain(&self.bodies);
         let still = solids.filter(|s| s.is_still()).flat_map(Solid::wall_positions);
         let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
         for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
@@ -381,7 +384,7 @@ impl<'a> Builder<'a> {
                 });
                 let (name, at) = (&gauge.name, point(at));
                 let message = format!("gauge.pressure `{name}` at {at}: no fixed wall there, {hint}");
-                let remedy = "move the point onto a wall";
+                let remedy = "move the point onto a wall; where water comes in or goes out there is none";
                 self.problems.push(Problem::new(format!("gauge.pressure.{k}.point"), message, remedy));
             }
         }

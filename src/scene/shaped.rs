@@ -5,10 +5,14 @@ use super::oriented::Placed;
 use super::placement::point;
 use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
-use crate::case::{Case, Form, MovingWall, Place, Vector, Wall};
+use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
 use crate::shape::Cells;
 use glam::{DMat3, DVec3};
+use std::collections::HashSet;
+
+/// Steps of a file's coordinates over the spacing that are worth a word [-].
+const COARSE: f64 = 1e-3;
 
 /// A wall without particles, where it stands; `moved` if it moves.
 fn wall(
@@ -201,6 +205,29 @@ impl Builder<'_> {
             || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
             || earlier().any(|b| b.holds(at, slack))
             || near && near_solid(lattice, &self.grid, at)
+    }
+
+    /// Tells of files in single precision whose coordinates are so large that the steps between them bend what they describe.
+    pub(super) fn coarse(&mut self) {
+        let (case, tank) = (self.case, self.case.tank.as_ref());
+        let walls =
+            case.obstacle.iter().map(|o| o.form(tank)).chain(case.moving_wall.iter().map(|w| w.form(tank)));
+        let water = case.fluid.iter().flat_map(|f| &f.shape).map(|w| w.form(tank));
+        let mut told = HashSet::new();
+        for form in walls.chain(water).chain(case.body.iter().map(Body::form)) {
+            let Some(file) = form.file.filter(|file| told.insert(*file)) else { continue };
+            let steps = match form.shape(self.lattice.spacing, self.lattice.plane) {
+                #[cfg(feature = "mesh")]
+                Ok((Shape::Mesh(mesh), _)) => mesh.steps(),
+                _ => None,
+            };
+            if let Some((step, at)) = steps.filter(|(step, _)| *step > COARSE * self.lattice.spacing) {
+                self.notes.push(format!(
+                    "{file}: a binary STL file has single precision, steps of {step:.1e} m at its coordinates of up to {at:.0} m: \
+                     export it as OBJ or as STL in text, or about an origin nearby"
+                ));
+            }
+        }
     }
 
     /// What is thinner than two particles has none inside, and what is thinner than one none at all. `key` is that of

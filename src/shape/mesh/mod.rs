@@ -4,6 +4,7 @@
 //! spacing, one and a half and so on below the surface. Points of the surface press into others: those above the
 //! wall layer, the vertices and the sharp edges.
 
+mod cut;
 mod flush;
 mod ground;
 mod mass;
@@ -55,6 +56,8 @@ pub struct Mesh {
     /// Turn from this frame to the file's.
     frame: DQuat,
     is_file: bool,
+    /// Whether its file holds numbers in single precision.
+    is_single: bool,
     /// Centre of mass in the file's coordinates [m].
     center: DVec3,
     /// Corners of its convex hull [m].
@@ -133,11 +136,15 @@ impl Mesh {
         let bytes = read::bytes(path).map_err(|e| {
             Unfit::new(format!("{path}: {e}"), "give an STL or OBJ file, by its path from the case")
         })?;
-        Self::made((path.to_owned(), crc32fast::hash(&bytes), [scale, base, 0.0].map(f64::to_bits)), || {
-            let (vertices, triangles) = read::soup(path, &bytes)?;
-            let vertices = vertices.into_iter().map(|v| scale * v).collect();
-            close((vertices, triangles))
-        })
+        let single = f64::from(u8::from(read::is_single(path, &bytes)));
+        Self::made(
+            (path.to_owned(), crc32fast::hash(&bytes), [scale, base, single].map(f64::to_bits)),
+            || {
+                let (vertices, triangles) = read::soup(path, &bytes)?;
+                let vertices = vertices.into_iter().map(|v| scale * v).collect();
+                close((vertices, triangles))
+            },
+        )
     }
 
     /// The mesh that `key` stands for, of what `make` gives if there is none yet.
@@ -149,6 +156,7 @@ impl Mesh {
         let (vertices, triangles) = make()?;
         let mut mesh = Self::new(&key.0, vertices, triangles)?;
         mesh.is_file = key.1 != 0;
+        mesh.is_single = mesh.is_file && f64::from_bits(key.2[2]) > 0.0;
         // A base makes it ground.
         mesh.thickness = mesh.thinnest(mesh.is_file && f64::from_bits(key.2[1]) > 0.0);
         let mesh: &'static Self = Box::leak(Box::new(mesh));
@@ -162,7 +170,7 @@ impl Mesh {
         let Mass { volume: signed, center, moments, frame } = Mass::of(&vertices, &triangles);
         let volume = signed.abs();
         let size = vertices.iter().map(|v| v.distance(vertices[0])).fold(0.0, f64::max);
-        if volume.is_nan() || volume < 1e-9 * size.powi(3) {
+        if volume.is_nan() || volume <= 1e-9 * size.powi(3) {
             let message = format!("{path}: its surface encloses no volume");
             return Err(Unfit::new(message, "give a closed solid with a volume"));
         }
@@ -191,6 +199,7 @@ impl Mesh {
             moments,
             frame,
             is_file: false,
+            is_single: false,
             center,
             hull,
             radius,
@@ -232,6 +241,13 @@ impl Mesh {
     /// Whether it comes from a file.
     pub(crate) fn is_file(&self) -> bool {
         self.is_file
+    }
+
+    /// Steps in which a file in single precision tells its coordinates where they are largest, and these [m].
+    pub(crate) fn steps(&self) -> Option<(f64, f64)> {
+        let (low, high) = (self.center + self.along_file.0, self.center + self.along_file.1);
+        let largest = low.abs().max(high.abs()).max_element();
+        self.is_single.then_some((largest * f64::from(f32::EPSILON), largest))
     }
 
     /// Where it is thinnest.

@@ -1,9 +1,8 @@
 //! Cones, wedges and prisms, as triangles.
 
-use super::super::signed_area;
+use super::cut;
 use super::read::Soup;
 use super::{Mesh, Unfit};
-use earcut::Earcut;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
@@ -67,11 +66,8 @@ fn wedge(size: DVec3) -> Soup {
 fn prism(section: &[[f64; 2]], height: f64) -> Soup {
     let n = section.len() as u32;
     let corners: Vec<DVec2> = section.iter().map(|&corner| corner.into()).collect();
-    let turn = signed_area(&corners).signum();
     let end = |y: f64| section.iter().map(move |&[x, z]| DVec3::new(x, y, z));
     let vertices: Vec<DVec3> = end(0.0).chain(end(height)).collect();
-    let mut flat: Vec<u32> = vec![];
-    Earcut::new().earcut(section.iter().copied(), &[], &mut flat);
     // Sides turn with the section, and the ends with them; what is inside out is turned when the mesh is made.
     let mut triangles: Vec<[u32; 3]> = (0..n)
         .flat_map(|a| {
@@ -79,11 +75,8 @@ fn prism(section: &[[f64; 2]], height: f64) -> Soup {
             [[a, n + a, n + b], [a, n + b, b]]
         })
         .collect();
-    for t in flat.chunks_exact(3) {
-        let [a, b, c] = [t[0], t[1], t[2]];
-        let corner = |k: u32| corners[k as usize];
-        let along = (corner(b) - corner(a)).perp_dot(corner(c) - corner(a)) * turn > 0.0;
-        let [a, b, c] = if along { [a, b, c] } else { [a, c, b] };
+    // A section is checked before: it does not cross itself.
+    for [a, b, c] in cut::section(&corners).unwrap_or_default() {
         triangles.extend([[a, b, c], [n + a, n + c, n + b]]);
     }
     (vertices, triangles)

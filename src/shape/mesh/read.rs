@@ -1,6 +1,6 @@
 //! STL and OBJ files: vertices and triangles, and whether they enclose a body.
 
-use super::Unfit;
+use super::{Unfit, cut};
 use glam::DVec3;
 use std::collections::HashMap;
 use std::io::{Cursor, Read};
@@ -54,33 +54,63 @@ pub(super) fn soup(path: &str, bytes: &[u8]) -> Result<Soup, Unfit> {
     Ok((vertices, triangles))
 }
 
+/// Whether the file holds numbers in single precision, as binary STL does.
+pub(super) fn is_single(path: &str, bytes: &[u8]) -> bool {
+    let end = std::path::Path::new(path).extension().unwrap_or_default();
+    end.eq_ignore_ascii_case("stl") && text(bytes).is_none()
+}
+
 fn stl(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
     let repair = "save it again as binary STL";
     let wrong = |e: std::io::Error| Unfit::new(format!("{path}: no STL file: {e}"), repair);
     let mut out = vec![];
     for solid in solids(bytes) {
-        let mut cursor = Cursor::new(solid);
+        let (mut cursor, mut triangles) = (Cursor::new(&solid), vec![]);
         for triangle in stl_io::create_stl_reader(&mut cursor).map_err(wrong)? {
-            let number = out.len();
+            let number = out.len() + triangles.len() + 1;
             let triangle =
-                triangle.map_err(|e| Unfit::new(format!("{path}: triangle {}: {e}", number + 1), repair))?;
-            let corners = triangle.vertices.map(|v| DVec3::from_array(v.0.map(f64::from)));
-            out.push(finite(path, number, corners)?);
+                triangle.map_err(|e| Unfit::new(format!("{path}: triangle {number}: {e}"), repair))?;
+            triangles.push(triangle.vertices.map(|v| DVec3::from_array(v.0.map(f64::from))));
+        }
+        // The reader knows single precision alone, and text has more digits.
+        let written = text(&solid).map(written).unwrap_or_default();
+        if written.len() == 3 * triangles.len() {
+            triangles = written.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+        }
+        for corners in triangles {
+            finite(path, out.len(), &corners)?;
+            out.push(corners);
         }
     }
     Ok(out)
+}
+
+/// The corners that an STL file in text states.
+fn written(text: &str) -> Vec<DVec3> {
+    let corner = |line: &str| {
+        let mut words = line.split_whitespace();
+        let is_one = words.next()? == "vertex";
+        let numbers = words.map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>()?;
+        is_one.then(|| <[f64; 3]>::try_from(numbers).ok().map(DVec3::from))?
+    };
+    text.lines().filter_map(corner).collect()
+}
+
+/// An STL file in text: not a binary one, even if its header looks like text.
+fn text(bytes: &[u8]) -> Option<&str> {
+    const HEADER: usize = 84;
+    const TRIANGLE: usize = 50;
+    let count =
+        bytes.get(HEADER - 4..HEADER).map(|n| n.iter().rev().fold(0, |n, &b| n << 8 | usize::from(b)));
+    let text = std::str::from_utf8(bytes).ok().map(|t| t.trim_start_matches('\u{feff}').trim_start());
+    text.filter(|_| count.is_none_or(|n| bytes.len() != HEADER + n * TRIANGLE))
 }
 
 /// The parts of an STL file that are read each by itself: the whole of a binary one, without a header that looks like text;
 /// each solid of one in text, of which there may be many, with or without names and a byte order mark, in small letters
 /// or large ones.
 fn solids(bytes: &[u8]) -> Vec<Vec<u8>> {
-    const HEADER: usize = 84;
-    const TRIANGLE: usize = 50;
-    let count =
-        bytes.get(HEADER - 4..HEADER).map(|n| n.iter().rev().fold(0, |n, &b| n << 8 | usize::from(b)));
-    let text = std::str::from_utf8(bytes).map(|t| t.trim_start_matches('\u{feff}').trim_start());
-    let (Ok(text), false) = (text, count.is_some_and(|n| bytes.len() == HEADER + n * TRIANGLE)) else {
+    let Some(text) = text(bytes) else {
         let mut binary = bytes.to_vec();
         binary.iter_mut().take(5).for_each(|b| *b = 0);
         return vec![binary];
@@ -98,7 +128,7 @@ fn solids(bytes: &[u8]) -> Vec<Vec<u8>> {
 }
 
 fn obj(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
-    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let none = |_: &std::path::Path| Ok(Default::default());
     let load = |bytes: &[u8]| tobj::load_obj_buf(&mut Cursor::new(bytes), &options, none);
     let (models, _) = load(bytes).map_err(|e| {
@@ -106,15 +136,28 @@ fn obj(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
             format!("{path}: line {}: no OBJ file: {e}", broken_line(bytes, |part| load(part).is_ok()));
         Unfit::new(message, "save it again as OBJ")
     })?;
-    let mut out = vec![];
-    for model in models {
-        let at = |k: u32| {
-            let p = model.mesh.positions.get(3 * k as usize..3 * k as usize + 3);
-            p.map_or(DVec3::NAN, |p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))
+    let (mut out, mut number) = (vec![], 0);
+    for tobj::Model { mesh, .. } in models {
+        let at = |&k: &u32| {
+            let p = mesh.positions.get(3 * k as usize..3 * k as usize + 3);
+            p.map_or(DVec3::NAN, DVec3::from_slice)
         };
-        for corners in model.mesh.indices.chunks_exact(3) {
-            let corners = [at(corners[0]), at(corners[1]), at(corners[2])];
-            out.push(finite(path, out.len(), corners)?);
+        let mut left = mesh.indices.as_slice();
+        // There are no counts of corners where all have three.
+        let mut counts = mesh.face_arities.iter();
+        while !left.is_empty() {
+            let count = counts.next().map_or(3, |&n| n as usize).min(left.len());
+            let (own, rest) = left.split_at(count);
+            let corners: Vec<DVec3> = own.iter().map(at).collect();
+            finite(path, out.len(), &corners)?;
+            number += 1;
+            let cut = cut::face(&corners).ok_or_else(|| {
+                let message =
+                    format!("{path}: face {number} of {count} corners at {} m crosses itself", corners[0]);
+                Unfit::new(message, "let the program that made it cut faces into triangles and save it again")
+            })?;
+            out.extend(cut.into_iter().map(|t| t.map(|k| corners[k as usize])));
+            left = rest;
         }
     }
     Ok(out)
@@ -126,9 +169,9 @@ fn broken_line(bytes: &[u8], reads: impl Fn(&[u8]) -> bool) -> usize {
     ends.partition_point(|&end| reads(&bytes[..end])) + 1
 }
 
-fn finite(path: &str, k: usize, corners: [DVec3; 3]) -> Result<[DVec3; 3], Unfit> {
+fn finite(path: &str, k: usize, corners: &[DVec3]) -> Result<(), Unfit> {
     if corners.iter().all(|c| c.is_finite()) {
-        return Ok(corners);
+        return Ok(());
     }
     let message = format!("{path}: triangle {}: a corner is not a finite place", k + 1);
     Err(Unfit::new(message, "save the file again"))
