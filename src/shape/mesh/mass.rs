@@ -42,7 +42,8 @@ impl Mass {
 }
 
 /// Eigenvalues of a symmetric `matrix` and its eigenvectors as the columns of a turn, by Jacobi's rotations: each in the plane of two axes, by
-/// the lesser angle that makes their product of inertia 0. Scales, equal moments and the order of axes make no difference to it.
+/// the lesser angle that makes their product of inertia 0. Scales, equal moments and the order of axes make no difference to it. Each stands
+/// in the place of the axis that it lies nearest to, as far as one place is for one.
 fn principal(matrix: DMat3) -> (DVec3, DMat3) {
     let (mut left, mut axes) = (matrix, DMat3::IDENTITY);
     let beside = |m: &DMat3| [(0, 1), (0, 2), (1, 2)].map(|(p, q)| m.col(q)[p].abs());
@@ -69,8 +70,18 @@ fn principal(matrix: DMat3) -> (DVec3, DMat3) {
             }
         }
     }
-    (DVec3::new(left.x_axis.x, left.y_axis.y, left.z_axis.z), axes)
+    // The rotations may lead far from the axes where they began.
+    let near = |order: &[usize; 3]| (0..3).map(|k| axes.col(order[k])[k].abs()).sum::<f64>();
+    let nearer = |best, order| if near(&order) > near(&best) { order } else { best };
+    let order = ORDERS.into_iter().fold(ORDERS[0], nearer);
+    let moments = DVec3::from_array(order.map(|k| left.col(k)[k]));
+    let [x, y, z] = order.map(|k| axes.col(k));
+    let turn = DMat3::from_cols(x, y, z);
+    (moments, if turn.determinant() < 0.0 { DMat3::from_cols(x, y, -z) } else { turn })
 }
+
+/// The orders of three axes.
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 0, 2], [0, 2, 1], [2, 1, 0], [1, 2, 0], [2, 0, 1]];
 
 /// Rounds over the three planes; the rest falls with its square, and five leave none.
 const SWEEPS: usize = 8;
@@ -120,6 +131,23 @@ mod tests {
                     assert!(off < 2e-6 * exact.max_element(), "{size} {turn}: {have} for {want}");
                 }
             }
+        }
+    }
+
+    /// `inertia` of a case is in the order of the file's axes.
+    #[test]
+    fn moments_keep_the_order_of_the_axes_that_they_lie_nearest_to() {
+        let size = DVec3::new(2.0, 0.6, 1.0);
+        let exact = (DVec3::splat((size * size).element_sum()) - size * size) / 12.0;
+        for k in 0..500 {
+            let part = |n: f64| 2.0 * (f64::from(k) * n).fract() - 1.0;
+            let axis = DVec3::new(part(0.618_034), part(0.754_877), part(0.569_84)).normalize_or(DVec3::X);
+            let turn = DQuat::from_axis_angle(axis, 0.6);
+            let (vertices, triangles) = brick(size, DVec3::ZERO, turn);
+            let mass = Mass::of(&vertices, &triangles);
+            assert!((mass.moments - exact).length() < 1e-9, "{axis}: {} for {exact}", mass.moments);
+            let matrix = DMat3::from_quat(mass.frame);
+            assert!((0..3).all(|k| matrix.col(k)[k].abs() > 0.8), "{axis}: {matrix}");
         }
     }
 }
