@@ -355,3 +355,19 @@ fn bodies_stand_on_bodies() {
         assert!((z[0] - 0.1 - gap).abs() < 1e-9 && (z[1] - 0.3 - 2.0 * gap).abs() < 1e-9, "{law}: {z:?}");
     }
 }
+
+/// A cone's base is a quarter of its height below its centroid, and its tip three: a domain holds the cone and not what it would be about its middle.
+#[test]
+fn a_cone_fits_a_domain_that_ends_below_its_base() {
+    let within = |floor: f64| {
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.02\ndomain = [[-0.2, -0.2, {floor}], [0.8, 0.5, 1.0]]\n\
+             [[body]]\nname = \"cone\"\nshape = \"cone\"\nradius = 0.1\nheight = 0.4\ncenter = [0.3, 0.15, 0.101]\ndensity = 500\n\
+             [contact]\nspring = 1e5\n"
+        );
+        build(&text).map(|_| ())
+    };
+    assert_eq!(within(-0.1), Ok(()));
+    let cut = within(0.01);
+    assert!(cut.as_ref().is_err_and(|e| e.contains("from z = 0.0010 to 0.4010 m")), "{cut:?}");
+}

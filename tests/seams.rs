@@ -79,6 +79,33 @@ fn collisions_over_the_seam_are_those_in_the_middle() {
     }
 }
 
+/// A wedge reaches twice as far to its toe as to its heel.
+#[test]
+fn what_is_not_even_about_its_middle_ends_where_it_does() {
+    let build = |x: f64| {
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.02\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.4]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n\
+             [[obstacle]]\nname = \"w\"\nshape = \"wedge\"\nsize = [0.3, 0.1, 0.1]\ncenter = [{x}, 0.05, 0.0334]\n\
+             [[body]]\nname = \"b\"\nsize = [0.06, 0.06, 0.06]\ncenter = [0.3, 0.05, 0.25]\ndensity = 500\n\
+             [contact]\nspring = 1e5\n"
+        );
+        Scene::build(&case(&text)).map_err(|e| e.to_string())
+    };
+    let (low, high) = (build(0.19), build(0.51));
+    assert!(
+        low.as_ref().is_err_and(|e| e.contains("x = -0.0100 to 0.2900 m, over a periodic side")),
+        "{low:?}"
+    );
+    assert!(
+        high.as_ref().is_err_and(|e| e.contains("x = 0.3100 to 0.6100 m, over a periodic side")),
+        "{high:?}"
+    );
+    for x in [0.205, 0.495] {
+        build(x).unwrap_or_else(|e| panic!("{x}: {e}"));
+    }
+}
+
 #[test]
 fn a_device_finds_what_touches_over_the_seam() {
     if !there_is_a_device("contact over seams is not compared") {

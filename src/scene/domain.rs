@@ -15,8 +15,8 @@ impl Builder<'_> {
         let l0 = self.lattice.spacing;
         let (mut bounds, mut notes) = (Bounds::default(), vec![]);
         for wall in &self.fixed.shapes {
-            let reach = Placed::from(wall).bounds();
-            bounds.add(&format!("wall `{}`", wall.name), wall.center - reach, wall.center + reach);
+            let (lo, hi) = Placed::from(wall).ends();
+            bounds.add(&format!("wall `{}`", wall.name), lo, hi);
         }
         for solid in self.moving_walls.iter().chain(&self.bodies) {
             let shape = solid.placed();
@@ -28,15 +28,15 @@ impl Builder<'_> {
                 bounds.add(&label, left.0 - l0, left.1 + l0);
                 continue;
             }
-            let (lo, hi) = (shape.center - shape.bounds(), shape.center + shape.bounds());
+            let (lo, hi) = shape.ends();
             bounds.add(&label, lo, hi);
             if let Drive::Prescribed(motion) = &solid.drive {
                 let (mut low, mut high) = (lo, hi);
                 for (way, turn) in motion.poses() {
                     let center = shape.center + way;
                     let axes = DMat3::from_quat(turn) * shape.axes;
-                    let reach = Placed { center, axes, ..shape }.bounds();
-                    (low, high) = (low.min(center - reach), high.max(center + reach));
+                    let (lo, hi) = Placed { center, axes, ..shape }.ends();
+                    (low, high) = (low.min(lo), high.max(hi));
                 }
                 bounds.add(&label, low, high);
                 notes.extend(if solid.is_body {
@@ -142,7 +142,7 @@ impl Builder<'_> {
         let (placed, reach) = (body.placed(), body.radius());
         let (mut low, mut high) = (body.position - reach, body.position + reach);
         let Some(tank) = &self.case.tank else { return (low, high) };
-        let now = placed.bounds();
+        let now = placed.ends();
         // The floor first: flaps stand on it.
         for k in [4, 5, 0, 1, 2, 3].into_iter().filter(self.walled(tank)) {
             let axis = k / 2;
@@ -152,9 +152,9 @@ impl Builder<'_> {
                 continue;
             }
             if k.is_multiple_of(2) {
-                low[axis] = low[axis].max(tank.min[axis].min(placed.center[axis] - now[axis]));
+                low[axis] = low[axis].max(tank.min[axis].min(now.0[axis]));
             } else {
-                high[axis] = high[axis].min(tank.max[axis].max(placed.center[axis] + now[axis]));
+                high[axis] = high[axis].min(tank.max[axis].max(now.1[axis]));
             }
         }
         (low, high)

@@ -38,10 +38,10 @@ impl Builder<'_> {
     /// Complains of a solid of any shape that reaches over a periodic side: half of it would be missing at the other
     /// one. A fixed one that spans the whole axis goes on there.
     pub(super) fn seams(&mut self, key: &str, what: &str, name: &str, shape: &Placed, fixed: bool) {
-        let (reach, slack) = (shape.bounds(), 1e-6 * self.lattice.spacing);
+        let ((start, end), slack) = (shape.ends(), 1e-6 * self.lattice.spacing);
         for k in 0..3 {
             let Some((low, high)) = self.periodic.sides(k) else { continue };
-            let (from, to) = (shape.center[k] - reach[k], shape.center[k] + reach[k]);
+            let (from, to) = (start[k], end[k]);
             let over = from < low - slack || to > high + slack;
             if over && !(fixed && from <= low + slack && to >= high - slack) {
                 let axis = AXES[k];

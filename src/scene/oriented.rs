@@ -37,7 +37,13 @@ impl Placed {
     pub fn reach(&self, n: DVec3) -> f64 {
         self.shape.reach(self.axes.transpose() * n)
     }
-    /// Half of the edges of the enclosing box along the world's axes [m].
+    /// Lower and upper corner of the box around it along the world's axes [m].
+    pub fn ends(&self) -> (DVec3, DVec3) {
+        let to = |way: f64| DVec3::from_array(DVec3::AXES.map(|n| way * self.reach(way * n)));
+        (self.center + to(-1.0), self.center + to(1.0))
+    }
+    /// Half of the edges of the box about its centre along the world's axes that holds it [m]: where it ends, see [`Placed::ends`], may be
+    /// nearer on one side.
     pub fn bounds(&self) -> DVec3 {
         DVec3::from_array(DVec3::AXES.map(|n| self.reach(n).max(self.reach(-n))))
     }
