@@ -207,6 +207,28 @@ fn a_tip_is_no_plate_however_its_sides_are_divided() {
     }
 }
 
+/// A section has the coordinates of the case: it turns about what is near it there, not about their origin.
+#[test]
+fn a_wall_far_from_the_origin_turns_as_fast_as_it_does_near_it() {
+    let flap = |dimensions: u32, keys: &str| {
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.02\ndimensions = {dimensions}\n\
+             [tank]\nmin = [20, 0, 0]\nmax = [21, 0.1, 0.6]\nopen = [\"z_max\"]\n\
+             [[body]]\nname = \"b\"\nsize = [0.06, 0.06, 0.06]\ncenter = [20.1, 0.05, 0.25]\ndensity = 500\n\
+             [contact]\nspring = 1e5\n\
+             [[moving_wall]]\nname = \"flap\"\nshape = \"prism\"\nheight = 0.08\nposition = [0, 0.01, 0]\n\
+             section = [[20.45, 0.1], [20.55, 0.1], [20.55, 0.5], [20.45, 0.5]]\n{keys}\n"
+        );
+        text.parse::<seixo::Case>().map_err(|e| e.to_string())
+    };
+    for dimensions in [2, 3] {
+        let near = flap(dimensions, "pivot = [20.5, 0.05, 0.1]\nrotation = [[0, 0, 0, 0], [1, 0, 60, 0]]");
+        near.unwrap_or_else(|e| panic!("{e}"));
+        let far = flap(dimensions, "pivot = [0, 0, 0]\nrotation = [[0, 0, 0, 0], [0.05, 0, 45, 0]]");
+        assert!(far.as_ref().is_err_and(|e| e.contains("the solid would jump")), "{far:?}");
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_section_is_said_with_its_key() {
     let prism = |rest: &str| format!("shape = \"prism\"\n{rest}");

@@ -26,7 +26,12 @@ impl Checker<'_> {
         if guide.motion.is_none() && guide.sine.is_none() && w.wave.is_none() && !guide.turns() {
             self.motion(&format!("{path}.motion"), &[]);
         }
-        self.guided(path, &guide, w.wave.is_some(), w.reach_and_middle());
+        self.guided(
+            path,
+            &guide,
+            w.wave.is_some(),
+            w.reach_and_middle(self.spacing().unwrap_or_default(), self.flat()),
+        );
         self.wave(&format!("{path}.wave"), w);
     }
 

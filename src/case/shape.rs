@@ -176,14 +176,26 @@ wall!(Obstacle);
 wall!(MovingWall);
 
 impl MovingWall {
-    /// Half of its diagonal [m] and its middle, as far as they are known without its file.
-    pub(super) fn reach_and_middle(&self) -> (f64, Vector) {
+    /// Radius of a sphere about its middle that holds it [m], and that middle, as far as its file can be read.
+    pub(super) fn reach_and_middle(&self, spacing: f64, flat: bool) -> (f64, Vector) {
         if let Some((min, max)) = self.corners() {
             let half = DVec3::from(max) - DVec3::from(min);
             return (0.5 * half.length(), [0, 1, 2].map(|k| 0.5 * (min[k] + max[k])));
         }
-        let middle = self.center.or(self.position).unwrap_or_default();
-        (self.form(None).reach(), middle)
+        let form = self.form(None);
+        let place = DVec3::from(self.position.unwrap_or_default());
+        let known = |middle: DVec3| (place + form.orientation() * middle).to_array();
+        match self.shape {
+            BodyShape::Prism => {
+                let (low, high) = form.ends(flat);
+                (0.5 * (high - low).length(), known(0.5 * (low + high)))
+            }
+            BodyShape::Mesh | BodyShape::Terrain => match form.shape(spacing, flat) {
+                Ok((shape, _)) => (shape.radius(), known(shape.origin())),
+                Err(_) => (form.reach(), place.to_array()),
+            },
+            _ => (form.reach(), self.center.unwrap_or_default()),
+        }
     }
 }
 
@@ -337,13 +349,18 @@ impl Form<'_> {
 
     /// Edges of the box around a prism [m]; zero of other shapes.
     fn around(&self) -> Vector {
-        let Some(section) = self.section.filter(|s| !s.is_empty()) else { return [0.0; 3] };
-        let across = |k: usize| {
-            let places = section.iter().map(|corner| corner[k]);
-            let ends = places.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)));
-            ends.1 - ends.0
-        };
-        [across(0), self.height.unwrap_or_default(), across(1)]
+        let (low, high) = self.ends(false);
+        (high - low).to_array()
+    }
+
+    /// Lower and upper corner of the box around a prism in the coordinates of its section [m], in the plane if it is `flat`; zero of other
+    /// shapes.
+    fn ends(&self, flat: bool) -> (DVec3, DVec3) {
+        let Some(section) = self.section.filter(|s| !s.is_empty()) else { return Default::default() };
+        let corners = section.iter().map(|&[x, z]| DVec3::new(x, 0.0, z));
+        let (low, high) = corners.fold((DVec3::MAX, DVec3::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)));
+        let height = if flat { 0.0 } else { self.height.unwrap_or_default() };
+        (low, high + height * DVec3::Y)
     }
 
     /// The key that its smallest length comes from, and the edges of the box around it [m].
