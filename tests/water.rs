@@ -95,6 +95,19 @@ fn a_seed_fills_its_basin_up_to_the_level_and_no_other() {
     assert!((volume(&held) / (0.28 * 0.28 * 0.14) - 1.0).abs() < 1e-9, "{}", volume(&held));
 }
 
+/// A tank that sloshes is a moving wall, and there is nothing else.
+#[test]
+fn a_vessel_of_moving_walls_holds_a_fill() {
+    let held = scene(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.1\ndimensions = 2\n\
+         [fluid]\n[[fluid.fill]]\nseed = [0.3, 0, 0.1]\nlevel = 0.2\n\
+         [[moving_wall]]\nname = \"vessel\"\nshape = \"prism\"\npivot = [0.3, 0, 0]\n\
+         section = [[-0.1, -0.1], [0.7, -0.1], [0.7, 0.5], [0.6, 0.5], [0.6, 0], [0, 0], [0, 0.5], [-0.1, 0.5]]\n\
+         [moving_wall.swing]\naxis = [0, 1, 0]\namplitude_deg = 4\nperiod = 1.3\nramp = 1.3\n",
+    );
+    assert_eq!(held.groups.fluid, 300);
+}
+
 #[test]
 fn a_fill_that_leaks_says_where_and_a_run_of_one_that_does_not_goes() {
     let folder = tempfile::tempdir().unwrap();

@@ -132,9 +132,13 @@ impl Checker<'_> {
                     format!("the seed at z = {} lies above the level of {}", fill.seed[2], fill.level);
                 self.add(format!("{path}.seed"), message, "put it into the water, below `level`");
             }
-            if case.tank.is_none() && case.obstacle.is_empty() {
+            if case.tank.is_none() && case.obstacle.is_empty() && case.moving_wall.is_empty() {
                 let message = "there is nothing that holds the water";
-                self.add(path, message, "give a [tank] or an [[obstacle]], or use a [[fluid.block]]");
+                self.add(
+                    path,
+                    message,
+                    "give a [tank], an [[obstacle]] or a [[moving_wall]], or use a [[fluid.block]]",
+                );
             }
         }
     }
