@@ -220,6 +220,23 @@ fn what_is_wrong_with_many_is_told_where_it_was_written() {
     assert_eq!(typed.laid_out().unwrap().body.len(), 6);
 }
 
+/// Numbers that make no solid are told as they are without `scatter`, and at once.
+#[test]
+fn what_is_scattered_among_wrong_numbers_is_told_them() {
+    let ball = |keys: &str| {
+        format!(
+            "[[body]]\nname = \"s\"\nshape = \"cylinder\"\nheight = 0.1\n{keys}\ndensity = 900\ncenter = [0.6, 0.5, 0.5]\n\
+             scatter = {{ count = 3, size = [0.5, 0.4, 0.2] }}\n"
+        )
+    };
+    let slope = "[[obstacle]]\nname = \"p\"\nshape = \"prism\"\nsection = [[0.4, 0.3], [0.8, 0.3], [0.8, 0.6]]\nheight = 0.6\n";
+    let wrong = told(&format!("{}{slope}", ball("radius = -0.1")));
+    assert!(wrong.contains("body.0.radius"), "{wrong}");
+    let endless = "[[obstacle]]\nname = \"o\"\nmin = [0.5, 0, 0]\nmax = [inf, 0.6, 0.1]\n";
+    let wrong = told(&format!("{}{endless}", ball("radius = 0.05")));
+    assert!(wrong.contains("obstacle.0.max"), "{wrong}");
+}
+
 /// The case beside the results stays as it was written, its mesh under another name; what changed of it is told by
 /// its keys.
 #[test]

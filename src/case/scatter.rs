@@ -89,13 +89,18 @@ struct Block {
 }
 
 impl Block {
-    /// That of a solid of the shape `form` about its middle.
+    /// That of a solid of the shape `form` about its middle; `None` of what is none, which is told elsewhere.
     fn of(form: &Form, spacing: f64, flat: bool) -> Option<Self> {
         let (shape, _) = form.shape(spacing, flat).ok()?;
         let (low, high) = shape.bounds(DMat3::IDENTITY);
         let axes = DMat3::from_quat(form.turn(flat) * shape.frame());
-        let known = low.is_finite() && high.is_finite() && axes.is_finite();
-        known.then(|| Self { center: axes * (0.5 * (low + high)), half: 0.5 * (high - low), axes })
+        Self { center: axes * (0.5 * (low + high)), half: 0.5 * (high - low), axes }.sound()
+    }
+
+    /// Itself if it has a size and a place.
+    fn sound(self) -> Option<Self> {
+        let known = self.center.is_finite() && self.half.is_finite() && self.axes.is_finite();
+        (known && self.half.cmpgt(DVec3::ZERO).all()).then_some(self)
     }
 
     /// Whether `gap` and more lies between it and `wall`, as far as halving it down to parts of [`PART`] of it shows.
@@ -192,6 +197,8 @@ impl Standing {
             Wall::Lattice(min, max) => {
                 let (low, high) = (self.place(*min), self.place(*max));
                 let half = 0.5 * (high - low);
+                // In two dimensions it has no width.
+                let half = if self.flat { half.with_y(0.5 * self.spacing) } else { half };
                 self.put(Block { center: low + half, half, axes: DMat3::IDENTITY });
             }
             Wall::Shaped(form, Place::Center(center))
@@ -201,6 +208,9 @@ impl Standing {
             }
             Wall::Shaped(form, place) => {
                 // What cannot be told of a shape is told elsewhere.
+                if Block::of(form, self.spacing, self.flat).is_none() {
+                    return;
+                }
                 let Ok((shape, _)) = form.shape(self.spacing, self.flat) else { return };
                 let turn = form.turn(self.flat);
                 let center = match place {
@@ -219,6 +229,7 @@ impl Standing {
     }
 
     fn put(&mut self, block: Block) {
+        let Some(block) = block.sound() else { return };
         self.blocks.push(block);
         if self.edge > 0.0 {
             self.enter(self.blocks.len() - 1);
