@@ -108,3 +108,25 @@ fn what_is_wrong_with_a_file_is_told_with_its_line() {
     let number = case(folder.path(), "motion = 7");
     assert_eq!(ran(&["plan", &number]).code, 2);
 }
+
+/// A discharge of each metre across is none of the whole width.
+#[test]
+fn a_discharge_has_the_unit_of_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("channel.toml");
+    for (dimensions, unit, fits) in
+        [(2, "m2/s", true), (2, "m3/s", false), (3, "m^3/s", true), (3, "m2/s", false)]
+    {
+        std::fs::write(folder.path().join("q.csv"), format!("t [s], q [{unit}]\n0,0\n1,0.02\n")).unwrap();
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 0.1\ndimensions = {dimensions}\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [1, 0.5, 0.5]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0.5, 0.3]\n\
+             [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.5, 0.2]\ndischarge = \"q.csv\"\n"
+        );
+        let read = seixo::case::file::load_text(&path, text, None, &[]).map_err(|e| e.to_string());
+        assert_eq!(read.is_ok(), fits, "{dimensions} {unit}: {read:?}");
+        let own = if dimensions == 2 { "[m2/s] in two" } else { "[m3/s] in three" };
+        assert!(read.is_ok() || read.is_err_and(|e| e.contains("`q` is in [") && e.contains(own)));
+    }
+}

@@ -31,6 +31,7 @@ const RATE: Form = Form { columns: 2, what: "time [s] and value, two numbers", s
 /// [`Error::Case`] with file and line of what is wrong with the rows, [`Error::Io`].
 pub(super) fn inline(path: &Path, text: String) -> Result<String> {
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text) };
+    let flat = document.get("run").and_then(|run| run.get("dimensions")?.as_integer()) == Some(2);
     let mut found = false;
     for (table, keys, form) in TABLES {
         let tables: Vec<&mut dyn TableLike> = match document.get_mut(table) {
@@ -44,7 +45,8 @@ pub(super) fn inline(path: &Path, text: String) -> Result<String> {
             for &key in keys {
                 let Some(Item::Value(value)) = one.get_mut(key) else { continue };
                 let Some(file) = value.as_str() else { continue };
-                let mut rows = Value::Array(rows(path, file, (&format!("{table}.{k}.{key}"), key), form)?);
+                let mut rows =
+                    Value::Array(rows(path, file, (&format!("{table}.{k}.{key}"), key), (form, flat))?);
                 // What stands around the name, a comment say, stays around the rows.
                 *rows.decor_mut() = value.decor().clone();
                 *value = rows;
@@ -82,7 +84,7 @@ pub(super) fn allow_files(schema: &mut serde_json::Value) {
 }
 
 /// The first column of a line of names that states a unit other than its own, with that unit.
-fn other_unit<'a>(line: &'a str, key: &str, form: &Form) -> Option<(&'a str, &'a str)> {
+fn other_unit<'a>(line: &'a str, key: &str, (form, flat): (&Form, bool)) -> Option<(&'a str, &'a str)> {
     let stated = |column: &'a str| {
         let (name, rest) = column.trim().split_once(['[', '('])?;
         Some((name.trim(), rest.split([']', ')']).next()?.trim()))
@@ -90,7 +92,8 @@ fn other_unit<'a>(line: &'a str, key: &str, form: &Form) -> Option<(&'a str, &'a
     let own = match key {
         "motion" => &["m", "metres", "meters"][..],
         "velocity" => &["m/s", "m s-1"],
-        _ => &["m3/s", "m\u{b3}/s", "m^3/s", "m2/s", "m\u{b2}/s", "m^2/s"],
+        _ if flat => &["m2/s", "m\u{b2}/s", "m^2/s", "m2 s-1"],
+        _ => &["m3/s", "m\u{b3}/s", "m^3/s", "m3 s-1"],
     };
     let columns = line.split(',').take(form.columns).enumerate();
     let mut found = columns.filter_map(|(k, column)| {
@@ -102,7 +105,7 @@ fn other_unit<'a>(line: &'a str, key: &str, form: &Form) -> Option<(&'a str, &'a
 }
 
 /// The rows of `file`, a name relative to the case at `path`, where `key` of the table at `place` names it.
-fn rows(path: &Path, file: &str, (place, key): (&str, &str), form: &Form) -> Result<Array> {
+fn rows(path: &Path, file: &str, (place, key): (&str, &str), (form, flat): (&Form, bool)) -> Result<Array> {
     let file = path.with_file_name("").join(file);
     let name = file.display().to_string();
     let wrong = |line: usize, why: String| {
@@ -125,8 +128,13 @@ fn rows(path: &Path, file: &str, (place, key): (&str, &str), form: &Form) -> Res
         // One line of names before the first row: names have letters, and what has none is a row that went wrong.
         let names = line.chars().any(char::is_alphabetic) && cells.iter().all(Option::is_none);
         if rows.is_empty() && !headed && names {
-            if let Some((name, unit)) = other_unit(line, key, form) {
-                let why = format!("`{name}` is in [{unit}]: write {}, and its name so", form.what);
+            if let Some((name, unit)) = other_unit(line, key, (form, flat)) {
+                let own = match (key, flat) {
+                    ("discharge", true) => ", a discharge of each metre across [m2/s] in two dimensions",
+                    ("discharge", false) => ", a discharge [m3/s] in three dimensions",
+                    _ => "",
+                };
+                let why = format!("`{name}` is in [{unit}]: write {}{own}, and its name so", form.what);
                 return Err(wrong(n, why));
             }
             headed = true;
