@@ -364,6 +364,20 @@ fn a_gauge_finds_its_wall_at_every_spacing() {
     assert!(error.contains("no fixed wall there"), "{error}");
 }
 
+/// An opening's solid has no pressure of its own: a gauge there is refused before anything starts, with its key.
+#[test]
+fn a_gauge_in_an_opening_is_refused_with_its_key() {
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.02\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.6]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.3]\n\
+         [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.2]\nvelocity = 0.1\n\
+         [[gauge.pressure]]\nname = \"p\"\npoint = [0, 0.05, 0.1]\n";
+    match Scene::build(&case(text)) {
+        Err(seixo::Error::Case(why)) => assert_eq!(why.problems[0].key, "gauge.pressure.0.point", "{why}"),
+        other => panic!("expected a refusal, got {:?}", other.map(|_| ())),
+    }
+}
+
 #[test]
 fn a_jet_presses_on_a_wall_with_the_momentum_that_it_loses() {
     // A jet of 0.1 m and 2 m/s meets, without gravity, a face of the tank, an obstacle of the lattice or a box that stands off it.
