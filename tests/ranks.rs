@@ -356,6 +356,49 @@ fn the_cuts_follow_the_water() {
     }
 }
 
+/// Water that runs fast along the floor of a tank, and what a gauge tells of that after each of the first steps, in which the tank is cut anew twice.
+pub(crate) fn felt_by_a_floor(simulation: &mut Simulation) -> Vec<Vec<f64>> {
+    let told = |s: &mut Simulation| s.gauges().expect("read").into_iter().map(|(_, value)| value).collect();
+    let step = |_| {
+        simulation.step().expect("a step");
+        told(simulation)
+    };
+    (0..45).map(step).collect()
+}
+
+pub(crate) fn fast_over_a_floor(tolerance: f64) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 0.5]\nopen = [\"z_max\"]\n\
+         [fluid]\nviscosity = 1e-2\nsolver = {{ tolerance = {tolerance} }}\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.3]\nvelocity = [2, 0, 0]\n\
+         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n"
+    ))
+}
+
+/// Asserts that many ranks, which stand so at the end, told the same as one after every step, to a `part` of the largest of each number.
+pub(crate) fn assert_felt(one: &[Vec<f64>], many: &[Vec<f64>], said: &[Standing], part: f64) {
+    // They began with the ten columns of the water.
+    assert!(said[said.len() - 1].columns[0] > 5, "cut anew: {said:?}");
+    for k in 0..one[0].len() {
+        let most = one.iter().map(|told| told[k].abs()).fold(0.0, f64::max);
+        for (step, (a, b)) in one.iter().zip(many).enumerate() {
+            assert!((a[k] - b[k]).abs() <= part * most, "number {k}, step {step}: {} {} {most}", a[k], b[k]);
+        }
+    }
+}
+
+/// What viscosity has done to a fixed wall in the step in which the tank is cut anew goes with it to the rank whose it is then.
+#[test]
+fn a_gauge_on_a_fixed_wall_knows_all_of_the_step_in_which_the_tank_is_cut_anew() {
+    let case = fast_over_a_floor(1e-11);
+    let one = felt_by_a_floor(&mut simulation(&case));
+    for ranks in [2, 3] {
+        let (many, said) = on_ranks(&case, ranks, felt_by_a_floor);
+        assert_felt(&one, &many, &said, 1e-6);
+    }
+}
+
 #[test]
 fn plan_tells_what_ranks_have_and_say() {
     for (case, ranks) in [

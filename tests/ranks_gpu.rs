@@ -205,6 +205,17 @@ fn the_cuts_between_devices_follow_the_water() {
 }
 
 #[test]
+fn a_gauge_on_a_fixed_wall_knows_all_of_the_step_in_which_devices_share_anew() {
+    if !device() {
+        return;
+    }
+    let case = fast_over_a_floor(1e-6);
+    let one = felt_by_a_floor(&mut on_device(&case));
+    let (many, said) = on_devices(&case, 2, felt_by_a_floor);
+    assert_felt(&one, &many, &said, 1e-2);
+}
+
+#[test]
 fn plan_tells_what_devices_of_ranks_say() {
     if !device() {
         return;

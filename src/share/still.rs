@@ -18,6 +18,8 @@ pub struct StillParticle {
     pub position: DVec3,
     /// [Pa], of a wall layer.
     pub pressure: f64,
+    /// What this step has told so far of the force on a wall layer [N], where that is kept ([`Fields::reaction`]).
+    pub reaction: DVec3,
     /// 0 of a wall layer, 1 of a dummy.
     group: u32,
     /// Among all of its group.
@@ -68,9 +70,17 @@ impl Share {
             let (first, columns) = (firsts[group], columns.clone());
             let particle = move |(k, &number): (usize, &u32)| {
                 let position = fields.position[first + k];
-                let pressure = if group == 0 { fields.pressure[first + k] } else { 0.0 };
+                let carrier = (group == 0).then_some(first + k);
+                let pressure = carrier.map_or(0.0, |i| fields.pressure[i]);
+                let reaction = carrier.and_then(|i| fields.reaction.get(i - self.groups.fluid).copied());
                 let there = columns.contains(&grid.coordinates(position)[0]);
-                there.then_some(StillParticle { position, pressure, group: group as u32, number })
+                there.then_some(StillParticle {
+                    position,
+                    pressure,
+                    reaction: reaction.unwrap_or_default(),
+                    group: group as u32,
+                    number,
+                })
             };
             numbers[group].iter().enumerate().filter_map(particle)
         };

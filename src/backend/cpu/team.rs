@@ -73,9 +73,14 @@ impl Cpu {
         let Some(share) = &mut self.share else { return };
         let Settled { water: here, still } = share.settle(&mut self.fields, &self.grid, &self.params);
         if let Some([walls, dummies]) = still {
-            let walls: Vec<_> = walls.iter().map(|s| (s.position, s.pressure)).collect();
+            let places: Vec<_> = walls.iter().map(|s| (s.position, s.pressure)).collect();
             let dummies: Vec<_> = dummies.iter().map(|s| s.position).collect();
-            self.lay_still(&walls, &dummies);
+            self.lay_still(&places, &dummies);
+            if self.still_reacts {
+                // Viscosity has acted in this step already.
+                let felt = &mut self.fields.reaction[self.groups.moving_wall..];
+                felt.iter_mut().zip(&walls).for_each(|(felt, s)| *felt = s.reaction);
+            }
         }
         self.make_room(here.len());
         if let Some(share) = &self.share {
@@ -121,7 +126,6 @@ impl Cpu {
         let carriers = self.groups.pressure() - self.groups.fluid;
         self.excess.lay_still(carriers);
         if self.still_reacts {
-            // What viscosity has told of them in the step that deals them out anew is lost.
             self.fields.reaction.truncate(self.groups.moving_wall);
             self.fields.reaction.resize(carriers, DVec3::ZERO);
         }

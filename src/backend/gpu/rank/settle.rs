@@ -16,7 +16,7 @@ use crate::kernels::device::of_halo::buffer;
 use crate::kernels::move_solids::move_solids;
 use crate::kernels::predict::DISPLACEMENT_MAX;
 use crate::kernels::shift::SHIFT_MAX;
-use crate::plan::Arrays;
+use crate::plan::{Arrays, Told};
 use crate::scene::{Kind, Scene};
 use crate::share::room;
 use bytemuck::{Pod, Zeroable};
@@ -254,7 +254,20 @@ impl GpuRank {
         if self.gpu.plan.needs(Arrays::Coupling) {
             self.tell_walls(buffers::inertia_head, 0, self.gpu.groups.moving_wall)?;
         }
-        Ok(())
+        if self.gpu.plan.reaction == Told::All { self.tell_reactions(walls.len()) } else { Ok(()) }
+    }
+
+    /// Tells all ranks what this step has told so far of the forces on the walls, of `count`, that never move: viscosity has acted. Of those that move
+    /// each rank adds up what it has itself.
+    fn tell_reactions(&mut self, count: usize) -> Result<()> {
+        let mut rows = self.gpu.context.download(buffers::reaction, count)?;
+        for axis in 0..3 {
+            let mut told: Vec<f64> = rows.iter().map(|row| f64::from(row[axis])).collect();
+            self.share.tell_walls(&mut told);
+            let still = rows.iter_mut().zip(told).skip(self.gpu.groups.moving_wall);
+            still.for_each(|(row, told)| row[axis] = told as f32);
+        }
+        self.gpu.context.upload(buffers::reaction, &rows)
     }
 
     /// Tells all ranks the `count` numbers of wall layers from `first` on that this one has.
