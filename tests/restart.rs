@@ -107,13 +107,21 @@ impl Case {
         assert_same(&self.root("whole"), &self.root("parts"), what);
         let result =
             |name: &str| json(&std::fs::read_to_string(self.root(name).join("result.json")).unwrap());
-        let (mut a, mut b) = (result("whole"), result("parts"));
-        assert_eq!((a["parts"].as_u64(), b["parts"].as_u64()), (Some(1), Some(3)));
-        for times in ["wall_s", "parts", "stages", "memory_peak_bytes"] {
-            a[times] = serde_json::Value::Null;
-            b[times] = serde_json::Value::Null;
-        }
-        assert_eq!(a, b, "{what}");
+        let assert_same_result = |parts: u64| {
+            let (mut a, mut b) = (result("whole"), result("parts"));
+            assert_eq!((a["parts"].as_u64(), b["parts"].as_u64()), (Some(1), Some(parts)));
+            for times in ["wall_s", "parts", "stages", "memory_peak_bytes"] {
+                a[times] = serde_json::Value::Null;
+                b[times] = serde_json::Value::Null;
+            }
+            assert_eq!(a, b, "{what}, {parts} parts");
+        };
+        assert_same_result(3);
+        // Killed before its last word, it says the same without a step more.
+        std::fs::remove_file(self.root("parts").join("result.json")).unwrap();
+        let last = self.run("parts", &["--resume"]);
+        assert_eq!(last.code, 0, "{what}: {}", last.err);
+        assert_same_result(4);
     }
 }
 
@@ -300,6 +308,40 @@ fn a_damaged_state_is_passed_over_for_the_older_one() {
     }
     let lost = case.run("b", &["--resume"]);
     assert!(lost.code == 2 && lost.err.matches("cut off").count() == 2, "{}", lost.err);
+}
+
+/// Another interval holds from then on, whatever multiples of the old one have been reached.
+#[test]
+fn a_run_goes_on_with_states_at_other_times() {
+    let case = Case::new(&["run.checkpoint={every=1e-3,wall=0}", "output.every=1"], "cpu");
+    let steps = || {
+        let files = seixo::checkpoint::file::files(&case.root("a").join("checkpoint")).unwrap();
+        let step =
+            |path: &std::path::PathBuf| path.file_stem().unwrap().to_str().unwrap()[5..].parse().unwrap();
+        files.iter().map(step).collect::<Vec<u64>>()
+    };
+    assert_eq!(case.run("a", &["--steps", "20"]).code, 0);
+    assert_eq!(steps(), [20, 19]);
+    let on = case.run("a", &["--resume", "--set", "run.checkpoint.every=0.01", "--steps", "35"]);
+    assert_eq!(on.code, 0, "{}", on.err);
+    assert_eq!(steps(), [35, 30]);
+}
+
+/// A run keeps the names of its files when the case file gets another one, and when its folder tells it.
+#[test]
+fn a_run_goes_on_with_its_case_renamed() {
+    let mut case = Case::new(&[], "cpu");
+    assert_eq!(case.run("whole", &[]).code, 0);
+    assert_eq!(case.run("a", &["--steps", "7"]).code, 0);
+    let renamed = case.root("renamed.toml");
+    std::fs::rename(&case.path, &renamed).unwrap();
+    case.path = renamed.display().to_string();
+    let on = case.run("a", &["--resume", "--steps", "30"]);
+    assert_eq!(on.code, 0, "{}", on.err);
+    let root = case.root("a").display().to_string();
+    let told = ran(&["run", "--resume", &root, "--backend", "cpu", "--threads", "1", "-q"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert_same(&case.root("whole"), &case.root("a"), "renamed");
 }
 
 #[test]

@@ -220,6 +220,9 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
                 if !args.quiet {
                     let (step, time) = (found.origin.step, found.origin.time);
                     remark(&format!("going on from step {step}, t = {time:.4} s"));
+                    if found.origin.name != asked.name {
+                        remark(&format!("its files keep their name, {}", found.origin.name));
+                    }
                 }
                 Start::Resume(found)
             }

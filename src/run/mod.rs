@@ -100,6 +100,8 @@ pub fn run(
         Start::Replace => Mode::Replace,
         Start::Resume(found) => {
             fits(simulation, &found)?;
+            // What was written goes on under the name that it has, whatever that of the case file is now.
+            options.name = found.origin.name;
             archive = Some(found.archive.into_restore());
             Mode::Continue
         }
@@ -134,7 +136,10 @@ pub fn run(
     };
     // The state may be large, and ends here.
     match archive {
-        Some(mut archive) => run.exchange(&mut archive)?,
+        Some(mut archive) => {
+            run.exchange(&mut archive)?;
+            run.saving.every.reached(simulation.time);
+        }
         None => run.skip(simulation.time),
     }
     // What the run said of its end holds no more.
@@ -176,11 +181,22 @@ struct Run {
 impl Run {
     /// Save how far files and sums are, or go back to that.
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self { start, frames, tables, totals, steps_max: _, saving, pace: _, walls, parts, dt } = self;
+        let Self {
+            start,
+            frames,
+            tables,
+            totals,
+            steps_max: _,
+            // The interval may have changed; the next moment follows from the time.
+            saving: _,
+            pace: _,
+            walls,
+            parts,
+            dt,
+        } = self;
         frames.exchange(archive)?;
         tables.exchange(archive)?;
         totals.exchange(archive)?;
-        saving.every.exchange("checkpoint", archive)?;
         let mut wall = *walls + start.elapsed().as_secs_f64();
         archive.number("run.wall", &mut wall)?;
         if !archive.is_saving() {

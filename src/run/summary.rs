@@ -47,7 +47,7 @@ impl Totals {
             looks,
             density_error,
             speed,
-            // Read from the simulation at the next row.
+            // Read from the simulation at the next row, and at the end.
             ledger: _,
             water: _,
             // By the clock of each process.
@@ -131,10 +131,16 @@ impl Totals {
         monitors.driven_contact_work += report.dt * simulation.solids.driven_contact_power();
     }
 
+    /// Take in what the simulation itself has counted since the start.
+    pub fn see(&mut self, fluid: &FluidMonitor, counters: &Counters) {
+        self.water = (fluid.particles, counters.swallowed.clone());
+        self.pressure.clamps = counters.pressure_clamps;
+    }
+
     /// Count in what a table row shows: the fluid, the guards and the bodies' energy [J].
     pub fn look(&mut self, fluid: &FluidMonitor, counters: &Counters, bodies: f64, dt: f64, l0: f64) {
+        self.see(fluid, counters);
         self.speed = fluid.speed_max;
-        self.water = (fluid.particles, counters.swallowed.clone());
         self.looks += 1;
         self.density_error += fluid.density_error_mean;
         let monitors = &mut self.monitors;
@@ -146,7 +152,6 @@ impl Totals {
         if monitors.energy_end.partial_cmp(&monitors.energy_max).is_none_or(std::cmp::Ordering::is_gt) {
             monitors.energy_max = monitors.energy_end;
         }
-        self.pressure.clamps = counters.pressure_clamps;
         monitors.lost_particles = counters.lost;
         monitors.neighbours_max = counters.neighbours_max;
     }

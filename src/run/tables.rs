@@ -193,7 +193,8 @@ impl Tables {
         Ok(())
     }
 
-    /// Rows at the end, if the last step has none yet; the summary's numbers of the end come from here.
+    /// Rows at the end, if the last step has none yet; the summary's numbers of the end come from here. A run that went on from a state of its last step
+    /// has the rows, but not all of these numbers.
     ///
     /// # Errors
     /// [`crate::error::Error::Io`], or what the backend says.
@@ -206,22 +207,18 @@ impl Tables {
         if self.gauged != Some(simulation.steps) {
             self.write_gauges(simulation)?;
         }
-        if self.last == Some(simulation.steps) {
-            return Ok(());
+        if self.last != Some(simulation.steps) {
+            return self.write(report, simulation, totals);
         }
-        self.write(report, simulation, totals)
+        let (fluid, counters) = observe(simulation, report)?;
+        totals.see(&fluid, &counters);
+        totals.ledger = simulation.ledger()?;
+        Ok(())
     }
 
     fn write(&mut self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
         self.last = Some(simulation.steps);
-        let (fluid, counters) = if simulation.plan.wet() {
-            match &report.look {
-                Some(seen) => seen.clone(),
-                None => simulation.observe()?,
-            }
-        } else {
-            (FluidMonitor::default(), Counters::default())
-        };
+        let (fluid, counters) = observe(simulation, report)?;
         let bodies = simulation.solids.energy();
         totals.look(&fluid, &counters, bodies.total(), report.dt, simulation.params.spacing);
         let since = std::mem::take(&mut self.since);
@@ -316,6 +313,14 @@ impl Tables {
         }
         Ok(())
     }
+}
+
+/// The water and the counters, if `report` has not seen them already; nothing of a dry scene.
+fn observe(simulation: &mut Simulation, report: &StepReport) -> Result<(FluidMonitor, Counters)> {
+    if !simulation.plan.wet() {
+        return Ok(Default::default());
+    }
+    report.look.clone().map_or_else(|| simulation.observe(), Ok)
 }
 
 fn monitor_header(stages: &[Stage], simulation: &Simulation) -> Vec<String> {
