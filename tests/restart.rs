@@ -486,6 +486,18 @@ fn another_run_takes_over_how_things_move_and_nothing_that_followed_from_laws() 
 }
 
 #[cfg(unix)]
+    // Locked in all that it could do, it stays where it has come to, when that run goes on, too.
+    let whole = more("density=500,locked=[\"x\",\"z\",\"rotation_y\"]");
+    let (fixed, stuck) = end(&[&whole, soft], "stuck", Some(&moving));
+    assert_eq!(fixed.run("parts", &["--steps", "20"]).code, 0);
+    assert_eq!(fixed.run("parts", &["--resume"]).code, 0);
+    let parts = json(&std::fs::read_to_string(fixed.root("parts").join("result.json")).unwrap());
+    for stuck in [stuck, parts] {
+        for key in ["position_m", "orientation_wxyz"] {
+            assert_eq!(stuck["bodies"][0][key], before["bodies"][0][key]);
+        }
+        assert_eq!((of(&stuck, "velocity_m_s", 0), of(&stuck, "angular_velocity_rad_s", 1)), (0.0, 0.0));
+    }
 #[test]
 fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     let case = Case::new(&["run.end=1e6", "output.every=0.005"], "cpu");

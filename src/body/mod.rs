@@ -63,6 +63,8 @@ pub(crate) struct Body {
     weight_arm: DVec3,
     /// Place and orientation at the start, and tables of motion, of a prescribed solid.
     motion: Option<(DVec3, DQuat, Motion)>,
+    /// It is locked in all that it could do, and stays where it is: at the start, or where a state had it.
+    held: bool,
     /// The inertia does not depend on the orientation.
     isotropic: bool,
 }
@@ -89,6 +91,7 @@ impl Body {
             shape_offset: solid.shape_offset,
             weight_arm: DVec3::ZERO,
             motion: None,
+            held: false,
             isotropic: false,
         };
         match &solid.drive {
@@ -97,6 +100,7 @@ impl Body {
             }
             // What is held in all that it could do is a wall to others.
             Drive::Free(free) if !free.gives_way() => {
+                body.held = true;
                 body.motion = Some((solid.position, body.pose.orientation, Motion::still()));
             }
             Drive::Free(free) => {
@@ -275,11 +279,18 @@ impl Body {
         if self.is_free() {
             self.inverse_inertia = self.inverse_inertia_at(self.rotation);
         }
+        if let (true, Some((position, orientation, _))) = (self.held, &mut self.motion) {
+            (*position, *orientation) = (pose.position, pose.orientation);
+        }
     }
 
     /// Moves on from `pose` as far as its freedom goes, with `momentum` [kg m2/s] if that is still what turns it so.
     pub fn take_over(&mut self, pose: Pose, momentum: DVec3) {
         self.restore(pose, momentum);
+        if self.held {
+            self.pose = Pose { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, ..pose };
+            self.momentum = DVec3::ZERO;
+        }
         if !self.is_free() {
             return;
         }
