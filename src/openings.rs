@@ -36,6 +36,7 @@ struct Gate {
     /// Particles that it had swallowed when they were last counted.
     taken: u64,
     /// Volume that its discharge has asked for so far [m3]: the discharge may have been another before `run.from`.
+    /// 0 of walls that follow none.
     asked: f64,
 }
 
@@ -154,6 +155,21 @@ impl Openings {
             let wet = if wet > 0.0 { wet } else { full };
             gate.area =
                 (wet - MADE_UP * behind / l0).clamp(full / crate::case::HURRY, full * crate::case::HURRY);
+        }
+    }
+
+    /// Takes in what outflows have `swallowed` in the run before `run.from`. One that follows a discharge from now on, and had none there, owes
+    /// nothing for that time: of what it is asked for it has all but the layer that its wall has begun.
+    pub(crate) fn begin(&mut self, swallowed: &[u64]) {
+        let l0 = self.spacing;
+        let outflows = self.gates.iter_mut().filter(|g| !g.opening.is_inflow());
+        for (gate, &total) in outflows.zip(swallowed) {
+            if !matches!(gate.opening.passes, Passes::Drawn(_)) {
+                gate.asked = 0.0;
+            } else if gate.asked == 0.0 {
+                gate.taken = total;
+                gate.asked = total as f64 * l0.powi(3) + gate.travel * gate.area;
+            }
         }
     }
 

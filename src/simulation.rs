@@ -2,7 +2,7 @@
 //! `step.rs`, what it does to solids in `simulation/solids.rs`, what ends a run before its end in `simulation/guards.rs`,
 //! its state in `simulation/archive.rs`.
 
-mod archive;
+pub(crate) mod archive;
 mod guards;
 mod solids;
 

@@ -20,7 +20,7 @@ fn tank(depth: f64, more: &str) -> String {
 }
 
 /// A channel 0.8 m long with water 0.1 m deep that flows at 0.25 m/s, in two dimensions.
-fn channel(outflow: &str) -> String {
+pub(crate) fn channel(outflow: &str) -> String {
     format!(
         "[run]\nspacing = 0.01\ntime_step = 2e-3\nadaptive = true\nend = 6.0\ndimensions = 2\n\
          [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0.1, 0.2]\nopen = [\"z_max\"]\n\
@@ -327,34 +327,91 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
     }
 }
 
-/// What the old discharge has asked for was met, or was not, by the old run: the new one follows its own from there on.
+/// What the old discharge has asked for was met, or was not, by the old run, and a velocity asks for nothing: the new discharge is followed from
+/// there on.
 #[test]
 fn a_run_that_goes_on_with_another_discharge_owes_nothing_for_the_time_before() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("tank.toml");
-    let outflow = "[[outflow]]\nname = \"out\"\nface = \"x_max\"\ndischarge = 0.01\n";
-    std::fs::write(&path, tank(0.2, outflow)).unwrap();
-    let path = path.display().to_string();
     let root = |name: &str| folder.path().join(name).display().to_string();
     // Particles that have gone out by the end of each run.
-    let run = |name: &str, end: &str, sets: &[&str]| {
-        let out = root(name);
-        let sets = sets.iter().flat_map(|set| ["--set", set]);
+    let run = |name: &str, end: &str, flow: &str, from: Option<&str>| {
+        let (path, out) = (root(&format!("{name}.toml")), root(name));
+        let outflow = format!("[[outflow]]\nname = \"out\"\nface = \"x_max\"\n{flow}\n");
+        std::fs::write(&path, tank(0.2, &outflow)).unwrap();
         let args = ["run", &path, "--backend", "cpu", "--threads", "1", "-q", "-o", &out, "--until", end];
+        let from = from.map(|name| format!("run.from=\"{}\"", root(name)));
+        let sets = from.iter().flat_map(|set| ["--set", set]);
         let ran = ran(&args.into_iter().chain(sets).collect::<Vec<_>>());
         assert_eq!(ran.code, 0, "{}", ran.err);
         let result = json(&std::fs::read_to_string(Path::new(&out).join("result.json")).unwrap());
         result["water"]["outflow"][0]["particles"].as_u64().unwrap()
     };
-    let first = run("first", "0.4", &[]);
-    let from = format!("run.from=\"{}\"", root("first"));
-    for discharge in [0.002, 0.02] {
-        let set = format!("outflow.0.discharge={discharge}");
-        let out = run(&format!("second {discharge}"), "0.8", &[&from, &set]);
-        let asked = discharge * 0.4 / 1e-4;
-        println!("{first} out by 0.4 s, {} of {asked} from there on with {discharge} m2/s", out - first);
-        // A layer goes at a time, of at most 20 particles.
-        assert!(((out - first) as f64 - asked).abs() <= 20.0, "{discharge}: {first}, then {out}");
+    run("short", "0.2", "discharge = 0.01", None);
+    for (before, first, then) in [
+        ("discharge", run("discharge", "0.4", "discharge = 0.01", None), &[0.002, 0.02][..]),
+        ("velocity", run("velocity", "0.4", "velocity = 0.05", None), &[0.02]),
+        ("one after the other", run("one after the other", "0.4", "velocity = 0.1", Some("short")), &[0.02]),
+    ] {
+        for discharge in then {
+            let name = format!("{before}, then {discharge}");
+            let out = run(&name, "0.8", &format!("discharge = {discharge}"), Some(before));
+            let asked = discharge * 0.4 / 1e-4;
+            println!("{name}: {first} out by 0.4 s, {} of {asked} from there on", out - first);
+            // A layer goes at a time, of at most 20 particles.
+            assert!(((out - first) as f64 - asked).abs() <= 20.0, "{name}: {first}, then {out}");
+        }
+    }
+}
+
+/// A later end brings more water, for which the state has no room: it is made. A state with room for more than the case has is refused, with the
+/// key that gives as much.
+#[test]
+fn a_state_goes_on_with_room_for_more_water() {
+    for backend in ["cpu", "gpu"] {
+        if backend == "gpu" && gpu::adapters().is_empty() {
+            eprintln!("SKIPPED: no GPU adapter");
+            continue;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("channel.toml");
+        std::fs::write(&path, channel("velocity = 0.25")).unwrap();
+        let path = path.display().to_string();
+        let root = |name: &str| folder.path().join(name).display().to_string();
+        // Lists of neighbours, which a viscous state has, name slots.
+        let viscous = ["--set", "fluid.viscosity=1e-6", "--set", "inflow.0.velocity=0.5"];
+        let base = ["run", &path, "--backend", backend, "--threads", "1", "-q"];
+        let run = |name: &str, more: &[&str]| {
+            let out = root(name);
+            ran(&base.iter().chain(&viscous).chain(&["-o", &out]).chain(more).copied().collect::<Vec<_>>())
+        };
+        let done = |name: &str, more: &[&str]| {
+            let ran = run(name, more);
+            assert_eq!(ran.code, 0, "{name}: {}", ran.err);
+            json(&std::fs::read_to_string(format!("{}/result.json", root(name))).unwrap())
+        };
+        let from = |name: &str| format!("run.from=\"{}\"", root(name));
+        let long = done("long", &["--until", "0.15"]);
+        done("first", &["--until", "0.05"]);
+        let second = done("second", &["--until", "0.15", "--set", &from("first")]);
+        assert_eq!(second["water"], long["water"], "{backend}");
+        let energy = |result: &serde_json::Value| result["monitors"]["energy_end_J"].as_f64().unwrap();
+        // An earlier end is one at which the water stands lower, and constants follow from its depth.
+        let apart = (energy(&second) / energy(&long) - 1.0).abs();
+        assert!(apart < 1e-3, "{backend}: {apart:e}");
+        // Its state knows the room that it has.
+        done("third", &["--until", "0.16", "--set", &from("second"), "--set", "fluid.max_volume=0.1"]);
+        if backend == "gpu" {
+            continue;
+        }
+        let narrow = ["--until", "0.16", "--set", &from("second"), "--set", "fluid.max_volume=0.081"];
+        let refused = run("none", &narrow);
+        assert!(refused.code == 2 && refused.err.contains("fluid.max_volume: the state"), "{}", refused.err);
+        let planned =
+            ran(&["plan", &path].iter().chain(&viscous).chain(&narrow).copied().collect::<Vec<_>>());
+        assert!(planned.code == 2 && planned.err.contains("fluid.max_volume: the state"), "{}", planned.err);
+        let least = refused.err.split("give fluid.max_volume = ").nth(1).and_then(|t| t.split(' ').next());
+        let least = format!("fluid.max_volume={}", least.unwrap_or_else(|| panic!("{}", refused.err)));
+        done("fourth", &["--until", "0.16", "--set", &from("second"), "--set", &least]);
     }
 }
 

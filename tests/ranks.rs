@@ -632,6 +632,24 @@ fn run_on(text: &str, ranks: usize, out: &Path, steps: u64) -> Finished {
     if ranks == 1 { go(&mut simulation(&case)) } else { on_ranks(&case, ranks, go).0 }
 }
 
+#[test]
+fn ranks_go_on_from_a_state_with_room_for_less_water() {
+    let text =
+        crate::openings::channel("velocity = 0.25").replace("velocity = 0.25\n[[o", "velocity = 0.5\n[[o");
+    let folder = tempfile::tempdir().unwrap();
+    let first = folder.path().join("first");
+    run_on(&text.replace("end = 6.0", "end = 0.04"), 1, &first, u64::MAX);
+    let more = format!("end = 0.1\nfrom = \"{}\"", first.display());
+    let water = |ranks: usize| {
+        let done =
+            run_on(&text.replace("end = 6.0", &more), ranks, &folder.path().join(ranks.to_string()), 60);
+        done.summary.water.expect("openings")
+    };
+    let (one, two) = (water(1), water(2));
+    assert!(one.inflow[0].particles > 10 && one.particles_end > 800, "{one:?}");
+    assert_eq!(format!("{one:?}"), format!("{two:?}"));
+}
+
 /// The water of a frame, and the places of its particles in the order of their numbers.
 fn water(frame: &Frame) -> (Particles, Vec<usize>) {
     let water = particles(frame.fluid.as_deref().expect("a frame with water")).expect("it is read");

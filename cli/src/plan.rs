@@ -23,7 +23,7 @@ use seixo::machine;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
-use seixo::run::from::named;
+use seixo::run::from::{holds, named};
 use seixo::run::summary::particles;
 use seixo::scene::{Drive, Scene, Solid};
 use seixo::share::Outlook;
@@ -267,6 +267,9 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         None => None,
     };
     if let Some(found) = named(case)? {
+        if built {
+            holds(&found, scene)?;
+        }
         let (step, time) = (found.origin.step, found.origin.time);
         advice.push(format!("run.from: it begins with the state of step {step}, t = {time:.4} s"));
         advice.extend(found.damaged.iter().map(|why| format!("run.from: an older state is taken: {why}")));

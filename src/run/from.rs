@@ -6,7 +6,9 @@ use crate::case::file::{Loaded, parse};
 use crate::checkpoint::{Found, file};
 use crate::error::{Error, Result};
 use crate::output::folder::checkpoints;
+use crate::scene::Scene;
 use crate::simulation::Simulation;
+use crate::simulation::archive::slots_of_water;
 use std::path::Path;
 
 /// The state that `run.from` names.
@@ -17,6 +19,7 @@ use std::path::Path;
 pub(super) fn earlier(simulation: &Simulation) -> Result<Option<Found>> {
     let Some(found) = named(&simulation.case)? else { return Ok(None) };
     fits(simulation, &found).map_err(|e| Error::misfit(format!("run.from: {e}")))?;
+    holds(&found, &simulation.scene)?;
     Ok(Some(Found { archive: found.archive.into_beginning(), ..found }))
 }
 
@@ -100,6 +103,21 @@ fn is_of_scene(path: &str) -> bool {
     };
     // A table as a whole: there are more of them, or fewer.
     parts.next().is_none_or(|key| !free.contains(&key))
+}
+
+/// Refuses a state with room for more water than `scene` has: there may be that much in it. Room for more is made.
+///
+/// # Errors
+/// [`Error::Case`].
+pub fn holds(found: &Found, scene: &Scene) -> Result<()> {
+    let (l0, here) = (scene.spacing, scene.groups.fluid);
+    let Some(held) = slots_of_water(&found.archive).filter(|&held| held > here) else { return Ok(()) };
+    let (volume, unit) = if scene.dimensions == 2 { (l0.powi(2), "m2") } else { (l0.powi(3), "m3") };
+    let text = format!(
+        "fluid.max_volume: the state of run.from has room for {held} particles of water, this case for {here}"
+    );
+    let remedy = format!("give fluid.max_volume = {:.4e} [{unit}] or more", 1.0001 * held as f64 * volume);
+    Err(Error::key("fluid.max_volume", text, remedy))
 }
 
 /// Refuses a state of another kind of processor.

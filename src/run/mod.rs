@@ -114,6 +114,7 @@ pub fn run(
         for why in &found.damaged {
             remark(&format!("warning: run.from: an older state is taken: {why}"));
         }
+        simulation.make_room(&mut found.archive)?;
         simulation.exchange(&mut found.archive)?;
         stands(simulation)?;
         inputs.extend(simulation.case.run.from.as_ref().map(PathBuf::from));

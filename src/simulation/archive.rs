@@ -8,7 +8,52 @@ use crate::plan::Stage;
 use crate::scene::Groups;
 use glam::DVec3;
 
+/// Slots of the water in a state.
+const WATER: &str = "particles of water";
+/// Arrays of every backend's states over all particles, over those that carry pressure, over the water.
+const OF_ALL: [&str; 3] = ["position", "velocity", "kind"];
+const OF_CARRIERS: [&str; 3] = ["pressure", "number_density", "state"];
+const OF_WATER: [&str; 2] = ["id", "acceleration"];
+/// Lists of neighbours, which name slots.
+const LISTS: [&str; 5] =
+    ["list_start", "list_dummies", "list_neighbour", "neighbour_count", "neighbour_list"];
+
+/// Slots of the water in `archive`, if it says.
+pub(crate) fn slots_of_water(archive: &Archive) -> Option<usize> {
+    archive.numbers.get(WATER).map(|&n| n as usize)
+}
+
 impl Simulation {
+    /// Gives `archive`, a state of another run, as many slots of water as there are here, if it has fewer: more is to come in. They hold what those here
+    /// hold at t = 0, no particle. Lists of neighbours are left out, and made anew.
+    ///
+    /// # Errors
+    /// What the backend says.
+    pub(crate) fn make_room(&mut self, archive: &mut Archive) -> Result<()> {
+        let (groups, slots) = (self.groups, self.groups.fluid);
+        let spare = self.scene.water()..slots;
+        let Some(held) = slots_of_water(archive).filter(|held| spare.contains(held)) else { return Ok(()) };
+        let mut here = Archive::new();
+        self.exchange(&mut here)?;
+        let arrays = [(groups.total(), &OF_ALL[..]), (groups.pressure(), &OF_CARRIERS), (slots, &OF_WATER)];
+        for (count, name) in
+            arrays.into_iter().flat_map(|(count, names)| names.iter().map(move |n| (count, *n)))
+        {
+            let (Some(full), Some(short)) = (here.sections.get(name), archive.sections.get_mut(name)) else {
+                continue;
+            };
+            let size = full.bytes.len() / count;
+            let more = held * size..slots * size;
+            // What fits no better then is refused when it is taken over.
+            if short.bytes.len() + more.len() == full.bytes.len() {
+                short.bytes.splice(more.start..more.start, full.bytes[more].iter().copied());
+            }
+        }
+        LISTS.iter().for_each(|name| drop(archive.sections.remove(*name)));
+        archive.numbers.insert(WATER.to_owned(), slots as u64);
+        Ok(())
+    }
+
     /// Save the whole state between two steps, or take it over.
     ///
     /// # Errors
@@ -43,7 +88,7 @@ impl Simulation {
             openings,
         } = self;
         let Groups { fluid, moving_wall, static_wall, static_dummy, moving_dummy } = *groups;
-        archive.same("particles of water", fluid as u64)?;
+        archive.same(WATER, fluid as u64)?;
         archive.same("wall particles that move", moving_wall as u64)?;
         archive.same("wall particles", static_wall as u64)?;
         archive.same("dummies", static_dummy as u64)?;
@@ -83,6 +128,10 @@ impl Simulation {
         if !archive.is_saving() && plan.has(Stage::MoveSolids) {
             backend.move_solids(&openings.place(solids.poses()))?;
         }
-        backend.exchange(archive)
+        backend.exchange(archive)?;
+        if archive.is_of_another() && !openings.is_empty() {
+            openings.begin(&backend.counters()?.swallowed);
+        }
+        Ok(())
     }
 }
