@@ -380,6 +380,18 @@ fn a_state_starts_another_case() {
         assert!(wrong.code == 2 && wrong.err.contains(words), "{words}: {}", wrong.err);
         assert!(!case.root("third").exists(), "{words}");
     }
+    // Steps that are asked for are the run's own, when it goes on, too.
+    let (short, root) = (case.root("short"), case.root("short").display().to_string());
+    for (own, more) in [(5, &["--steps", "5"][..]), (9, &["--steps", "9", "--resume"])] {
+        let args: Vec<&str> = case.args(&root, &["--until", "0.08", "--set", &from]);
+        let few =
+            ran(&args.into_iter().filter(|a| *a != "-q").chain(more.iter().copied()).collect::<Vec<_>>());
+        let result = json(&std::fs::read_to_string(short.join("result.json")).unwrap());
+        let (all, before) = (result["steps"].as_u64().unwrap(), result["steps_before"].as_u64().unwrap());
+        assert!(few.code == 0 && before >= 50 && all == before + own, "{all} of {before}: {}", few.err);
+        let told = format!("{own} steps, after {before} of run.from, to t = ");
+        assert!(few.out.contains(&told), "{}", few.out);
+    }
     // What happens from then on may change, where the wall goes included.
     let free = [
         "--set",
@@ -474,18 +486,6 @@ fn another_run_takes_over_how_things_move_and_nothing_that_followed_from_laws() 
     let way = |r: &serde_json::Value| of(r, "position_m", 0) - of(&before, "position_m", 0);
     assert!((way(&heavy) - 0.025).abs() < 1e-6 && way(&held) == 0.0, "{} {}", way(&heavy), way(&held));
     assert_eq!(of(&held, "velocity_m_s", 0), 0.0);
-    // A harder spring is cut into more sub-steps; a ledger begins with the run.
-    let (_, hard) = end(&[&free, "contact.spring=1e7", "output.ledger=true"], "hard", Some(&moving));
-    let substeps = |r: &serde_json::Value| r["monitors"]["contact_substeps_max"].as_u64().unwrap();
-    assert!(substeps(&hard) > substeps(&before), "{} {}", substeps(&hard), substeps(&before));
-    let left = hard["ledger_J"]["unaccounted"].as_f64().unwrap();
-    assert!(left.abs() < 1e-9, "{left}");
-    // Solves are those of the run.
-    let steps = |r: &serde_json::Value| r["steps"].as_u64().unwrap();
-    assert_eq!(hard["pressure"]["solves"].as_u64().unwrap(), steps(&hard) - steps(&before));
-}
-
-#[cfg(unix)]
     // Locked in all that it could do, it stays where it has come to, when that run goes on, too.
     let whole = more("density=500,locked=[\"x\",\"z\",\"rotation_y\"]");
     let (fixed, stuck) = end(&[&whole, soft], "stuck", Some(&moving));
@@ -498,6 +498,18 @@ fn another_run_takes_over_how_things_move_and_nothing_that_followed_from_laws() 
         }
         assert_eq!((of(&stuck, "velocity_m_s", 0), of(&stuck, "angular_velocity_rad_s", 1)), (0.0, 0.0));
     }
+    // A harder spring is cut into more sub-steps; a ledger begins with the run.
+    let (_, hard) = end(&[&free, "contact.spring=1e7", "output.ledger=true"], "hard", Some(&moving));
+    let substeps = |r: &serde_json::Value| r["monitors"]["contact_substeps_max"].as_u64().unwrap();
+    assert!(substeps(&hard) > substeps(&before), "{} {}", substeps(&hard), substeps(&before));
+    let left = hard["ledger_J"]["unaccounted"].as_f64().unwrap();
+    assert!(left.abs() < 1e-9, "{left}");
+    // Solves are those of the run.
+    let steps = |r: &serde_json::Value| r["steps"].as_u64().unwrap();
+    assert_eq!(hard["pressure"]["solves"].as_u64().unwrap(), steps(&hard) - steps(&before));
+}
+
+#[cfg(unix)]
 #[test]
 fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     let case = Case::new(&["run.end=1e6", "output.every=0.005"], "cpu");

@@ -49,7 +49,7 @@ pub struct RunArgs {
     /// Replace earlier results in the folder.
     #[arg(long)]
     force: bool,
-    /// Stop after this many steps.
+    /// Stop after this many steps, counted from t = 0 or from run.from.
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     steps: Option<u64>,
     /// Memory that the run may take, e.g. 8G, instead of what the machine has free.
@@ -304,13 +304,17 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
         Status::Diverged => "diverged",
         Status::Failed => "failed",
     };
+    let own = summary.steps - summary.steps_before;
+    let before = match summary.steps_before {
+        0 => String::new(),
+        n => format!(", after {n} of run.from,"),
+    };
     let mut lines = vec![format!(
-        "{}: {} steps to t = {:.4} s in {} ({:.3e} s a step) on {}",
+        "{}: {own} steps{before} to t = {:.4} s in {} ({:.3e} s a step) on {}",
         ended,
-        summary.steps,
         summary.time_s,
         clock(Duration::from_secs_f64(summary.wall_s)),
-        summary.wall_s / summary.steps.max(1) as f64,
+        summary.wall_s / own.max(1) as f64,
         summary.adapter,
     )];
     if summary.particles.fluid > 0 {

@@ -202,6 +202,9 @@ pub struct Summary {
     pub verdict: Verdict,
     /// Steps done.
     pub steps: u64,
+    /// Of these, steps of the run that it goes on from with `run.from`.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub steps_before: u64,
     /// Time reached [s].
     pub time_s: f64,
     /// Wall-clock time [s], of all its processes.
@@ -235,6 +238,11 @@ pub struct Summary {
     /// The water, of a scene with inflows or outflows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub water: Option<Water>,
+}
+
+/// Whether there are none: nothing is said of them then.
+fn is_zero(n: &u64) -> bool {
+    *n == 0
 }
 
 impl Summary {

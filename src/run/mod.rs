@@ -381,7 +381,7 @@ impl Run {
             if simulation.time >= end - 1e-6 * self.dt {
                 break End::Time;
             }
-            if simulation.steps >= self.steps_max {
+            if simulation.own_steps() >= self.steps_max {
                 break End::Steps;
             }
             if stop.is_asked() {
@@ -407,7 +407,7 @@ impl Run {
             progress.report = report;
             progress.time = simulation.time;
             progress.speed_max = self.totals.speed;
-            self.clock(&mut progress, simulation.steps, end);
+            self.clock(&mut progress, simulation.own_steps(), end);
             observe(&progress);
         };
         let writing = Instant::now();

@@ -25,7 +25,7 @@ pub struct Options {
     pub out: PathBuf,
     /// Where to begin.
     pub start: Start,
-    /// Stop after this many steps, counted from t = 0.
+    /// Stop after this many steps, counted from t = 0 or from `run.from`.
     pub steps: Option<u64>,
     /// Stop at this moment, with the state saved.
     pub deadline: Option<Instant>,

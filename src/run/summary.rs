@@ -183,6 +183,7 @@ impl Totals {
             adapter: simulation.backend.description(),
             precision: precision.to_string(),
             steps: simulation.steps,
+            steps_before: simulation.steps - simulation.own_steps(),
             time_s: simulation.time,
             particles: particles(scene),
             stages: simulation.stages.iter().map(|(stage, seconds)| (stage.name(), *seconds)).collect(),

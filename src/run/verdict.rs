@@ -46,7 +46,8 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     let (p, m) = (&summary.pressure, &summary.monitors);
     let mut judge = Judge(Vec::new());
     let solves = p.solves.max(1) as f64;
-    let wet = (summary.particles.fluid > 0 || summary.water.is_some()) && summary.steps > 0;
+    let wet =
+        (summary.particles.fluid > 0 || summary.water.is_some()) && summary.steps > summary.steps_before;
     if wet {
         let came = summary.water.iter().flat_map(|w| &w.inflow).map(|i| i.particles).sum::<u64>();
         let fluid = (summary.particles.fluid as f64 + came as f64).max(1.0);

@@ -29,9 +29,14 @@ impl Simulation {
         })
     }
 
+    /// Steps done, without those of the run that it goes on from with `run.from`.
+    pub fn own_steps(&self) -> u64 {
+        self.steps - self.began
+    }
+
     /// Whether a step was done, so that pressures and forces are known.
     pub fn has_stepped(&self) -> bool {
-        self.steps > self.began
+        self.own_steps() > 0
     }
 
     /// Whether [`Self::fluid_force`] is what acts: it is left at zero where nothing asks for the force on walls that move.
