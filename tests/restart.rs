@@ -448,6 +448,25 @@ fn a_body_that_is_driven_in_a_state_is_free_from_then_on() {
     }
 }
 
+/// On a device places count from the middle of the domain.
+#[test]
+fn a_state_is_gone_on_with_in_another_domain() {
+    for backend in ["cpu", "gpu"] {
+        let case = Case::new(&["run.end=0.02"], backend);
+        let first = case.run("first", &[]);
+        assert_eq!(first.code, 0, "{backend}: {}", first.err);
+        let from = format!("run.from=\"{}\"", case.root("first").display());
+        let [here, wider] = ["[[-1,-1,-1],[3,2,2]]", "[[-1,-1,-1],[7,2,5]]"].map(|domain| {
+            let next = Case::new(&[&from, "run.end=0.03", &format!("run.domain={domain}")], backend);
+            let ran = next.run("next", &[]);
+            assert_eq!(ran.code, 0, "{backend}: {}", ran.err);
+            let result = json(&std::fs::read_to_string(next.root("next").join("result.json")).unwrap());
+            result["monitors"]["energy_end_J"].as_f64().unwrap()
+        });
+        assert!((wider / here - 1.0).abs() < 1e-3, "{backend}: {here} and {wider} J");
+    }
+}
+
 /// A state may be gone on with under other laws, masses and freedoms: what follows from those is made anew.
 #[test]
 fn another_run_takes_over_how_things_move_and_nothing_that_followed_from_laws() {

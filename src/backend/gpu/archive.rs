@@ -1,12 +1,14 @@
 //! The state of the GPU path: the buffers as they are, to the last bit.
 
-use super::layout::counter;
+use super::layout::{self, Remainder, counter};
 use super::{Gpu, buffers};
 use crate::checkpoint::Archive;
 use crate::compute::{Buffer, Element};
 use crate::error::{Error, Result};
+use crate::params::Params;
 use crate::plan::Arrays;
 use bytemuck::Pod;
+use glam::DVec3;
 
 /// What holds the neighbour lists of a state.
 const LISTED: &str = "neighbour_count";
@@ -86,7 +88,13 @@ impl Gpu {
     pub(super) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         if self.plan.wet() {
             let g = self.groups;
-            self.buffer(archive, buffers::position, g.total())?;
+            if archive.is_saving() {
+                save_domain(archive, &self.params)?;
+                self.buffer(archive, buffers::position, g.total())?;
+            } else {
+                let places = read_places(archive, &self.params, g.total())?;
+                self.context.upload(buffers::position, &places)?;
+            }
             self.buffer(archive, buffers::velocity, g.total())?;
             self.buffer(archive, buffers::pressure, g.pressure())?;
             self.buffer(archive, buffers::number_density, g.pressure())?;
@@ -188,6 +196,38 @@ impl Gpu {
         }
         Ok(())
     }
+}
+
+/// The corners of the domain, from whose middle a state's places count [m].
+const DOMAIN: &str = "domain";
+
+/// Saves the domain of `params`.
+pub(super) fn save_domain(archive: &mut Archive, params: &Params) -> Result<()> {
+    archive.array(DOMAIN, &mut vec![params.domain_min.to_array(), params.domain_max.to_array()], false)
+}
+
+/// The `count` places that a state holds, from the middle of the domain of `params`: another case may have had another one.
+pub(super) fn read_places(archive: &mut Archive, params: &Params, count: usize) -> Result<Vec<[f32; 4]>> {
+    let mut places = read(archive, buffers::position, count)?;
+    let mut domain = vec![params.domain_min.to_array(), params.domain_max.to_array()];
+    // States of before it was saved have none.
+    if archive.holds(DOMAIN) {
+        archive.array(DOMAIN, &mut domain, false)?;
+    }
+    let [min, max] = domain[..] else { return Err(Error::damaged("the checkpoint's domain is damaged")) };
+    let (domain_min, domain_max) = (DVec3::from(min), DVec3::from(max));
+    if domain_min != params.domain_min || domain_max != params.domain_max {
+        let theirs = Params { domain_min, domain_max, ..params.clone() };
+        let shift = layout::middle(&theirs) - layout::middle(params);
+        let (from, to) = (Remainder::new(&theirs), Remainder::new(params));
+        for place in &mut places {
+            let at = from.place(place) + shift;
+            let packed = to.pack(at);
+            // Of what is no water the fourth number is the kind.
+            *place = if place[3] < 0.5 { packed } else { [packed[0], packed[1], packed[2], place[3]] };
+        }
+    }
+    Ok(places)
 }
 
 /// The `count` elements of `buffer` that a state holds, unless it is none.

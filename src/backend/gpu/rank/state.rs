@@ -102,6 +102,7 @@ impl Ranked for GpuRank {
         let scalar = |values: &[f64]| values.iter().map(|&v| v as f32).collect::<Vec<f32>>();
         let number = |i: usize| fields.id.get(i).map_or(0.0, |&id| word_of(id));
         let still = |values: &[DVec3]| packed(values, |_| 0.0);
+        archive::save_domain(archive, &self.gpu.params)?;
         archive.array(
             buffers::position.id().name(),
             &mut packed_places(&fields, self.gpu.middle, Remainder::new(&self.gpu.params)),
@@ -130,7 +131,7 @@ impl Ranked for GpuRank {
 
     fn read_all(&mut self, archive: &mut Archive) -> Result<Fields> {
         let (all, plan) = (self.share.all(), self.gpu.plan.clone());
-        let position = archive::read(archive, buffers::position, all.total())?;
+        let position = archive::read_places(archive, &self.gpu.params, all.total())?;
         let velocity = archive::read(archive, buffers::velocity, all.total())?;
         let state = archive::read(archive, buffers::state, all.pressure())?;
         let wide = |v: Vec<f32>| v.into_iter().map(f64::from).collect::<Vec<f64>>();
