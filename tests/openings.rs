@@ -120,8 +120,8 @@ fn a_channel_keeps_its_level() {
         let (came, out, _, there) = counted(&mut simulation);
         let mean = sum / count;
         println!("{outflow}: mean depth {mean:.4} m, worst off by {:.1} %", 100.0 * worst);
-        // 4 s at 0.25 m/s: 100 layers, more than the channel holds.
-        assert_eq!(came, 1000);
+        // 4 s at 0.25 m/s: 100 layers, more than the channel holds. The last is due at this very moment.
+        assert!((990..=1000).contains(&came), "{outflow}: {came}");
         // Of 17 starts that differ by chance the mean depths were 0.0999 to 0.1016 m, 0.1003 on average.
         assert!(worst < 0.025 && (mean / 0.1 - 1.0).abs() < 0.018, "{outflow}: {mean} m");
         assert!((there as f64 / 800.0 - 1.0).abs() < 0.025, "{outflow}: {there} particles");
@@ -257,7 +257,7 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("channel.toml");
-        let text = channel("discharge = 0.025").replace("end = 6.0", "end = 0.2");
+        let text = channel("discharge = 0.025").replace("end = 6.0", "end = 0.21");
         std::fs::write(&path, text.replace("velocity = 0.25\n[[outflow", "velocity = 0.5\n[[outflow"))
             .unwrap();
         let path = path.display().to_string();
@@ -304,6 +304,7 @@ fn a_run_that_was_stopped_goes_on_to_the_bit() {
             800 + came - out - number(&water["particles_lost"]),
             "{water}"
         );
+        // The tenth layer at 0.2 s.
         assert_eq!(came, 100);
         // The table says the same, and knows no solid.
         let table = std::fs::read_to_string(format!("{parts}/monitors.csv")).unwrap();
