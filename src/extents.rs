@@ -269,6 +269,8 @@ pub(crate) fn with_room(case: &Case, all: Bounds, held: bool, flight: (DVec3, DV
         let up = -gravity.normalize();
         let tank =
             case.tank.as_ref().map_or(0.0, |t| (DVec3::from(t.max) - DVec3::from(t.min)).dot(up.abs()));
+        // What comes in may fill the tank, whatever goes out meanwhile.
+        let depth = if case.inflow.is_empty() { depth } else { depth.max(tank) };
         let head = up * (4.0 * depth).max(tank);
         lo += head.min(DVec3::ZERO);
         hi += head.max(DVec3::ZERO);
@@ -298,12 +300,10 @@ pub(crate) fn domain(case: &Case, extents: &[Extent]) -> Bounds {
     let water = extents.iter().filter(|e| e.of == Of::Water).map(|e| e.bounds);
     let water = water.reduce(Bounds::union);
     let held = tank.is_some() && water.is_some();
-    // What comes in may fill the tank.
     let up = DVec3::from(case.run.gravity).normalize_or_zero().abs();
     let size = |b: Bounds| (b.hi - b.lo).max(DVec3::ZERO).dot(up);
     let still = water.map_or(0.0, size);
-    let filled = tank.map(|t| size(Bounds::new(t.min, t.max))).filter(|_| !case.inflow.is_empty());
-    let Bounds { mut lo, mut hi } = with_room(case, all, held, flight(case), filled.unwrap_or(still));
+    let Bounds { mut lo, mut hi } = with_room(case, all, held, flight(case), still);
     if let Some(t) = tank {
         for k in (0..3).filter(|&k| t.periodic()[k]) {
             (lo[k], hi[k]) = (t.min[k], t.max[k]);
