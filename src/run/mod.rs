@@ -182,19 +182,8 @@ struct Run {
 impl Run {
     /// Save how far files and sums are, or go back to that.
     fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self {
-            start,
-            frames,
-            tables,
-            totals,
-            steps_max: _,
-            // The interval may have changed; the next moment follows from the time.
-            saving: _,
-            pace: _,
-            walls,
-            parts,
-            dt,
-        } = self;
+        // When states are due follows from the time: the interval may have changed.
+        let Self { start, frames, tables, totals, steps_max: _, saving: _, pace: _, walls, parts, dt } = self;
         frames.exchange(archive)?;
         tables.exchange(archive)?;
         totals.exchange(archive)?;

@@ -39,8 +39,8 @@ impl Placed {
     }
     /// Lower and upper corner of the box around it along the world's axes [m].
     pub fn ends(&self) -> (DVec3, DVec3) {
-        let to = |way: f64| DVec3::from_array(DVec3::AXES.map(|n| way * self.reach(way * n)));
-        (self.center + to(-1.0), self.center + to(1.0))
+        let (low, high) = self.shape.bounds(self.axes);
+        (self.center + low, self.center + high)
     }
     /// Half of the edges of the box about its centre along the world's axes that holds it [m]: where it ends, see [`Placed::ends`], may be
     /// nearer on one side.

@@ -147,19 +147,9 @@ impl Shape {
 
     /// Lower and upper corner of the box around it, from its centre of mass [m], where `axes` takes its frame to that of the box.
     pub fn bounds(&self, axes: DMat3) -> (DVec3, DVec3) {
-        match self {
-            #[cfg(feature = "mesh")]
-            Self::Mesh(shape) => {
-                let turned = shape.vertices().iter().map(|&v| axes * v);
-                turned.fold((DVec3::MAX, DVec3::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
-            }
-            Self::Polygon(_) => {
-                let to_shape = axes.transpose();
-                let end = |way: f64| DVec3::AXES.map(|axis| way * self.reach(to_shape * (way * axis)));
-                (end(-1.0).into(), end(1.0).into())
-            }
-            _ => (-self.extent(axes), self.extent(axes)),
-        }
+        let to_shape = axes.transpose();
+        let end = |way: f64| DVec3::AXES.map(|axis| way * self.reach(to_shape * (way * axis)));
+        (end(-1.0).into(), end(1.0).into())
     }
 
     /// [`Geometry::depth`], for boxes without asking which shape it is at every point.

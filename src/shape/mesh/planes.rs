@@ -24,8 +24,6 @@ struct Plane {
     outward: DVec3,
     /// Its distance from the origin along `outward` [m].
     place: f64,
-    /// Area of its faces [m2].
-    area: f64,
     open: Open,
 }
 
@@ -47,7 +45,7 @@ impl Planes {
     /// Those of `mesh`, of the given radius [m], if it is convex and there are few.
     pub fn of(mesh: &TriMesh, radius: f64) -> Option<Self> {
         let flat = FLAT * radius;
-        let mut all: Vec<Plane> = vec![];
+        let (mut all, mut areas): (Vec<Plane>, Vec<f64>) = (vec![], vec![]);
         let mut of = vec![];
         for triangle in mesh.triangles() {
             let corners = [triangle.a, triangle.b, triangle.c];
@@ -60,14 +58,16 @@ impl Planes {
             if known.is_none() && (all.len() == MOST || outward == DVec3::ZERO) {
                 return None;
             }
-            of.push(known.unwrap_or(all.len()));
-            match known {
-                Some(known) => all[known].area += area,
-                None => all.push(Plane { outward, place: outward.dot(corners[0]), area, open: Open::Whole }),
+            let own = known.unwrap_or(all.len());
+            if known.is_none() {
+                all.push(Plane { outward, place: outward.dot(corners[0]), open: Open::Whole });
+                areas.push(0.0);
             }
+            areas[own] += area;
+            of.push(own);
         }
         let mut order: Vec<usize> = (0..all.len()).collect();
-        order.sort_by(|&a, &b| all[a].area.total_cmp(&all[b].area));
+        order.sort_by(|&a, &b| areas[a].total_cmp(&areas[b]));
         of.iter_mut().for_each(|of| *of = order.iter().position(|k| k == of).unwrap_or_default());
         let all: Vec<Plane> = order.into_iter().map(|k| all[k]).collect();
         let is_behind = |plane: &Plane| mesh.vertices().iter().all(|&v| plane.above(v) < flat);
