@@ -2,8 +2,8 @@
 //! the same, and a run that was stopped goes on as it would have.
 
 use crate::cli::{json, ran};
+use crate::common::{backends, there_is_a_device};
 use crate::restart::assert_same;
-use seixo::backend::gpu;
 use seixo::case::Case;
 use seixo::plan::{Plan, Stage};
 use seixo::scene::{Kind, Passes, Scene};
@@ -204,9 +204,7 @@ const LOW_HOLE: &str = "min = [0.8, 0, 0]\nmax = [0.8, 0.1, 0.02]";
 
 #[test]
 fn both_backends_do_the_same() {
-    if gpu::adapters().is_empty() {
-        assert!(std::env::var_os("CI").is_none(), "no adapter");
-        eprintln!("SKIPPED: no GPU adapter");
+    if !there_is_a_device("water that comes and goes on a device") {
         return;
     }
     for (outflow, periodic) in [("velocity = 0.25", false), (LOW_HOLE, false), ("discharge = 0.025", true)] {
@@ -250,11 +248,7 @@ fn both_backends_do_the_same() {
 
 #[test]
 fn a_run_that_was_stopped_goes_on_to_the_bit() {
-    for backend in ["cpu", "gpu"] {
-        if backend == "gpu" && gpu::adapters().is_empty() {
-            eprintln!("SKIPPED: no GPU adapter");
-            continue;
-        }
+    for backend in backends("a channel that goes on on a device") {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("channel.toml");
         let text = channel("discharge = 0.025").replace("end = 6.0", "end = 0.21");
@@ -368,11 +362,7 @@ fn a_run_that_goes_on_with_another_discharge_owes_nothing_for_the_time_before() 
 /// key that gives as much.
 #[test]
 fn a_state_goes_on_with_room_for_more_water() {
-    for backend in ["cpu", "gpu"] {
-        if backend == "gpu" && gpu::adapters().is_empty() {
-            eprintln!("SKIPPED: no GPU adapter");
-            continue;
-        }
+    for backend in backends("room for water in a state of a device") {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("channel.toml");
         std::fs::write(&path, channel("velocity = 0.25")).unwrap();

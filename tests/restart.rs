@@ -1,6 +1,7 @@
 //! Restart: a run that is stopped, killed or damaged goes on as if nothing had happened.
 
 use crate::cli::{Ran, json, ran, small_case};
+use crate::common::{backends, there_is_a_device};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -193,9 +194,7 @@ fn a_dry_run_in_parts_is_the_run_to_the_last_bit() {
 
 #[test]
 fn a_run_on_the_device_in_parts_is_the_run_to_the_last_bit() {
-    if json(&ran(&["adapters", "--json"]).out).as_array().unwrap().is_empty() {
-        assert!(std::env::var_os("CI").is_none(), "no adapter: the GPU path is not tested");
-        eprintln!("SKIPPED: no adapter");
+    if !there_is_a_device("a run on a device in parts") {
         return;
     }
     let device = |own: &[&'static str]| [&BODIES[..], own].concat();
@@ -426,7 +425,7 @@ fn a_state_starts_another_case() {
 /// What is lowered is let go: a state of a scene in which no body is free has no answer of theirs to the water.
 #[test]
 fn a_body_that_is_driven_in_a_state_is_free_from_then_on() {
-    for backend in ["cpu", "gpu"] {
+    for backend in backends("a body let go on a device") {
         let body = |more: &str| {
             let rest = "size=[0.2,0.05,0.2],center=[0.25,0,0.62],density=500";
             format!("body=[{{name=\"caisson\",{rest}{more}}}]")
@@ -451,7 +450,7 @@ fn a_body_that_is_driven_in_a_state_is_free_from_then_on() {
 /// On a device places count from the middle of the domain.
 #[test]
 fn a_state_is_gone_on_with_in_another_domain() {
-    for backend in ["cpu", "gpu"] {
+    for backend in backends("a state of a device in another domain") {
         let case = Case::new(&["run.end=0.02"], backend);
         let first = case.run("first", &[]);
         assert_eq!(first.code, 0, "{backend}: {}", first.err);
@@ -637,9 +636,7 @@ fn a_long_step_is_given_up_and_nothing_is_lost() {
 #[cfg(unix)]
 #[test]
 fn a_long_step_on_the_device_is_given_up_and_nothing_is_lost() {
-    if json(&ran(&["adapters", "--json"]).out).as_array().unwrap().is_empty() {
-        assert!(std::env::var_os("CI").is_none(), "no adapter: the GPU path is not tested");
-        eprintln!("SKIPPED: no adapter");
+    if !there_is_a_device("a long step on a device") {
         return;
     }
     let sets = [

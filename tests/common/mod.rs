@@ -63,6 +63,11 @@ pub fn processors(untested: &str) -> Vec<Processor> {
     [Processor::Cpu].into_iter().chain(device).collect()
 }
 
+/// The same by the names that the program has for them.
+pub fn backends(untested: &str) -> impl Iterator<Item = &'static str> {
+    ["cpu"].into_iter().chain(there_is_a_device(untested).then_some("gpu"))
+}
+
 pub fn case(text: &str) -> Case {
     alone();
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
