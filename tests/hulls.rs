@@ -84,6 +84,24 @@ fn a_heeled_hull_is_righted_by_its_metacentric_height() {
     assert!((height / expected - 1.0).abs() < 0.12, "{height} m for {expected} m");
 }
 
+/// A lattice along the axes of its file has places half a spacing below its faces too, but 1.4 spacings apart.
+#[test]
+fn sides_at_45_degrees_have_a_particle_for_each_square_of_the_spacing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "hull.stl", &stl(&hull()));
+    for l0 in [0.014, 0.02] {
+        let scene = Scene::build(&case(&format!(
+            "[run]\nspacing = {l0}\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [0.28, 0.56, 0.42]\n\
+             [[obstacle]]\nname = \"hull\"\nshape = \"mesh\"\nfile = \"{path}\"\nposition = [0.04, 0.28, 0.1]\n"
+        )));
+        let mut areas: Vec<f64> =
+            scene.expect("builds").solids[0].wall_area.iter().map(|a| a.length() / (l0 * l0)).collect();
+        areas.sort_by(f64::total_cmp);
+        let median = areas[areas.len() / 2];
+        assert!((0.85..1.15).contains(&median), "{median} at {l0} m");
+    }
+}
+
 #[test]
 fn the_section_of_the_hull_has_its_metacentre_where_theory_has_it() {
     // GM = KB + BM - KG = 2 T / 3 + b^2 / (6 T) - 2 D / 3 with b = 2 T

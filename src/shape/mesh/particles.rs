@@ -86,7 +86,9 @@ fn cells(mesh: &Mesh, spacing: f64, layers: i32) -> (Vec<(DVec3, f64, DVec3)>, f
 pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     let (found, border) = cells(mesh, spacing, layers);
     let off = |depth: f64| (depth - 0.5 * spacing).abs();
-    let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing);
+    // Below a face at 45 degrees to its axes a lattice has places at one depth that stand 1.4 spacings apart.
+    let is_gentle = |outward: DVec3| (mesh.frame * outward).abs().max_element() > GENTLE;
+    let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing && is_gentle(f.2));
     let skin = (!fits).then(|| Skin::new(mesh, spacing));
     let mut out = Particles::default();
     let mut taken = Cells::new(spacing);
@@ -97,8 +99,8 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
         here.sort_by(|a, b| (a.1 - depth).abs().total_cmp(&(b.1 - depth).abs()));
         let places: Vec<Place> = if let Some(skin) = &skin {
             let moved = here.into_par_iter().filter_map(|&(at, inside, outward)| {
-                let gentle = (mesh.frame * outward).abs().max_element() > GENTLE;
-                gentle.then(|| Place::moved(at, (inside, outward), depth).looked_up(mesh, depth, spacing))?
+                is_gentle(outward)
+                    .then(|| Place::moved(at, (inside, outward), depth).looked_up(mesh, depth, spacing))?
             });
             even(mesh, skin.layer(depth, moved.collect(), &taken), depth, spacing)
         } else {
