@@ -9,6 +9,9 @@
 //!
 //! P_f = sum_r h_fr (P_r + rho g . (x_f - x_r)),  h_fr = 1/N + xi_f . C^-1 xi_r,
 //!
+//! xi_f of a row no farther out than those of the rim, along each axis of the body's frame. The slots below and above a stone that
+//! leans on a wall are one, and its rim two rows between them: what these told of a slope, taken on to both ends, threw such a stone up.
+//!
 //! and a row of S in [`crate::kernels::coupling`] becomes S_r + sum_f h_fr S_f: as P does work on the body there, the
 //! body's motion sucks water in at the rim, and the equation stays symmetric.
 //!
@@ -198,6 +201,20 @@ struct Field {
     mean: f64,
     slope: DVec3,
     any_wet: bool,
+    /// Axes of the body's frame, and least and largest xi of the rim along each.
+    axes: DMat3,
+    ends: [DVec3; 2],
+}
+
+impl Field {
+    /// xi of a row at `place`, with `spacing` for l0: no farther out than the rim.
+    fn xi(&self, place: DVec3, spacing: f64) -> DVec3 {
+        let xi = (place - self.middle) / spacing;
+        let along = self.axes.transpose() * xi;
+        let [low, high] = self.ends;
+        let within = along.clamp(low, high);
+        if within == along { xi } else { self.axes * within }
+    }
 }
 
 /// Finds the slots of the free bodies of a scene.
@@ -340,8 +357,8 @@ impl Slots {
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }
 
-    /// The pressure in a slot with `passing` rows of its rim, which lie at `place`.
-    fn field(&self, passing: &[(usize, f64)], place: impl Fn(usize) -> DVec3) -> Field {
+    /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`.
+    fn field(&self, pose: &Pose, passing: &[(usize, f64)], place: impl Fn(usize) -> DVec3) -> Field {
         let count = passing.len() as f64;
         let middle = passing.iter().map(|&(n, _)| place(n)).sum::<DVec3>() / count;
         let xi = |n: usize| (place(n) - middle) / self.spacing;
@@ -351,7 +368,10 @@ impl Slots {
         let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n) - middle);
         let mean = passing.iter().map(level).sum::<f64>() / count;
         let slope = inverse * passing.iter().map(|row| level(row) * xi(row.0)).sum::<DVec3>();
-        Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0) }
+        let axes = DMat3::from_quat(pose.orientation);
+        let along = || passing.iter().map(|row| axes.transpose() * xi(row.0));
+        let ends = [along().fold(DVec3::INFINITY, DVec3::min), along().fold(DVec3::NEG_INFINITY, DVec3::max)];
+        Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0), axes, ends }
     }
 
     /// The rows that lie in `slot`, and those at its rim with what they pass on; `told` are the rim and its
@@ -363,9 +383,9 @@ impl Slots {
         let on_surface = |n: usize| pose.orientation * (layer.offset[n] + layer.to_surface[n]);
         let passing = self.passing(told.to_vec(), |n| pose.orientation * layer.offset[n]);
         let count = passing.len() as f64;
-        let field = self.field(&passing, &place);
+        let field = self.field(pose, &passing, &place);
         let Field { middle, inverse, any_wet, .. } = field;
-        let xi = |n: usize| (place(n) - middle) / self.spacing;
+        let xi = |n: usize| field.xi(place(n), self.spacing);
         let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
@@ -443,7 +463,7 @@ impl Slots {
 
     /// Pressure of the `field` of a slot on a body's surface, at `x` by a row at `place` [Pa].
     fn in_slot(&self, field: &Field, place: DVec3, x: DVec3) -> f64 {
-        let xi = (place - field.middle) / self.spacing;
+        let xi = field.xi(place, self.spacing);
         field.mean + field.slope.dot(xi) + self.weight.dot(x - field.middle)
     }
 

@@ -73,6 +73,34 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
     );
 }
 
+/// Slots below, above and behind a block hang together, and their rim is two rows between the lower and the upper one.
+#[test]
+fn a_pile_at_a_wall_under_still_water_comes_to_rest() {
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -9.80665]\n\
+                [tank]\nmin = [0, 0, 0]\nmax = [0.2, 0.16, 0.24]\nopen = [\"z_max\"]\n\
+                [fluid]\nsound_speed = 8\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.16, 0.18]\n\
+                [contact]\nspring = 2e4\nfriction = 0.3\n";
+    let block = |name: &str, z: f64| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nsize = [0.08, 0.08, 0.08]\ncenter = [0.0402, 0.08, {z}]\ndensity = 2000\n\
+             displaces_fluid = true\nstanding = true\n"
+        )
+    };
+    let mut simulation =
+        simulation(&case(&format!("{text}{}{}", block("lower", 0.04), block("upper", 0.12))));
+    let (mut fastest, mut highest) = (0.0_f64, 0.0_f64);
+    while simulation.time < 0.4 {
+        simulation.step().expect("still water");
+        if simulation.time > 0.25 {
+            let poses = simulation.solids.poses();
+            fastest = poses.iter().map(|p| p.velocity.length()).fold(fastest, f64::max);
+            highest = highest.max(poses[1].position.z);
+        }
+    }
+    println!("{fastest:.4} m/s, {highest:.4} m high");
+    assert!(fastest < 0.03 && highest < 0.12, "{fastest} m/s, {highest} m");
+}
+
 /// Mean force of the water on the block from 0.15 s to 0.2 s [N].
 fn lift(mut simulation: Simulation) -> f64 {
     let (mut sum, mut steps) = (0.0, 0.0);

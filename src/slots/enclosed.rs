@@ -162,6 +162,6 @@ impl Slots {
         };
         let (places, told): (Vec<DVec3>, Vec<f64>) = f.lenders.iter().flat_map(of).unzip();
         let passing = self.passing(told.into_iter().enumerate().collect(), |n| places[n]);
-        Some(self.field(&passing, |n| places[n])).filter(|field| field.any_wet)
+        Some(self.field(&poses[f.slot.solid], &passing, |n| places[n])).filter(|field| field.any_wet)
     }
 }

@@ -53,7 +53,8 @@ impl Slots {
                 true => self.lent(&found, &pressure, f, poses),
                 false => {
                     let passing = self.passing(told.clone(), row_place);
-                    Some(self.field(&passing, self.places(slot, pose, told))).filter(|field| field.any_wet)
+                    Some(self.field(pose, &passing, self.places(slot, pose, told)))
+                        .filter(|field| field.any_wet)
                 }
             };
             field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, pose))
