@@ -284,3 +284,26 @@ fn cylinders_keep_their_energy_on_edges() {
         assert!(hits >= 10 && worst < 1e-2, "{name}: {worst} in {hits} impacts");
     }
 }
+
+#[test]
+fn a_cylinder_as_wide_as_a_box_or_wider_strikes_it_evenly() {
+    for height in [0.1, 0.12] {
+        let held = "density = 1000\nstanding = true\nlocked = [\"y\", \"rotation_x\", \"rotation_z\"]";
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -10]\n\
+             [tank]\nmin = [-1, -0.1, 0]\nmax = [1, 0.1, 1]\nopen = [\"z_max\"]\n\
+             [[body]]\nname = \"box\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0.05]\n{held}\n\
+             [[body]]\nname = \"it\"\nshape = \"cylinder\"\nradius = 0.06\nheight = {height}\naxis = [0, 1, 0]\n\
+             center = [0.115, 0, 0.06]\nvelocity = [-2, 0, 0]\n{held}\n\
+             [contact]\nspring = 1e5\nrestitution = 0.4\nfriction = 0.3\n"
+        ));
+        let (mut most, mut aside) = (0.0_f64, 0.0_f64);
+        while dry.time() < 0.03 {
+            dry.step();
+            let force = dry.solids.contact_wrenches()[0].force;
+            (most, aside) = (most.max(force.length()), aside.max(force.y.abs()));
+        }
+        println!("{height} m wide: {most:.0} N, {aside:.1e} N aside");
+        assert!(most > 300.0 && aside < 1e-3 * most, "{height}: {most} N, {aside} N aside");
+    }
+}

@@ -1,7 +1,8 @@
 //! Rules for depth^8 over the parts of lines and rings that lie inside a shape.
 //!
-//! Along a line the distance from a convex shape has one minimum: the part inside is one stretch, halved there. A shape
-//! that is not convex gives its stretches one by one. A ring may enter a shape several times.
+//! Along a line the distance from a convex shape has one minimum: the part inside is one stretch, halved there, and once more where
+//! it is level and falls off at an end. A shape that is not convex gives its stretches one by one. A ring may enter a shape several
+//! times.
 
 /// Nodes and weights of Gauss's rule with five nodes on 0..1, exact to the ninth power.
 pub(crate) const GAUSS_5: [(f64, f64); 5] = [
@@ -23,12 +24,19 @@ const GAUSS_8: [(f64, f64); 4] = [
 /// Points at which a ring is first looked at: 8th powers of what is linear along a diameter are integrated exactly.
 const AROUND: usize = 24;
 
-/// Where `f` changes its sign between `a` and `b`: false position with halved ends (Illinois), to round-off.
+/// Steps of false position on one side of a place from which it is halved for: the slope of what is all but level, with a kink.
+const ONE_SIDED: u32 = 4;
+
+/// Where `f` changes its sign between `a` and `b`: false position with halved ends (Illinois), to round-off. An end at which it is
+/// nothing is the place: the end of a line may lie in a face to the last bit.
 pub(crate) fn root(mut a: (f64, f64), mut b: (f64, f64), mut f: impl FnMut(f64) -> f64) -> f64 {
-    let mut side = 0;
-    for _ in 0..60 {
+    if let Some(end) = [a, b].into_iter().find(|end| end.1 == 0.0) {
+        return end.0;
+    }
+    let (mut side, mut again) = (0, 0);
+    for _ in 0..80 {
         let mut x = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
-        if !(x > a.0.min(b.0) && x < a.0.max(b.0)) {
+        if again >= ONE_SIDED || !(x > a.0.min(b.0) && x < a.0.max(b.0)) {
             x = 0.5 * (a.0 + b.0);
         }
         if x == a.0 || x == b.0 {
@@ -38,25 +46,33 @@ pub(crate) fn root(mut a: (f64, f64), mut b: (f64, f64), mut f: impl FnMut(f64) 
         if y == 0.0 || (b.0 - a.0).abs() < 1e-15 {
             return x;
         }
-        if (y > 0.0) == (b.1 > 0.0) {
+        let now = if (y > 0.0) == (b.1 > 0.0) { 1 } else { -1 };
+        // once it is halved for, it is to the end
+        if again < ONE_SIDED {
+            again = if now == side { again + 1 } else { 0 };
+        }
+        if now == 1 {
             b = (x, y);
             if side == 1 {
                 a.1 *= 0.5;
             }
-            side = 1;
         } else {
             a = (x, y);
             if side == -1 {
                 b.1 *= 0.5;
             }
-            side = -1;
         }
+        side = now;
     }
     if a.1.abs() < b.1.abs() { a.0 } else { b.0 }
 }
 
 /// Calls `visit` with place and length of the nodes on the stretch of 0..`length` where the convex `distance`
 /// (with its slope) is negative.
+///
+/// Under a face that the line reaches the edges of it is level but for both ends, where that of the next face falls within its depth,
+/// blended as far as twice that. These falls, which nodes over all of it would miss or meet by chance, are stretches of their own. What
+/// is straight or evenly curved has no such end.
 pub(crate) fn along(length: f64, distance: impl Fn(f64) -> (f64, f64), mut visit: impl FnMut(f64, f64)) {
     let (first, last) = (distance(0.0), distance(length));
     let lowest = if first.1 >= 0.0 {
@@ -70,11 +86,24 @@ pub(crate) fn along(length: f64, distance: impl Fn(f64) -> (f64, f64), mut visit
     if least >= 0.0 {
         return;
     }
-    let end = |at: f64, value: f64| {
-        if value < 0.0 { at } else { root((lowest, least), (at, value), |s| distance(s).0) }
+    // an end of the part inside, and where its fall begins; where nothing blends it has a kink halfway
+    let end = |at: f64, there: (f64, f64)| {
+        let (at, (value, slope)) = if there.0 < 0.0 {
+            (at, there)
+        } else {
+            let at = root((lowest, least), (at, there.0), |s| distance(s).0);
+            (at, distance(at))
+        };
+        let fall = 2.0 * (value - least) / slope.abs();
+        if fall < (lowest - at).abs() {
+            let fall = fall.copysign(lowest - at);
+            [at, at + 0.5 * fall, at + fall]
+        } else {
+            [at, lowest, lowest]
+        }
     };
-    let (low, high) = (end(0.0, first.0), end(length, last.0));
-    for (from, to) in [(low, lowest), (lowest, high)] {
+    let ([a, b, c], [f, e, d]) = (end(0.0, first), end(length, last));
+    for (from, to) in [(a, b), (b, c), (c, lowest), (lowest, d), (d, e), (e, f)] {
         if to > from {
             for (node, weight) in GAUSS_5 {
                 visit(from + node * (to - from), weight * (to - from));
@@ -153,6 +182,34 @@ mod tests {
             let plain = (0..n).map(|k| (f64::from(k) + 0.5) * 2.0 / f64::from(n));
             let plain = plain.map(|s| (-distance(s).0).max(0.0).powi(8)).sum::<f64>() * 2.0 / f64::from(n);
             assert!((sum / plain - 1.0).abs() < 1e-7, "{slope}: {sum:e} {plain:e}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_ends_in_the_edges_of_a_face_is_integrated_evenly() {
+        let (length, depth) = (0.1, 1e-3);
+        // ends beyond the edges, in them to the last bit, and inside; the slope of what is level is that of rounding
+        for beyond in [0.01, 0.0, -2e-4] {
+            for noise in [0.0, 1e-17, -1e-17, 1e-8] {
+                let distance = |s: f64| {
+                    let (left, right) = (s - beyond, length - beyond - s);
+                    if left.min(right) < depth {
+                        (-left.min(right), if left < right { -1.0 } else { 1.0 })
+                    } else {
+                        (-depth, noise * if s < 0.3 * length { -1.0 } else { 1.0 })
+                    }
+                };
+                let (mut sum, mut aside) = (0.0, 0.0);
+                along(length, distance, |s, w| {
+                    let (d, slope) = distance(s);
+                    sum += w * (-d / depth).powi(8);
+                    aside += w * (-d / depth).powi(7) * slope;
+                });
+                let end = depth / 9.0 * (1.0 - (-beyond.min(0.0) / depth).powi(9));
+                let exact = length - 2.0 * beyond.max(0.0) - 2.0 * (depth + beyond.min(0.0)) + 2.0 * end;
+                assert!((sum / exact - 1.0).abs() < 1e-3, "{beyond} {noise}: {sum} {exact}");
+                assert!(aside.abs() <= 1e-9 * depth + noise.abs() * length, "{beyond} {noise}: {aside}");
+            }
         }
     }
 
