@@ -351,3 +351,27 @@ fn a_corner_stands_in_a_groove_that_ends_on_the_floor() {
         assert!((held - 1.0).abs() < 1e-2, "{held}");
     }
 }
+
+/// Along a groove both flanks rub with their own forces, whose sum is more than what they hold up.
+#[test]
+fn a_plank_slides_down_the_groove_of_one_prism_by_the_forces_of_both_flanks() {
+    let (slope, mu) = (30_f64.to_radians(), 0.2);
+    for flank in [25_f64, 40.0] {
+        let rise = flank.to_radians().tan();
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, {}, {}]\n\
+             [[obstacle]]\nname = \"groove\"\nshape = \"prism\"\nheight = 1\nposition = [0, -0.3, 0]\n\
+             section = [[-0.3, -0.1], [0.3, -0.1], [0.3, {top}], [0.2, {top}], [0, 0], [-0.2, {top}], [-0.3, {top}]]\n\
+             [[body]]\nname = \"plank\"\nsize = [0.2, 0.1, 0.04]\ndensity = 1000\ncenter = [0, 0, {}]\nstanding = true\n\
+             [contact]\nspring = 1e6\nrestitution = 0.3\nfriction = {mu}\n",
+            G * slope.sin(),
+            -G * slope.cos(),
+            0.1 * rise + 0.02,
+            top = 0.2 * rise,
+        ));
+        let speed = dry.run(0.2)[0].velocity.y;
+        let exact = 0.2 * G * (slope.sin() - mu * slope.cos() / flank.to_radians().cos());
+        println!("flanks of {flank}: {speed:.4} m/s for {exact:.4}");
+        assert!((speed / exact - 1.0).abs() < 1e-2, "flanks of {flank}: {speed} for {exact}");
+    }
+}

@@ -127,11 +127,16 @@ impl Shape {
 
     /// Whether planes tell it apart from what does not touch it.
     pub fn is_convex(&self) -> bool {
+        !self.is_faceted()
+    }
+
+    /// Whether its faces look any way: their numbers say only along which axis they look most, see [`face`].
+    pub fn is_faceted(&self) -> bool {
         match self {
             #[cfg(feature = "mesh")]
-            Self::Mesh(_) => false,
-            Self::Polygon(_) => false,
-            _ => true,
+            Self::Mesh(_) => true,
+            Self::Polygon(_) => true,
+            _ => false,
         }
     }
 

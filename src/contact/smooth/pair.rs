@@ -7,7 +7,7 @@ mod lists;
 use super::answer::Mode;
 use super::constants::{Constants, felt};
 use super::frame::Frame;
-use super::patch::{Contact, Patch, place, square};
+use super::patch::{Contact, Patch, part_by_direction, place, square};
 use super::walls::WallBox;
 use crate::body::{Body, Pose, Wrench};
 use crate::contact::candidates::image;
@@ -210,6 +210,11 @@ impl Pair {
         }
         self.count = self.contacts.len();
         if !self.contacts.is_empty() {
+            let other = self.other(bodies, surfaces, walls).shape;
+            part_by_direction(
+                &mut self.contacts,
+                [bodies[self.a].shape, other].map(|shape| shape.is_faceted()),
+            );
             self.press(bodies);
             self.sum(bodies);
         }

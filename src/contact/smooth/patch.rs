@@ -3,6 +3,13 @@
 use crate::body::Wrench;
 use glam::{DMat3, DVec3};
 
+/// Cosine between the force of an edge and a face's normal from which the edge counts to that face, and between those of two points
+/// from which a face of a mesh or a prism is one to both.
+pub(super) const ALONG_NORMAL: f64 = 0.95;
+
+/// First number of the patches of [`part_by_direction`]: no solid has so many edges.
+const DIRECTIONS: u32 = 1 << 30;
+
 /// One point in contact.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contact {
@@ -21,7 +28,7 @@ pub(crate) struct Contact {
     /// Part of a face that it stands for over that which its weight says [-].
     pub part: f64,
     /// The patch that it belongs to: the face that presses, 8 more for one of the first solid; or an edge, see
-    /// [`edge_key`].
+    /// [`edge_key`]; or a direction, see [`part_by_direction`].
     pub patch: u32,
 }
 
@@ -29,6 +36,26 @@ pub(crate) struct Contact {
 /// wall's edges may be many, where others cover parts of them.
 pub(super) fn edge_key(edge: u32, second: bool) -> u32 {
     32 + 2 * edge + u32::from(second)
+}
+
+/// Makes patches of what looks one way, of the points that the first and the second solid press where `faceted` says that it is a mesh or
+/// a prism. Those call by the number of a face all that looks more along one axis than along the others: both flanks of a groove, whose
+/// normal forces friction goes by one by one.
+pub(super) fn part_by_direction(contacts: &mut [Contact], faceted: [bool; 2]) {
+    let mut found: Vec<(DVec3, bool)> = vec![];
+    for c in contacts {
+        let Some(second) = c.face().map(|face| face < 6).filter(|&second| faceted[usize::from(second)])
+        else {
+            continue;
+        };
+        let normal = c.normal.normalize_or_zero();
+        let same = |&(other, of): &(DVec3, bool)| of == second && other.dot(normal) > ALONG_NORMAL;
+        let place = found.iter().position(same).unwrap_or(found.len());
+        if place == found.len() {
+            found.push((normal, second));
+        }
+        c.patch = edge_key(DIRECTIONS + place as u32, !second);
+    }
 }
 
 impl Contact {

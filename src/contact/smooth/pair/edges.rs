@@ -1,7 +1,7 @@
 //! Edges and round parts of both solids inside the other one.
 
 use super::super::frame::{Frame, View};
-use super::super::patch::{Contact, edge_key};
+use super::super::patch::{ALONG_NORMAL, Contact, edge_key};
 use super::super::round;
 use super::super::walls::WallBox;
 use super::{Other, Pair};
@@ -9,9 +9,6 @@ use crate::body::Body;
 use crate::shape::{Line, Surface};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
-
-/// Cosine between the force of an edge and a face's normal from which the edge counts to that face.
-const ALONG_NORMAL: f64 = 0.95;
 
 impl Pair {
     /// Nodes of the edges inside the other solid, after the points.
