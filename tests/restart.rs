@@ -522,6 +522,13 @@ fn another_run_takes_over_how_things_move_and_nothing_that_followed_from_laws() 
     assert!(substeps(&hard) > substeps(&before), "{} {}", substeps(&hard), substeps(&before));
     let left = hard["ledger_J"]["unaccounted"].as_f64().unwrap();
     assert!(left.abs() < 1e-9, "{left}");
+    // Pressed into the wall it comes back out of it, whether or not somebody has looked at the energy before it was taken over.
+    let struck = body(",density=500,velocity=[1,0,0]").replace("center=[1.5,", "center=[1.853,");
+    let (striking, _) = end(&[&struck, soft], "striking", None);
+    let [plain, watched] = ["output.ledger=false", "output.ledger=true"]
+        .map(|ledger| end(&[&struck, soft, ledger], ledger, Some(&striking)).1);
+    assert!(of(&watched, "velocity_m_s", 0) < -0.3, "{watched}");
+    assert_eq!(watched["bodies"], plain["bodies"]);
     // Solves are those of the run.
     let steps = |r: &serde_json::Value| r["steps"].as_u64().unwrap();
     assert_eq!(hard["pressure"]["solves"].as_u64().unwrap(), steps(&hard) - steps(&before));
