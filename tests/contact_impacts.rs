@@ -295,7 +295,7 @@ fn a_cylinder_as_wide_as_a_box_or_wider_strikes_it_evenly() {
              [[body]]\nname = \"box\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0.05]\n{held}\n\
              [[body]]\nname = \"it\"\nshape = \"cylinder\"\nradius = 0.06\nheight = {height}\naxis = [0, 1, 0]\n\
              center = [0.115, 0, 0.06]\nvelocity = [-2, 0, 0]\n{held}\n\
-             [contact]\nspring = 1e5\nrestitution = 0.4\nfriction = 0.3\n"
+             [contact]\nspring = 1e5\nrestitution = 0.4\n"
         ));
         let (mut most, mut aside) = (0.0_f64, 0.0_f64);
         while dry.time() < 0.03 {

@@ -94,6 +94,20 @@ fn a_body_against_another_and_against_all_of_the_tank() {
 }
 
 #[test]
+fn a_heavy_body_beside_a_light_one_is_spoken_of() {
+    for (mass, told) in [(11.0, true), (5.0, false)] {
+        let dry = Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n\
+             [[body]]\nname = \"light\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.5, 0.5, 0.05]\nmass = 1\nstanding = true\n\
+             [[body]]\nname = \"heavy\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.5, 0.5, 0.17]\nmass = {mass}\n\
+             [contact]\nspring = 1e7\nrestitution = 0.3\n"
+        ));
+        let words = dry.solids.advice(1e-3).words.join("\n");
+        assert_eq!(words.contains("11 times the lightest"), told, "{words}");
+    }
+}
+
+#[test]
 fn pairs_that_mean_nothing_are_refused_with_what_there_is() {
     let text = |pairs: &str| {
         format!(

@@ -3,6 +3,9 @@
 use super::Solids;
 use crate::error::CaseError;
 
+/// Mass of the heaviest body over that of the lightest from which a restitution between them is spoken of.
+const HEAVIER: f64 = 10.0;
+
 /// What contact will do at a time step, for `seixo plan`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactAdvice {
@@ -78,6 +81,13 @@ impl Solids {
             words.push(format!(
                 "contact: at that speed the heaviest body may press what lies between it and a wall {sinks:.2} \
                  spacings deep; a spring four times as stiff halves that, where the sub-steps carry it"
+            ));
+        }
+        if self.limits.restores() && heaviest > HEAVIER * self.limits.lightest {
+            words.push(format!(
+                "contact: the heaviest body weighs {:.0} times the lightest: `restitution` is that of two bodies alone, and one that \
+                 presses a much lighter one against a third comes back with more",
+                heaviest / self.limits.lightest
             ));
         }
         ContactAdvice {

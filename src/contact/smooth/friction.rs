@@ -37,9 +37,6 @@ const UNCHANGED: f64 = 1e-4;
 /// Share of a slip that is left by rounding where it was stopped.
 const STUCK: f64 = 1e-9;
 
-/// Response along what is locked over that of all [-].
-const LEAST_RESPONSE: f64 = 1e-9;
-
 /// Share of the response that a spin may have for a patch to count as small: the ellipsoid does for it.
 const SMALL: f64 = 2.5e-3;
 
@@ -165,9 +162,9 @@ impl Slip {
                 *response.col_mut(column) += slip + spun;
             }
         }
-        // a point has no arm and a locked axis no response: keep the system regular, and what is rounding along it nothing
+        // a point has no arm and a locked axis no response: keep the system regular
         let trace = response.x_axis.x + response.y_axis.y + response.z_axis.z;
-        response += DMat3::IDENTITY * (LEAST_RESPONSE * trace);
+        response += DMat3::IDENTITY * (1e-12 * trace);
         Self {
             a,
             b: pair.b,
