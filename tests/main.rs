@@ -65,6 +65,7 @@ mod slots;
 mod stability;
 mod study;
 mod study_files;
+mod study_measures;
 mod surface;
 mod twins;
 mod wall_layers;

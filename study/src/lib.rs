@@ -27,6 +27,7 @@ pub mod contact_rest;
 pub mod contact_statics;
 pub mod definition;
 pub mod device_compare;
+pub mod draft;
 pub mod drop_rows;
 pub mod dry;
 mod dry_studies;

@@ -1,5 +1,6 @@
 //! Measures on a running simulation, against analytic solutions where there is one.
 
+use super::draft::Draft;
 use super::record::{Profile, Recorder};
 use super::row::Measured;
 use super::time_mean::{TimeMean, deviation, mean};
@@ -7,9 +8,8 @@ use glam::DVec3;
 use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
 use seixo::fields::{Fields, State};
-use seixo::gauges::level;
 use seixo::run::Due;
-use seixo::scene::{Drive, Kind, Scene, Shape};
+use seixo::scene::{Drive, Kind, Scene};
 use seixo::simulation::Simulation;
 use serde::Deserialize;
 
@@ -26,13 +26,13 @@ pub enum Measure {
     Sensor,
     /// Kinetic energy of water at rest, and the speed that it stands for over sqrt(g H).
     KineticEnergy,
-    /// Depth from the centroid, 2 (z_c - floor) / H.
+    /// Depth from the centroid, 2 (z_c - floor) / H, of which the floor is where the water ends below at the start.
     Volume,
     /// Front of the water: the foremost x that is no spray over time, and scaled for comparison with experiments.
     Front,
     /// Kinetic plus potential energy of the water over its start, over time.
     Energy,
-    /// Draft of the first body at rest against Archimedes' law.
+    /// Draft of the first body at rest, a box on one of its faces, against Archimedes' law.
     Draft,
     /// Height of the first body's centre over time.
     BodyHeight,
@@ -79,16 +79,17 @@ pub struct Sampler {
     spec: Spec,
     recorder: Recorder,
     due: Due,
+    /// Against gravity; z without any.
+    up: DVec3,
+    /// Where the water ends below at the start, along `up` [m].
     floor: f64,
-    width: f64,
-    left: f64,
+    /// Where it ends at the start along x [m].
+    sides: [f64; 2],
     weight: f64,
     sensor: Option<usize>,
     means: TimeMean,
     sensed: Vec<[f64; 2]>,
-    draft: Vec<[f64; 3]>,
-    tilt: f64,
-    speed_body: f64,
+    draft: Option<Draft>,
     energy_start: f64,
     rise: f64,
     /// Whether the water has energy from outside: from openings, or from what follows a motion.
@@ -107,15 +108,14 @@ impl Sampler {
     pub fn new(spec: &Spec, simulation: &Simulation, scene: &Scene) -> Result<Self> {
         let has = |m| spec.of.contains(&m);
         let case = &simulation.case;
-        let block = case.fluid.as_ref().and_then(|f| f.block.first());
         let needs = |what: &str| {
             Error::key("measure", format!("this study measures what the case lacks: {what}"), "")
         };
         let dry = [Measure::BodyHeight, Measure::Bodies, Measure::Gauges, Measure::Fluid, Measure::Spread];
-        if block.is_none() && spec.of.iter().any(|m| !dry.contains(m)) {
-            return Err(needs("a fluid.block"));
+        if scene.water() == 0 && spec.of.iter().any(|m| !dry.contains(m)) {
+            return Err(needs("water at the start"));
         }
-        if (has(Measure::Draft) || has(Measure::BodyHeight)) && scene.solids.is_empty() {
+        if has(Measure::BodyHeight) && scene.solids.is_empty() {
             return Err(needs("a body"));
         }
         let sensor = match case.gauge.pressure.first().filter(|_| has(Measure::Sensor)) {
@@ -131,20 +131,19 @@ impl Sampler {
             }
         };
         let params = &simulation.params;
+        let up = (-params.gravity).try_normalize().unwrap_or(DVec3::Z);
         Ok(Self {
             recorder: Recorder::new(spec, simulation, scene)?,
             due: Due::new((spec.every > 0.0).then_some(spec.every)),
-            floor: block.map_or(0.0, |b| b.min[2]),
-            left: block.map_or(0.0, |b| b.min[0]),
-            width: block.map_or(1.0, |b| b.max[0] - b.min[0]),
+            up,
+            floor: ends(scene, up)[0],
+            sides: ends(scene, DVec3::X),
             weight: params.density * params.gravity.length(),
             spec: spec.clone(),
             sensor,
             means: TimeMean::default(),
             sensed: Vec::new(),
-            draft: Vec::new(),
-            tilt: 0.0,
-            speed_body: 0.0,
+            draft: if has(Measure::Draft) { Some(Draft::new(simulation, scene)?) } else { None },
             energy_start: 0.0,
             rise: 0.0,
             fed: !scene.openings.is_empty()
@@ -164,9 +163,9 @@ impl Sampler {
         let Self {
             // From the study and the case.
             spec: _,
+            up: _,
             floor: _,
-            width: _,
-            left: _,
+            sides: _,
             weight: _,
             sensor: _,
             fed: _,
@@ -176,8 +175,6 @@ impl Sampler {
             means,
             sensed,
             draft,
-            tilt,
-            speed_body,
             energy_start,
             rise,
             iterations_max,
@@ -188,13 +185,11 @@ impl Sampler {
         recorder.exchange(archive)?;
         due.exchange("measure", archive)?;
         means.exchange("measure.means", archive)?;
-        archive.number("measure.tilt", tilt)?;
-        archive.number("measure.speed_body", speed_body)?;
         archive.number("measure.energy_start", energy_start)?;
         archive.number("measure.rise", rise)?;
         archive.small("measure.iterations_max", iterations_max)?;
         archive.array("measure.sensed", sensed, false)?;
-        archive.array("measure.draft", draft, false)?;
+        draft.iter_mut().try_for_each(|draft| draft.exchange(archive))?;
         archive.array("measure.front", front, false)?;
         archive.array("measure.energy", energy, false)?;
         archive.array("measure.height", height, false)
@@ -229,7 +224,7 @@ impl Sampler {
         let monitor = simulation.backend.monitor()?;
         let energy = monitor.kinetic + monitor.potential;
         let depth = simulation.params.depth;
-        // From the floor of the first block, so that the ratio does not depend on the origin.
+        // From the floor, so that the ratio does not depend on the origin.
         let mass = monitor.particles as f64 * simulation.params.particle_mass();
         let ground = mass * simulation.params.gravity.length() * self.floor;
         if first {
@@ -252,11 +247,11 @@ impl Sampler {
         let mut now = vec![0.0; 6];
         (now[KINETIC], now[DENSITY_ERROR]) = (monitor.kinetic, monitor.density_error_mean);
         now[PARTICLES] = monitor.particles as f64;
-        let centroid = monitor.centroid[2] - self.floor;
+        let centroid = DVec3::from(monitor.centroid).dot(self.up) - self.floor;
         now[DEPTH] = 2.0 * centroid / depth;
         if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::HydrostaticPressure)) {
             let surface = self.floor + 2.0 * centroid - simulation.params.zero_pressure_depth();
-            let (rms, slope) = hydrostatics(fields, simulation.groups.fluid, surface, self.weight);
+            let (rms, slope) = hydrostatics(fields, simulation.groups.fluid, self.up, surface, self.weight);
             now[SQUARE] = (rms / (self.weight * depth)).powi(2);
             now[SLOPE] = slope;
         }
@@ -265,27 +260,10 @@ impl Sampler {
             let p = simulation.backend.wall_pressures(&[slot])?;
             self.sensed.push([t, p.first().map_or(f64::NAN, |p| p.pressure / (self.weight * depth))]);
         }
-        if let Some(fields) = fields.as_ref().filter(|_| self.has(Measure::Draft)) {
-            self.sample_draft(simulation, fields);
+        if let (Some(draft), Some(fields)) = (&mut self.draft, &fields) {
+            draft.sample(simulation, fields);
         }
         Ok(())
-    }
-
-    fn sample_draft(&mut self, simulation: &Simulation, fields: &Fields) {
-        let pose = &simulation.solids.poses()[0];
-        let params = &simulation.params;
-        // The level where the body is not: a quarter of the way from the tank's corner to its middle.
-        let at = simulation
-            .case
-            .tank
-            .as_ref()
-            .map_or([0.0, 0.0], |t| [0, 1].map(|k| t.min[k] + 0.125 * (t.max[k] - t.min[k])));
-        let (reach, l0) = (params.effective_radius, params.spacing);
-        let level = level(fields, &simulation.groups, at, params.dimensions, reach, l0, &params.periodic);
-        self.draft.push([simulation.time, level.unwrap_or(f64::NAN), pose.position.z]);
-        let up = pose.orientation * DVec3::Z;
-        self.tilt = self.tilt.max(up.z.clamp(-1.0, 1.0).acos().to_degrees());
-        self.speed_body = self.speed_body.max(pose.velocity.length());
     }
 
     /// The results.
@@ -331,15 +309,17 @@ impl Sampler {
             out.put("volume [-]", mean_of(DEPTH));
             out.put("volume error [-]", (mean_of(DEPTH) - 1.0).abs());
         }
-        if self.has(Measure::Draft) {
-            self.finish_draft(simulation, &mut out);
+        if let Some(draft) = &self.draft {
+            draft.finish(simulation.params.spacing, &mut out);
         }
         if self.has(Measure::Front) {
             // T = t sqrt(2 g / L), Z = x / L as in the experiments.
-            let scale = (2.0 * gravity / self.width).sqrt();
+            let [left, right] = self.sides;
+            let width = right - left;
+            let scale = (2.0 * gravity / width).sqrt();
             // The front is a particle's centre; its surface lies half a spacing further on.
-            let half = 0.5 * simulation.params.spacing / self.width;
-            let scaled = self.front.iter().map(|[t, x]| [t * scale, (x - self.left) / self.width + half]);
+            let half = 0.5 * simulation.params.spacing / width;
+            let scaled = self.front.iter().map(|[t, x]| [t * scale, (x - left) / width + half]);
             out.curves.insert("front scaled".into(), scaled.collect());
             out.curves.insert("front".into(), std::mem::take(&mut self.front));
         }
@@ -353,30 +333,17 @@ impl Sampler {
         self.recorder.finish(&mut out);
         Ok(out)
     }
+}
 
-    fn finish_draft(&self, simulation: &Simulation, out: &mut Measured) {
-        let Some(body) = simulation.case.body.first() else { return };
-        let Some(size) = body.size else { return };
-        let over_time = |k: usize| self.draft.iter().map(|d| [d[0], d[k]]).collect::<Vec<_>>();
-        let (level, centre) = (mean(&over_time(1)), mean(&over_time(2)));
-        let swing = self.draft.iter().map(|d| (d[2] - centre).abs()).fold(0.0, f64::max);
-        let height = size[2];
-        let density = simulation.params.density;
-        let volume: f64 = size.iter().product();
-        let ratio = body.density.or(body.mass.map(|m| m / volume)).unwrap_or(f64::NAN) / density;
-        let draft = level - (centre - 0.5 * height);
-        out.put("draft [m]", draft);
-        out.put("draft of Archimedes [m]", ratio * height);
-        out.put("draft error [-]", (draft / height - ratio).abs());
-        out.put(
-            "draft error from P = 0 [-]",
-            ((draft - 0.5 * simulation.params.spacing) / height - ratio).abs(),
-        );
-        out.put("draft offset over l0 [-]", (draft - ratio * height) / simulation.params.spacing);
-        out.put("swing over height [-]", swing / height);
-        out.put("tilt [deg]", self.tilt);
-        out.put("speed of the body [m/s]", self.speed_body);
-    }
+/// Where the water ends at t = 0 along the unit vector `way` [m], lowest and highest, in the cells of its lattice: a jittered start has
+/// those of the one that stands on it. Zeros without water.
+fn ends(scene: &Scene, way: DVec3) -> [f64; 2] {
+    let half = 0.5 * scene.spacing * way.abs().element_sum();
+    let cells = scene.position[..scene.water()]
+        .iter()
+        .map(|x| scene.node + scene.spacing * ((*x - scene.node) / scene.spacing).round());
+    let ends = cells.map(|cell| cell.dot(way)).map(|s| [s - half, s + half]);
+    ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_default()
 }
 
 /// x of the foremost water particle that has company: two others within two and a half spacings `l0` [m]. Spray ahead of it does not count, and a
@@ -394,11 +361,11 @@ pub fn front(fields: &Fields, fluid: usize, l0: f64) -> f64 {
     at.iter().enumerate().find(has_company).map_or(f64::NAN, |(_, x)| x.x)
 }
 
-/// Rms of P - rho g (surface - z) [Pa] and slope -dP/dz over rho g [-], over inner fluid particles.
-pub fn hydrostatics(fields: &Fields, fluid: usize, surface: f64, weight: f64) -> (f64, f64) {
+/// Rms of P - rho g (surface - z) [Pa] and slope -dP/dz over rho g [-], over inner fluid particles, with z along `up`.
+pub fn hydrostatics(fields: &Fields, fluid: usize, up: DVec3, surface: f64, weight: f64) -> (f64, f64) {
     let [mut e, mut n, mut z, mut p, mut zz, mut zp] = [0.0; 6];
     for i in (0..fluid).filter(|&i| fields.state[i] == State::Inner) {
-        let (zi, pi) = (fields.position[i].z, fields.pressure[i]);
+        let (zi, pi) = (fields.position[i].dot(up), fields.pressure[i]);
         e += (pi - weight * (surface - zi).max(0.0)).powi(2);
         n += 1.0;
         z += zi;
@@ -409,14 +376,21 @@ pub fn hydrostatics(fields: &Fields, fluid: usize, surface: f64, weight: f64) ->
     ((e / n).sqrt(), -(zp / n - z / n * p / n) / (zz / n - (z / n).powi(2)) / weight)
 }
 
-/// Volume of a solid's shape [m3].
-pub fn volume(shape: &Shape) -> f64 {
-    shape.volume()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_jittered_start_ends_where_its_lattice_does() {
+        let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\n[fluid]\njitter = 0.3\n\
+                    [[fluid.block]]\nmin = [0.2, 0, 0.4]\nmax = [0.3, 1, 0.5]\n\
+                    [[fluid.block]]\nmin = [0.1, 0, -0.2]\nmax = [0.3, 1, 0.1]\n";
+        let scene = Scene::build(&text.parse().unwrap()).unwrap();
+        for (way, expected) in [(DVec3::Z, [-0.2, 0.5]), (DVec3::X, [0.1, 0.3]), (-DVec3::X, [-0.3, -0.1])] {
+            let found = ends(&scene, way);
+            assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-9), "{way}: {found:?}");
+        }
+    }
 
     #[test]
     fn a_front_is_a_tongue_and_no_spray() {

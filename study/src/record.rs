@@ -113,6 +113,25 @@ impl Sums {
     }
 }
 
+/// Curves of the water as a whole,
+const WATER: [&str; 7] = [
+    "fluid x [m]",
+    "fluid y [m]",
+    "fluid z [m]",
+    "fluid momentum x [kg m/s]",
+    "fluid momentum y [kg m/s]",
+    "fluid momentum z [kg m/s]",
+    "fluid kinetic [J]",
+];
+/// of its spread,
+const SPREAD: [&str; 3] = ["fluid spread x [m]", "fluid spread y [m]", "fluid spread z [m]"];
+
+/// and of the solid `name`.
+fn of_solid(name: &str) -> [String; 7] {
+    ["x [m]", "y [m]", "z [m]", "vx [m/s]", "vy [m/s]", "vz [m/s]", "tilt [deg]"]
+        .map(|what| format!("{name} {what}"))
+}
+
 /// Keeps the curves of a run.
 #[derive(Debug)]
 pub struct Recorder {
@@ -130,7 +149,7 @@ impl Recorder {
     /// For a run of `simulation`.
     ///
     /// # Errors
-    /// A gauge that hangs in the air, a profile without bins.
+    /// A gauge that hangs in the air, a profile without bins, two curves of one name.
     pub fn new(spec: &Spec, simulation: &Simulation, scene: &Scene) -> Result<Self> {
         let has = |m| spec.of.contains(&m);
         if let Some(p) = spec.profile.iter().find(|p| p.bins == 0) {
@@ -147,7 +166,7 @@ impl Recorder {
             return Err(Error::key("measure.profile.along", text, "take x or z"));
         }
         let sums = |p: &Profile| Sums { profile: p.clone(), flat, bins: TimeMean::default() };
-        Ok(Self {
+        let recorder = Self {
             gauges: if has(Measure::Gauges) { Some(Gauges::new(&simulation.case, scene)?) } else { None },
             bodies: has(Measure::Bodies),
             fluid: has(Measure::Fluid) && simulation.plan.wet(),
@@ -155,7 +174,38 @@ impl Recorder {
             profiles: spec.profile.iter().map(sums).collect(),
             curves: BTreeMap::new(),
             times: Vec::new(),
-        })
+        };
+        recorder.tells_apart(spec, simulation)?;
+        Ok(recorder)
+    }
+
+    /// Refuses two curves of one name, of which a study would take one for the other.
+    fn tells_apart(&self, spec: &Spec, simulation: &Simulation) -> Result<()> {
+        let mut all: Vec<(String, String)> = Vec::new();
+        let mut put = |whose: &str, names: &mut dyn Iterator<Item = String>| {
+            all.extend(names.map(|name| (name, whose.to_owned())));
+        };
+        let owned = |names: &'static [&str]| names.iter().map(|name| (*name).to_owned());
+        put("a gauge", &mut self.gauges.iter().flat_map(|gauges| gauges.header().into_iter().skip(1)));
+        for k in (0..simulation.scene.followed()).filter(|_| self.bodies) {
+            let name = simulation.solids.name(k);
+            put(&format!("the solid `{name}`"), &mut of_solid(name).into_iter());
+        }
+        put("the water", &mut owned(&WATER).filter(|_| self.fluid));
+        put("the water", &mut owned(&SPREAD).filter(|_| self.spread));
+        put("a profile", &mut self.profiles.iter().map(|sums| sums.profile.name.clone()));
+        for (measure, whose, names) in [
+            (Measure::Front, "the front", &["front", "front scaled"][..]),
+            (Measure::Energy, "the energy", &["energy"]),
+            (Measure::BodyHeight, "the first body", &["height"]),
+        ] {
+            put(whose, &mut owned(names).filter(|_| spec.of.contains(&measure)));
+        }
+        all.sort();
+        let Some(twice) = all.windows(2).find(|pair| pair[0].0 == pair[1].0) else { return Ok(()) };
+        let [(name, one), (_, other)] = [&twice[0], &twice[1]];
+        let text = format!("measure: two curves would be called `{name}`: that of {one} and that of {other}");
+        Err(Error::key("measure", text, "rename the solid, gauge or profile, or measure one of them alone"))
     }
 
     /// Save the curves and sums, or take them over.
@@ -211,22 +261,21 @@ impl Recorder {
         if self.bodies {
             let followed = simulation.scene.followed();
             for (k, pose) in simulation.solids.poses().iter().take(followed).enumerate() {
-                let name = simulation.solids.name(k);
-                for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-                    put(format!("{name} {letter} [m]"), simulation.solids.path(k)[axis]);
-                    put(format!("{name} v{letter} [m/s]"), pose.velocity[axis]);
-                }
+                let (x, v) = (simulation.solids.path(k), pose.velocity);
                 let up = pose.orientation * DVec3::Z;
-                put(format!("{name} tilt [deg]"), up.z.clamp(-1.0, 1.0).acos().to_degrees());
+                let tilt = up.z.clamp(-1.0, 1.0).acos().to_degrees();
+                let values = [x[0], x[1], x[2], v.x, v.y, v.z, tilt];
+                of_solid(simulation.solids.name(k))
+                    .into_iter()
+                    .zip(values)
+                    .for_each(|(name, value)| put(name, value));
             }
         }
         if self.fluid {
             let monitor = simulation.backend.monitor()?;
-            for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-                put(format!("fluid {letter} [m]"), monitor.centroid[axis]);
-                put(format!("fluid momentum {letter} [kg m/s]"), monitor.momentum[axis]);
-            }
-            put("fluid kinetic [J]".into(), monitor.kinetic);
+            let ([x, y, z], [px, py, pz]) = (monitor.centroid, monitor.momentum);
+            let values = [x, y, z, px, py, pz, monitor.kinetic];
+            WATER.into_iter().zip(values).for_each(|(name, value)| put(name.into(), value));
         }
         let profiled = in_window && !self.profiles.is_empty();
         if !(self.spread || profiled) {
@@ -234,10 +283,8 @@ impl Recorder {
         }
         let fields = simulation.backend.read()?;
         if self.spread {
-            let [x, y, z] = spread(&fields, simulation.groups.fluid).to_array();
-            put("fluid spread x [m]".into(), x);
-            put("fluid spread y [m]".into(), y);
-            put("fluid spread z [m]".into(), z);
+            let values = spread(&fields, simulation.groups.fluid).to_array();
+            SPREAD.into_iter().zip(values).for_each(|(name, value)| put(name.into(), value));
         }
         if profiled {
             self.profiles.iter_mut().for_each(|p| p.add(&fields, simulation.groups.fluid, t));

@@ -5,6 +5,7 @@ use super::measure::hydrostatics;
 use super::pressure_solve;
 use super::row::Measured;
 use super::stability::{Map, bisect, horizontal, vertical};
+use glam::DVec3;
 use seixo::case::file::parse;
 use seixo::error::{Error, Result};
 use seixo::lattice::Shear;
@@ -105,6 +106,7 @@ fn still(sets: &[String], gamma: f64, context: &Context) -> Result<(f64, f64, Si
             let (rms, _) = hydrostatics(
                 &fields,
                 simulation.groups.fluid,
+                DVec3::Z,
                 2.0 * z - simulation.params.zero_pressure_depth(),
                 weight,
             );
