@@ -18,6 +18,24 @@ fn differing(a: &[u8], b: &[u8]) -> usize {
 }
 
 #[test]
+fn frames_less_than_a_millisecond_apart_have_times_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let root = folder.path().join("a").display().to_string();
+    let sets =
+        ["run.time_step=1e-4", "run.end=1.2e-3", "output.every=4e-4"].map(|set| ["--set", set]).concat();
+    let run = ran(&[&["run", &case, "-o", &root, "--backend", "cpu"][..], &sets].concat());
+    assert!(run.code == 0 && run.out.contains("to t = 0.0012 s"), "{} {}", run.out, run.err);
+    let drawn = ran(&["render", &root, "--size", "64x48"]);
+    for time in ["t = 0.0000 s", "t = 0.0004 s", "t = 0.0008 s", "t = 0.0012 s"] {
+        assert!(drawn.err.contains(time), "{time}: {}", drawn.err);
+    }
+    let told = ran(&["report", &root, "--pictures", "4", "--size", "64x48"]);
+    let page = std::fs::read_to_string(folder.path().join("a/report.html")).unwrap();
+    assert!(told.code == 0 && page.contains("\"time\":\"0.0004\""), "{}", told.err);
+}
+
+#[test]
 fn frames_become_pictures_as_the_run_itself_draws_them() {
     let folder = tempfile::tempdir().unwrap();
     let case = small_case(folder.path());

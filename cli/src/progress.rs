@@ -19,19 +19,20 @@ pub struct Display {
     bar: Option<ProgressBar>,
     quiet: bool,
     wet: bool,
+    decimals: usize,
     last: Instant,
 }
 
 impl Display {
-    /// Nothing is shown if `quiet`; `wet` scenes tell of water.
-    pub fn new(quiet: bool, wet: bool) -> Self {
+    /// Nothing is shown if `quiet`; `wet` scenes tell of water, and times have so many `decimals`.
+    pub fn new(quiet: bool, wet: bool, decimals: usize) -> Self {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(Some(BAR_LENGTH), ProgressDrawTarget::stderr_with_hz(4));
             let style = ProgressStyle::with_template("[{bar:10}] {percent:>3} %  {wide_msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar
         });
-        Self { bar, quiet, wet, last: Instant::now() }
+        Self { bar, quiet, wet, decimals, last: Instant::now() }
     }
 
     /// After a step.
@@ -65,7 +66,7 @@ impl Display {
         let report = &progress.report;
         let mut fields = vec![
             format!("ETA {}", clock(progress.remaining)),
-            format!("t={:.3} s", progress.time),
+            format!("t={:.1$} s", progress.time, self.decimals),
             format!("step {}", report.step + 1),
             format!("dt {:.1e}", report.dt),
         ];

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use seixo::case::{Case, OutputKind};
 use seixo::console::{remark, tell};
 use seixo::error::{Error, Result};
+use seixo::output::digits::of_time;
 use seixo::output::label::{Picture, animation, sheet};
 use seixo::output::particles::{Particles, name};
 use seixo::output::picture::{Field, Painter, Style, drops_of, placed_by};
@@ -208,6 +209,7 @@ impl LookArgs {
             (None, None) => return Err(Error::usage("--field", NO_COLOUR)),
         };
         (style.range, style.slice, style.labels) = (self.range, self.slice, !self.no_labels);
+        style.decimals = of_time(case);
         Ok(style)
     }
 }
@@ -304,7 +306,7 @@ pub fn render(args: &RenderArgs) -> Exit {
         let (number, time) = (frame.0, frame.1.time);
         write_whole(&out.join(format!("frame_{number:04}.png")), &picture.png())?;
         if !args.quiet {
-            remark(&format!("frame {number}, t = {time:.3} s"));
+            remark(&format!("frame {number}, t = {time:.0$} s", of_time(&case)));
         }
         Ok((1, None))
     };

@@ -15,6 +15,7 @@ use seixo::console::{remark, say, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
+use seixo::output::digits::{of_place, of_time};
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
 use seixo::params::Params;
@@ -219,7 +220,8 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
                     .for_each(|why| remark(&format!("warning: an older state is taken: {why}")));
                 if !args.quiet {
                     let (step, time) = (found.origin.step, found.origin.time);
-                    remark(&format!("going on from step {step}, t = {time:.4} s"));
+                    let decimals = of_time(&loaded.case).max(4);
+                    remark(&format!("going on from step {step}, t = {time:.decimals$} s"));
                     if found.origin.name != asked.name {
                         remark(&format!("its files keep their name, {}", found.origin.name));
                     }
@@ -271,7 +273,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
         let advice = simulation.solids.advice(step);
         advice.words.iter().for_each(|line| remark(line));
     }
-    let mut display = Display::new(args.quiet, simulation.plan.wet());
+    let mut display = Display::new(args.quiet, simulation.plan.wet(), of_time(&simulation.case));
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
     let finished =
         run_simulation(&mut simulation, &setup.scene, &setup.loaded.text, options, &stop, &mut observe)?;
@@ -310,8 +312,9 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
         n => format!(", after {n} of run.from,"),
     };
     let mut lines = vec![format!(
-        "{}: {own} steps{before} to t = {:.4} s in {} ({:.3e} s a step) on {}",
+        "{}: {own} steps{before} to t = {:.*} s in {} ({:.3e} s a step) on {}",
         ended,
+        of_time(case).max(4),
         summary.time_s,
         clock(Duration::from_secs_f64(summary.wall_s)),
         summary.wall_s / own.max(1) as f64,
@@ -333,9 +336,10 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
     // Where obstacles are the case says.
     let stands = |name: &str| case.obstacle.iter().any(|o| o.name == name);
     let bodies: Vec<_> = summary.bodies.iter().filter(|body| !stands(&body.name)).collect();
+    let places = of_place(case.run.spacing);
     for body in bodies.iter().take(BODIES) {
         let [x, y, z] = body.position_m;
-        lines.push(format!("{}: at ({x:.4}, {y:.4}, {z:.4}) m", body.name));
+        lines.push(format!("{}: at ({x:.places$}, {y:.places$}, {z:.places$}) m", body.name));
     }
     if bodies.len() > BODIES {
         lines.push(format!("{} more bodies: in result.json", bodies.len() - BODIES));

@@ -6,6 +6,7 @@ use clap::ValueEnum;
 use rayon::prelude::*;
 use seixo::console::{remark, tell};
 use seixo::error::{Error, Result};
+use seixo::output::digits::of_time;
 use seixo::output::replay::Frame;
 use seixo::output::spare::spare_folder;
 use seixo::output::surface::surface;
@@ -82,7 +83,10 @@ pub fn write(args: &SurfaceArgs) -> Exit {
         write_whole(&out.join(format!("surface_{number:04}.{extension}")), &bytes)?;
         if !args.quiet {
             let (time, count, volume) = (frame.time, mesh.triangle.len(), mesh.volume());
-            remark(&format!("frame {number}, t = {time:.3} s: {count} triangles around {volume:.4e} m3"));
+            let decimals = of_time(&case);
+            remark(&format!(
+                "frame {number}, t = {time:.decimals$} s: {count} triangles around {volume:.4e} m3"
+            ));
         }
         Ok(1)
     };

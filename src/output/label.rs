@@ -77,22 +77,22 @@ impl Picture {
         }
     }
 
-    /// The time in the upper left corner.
-    pub fn time(&mut self, time: f64) {
-        let (letter, text) = (self.letters().val(), clock(time));
+    /// The time, as it is `told`, in the upper left corner.
+    pub fn time(&mut self, told: &str) {
+        let letter = self.letters().val();
         let edge = letter / 2;
-        self.plate(edge / 2, edge / 2, self.length(&text) + edge, letter + edge);
-        self.write(edge, edge, &text);
+        self.plate(edge / 2, edge / 2, self.length(told) + edge, letter + edge);
+        self.write(edge, edge, told);
     }
 
     /// A bar of the colours in the upper right corner, from `range[0]` to `range[1]`, called `name`; none in a picture that
-    /// it would cover, or in which it would meet the `time`.
-    pub fn bar(&mut self, name: &str, range: [f64; 2], time: f64) {
+    /// it would cover, or in which it would meet the time, as it is `told`.
+    pub fn bar(&mut self, name: &str, range: [f64; 2], told: &str) {
         let letter = self.letters().val();
         let (width, edge) = ((self.width / 4).max(8 * letter).min(self.width), letter / 2);
         let (left, high) = (self.width.saturating_sub(width + 2 * edge), letter / 2);
         let bottom = edge + letter + letter / 8;
-        let beside = self.length(&clock(time)) + 2 * edge;
+        let beside = self.length(told) + 2 * edge;
         if left < beside + edge || 3 * (bottom + high + letter) > self.height() {
             return;
         }
@@ -109,11 +109,6 @@ impl Picture {
         // Above the bar, so that it meets no number.
         self.write(left + middle, edge, name);
     }
-}
-
-/// The time as it is written [s].
-fn clock(time: f64) -> String {
-    format!("t = {time:.3} s")
 }
 
 /// A number in few digits.
@@ -174,20 +169,20 @@ mod tests {
     fn words_stay_inside_and_leave_ink() {
         let blank = Picture { width: 300, bytes: vec![255; 3 * 300 * 200] };
         let mut written = blank.clone();
-        written.time(1.25);
+        written.time("t = 1.250 s");
         let before = written.bytes.clone();
-        written.bar("speed [m/s]", [0.0, 2.5], 1.25);
+        written.bar("speed [m/s]", [0.0, 2.5], "t = 1.250 s");
         assert_ne!(written.bytes, before);
         let ink = written.bytes.iter().zip(&blank.bytes).filter(|(a, b)| a != b).count();
         assert!(ink > 3000, "{ink}");
         // Too small for words: nothing is written beside it.
         let mut tiny = Picture { width: 3, bytes: vec![255; 3 * 3 * 2] };
-        tiny.time(1.0);
-        tiny.bar("x", [0.0, 1.0], 1.0);
+        tiny.time("t = 1.000 s");
+        tiny.bar("x", [0.0, 1.0], "t = 1.000 s");
         // Where it would cover the scene or the time there is no bar.
         for (width, height) in [(200, 100), (240, 400), (400, 100)] {
             let mut small = Picture { width, bytes: vec![255; 3 * width * height] };
-            small.bar("speed [m/s]", [0.0, 2.5], 1.25);
+            small.bar("speed [m/s]", [0.0, 2.5], "t = 1.250 s");
             assert!(small.bytes.iter().all(|&b| b == 255), "{width} x {height}");
         }
         let all = sheet(&[blank.clone(), written.clone(), blank], 2).unwrap();

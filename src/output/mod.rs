@@ -18,6 +18,7 @@
 //! Whole files appear by rename and tables grow by whole rows, so a killed run leaves nothing that cannot
 //! be read.
 
+pub mod digits;
 pub mod folder;
 pub mod label;
 pub mod particles;

@@ -95,6 +95,8 @@ pub struct Style {
     pub slice: Option<(usize, f64)>,
     /// Write time and colour bar.
     pub labels: bool,
+    /// Decimals of the time, see [`super::digits`].
+    pub decimals: usize,
 }
 
 impl Style {
@@ -102,7 +104,7 @@ impl Style {
     pub fn of(dimensions: u32) -> Self {
         let (azimuth, elevation) = if dimensions == 2 { (0.0, 0.0) } else { (0.38, 0.42) };
         let view = View { size: [960, 480], azimuth, elevation, zoom: 1.0, target: None };
-        Self { view, field: Field::Speed, range: None, slice: None, labels: true }
+        Self { view, field: Field::Speed, range: None, slice: None, labels: true, decimals: 3 }
     }
 }
 
@@ -200,9 +202,10 @@ impl Painter {
         let bytes = layers.pixels(2.0 * l0);
         let mut picture = Picture { width: self.style.view.size[0], bytes };
         if self.style.labels {
-            picture.time(time);
+            let told = format!("t = {time:.0$} s", self.style.decimals);
+            picture.time(&told);
             if scene.groups.fluid > 0 {
-                picture.bar(self.style.field.name(), self.range, time);
+                picture.bar(self.style.field.name(), self.range, &told);
             }
         }
         picture

@@ -1,10 +1,11 @@
 //! Frames: the particles of one moment, in VTU files and pictures.
 
 use super::due::Due;
-use crate::case::{Choice, Encoding, Output, OutputField, OutputKind, OutputRegion};
+use crate::case::{Case, Choice, Encoding, OutputField, OutputKind, OutputRegion};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
+use crate::output::digits::of_time;
 use crate::output::folder::{Folder, series_in};
 use crate::output::particles::{Carried, Particles};
 use crate::output::picture::{Painter, Style, drops, placed};
@@ -47,19 +48,15 @@ struct Series {
 }
 
 impl Frames {
-    /// Frames of `scene` in `folder`, with the kinds of particles that `output` asks for. `pictures` adds
+    /// Frames of `scene` in `folder`, with the kinds of particles that `case` asks for. `pictures` adds
     /// a picture of every frame of `[output]`.
     ///
     /// # Errors
     /// [`Error::Io`] if the folder of the pictures or of a series cannot be made.
-    pub fn new(
-        folder: &Folder,
-        output: &Output,
-        scene: &Scene,
-        params: &Params,
-        pictures: bool,
-    ) -> Result<Self> {
-        let picture = pictures.then(|| Painter::new(scene, &Style::of(scene.dimensions), params));
+    pub fn new(folder: &Folder, case: &Case, scene: &Scene, params: &Params, pictures: bool) -> Result<Self> {
+        let output = &case.output;
+        let style = Style { decimals: of_time(case), ..Style::of(scene.dimensions) };
+        let picture = pictures.then(|| Painter::new(scene, &style, params));
         if pictures {
             std::fs::create_dir_all(folder.pictures()).map_err(Error::io(folder.pictures()))?;
         }

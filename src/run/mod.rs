@@ -124,7 +124,7 @@ pub fn run(
     let folder = Folder::open(&options.out, &options.name, mode, &inputs)?;
     let mut run = Run {
         start: Instant::now(),
-        frames: Frames::new(&folder, &simulation.case.output, scene, &simulation.params, options.pictures)?,
+        frames: Frames::new(&folder, &simulation.case, scene, &simulation.params, options.pictures)?,
         tables: Tables::create(&folder, simulation, scene, gauges, resumes)?,
         totals: Totals::default(),
         steps_max: options.steps.unwrap_or(u64::MAX),

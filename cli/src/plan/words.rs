@@ -5,6 +5,7 @@ use seixo::backend::gpu::forecast::Forecast;
 use seixo::case::Case;
 use seixo::error::{CaseError, Error};
 use seixo::estimate::{Estimate, bytes};
+use seixo::output::digits::of_place;
 use seixo::plan::Stage;
 use seixo::share::Outlook;
 
@@ -34,8 +35,9 @@ impl WaveLine {
 }
 
 impl BodyLine {
-    fn words(&self) -> String {
-        let span = |k: usize| format!("{:.4} to {:.4}", self.min_m[k], self.max_m[k]);
+    /// Where it is in `places` decimals.
+    fn words(&self, places: usize) -> String {
+        let span = |k: usize| format!("{:.places$} to {:.places$}", self.min_m[k], self.max_m[k]);
         format!(
             "  `{}`: {:.4e} kg, {:.4e} m3; x {}, y {}, z {} m",
             self.name,
@@ -83,7 +85,8 @@ impl Report {
         }
         if !report.bodies.is_empty() {
             lines.extend([String::new(), "bodies at t = 0".to_string()]);
-            lines.extend(report.bodies.iter().take(MOST_BODIES).map(BodyLine::words));
+            let places = of_place(report.spacing_m);
+            lines.extend(report.bodies.iter().take(MOST_BODIES).map(|body| body.words(places)));
             let more = report.bodies.len().saturating_sub(MOST_BODIES);
             lines.extend((more > 0).then(|| format!("  and {more} more: --json")));
         }

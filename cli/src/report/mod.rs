@@ -17,6 +17,7 @@ use seixo::case::file::load;
 use seixo::case::{Case, OutputField, OutputKind};
 use seixo::console::{remark, tell};
 use seixo::error::{FolderError, Result};
+use seixo::output::digits::of_time;
 use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
 use seixo::output::spare::spare;
@@ -145,7 +146,7 @@ fn pictures(args: &ReportArgs, run: &Run) -> Result<Vec<(f64, String)>> {
 fn page(run: &Run, pictures: &[(f64, String)]) -> Result<String> {
     let sections = [
         section("what", "What was run", &what(run)),
-        section("seen", "Pictures", &film(pictures)),
+        section("seen", "Pictures", &film(pictures, of_time(&run.case))),
         section("bodies", "Bodies and moving walls", &bodies(run)),
         section("gauges", "Gauges", &gauges(run)),
         section("water", "Water in and out", &water(run)),
@@ -201,7 +202,10 @@ fn what(run: &Run) -> String {
     put("Particles", p["total"].as_u64().map(|n| format!("{n}, of them {} of water", p["fluid"])));
     put(
         "Steps",
-        r["steps"].as_u64().map(|n| format!("{n}, to t = {:.4} s", number("time_s").unwrap_or(f64::NAN))),
+        r["steps"].as_u64().map(|n| {
+            let time = number("time_s").unwrap_or(f64::NAN);
+            format!("{n}, to t = {time:.0$} s", of_time(&run.case).max(4))
+        }),
     );
     let wall = number("wall_s").and_then(|s| Duration::try_from_secs_f64(s).ok());
     let parts = match r["parts"].as_u64() {
@@ -226,21 +230,21 @@ fn what(run: &Run) -> String {
     format!("<dl>{rows}</dl>\n")
 }
 
-/// Pictures with a slider; the last one alone where no script runs.
-fn film(pictures: &[(f64, String)]) -> String {
+/// Pictures with a slider, times in so many `decimals`; the last one alone where no script runs.
+fn film(pictures: &[(f64, String)], decimals: usize) -> String {
     let Some((time, png)) = pictures.last() else { return String::new() };
     let frames: Vec<Value> = pictures
         .iter()
-        .map(|(t, png)| serde_json::json!({ "time": format!("{t:.3}"), "png": png }))
+        .map(|(t, png)| serde_json::json!({ "time": format!("{t:.decimals$}"), "png": png }))
         .collect();
     let frames = serde_json::to_string(&frames).unwrap_or_default();
     let last = pictures.len() - 1;
     format!(
-        "<img id=\"picture\" alt=\"The scene at t = {time:.3} s\" src=\"data:image/png;base64,{png}\">\n\
+        "<img id=\"picture\" alt=\"The scene at t = {time:.decimals$} s\" src=\"data:image/png;base64,{png}\">\n\
          <div class=\"film\"><button id=\"play\" type=\"button\" hidden>Play</button>\
          <label for=\"moment\">Time</label>\
          <input id=\"moment\" type=\"range\" min=\"0\" max=\"{last}\" step=\"1\" value=\"{last}\">\
-         <output id=\"said\" for=\"moment\">t = {time:.3} s</output></div>\n\
+         <output id=\"said\" for=\"moment\">t = {time:.decimals$} s</output></div>\n\
          <script type=\"application/json\" id=\"frames\">{frames}</script>\n"
     )
 }
