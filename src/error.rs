@@ -220,14 +220,16 @@ pub enum FolderError {
     Run(PathBuf),
     /// The run in it is one of another case.
     #[error(
-        "the case is another one than that of the run in {}: {}{}; run it as it was, or start a new run from that state \
-         with run.from = \"{}\"", folder.display(), first(changed), more(changed), folder.display()
+        "the case is another one than that of the run in {}: {}{}; run it as it was, or {}", folder.display(),
+        first(changed), more(changed), another(from.as_deref())
     )]
     OtherCase {
         /// The folder.
         folder: PathBuf,
         /// Keys that differ, each with both values.
         changed: Vec<String>,
+        /// Where `run.from` finds a state that the changed case can begin with, if there is one.
+        from: Option<PathBuf>,
     },
     /// There is no run in it to go on with.
     #[error("{}", no_run(.0))]
@@ -267,6 +269,15 @@ const MOST_CHANGES: usize = 5;
 
 fn first(changed: &[String]) -> String {
     changed[..changed.len().min(MOST_CHANGES)].join("; ")
+}
+
+/// What to do with a changed case.
+fn another(from: Option<&Path>) -> String {
+    let start = "start another run with --out";
+    from.map_or_else(
+        || start.into(),
+        |from| format!("{start}, from that state with run.from = {:?}", from.display().to_string()),
+    )
 }
 
 fn more(changed: &[String]) -> String {

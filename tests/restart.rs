@@ -271,6 +271,19 @@ fn a_done_run_is_left_alone_and_a_changed_case_is_refused_by_key() {
     for word in ["fluid.density was 1000.0, is 900.0", "run.end was 0.05, is 0.1", "run.from"] {
         assert!(longer.err.contains(word), "{word}: {}", longer.err);
     }
+    // Beside the case, wherever that is and whatever folder the command was typed in.
+    let typed = || {
+        let mut command = crate::cli::seixo();
+        command.current_dir(case.folder.path()).args(case.args("a", &["--resume", "--until", "0.1"]));
+        command
+    };
+    let told = String::from_utf8(typed().output().unwrap().stderr).unwrap();
+    let from = told.split("run.from = \"").nth(1).and_then(|rest| rest.split('"').next()).unwrap_or_default();
+    assert!(Path::new(from).is_absolute() && from.ends_with('a'), "{told}");
+    // A state of another scene is none to begin with.
+    let other = typed().args(["--set", "run.spacing=0.1"]).output().unwrap();
+    let told = String::from_utf8(other.stderr).unwrap();
+    assert!(told.contains("run.spacing was") && !told.contains("run.from"), "{told}");
     let none = ran(&["run", "--resume", &case.folder.path().display().to_string()]);
     assert!(none.code == 2 && none.err.contains("holds no run"), "{}", none.err);
 }
@@ -695,9 +708,18 @@ fn a_run_that_diverges_keeps_its_last_good_state() {
     assert!(result["exit_reason"].as_str().unwrap().contains("is in checkpoint/"), "{result}");
     let again = case.run("a", &["--resume"]);
     assert!(again.code == 4 && again.err.contains("would do so again"), "{} {}", again.code, again.err);
+    assert!(
+        again.err.contains(&format!("run.from = {:?}", case.root("a").display().to_string())),
+        "{}",
+        again.err
+    );
     let from = format!("run.from=\"{}\"", case.root("a").display());
     // It begins there, and its one step is what such water does.
     let other = case.run("b", &["--set", &from, "--steps", "1"]);
     assert!(other.code == 4 && other.err.contains("diverged at step"), "{} {}", other.code, other.err);
     assert!(case.root("b").join("vtu/fluid_0000.vtu").exists());
+    // Where none was saved, none is offered.
+    std::fs::remove_dir_all(case.root("a").join("checkpoint")).unwrap();
+    let again = case.run("a", &["--resume"]);
+    assert!(again.err.contains("--force") && !again.err.contains("run.from"), "{}", again.err);
 }

@@ -83,7 +83,7 @@ const TOLD: usize = 6;
 
 /// Whether the value at `path`, a dotted key or the table of it, is part of what a state is the state of. Laws,
 /// constants, motions, gauges, names and what is written may change.
-fn is_of_scene(path: &str) -> bool {
+pub(super) fn is_of_scene(path: &str) -> bool {
     let mut parts = path.split([' ', '.']).filter(|p| p.parse::<usize>().is_err());
     let table = parts.next().unwrap_or_default();
     let free = match table {

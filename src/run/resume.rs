@@ -1,5 +1,6 @@
 //! What an earlier run left in a folder, and whether another one may go on with it.
 
+use super::from::is_of_scene;
 use super::meshes::by_content;
 use crate::case::Case;
 use crate::case::file::parse;
@@ -7,7 +8,7 @@ use crate::checkpoint::Found;
 use crate::checkpoint::file::newest;
 use crate::error::{Error, FolderError, Result};
 use crate::output::folder::{case_name, checkpoints};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a folder holds.
 #[derive(Debug)]
@@ -50,11 +51,16 @@ pub fn standing(root: &Path, case: &Case) -> Result<Standing> {
                 return Ok(Standing::Done(text));
             }
             (Some("diverged"), _) => {
+                let why = result["exit_reason"].as_str().unwrap_or("diverged");
+                let remedy = match state_in(root, case) {
+                    Some(from) => {
+                        format!("start another case from its last good state with run.from = {from:?}")
+                    }
+                    None => "it has saved no state, so change the case and start again with --force".into(),
+                };
                 return Err(Error::Senseless(format!(
-                    "the run in {} {}; gone on with, it would do so again: start another case from its last good state \
-                     with run.from = \"{0}\"",
+                    "the run in {} {why}; gone on with, it would do so again: {remedy}",
                     root.display(),
-                    result["exit_reason"].as_str().unwrap_or("diverged"),
                 )));
             }
             _ => {}
@@ -72,7 +78,15 @@ fn same(root: &Path, old: &Case, new: &Case) -> Result<()> {
     if changed.is_empty() {
         return Ok(());
     }
-    Err(FolderError::OtherCase { folder: root.to_path_buf(), changed }.into())
+    // The state of another scene is none that it could begin with.
+    let from = if changed.iter().any(|c| is_of_scene(c)) { None } else { state_in(root, new) };
+    Err(FolderError::OtherCase { folder: root.to_path_buf(), changed, from }.into())
+}
+
+/// The folder `root` as `run.from` names it wherever the case lies, if the run there has saved a state from before the end of `case`.
+fn state_in(root: &Path, case: &Case) -> Option<PathBuf> {
+    let found = newest(&checkpoints(root)).ok()??;
+    std::path::absolute(root).ok().filter(|_| found.origin.time < case.run.end)
 }
 
 /// Keys with other values, each with both of them.
