@@ -185,9 +185,12 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
                 .ok_or_else(|| Error::key("error.against", format!("no reference `{file}`"), ""))
         };
         compare::curves(&definition, rows, &read)?;
+        // A point has held what it measured against them; the errors of its curves are new.
+        rows.iter_mut().for_each(|row| definition.hold(&mut row.measured));
         let errors: Vec<String> = definition.error.iter().map(|e| e.name()).collect();
         let mut report = work_precision::report(&definition.name, &definition.title, rows, &errors, wanted);
         report.charts.extend(compare::charts(&definition, rows, &read)?);
+        report.findings.extend(definition.idle_limits(rows));
         Ok(report)
     });
     Study { name, title, question, jobs: Vec::new(), finish }
@@ -196,6 +199,34 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::row::Row;
+
+    #[test]
+    fn limits_are_of_errors_of_curves_too_and_one_of_nothing_is_told() {
+        let text = "name = 's'\ntitle = 't'\nmethod = 'm'\ntext = ''\n[measure]\nof = []\n\
+                    [[error]]\ncurve = 'c'\nagainst = 'finest'\n\
+                    [limit]\n'c against finest [-]' = 0.1\n'v [-]' = 1\n'w [-]' = 1\n";
+        let study = of_points(Definition::parse("s", text).unwrap(), BTreeMap::new());
+        let mut rows = [0, 1].map(|index| {
+            let mut row = Row { index, method: "m".into(), ..Row::default() };
+            let rise = index as f64;
+            row.measured.curves.insert("c".into(), vec![[0.0, 1.0], [1.0, 1.0 + rise]]);
+            row.measured.put("v [-]", 2.0);
+            row.measured.limit("v [-]", 1.0);
+            row.measured.work.particles = index as u64;
+            row
+        });
+        let report = (study.finish)(&mut rows, None).unwrap();
+        let told = rows.each_ref().map(|row| row.measured.reason.as_str());
+        // The finest is held against nothing, and what the point told is told once.
+        assert_eq!(told[1], "v [-] = 2.000e0 > 1.000e0");
+        assert!(
+            told[0].contains("c against finest [-] = ") && told[0].matches("v [-]").count() == 1,
+            "{told:?}"
+        );
+        let idle: Vec<&String> = report.findings.iter().filter(|f| f.starts_with("[limit]")).collect();
+        assert!(idle.len() == 1 && idle[0].contains("`w [-]`") && idle[0].contains("v [-]"), "{idle:?}");
+    }
 
     #[test]
     fn every_built_in_study_can_be_set_up_quick_and_full() {

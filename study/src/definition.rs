@@ -28,14 +28,14 @@
 use super::engine::{Job, Processor};
 use super::measure::Spec;
 use super::result_number::ResultNumber;
-use super::row::Measured;
+use super::row::{Class, Measured, Row};
 use super::run_point::{Point, run};
 use super::validation::check::Check;
 use seixo::case::file::{load_text, parse_as};
 use seixo::error::{Error, Result};
 use seixo::run::{from, named_by_content};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// A study file.
@@ -86,7 +86,7 @@ pub struct Definition {
     /// What is compared with what, for a validation.
     #[serde(default)]
     pub check: Vec<Check>,
-    /// Values beyond which a point counts as degraded.
+    /// Values beyond which a point counts as degraded: of what is measured, and errors of curves.
     #[serde(default)]
     pub limit: BTreeMap<String, f64>,
 }
@@ -258,6 +258,7 @@ impl Definition {
         for check in &study.check {
             check.sound().map_err(|e| wrong("check", &e))?;
         }
+        study.reaches().map_err(|e| wrong("check.only", &e))?;
         for result in &study.result {
             result.sound().map_err(|e| wrong("result", &e))?;
         }
@@ -294,8 +295,8 @@ impl Definition {
     /// point whose case is refused is a point that fails.
     ///
     /// # Errors
-    /// [`Error::Case`] for a case that cannot be read, an axis without values, a method that names what is no axis, and if
-    /// every point is refused: that is a mistake in the study, and not a finding.
+    /// [`Error::Case`] for a case that cannot be read, an axis without values, a method that names what is no axis, a study without
+    /// points, and if every point is refused: that is a mistake in the study, and not a finding.
     pub fn jobs(&self, files: &Files, folder: &Path, setup: &Setup) -> Result<Vec<Job>> {
         let full = setup.full;
         let (path, text) = self.case_text(files, folder)?;
@@ -306,7 +307,8 @@ impl Definition {
         let mut jobs: Vec<(Job, Option<Error>)> = Vec::new();
         let main = Grid { method: None, full: false, axis: self.axis.clone() };
         for grid in std::iter::once(&main).chain(&self.grid).filter(|g| full || !g.full) {
-            if grid.axis.is_empty() {
+            // A study that varies nothing is of one point.
+            if std::ptr::eq(grid, &main) && main.axis.is_empty() && !self.grid.is_empty() {
                 continue;
             }
             let method = grid.method.as_ref().unwrap_or(&self.method);
@@ -335,6 +337,10 @@ impl Definition {
                 }
             }
         }
+        if jobs.is_empty() {
+            let text = format!("study `{}`: all of its grids are for --full alone", self.name);
+            return Err(Error::key("grid", text, "run it with --full, or give an [[axis]]"));
+        }
         if let Some((_, Some(_))) = jobs.first()
             && jobs.iter().all(|(_, refused)| refused.is_some())
         {
@@ -346,6 +352,58 @@ impl Definition {
             return Err(Error::key("axis", text, ""));
         }
         Ok(jobs.into_iter().map(|(job, _)| job).collect())
+    }
+
+    /// Holds what was `measured` against the limits.
+    pub fn hold(&self, measured: &mut Measured) {
+        self.limit.iter().for_each(|(name, most)| measured.limit(name, *most));
+    }
+
+    /// Limits of values that none of the points in `rows` has, in words with those that there are.
+    pub fn idle_limits(&self, rows: &[Row]) -> Vec<String> {
+        let ended = || rows.iter().filter(|r| r.measured.class <= Class::Degraded);
+        let known: BTreeSet<&str> =
+            ended().flat_map(|r| r.measured.values.keys().map(String::as_str)).collect();
+        if ended().next().is_none() {
+            return Vec::new();
+        }
+        let idle = self.limit.keys().filter(|name| !known.contains(name.as_str()));
+        let there: Vec<&str> = known.iter().copied().collect();
+        let told = |name: &String| {
+            format!(
+                "[limit] `{name}` is held against nothing: no point has this value; there are {}.",
+                there.join(", ")
+            )
+        };
+        idle.map(told).collect()
+    }
+
+    /// Refuses a `[[check]]` that is for points that no grid has.
+    ///
+    /// # Errors
+    /// [`Error::Case`] with the axes, or their values, that there are.
+    fn reaches(&self) -> Result<()> {
+        let axes: Vec<&Axis> = self.axis.iter().chain(self.grid.iter().flat_map(|g| &g.axis)).collect();
+        for check in &self.check {
+            for (name, value) in &check.only {
+                let picks = axes.iter().filter(|a| a.name == *name).map(|a| a.picks(true));
+                let values: Vec<String> =
+                    picks.collect::<Result<Vec<_>>>()?.concat().into_iter().map(|p| p.name).collect();
+                if values.contains(value) {
+                    continue;
+                }
+                let what = if values.is_empty() {
+                    let names: BTreeSet<&str> = axes.iter().map(|a| a.name.as_str()).collect();
+                    let names: Vec<&str> = names.into_iter().collect();
+                    format!("there is no axis `{name}`; there are: {}", names.join(", "))
+                } else {
+                    format!("the axis `{name}` has no value \"{value}\"; it has: {}", values.join(", "))
+                };
+                let text = format!("check `{}`: only: {what}", check.name);
+                return Err(Error::key("check.only", text, "no point would be held against it"));
+            }
+        }
+        Ok(())
     }
 
     /// Refuses a `method` with a name in braces that is none of `axes`.
@@ -470,6 +528,37 @@ value = "e [-]"
             )
             .unwrap();
         assert_ne!(other[0].hash("s"), quick[0].hash("s"));
+    }
+
+    #[test]
+    fn a_study_that_varies_nothing_is_of_one_point_and_one_without_points_is_refused() {
+        let none = |_: &str| unreachable!();
+        let head = STUDY.split("[[axis]]").next().unwrap().replace("{a} at {b}", "m");
+        let points = |more: &str, full: bool| {
+            let study =
+                Definition::parse("s.toml", &format!("{head}{more}[[error]]\nvalue = \"e [-]\"\n")).unwrap();
+            study.jobs(&none, Path::new(""), &Setup { full, ..Setup::default() })
+        };
+        assert_eq!(points("", false).unwrap().len(), 1);
+        let grid = "[[grid]]\nfull = true\naxis = [{ name = \"e\", key = \"run.end\", values = [1, 2] }]\n";
+        assert_eq!(points(grid, true).unwrap().len(), 2);
+        let refused = points(grid, false).err().expect("there is no point").to_string();
+        assert!(refused.contains("--full"), "{refused}");
+    }
+
+    #[test]
+    fn a_check_for_what_no_axis_has_is_refused() {
+        let check = |only: &str| {
+            let check = format!(
+                "[[check]]\nname = \"c\"\nonly = {only}\nvalue = \"e [-]\"\nreference = 1\ntolerance = 1\n"
+            );
+            Definition::parse("s.toml", &format!("{STUDY}{check}")).map(|_| ()).map_err(|e| e.to_string())
+        };
+        assert_eq!(check("{ a = \"3.0\", b = \"y\" }"), Ok(()));
+        let told = check("{ c = \"3.0\" }").unwrap_err();
+        assert!(told.contains("there is no axis `c`; there are: a, b"), "{told}");
+        let told = check("{ a = \"3\" }").unwrap_err();
+        assert!(told.contains("has no value \"3\"; it has: 1.0, 2.0, 3.0"), "{told}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! joined later, and a changed case computes only what changed.
 
 use super::kept::{VERSION, gather, json, point, read, told_of_kept};
-use super::row::{FORMAT, Measured, Row, hash};
+use super::row::{FORMAT, Measured, Row, hash, told};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::console::remark;
@@ -210,9 +210,8 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
             let why = if row.measured.reason.is_empty() { "" } else { ": " };
             let place = format!("{}/{}", n + 1, open.len());
             remark(&format!(
-                "{study} [{place}] {} ({}): {}{why}{}  elapsed {elapsed:.0} s, ETA {left:.0} s",
-                row.method,
-                row.setting(),
+                "{study} [{place}] {}: {}{why}{}  elapsed {elapsed:.0} s, ETA {left:.0} s",
+                told(&row.method, &row.setting()),
                 row.measured.class.name(),
                 first_line(&row.measured.reason),
             ));

@@ -5,6 +5,7 @@ use super::Study;
 use super::builtin;
 use super::definition::{Definition, Setup, files_of};
 use super::engine::Processor;
+use super::row::told;
 use seixo::error::{Error, Result};
 use seixo::output::write_whole;
 use serde::{Deserialize, Serialize};
@@ -64,7 +65,7 @@ impl Manifest {
         };
         let listed = study.jobs.iter().map(|job| {
             let parts: Vec<String> = job.parameters.iter().map(|(k, v)| format!("{k} = {v}")).collect();
-            Listed { hash: job.hash(&study.name), point: format!("{} ({})", job.method, parts.join(", ")) }
+            Listed { hash: job.hash(&study.name), point: told(&job.method, &parts.join(", ")) }
         });
         let manifest = Self {
             what: what.into(),

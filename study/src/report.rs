@@ -1,7 +1,7 @@
 //! What a study leaves: results.csv, results.json, report.md, and its charts as SVG.
 
 use super::kept::VERSION;
-use super::row::{Class, Row};
+use super::row::{Class, Row, told};
 use crate::plot::Chart;
 use seixo::error::{Error, Result};
 use seixo::output::table::{Cell, Table};
@@ -179,9 +179,8 @@ pub fn write(
             let (class, reason) = (row.measured.class.name(), &row.measured.reason);
             let _ = writeln!(
                 text,
-                "- {} ({}): {class}: {}",
-                row.method,
-                row.setting(),
+                "- {}: {class}: {}",
+                told(&row.method, &row.setting()),
                 reason.replace('\n', " ")
             );
         }

@@ -128,13 +128,16 @@ impl Measured {
         }
     }
 
-    /// Degraded if `name` was measured above `most`.
+    /// Degraded if `name` was measured above `most`; told once, however often it is asked.
     pub fn limit(&mut self, name: &str, most: f64) {
         // What is no number is within no limit.
         if let Some(&value) =
             self.values.get(name).filter(|v| v.partial_cmp(&&most).is_none_or(Ordering::is_gt))
         {
-            self.degrade(&format!("{name} = {value:.3e} > {most:.3e}"));
+            let reason = format!("{name} = {value:.3e} > {most:.3e}");
+            if !self.reason.split("; ").any(|told| told == reason) {
+                self.degrade(&reason);
+            }
         }
     }
 
@@ -202,6 +205,11 @@ impl Row {
         let parts: Vec<String> = more.map(|(k, v)| format!("{k} = {v}")).collect();
         if parts.is_empty() { self.method.clone() } else { format!("{}, {}", self.method, parts.join(", ")) }
     }
+}
+
+/// A point in words: its method, and its setting where anything is varied.
+pub fn told(method: &str, setting: &str) -> String {
+    if setting.is_empty() { method.into() } else { format!("{method} ({setting})") }
 }
 
 /// 64-bit FNV-1a, as 16 hexadecimal digits: the same on every machine and in every version of the compiler.

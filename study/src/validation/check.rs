@@ -203,6 +203,9 @@ impl Check {
         if self.take == Take::Lag && self.reference.is_none() {
             return wrong("a lag needs a `reference`");
         }
+        if self.take == Take::Lag && self.since_moved.is_some() {
+            return wrong("`since_moved` would shift one curve of a lag and not the other: leave it out");
+        }
         if self.value.is_some() && self.against.is_some() {
             return wrong("`against` needs a `curve`");
         }
@@ -360,5 +363,14 @@ mod tests {
         ] {
             assert!(check(&wrong).sound().is_err(), "{wrong}");
         }
+        let lag = "name = 'n'\ncurve = 'c'\ntake = 'lag'\nbehind = 'd'\nreference = 1\ntolerance = 0.1\n";
+        assert!(check(lag).sound().is_ok());
+        assert!(
+            check(&format!("{lag}since_moved = 0.1"))
+                .sound()
+                .unwrap_err()
+                .to_string()
+                .contains("since_moved")
+        );
     }
 }

@@ -98,6 +98,7 @@ pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
     page::write(&path, &suite, &rows)?;
     for validation in &suite.validations {
         page::lines(validation, &rows).iter().for_each(|line| say(line));
+        validation.notes(&rows).iter().for_each(|note| say(&format!("note: {note}")));
     }
     let missing = suite.len() - rows.len();
     if missing > 0 {

@@ -15,7 +15,7 @@ use crate::cases;
 use crate::definition::{Definition, Files, Setup, files_of};
 use crate::engine::{self, Context, Job, Options};
 use crate::row::Row;
-use check::Reference;
+use check::{Check, Reference};
 use seixo::error::{Error, Result};
 use std::ops::Range;
 use std::path::Path;
@@ -31,6 +31,8 @@ pub struct Validation {
     pub references: Vec<Reference>,
     /// Its points among those of the sweep.
     pub points: Range<usize>,
+    /// Its checks that are for none of these points, in words.
+    pub idle: Vec<String>,
 }
 
 /// Validations that run as one sweep.
@@ -94,7 +96,18 @@ impl Suite {
             job.identity = format!("{}\n{}", definition.name, job.identity);
             self.jobs.push(job);
         }
-        self.validations.push(Validation { definition, references, points: first..self.jobs.len() });
+        let idle = definition.check.iter().filter(|check| {
+            let mut points = self.jobs[first..].iter();
+            !points.any(|job| check.applies(&job.parameters.iter().cloned().collect()))
+        });
+        let told = |check: &Check| {
+            let only: Vec<String> =
+                check.only.iter().map(|(axis, value)| format!("{axis} {value}")).collect();
+            let (name, only) = (&definition.name, only.join(", "));
+            format!("{name}: {}: not checked, no point that runs is at {only} (see --full).", check.name)
+        };
+        let idle = idle.map(told).collect();
+        self.validations.push(Validation { definition, references, points: first..self.jobs.len(), idle });
         Ok(())
     }
 
@@ -126,6 +139,7 @@ impl Suite {
         for validation in &self.validations {
             for row in rows.iter_mut().filter(|r| validation.points.contains(&r.index)) {
                 validation.judge(row);
+                validation.definition.hold(&mut row.measured);
             }
         }
         Ok(rows)
@@ -138,6 +152,14 @@ pub fn error_name(check: &str) -> String {
 }
 
 impl Validation {
+    /// Checks and limits that none of its points among `rows` is held against, in words.
+    pub fn notes(&self, rows: &[Row]) -> Vec<String> {
+        let own: Vec<Row> = rows.iter().filter(|r| self.points.contains(&r.index)).cloned().collect();
+        let limits = self.definition.idle_limits(&own);
+        let named = limits.into_iter().map(|limit| format!("{}: {limit}", self.definition.name));
+        self.idle.iter().cloned().chain(named).collect()
+    }
+
     /// Puts result and error of every check that is for `row` among its values.
     fn judge(&self, row: &mut Row) {
         for (check, reference) in self.definition.check.iter().zip(&self.references) {
@@ -175,6 +197,24 @@ mod tests {
         points.sort();
         points.dedup();
         assert_eq!(points.len(), full.len(), "points that are the same");
+    }
+
+    #[test]
+    fn a_check_that_no_point_is_for_is_told() {
+        let text = "name = 'v'\ntitle = 't'\nmethod = 'm'\ntext = \"[run]\\nspacing = 0.1\\ntime_step = 1e-3\\nend = 1\\n\"\n\
+                    [measure]\nof = []\n[[axis]]\nname = 'e'\nkey = 'run.end'\nvalues = [1.0]\nfull_values = [2.0]\n\
+                    [[check]]\nname = 'fine'\nonly = { e = '2.0' }\nvalue = 'v'\nreference = 1\ntolerance = 1\n";
+        for (full, told) in [(false, 1), (true, 0)] {
+            let mut suite = Suite::default();
+            let setup = Setup { full, ..Setup::default() };
+            suite.add("v", text, &|_: &str| unreachable!(), Path::new(""), &setup).unwrap();
+            let notes = suite.validations[0].notes(&[]);
+            assert_eq!(notes.len(), told, "{notes:?}");
+            assert!(
+                notes.iter().all(|n| n.starts_with("v: fine: not checked") && n.contains("e 2.0")),
+                "{notes:?}"
+            );
+        }
     }
 
     #[test]

@@ -204,6 +204,9 @@ fn section(text: &mut String, validation: &Validation, rows: &[Row], images: &Pa
             line(text, &[cells.to_vec(), rest.to_vec()].concat());
         }
     }
+    for note in validation.notes(rows) {
+        let _ = writeln!(text, "\n{note}");
+    }
     text.push_str(
         "\n| scheme | setting | particles | steps | run time [s] | remarks |\n|---|---|---|---|---|---|\n",
     );
@@ -340,7 +343,7 @@ mod tests {
                     [[check]]\nname = 'level [m]'\nvalue = 'H [m]'\nreference = 0.1\ntolerance = 0.1\n";
         let definition = Definition::parse("tiny", text).unwrap();
         let references = vec![Default::default()];
-        let validation = Validation { definition, references, points: 0..3 };
+        let validation = Validation { definition, references, points: 0..3, idle: Vec::new() };
         let row = |index: usize| {
             let mut row = Row { index, method: "own".into(), ..Row::default() };
             row.parameters.insert("run".into(), index.to_string());
