@@ -395,7 +395,8 @@ impl Definition {
                 let what = if values.is_empty() {
                     let names: BTreeSet<&str> = axes.iter().map(|a| a.name.as_str()).collect();
                     let names: Vec<&str> = names.into_iter().collect();
-                    format!("there is no axis `{name}`; there are: {}", names.join(", "))
+                    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                    format!("there is no axis `{name}`; there are: {names}")
                 } else {
                     format!("the axis `{name}` has no value \"{value}\"; it has: {}", values.join(", "))
                 };

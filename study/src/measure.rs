@@ -382,7 +382,7 @@ mod tests {
 
     #[test]
     fn a_jittered_start_ends_where_its_lattice_does() {
-        let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\n[fluid]\njitter = 0.3\n\
+        let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\ngravity = [0, 0, 0]\n[fluid]\njitter = 0.3\n\
                     [[fluid.block]]\nmin = [0.2, 0, 0.4]\nmax = [0.3, 1, 0.5]\n\
                     [[fluid.block]]\nmin = [0.1, 0, -0.2]\nmax = [0.3, 1, 0.1]\n";
         let scene = Scene::build(&text.parse().unwrap()).unwrap();
