@@ -11,10 +11,10 @@ fn telling(gap: f64) -> usize {
     (-(0.5 * gap).log10() - 1e-9).ceil().clamp(3.0, MOST) as usize
 }
 
-/// Those of times of `case` [s]: frames of `[output]` differ in them, and tenths of the run.
+/// Those of times of `case` [s]: frames of `[output]` differ in them, or tenths of a run without.
 pub fn of_time(case: &Case) -> usize {
-    let (every, tenth) = (case.output.every, 0.1 * case.run.end);
-    telling(if every > 0.0 { every.min(tenth) } else { tenth })
+    let (every, end) = (case.output.every, case.run.end);
+    telling(if every > 0.0 { every.min(end) } else { 0.1 * end })
 }
 
 /// Those of places in particles of the spacing `l0` [m]: tenths of a spacing differ in them; 4 or more.
