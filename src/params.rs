@@ -383,15 +383,13 @@ impl Params {
         let c = self.sound_speed(dt);
         // A slam: up to 31 rho v^2. A wedge of 10 degrees comes to 40, what falls flat to more: such peaks are cut, and counted.
         let slam = (SOUND_OVER_FLOW * speed).powi(2);
-        let most = if head > 0.0 {
-            // Viscosity: over the length of the domain in gaps of a spacing.
-            let viscous = self.viscosity * speed * self.extent() / self.spacing.powi(2);
-            let driven = self.extent() * self.drive.length();
-            (c * c).max(head).max(viscous).max(driven)
-        } else {
-            // Without weight a jolt makes the pressure, rho v L / dt, or what drives the flow along a periodic axis.
-            self.extent() * (speed / dt + self.drive.length())
-        };
+        // Viscosity: over the length of the domain in gaps of a spacing.
+        let viscous = self.viscosity * speed * self.extent() / self.spacing.powi(2);
+        // Where there is no weight, or no room to give way, a jolt makes the pressure, rho v L / dt.
+        let jolt = if head > 0.0 && !self.filled { 0.0 } else { speed / dt };
+        let driven = self.extent() * (self.drive.length() + jolt);
+        // c_s is never 0: the noise of water at rest is not cut.
+        let most = (c * c).max(head).max(viscous).max(driven);
         let pressure_max = 5.0 * self.density * most.max(slam);
         let fastest = if self.filled { speed } else { 0.0 };
         let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;

@@ -276,3 +276,57 @@ fn a_full_tank_stays_full_when_a_driven_disc_crosses_its_seam() {
         assert!(filled(at, way), "from {at} by {way}");
     }
 }
+
+#[test]
+fn a_full_tank_that_is_shaken_pushes_back_with_the_mass_of_its_water() {
+    // 49 kPa from end to end where g H is 1 kPa: the pressure was cut, and the water collapsed onto itself.
+    let (length, l0, amplitude, period) = (1.0, 0.02, 0.05, 0.2);
+    let wall = |name: &str, [x0, x1]: [f64; 2], [z0, z1]: [f64; 2]| {
+        format!(
+            "[[moving_wall]]\nname = \"{name}\"\nmin = [{x0}, 0, {z0}]\nmax = [{x1}, 0.1, {z1}]\n\
+             sine = {{ axis = [1, 0, 0], amplitude = {amplitude}, period = {period}, ramp = 0.1 }}\n"
+        )
+    };
+    let ends = [-0.06, length + 0.06];
+    let text = format!(
+        "[run]\nspacing = {l0}\ntime_step = 5e-4\nend = 0.3\ndimensions = 2\ngravity = [0, 0, -10]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{length}, 0.1, 0.1]\n"
+    ) + &wall("floor", ends, [-0.06, 0.0])
+        + &wall("left", [-0.06, 0.0], [0.0, 0.1])
+        + &wall("right", [length, length + 0.06], [0.0, 0.1])
+        + &wall("lid", ends, [0.1, 0.16]);
+    let mut sim = simulation(&case(&text));
+    assert!(sim.params.filled);
+    let (mass, omega) = (1000.0 * length * 0.1 * l0, 2.0 * PI / period);
+    let (mut with, mut own) = (0.0, 0.0);
+    while sim.time < 0.3 - 1e-9 {
+        let before = sim.time;
+        sim.step().expect("a step");
+        if before > 0.1 {
+            let inertia = mass * amplitude * omega * omega * (omega * before).sin();
+            let force: f64 = sim.fluid_force.iter().map(|f| f.force.x).sum();
+            (with, own) = (with + force * inertia, own + inertia * inertia);
+        }
+    }
+    println!("force over that of the mass {:.4}", with / own);
+    assert!((with / own - 1.0).abs() < 0.02, "{}", with / own);
+    assert_eq!(sim.backend.counters().expect("counted").pressure_clamps, 0);
+}
+
+#[test]
+fn nothing_is_cut_of_the_noise_of_weightless_water_at_rest() {
+    let mut all = vec![Processor::Cpu];
+    all.extend(device());
+    for processor in all {
+        let mut case = full_tank("", "");
+        case.run.gravity = [0.0; 3];
+        case.fluid.as_mut().expect("water").sound_speed = None;
+        let mut sim =
+            Simulation::on(&case, Scene::build(&case).expect("it builds"), &processor).expect("it starts");
+        for _ in 0..50 {
+            sim.step().expect("a step");
+        }
+        let cut = sim.backend.counters().expect("counted").pressure_clamps;
+        assert_eq!(cut, 0, "{}", sim.backend.description());
+    }
+}
