@@ -600,3 +600,27 @@ fn what_is_wrong_with_an_opening_is_told() {
         .replace("[fluid]\n", "[fluid]\nmax_volume = 0.01\n");
     assert!(error(little).contains("fluid.max_volume"));
 }
+
+#[test]
+fn a_tank_that_lets_nothing_out_says_when_it_is_full() {
+    let noted = |text: &str| {
+        let scene = Scene::build(&text.parse().unwrap()).unwrap_or_else(|e| panic!("{e}"));
+        scene.notes.into_iter().find(|n| n.starts_with("inflow: the tank is full"))
+    };
+    // 0.4 x 0.2 m are left at 0.05 m2/s.
+    let inflow =
+        "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.5\n";
+    let open = tank(0.2, inflow);
+    let shut = open.replace("open = [\"z_max\"]\n", "");
+    let note = noted(&shut).expect("it overflows");
+    assert!(note.contains("full at t = 1.6000 s") && note.contains("add an [[outflow]]"), "{note}");
+    let outflow = "[[outflow]]\nname = \"out\"\nface = \"x_max\"\n";
+    for fine in [
+        open,
+        format!("{shut}{outflow}"),
+        shut.replace("end = 2.0", "end = 1.5"),
+        shut.replace("[fluid]\n", "[fluid]\nmax_volume = 0.15\n"),
+    ] {
+        assert_eq!(noted(&fine), None, "{fine}");
+    }
+}

@@ -33,6 +33,7 @@ impl Scene {
         builder.water();
         builder.bodies();
         builder.room();
+        builder.overfilled();
         builder.gauges();
         builder.coarse();
         let domain = builder.domain();

@@ -2,7 +2,7 @@
 
 use super::Passes;
 use super::build::Builder;
-use super::lattice::{Cells, FLUID, FREE};
+use super::lattice::{BLOCKED, Cells, FLUID, FREE, SOLID};
 use super::opening::Planned;
 use crate::case::HURRY;
 use glam::{DVec3, IVec3};
@@ -109,6 +109,37 @@ impl Builder<'_> {
 }
 
 impl Builder<'_> {
+    /// Notes when a tank that lets nothing out is full of what comes in: there is no room for more.
+    pub(super) fn overfilled(&mut self) {
+        let shut = self.case.outflow.is_empty() && self.case.tank.as_ref().is_some_and(|t| t.open.is_empty());
+        let Some(tank) = self.tank.filter(|_| shut) else { return };
+        let (l0, end) = (self.lattice.spacing, self.case.run.end);
+        let cells = tank.iter().filter(|&c| !matches!(self.grid.get(c), SOLID | BLOCKED)).count();
+        let room = cells as f64 - self.water.cell.len() as f64;
+        let slice = if self.lattice.plane { l0 } else { 1.0 };
+        // Beyond `fluid.max_volume` nothing comes in: the run says so.
+        let most = self.case.fluid.as_ref().and_then(|f| f.max_volume).map(|v| v * slice / l0.powi(3));
+        let comes = |t: f64| {
+            let of = |o: &Planned| match &o.opening.passes {
+                Passes::In(speed) => speed.integral(0.0, t) * o.opening.area / l0.powi(3),
+                _ => 0.0,
+            };
+            self.openings.iter().map(of).sum::<f64>()
+        };
+        if comes(end) <= room || most.is_some_and(|most| most <= cells as f64) {
+            return;
+        }
+        let (mut before, mut full) = (0.0, end);
+        for _ in 0..50 {
+            let middle = 0.5 * (before + full);
+            *if comes(middle) > room { &mut full } else { &mut before } = middle;
+        }
+        self.notes.push(format!(
+            "inflow: the tank is full at t = {full:.4} s, and nothing lets water out: add an [[outflow]], open a face (tank.open), or end \
+             the inflow or the run before"
+        ));
+    }
+
     /// The lowest level at which the water of every inflow gets to the `outflow` within the `tank` [m], of cells with middles at `height`
     /// [m]; infinite if there is no way.
     fn sill(&self, outflow: &Planned, tank: Cells, height: impl Fn(IVec3) -> f64) -> f64 {
