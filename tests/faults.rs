@@ -534,3 +534,27 @@ fn a_thousand_errors_are_twenty_and_a_count() {
     assert!(refused.err.contains("and 9980 more"));
     assert!(clock.elapsed() < std::time::Duration::from_secs(20), "{:?}", clock.elapsed());
 }
+
+#[test]
+fn the_end_of_a_run_counts_the_water_that_has_come_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("case.toml").display().to_string();
+    let out = folder.path().join("results");
+    std::fs::write(
+        &file,
+        "[run]\nspacing = 0.02\ntime_step = 2e-3\nadaptive = true\nend = 0.2\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.1, 0.4]\nopen = [\"z_max\"]\n[fluid]\n\
+         [[inflow]]\nname = \"in\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0.1, 0.1]\nvelocity = 0.5\n[output]\nevery = 0\n",
+    )
+    .unwrap();
+    let run = ran(&["run", &file, "--backend", "cpu", "-o", &out.display().to_string()]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let result = json(&std::fs::read_to_string(out.join("result.json")).unwrap());
+    let came = result["water"]["inflow"][0]["particles"].as_u64().unwrap();
+    assert!(came > 10 && result["particles"]["fluid"] == 0, "{result}");
+    assert!(
+        run.out.contains("pressure: ") && run.out.contains(&format!("0 of {came} particles lost")),
+        "{}",
+        run.out
+    );
+}

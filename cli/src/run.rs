@@ -320,16 +320,15 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
         summary.wall_s / own.max(1) as f64,
         summary.adapter,
     )];
-    if summary.particles.fluid > 0 {
+    if let Some(fluid) = summary.water_in_all() {
         let p = &summary.pressure;
         lines.push(format!(
             "pressure: {:.1} iterations a solve (at most {}) with {}, {} failures; density error {:.2e} mean, {:.2e} max",
             p.iterations_mean, p.iterations_max, p.preconditioner.unwrap_or("nothing"), p.failures, m.density_error_mean, m.density_error_max
         ));
-        let (lost, fluid) = (m.lost_particles, summary.particles.fluid);
         lines.push(format!(
-            "water: Courant number at most {:.2}; {lost} of {fluid} particles lost",
-            m.courant_max
+            "water: Courant number at most {:.2}; {} of {fluid} particles lost",
+            m.courant_max, m.lost_particles
         ));
     }
     lines.push(format!("energy: {:.6e} J at the start, {:.6e} J at the end", m.energy_start, m.energy_end));

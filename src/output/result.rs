@@ -246,6 +246,13 @@ fn is_zero(n: &u64) -> bool {
 }
 
 impl Summary {
+    /// Particles of water that the run has had, those of the start and those that came in; `None` of a scene without water.
+    pub fn water_in_all(&self) -> Option<u64> {
+        let came = self.water.as_ref().map(|w| w.inflow.iter().map(|i| i.particles).sum::<u64>());
+        let start = self.particles.fluid as u64;
+        (start > 0 || came.is_some()).then(|| start + came.unwrap_or(0))
+    }
+
     /// The summary as JSON.
     pub fn json(&self) -> String {
         // Numbers that are not finite become null; nothing else in here can fail.

@@ -46,11 +46,10 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     let (p, m) = (&summary.pressure, &summary.monitors);
     let mut judge = Judge(Vec::new());
     let solves = p.solves.max(1) as f64;
-    let wet =
-        (summary.particles.fluid > 0 || summary.water.is_some()) && summary.steps > summary.steps_before;
-    if wet {
-        let came = summary.water.iter().flat_map(|w| &w.inflow).map(|i| i.particles).sum::<u64>();
-        let fluid = (summary.particles.fluid as f64 + came as f64).max(1.0);
+    let water = summary.water_in_all().filter(|_| summary.steps > summary.steps_before);
+    let wet = water.is_some();
+    if let Some(water) = water {
+        let fluid = (water as f64).max(1.0);
         judge.bound(p.failures as f64 / solves, FAILURES, || {
             format!(
                 "{} of {} pressure solves missed fluid.solver.tolerance (largest residual {:.1e})",
