@@ -67,6 +67,11 @@ const SLIPS: &[(&[&str], &str)] = &[
         "body.0.swing.amplitude_deg: 400 degrees is more than a turn",
     ),
     (&["absorber.0.towards=z_max"], "absorber.0.towards: waves come in along x or y"),
+    (&["run.gravity=[9.81,0,0]"], "absorber.0.towards: waves come in along y or z"),
+    (
+        &["run.gravity=[-9.81,0,0]", "absorber.0.towards=z_max"],
+        "absorber.0.min: it begins 0.5000 m above the water",
+    ),
     (&["absorber.0.min=[1.5,0,0.7]"], "absorber.0.min: it begins 0.2000 m above the water"),
     (&["plane.0.center=[9,0.25,0.2]"], "plane `slope` lies outside of the tank along x"),
     (&["gauge.every=5"], "gauge.every: 5 s is longer than the run of 1 s"),
@@ -94,7 +99,7 @@ fn slips_of_unit_sign_and_place_are_warned_of() {
         &["body.0.inertia=[0.1,0.1,0.1]"][..],
         &["body.0.density=50"],
         &["output.kinds=[\"fluid\",\"body\",\"wall\"]", "body=[]", "moving_wall=[]"],
-        &["run.gravity=[9.81,0,0]"],
+        &["run.gravity=[9.81,0,0]", "absorber.0.towards=z_max"],
         &["fluid.block.0.velocity=[20,0,0]"],
     ] {
         assert_eq!(read(sets), Ok(vec![]), "{sets:?}");

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 const MOST_CELLS: f64 = 1e11;
 /// Cells that a place may lie away from the origin: they are numbered in 32 bits.
 const FARTHEST: f64 = 1e9;
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The keys of a wall beside those of its shape.
 pub(super) struct WallKeys<'a> {

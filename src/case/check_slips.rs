@@ -1,7 +1,8 @@
 //! The part of the check that warns of values that run but are hardly meant: slips of a unit, a sign or a place.
 
 use super::check::{Checker, length};
-use super::{Face, OutputKind, Vector, output};
+use super::check_geometry::AXES;
+use super::{Face, OutputKind, Tank, Vector, output};
 use glam::{DMat3, DVec3};
 
 /// Gravity and speeds beyond which a number is a slip [m/s2, m/s], and speeds that nothing has [m/s].
@@ -169,25 +170,7 @@ impl Checker<'_> {
     fn slips_of_places(&mut self) {
         let case = self.case;
         let Some(l0) = self.spacing() else { return };
-        let blocks = case.fluid.iter().flat_map(|f| &f.block).map(|b| b.max[2]);
-        let fills = case.fluid.iter().flat_map(|f| &f.fill).map(|f| f.level);
-        let level = blocks.chain(fills).fold(f64::NEG_INFINITY, f64::max);
-        // What else brings water brings it to a height that is not known here.
-        let other = case.fluid.as_ref().is_none_or(|f| !f.shape.is_empty()) || !case.inflow.is_empty();
-        for (k, absorber) in case.absorber.iter().enumerate() {
-            if absorber.way().0 == 2 {
-                let message = "waves come in along x or y: this damps from the floor up, or down".to_owned();
-                self.warn(
-                    &format!("absorber.{k}.towards"),
-                    message,
-                    "name the side that they should not come back from",
-                );
-            }
-            if !other && absorber.min[2] >= level {
-                let message = format!("it begins {:.4} m above the water", absorber.min[2] - level);
-                self.warn(&format!("absorber.{k}.min"), message, "let it reach down to the floor");
-            }
-        }
+        self.slips_of_absorbers();
         let Some(tank) = &case.tank else { return };
         for (k, plane) in case.plane.iter().enumerate() {
             let (Some(normal), Some(along)) =
@@ -205,10 +188,52 @@ impl Checker<'_> {
             if let Some(axis) = self.axes().find(apart) {
                 let message = format!(
                     "plane `{}` lies outside of the tank along {}: it holds no water",
-                    plane.name,
-                    ["x", "y", "z"][axis]
+                    plane.name, AXES[axis]
                 );
                 self.warn(&format!("plane.{k}.center"), message, "move it into the tank");
+            }
+        }
+    }
+
+    /// Absorbers that no wave runs into: these come in across gravity, in the water.
+    fn slips_of_absorbers(&mut self) {
+        let case = self.case;
+        let periodic = case.tank.as_ref().map_or([false; 3], Tank::periodic);
+        let weight = |k: usize| if periodic[k] { 0.0 } else { case.run.gravity[k].abs() };
+        let Some(axis) = self.axes().max_by(|&a, &b| weight(a).total_cmp(&weight(b))) else { return };
+        if weight(axis) == 0.0 {
+            return;
+        }
+        let up = -case.run.gravity[axis].signum();
+        let height = |low: &Vector, high: &Vector| {
+            if up > 0.0 { [low[axis], high[axis]] } else { [-high[axis], -low[axis]] }
+        };
+        let blocks = case.fluid.iter().flat_map(|f| &f.block).map(|b| height(&b.min, &b.max)[1]);
+        let fills = case.fluid.iter().flat_map(|f| &f.fill).map(|f| f.level);
+        let level = blocks.chain(fills).fold(f64::NEG_INFINITY, f64::max);
+        // What else brings water brings it to a height that is not known here; a fill's level is one along z.
+        let other = case
+            .fluid
+            .as_ref()
+            .is_none_or(|f| !f.shape.is_empty() || !(f.fill.is_empty() || axis == 2 && up > 0.0));
+        let other = other || !case.inflow.is_empty();
+        let across: Vec<&str> = self.axes().filter(|&k| k != axis).map(|k| AXES[k]).collect();
+        for (k, absorber) in case.absorber.iter().enumerate() {
+            if absorber.way().0 == axis {
+                let message = format!(
+                    "waves come in along {}: this damps from the floor up, or down",
+                    across.join(" or ")
+                );
+                self.warn(
+                    &format!("absorber.{k}.towards"),
+                    message,
+                    "name the side that they should not come back from",
+                );
+            }
+            let begins = height(&absorber.min, &absorber.max)[0];
+            if !other && begins >= level {
+                let message = format!("it begins {:.4} m above the water", begins - level);
+                self.warn(&format!("absorber.{k}.min"), message, "let it reach down to the floor");
             }
         }
     }
