@@ -1,5 +1,5 @@
 // Absorber: v = v / (1 + dt sigma(r)), the implicit step of dv/dt = -sigma v, with sigma = rate s^2 in each zone that holds
-// the particle; s runs from 0 where waves come in to 1 at the far end.
+// the particle, or an image of it; s runs from 0 where waves come in to 1 at the far end.
 // Twin: src/kernels/absorber.rs
 
 @group(0) @binding(2) var<storage, read> position: array<vec4f>;
@@ -18,7 +18,7 @@ fn absorber(@builtin(global_invocation_id) id: vec3u) {
     }
     var rate = 0.0;
     for (var k = 0u; k < arrayLength(&absorber_zone); k += 1u) {
-        rate += absorber_rate(absorber_zone[k], wrapped(x.xyz));
+        rate += absorber_rate(absorber_zone[k], x.xyz);
     }
     if rate > 0.0 {
         let v = velocity[i];

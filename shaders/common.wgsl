@@ -291,8 +291,13 @@ fn wrapped(x: vec3f) -> vec3f {
 //#endif
 }
 
-// sigma of crate::kernels::absorber in one zone.
-fn absorber_rate(zone: AbsorberZone, x: vec3f) -> f32 {
+// sigma of crate::kernels::absorber in one zone, which may reach over a periodic side.
+fn absorber_rate(zone: AbsorberZone, place: vec3f) -> f32 {
+//#if PERIODIC
+    let x = place - params.period * floor((place - zone.low.xyz) * params.inverse_period);
+//#else
+    let x = place;
+//#endif
     let s = clamp(dot(zone.ramp.xyz, x - zone.start.xyz), 0.0, 1.0);
     let holds = all(x >= zone.low.xyz) && all(x <= zone.high.xyz);
     return select(0.0, zone.ramp.w * s * s, holds);

@@ -102,7 +102,7 @@ fn absorber_work(@builtin(global_invocation_id) id: vec3u, @builtin(local_invoca
         if is_water(x.w) {
             var rate = 0.0;
             for (var k = 0u; k < arrayLength(&absorber_zone); k++) {
-                rate += absorber_rate(absorber_zone[k], wrapped(x.xyz));
+                rate += absorber_rate(absorber_zone[k], x.xyz);
             }
             // v^2 (b^2 - 1) / 2 with b = 1 / (1 + dt sigma), without the difference of two numbers near 1.
             let v = velocity[i].xyz;

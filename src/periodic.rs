@@ -83,6 +83,13 @@ impl Periodic {
         x
     }
 
+    /// The image of `x` from `low` on, less than a length above it along each periodic axis [m]: the one that a box whose lower corner
+    /// is `low` holds, wherever it reaches over a side.
+    #[inline(always)]
+    pub fn image_from(&self, low: DVec3, x: DVec3) -> DVec3 {
+        if self.any { x - self.length * ((x - low) * self.inverse).floor() } else { x }
+    }
+
     /// Whole lengths by which the box from `low` to `high` [m] is moved by its images that reach between the sides, itself included if it
     /// does.
     pub fn turns(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = IVec3> + use<> {
@@ -152,6 +159,23 @@ mod tests {
         let x = DVec3::new(1e9, -3.0, 0.1);
         assert_eq!((Periodic::default().wrap(x), Periodic::default().nearest(x)), (x, x));
         assert!(!Periodic::default().is_any() && p.is_any());
+    }
+
+    #[test]
+    fn a_box_over_a_side_holds_what_comes_in_at_the_opposite_one() {
+        let p = two_axes();
+        // From the upper side along x and the lower one along z.
+        let (low, high) = (DVec3::new(1.5, 7.0, 1.9), DVec3::new(2.5, 8.0, 2.1));
+        let holds = |x: f64, z: f64| {
+            let x = p.image_from(low, DVec3::new(x, 7.5, z));
+            x.cmpge(low).all() && x.cmplt(high).all()
+        };
+        for (x, z, is) in
+            [(1.6, 2.05, true), (-0.9, 2.45, true), (4.6, 1.95, true), (-0.4, 2.05, false), (1.6, 2.2, false)]
+        {
+            assert_eq!(holds(x, z), is, "{x} {z}");
+        }
+        assert_eq!(Periodic::default().image_from(low, high), high);
     }
 
     #[test]

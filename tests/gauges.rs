@@ -576,6 +576,7 @@ fn gauges_in_the_water_read_its_velocity_and_volume() {
              [[gauge.velocity]]\nname = \"seam\"\npoint = [0.0, 0.08, 0.19]\n\
              [[gauge.velocity]]\nname = \"air\"\npoint = [0.2, 0.08, 0.3]\n\
              [[gauge.volume]]\nname = \"all\"\nmin = [-1, -1, -1]\nmax = [1, 1, 1]\n\
+             [[gauge.volume]]\nname = \"over\"\nmin = [0.3, -1, 0]\nmax = [0.5, 1, 0.1]\n\
              [[gauge.volume]]\nname = \"part\"\nmin = [0.1, -1, 0]\nmax = [0.3, 1, 0.1]\n"
         ));
         let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
@@ -595,7 +596,9 @@ fn gauges_in_the_water_read_its_velocity_and_volume() {
         let all = 0.4 * width * 0.2;
         assert!((row["all [m3]"] / all - 1.0).abs() < 1e-9, "{row:?}");
         // A column of particles more or less at either side.
-        assert!((row["part [m3]"] / all - 0.25).abs() < 0.026, "{row:?}");
+        for name in ["part [m3]", "over [m3]"] {
+            assert!((row[name] / all - 0.25).abs() < 0.026, "{row:?}");
+        }
     }
 }
 

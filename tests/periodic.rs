@@ -5,12 +5,14 @@ use common::*;
 use glam::DVec3;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::{Backend, Processor, gpu};
-use seixo::case::Case;
+use seixo::case::{Absorber, Case, Face};
 use seixo::cells::Grid;
 use seixo::fields::{Fields, State};
 use seixo::gauges::Gauges;
+use seixo::kernels::absorber;
 use seixo::kernels::pressure_level::{subtract_mean, sum_source};
 use seixo::kernels::pressure_source::laplacian_coefficient;
+use seixo::output::particles::{Particles, Region};
 use seixo::params::Params;
 use seixo::plan::{ParticleStage, Plan};
 use seixo::pressure::cg::{Jacobi, Precondition, System, Workspace, dot, solve};
@@ -397,7 +399,16 @@ fn the_device_agrees_with_the_cpu_stage_by_stage() {
         return;
     }
     for (what, case) in [
-        ("flume", flume("solver = { tolerance = 1e-5 }")),
+        ("flume", {
+            let mut case = flume("solver = { tolerance = 1e-5 }");
+            case.absorber = vec![Absorber {
+                min: [0.0, 0.31, 0.0],
+                max: [0.4, 0.52, 1.0],
+                towards: Face::YMax,
+                rate: Some(50.0),
+            }];
+            case
+        }),
         ("multigrid", flume("solver = { tolerance = 1e-5, preconditioner = \"multigrid\" }")),
         ("paper", flume("preset = \"paper\"\nsolver = { tolerance = 1e-5 }")),
         ("box", box_of_water("jitter = 0.2\nsolver = { tolerance = 1e-5, preconditioner = \"multigrid\" }")),
@@ -596,6 +607,12 @@ fn what_cannot_go_round_is_refused_by_key_with_what_would_do() {
     assert_eq!(key, "tank.periodic.0");
     let (key, _) = refusal(&sound.replace("max = [0.4, 0.4, 0.3]", "max = [0.4, 0.6, 0.3]"));
     assert_eq!(key, "fluid.block.0.max");
+    let long = "[[absorber]]\nmin = [0, -0.1, 0]\nmax = [0.4, 0.4, 0.5]\ntowards = \"y_max\"\n";
+    let (key, text) = refusal(&format!("{sound}{long}"));
+    assert!(
+        key == "absorber.0" && text.contains("0.5 m long in a tank that is periodic after 0.4 m"),
+        "{key}: {text}"
+    );
     let sill = "[[obstacle]]\nname = \"sill\"\nmin = [0.1, -0.1, 0]\nmax = [0.2, 0.2, 0.1]\n";
     let (key, _) = refusal(&format!("{sound}{sill}"));
     assert_eq!(key, "obstacle.0.min");
@@ -635,4 +652,27 @@ fn walls_go_on_over_the_seam() {
     let faces: Vec<DVec3> = sides.map(|i| scene.position[i]).collect();
     let ends = faces.iter().filter(|x| x.y < 0.05).count();
     assert_eq!(faces.len(), 8 * ends, "every slice across y is like any other: {faces:?}");
+}
+
+#[test]
+fn boxes_over_the_seam_hold_what_comes_in_at_the_other_side() {
+    let case = case(
+        "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.3]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.5]\nopen = [\"z_max\"]\nperiodic = [\"x\", \"y\"]\n\
+         [[absorber]]\nmin = [0.3, -1, 0]\nmax = [0.5, 1, 0.2]\ntowards = \"x_max\"\nrate = 8\n\
+         [output]\nregion = { min = [0.7, 0, 0], max = [0.9, 0.4, 0.3] }\n",
+    );
+    let scene = Scene::build(&case).expect("it builds");
+    let params = Params::new(&case, &scene).expect("valid");
+    let rate = |x: f64| absorber::rate(DVec3::new(x, 0.3, 0.1), &params);
+    for (x, s) in [(0.25, 0.0), (0.35, 0.25), (0.05, 0.75), (0.15, 0.0)] {
+        assert!((rate(x) - 8.0 * s * s).abs() < 1e-9, "{x}: {}", rate(x));
+    }
+    let region = Region::new(&case.output.region.expect("a region"), &scene);
+    let mut sim = simulation(&case);
+    let fields = sim.backend.read().expect("the fields");
+    let water = Particles::fluid(&scene, &fields);
+    let over = water.position.iter().filter(|x| x[0] > 0.3 || x[0] < 0.1).count();
+    assert_eq!((water.within(&region).len(), over), (over, 4 * 8 * 6));
 }

@@ -4,7 +4,7 @@ use crate::cli::ran;
 use glam::DVec3;
 use seixo::case::Case;
 use seixo::kernels::absorber;
-use seixo::params::{Params, Zone};
+use seixo::params::Params;
 use seixo::plan::{Plan, Stage};
 use seixo::scene::{Drive, Motion, Scene};
 use std::path::Path;
@@ -156,14 +156,13 @@ fn the_rate_of_an_absorber_grows_as_the_square_of_the_way_into_it() {
     let scene = Scene::build(&case).unwrap();
     let params = Params::new(&case, &scene).unwrap();
     assert!(Plan::new(&case, &scene, &params).has(Stage::Absorber));
-    let zones: &[Zone] = &params.absorbers;
-    let rate = |x: f64| absorber::rate(DVec3::new(x, 0.0, 0.1), zones);
+    let rate = |x: f64| absorber::rate(DVec3::new(x, 0.0, 0.1), &params);
     assert!(rate(2.0) == 0.0 && rate(4.1) == 0.0 && rate(3.0) == 0.0);
     assert!((rate(3.5) - 2.0).abs() < 1e-12 && (rate(4.0) - 8.0).abs() < 1e-12);
     // By itself: 12 sqrt(g d) over the length.
     assert!((rate(-1.0) / (12.0 * (9.80665_f64 * 0.2).sqrt() / 2.0) - 1.0).abs() < 1e-12);
     let v = DVec3::new(1.0, 0.0, -2.0);
-    let slowed = absorber::absorber(DVec3::new(4.0, 0.0, 0.1), v, zones, 0.125);
+    let slowed = absorber::absorber(DVec3::new(4.0, 0.0, 0.1), v, &params, 0.125);
     assert!((slowed - 0.5 * v).length() < 1e-12);
 }
 

@@ -64,6 +64,15 @@ impl Checker<'_> {
                 self.add(format!("{path}.towards"), message, "allowed: x_min, x_max, z_min, z_max");
             }
             if self.box_edges(&path, &format!("{path}.max"), &absorber.min, &absorber.max) {
+                let axis = absorber.way().0;
+                let around = case.tank.as_ref().filter(|_| periodic[axis]).map(|t| t.max[axis] - t.min[axis]);
+                if let Some(around) = around.filter(|around| absorber.length() > around * (1.0 + 1e-9)) {
+                    let message = format!(
+                        "it is {} m long in a tank that is periodic after {around} m",
+                        absorber.length()
+                    );
+                    self.add(path.clone(), message, "make it as long as the tank, or shorter");
+                }
                 self.fits(&path, "the absorber", &absorber.min, &absorber.max);
                 let flat = |v: &Vector| [v[0], v[1]];
                 self.in_tank(&path, [&absorber.min, &absorber.max].map(flat), "the absorber");

@@ -346,7 +346,10 @@ impl Checker<'_> {
             return;
         }
         let Some(tank) = &self.case.tank else { return };
-        let apart = |k: &usize| region.max[*k] <= tank.min[*k] || region.min[*k] >= tank.max[*k];
+        // Along a periodic axis it holds the images of what is in the tank.
+        let periodic = tank.periodic();
+        let apart =
+            |k: &usize| !periodic[*k] && (region.max[*k] <= tank.min[*k] || region.min[*k] >= tank.max[*k]);
         if let Some(k) = self.axes().find(apart) {
             let axis = ["x", "y", "z"][k];
             self.add(

@@ -70,10 +70,11 @@ impl InWater {
             }
             Self::Volume(_, [low, high]) => {
                 let within = |x: DVec3| {
+                    let x = params.periodic.image_from(low, x);
                     let inside = x.cmpge(low) & x.cmplt(high);
                     inside.x && inside.z && (flat || inside.y)
                 };
-                let count = water().filter(|&i| within(params.periodic.wrap(fields.position[i]))).count();
+                let count = water().filter(|&i| within(fields.position[i])).count();
                 vec![Cell::from(count as f64 * params.spacing.powi(3))]
             }
         }

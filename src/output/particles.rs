@@ -4,8 +4,10 @@ use super::vtu::{Values, vtu};
 use crate::body::Pose;
 use crate::case::{Encoding, OutputField, OutputRegion};
 use crate::fields::Fields;
+use crate::periodic::Periodic;
 use crate::scene::{Kind, Scene};
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Particles of a file or of a picture, one entry a particle in each array; an array that a file does not hold is empty.
@@ -49,6 +51,31 @@ impl<'a> Carried<'a> {
         let get =
             |values: &[f64]| slot.checked_sub(self.first).and_then(|k| values.get(k)).copied().unwrap_or(0.0);
         (get(self.pressure), get(self.number_density))
+    }
+}
+
+/// A box of which frames are written, as it lies in its scene.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Region {
+    low: DVec3,
+    high: DVec3,
+    periodic: Periodic,
+}
+
+impl Region {
+    /// That of a case in its `scene`; in two dimensions y does not count.
+    pub fn new(region: &OutputRegion, scene: &Scene) -> Self {
+        let (mut low, mut high): (DVec3, DVec3) = (region.min.into(), region.max.into());
+        if scene.dimensions == 2 {
+            (low.y, high.y) = (-1.0, 1.0);
+        }
+        Self { low, high, periodic: scene.periodic }
+    }
+
+    /// Whether it holds a particle at `x` [m], or an image of it.
+    fn holds(&self, x: DVec3) -> bool {
+        let x = self.periodic.image_from(self.low, x);
+        x.cmpge(self.low).all() && x.cmple(self.high).all()
     }
 }
 
@@ -121,11 +148,9 @@ impl Particles {
         out
     }
 
-    /// Those of them within `region`, of which y does not count in a `flat` scene.
-    pub fn within(self, region: &OutputRegion, flat: bool) -> Self {
-        let axis =
-            |x: f32, k: usize| flat && k == 1 || (region.min[k]..=region.max[k]).contains(&f64::from(x));
-        let inside = |x: &[f32; 3]| (0..3).all(|k| axis(x[k], k));
+    /// Those of them within `region`.
+    pub fn within(self, region: &Region) -> Self {
+        let inside = |x: &[f32; 3]| region.holds(x.map(f64::from).into());
         let kept: Vec<bool> = self.position.iter().map(inside).collect();
         fn pick<T: Copy>(values: &[T], kept: &[bool]) -> Vec<T> {
             values.iter().zip(kept).filter(|(_, kept)| **kept).map(|(value, _)| *value).collect()

@@ -1,9 +1,9 @@
 //! Water that many ranks write: each a VTU file of its own, a piece, and the first one the PVTU file that names them.
 
-use super::particles::{Particles, name};
+use super::particles::{Particles, Region, name};
 use super::vtu::Values;
 use super::write_whole;
-use crate::case::{Encoding, OutputField, OutputRegion};
+use crate::case::{Encoding, OutputField};
 use crate::error::{Error, Result};
 use crate::whole::remove;
 use serde::{Deserialize, Serialize};
@@ -40,22 +40,19 @@ pub struct Pieces {
     time: f64,
     encoding: Encoding,
     fields: Vec<OutputField>,
-    region: Option<OutputRegion>,
-    /// Whether the scene has two dimensions.
-    flat: bool,
+    region: Option<Region>,
 }
 
 impl Pieces {
-    /// Pieces of `stem` at `time` [s], of the water in `region`, of which y does not count in a `flat` scene.
+    /// Pieces of `stem` at `time` [s], of the water in `region`.
     pub fn new(
         stem: &Path,
         time: f64,
         encoding: Encoding,
         fields: &[OutputField],
-        region: Option<OutputRegion>,
-        flat: bool,
+        region: Option<Region>,
     ) -> Self {
-        Self { stem: stem.into(), time, encoding, fields: fields.to_vec(), region, flat }
+        Self { stem: stem.into(), time, encoding, fields: fields.to_vec(), region }
     }
 
     /// Writes the piece of the rank numbered `rank`, which has this `water`; returns its bytes.
@@ -64,7 +61,7 @@ impl Pieces {
     /// [`Error::Io`].
     pub fn write(&self, rank: usize, water: Particles) -> Result<u64> {
         let water = match &self.region {
-            Some(region) => water.within(region, self.flat),
+            Some(region) => water.within(region),
             None => water,
         };
         let file = water.vtu(self.time, self.encoding, &self.fields);

@@ -1,13 +1,13 @@
 //! Frames: the particles of one moment, in VTU files and pictures.
 
 use super::due::Due;
-use crate::case::{Case, Choice, Encoding, OutputField, OutputKind, OutputRegion};
+use crate::case::{Case, Choice, Encoding, OutputField, OutputKind};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::output::digits::of_time;
 use crate::output::folder::{Folder, series_in};
-use crate::output::particles::{Carried, Particles};
+use crate::output::particles::{Carried, Particles, Region};
 use crate::output::picture::{Painter, Style, drops, placed};
 use crate::output::pieces::{self, Pieces};
 use crate::output::pvd::Pvd;
@@ -36,7 +36,7 @@ struct Series {
     pvd: Pvd,
     encoding: Encoding,
     fields: Vec<OutputField>,
-    region: Option<OutputRegion>,
+    region: Option<Region>,
     fluid: bool,
     solids: bool,
     walls: (bool, bool),
@@ -66,7 +66,7 @@ impl Frames {
             pvd: Pvd::new(pvd),
             encoding: output.encoding,
             fields: choice.fields.to_vec(),
-            region: choice.region,
+            region: choice.region.map(|region| Region::new(&region, scene)),
             fluid: choice.has(OutputKind::Fluid) && scene.groups.fluid > 0,
             solids: choice.has(OutputKind::Body) && !scene.solids.is_empty(),
             walls: (
@@ -245,7 +245,7 @@ impl Series {
             let file = "vtu/walls.vtu".to_string();
             if number == 0 {
                 let walls = Particles::walls(scene, present.carried(), self.walls.0, self.walls.1);
-                self.put(&file, &self.cut(walls, scene), time)?;
+                self.put(&file, &self.cut(walls), time)?;
             }
             parts.push(("walls", file));
         }
@@ -269,13 +269,12 @@ impl Series {
         let stem = format!("vtu/{}", name("fluid"));
         let path = self.root.join(&stem);
         if let Some(lead) = simulation.backend.lead().filter(|_| self.fluid) {
-            let flat = scene.dimensions == 2;
-            let pieces = Pieces::new(&path, time, self.encoding, &self.fields, self.region, flat);
+            let pieces = Pieces::new(&path, time, self.encoding, &self.fields, self.region);
             lead.write_pieces(&pieces)?;
             parts.push(("fluid", format!("{stem}.pvtu")));
         } else if let Some(fields) = present.fields.as_ref().filter(|_| self.fluid) {
             let file = format!("{stem}.vtu");
-            self.put(&file, &self.cut(Particles::fluid(scene, fields), scene), time)?;
+            self.put(&file, &self.cut(Particles::fluid(scene, fields)), time)?;
             pieces::replace(&path)?;
             parts.push(("fluid", file));
         }
@@ -289,9 +288,9 @@ impl Series {
     }
 
     /// What lies in the region of the output.
-    fn cut(&self, particles: Particles, scene: &Scene) -> Particles {
+    fn cut(&self, particles: Particles) -> Particles {
         match &self.region {
-            Some(region) => particles.within(region, scene.dimensions == 2),
+            Some(region) => particles.within(region),
             None => particles,
         }
     }

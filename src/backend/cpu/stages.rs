@@ -58,15 +58,15 @@ impl Cpu {
     }
 
     pub(super) fn absorber(&mut self, dt: f64) {
-        let (zones, own, sides) = (&self.params.absorbers, self.own(), self.params.periodic);
+        let (params, own) = (&self.params, self.own());
         let Fields { position, velocity, .. } = &mut self.fields;
         if let Some(ledger) = &mut self.ledger {
-            let slowed = |i: usize| absorber::absorber(sides.wrap(position[i]), velocity[i], zones, dt);
-            ledger.absorber(own.clone(), &self.params, velocity, slowed);
+            let slowed = |i: usize| absorber::absorber(position[i], velocity[i], params, dt);
+            ledger.absorber(own.clone(), params, velocity, slowed);
         }
         (&position[own.clone()], &mut velocity[own])
             .into_par_iter()
-            .for_each(|(&x, v)| *v = absorber::absorber(sides.wrap(x), *v, zones, dt));
+            .for_each(|(&x, v)| *v = absorber::absorber(x, *v, params, dt));
     }
 
     pub(super) fn predict(&mut self, step: &Step) {
