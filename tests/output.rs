@@ -128,7 +128,7 @@ fn round_trip(n: usize, encoding: Encoding) -> Vec<Vec<usize>> {
         ("Kind", Values::Byte(&kinds)),
         ("Id", Values::Number(&ids)),
     ];
-    let file = vtu(&points, &fields, 0.125, encoding);
+    let file = vtu(Values::Vector(&points), &fields, 0.125, encoding);
     let (head, arrays, headers) = read(&file);
     assert!(head.contains("Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">0.125<"), "{head}");
     assert!(head.contains(&format!("NumberOfPoints=\"{n}\" NumberOfCells=\"{n}\"")), "{head}");
@@ -175,7 +175,7 @@ fn a_full_last_block_says_its_size() {
 fn a_file_without_points_is_not_compressed() {
     for encoding in [Encoding::Base64, Encoding::Raw] {
         round_trip(0, encoding);
-        let file = vtu(&[], &[("Pressure", Values::Scalar(&[]))], 0.0, encoding);
+        let file = vtu(Values::Vector(&[]), &[("Pressure", Values::Scalar(&[]))], 0.0, encoding);
         assert!(!String::from_utf8_lossy(&file).contains("compressor"));
     }
 }

@@ -87,7 +87,7 @@ fn frames_hold_the_water_and_the_walls_of_a_region_and_solids_whole() {
     let part = run(folder.path(), "part", &["--set", kinds, "--set", region]);
     let ids = |p: &Particles| p.id.clone();
     let inside = |p: &Particles| -> Vec<u32> {
-        let within = |x: &[f32; 3]| (-0.5..=0.3).contains(&x[0]) && (0.1..=0.4).contains(&x[2]);
+        let within = |x: &[f64; 3]| (-0.5..=0.3).contains(&x[0]) && (0.1..=0.4).contains(&x[2]);
         p.position.iter().zip(&p.id).filter(|(x, _)| within(x)).map(|(_, &id)| id).collect()
     };
     let (whole, cut) = (particles(&last(&all).0).unwrap(), particles(&last(&part).0).unwrap());
@@ -151,8 +151,8 @@ fn series_are_frames_of_their_own_choice_and_interval() {
     assert_eq!(counts.map(|n| n.as_u64()), [Some(4), Some(11), Some(6)]);
     let shown = particles(corner[10].fluid.as_ref().unwrap()).unwrap();
     let whole = particles(&last(&root).0).unwrap();
-    let inside = |x: &&[f32; 3]| x[0] >= 0.0 && x[0] <= 0.2 && (0.0..=0.2).contains(&x[2]);
-    let expected: Vec<[f32; 3]> = whole.position.iter().filter(inside).copied().collect();
+    let inside = |x: &&[f64; 3]| x[0] >= 0.0 && x[0] <= 0.2 && (0.0..=0.2).contains(&x[2]);
+    let expected: Vec<[f64; 3]> = whole.position.iter().filter(inside).copied().collect();
     assert!(shown.position == expected && expected.len() > 10, "{} {}", shown.len(), expected.len());
     assert!(corner[10].solids.is_none() && shown.pressure.is_empty() && !shown.velocity.is_empty());
     let (there, here) = (gate[5].solids.as_ref().unwrap(), last(&root).1);
@@ -234,4 +234,36 @@ fn what_is_wrong_with_a_series_names_it() {
         // The line in question.
         assert!(told.err.contains("small.toml:"), "{}", told.err);
     }
+}
+
+#[test]
+fn frames_at_coordinates_of_a_site_tell_their_particles_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |at: f64| {
+        let text = format!(
+            "[run]\nspacing = 0.5\ntime_step = 0.01\nend = 0.02\ndimensions = 2\n\
+             [tank]\nmin = [{at}, 0, 0]\nmax = [{}, 5, 8]\nopen = [\"z_max\"]\n\
+             [fluid]\nsound_speed = 20\n[[fluid.block]]\nmin = [{at}, 0, 0]\nmax = [{}, 5, 5]\n\
+             [output]\nregion = {{ min = [{}, 0, 0], max = [{}, 5, 5] }}\n",
+            at + 10.0,
+            at + 10.0,
+            at + 2.1,
+            at + 4.1
+        );
+        let (case, out) = (folder.path().join("site.toml"), folder.path().join(format!("{at}")));
+        std::fs::write(&case, text).unwrap();
+        let (case, out) = (case.display().to_string(), out.display().to_string());
+        let ran = ran(&["run", &case, "-o", &out, "--backend", "cpu", "-q"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let file = last(Path::new(&out)).0;
+        let head = String::from_utf8_lossy(&std::fs::read(&file).unwrap()[..2000]).into_owned();
+        (particles(&file).unwrap(), head.contains("type=\"Float64\" Name=\"Points\""), out)
+    };
+    let ((near, small, _), (far, double, out)) = (write(0.0), write(4.5e6));
+    assert!(double && !small && near.len() == 4 * 10 && far.id == near.id, "{} {}", near.len(), far.len());
+    for (a, b) in near.position.iter().zip(&far.position) {
+        assert!((b[0] - 4.5e6 - a[0]).abs() < 1e-3 && (b[2] - a[2]).abs() < 1e-3, "{a:?} {b:?}");
+    }
+    let rows = ran(&["measure", &out, "--point", "4500003.1,0,2.1", "--times", "0.02"]);
+    assert!(rows.code == 0 && !rows.out.lines().last().unwrap().ends_with(','), "{} {}", rows.out, rows.err);
 }

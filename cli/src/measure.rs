@@ -171,6 +171,6 @@ fn values(water: &Particles) -> impl Iterator<Item = (DVec3, Value)> {
     water.position.iter().enumerate().map(move |(k, x)| {
         let velocity = water.velocity.get(k).map_or(DVec3::ZERO, vector);
         let pressure = water.pressure.get(k).map_or(0.0, |&p| f64::from(p));
-        (vector(x), Value { velocity, pressure })
+        (DVec3::from(*x), Value { velocity, pressure })
     })
 }

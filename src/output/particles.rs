@@ -1,4 +1,4 @@
-//! Particles on their way into a file: single precision, in the order of the scene's groups.
+//! Particles on their way into a file: single precision, places where they need it in double, in the order of the scene's groups.
 
 use super::vtu::{Values, vtu};
 use crate::body::Pose;
@@ -14,7 +14,7 @@ use std::ops::Range;
 #[derive(Clone, Default, Debug)]
 pub struct Particles {
     /// Position [m].
-    pub position: Vec<[f32; 3]>,
+    pub position: Vec<[f64; 3]>,
     /// Velocity [m/s].
     pub velocity: Vec<[f32; 3]>,
     /// Pressure [Pa]; 0 for dummies.
@@ -79,13 +79,22 @@ impl Region {
     }
 }
 
+/// Part of a spacing that places in a file may be off by.
+const OFF: f64 = 1e-3;
+
+/// Whether places between `low` and `high` [m] are to be kept in double precision, for single precision is off by more than a thousandth
+/// of the `spacing` [m] there: coordinates of a site are far from their origin.
+pub fn in_double((low, high): (DVec3, DVec3), spacing: f64) -> bool {
+    low.abs().max(high.abs()).max_element() * f64::from(f32::EPSILON) > OFF * spacing
+}
+
 fn single(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
 impl Particles {
     fn push(&mut self, at: (DVec3, DVec3), of: (f64, f64), kind: Kind, body: u32, id: usize) {
-        self.position.push(single(at.0));
+        self.position.push(at.0.to_array());
         self.velocity.push(single(at.1));
         self.pressure.push(of.0 as f32);
         self.number_density.push(of.1 as f32);
@@ -150,7 +159,7 @@ impl Particles {
 
     /// Those of them within `region`.
     pub fn within(self, region: &Region) -> Self {
-        let inside = |x: &[f32; 3]| region.holds(x.map(f64::from).into());
+        let inside = |x: &[f64; 3]| region.holds((*x).into());
         let kept: Vec<bool> = self.position.iter().map(inside).collect();
         fn pick<T: Copy>(values: &[T], kept: &[bool]) -> Vec<T> {
             values.iter().zip(kept).filter(|(_, kept)| **kept).map(|(value, _)| *value).collect()
@@ -166,11 +175,15 @@ impl Particles {
         }
     }
 
-    /// The VTU file of these particles at `time` [s], with `fields` beside their positions.
-    pub fn vtu(&self, time: f64, encoding: Encoding, fields: &[OutputField]) -> Vec<u8> {
+    /// The VTU file of these particles at `time` [s], with `fields` beside their positions, which are `double` or single.
+    pub fn vtu(&self, time: f64, encoding: Encoding, fields: &[OutputField], double: bool) -> Vec<u8> {
         let asked = OutputField::ALL.into_iter().filter(|field| fields.contains(field));
         let arrays: Vec<(&str, Values)> = asked.map(|field| (name(field), self.values(field))).collect();
-        vtu(&self.position, &arrays, time, encoding)
+        if double {
+            return vtu(Values::Place(&self.position), &arrays, time, encoding);
+        }
+        let single: Vec<[f32; 3]> = self.position.iter().map(|x| x.map(|x| x as f32)).collect();
+        vtu(Values::Vector(&single), &arrays, time, encoding)
     }
 
     /// The values of `field`.

@@ -239,7 +239,7 @@ pub fn drops_of(particles: &Particles) -> impl Iterator<Item = Drop> {
     let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let number = |values: &[f32], i: usize| values.get(i).map_or(f64::NAN, |&x| f64::from(x));
     (0..particles.len()).map(move |i| Drop {
-        position: vector(particles.position[i]),
+        position: particles.position[i].into(),
         velocity: particles.velocity.get(i).map_or(DVec3::NAN, |&v| vector(v)),
         pressure: number(&particles.pressure, i),
         number_density: number(&particles.number_density, i),
@@ -269,7 +269,7 @@ pub fn placed_by(scene: &Scene, particles: &Particles) -> Vec<Option<(DVec3, DQu
         } else {
             None
         };
-        pairs[k].extend(offset.map(|o| (o, Vec3::from(x).as_dvec3())));
+        pairs[k].extend(offset.map(|o| (o, DVec3::from(x))));
     }
     let fitted = scene.solids.iter().zip(&pairs).enumerate().map(|(k, (solid, pairs))| {
         let moves = k < scene.followed() && (solid.gives_way() || !(solid.is_free() || solid.is_still()));

@@ -41,18 +41,21 @@ pub struct Pieces {
     encoding: Encoding,
     fields: Vec<OutputField>,
     region: Option<Region>,
+    /// Whether places are in double precision.
+    double: bool,
 }
 
 impl Pieces {
-    /// Pieces of `stem` at `time` [s], of the water in `region`.
+    /// Pieces of `stem` at `time` [s], of the water in `region`, with places that are `double` or single.
     pub fn new(
         stem: &Path,
         time: f64,
         encoding: Encoding,
         fields: &[OutputField],
         region: Option<Region>,
+        double: bool,
     ) -> Self {
-        Self { stem: stem.into(), time, encoding, fields: fields.to_vec(), region }
+        Self { stem: stem.into(), time, encoding, fields: fields.to_vec(), region, double }
     }
 
     /// Writes the piece of the rank numbered `rank`, which has this `water`; returns its bytes.
@@ -64,7 +67,7 @@ impl Pieces {
             Some(region) => water.within(region),
             None => water,
         };
-        let file = water.vtu(self.time, self.encoding, &self.fields);
+        let file = water.vtu(self.time, self.encoding, &self.fields, self.double);
         write_whole(&piece(self.stem.as_ref(), rank), &file)?;
         Ok(file.len() as u64)
     }
@@ -104,7 +107,35 @@ impl Pieces {
         let stem = Path::new(&self.stem);
         remove(&with_end(stem, ".vtu"))?;
         clear(stem, ranks)?;
-        write_whole(&list(stem), pvtu(stem, &self.fields, self.encoding, ranks).as_bytes())
+        write_whole(&list(stem), self.pvtu(stem, ranks).as_bytes())
+    }
+
+    /// The file that names the pieces of `ranks` ranks.
+    fn pvtu(&self, stem: &Path, ranks: usize) -> String {
+        let nothing = Particles::default();
+        let array = |name: &str, values: Values| {
+            let (of, components) = (values.type_name(), values.components());
+            format!("      <PDataArray type=\"{of}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>\n")
+        };
+        let asked = OutputField::ALL.into_iter().filter(|field| self.fields.contains(field));
+        let lines: String = asked.map(|field| array(name(field), nothing.values(field))).collect();
+        let points = array("Points", if self.double { Values::Place(&[]) } else { Values::Vector(&[]) });
+        let byte_order = if cfg!(target_endian = "little") { "LittleEndian" } else { "BigEndian" };
+        let compressor =
+            if self.encoding == Encoding::Raw { "" } else { " compressor=\"vtkZLibDataCompressor\"" };
+        let mut text = format!(
+            "<?xml version=\"1.0\"?>\n\
+             <VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"{byte_order}\" \
+             header_type=\"UInt64\"{compressor}>\n  <PUnstructuredGrid GhostLevel=\"0\">\n    <PPointData>\n{lines}    </PPointData>\n    \
+             <PPoints>\n{points}    </PPoints>\n"
+        );
+        for rank in 0..ranks {
+            let path = piece(stem, rank);
+            let file = path.file_name().unwrap_or_default().to_string_lossy();
+            writeln!(text, "    <Piece Source=\"{file}\"/>").expect("a String takes everything");
+        }
+        text.push_str("  </PUnstructuredGrid>\n</VTKFile>\n");
+        text
     }
 }
 
@@ -125,33 +156,6 @@ fn clear(stem: &Path, from: usize) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The file that names the pieces of `ranks` ranks with these `fields`.
-fn pvtu(stem: &Path, fields: &[OutputField], encoding: Encoding, ranks: usize) -> String {
-    let nothing = Particles::default();
-    let array = |name: &str, values: Values| {
-        let (of, components) = (values.type_name(), values.components());
-        format!("      <PDataArray type=\"{of}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>\n")
-    };
-    let asked = OutputField::ALL.into_iter().filter(|field| fields.contains(field));
-    let lines: String = asked.map(|field| array(name(field), nothing.values(field))).collect();
-    let points = array("Points", Values::Vector(&[]));
-    let byte_order = if cfg!(target_endian = "little") { "LittleEndian" } else { "BigEndian" };
-    let compressor = if encoding == Encoding::Raw { "" } else { " compressor=\"vtkZLibDataCompressor\"" };
-    let mut text = format!(
-        "<?xml version=\"1.0\"?>\n\
-         <VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"{byte_order}\" \
-         header_type=\"UInt64\"{compressor}>\n  <PUnstructuredGrid GhostLevel=\"0\">\n    <PPointData>\n{lines}    </PPointData>\n    \
-         <PPoints>\n{points}    </PPoints>\n"
-    );
-    for rank in 0..ranks {
-        let path = piece(stem, rank);
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        writeln!(text, "    <Piece Source=\"{file}\"/>").expect("a String takes everything");
-    }
-    text.push_str("  </PUnstructuredGrid>\n</VTKFile>\n");
-    text
 }
 
 /// What a rank has to say of its piece: its bytes, or what kept it from writing them.

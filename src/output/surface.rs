@@ -5,7 +5,8 @@
 //! surface nets (Gibson 1998): a vertex in each cell of a grid that the surface passes, a quadrilateral across each edge that it cuts.
 //! No edge is open: the mesh encloses a volume.
 
-use glam::{IVec3, Vec3};
+use super::particles::in_double;
+use glam::{DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 
 /// Radius of the kernel over the spacing, W = (1 - (r / R)^2)^3.
@@ -18,6 +19,8 @@ const MOST_NODES: f64 = 1e9;
 /// Triangles, and the velocity of the water at their corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
+    /// What vertices are counted from [m]: zero, unless single precision does not tell them apart there.
+    pub origin: DVec3,
     /// Vertices [m].
     pub vertex: Vec<[f32; 3]>,
     /// Velocity at each vertex [m/s]; none if the particles have none.
@@ -116,7 +119,7 @@ impl Nodes {
 /// # Errors
 /// In words, if the grid would have more nodes than memory holds or a place is not a number.
 pub fn surface(
-    position: &[[f32; 3]],
+    position: &[[f64; 3]],
     velocity: &[[f32; 3]],
     spacing: f64,
     cell: f64,
@@ -124,6 +127,12 @@ pub fn surface(
     if position.iter().flatten().any(|x| !x.is_finite()) {
         return Err("a place of a particle is not a number".into());
     }
+    let (low, high) =
+        position.iter().fold((DVec3::MAX, DVec3::MIN), |(a, b), &x| (a.min(x.into()), b.max(x.into())));
+    let far = !position.is_empty() && in_double((low, high), spacing);
+    let origin = if far { low.floor() } else { DVec3::ZERO };
+    let near = |&x: &[f64; 3]| (DVec3::from(x) - origin).as_vec3().to_array();
+    let position: &[[f32; 3]] = &position.iter().map(near).collect::<Vec<_>>();
     let corners =
         position.iter().fold((Vec3::MAX, Vec3::MIN), |(a, b), &x| (a.min(x.into()), b.max(x.into())));
     if corners.0.x > corners.1.x {
@@ -140,7 +149,7 @@ pub fn surface(
     let bins = Bins::new(position, (low, corners.1 + room), reach);
     let nodes = Nodes { low, cell, count: size.ceil().as_ivec3() + 1 };
     let filled = filled(&bins, &nodes, reach * reach);
-    let mut out = net(&nodes, &filled);
+    let mut out = Surface { origin, ..net(&nodes, &filled) };
     if velocity.len() == position.len() {
         out.velocity =
             out.vertex.par_iter().map(|&x| mean(&bins, velocity, x.into(), reach * reach)).collect();
@@ -295,6 +304,11 @@ fn crossing(value: &[f32; 8]) -> Option<Vec3> {
 }
 
 impl Surface {
+    /// Where a `vertex` is [m].
+    fn place(&self, &vertex: &[f32; 3]) -> [f64; 3] {
+        (self.origin + Vec3::from(vertex).as_dvec3()).to_array()
+    }
+
     /// The bytes of a PLY file (binary, little endian): x, y, z and, if there are any, velocities as vx, vy, vz.
     pub fn ply(&self) -> Vec<u8> {
         let moves = self.velocity.len() == self.vertex.len() && !self.vertex.is_empty();
@@ -304,14 +318,21 @@ impl Surface {
             "ply\nformat binary_little_endian 1.0\ncomment water surface by seixo, [m] and [m/s]\nelement vertex {}\n",
             self.vertex.len()
         );
-        names.iter().for_each(|name| head += &format!("property float {name}\n"));
+        let far = self.origin != DVec3::ZERO;
+        for (k, name) in names.iter().enumerate() {
+            head += &format!("property {} {name}\n", if far && k < 3 { "double" } else { "float" });
+        }
         head += &format!(
             "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
             self.triangle.len()
         );
         out.extend(head.into_bytes());
         for (i, x) in self.vertex.iter().enumerate() {
-            out.extend(x.iter().flat_map(|x| x.to_le_bytes()));
+            if far {
+                out.extend(self.place(x).iter().flat_map(|x| x.to_le_bytes()));
+            } else {
+                out.extend(x.iter().flat_map(|x| x.to_le_bytes()));
+            }
             if moves {
                 out.extend(self.velocity[i].iter().flat_map(|v| v.to_le_bytes()));
             }
@@ -327,8 +348,10 @@ impl Surface {
     pub fn obj(&self) -> String {
         use std::fmt::Write;
         let mut out = String::from("# water surface by seixo [m]\n");
-        for [x, y, z] in &self.vertex {
-            let _ = writeln!(out, "v {x} {y} {z}");
+        let far = self.origin != DVec3::ZERO;
+        for vertex in &self.vertex {
+            let ([x, y, z], [a, b, c]) = (vertex, self.place(vertex));
+            let _ = if far { writeln!(out, "v {a} {b} {c}") } else { writeln!(out, "v {x} {y} {z}") };
         }
         for t in &self.triangle {
             let _ = writeln!(out, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1);
@@ -365,11 +388,11 @@ mod tests {
         for i in 0..n[0] {
             for j in 0..n[1] {
                 for k in 0..n[2] {
-                    position.push([i, j, k].map(|k| 5.0 + l0 as f32 * (k as f32 + 0.5)));
+                    position.push([i, j, k].map(|k| 5.0 + l0 * (f64::from(k) + 0.5)));
                 }
             }
         }
-        let velocity: Vec<[f32; 3]> = position.iter().map(|x| [1.0, 0.0, x[2]]).collect();
+        let velocity: Vec<[f32; 3]> = position.iter().map(|x| [1.0, 0.0, x[2] as f32]).collect();
         let surface = surface(&position, &velocity, l0, 0.5 * l0).expect("it is small");
         closed(&surface);
         let volume = (n[0] * n[1] * n[2]) as f64 * l0.powi(3);
@@ -401,6 +424,19 @@ mod tests {
         assert!((1.2e-6..2.4e-6).contains(&each) && surface.velocity.is_empty(), "{each}");
         assert_eq!(super::surface(&[], &[], 0.01, 0.01), Ok(Surface::default()));
         assert!(super::surface(&[[0.0; 3], [1e4; 3]], &[], 0.01, 0.01).is_err());
+    }
+
+    #[test]
+    fn a_surface_at_coordinates_of_a_site_is_the_one_near_zero() {
+        let drop = |at: f64| surface(&[[at, 0.0, 0.0], [at, 0.0, 0.5]], &[], 0.5, 0.25).expect("it is small");
+        let (near, far) = (drop(0.0), drop(4.5e6));
+        closed(&far);
+        assert!((far.volume() / near.volume() - 1.0).abs() < 1e-4 && near.origin == DVec3::ZERO);
+        let head = String::from_utf8_lossy(&far.ply()[..200]).into_owned();
+        assert!(head.contains("property double x\n"), "{head}");
+        let first = far.obj().lines().nth(1).expect("a vertex").to_owned();
+        let x: f64 = first.split(' ').nth(1).expect("x").parse().expect("a number");
+        assert!((x - 4.5e6).abs() < 1.0 && x.fract() != 0.0, "{first}");
     }
 
     #[test]

@@ -18,6 +18,8 @@ pub const BLOCK: usize = 1 << 16;
 pub enum Values<'a> {
     /// Vectors.
     Vector(&'a [[f32; 3]]),
+    /// Places that single precision does not tell apart.
+    Place(&'a [[f64; 3]]),
     /// Scalars.
     Scalar(&'a [f32]),
     /// Small numbers.
@@ -32,6 +34,7 @@ impl Values<'_> {
     fn bytes(&self) -> &[u8] {
         match self {
             Self::Vector(v) => bytemuck::cast_slice(v),
+            Self::Place(v) => bytemuck::cast_slice(v),
             Self::Scalar(v) => bytemuck::cast_slice(v),
             Self::Byte(v) => v,
             Self::Number(v) => bytemuck::cast_slice(v),
@@ -43,6 +46,7 @@ impl Values<'_> {
     pub(super) fn len(&self) -> usize {
         match self {
             Self::Vector(v) => v.len(),
+            Self::Place(v) => v.len(),
             Self::Scalar(v) => v.len(),
             Self::Byte(v) => v.len(),
             Self::Number(v) => v.len(),
@@ -54,6 +58,7 @@ impl Values<'_> {
     pub(super) fn type_name(&self) -> &'static str {
         match self {
             Self::Vector(_) | Self::Scalar(_) => "Float32",
+            Self::Place(_) => "Float64",
             Self::Byte(_) => "UInt8",
             Self::Number(_) => "UInt32",
             Self::Index(_) => "Int32",
@@ -62,12 +67,12 @@ impl Values<'_> {
 
     /// Components of a value.
     pub(super) fn components(&self) -> usize {
-        if matches!(self, Self::Vector(_)) { 3 } else { 1 }
+        if matches!(self, Self::Vector(_) | Self::Place(_)) { 3 } else { 1 }
     }
 }
 
 /// The file: `points` [m] with `fields` (name and one value a point) at `time` [s].
-pub fn vtu(points: &[[f32; 3]], fields: &[(&str, Values)], time: f64, encoding: Encoding) -> Vec<u8> {
+pub fn vtu(points: Values, fields: &[(&str, Values)], time: f64, encoding: Encoding) -> Vec<u8> {
     let n = points.len();
     let connectivity: Vec<i32> = (0..n as i32).collect();
     let offsets: Vec<i32> = (1..=n as i32).collect();
@@ -87,7 +92,7 @@ pub fn vtu(points: &[[f32; 3]], fields: &[(&str, Values)], time: f64, encoding: 
         line
     };
     let lines: String = fields.iter().map(|(name, values)| array(name, *values)).collect();
-    let position = array("Points", Values::Vector(points));
+    let position = array("Points", points);
     let cells = array("connectivity", Values::Index(&connectivity))
         + &array("offsets", Values::Index(&offsets))
         + &array("types", Values::Byte(&types));

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::output::digits::of_time;
 use crate::output::folder::{Folder, series_in};
-use crate::output::particles::{Carried, Particles, Region};
+use crate::output::particles::{Carried, Particles, Region, in_double};
 use crate::output::picture::{Painter, Style, drops, placed};
 use crate::output::pieces::{self, Pieces};
 use crate::output::pvd::Pvd;
@@ -37,6 +37,8 @@ struct Series {
     encoding: Encoding,
     fields: Vec<OutputField>,
     region: Option<Region>,
+    /// Whether places are in double precision.
+    double: bool,
     fluid: bool,
     solids: bool,
     walls: (bool, bool),
@@ -67,6 +69,7 @@ impl Frames {
             encoding: output.encoding,
             fields: choice.fields.to_vec(),
             region: choice.region.map(|region| Region::new(&region, scene)),
+            double: in_double(scene.domain, scene.spacing),
             fluid: choice.has(OutputKind::Fluid) && scene.groups.fluid > 0,
             solids: choice.has(OutputKind::Body) && !scene.solids.is_empty(),
             walls: (
@@ -208,6 +211,7 @@ impl Series {
             encoding: _,
             fields: _,
             region: _,
+            double: _,
             fluid: _,
             solids: _,
             walls: _,
@@ -269,7 +273,7 @@ impl Series {
         let stem = format!("vtu/{}", name("fluid"));
         let path = self.root.join(&stem);
         if let Some(lead) = simulation.backend.lead().filter(|_| self.fluid) {
-            let pieces = Pieces::new(&path, time, self.encoding, &self.fields, self.region);
+            let pieces = Pieces::new(&path, time, self.encoding, &self.fields, self.region, self.double);
             lead.write_pieces(&pieces)?;
             parts.push(("fluid", format!("{stem}.pvtu")));
         } else if let Some(fields) = present.fields.as_ref().filter(|_| self.fluid) {
@@ -302,7 +306,7 @@ impl Series {
             // Places of solids are read from these.
             fields.extend([OutputField::Body, OutputField::Id]);
         }
-        write_whole(&path, &particles.vtu(time, self.encoding, &fields))
+        write_whole(&path, &particles.vtu(time, self.encoding, &fields, self.double))
     }
 }
 
