@@ -201,7 +201,7 @@ impl Params {
         if lattice.number_density == 0.0 {
             let message =
                 format!("run.effective_radius = {}: no lattice neighbour lies inside", run.effective_radius);
-            return Err(Error::key("run.effective_radius", message, "use 2.1 to 3.1"));
+            return Err(Error::key("run.effective_radius", message, "use 2.1 to 2.6"));
         }
         let l0 = run.spacing;
         let fluid = case.fluid.as_ref();

@@ -66,6 +66,10 @@ const SLIPS: &[(&[&str], &str)] = &[
         &["body.0.swing={axis=[0,1,0],amplitude_deg=400,period=100}"],
         "body.0.swing.amplitude_deg: 400 degrees is more than a turn",
     ),
+    (
+        &["run.effective_radius=3.1"],
+        "run.effective_radius: with 3.1 the pressure below a free surface is too small",
+    ),
     (&["absorber.0.towards=z_max"], "absorber.0.towards: waves come in along x or y"),
     (&["run.gravity=[9.81,0,0]"], "absorber.0.towards: waves come in along y or z"),
     (
