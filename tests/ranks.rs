@@ -702,7 +702,10 @@ fn ranks_write_pieces_that_are_read_as_the_frame_of_one() {
             assert!(near(&pressure(&a, &a_order), &pressure(&b, &b_order), 5e3));
             assert!(number == 0 || pressure(&a, &a_order).iter().any(|&p| p > 1e3));
             for (&i, &j) in a_order.iter().zip(&b_order) {
-                assert!(near(&a.position[i], &b.position[j], 1.0), "{i} {j}");
+                assert!(
+                    near(&a.position[i].map(|x| x as f32), &b.position[j].map(|x| x as f32), 1.0),
+                    "{i} {j}"
+                );
             }
             assert_eq!(b.has(OutputField::Velocity), series.is_none());
             assert_eq!(a.has(OutputField::NumberDensity), b.has(OutputField::NumberDensity));
