@@ -19,7 +19,8 @@
 @group(0) @binding(9) var<storage, read> reaction: array<vec4f>;
 //#endif
 
-// How a body answers: M^-1 times rho / (c l0^3), with the c by which the device's equation is divided.
+// How a body answers: M^-1 times rho / (c l0^3), with the c by which the device's equation is divided. Arms count in spacings
+// here, and so torques, turns and inertia: in metres f32 would not hold those of a body of microns.
 struct FreeBody {
     inverse_mass: vec4f,
     inertia_x: vec4f, // columns of the inverse inertia
@@ -85,10 +86,11 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     let pose = poses[free_body[b].solid];
     let place = word_of(coupled_row(params.moving_wall + b));
     let end = free_body[b].first + free_body[b].count;
+    let per_spacing = 1.0 / params.spacing;
     var known = Wrench(vec3f(0.0), vec3f(0.0));
     for (var k = free_body[b].first + t; k < end; k += WORKGROUP) {
         let wall = wall_layer[k];
-        let arm = rotate(pose.orientation, wall.arm.xyz);
+        let arm = per_spacing * rotate(pose.orientation, wall.arm.xyz);
         var row = Wrench(vec3f(0.0), vec3f(0.0));
         var force = vec3f(0.0);
         if excess[k] < DRY {
@@ -100,9 +102,9 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
             let of_torque = coupling[4u * k + 1u];
             let head = coupling[4u * k + 2u];
             row.force += slot.xyz;
-            row.torque += of_torque.xyz;
+            row.torque += per_spacing * of_torque.xyz;
             known.force += head.xyz;
-            known.torque += coupling[4u * k + 3u].xyz;
+            known.torque += per_spacing * coupling[4u * k + 3u].xyz;
             source_diagonal[params.fluid + k] += vec2f(head.w, of_torque.w);
         }
 //#if REACTION

@@ -80,8 +80,8 @@ pub struct Gpu {
     wall_layers: Vec<(usize, usize)>,
     /// Rows at slots between solids that the device has.
     slot_rows: solids::SlotRows,
-    /// Free bodies in the next solve.
-    coupled: u64,
+    /// Bodies in the next solve that answer the pressure, by the numbers of their solids, rising.
+    coupled: Vec<usize>,
     counters: Counters,
     coefficients: Coefficients,
     /// What swallows on the device.

@@ -152,7 +152,7 @@ impl Gpu {
             solids: scene.solids.len(),
             wall_layers: wall_layers.collect(),
             slot_rows: solids::SlotRows::new(),
-            coupled: 0,
+            coupled: Vec::new(),
             counters: Counters::new(backend::outflows(scene)),
             coefficients: Coefficients::default(),
             outlets: Vec::new(),

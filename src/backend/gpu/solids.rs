@@ -34,14 +34,15 @@ impl Gpu {
         let with = |v: DVec3, w: f64| v.as_vec3().extend(w as f32).to_array();
         let four = |v: DVec3| with(v, 0.0);
         let device = |(solid, (body, &(first, count))): (usize, (&FreeBody, &(usize, usize)))| {
-            let inertia = factor * body.inverse_inertia;
+            // Arms are counted in spacings: in metres what turns a body of microns is beyond f32.
+            let inertia = factor * p.spacing.powi(2) * body.inverse_inertia;
             layout::FreeBody {
                 inverse_mass: four(factor * body.inverse_mass),
                 inertia_x: four(inertia.x_axis),
                 inertia_y: four(inertia.y_axis),
                 inertia_z: four(inertia.z_axis),
                 force: four(body.load.force),
-                torque: four(body.load.torque),
+                torque: four(body.load.torque / p.spacing),
                 first: first as u32,
                 count: count as u32,
                 solid: solid as u32,
@@ -57,7 +58,6 @@ impl Gpu {
         let mut free: Vec<_> = free.map(device).collect();
         let count = free.len() as u32;
         free.iter_mut().for_each(|body| body.bodies = count);
-        self.coupled = free.len() as u64;
         self.context.begin(Some(Stage::ConjugateGradient));
         if !free.is_empty() {
             self.context.upload(buffers::free_body, &free)?;
@@ -78,6 +78,21 @@ impl Gpu {
             self.context.upload_to(buffers::coupling.id(), at, bytemuck::cast_slice(&rows))?;
         }
         self.slot_rows = now;
+        self.forget_rows(free.iter().map(|body| body.solid as usize).collect())
+    }
+
+    /// Clears the rows of bodies that were in the last solve and are not among the `coupled` of the next: nothing makes them anew, and
+    /// they would take the answer of another body for theirs.
+    fn forget_rows(&mut self, coupled: Vec<usize>) -> Result<()> {
+        for &k in self.coupled.iter().filter(|k| coupled.binary_search(k).is_err()) {
+            let (first, count) = self.wall_layers[k];
+            let at = (4 * self.groups.moving_wall + 2 * first) as u64 * buffers::coupling.size();
+            let none = vec![[0.0_f32; 4]; 2 * count];
+            if count > 0 {
+                self.context.upload_to(buffers::coupling.id(), at, bytemuck::cast_slice(&none))?;
+            }
+        }
+        self.coupled = coupled;
         Ok(())
     }
 

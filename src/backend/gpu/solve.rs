@@ -21,8 +21,8 @@ impl Gpu {
     /// Conjugate gradients with the planned preconditioner; where multigrid breaks them down, again with the diagonal
     /// alone, from where they stopped. The residual reported is the true one, ||b - A x|| / ||b||.
     pub(super) fn conjugate_gradient(&mut self) -> Result<PressureReport> {
-        if self.coupled > 0 {
-            self.context.pass([(coupling::prepare, self.coupled)])?;
+        if !self.coupled.is_empty() {
+            self.context.pass([(coupling::prepare, self.coupled.len() as u64)])?;
         }
         let groups = self.sizes.reduction_groups();
         if self.params.filled {
@@ -57,7 +57,8 @@ impl Gpu {
         let groups = self.sizes.reduction_groups();
         let over_rows = |kernel| (kernel, groups);
         // How bodies answer the vector that is multiplied next.
-        let respond = (self.coupled > 0).then_some((coupling::respond, self.coupled));
+        let bodies = self.coupled.len() as u64;
+        let respond = (bodies > 0).then_some((coupling::respond, bodies));
         let mut iteration = Vec::new();
         // What judges the residual of the last iteration of a chunk; without levels the next chunk does.
         let mut judge = None;

@@ -90,7 +90,7 @@ impl Gpu {
     fn solve_traffic(&mut self, rows: &Rows, unknowns: u64) -> Result<Solve> {
         let (slots, u) = (self.sizes.pressure, unknowns);
         let work = |bytes, dispatches| Work { bytes, dispatches };
-        let respond = u64::from(self.coupled > 0);
+        let respond = u64::from(!self.coupled.is_empty());
         let prepare = respond;
         // What presses on walls, before the solve and after it.
         let before = u64::from(self.plan.needs(Arrays::Coupling));

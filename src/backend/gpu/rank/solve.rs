@@ -57,7 +57,7 @@ impl GpuRank {
         if self.gpu.plan.needs(Arrays::Coupling) {
             self.over_walls(wall_excess::before_solve, self.gpu.groups.moving_wall)?;
         }
-        if self.gpu.coupled > 0 {
+        if !self.gpu.coupled.is_empty() {
             self.over_bodies(coupling::prepare)?;
             self.meet(Meeting { bodies: true, ..Meeting::default() })?;
             self.over_bodies(coupling::subtract)?;
@@ -90,7 +90,7 @@ impl GpuRank {
     }
 
     fn over_bodies(&mut self, kernel: Kernel) -> Result<()> {
-        self.gpu.context.pass([(kernel, self.gpu.coupled)])
+        self.gpu.context.pass([(kernel, self.gpu.coupled.len() as u64)])
     }
 
     fn over_rows(&mut self, kernels: impl IntoIterator<Item = Kernel>) -> Result<()> {
@@ -170,7 +170,7 @@ impl GpuRank {
 
     /// Meet for the `sums`, and for what a product with the vector beside the positions takes: its copies, and how bodies answer it.
     fn multiplied(&mut self, sums: Option<usize>) -> Result<Met> {
-        let bodies = self.gpu.coupled > 0;
+        let bodies = !self.gpu.coupled.is_empty();
         if bodies {
             self.over_bodies(coupling::respond)?;
         }
@@ -184,7 +184,8 @@ impl GpuRank {
         let sum = buffers::partial_sum.size() * groups;
         let first = meeting.sums.map(|half| half as u64 * sum);
         let answer = buffers::coupling.size();
-        let (at, bodies) = (answer * 6 * self.gpu.groups.moving_wall as u64, self.gpu.coupled * 2 * answer);
+        let at = answer * 6 * self.gpu.groups.moving_wall as u64;
+        let bodies = self.gpu.coupled.len() as u64 * 2 * answer;
         let parts = [
             (buffers::solve.id(), 0, buffers::solve.size()),
             (buffers::partial_sum.id(), first.unwrap_or(0), first.map_or(0, |_| sum)),
