@@ -297,6 +297,8 @@ impl<'a> Builder<'a> {
         for shape in &self.off_lattice {
             self.water.remove(shape, from, &self.lattice, &mut self.grid);
         }
+        self.water.laid.push(from);
+        self.drain_walls();
         self.water.clear = self.water.cell.len();
         self.water.clear - from
     }
@@ -344,6 +346,9 @@ impl<'a> Builder<'a> {
             } else {
                 Water::inside(&shape, &self.lattice, &self.grid)
             };
+            if body.displaces_fluid {
+                self.drain(&solid, 0);
+            }
             if wet > 0 && body.displaces_fluid {
                 self.notes.push(format!("body `{}`: displaces {wet} fluid particles", body.name));
             } else if wet > 0 {

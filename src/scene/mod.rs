@@ -13,6 +13,7 @@
 
 mod bodies;
 mod build;
+mod cavities;
 mod curve;
 mod domain;
 mod fits;

@@ -42,6 +42,8 @@ pub(super) struct Water {
     pub velocity: Vec<DVec3>,
     /// How many of them are known to stand clear of the walls.
     pub clear: usize,
+    /// The first particle of each block, shape and fill.
+    pub laid: Vec<usize>,
 }
 
 impl Water {
@@ -303,7 +305,7 @@ fn leaves(queue: &[(IVec3, usize)], end: usize, tank: Option<Cells>) -> IVec3 {
 }
 
 /// Cells of the grid around a shape, a spacing beyond its box.
-fn around(shape: &Placed, lattice: &Lattice, grid: &Grid) -> Cells {
+pub(super) fn around(shape: &Placed, lattice: &Lattice, grid: &Grid) -> Cells {
     let reach = shape.bounds() + lattice.spacing;
     let Cells { lo, hi } = lattice.cells(shape.center - reach, shape.center + reach);
     Cells { lo: lo.max(grid.cells.lo), hi: hi.min(grid.cells.hi) }

@@ -140,6 +140,25 @@ impl Shape {
         }
     }
 
+    /// Whether it encloses room that nothing gets into.
+    pub(crate) fn has_cavities(&self) -> bool {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => shape.has_cavities(),
+            _ => false,
+        }
+    }
+
+    /// Whether a point lies in such room, or in the solid and nearest to it.
+    #[cfg_attr(not(feature = "mesh"), allow(unused_variables))]
+    pub(crate) fn in_cavity(&self, q: DVec3) -> bool {
+        match self {
+            #[cfg(feature = "mesh")]
+            Self::Mesh(shape) => shape.in_cavity(q),
+            _ => false,
+        }
+    }
+
     /// Its centre in the coordinates of its file or section [m], before [`Shape::frame`] is left.
     pub(crate) fn origin(&self) -> DVec3 {
         match self {

@@ -4,6 +4,7 @@
 //! spacing, one and a half and so on below the surface. Points of the surface press into others: those above the
 //! wall layer, the vertices and the sharp edges.
 
+mod cavities;
 mod cut;
 mod flush;
 mod ground;
@@ -25,7 +26,7 @@ use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 use planes::Planes;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// What is wrong with a file, and what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,6 +71,8 @@ pub struct Mesh {
     /// Convex edges that are sharper than [`SHARP`]: their ends, and the faces that their triangles belong to.
     sharp: Vec<(DVec3, DVec3, Faces)>,
     thickness: Thickness,
+    /// Its sealed cavities, when somebody has asked for them.
+    cavities: OnceLock<Arc<[TriMesh]>>,
 }
 
 /// Where a mesh is thinnest.
@@ -207,6 +210,7 @@ impl Mesh {
             along_file,
             sharp,
             thickness: Thickness { least: f64::INFINITY, place: center },
+            cavities: OnceLock::new(),
         })
     }
 
