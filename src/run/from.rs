@@ -1,6 +1,6 @@
 //! `run.from`: a run that begins with the last state of another one.
 
-use super::resume::changed;
+use super::resume::{HAD, changed};
 use crate::case::Case;
 use crate::case::file::{Loaded, parse};
 use crate::checkpoint::{Found, file};
@@ -71,9 +71,13 @@ pub fn named(case: &Case) -> Result<Option<Found>> {
         return Ok(Some(found));
     }
     let more = if scene.len() > TOLD { format!(" and {} more", scene.len() - TOLD) } else { String::new() };
+    let remedy = if scene.iter().any(|change| change.split(' ').nth(1) == Some(HAD)) {
+        "nothing can be added to it or taken out: keep a body that is to do nothing more, held by `locked`"
+    } else {
+        "leave places, orientations and velocities at t = 0 as they were: these come from the saved state"
+    };
     Err(Error::misfit(format!(
-        "run.from: the state in {from} is of another scene: {}{more}; leave places, orientations and velocities at t = 0 \
-         as they were: these come from the saved state",
+        "run.from: the state in {from} is of another scene: {}{more}; {remedy}",
         scene[..scene.len().min(TOLD)].join(", "),
     )))
 }
@@ -167,7 +171,8 @@ mod tests {
         for scene in [
             "run.spacing was 0.1, is 0.2",
             "obstacle.0.min.2 was 0, is 1",
-            "obstacle was absent, is other",
+            "obstacle had 0, has 1: `step` is new",
+            "body had 2, has 1: `c` is missing",
             "body.1.velocity.0 was 0, is 1",
             "body.0.center was other, is other",
             "fluid.block.0.max.1 was 1, is 2",
@@ -182,6 +187,7 @@ mod tests {
             "gauge.level.0.at.0 was 1, is 2",
             "fluid.viscosity was 0, is 1",
             "output was absent, is other",
+            "body.0.sine had 1, has 2",
             "contact.friction was 0.1, is 0.2",
         ] {
             assert!(!is_of_scene(free), "{free}");

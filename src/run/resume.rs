@@ -118,13 +118,64 @@ fn compare(path: &str, old: Option<&toml::Value>, new: Option<&toml::Value>, fou
                 .for_each(|(k, (a, b))| compare(&join(&k.to_string()), Some(a), Some(b), found));
         }
         (Some(a), Some(b)) if a == b => {}
-        _ => {
+        _ => found.push(counts(path, old, new).unwrap_or_else(|| {
             let shown = |value: Option<&toml::Value>| match value {
                 None => "absent".to_owned(),
                 Some(Table(_) | Array(_)) => "other".to_owned(),
                 Some(value) => value.to_string(),
             };
-            found.push(format!("{path} was {}, is {}", shown(old), shown(new)));
+            format!("{path} was {}, is {}", shown(old), shown(new))
+        })),
+    }
+}
+
+/// What is said of lists of tables of other lengths: these, and the names that one has and the other lacks.
+fn counts(path: &str, old: Option<&toml::Value>, new: Option<&toml::Value>) -> Option<String> {
+    let list = |value: Option<&toml::Value>| match value {
+        None => Some(vec![]),
+        Some(toml::Value::Array(all)) => all.iter().map(|v| v.as_table().cloned()).collect(),
+        Some(_) => None,
+    };
+    let (old, new): (Vec<toml::Table>, Vec<toml::Table>) = (list(old)?, list(new)?);
+    let names = |of: &[toml::Table]| -> Vec<String> {
+        of.iter().filter_map(|table| Some(table.get("name")?.as_str()?.to_owned())).collect()
+    };
+    let (had, has) = (names(&old), names(&new));
+    let gone = had.iter().filter(|name| !has.contains(name)).map(|name| format!("`{name}` is missing"));
+    let more = has.iter().filter(|name| !had.contains(name)).map(|name| format!("`{name}` is new"));
+    let told: Vec<String> = gone.chain(more).take(NAMED).collect();
+    let told = if told.is_empty() { String::new() } else { format!(": {}", told.join(", ")) };
+    Some(format!("{path} {HAD} {}, has {}{told}", old.len(), new.len()))
+}
+
+/// Names that are told of a list with others.
+const NAMED: usize = 4;
+/// The word after the key of a list that has become longer or shorter.
+pub(super) const HAD: &str = "had";
+
+#[cfg(test)]
+mod tests {
+    use super::compare;
+
+    #[test]
+    fn a_list_that_is_longer_or_shorter_is_told_with_the_names() {
+        let told = |old: &str, new: &str| {
+            let [old, new] = [old, new].map(|text| toml::Value::Table(toml::from_str(text).unwrap()));
+            let mut found = vec![];
+            compare("", Some(&old), Some(&new), &mut found);
+            found
+        };
+        let [a, c, e] = ["a", "c", "e"].map(|name| format!("[[body]]\nname = \"{name}\"\n"));
+        for (old, new, wanted) in [
+            (a.clone() + &c, a.clone(), "body had 2, has 1: `c` is missing"),
+            (a.clone() + &c, e.clone() + &a + &c, "body had 2, has 3: `e` is new"),
+            (a.clone() + &c, e.clone(), "body had 2, has 1: `a` is missing, `c` is missing, `e` is new"),
+            (String::new(), e, "body had 0, has 1: `e` is new"),
+            ("block = [{ x = 1 }, { x = 2 }]".into(), "block = [{ x = 1 }]".into(), "block had 2, has 1"),
+            ("motion = [[0, 1]]".into(), "motion = [[0, 1], [1, 2]]".into(), "motion was other, is other"),
+            ("open = []".into(), "open = [\"z_max\"]".into(), "open was other, is other"),
+        ] {
+            assert_eq!(told(&old, &new), [wanted]);
         }
     }
 }
