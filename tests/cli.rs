@@ -488,4 +488,13 @@ fn plan_tells_where_free_bodies_stand_and_what_they_weigh() {
     }
     let words = ran(&["plan", &case]).out;
     assert!(words.contains("`ramp`: 4.5000e0 kg, 9.0000e-3 m3; x 1.2000 to 1.5000"), "{words}");
+    let held = "locked = [\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\"]";
+    std::fs::write(&case, std::fs::read_to_string(&case).unwrap().replace("density = 500", held)).unwrap();
+    let words = ran(&["plan", &case]);
+    assert!(
+        words.out.contains("`ramp`: held, 9.0000e-3 m3; x 1.2000 to 1.5000"),
+        "{} {}",
+        words.out,
+        words.err
+    );
 }

@@ -100,7 +100,7 @@ impl WaveLine {
 #[derive(Serialize)]
 struct BodyLine {
     name: String,
-    /// In two dimensions of the slice one spacing wide.
+    /// In two dimensions of the slice one spacing wide; 0 of one that is held and has none.
     mass_kg: f64,
     volume_m3: f64,
     /// Lower and upper corner of the box around it at t = 0.

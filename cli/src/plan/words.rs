@@ -38,10 +38,11 @@ impl BodyLine {
     /// Where it is in `places` decimals.
     fn words(&self, places: usize) -> String {
         let span = |k: usize| format!("{:.places$} to {:.places$}", self.min_m[k], self.max_m[k]);
+        // One that nothing moves needs no mass.
+        let mass = if self.mass_kg > 0.0 { format!("{:.4e} kg", self.mass_kg) } else { "held".into() };
         format!(
-            "  `{}`: {:.4e} kg, {:.4e} m3; x {}, y {}, z {} m",
+            "  `{}`: {mass}, {:.4e} m3; x {}, y {}, z {} m",
             self.name,
-            self.mass_kg,
             self.volume_m3,
             span(0),
             span(1),
