@@ -130,7 +130,7 @@ impl Shape {
         !self.is_faceted()
     }
 
-    /// Whether its faces look any way: their numbers say only along which axis they look most, see [`face`].
+    /// Whether its faces look any way: their numbers say only along which axis they look most.
     pub fn is_faceted(&self) -> bool {
         match self {
             #[cfg(feature = "mesh")]
