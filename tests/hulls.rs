@@ -139,8 +139,10 @@ fn a_sealed_cavity_is_empty_unless_water_is_put_into_it() {
     // Ballast up to the middle, meant for the cavity alone though it is as wide as the walls are thick on top of it.
     let ballast = "[[fluid.block]]\nmin = [0.12, 0.12, 0.12]\nmax = [0.28, 0.28, 0.2]\n";
     let solid = |table: &str, file: &str, more: &str| {
+        // Its middle is the file's origin.
+        let at = if table == "body" { "center" } else { "position" };
         format!(
-            "[[{table}]]\nname = \"b\"\nshape = \"mesh\"\nfile = \"{file}\"\ncenter = [0.2, 0.2, 0.2]\n\
+            "[[{table}]]\nname = \"b\"\nshape = \"mesh\"\nfile = \"{file}\"\n{at} = [0.2, 0.2, 0.2]\n\
              orientation = {{ axis = [1, 2, 0], angle_deg = 10 }}\n{more}\n"
         )
     };

@@ -383,15 +383,8 @@ fn a_state_starts_another_case() {
         (&["--until", "0.08", "--set", "moving_wall.0.max=[0.8,0,0.7]"], "moving_wall.0.max"),
         (&["--until", "0.08", "--set", "fluid.block.0.max=[0.5,0,0.4]"], "fluid.block.0.max"),
         (
-            &[
-                "--until",
-                "0.08",
-                "--set",
-                "moving_wall=[]",
-                "--set",
-                "obstacle=[{name=\"step\",min=[1.5,0,0],max=[2,0,0.2]}]",
-            ],
-            "moving_wall had 1, has 0: `gate` is missing, obstacle had 0, has 1: `step` is new; nothing can be added to it or taken out",
+            &["--until", "0.08", "--set", "obstacle=[{name=\"step\",min=[1.5,0,0],max=[2,0,0.2]}]"],
+            "obstacle had 0, has 1: `step` is new; nothing can be added to it or taken out",
         ),
         // The gate is 25 mm up; it would be 5 mm higher at once.
         (
