@@ -174,6 +174,16 @@ fn a_sealed_cavity_is_empty_unless_water_is_put_into_it() {
             }
         }
     }
+    // Along the lattice all cells on one side of a wall are as deep in it: neither side counts for the other.
+    for off in [0.004, 0.006] {
+        let upright = format!(
+            "[[body]]\nname = \"b\"\nshape = \"mesh\"\nfile = \"{path}\"\ncenter = [{0}, {0}, {0}]\n{body}\n",
+            0.2 + off
+        );
+        let scene = Scene::build(&case(&[tank, all, &upright].concat())).expect("it builds");
+        let left = scene.groups.fluid as f64 * 0.02_f64.powi(3);
+        assert!((left - (in_all - block)).abs() < 1e-4, "{off}: {left}");
+    }
 }
 
 /// Eight of them fall into a pit.

@@ -21,11 +21,12 @@ impl Builder<'_> {
     /// Takes out of the grid what stands in the sealed cavities of a solid, of the blocks, shapes and fills from the `first` on. One that lies
     /// in there alone is meant to. Returns how many particles; [`super::water::Water::keep_what_is_left`] follows.
     pub(super) fn drain(&mut self, solid: &Solid, first: usize) -> usize {
-        if !solid.shape.has_cavities() {
+        let shape = solid.placed();
+        if !shape.has_cavities() {
             return 0;
         }
         let Self { water, grid, lattice, .. } = self;
-        let (shape, near) = (solid.placed(), around(&solid.placed(), lattice, grid));
+        let near = around(&shape, lattice, grid);
         let ends = water.laid.iter().skip(1).copied().chain([water.cell.len()]);
         let mut drained = 0;
         for (from, to) in water.laid.iter().copied().zip(ends).skip(first) {
@@ -39,8 +40,8 @@ impl Builder<'_> {
         }
         if drained > 0 {
             self.notes.push(format!(
-                "{} `{}`: {drained} fluid particles taken out of its sealed cavity; a fluid.block or fluid.shape that lies in \
-                 there alone fills it",
+                "{} `{}`: {drained} fluid particles taken out of its sealed cavity; a fluid.block that lies in there alone, before \
+                 those around the solid, fills it",
                 solid.what(),
                 solid.name
             ));

@@ -1,9 +1,10 @@
 //! How deep the water of a tank with inflows comes to be: what derives from the depth is fixed at the start.
 
-use super::Passes;
 use super::build::Builder;
 use super::lattice::{BLOCKED, Cells, FLUID, FREE, SOLID};
 use super::opening::Planned;
+use super::water::around;
+use super::{Passes, Solid};
 use crate::case::HURRY;
 use glam::{DVec3, IVec3};
 
@@ -112,9 +113,16 @@ impl Builder<'_> {
     /// Notes when a tank that lets nothing out is full of what comes in: there is no room for more.
     pub(super) fn overfilled(&mut self) {
         let shut = self.case.outflow.is_empty() && self.case.tank.as_ref().is_some_and(|t| t.open.is_empty());
-        let Some(tank) = self.tank.filter(|_| shut) else { return };
+        let Some(tank) = self.tank.filter(|_| shut && !self.openings.is_empty()) else { return };
         let (l0, end) = (self.lattice.spacing, self.case.run.end);
+        let taken = |body: &Solid| {
+            let shape = body.placed();
+            let near = around(&shape, &self.lattice, &self.grid).iter();
+            near.filter(|&c| tank.contains(c) && shape.holds(self.lattice.center(c), 0.0)).count()
+        };
+        let bodies: usize = self.bodies.iter().map(taken).sum();
         let cells = tank.iter().filter(|&c| !matches!(self.grid.get(c), SOLID | BLOCKED)).count();
+        let cells = cells.saturating_sub(bodies);
         let room = cells as f64 - self.water.cell.len() as f64;
         let slice = if self.lattice.plane { l0 } else { 1.0 };
         // Beyond `fluid.max_volume` nothing comes in: the run says so.

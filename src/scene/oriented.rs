@@ -56,6 +56,10 @@ impl Placed {
         let q = self.axes.transpose() * (p - self.center);
         if self.shape.as_cuboid().is_some() { self.shape.outside(q) } else { self.shape.distance(q).0 }
     }
+    /// See [`Shape::has_cavities`].
+    pub fn has_cavities(&self) -> bool {
+        self.shape.has_cavities()
+    }
     /// See [`Shape::in_cavity`].
     pub fn in_cavity(&self, p: DVec3) -> bool {
         self.shape.in_cavity(self.axes.transpose() * (p - self.center))

@@ -176,7 +176,7 @@ impl Water {
     pub fn displace(body: &Placed, lattice: &Lattice, grid: &mut Grid) -> usize {
         let near: Vec<IVec3> = around(body, lattice, grid).iter().filter(|&c| grid.get(c) == FLUID).collect();
         let cut = near.into_par_iter().filter_map(|c| cut(body, c, lattice).map(|cut| (cut, c)));
-        let cut = deepest(cut.collect());
+        let cut = deepest_on_each_side(body, cut, |&c| lattice.center(c));
         cut.iter().for_each(|&c| grid.set(c, FREE));
         cut.len()
     }
@@ -203,7 +203,8 @@ impl Water {
             let cut = near.contains(c).then(|| cut(wall, c, lattice))?;
             cut.map(|cut| (cut, k))
         };
-        let cut = deepest(self.cell.par_iter().enumerate().skip(from).filter_map(depth).collect());
+        let found = self.cell.par_iter().enumerate().skip(from).filter_map(depth);
+        let cut = deepest_on_each_side(wall, found, |&k| lattice.center(self.cell[k]));
         let mut gone = vec![false; self.cell.len()];
         for k in cut {
             gone[k] = true;
@@ -324,6 +325,20 @@ fn deepest<T>(mut cut: Vec<((i64, u64, f64), T)>) -> Vec<T> {
     cut.sort_by_key(|&((off, even, _), _)| (off, even));
     cut.truncate(displaced.round() as usize);
     cut.into_iter().map(|(_, of)| of).collect()
+}
+
+/// [`deepest`] of what is [`cut`] by `shape` at the places `at`, at its sealed cavities and elsewhere each on its own: what stands in a cavity may
+/// be taken out of it, and may not count for what stands outside.
+fn deepest_on_each_side<T: Send>(
+    shape: &Placed,
+    cut: impl ParallelIterator<Item = ((i64, u64, f64), T)>,
+    at: impl Fn(&T) -> DVec3 + Sync,
+) -> Vec<T> {
+    if !shape.has_cavities() {
+        return deepest(cut.collect());
+    }
+    let (within, around): (Vec<_>, Vec<_>) = cut.partition(|(_, of)| shape.in_cavity(at(of)));
+    [within, around].into_iter().flat_map(deepest).collect()
 }
 
 /// An order of cells, any part of which is spread evenly: the fractional part of a plane's multiples that no lattice repeats (Roberts 2018).
