@@ -3,6 +3,7 @@
 use crate::case::{Case, Choice, Encoding, Face, OutputField, OutputKind, OutputRegion, Series, Vector};
 use crate::extents::{self, Bounds, Extent, Of};
 use crate::lattice::Lattice;
+use crate::output::particles::in_double;
 use serde::Serialize;
 
 /// Bytes on the host, as measured on the transport case from 27,000 to 577,000 particles, states among them: for each particle, for
@@ -29,6 +30,8 @@ const FRAME_BASE64: f64 = 45.0;
 const FRAME_RAW: f64 = 50.0;
 /// Bytes of the position and the cell of a particle in a frame, before it is packed.
 const POINT: f64 = 21.0;
+/// More of them where places are in double precision.
+const IN_DOUBLE: f64 = 12.0;
 const CHECKPOINT: f64 = 120.0;
 /// Bytes of a row of the tables, and more for each solid.
 const ROW: f64 = 700.0;
@@ -184,13 +187,14 @@ impl Estimate {
         let frames = |every: f64| if every > 0.0 { (run.end / every).floor() + 2.0 } else { 0.0 };
         let bodies: f64 = case.body.iter().map(|b| inside(&|k| extent(b)[k], &[])).sum();
         let each = if output.encoding == Encoding::Raw { FRAME_RAW } else { FRAME_BASE64 };
-        let told = |fields: &[OutputField]| POINT + fields.iter().map(|f| f.bytes()).sum::<usize>() as f64;
+        let of = |fields: &[OutputField]| fields.iter().map(|f| f.bytes()).sum::<usize>() as f64;
+        let point = POINT + if in_double((domain.lo, domain.hi), l0) { IN_DOUBLE } else { 0.0 };
         // No region holds more water than fits into it.
         let holds = |region: &OutputRegion| cells(&|k| span(&region.min, &region.max, k));
         let frame = |choice: Choice<'_>| {
             let shown = |kind| if choice.has(kind) { 1.0 } else { 0.0 };
             let water = choice.region.as_ref().map_or(water, |region| water.min(holds(region)));
-            let told = each * told(choice.fields) / told(&OutputField::ALL);
+            let told = each * (point + of(choice.fields)) / (POINT + of(&OutputField::ALL));
             told * (water * shown(OutputKind::Fluid) + bodies * shown(OutputKind::Body))
         };
         let series = |named: &Series| SeriesEstimate {

@@ -93,5 +93,6 @@ fn two_curves_of_one_name_are_refused() {
     assert!((alone.curves["fluid x [m]"][0][1] - 0.2).abs() < 1e-9, "{:?}", alone.curves["fluid x [m]"]);
     let profile = "of = [\"front\"]\nprofile = [{ name = \"front\", of = \"vx\", along = \"x\", \
                    within = [[0, 0, 0], [1, 1, 1]], bins = 2 }]";
-    assert!(measured(&case, profile).is_err());
+    let refused = measured(&case, profile).expect_err("one is taken for the other");
+    assert!(refused.to_string().contains("`front"), "{refused}");
 }

@@ -56,7 +56,10 @@ pub fn standing(root: &Path, case: &Case) -> Result<Standing> {
                     Some(from) => {
                         format!("start another case from its last good state with run.from = {from:?}")
                     }
-                    None => "it has saved no state, so change the case and start again with --force".into(),
+                    None => {
+                        "no state of it goes before run.end, so change the case and start again with --force"
+                            .into()
+                    }
                 };
                 return Err(Error::Senseless(format!(
                     "the run in {} {why}; gone on with, it would do so again: {remedy}",

@@ -359,7 +359,7 @@ impl Definition {
         self.limit.iter().for_each(|(name, most)| measured.limit(name, *most));
     }
 
-    /// Limits of values that none of the points in `rows` has, in words with those that there are.
+    /// Limits of values that none of the finished points in `rows` has, in words with those that there are.
     pub fn idle_limits(&self, rows: &[Row]) -> Vec<String> {
         let ended = || rows.iter().filter(|r| r.measured.class <= Class::Degraded);
         let known: BTreeSet<&str> =
@@ -371,7 +371,7 @@ impl Definition {
         let there: Vec<&str> = known.iter().copied().collect();
         let told = |name: &String| {
             format!(
-                "[limit] `{name}` is held against nothing: no point has this value; there are {}.",
+                "[limit] `{name}` is held against nothing: no finished point has this value; there are {}.",
                 there.join(", ")
             )
         };

@@ -49,6 +49,9 @@ impl Draft {
         };
         let of_body = |what: &str| refused(&format!("the first body, `{}`, {what}", body.name));
         let Drive::Free(free) = &body.drive else { return of_body("follows a motion") };
+        if !free.gives_way() {
+            return of_body("is held");
+        }
         let Some(cuboid) = body.shape.as_cuboid() else {
             return of_body(&format!("is a {}", body.shape.name()));
         };
@@ -57,7 +60,7 @@ impl Draft {
         if edge.max_element() < 1.0 - LEVEL * LEVEL {
             return of_body("is turned");
         }
-        let gravity = scene.gravity;
+        let gravity = simulation.params.gravity;
         if gravity.z >= 0.0 || gravity.truncate().length() > LEVEL * gravity.length() {
             return refused("gravity does not act along -z");
         }

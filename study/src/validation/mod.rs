@@ -104,7 +104,8 @@ impl Suite {
             let only: Vec<String> =
                 check.only.iter().map(|(axis, value)| format!("{axis} {value}")).collect();
             let (name, only) = (&definition.name, only.join(", "));
-            format!("{name}: {}: not checked, no point that runs is at {only} (see --full).", check.name)
+            let remedy = if setup.full { "" } else { " (see --full)" };
+            format!("{name}: {}: not checked, no point that runs is at {only}{remedy}.", check.name)
         };
         let idle = idle.map(told).collect();
         self.validations.push(Validation { definition, references, points: first..self.jobs.len(), idle });
