@@ -309,6 +309,7 @@ impl Recorder {
                 ));
             }
             out.curves.insert(name.clone(), curve);
+            out.profiles.insert(name.clone());
         }
     }
 }

@@ -9,7 +9,7 @@
 //! ```
 
 use super::row::{Class, Measured};
-use super::validation::reduce::{Curve, Take, cut, prepared, reduce};
+use super::validation::reduce::{Curve, Take, cut, prepared, reduce, reduce_bins};
 use seixo::error::{Error, Result};
 use serde::Deserialize;
 
@@ -69,8 +69,9 @@ impl ResultNumber {
             return Err(Error::key("result", text, "name a curve that [measure] takes"));
         };
         let curve = prepared(curve, self.since_moved, self.smooth);
+        let reduced = if measured.profiles.contains(&self.curve) { reduce_bins } else { reduce };
         let number =
-            |(curve, _): (Curve, f64)| reduce(self.take, &cut(&curve, self.window), [self.level, self.to]);
+            |(curve, _): (Curve, f64)| reduced(self.take, &cut(&curve, self.window), [self.level, self.to]);
         if let Some(value) = curve.and_then(number) {
             measured.put(&self.name, value);
         }

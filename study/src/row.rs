@@ -3,7 +3,7 @@
 use seixo::error::Error;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Version of the files of finished points. A change of meaning of any measure raises it, so that older points
 /// are computed again.
@@ -90,6 +90,9 @@ pub struct Measured {
     /// Curves by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub curves: BTreeMap<String, Vec<[f64; 2]>>,
+    /// Names of the curves that are profiles: their rows are bins, of which each weighs alike in a mean.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub profiles: BTreeSet<String>,
     /// Times at which curves over time were sampled [s], if one of them has gaps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sampled: Vec<f64>,

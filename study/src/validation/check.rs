@@ -13,7 +13,7 @@
 //! peers = [{ name = "MPS of the paper's group, l0 = 15 mm", value = 18505 }]
 //! ```
 
-use super::reduce::{Curve, Take, cut, distance, lag, prepared, reduce, smooth};
+use super::reduce::{Curve, Take, cut, distance, lag, prepared, reduce, reduce_bins, smooth};
 use crate::compare::within;
 use crate::definition::Files;
 use crate::engine::first_line;
@@ -247,7 +247,7 @@ impl Check {
     }
 
     /// The number of a curve that is prepared, against that of the reference.
-    fn of_curve(&self, curve: &[[f64; 2]], reference: &Reference) -> Option<Verdict> {
+    fn of_curve(&self, curve: &[[f64; 2]], is_profile: bool, reference: &Reference) -> Option<Verdict> {
         let expected = reference.curve.as_ref().map(|c| cut(c, self.window));
         if self.take == Take::Distance {
             let reached = within(self.curve.as_deref().unwrap_or_default(), &expected?, curve);
@@ -260,7 +260,8 @@ impl Check {
                 origin: 0.0,
             });
         }
-        let result = reduce(self.take, &cut(curve, self.window), [self.level, self.to])?;
+        let reduced = if is_profile { reduce_bins } else { reduce };
+        let result = reduced(self.take, &cut(curve, self.window), [self.level, self.to])?;
         let expected = match expected {
             Some(curve) => reduce(self.take, &smooth(&curve, self.smooth), [self.level, self.to])?,
             None => self.reference?,
@@ -287,13 +288,14 @@ impl Check {
             let late = lag(&cut(&curve, self.window), &cut(&first, self.window))?;
             return self.of_numbers(late, self.reference?);
         }
-        Some(Verdict { origin, ..self.of_curve(&curve, reference)? })
+        let is_profile = self.curve.as_ref().is_some_and(|name| measured.profiles.contains(name));
+        Some(Verdict { origin, ..self.of_curve(&curve, is_profile, reference)? })
     }
 
     /// Judges peer `k`.
     pub fn judge_peer(&self, k: usize, reference: &Reference) -> Option<Verdict> {
         if let Some(curve) = reference.peers.get(k)? {
-            return self.of_curve(curve, reference);
+            return self.of_curve(curve, false, reference);
         }
         let expected = match &reference.curve {
             Some(curve) => {

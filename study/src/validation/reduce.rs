@@ -258,6 +258,16 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
     }
 }
 
+/// [`reduce`] of a profile: mean and deviation are those of its bins, whose ends lie half a bin beyond the first and the last row.
+pub fn reduce_bins(take: Take, profile: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
+    let bins: Curve =
+        (0u32..).zip(profile).flat_map(|(k, p)| [0.0, 1.0].map(|end| [f64::from(k) + end, p[1]])).collect();
+    match take {
+        Take::Mean | Take::Deviation => reduce(take, &bins, levels),
+        _ => reduce(take, profile, levels),
+    }
+}
+
 /// Time by which `curve` lags `behind` another one of about the same samples: the shift from 0 to half of the window's
 /// length at which they are best correlated over what they then share; `None` where they do not go together at all.
 pub fn lag(curve: &[[f64; 2]], behind: &[[f64; 2]]) -> Option<f64> {
@@ -374,6 +384,16 @@ mod tests {
         let noise: Curve = (0..100).map(|k| [f64::from(k), if k % 2 == 0 { 1.0 } else { -1.0 }]).collect();
         assert!(smooth(&noise, 9.0)[10..90].iter().all(|p| p[1].abs() < 0.2));
         assert_eq!(smooth(&noise, 0.0), noise);
+    }
+
+    #[test]
+    fn all_bins_of_a_profile_weigh_alike() {
+        let speed: Curve = (0..4).map(|k| 0.125 + 0.25 * f64::from(k)).map(|x| [x, x * (1.0 - x)]).collect();
+        let take = |take| reduce_bins(take, &speed, [0.0; 2]).unwrap();
+        // 0.125 . 0.875 and 0.375 . 0.625, twice each.
+        assert!((take(Take::Mean) - 0.171875).abs() < 1e-12);
+        assert!((take(Take::Deviation) - 0.0625).abs() < 1e-12);
+        assert_eq!(take(Take::Largest), 0.234375);
     }
 
     #[test]
