@@ -1,9 +1,8 @@
 //! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
 
 use crate::case::{Case, Choice, Encoding, Face, OutputField, OutputKind, OutputRegion, Series, Vector};
-use crate::extents::{self, Bounds, Extent, Of};
+use crate::extents::{self, Bounds, Extent, Of, in_double};
 use crate::lattice::Lattice;
-use crate::output::particles::in_double;
 use serde::Serialize;
 
 /// Bytes on the host, as measured on the transport case from 27,000 to 577,000 particles, states among them: for each particle, for

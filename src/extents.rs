@@ -323,3 +323,12 @@ fn flight(case: &Case) -> (DVec3, DVec3) {
     let (least, most) = speeds.fold((DVec3::ZERO, DVec3::ZERO), |(a, b), v| (a.min(v), b.max(v)));
     (-case.run.end * least, case.run.end * most)
 }
+
+/// Part of a spacing that places in a file may be off by.
+const OFF: f64 = 1e-3;
+
+/// Whether places between `low` and `high` [m] are to be kept in double precision, for single precision is off by more than a thousandth
+/// of the `spacing` [m] there: coordinates of a site are far from their origin.
+pub(crate) fn in_double((low, high): (DVec3, DVec3), spacing: f64) -> bool {
+    low.abs().max(high.abs()).max_element() * f64::from(f32::EPSILON) > OFF * spacing
+}

@@ -294,7 +294,8 @@ fn a_full_tank_that_is_shaken_pushes_back_with_the_mass_of_its_water() {
     ) + &wall("floor", ends, [-0.06, 0.0])
         + &wall("left", [-0.06, 0.0], [0.0, 0.1])
         + &wall("right", [length, length + 0.06], [0.0, 0.1])
-        + &wall("lid", ends, [0.1, 0.16]);
+        + &wall("lid", ends, [0.1, 0.16])
+        + "[[gauge.force]]\nname = \"push\"\non = \"left\"\n";
     let mut sim = simulation(&case(&text));
     assert!(sim.params.filled);
     let (mass, omega) = (1000.0 * length * 0.1 * l0, 2.0 * PI / period);

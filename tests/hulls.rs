@@ -182,7 +182,7 @@ fn a_sealed_cavity_is_empty_unless_water_is_put_into_it() {
         );
         let scene = Scene::build(&case(&[tank, all, &upright].concat())).expect("it builds");
         let left = scene.groups.fluid as f64 * 0.02_f64.powi(3);
-        assert!((left - (in_all - block)).abs() < 1e-4, "{off}: {left}");
+        assert!((left - (in_all - block)).abs() < 1.5e-4, "{off}: {left}");
     }
 }
 

@@ -255,7 +255,7 @@ fn frames_at_coordinates_of_a_site_tell_their_particles_apart() {
         let (case, out) = (case.display().to_string(), out.display().to_string());
         let ran = ran(&["run", &case, "-o", &out, "--backend", "cpu", "-q"]);
         assert_eq!(ran.code, 0, "{}", ran.err);
-        let file = last(Path::new(&out)).0;
+        let file = frames(Path::new(&out), "site").unwrap().pop().unwrap().fluid.unwrap();
         let head = String::from_utf8_lossy(&std::fs::read(&file).unwrap()).into_owned();
         (particles(&file).unwrap(), head.contains("type=\"Float64\" Name=\"Points\""), out)
     };

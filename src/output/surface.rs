@@ -5,7 +5,7 @@
 //! surface nets (Gibson 1998): a vertex in each cell of a grid that the surface passes, a quadrilateral across each edge that it cuts.
 //! No edge is open: the mesh encloses a volume.
 
-use super::particles::in_double;
+use crate::extents::in_double;
 use glam::{DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 
