@@ -190,7 +190,7 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
         let errors: Vec<String> = definition.error.iter().map(|e| e.name()).collect();
         let mut report = work_precision::report(&definition.name, &definition.title, rows, &errors, wanted);
         report.charts.extend(compare::charts(&definition, rows, &read)?);
-        report.findings.extend(definition.idle_limits(rows));
+        report.findings.extend(definition.idle_limits(rows.iter()));
         Ok(report)
     });
     Study { name, title, question, jobs: Vec::new(), finish }

@@ -305,12 +305,13 @@ impl Definition {
         let wet = load_text(&path, text.clone(), None, &self.set).is_ok_and(|read| read.case.fluid.is_some());
         let runs = if wet { setup.runs } else { 0 };
         let mut jobs: Vec<(Job, Option<Error>)> = Vec::new();
-        let main = Grid { method: None, full: false, axis: self.axis.clone() };
-        for grid in std::iter::once(&main).chain(&self.grid).filter(|g| full || !g.full) {
-            // A study that varies nothing is of one point.
-            if std::ptr::eq(grid, &main) && main.axis.is_empty() && !self.grid.is_empty() {
-                continue;
-            }
+        // A study that varies nothing is of one point.
+        let main = (!self.axis.is_empty() || self.grid.is_empty()).then(|| Grid {
+            method: None,
+            full: false,
+            axis: self.axis.clone(),
+        });
+        for grid in main.iter().chain(&self.grid).filter(|g| full || !g.full) {
             let method = grid.method.as_ref().unwrap_or(&self.method);
             self.names_axes(method, &grid.axis)?;
             let mut points: Vec<Vec<Pick>> = vec![Vec::new()];
@@ -360,8 +361,8 @@ impl Definition {
     }
 
     /// Limits of values that none of the finished points in `rows` has, in words with those that there are.
-    pub fn idle_limits(&self, rows: &[Row]) -> Vec<String> {
-        let ended = || rows.iter().filter(|r| r.measured.class <= Class::Degraded);
+    pub fn idle_limits<'a>(&self, rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
+        let ended = || rows.clone().filter(|r| r.measured.class <= Class::Degraded);
         let known: BTreeSet<&str> =
             ended().flat_map(|r| r.measured.values.keys().map(String::as_str)).collect();
         if ended().next().is_none() {

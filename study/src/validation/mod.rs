@@ -155,8 +155,8 @@ pub fn error_name(check: &str) -> String {
 impl Validation {
     /// Checks and limits that none of its points among `rows` is held against, in words.
     pub fn notes(&self, rows: &[Row]) -> Vec<String> {
-        let own: Vec<Row> = rows.iter().filter(|r| self.points.contains(&r.index)).cloned().collect();
-        let limits = self.definition.idle_limits(&own);
+        let own = rows.iter().filter(|r| self.points.contains(&r.index));
+        let limits = self.definition.idle_limits(own);
         let named = limits.into_iter().map(|limit| format!("{}: {limit}", self.definition.name));
         self.idle.iter().cloned().chain(named).collect()
     }
