@@ -102,6 +102,28 @@ fn sides_at_45_degrees_have_a_particle_for_each_square_of_the_spacing() {
     }
 }
 
+/// Where the layers of two faces meet inside an edge either face may be taken for the nearest one. Particles between the rows there are
+/// too many: the wall's pressure beside them was three times that of still water.
+#[test]
+fn no_particle_stands_between_the_rows_along_an_edge() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = file(&folder, "hull.stl", &stl(&hull()));
+    for l0 in [0.01, 0.0125, 0.014, 0.02] {
+        let scene = Scene::build(&case(&format!(
+            "[run]\nspacing = {l0}\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [0.28, 0.56, 0.42]\n\
+             [[obstacle]]\nname = \"hull\"\nshape = \"mesh\"\nfile = \"{path}\"\nposition = [0.04, 0.28, 0.1]\n"
+        )));
+        let layer = &scene.expect("builds").solids[0].wall_offset;
+        // Of a row along an edge, with the rows of both faces a spacing away, none is nearer than a spacing.
+        let crowd = |x: &DVec3| -> f64 {
+            layer.iter().map(|y| (1.0 - x.distance(*y) / l0).max(0.0)).sum::<f64>() - 1.0
+        };
+        let most = layer.iter().map(crowd).fold(0.0, f64::max);
+        println!("{l0} {most} {}", layer.len());
+        assert!(most < 0.6, "{most} at {l0} m");
+    }
+}
+
 #[test]
 fn the_section_of_the_hull_has_its_metacentre_where_theory_has_it() {
     // GM = KB + BM - KG = 2 T / 3 + b^2 / (6 T) - 2 D / 3 with b = 2 T

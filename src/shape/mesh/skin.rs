@@ -164,8 +164,11 @@ impl<'a> Skin<'a> {
         }
         let (nearest, inside) = self.mesh.nearest(x);
         let way = nearest - x;
-        let sound = inside && nearest.distance(at) <= off;
-        sound.then(|| Place { at: x, inside: (way.length(), way.normalize_or(outward)), fixed: false })
+        // Inside an edge, where the layers of two faces meet, either is the nearest one.
+        let sound = inside && way.length() >= depth - off;
+        let known = self.mesh.planes.as_ref().and_then(|planes| planes.distance(x));
+        let outward = known.map_or_else(|| way.normalize_or(outward), |known| known.1);
+        sound.then(|| Place { at: x, inside: (way.length(), outward), fixed: false })
     }
 
     /// Places of the layer at `depth` [m]. Those of `offered`, of the lattice that fills the mesh, stand where its faces have none of their own;
