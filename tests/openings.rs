@@ -427,6 +427,31 @@ fn a_body_does_not_leave_through_an_opening() {
     }
 }
 
+/// A box that falls onto a hole comes to rest as on the floor beside it, whatever presses it: wall boxes or the particles of walls.
+#[test]
+fn a_body_does_not_fall_through_a_hole() {
+    for law in ["smooth", "paper", "pressure"] {
+        let spring = if law == "pressure" { "" } else { "spring = 2e3" };
+        let mut simulation = opened(
+            &format!(
+                "[run]\nspacing = 0.01\ntime_step = 5e-4\nend = 1\ndimensions = 2\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.3]\nopen = [\"z_max\"]\n\
+                 [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.05, 0, 0.05]\n[[obstacle]]\nname = \"dam\"\nmin = [0.05, 0, 0]\nmax = [0.09, 0, 0.1]\n\
+                 [[outflow]]\nname = \"hole\"\nface = \"z_min\"\nmin = [0.4, 0, 0]\nmax = [0.56, 0, 0]\n\
+                 [contact]\nlaw = \"{law}\"\n{spring}\n\
+                 [[body]]\nname = \"on_floor\"\nsize = [0.06, 0.01, 0.06]\ncenter = [0.25, 0, 0.06]\ndensity = 500\n\
+                 [[body]]\nname = \"on_hole\"\nsize = [0.06, 0.01, 0.06]\ncenter = [0.48, 0, 0.06]\ndensity = 500\n"
+            ),
+            &Processor::Cpu,
+        );
+        until(&mut simulation, 0.4);
+        let [floor, hole] =
+            ["on_floor", "on_hole"].map(|name| simulation.solid(name).expect(name).pose.position.z);
+        println!("{law}: {floor:.6} {hole:.6} m");
+        assert!((0.025..0.04).contains(&floor) && (floor - hole).abs() < 1e-9, "{law}: {floor} {hole}");
+    }
+}
+
 /// The depth that is derived from, of a tank 1 m long and 0.4 m high with water up to 0.1 m, an inflow of 0.03 m2/s and what is added.
 fn derived(end: f64, max_volume: &str, more: &str) -> f64 {
     let text = format!(

@@ -98,9 +98,14 @@ pub(crate) fn meeting_images(boxes: &[Bounds], periodic: &Periodic) -> Vec<(usiz
 /// Places of the particles of fixed walls [m], with their images up to half a length beyond periodic sides, and which of the walls' particles
 /// each is.
 pub(crate) fn fixed_walls(scene: &Scene) -> (Vec<DVec3>, Vec<usize>) {
-    let (periodic, reach) = (&scene.periodic, 0.5 * scene.periodic.length().max_element());
     let own = scene.position[scene.groups.static_wall_range()].iter().enumerate();
-    own.flat_map(|(k, &x)| periodic.images(periodic.wrap(x), reach).map(move |x| (x, k))).unzip()
+    own.flat_map(|(k, &x)| images_of(scene, x).map(move |x| (x, k))).unzip()
+}
+
+/// The place `x` [m] and its images up to half a length beyond periodic sides.
+pub(crate) fn images_of(scene: &Scene, x: DVec3) -> impl Iterator<Item = DVec3> {
+    let periodic = &scene.periodic;
+    periodic.images(periodic.wrap(x), 0.5 * periodic.length().max_element())
 }
 
 /// Fixed points in cells.

@@ -85,6 +85,8 @@ pub struct Opening {
     pub layer: usize,
     /// Of these, how many columns of the lattice in front of it hold water at t = 0.
     pub wet: usize,
+    /// Where particles of the tank's wall would stand in a hole [m]: bodies do not leave through it. None where a wall moves.
+    pub lid: Vec<DVec3>,
 }
 
 impl Opening {
@@ -233,6 +235,7 @@ impl Builder<'_> {
             // To the sides a spacing more, for what has been pressed between the particles of the wall.
             (box_behind(4.0 * f64::from(self.layers) * l0, l0), None)
         };
+        let is_hole = passes == Passes::Free;
         let mut opening = Opening {
             name: keys.name.to_owned(),
             passes,
@@ -244,9 +247,10 @@ impl Builder<'_> {
             area,
             layer,
             wet: 0,
+            lid: if is_hole { cells.iter().map(|c| self.lattice.center(c)).collect() } else { vec![] },
         };
         let mut wall = None;
-        if opening.passes != Passes::Free {
+        if !is_hole {
             wall = Some(self.openings.iter().filter(|o| o.wall.is_some()).count());
             // Counted from the bodies' end in `number_openings`.
             opening.solid = wall;

@@ -2,9 +2,9 @@
 
 use super::pair::{Layer, Pair, Walls};
 use crate::body::Body;
-use crate::contact::broad::{PointGrid, fixed_walls};
+use crate::contact::broad::{PointGrid, fixed_walls, images_of};
 use crate::contact::candidates::{Candidates, Close, MANY_PAIRS};
-use crate::scene::Scene;
+use crate::scene::{Scene, WallShape};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -22,17 +22,16 @@ impl Lists {
             offsets: s.wall_offset.clone(),
             normals: s.wall_area.iter().map(|a| a.normalize_or_zero()).collect(),
         });
-        let (positions, of) = fixed_walls(scene);
-        Self {
-            layers: layers.collect(),
-            walls: Walls {
-                grid: PointGrid::new(positions, 2.0 * scene.spacing),
-                normals: of.iter().map(|&k| scene.static_wall_normal[k]).collect(),
-                of: of.iter().map(|&k| scene.static_wall_shape[k]).collect(),
-            },
-            pairs: vec![],
-            generation: 0,
+        let (mut positions, of) = fixed_walls(scene);
+        let mut normals: Vec<DVec3> = of.iter().map(|&k| scene.static_wall_normal[k]).collect();
+        let mut of: Vec<u32> = of.iter().map(|&k| scene.static_wall_shape[k]).collect();
+        for (x, inward, wall) in lids(scene) {
+            positions.push(x);
+            normals.push(inward);
+            of.push(wall);
         }
+        let walls = Walls { grid: PointGrid::new(positions, 2.0 * scene.spacing), normals, of };
+        Self { layers: layers.collect(), walls, pairs: vec![], generation: 0 }
     }
 
     /// Whether the lists are those of `candidates`.
@@ -70,4 +69,20 @@ impl Lists {
             pairs.into_iter().filter_map(fill).collect()
         };
     }
+}
+
+/// Places of the particles that would close the holes of the tank [m], the ways into it there, and the walls that they would be of: bodies
+/// do not leave through holes.
+fn lids(scene: &Scene) -> Vec<(DVec3, DVec3, u32)> {
+    let mut out = vec![];
+    for opening in &scene.openings {
+        let holds = |x: DVec3| {
+            move |wall: &WallShape| (wall.axes.transpose() * (x - wall.center)).abs().cmple(wall.half).all()
+        };
+        for &x in &opening.lid {
+            let Some(wall) = scene.walls.iter().position(holds(x)) else { continue };
+            out.extend(images_of(scene, x).map(|x| (x, -opening.outward, wall as u32)));
+        }
+    }
+    out
 }
