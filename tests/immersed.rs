@@ -193,7 +193,8 @@ fn eight_light_cubes_rise_as_one_does() {
 fn a_floating_cube_is_carried_by_its_displacement() {
     // At rest the force is the weight and the draft s a.
     let s = 0.5;
-    let case = tank_with_cube(s, 0.4, "sound_speed = 4");
+    let mut case = tank_with_cube(s, 0.2, "sound_speed = 4");
+    case.fluid.as_mut().expect("water").block[0].max[2] = 0.2;
     let mut sim = simulation(&case);
     let (mut force, mut height, mut level, mut count) = (0.0, 0.0, 0.0, 0.0);
     while sim.time < 0.9 {

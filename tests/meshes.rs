@@ -386,7 +386,7 @@ fn a_hull_from_a_file_floats_at_its_draft() {
     let options = Options { processor: Processor::Cpu, ..Options::default() };
     let mut sim = Simulation::open(&case, &options).expect("opens");
     let (mut height, mut tilt, mut count) = (0.0, 0.0_f64, 0.0);
-    sim.run_until(1.6, |sim, _| {
+    sim.run_until(1.3, |sim, _| {
         if sim.time > 0.8 {
             let pose = sim.solids().next().expect("the hull").pose;
             height += pose.position.z;

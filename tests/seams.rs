@@ -214,7 +214,7 @@ fn river(moved: f64) -> Case {
 #[test]
 fn a_current_carries_bodies_over_the_seam_as_through_the_middle() {
     // Lattices at both places are the same, so that only rounding differs, which grows in the water.
-    const STEPS: usize = 100;
+    const STEPS: usize = 60;
     let middle = ways(&river(0.0), STEPS, &Processor::Cpu);
     for moved in [0.525, 0.275] {
         let seam = ways(&river(moved), STEPS, &Processor::Cpu);
