@@ -41,38 +41,36 @@ fn still(free: bool, preconditioner: &str) -> Case {
 #[test]
 fn a_step_is_one_submission_and_the_host_waits_for_answers_only() {
     const STEPS: u64 = 10;
-    for preconditioner in ["jacobi", "multigrid"] {
-        for free in [false, true] {
-            let Some(mut sim) = on_device(&still(free, preconditioner)) else { return };
-            assert_eq!(sim.plan.has(Stage::BodyForce), free);
-            for _ in 0..11 {
-                sim.step().expect("still water is no trouble");
-            }
-            let before = sim.backend.commands();
-            for _ in 0..STEPS {
-                sim.step().expect("still water is no trouble");
-            }
-            let now = sim.backend.commands();
-            let (submits, waits) = (now.submits - before.submits, now.waits - before.waits);
-            println!("{preconditioner}, body {free}: {submits} submissions, {waits} waits in {STEPS} steps");
-            // The solver's verdict and, with a free body, the force on it; every ten steps a look at the fluid.
-            let answers = if free { 2 * STEPS } else { STEPS } + 1;
-            // A solve that took many more iterations than those of late would be looked at a second time.
-            assert_eq!((submits, waits), (answers, answers), "{preconditioner}, body {free}");
-            let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
-            assert_eq!(count(Stage::CellList), 6 * STEPS);
-            assert_eq!(count(Stage::MoveSolids), 2 * STEPS);
-            // Nothing in the solver goes uncounted: once a solve the residuals, the levels and the last verdict, the
-            // rest are whole iterations.
-            let solve = sim.backend.traffic().expect("it can be counted").solve;
-            let once = solve.ends + solve.build;
-            let verdict = u64::from(preconditioner == "multigrid");
-            let iterations = count(Stage::ConjugateGradient) - STEPS * (once.dispatches + verdict);
-            let each = solve.iteration + solve.cycle;
-            println!("{solve:?}");
-            assert!(iterations >= STEPS * each.dispatches && iterations.is_multiple_of(each.dispatches));
-            assert!(solve.build.bytes < 2 * each.bytes && solve.build.dispatches < 2 * each.dispatches);
+    for (preconditioner, free) in [("jacobi", false), ("multigrid", true)] {
+        let Some(mut sim) = on_device(&still(free, preconditioner)) else { return };
+        assert_eq!(sim.plan.has(Stage::BodyForce), free);
+        for _ in 0..11 {
+            sim.step().expect("still water is no trouble");
         }
+        let before = sim.backend.commands();
+        for _ in 0..STEPS {
+            sim.step().expect("still water is no trouble");
+        }
+        let now = sim.backend.commands();
+        let (submits, waits) = (now.submits - before.submits, now.waits - before.waits);
+        println!("{preconditioner}, body {free}: {submits} submissions, {waits} waits in {STEPS} steps");
+        // The solver's verdict and, with a free body, the force on it; every ten steps a look at the fluid.
+        let answers = if free { 2 * STEPS } else { STEPS } + 1;
+        // A solve that took many more iterations than those of late would be looked at a second time.
+        assert_eq!((submits, waits), (answers, answers), "{preconditioner}, body {free}");
+        let count = |stage| now.by_stage[&stage] - before.by_stage[&stage];
+        assert_eq!(count(Stage::CellList), 6 * STEPS);
+        assert_eq!(count(Stage::MoveSolids), 2 * STEPS);
+        // Nothing in the solver goes uncounted: once a solve the residuals, the levels and the last verdict, the
+        // rest are whole iterations.
+        let solve = sim.backend.traffic().expect("it can be counted").solve;
+        let once = solve.ends + solve.build;
+        let verdict = u64::from(preconditioner == "multigrid");
+        let iterations = count(Stage::ConjugateGradient) - STEPS * (once.dispatches + verdict);
+        let each = solve.iteration + solve.cycle;
+        println!("{solve:?}");
+        assert!(iterations >= STEPS * each.dispatches && iterations.is_multiple_of(each.dispatches));
+        assert!(solve.build.bytes < 2 * each.bytes && solve.build.dispatches < 2 * each.dispatches);
     }
 }
 
@@ -182,7 +180,7 @@ fn water_in_a_huge_domain_is_the_same_water() {
         let domain = format!("domain = [[-0.21, -0.21, -0.21], {to:?}]");
         let Some(mut sim) = on_device(&column(&domain)) else { return };
         let mut iterations = 0;
-        for _ in 0..12 {
+        for _ in 0..6 {
             iterations += sim.step().expect("still water is no trouble").pressure.iterations;
         }
         let fields = sim.backend.read().expect("the device is there");
@@ -217,11 +215,11 @@ fn slow_water_in_a_long_domain_is_not_held() {
         fields.position.iter().sum::<DVec3>() / fields.position.len() as f64
     };
     let start = mean(&mut sim);
-    for _ in 0..40 {
+    for _ in 0..20 {
         sim.step().expect("nothing acts");
     }
     let gone = mean(&mut sim) - start;
-    let off = (gone - DVec3::new(4e-5, -2e-5, 0.0)).abs().max_element();
+    let off = (gone - DVec3::new(2e-5, -1e-5, 0.0)).abs().max_element();
     assert!(off < 1e-7, "{gone:?}");
 }
 
