@@ -92,7 +92,7 @@ fn divided_buffers_and_folded_dispatches_change_no_bit() {
     if !device() {
         return;
     }
-    const STEPS: usize = 4;
+    const STEPS: usize = 2;
     let start = Instant::now();
     let case = dam();
     let scene = Arc::new(Scene::build(&case).expect("the scene builds"));
