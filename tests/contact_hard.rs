@@ -448,7 +448,7 @@ fn a_wedge_a_leaning_plank_and_a_house_of_cards_stand_from_the_friction_of_stati
         for spacing in structure.spacings {
             for (share, stands) in [(0.97, false), (1.03, true)] {
                 let text = (structure.text)(share * (structure.threshold)());
-                let way = moved(&mut Dry::new(&format!("[run]\nspacing = {spacing}\n{text}")), 1.0);
+                let way = moved(&mut Dry::new(&format!("[run]\nspacing = {spacing}\n{text}")), 0.5);
                 println!("{} at {spacing}, {share}: {way:e}", structure.name);
                 assert_eq!(way < 1e-3, stands, "{} at {spacing}, {share}: {way} m", structure.name);
             }

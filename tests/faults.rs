@@ -115,9 +115,9 @@ fn a_verdict_knows_what_energy_a_scene_has_at_hand() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("case.toml").display().to_string();
     let out = folder.path().join("results").display().to_string();
-    let run = |end: f64, more: &str| {
+    let run = |spacing: f64, end: f64, more: &str| {
         let run = format!(
-            "[run]\nspacing = 0.01\ntime_step = 0.002\nadaptive = true\nend = {end}\ndimensions = 2\n{more}"
+            "[run]\nspacing = {spacing}\ntime_step = 0.002\nadaptive = true\nend = {end}\ndimensions = 2\n{more}"
         );
         std::fs::write(&file, run).unwrap();
         json(&ran(&["run", &file, "-o", &out, "--backend", "cpu", "--force", "-q", "--json"]).out)
@@ -142,7 +142,7 @@ fn a_verdict_knows_what_energy_a_scene_has_at_hand() {
         + &to_and_fro("right", [0.6, 0.69], [-0.09, 0.5])
         + &to_and_fro("floor", [0.0, 0.6], [-0.09, 0.0]);
     for (more, left_out) in [("", true), ("[output]\nledger = true\n", false)] {
-        let result = run(3.0, &format!("{shaken}{more}"));
+        let result = run(0.015, 3.0, &format!("{shaken}{more}"));
         let (verdict, monitors) = (&result["verdict"], &result["monitors"]);
         let of = |key: &str| monitors[key].as_f64().unwrap();
         assert!(of("energy_end_J") > 1.2 * of("energy_start_J"), "{monitors}");
@@ -154,7 +154,7 @@ fn a_verdict_knows_what_energy_a_scene_has_at_hand() {
         ("collapse", 0.5, collapse, "degraded", "the energy rose by"),
         ("empty", 0.02, empty, "fine", ""),
     ] {
-        let result = run(end, more);
+        let result = run(0.01, end, more);
         let verdict = &result["verdict"];
         println!("{name}: {verdict}");
         assert_eq!(verdict["grade"], grade, "{name}: {verdict}");
