@@ -199,9 +199,8 @@ fn a_run_on_the_device_in_parts_is_the_run_to_the_last_bit() {
     }
     let device = |own: &[&'static str]| [&BODIES[..], own].concat();
     Case::new(&["fluid.viscosity=1e-3", "output.ledger=true"], "gpu").assert_goes_on("a gate on the device");
-    Case::new(&device(&["fluid.solver.preconditioner=multigrid"]), "gpu")
-        .assert_goes_on("multigrid on the device");
-    Case::new(&device(&["contact.device=gpu"]), "gpu").assert_goes_on("contact on the device");
+    Case::new(&device(&["fluid.solver.preconditioner=multigrid", "contact.device=gpu"]), "gpu")
+        .assert_goes_on("multigrid and contact on the device");
 }
 
 /// Killed at any moment, and started again by the same command, until it is done.
