@@ -604,27 +604,33 @@ fn multigrid() {
         // One iteration from zero is the preconditioned right side times a number.
         let one = Settings { max_iterations: 1, warm_start: false, ..pair.settings };
         let before = pair.gpu.read().expect("readable");
-        let solved = |pair: &Pair, large: usize, sign: f64| -> (Vec<f64>, Vec<f64>) {
+        let start = |sign: f64| {
             let mut fields = before.clone();
             // Small enough for no bound; both signs, as negative pressures are cut.
             fields.source.iter_mut().for_each(|b| *b *= 1e-4 * sign);
+            fields
+        };
+        let on_device = |pair: &Pair, large: usize, sign: f64| -> Vec<f64> {
             let caps = Caps { large_levels: Some(large), ..Caps::default() };
             let mut gpu =
                 Gpu::capped(&pair.scene, &pair.params, &pair.plan, one, None, caps).expect("the device can");
-            gpu.write(&fields).expect("writable");
+            gpu.write(&start(sign)).expect("writable");
             gpu.run(ParticleStage::CellList, &pair.step).expect("runs");
             gpu.run(ParticleStage::NeighbourList, &pair.step).expect("runs");
             let report = gpu.solve_pressure(&pair.step).expect("solves");
             assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, 1));
+            gpu.read().expect("readable").pressure
+        };
+        let on_cpu = |pair: &Pair, sign: f64| -> Vec<f64> {
             let mut cpu = Cpu::new(&pair.scene, &pair.params, &pair.plan, one).expect("the CPU can");
-            cpu.write(&fields).expect("writable");
+            cpu.write(&start(sign)).expect("writable");
             cpu.run(ParticleStage::CellList, &pair.step).expect("runs");
             cpu.run(ParticleStage::NeighbourList, &pair.step).expect("runs");
             cpu.run(ParticleStage::NumberDensity, &pair.step).expect("runs"); // makes the weights
             cpu.solve_pressure(&pair.step).expect("solves");
-            (gpu.read().expect("readable").pressure, cpu.fields().pressure.clone())
+            cpu.fields().pressure.clone()
         };
-        let [plus, minus] = [1.0, -1.0].map(|sign| solved(pair, 0, sign));
+        let [plus, minus] = [1.0, -1.0].map(|sign| (on_device(pair, 0, sign), on_cpu(pair, sign)));
         let scale = plus.1.iter().chain(&minus.1).fold(0.0_f64, |s, p| s.max(*p));
         for ((gpu, cpu), least) in [(&plus, 200), (&minus, 0)] {
             let positive = cpu.iter().filter(|&&p| p > 1e-3 * scale).count();
@@ -633,9 +639,8 @@ fn multigrid() {
             assert!(positive >= least && worst < PARTICLE * scale);
         }
         // Who works a level does not matter, to the bit.
-        for large in 1..=4 {
-            assert!(solved(pair, large, 1.0).0 == plus.0, "{large} large levels differ");
-        }
+        let large = if pair.params.dimensions == 2 { 3 } else { 1 };
+        assert!(on_device(pair, large, 1.0) == plus.0, "{large} large levels differ");
         // The whole solve, against the diagonal.
         let g = pair.gpu.solve_pressure(&pair.step).expect("the device solves");
         let c = pair.cpu.solve_pressure(&pair.step).expect("the CPU solves");
@@ -1270,7 +1275,7 @@ fn two_runs_give_the_same_bytes() {
         let scheme = "preset = \"accurate\"";
         for preconditioner in [Preconditioner::Jacobi, Preconditioner::Multigrid] {
             let first = bytes(scheme, preconditioner);
-            for _ in 0..3 {
+            for _ in 0..2 {
                 assert!(first == bytes(scheme, preconditioner), "two runs differ ({preconditioner:?})");
             }
         }
