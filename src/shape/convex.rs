@@ -94,8 +94,9 @@ pub(crate) fn along(length: f64, distance: impl Fn(f64) -> (f64, f64), mut visit
             let at = root((lowest, least), (at, there.0), |s| distance(s).0);
             (at, distance(at))
         };
+        // on what is level, but for rounding, it may be of any sign and size
         let fall = 2.0 * (value - least) / slope.abs();
-        if fall < (lowest - at).abs() {
+        if (0.0..(lowest - at).abs()).contains(&fall) {
             let fall = fall.copysign(lowest - at);
             [at, at + 0.5 * fall, at + fall]
         } else {
@@ -209,6 +210,26 @@ mod tests {
                 let exact = length - 2.0 * beyond.max(0.0) - 2.0 * (depth + beyond.min(0.0)) + 2.0 * end;
                 assert!((sum / exact - 1.0).abs() < 1e-3, "{beyond} {noise}: {sum} {exact}");
                 assert!(aside.abs() <= 1e-9 * depth + noise.abs() * length, "{beyond} {noise}: {aside}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nodes_of_a_line_that_is_level_but_for_rounding_lie_on_it() {
+        let length = 0.1;
+        for slope in [0.0, 1e-17, -1e-17, 3e-16] {
+            for step in [0.0, 2e-18, -2e-18, 1e-16, -1e-16] {
+                // both ends are a bit off what is between, and the slope, which turns once, knows nothing of that
+                let distance = |s: f64| {
+                    let value = if s == 0.0 || s == length { step } else { 0.0 };
+                    (value - 1e-3, if s < 0.3 * length { -slope } else { slope })
+                };
+                let mut sum = 0.0;
+                along(length, distance, |s, w| {
+                    assert!((0.0..=length).contains(&s) && w > 0.0, "{slope} {step}: {w} at {s}");
+                    sum += w;
+                });
+                assert!((sum / length - 1.0).abs() < 1e-12, "{slope} {step}: {sum}");
             }
         }
     }
