@@ -12,6 +12,7 @@ mod compare;
 mod compare_runs;
 mod contact;
 mod contact_device;
+mod contact_drag;
 mod contact_forces;
 mod contact_hard;
 mod contact_impacts;

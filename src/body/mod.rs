@@ -55,6 +55,8 @@ pub(crate) struct Body {
     /// Impulse [N s] and angular impulse [N m s] of contact since they were last taken, whether or not the solid gives
     /// way.
     pub touched: Wrench,
+    /// Velocity [m/s] and angular velocity [rad/s] that forces, without friction, have given it in the sub-step.
+    pub forced: (DVec3, DVec3),
     /// Shape.
     pub shape: Shape,
     /// From the body's position to the centre of `shape`, body's frame [m].
@@ -87,6 +89,7 @@ impl Body {
             principal: DVec3::INFINITY,
             locked_rotation: [true; 3],
             touched: Wrench::default(),
+            forced: (DVec3::ZERO, DVec3::ZERO),
             shape: solid.shape,
             shape_offset: solid.shape_offset,
             weight_arm: DVec3::ZERO,

@@ -381,7 +381,10 @@ impl Solids {
             if body.is_free() {
                 let mut steady = body.weight(self.gravity);
                 steady += *fluid;
+                let before = body.pose;
                 body.kick(h * steady.force + span * load.force, h * steady.torque + span * load.torque);
+                let Pose { velocity, angular_velocity, .. } = body.pose;
+                body.forced = (velocity - before.velocity, angular_velocity - before.angular_velocity);
             }
         }
         if let Some(law) = &mut self.law {

@@ -13,7 +13,14 @@
 //! a body at rest on a slope stays where it is. Bodies with several patches are swept in a fixed order.
 //!
 //! The viscous friction of the paper's Eq. (12) is at hand as well: -eta times the slip, shared among the
-//! patches of two solids by their normal forces.
+//! patches of two solids by their normal forces. With X = eta h A and D = 1 + X + X^2 / 2 the slip v that the forces of the sub-step
+//! change by d goes to
+//!
+//! D^-1 (v + (1 + X / 2) d),
+//!
+//! which is of second order in h, never turns a slip round, stops it as eta grows, and has the slip X^-1 d of a steady slide for any h. A Coulomb
+//! impulse j of the patch is A j more of d: the patch then answers with D^-1 (1 + X / 2) A instead of A, and
+//! sticks below the same limit as without drag, which is nothing on what stands.
 
 use super::coulomb::{ARM, System, root_of, sticks};
 use super::pair::{Other, Pair};
@@ -58,10 +65,14 @@ struct Slip {
     spread: Option<DMat2>,
     /// Largest impulse [N s].
     cap: f64,
-    /// Response of the slip to the impulse [1/kg], and its inverse.
+    /// Response of the slip to the impulse [1/kg], with what the drag takes of it, and its inverse.
     response: DMat3,
     inverse: DMat3,
-    /// Impulse so far [N s].
+    /// What the drag leaves of an impulse, if there is one.
+    dragged: Option<DMat3>,
+    /// Impulse of the drag on what slips without Coulomb friction [N s].
+    drag: DVec3,
+    /// Coulomb friction's impulse so far, before the drag has taken of it [N s].
     impulse: DVec3,
     /// s of the last visit [1/kg], for a point: 0 while it sticks.
     remaining: f64,
@@ -72,37 +83,34 @@ struct Slip {
 /// Working memory of the friction solve.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Friction {
-    /// Patches with Coulomb friction, and those that the viscous one has dragged, of the last sub-step.
+    /// Patches with friction, of the last sub-step.
     slips: Vec<Slip>,
-    dragged: Vec<Slip>,
 }
 
 impl Friction {
     /// Applies the pairs' Coulomb friction and the viscous one, `eta` [kg/s], to the bodies for the sub-step `h` [s], with the
     /// pairs' normal forces.
     pub fn apply(&mut self, pairs: &[Pair], bodies: &mut [Body], eta: f64, h: f64) {
-        self.dragged.clear();
-        if eta > 0.0 {
-            for pair in pairs {
-                let all: f64 = pair.patches.iter().map(|p| p.force).sum();
-                for patch in &pair.patches {
-                    let mut slip = Slip::new(pair, patch, bodies, 0.0);
-                    slip.drag(bodies, eta * h * patch.force / all);
-                    self.dragged.push(slip);
-                }
-            }
-        }
         self.slips.clear();
-        for pair in pairs.iter().filter(|pair| pair.constants.friction > 0.0) {
+        for pair in pairs {
             let mu = pair.constants.friction;
+            if mu == 0.0 && eta == 0.0 {
+                continue;
+            }
+            let all: f64 = pair.patches.iter().map(|p| p.force).sum();
             for patch in &pair.patches {
-                self.slips.push(Slip::new(pair, patch, bodies, mu * patch.force * h));
+                let mut slip = Slip::new(pair, patch, bodies, mu * patch.force * h);
+                if eta > 0.0 && all > 0.0 {
+                    slip.drag(bodies, eta * h * patch.force / all);
+                }
+                self.slips.push(slip);
             }
         }
-        let sweeps = if self.slips.len() == 1 { 1 } else { SWEEPS };
+        let rubs = |slip: &&mut Slip| slip.cap > 0.0;
+        let sweeps = if self.slips.iter_mut().filter(rubs).count() == 1 { 1 } else { SWEEPS };
         for _ in 0..sweeps {
             let mut open = false;
-            for slip in &mut self.slips {
+            for slip in self.slips.iter_mut().filter(rubs) {
                 open |= slip.solve(bodies);
             }
             if !open {
@@ -113,9 +121,9 @@ impl Friction {
 
     /// Gives fixed walls and still boxes what the last [`Self::apply`] has taken from them.
     pub fn press_walls(&self, bodies: &mut [Body], walls: &[WallBox], fixed: &mut FixedWalls) {
-        for slip in self.slips.iter().chain(&self.dragged) {
+        for slip in &self.slips {
             let Other::Wall(w) = slip.b else { continue };
-            let (push, twist) = slip.parts(slip.impulse);
+            let (push, twist) = slip.parts(slip.drag + slip.passed(slip.impulse));
             let at = bodies[slip.a].pose.position + slip.arm_a;
             match walls[w].of {
                 Against::Wall(k) => fixed.touch(k, -push, at, -twist),
@@ -176,20 +184,28 @@ impl Slip {
             cap,
             response,
             inverse: response.inverse(),
+            dragged: None,
+            drag: DVec3::ZERO,
             impulse: DVec3::ZERO,
             remaining: 0.0,
             left: None,
         }
     }
 
-    /// Slip of `a` against `b`: two velocities and the spin times the arm [m/s].
-    fn velocity(&self, bodies: &[Body]) -> DVec3 {
-        let of = |body: &Body, arm: DVec3| {
-            let v = body.pose.velocity + body.pose.angular_velocity.cross(arm);
-            let spin = body.pose.angular_velocity.dot(self.spin);
-            DVec3::new(v.dot(self.tangent[0]), v.dot(self.tangent[1]), spin)
+    /// Slip of `a` against `b`, each with the velocity and the angular velocity that `of` tells: two velocities and the spin times the arm [m/s].
+    fn slip(&self, bodies: &[Body], of: impl Fn(&Body) -> (DVec3, DVec3)) -> DVec3 {
+        let parts = |body: &Body, arm: DVec3| {
+            let (velocity, turning) = of(body);
+            let v = velocity + turning.cross(arm);
+            DVec3::new(v.dot(self.tangent[0]), v.dot(self.tangent[1]), turning.dot(self.spin))
         };
-        of(&bodies[self.a], self.arm_a) - self.b.solid().map_or(DVec3::ZERO, |b| of(&bodies[b], self.arm_b))
+        let b = self.b.solid().map_or(DVec3::ZERO, |b| parts(&bodies[b], self.arm_b));
+        parts(&bodies[self.a], self.arm_a) - b
+    }
+
+    /// The slip as it is [m/s].
+    fn velocity(&self, bodies: &[Body]) -> DVec3 {
+        self.slip(bodies, |body| (body.pose.velocity, body.pose.angular_velocity))
     }
 
     /// One visit: the patch's impulse for the velocities as they are. Whether it changed.
@@ -225,11 +241,22 @@ impl Slip {
         change.length() > TOLERANCE * self.cap
     }
 
-    /// Drag `eta_h` [kg] times the slip in the middle of the sub-step: stable for any eta.
+    /// Drag `eta_h` [kg] times the slip, and its part in what Coulomb friction is yet to do.
     fn drag(&mut self, bodies: &mut [Body], eta_h: f64) {
-        let middle = DMat3::IDENTITY + 0.5 * eta_h * self.response;
-        self.impulse = -eta_h * (middle.inverse() * self.velocity(bodies));
-        self.kick(bodies, self.impulse);
+        let x = eta_h * self.response;
+        let half = DMat3::IDENTITY + 0.5 * x;
+        let damped = (half + 0.5 * x + 0.5 * x * x).inverse();
+        let forced = self.slip(bodies, |body| body.forced);
+        self.drag = -eta_h * (damped * (half * self.velocity(bodies) - 0.5 * forced));
+        self.dragged = Some(damped * half);
+        self.response = damped * half * self.response;
+        self.inverse = self.response.inverse();
+        self.give(bodies, self.drag);
+    }
+
+    /// What the drag leaves of an `impulse` [N s].
+    fn passed(&self, impulse: DVec3) -> DVec3 {
+        self.dragged.map_or(impulse, |dragged| dragged * impulse)
     }
 
     /// Push [N s] and twist [N m s] of an `impulse` along the tangents and the spin [N s].
@@ -237,9 +264,14 @@ impl Slip {
         (impulse.x * self.tangent[0] + impulse.y * self.tangent[1], impulse.z * self.spin)
     }
 
-    /// Gives both bodies the impulse `change` along the tangents and the spin [N s].
+    /// Gives both bodies the Coulomb impulse `change` along the tangents and the spin [N s].
     fn kick(&self, bodies: &mut [Body], change: DVec3) {
-        let (push, twist) = self.parts(change);
+        self.give(bodies, self.passed(change));
+    }
+
+    /// Gives both bodies the `impulse` along the tangents and the spin [N s].
+    fn give(&self, bodies: &mut [Body], impulse: DVec3) {
+        let (push, twist) = self.parts(impulse);
         bodies[self.a].touch(push, self.arm_a.cross(push) + twist);
         if let Some(b) = self.b.solid() {
             bodies[b].touch(-push, -self.arm_b.cross(push) - twist);
