@@ -336,3 +336,32 @@ fn what_lands_level_on_a_still_prism_keeps_to_its_plane_of_symmetry() {
         assert!(aside < 1e-9 && off < 1e-7 && gain.abs() < 0.01, "{name}: {aside} {off} {gain}");
     }
 }
+
+#[test]
+fn a_box_is_thrown_back_from_a_face_with_an_opening_as_from_the_face() {
+    for dimensions in [2, 3] {
+        let thrown = |opening: &str| {
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = {dimensions}\ngravity = [0, 0, 0]\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.2, 0.4]\n\
+                 [fluid]\n[[fluid.block]]\nmin = [0.5, 0, 0]\nmax = [0.6, 0.2, 0.04]\n\
+                 [[body]]\nname = \"box\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.06, 0.1, 0.2]\nvelocity = [-2, 0, 0]\ndensity = 900\n\
+                 [contact]\nspring = 1e5\nrestitution = 0.8\n{opening}\n"
+            ));
+            let asked = dry.solids.advice(1e-3).spring_recommended.unwrap();
+            (dry.run(0.05)[0].velocity.x, asked)
+        };
+        let (plain, asked) = thrown("");
+        assert!((plain - 1.6).abs() < 0.01, "{plain}");
+        for opening in [
+            "[[outflow]]\nname = \"out\"\nface = \"x_min\"\nvelocity = [[0, 0], [1, 0], [2, 0.1]]",
+            "[[inflow]]\nname = \"in\"\nface = \"x_min\"\nvelocity = [[0, 0], [1, 0], [2, 0.1]]",
+        ] {
+            assert_eq!(thrown(opening), (plain, asked), "{opening}");
+        }
+        let wall = "[[moving_wall]]\nname = \"wall\"\nmin = [0.4, 0, 0.1]\nmax = [0.46, 0.2, 0.38]\nmotion = [[0, 0, 0, 0], [1, 0, 0, 0.01]]\n";
+        for faces in ["\"x_min\", \"x_max\"", "\"z_min\", \"z_max\"", ""] {
+            assert_eq!(thrown(&format!("{wall}open = [{faces}]")).1, asked, "{faces}");
+        }
+    }
+}

@@ -84,8 +84,10 @@ pub(crate) struct Smooth {
     pub surfaces: Vec<Arc<Surface>>,
     /// Fixed walls and still boxes.
     pub walls: Vec<WallBox>,
-    /// Which solids are among `walls`.
+    /// Which solids press nothing as such: they are among `walls`, or are layers in openings, of which the tank's wall is as high.
     still: Vec<bool>,
+    /// Smallest weight of a point of a free body [-].
+    lightest_point: f64,
     pub pairs: Vec<Pair>,
     friction: Friction,
     middles: Middles,
@@ -132,7 +134,11 @@ impl Smooth {
     pub fn new(scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Self {
         let surfaces = shared(scene);
         let walls = walls::walls(scene);
-        let still = (0..scene.solids.len()).map(|k| walls::still_box(scene, k).is_some()).collect();
+        let still = (0..scene.solids.len())
+            .map(|k| k >= scene.followed() || walls::still_box(scene, k).is_some())
+            .collect();
+        let free = bodies.iter().zip(&surfaces).filter(|(b, _)| b.is_free());
+        let lightest_point = free.map(|(_, s)| s.smallest_weight).fold(1.0, f64::min);
         let middles = Middles::new(bodies, &surfaces, &walls);
         let harmless = (fault::THROUGH * middles.least()).min(fault::DRIVEN * scene.spacing);
         limits.lambda = bodies.iter().zip(&surfaces).map(|(b, s)| stability::lambda(b, s)).collect();
@@ -140,6 +146,7 @@ impl Smooth {
             surfaces,
             walls,
             still,
+            lightest_point,
             middles,
             harmless,
             pairs: vec![],
@@ -383,8 +390,8 @@ impl Law for Smooth {
     }
 
     fn spring(&self, energy: f64) -> Option<(f64, &'static str)> {
-        let weight = self.surfaces.iter().map(|s| s.smallest_weight).fold(1.0, f64::min);
-        let spring = energy / (STOP_DEPTH * self.spacing).powi(2) / weight.powf(2.0 / EXPONENT);
+        let corner = self.lightest_point.powf(2.0 / EXPONENT);
+        let spring = energy / (STOP_DEPTH * self.spacing).powi(2) / corner;
         Some((spring, "hard impacts reach a quarter of the spacing, where a stiffer stop takes over"))
     }
 

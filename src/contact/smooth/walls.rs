@@ -75,8 +75,8 @@ const GROOVE: f64 = 0.5;
 /// Most points along an edge of a face at which it is looked at whether it is covered.
 const MOST_LOOKS: f64 = 1000.0;
 
-/// The box of solid `k` of `scene`, if it is pressed as walls are: it stands still for ever. The layer in an opening only does so for contact: it
-/// goes and comes with the water that passes, and has all its faces.
+/// The box of solid `k` of `scene`, if it is pressed as walls are: it stands still for ever. The layer in an opening does not, it goes and comes
+/// with the water that passes, and has no part in contact: the box of the tank's wall goes on behind it.
 pub(super) fn still_box(scene: &Scene, k: usize) -> Option<&Cuboid> {
     let solid = &scene.solids[k];
     solid.shape.as_cuboid().filter(|_| scene.stands(k))

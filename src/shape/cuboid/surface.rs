@@ -51,8 +51,8 @@ impl Surface {
     }
 
     /// Second moment of the weights of all faces over that of an even pressure, in the mean, with the
-    /// border's weights times `border`.
-    fn moment(samples: &[(DVec3, f64, Faces)], border: f64) -> f64 {
+    /// border's weights times `border`, along what ends in a border; `None` if nothing does, as where the faces beside are open.
+    fn moment(samples: &[(DVec3, f64, Faces)], border: f64) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0.0);
         for face in 0..6_u8 {
             let on = samples.iter().filter(|s| s.2 & (1 << face) != 0);
@@ -64,6 +64,12 @@ impl Surface {
             let all: f64 = on.iter().map(|s| s.1).sum();
             let axis = usize::from(face / 2);
             for other in [(axis + 1) % 3, (axis + 2) % 3] {
+                let beside: Faces = 3 << (2 * other);
+                let is_border =
+                    |s: &(DVec3, f64, Faces)| s.1 > 0.0 && s.2 & 1 << face != 0 && s.2 & beside != 0;
+                if !samples.iter().any(is_border) {
+                    continue;
+                }
                 let half = on.iter().map(|s| s.0[other].abs()).fold(0.0, f64::max);
                 let second: f64 = on.iter().map(|s| s.1 * s.0[other].powi(2)).sum();
                 if half > 0.0 {
@@ -72,20 +78,21 @@ impl Surface {
                 }
             }
         }
-        if count > 0.0 { sum / count } else { 1.0 }
+        (count > 0.0).then(|| sum / count)
     }
 
     /// Makes edges and corners light enough that a face rocks, and its friction resists a spin, like an
     /// even pressure: particles stand for cells, whose outermost have been moved to the border.
     fn balance(&mut self) {
         let samples = self.samples();
-        if samples.iter().all(|s| s.2.count_ones() > 1) {
+        if Self::moment(&samples, 1.0).is_none() {
             return;
         }
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
-            if Self::moment(&samples, middle) < 1.0 { low = middle } else { high = middle }
+            let is_light = Self::moment(&samples, middle).is_some_and(|moment| moment < 1.0);
+            if is_light { low = middle } else { high = middle }
         }
         let border = self.faces.iter().map(|f| f.count_ones() > 1);
         self.weights.iter_mut().zip(border).filter(|(_, b)| *b).for_each(|(w, _)| *w *= high);
@@ -166,6 +173,36 @@ impl Surface {
             self.weights.iter_mut().for_each(|w| *w /= mean);
             self.edges.iter_mut().for_each(|e| e.density /= mean);
             self.smallest_weight /= mean;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plate_of_two_faces_alone_has_nothing_to_balance() {
+        let (n, l0) = (10, 0.1);
+        let half = DVec3::new(0.2, 0.5 * l0, 0.5 * f64::from(n) * l0);
+        let (mut offset, mut to_surface) = (vec![], vec![]);
+        for side in [-1.0, 1.0] {
+            for k in 0..n {
+                let z = (f64::from(k) + 0.5) * l0 - half.z;
+                offset.push(DVec3::new(side * (half.x - 0.5 * l0), 0.0, z));
+                to_surface.push(DVec3::new(side * 0.5 * l0, 0.0, 0.0));
+            }
+        }
+        for dimensions in [2, 3] {
+            let surface =
+                Surface::cuboid(half, &WallLayer { offset: &offset, to_surface: &to_surface }, dimensions);
+            assert!(
+                (surface.smallest_weight - 0.1).abs() < 0.05,
+                "{dimensions}: {}",
+                surface.smallest_weight
+            );
+            let all: f64 = surface.weights.iter().sum();
+            assert!((all - 2.0).abs() < 1e-12, "{dimensions}: {all}");
         }
     }
 }
