@@ -192,3 +192,27 @@ fn two_posts_share_what_a_beam_carries_by_the_lever() {
         assert!(moment.abs() < 2e-3 * 5.0 * G, "{moment}");
     }
 }
+
+#[test]
+fn torque_on_a_plane_counts_about_its_centre_at_any_spacing() {
+    for (spacing, dimensions) in [(0.04, 3), (0.02, 3), (0.02, 2)] {
+        let (sin, cos) = 20_f64.to_radians().sin_cos();
+        let mut dry = Dry::new(&format!(
+            "[run]\nspacing = {spacing}\ntime_step = 1e-3\nend = 1\ndimensions = {dimensions}\ngravity = [0, 0, -{G}]\n\
+             [[plane]]\nname = \"plane\"\ncenter = [0.1, 0, 0.2]\nnormal = [{sin}, 0, {cos}]\nalong = [{cos}, 0, -{sin}]\nsize = [1.2, 0.4]\n\
+             [[body]]\nname = \"block\"\nsize = [0.12, 0.12, 0.08]\ncenter = [{}, 0, {}]\nstanding = true\nmass = 1\n\
+             orientation = {{ axis = [0, 1, 0], angle_deg = 20 }}\n\
+             [contact]\nspring = 1e5\nrestitution = 0.2\nfriction = 0.6\n",
+            0.1 - 0.3 * cos + 0.04 * sin,
+            0.2 + 0.3 * sin + 0.04 * cos,
+        ));
+        let at = dry.run(0.3)[0].position;
+        let on_plane = dry.solids.wall_contact_wrenches().unwrap()[0];
+        let exact = (at - DVec3::new(0.1, 0.0, 0.2)).cross(on_plane.force);
+        println!("{spacing}: {} for {exact}", on_plane.torque);
+        assert!(
+            (on_plane.torque - exact).length() < 1e-3 * exact.length(),
+            "{spacing}: {on_plane:?} for {exact}"
+        );
+    }
+}

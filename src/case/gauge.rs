@@ -60,7 +60,7 @@ pub struct ForceGauge {
     pub name: String,
     /// Name of a body, moving wall, obstacle or plane, or of a face of the tank such as `tank.z_min`. `*` stands for any letters
     /// (`"pile_*"`), `tank` for all of its faces: the gauge then is the sum over all of them. Torque is about
-    /// the centre of mass, or the place on its hinge, or the middle of a fixed wall; of a face of the tank that of its surface, of a sum the origin. Where another solid stands before a
+    /// the centre of mass, or the place on its hinge, or the middle of a fixed wall; of a face of the tank that of its surface, of a plane its `center`, of a sum the origin. Where another solid stands before a
     /// part of it no water presses; under a free body that stands on it the water of the slot does.
     pub on: String,
 }

@@ -42,7 +42,7 @@ pub struct FixedWall {
     /// What stands before the faces and never moves.
     still: Vec<Standing>,
     tiles: Tiles,
-    /// Torque counts about this point, the middle of the wall: of a face of the tank that of its surface, else of its box [m].
+    /// Torque counts about this point, the middle of the wall: of a face of the tank or a plane that of its surface, else of its box [m].
     about: DVec3,
 }
 

@@ -129,7 +129,7 @@ impl Fixed {
             center: slab.center,
             half: frame.half(layers),
             axes: slab.axes,
-            middle: slab.center,
+            middle: frame.center,
         });
         let mut left_out = 0;
         for depth in 0..layers {
