@@ -596,7 +596,7 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
 #[cfg(unix)]
 const LONG: [&str; 3] = ["0.002", "0.0014", "0.001"];
 
-/// Sends `signal` to a run of `args` after `wait`; its exit code, its remarks and how long it took to end.
+/// Sends `signal` twice in a moment, as `timeout` does, to a run of `args` after `wait`; its exit code, its remarks and how long it took to end.
 #[cfg(unix)]
 fn interrupted(args: &[&str], signal: &str, wait: impl Fn() -> bool) -> (Option<i32>, String, Duration) {
     let mut command = crate::common::program();
@@ -606,8 +606,10 @@ fn interrupted(args: &[&str], signal: &str, wait: impl Fn() -> bool) -> (Option<
         assert!(clock.elapsed() < Duration::from_secs(60), "it never came so far");
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
     let clock = Instant::now();
+    for _ in 0..2 {
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    }
     let output = child.wait_with_output().unwrap();
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned(), clock.elapsed())
 }

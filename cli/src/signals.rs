@@ -4,8 +4,12 @@ use seixo::console::remark;
 use seixo::error::{Error, Result};
 use seixo::stop::Stop;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Signals that come within so many milliseconds of the first one are that one again: who ends a process and then its group, `timeout` does,
+/// sends each of its signals twice.
+const AGAIN_MS: u64 = 1000;
 
 /// Exit code of a run that was stopped with its state saved, to be resumed (EX_TEMPFAIL).
 pub const RESUME: u8 = 75;
@@ -31,29 +35,28 @@ pub fn exit_code(signal: i32) -> u8 {
 }
 
 /// What signals ask to end. As long as nobody attends to it, while a scene is built, say, there is nothing to save, and
-/// a signal ends the program on the spot with its exit code; so does a second one. Signals that the caller has switched
-/// off (nohup) stay so.
+/// a signal ends the program on the spot with its exit code; so does a second one, see [`is_second`]. Signals that the
+/// caller has switched off (nohup) stay so.
 ///
 /// # Errors
 /// [`Error::Io`] if the system takes no handlers.
 pub fn watch(quiet: bool) -> Result<Stop> {
     let stop = Stop::default();
-    let second = Arc::new(AtomicBool::new(false));
+    let (start, first) = (Instant::now(), Arc::new(AtomicU64::new(0)));
     let ignored = ignored();
     for signal in ASKING.into_iter().filter(|s| ignored >> (s - 1) & 1 == 0) {
-        let (attended, asked) = (stop.attended_cell().clone(), stop.signal_cell().clone());
-        let at_once = move || {
+        let (attended, asked, first) =
+            (stop.attended_cell().clone(), stop.signal_cell().clone(), first.clone());
+        let heed = move || {
             if !attended.load(Ordering::SeqCst) {
                 signal_hook::low_level::exit(i32::from(exit_code(signal)));
             }
+            if is_second(&first, start.elapsed().as_millis() as u64) {
+                signal_hook::low_level::exit(128 + signal);
+            }
         };
-        // The order matters: at the first signal the second is not expected yet.
-        // SAFETY: the closure loads an atomic and may call _exit, both of which are safe in a signal handler.
-        unsafe { signal_hook::low_level::register(signal, at_once) }
-            .and_then(|_| {
-                signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, second.clone())
-            })
-            .and_then(|_| signal_hook::flag::register(signal, second.clone()))
+        // SAFETY: the closure reads and writes atomics and the clock, and may call _exit: all are safe in a signal handler.
+        unsafe { signal_hook::low_level::register(signal, heed) }
             .and_then(|_| signal_hook::flag::register_usize(signal, asked, signal as usize))
             .map_err(Error::io("signal handler"))?;
     }
@@ -61,6 +64,14 @@ pub fn watch(quiet: bool) -> Result<Stop> {
         tell(stop.clone());
     }
     Ok(stop)
+}
+
+/// Whether a signal at `now` [ms] is a second one, and not the first, nor that again; `first` holds when that came, 0 before.
+fn is_second(first: &AtomicU64, now: u64) -> bool {
+    match first.compare_exchange(0, now.max(1), Ordering::SeqCst, Ordering::SeqCst) {
+        Ok(_) => false,
+        Err(first) => now >= first + AGAIN_MS,
+    }
 }
 
 /// Says that a signal was seen, however long the step in progress takes.
@@ -71,7 +82,7 @@ fn tell(stop: Stop) {
             if let Some(signal) = stop.signal() {
                 remark(&format!(
                     "signal {signal}: the step in progress is finished, or given up if it takes long, and the state saved; \
-                     a second signal ends the program at once"
+                     a second signal, a second or more after the first, ends the program at once"
                 ));
                 return;
             }
@@ -84,4 +95,20 @@ fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
     line.and_then(|bits| u64::from_str_radix(bits.trim(), 16).ok()).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AGAIN_MS, is_second};
+    use std::sync::atomic::AtomicU64;
+
+    #[test]
+    fn what_comes_twice_in_a_moment_is_one_signal() {
+        for start in [0, 5000] {
+            let first = AtomicU64::new(0);
+            let after = |ms: u64| is_second(&first, start + ms);
+            assert_eq!([0, 0, 2, AGAIN_MS - 1].map(after), [false; 4]);
+            assert!(after(AGAIN_MS + 1));
+        }
+    }
 }
