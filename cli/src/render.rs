@@ -75,7 +75,7 @@ pub struct LookArgs {
     /// Values of the first and the last colour, e.g. 0,2.5 [default: those of the frames].
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
-    /// Only the water within half a spacing of a plane, e.g. y=0.25 [m].
+    /// Only the water within three quarters of a spacing of a plane, e.g. y=0.25 [m].
     #[arg(long, value_name = "AXIS=AT", value_parser = slice)]
     slice: Option<(usize, f64)>,
     /// No time and no colour bar.

@@ -16,6 +16,9 @@ const MOVING_WALL: Vec3 = Vec3::new(0.55, 0.57, 0.62);
 const BODY: [Vec3; 2] = [Vec3::new(0.93, 0.45, 0.13), Vec3::new(1.0, 0.72, 0.42)];
 /// Radius of a ball over l0: a little more than half a spacing closes the surface.
 const RADIUS: f64 = 0.62;
+/// Half of the thickness of a slice over l0: a row that it goes through is alone, and of the two rows that it goes between, as in the middle
+/// of a tank, it has both.
+const SLICE: f64 = 0.75;
 
 /// What the water is coloured by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,7 +94,7 @@ pub struct Style {
     pub field: Field,
     /// Values of its first and last colour; from gravity and depth of the scene if absent.
     pub range: Option<[f64; 2]>,
-    /// Leave out all water but that within half a spacing of a plane: its axis and place [m].
+    /// Leave out all water but that within [`SLICE`] spacings of a plane: its axis and place [m].
     pub slice: Option<(usize, f64)>,
     /// Write time and colour bar.
     pub labels: bool,
@@ -105,6 +108,11 @@ impl Style {
         let (azimuth, elevation) = if dimensions == 2 { (0.0, 0.0) } else { (0.38, 0.42) };
         let view = View { size: [960, 480], azimuth, elevation, zoom: 1.0, target: None };
         Self { view, field: Field::Speed, range: None, slice: None, labels: true, decimals: 3 }
+    }
+
+    /// Whether water at `x` [m] is drawn, at the spacing `l0` [m].
+    fn shows(&self, x: DVec3, l0: f64) -> bool {
+        self.slice.is_none_or(|(axis, at)| (x[axis] - at).abs() <= SLICE * l0)
     }
 }
 
@@ -191,8 +199,7 @@ impl Painter {
             }
         }
         for drop in drops {
-            let near = |(axis, at): (usize, f64)| (drop.position[axis] - at).abs() <= 0.5 * l0;
-            if self.style.slice.is_none_or(near) {
+            if self.style.shows(drop.position, l0) {
                 let place = (self.style.field.of(&drop, self.number_density) - self.range[0])
                     / (self.range[1] - self.range[0]);
                 fluid.ball(&self.camera, drop.position, RADIUS * l0, water(place as f32));
@@ -333,6 +340,21 @@ mod tests {
         assert_eq!(Field::Velocity(2).range(&mut speeds), Some([-1.3, 1.3]));
         assert_eq!(Field::Speed.range(&mut [0.0, 0.0]), None);
         assert_eq!(Field::Speed.range(&mut []), None);
+    }
+
+    #[test]
+    fn a_slice_between_two_rows_has_both_and_one_through_a_row_that_alone() {
+        let l0 = 0.02;
+        let shown = |at: f64| {
+            let style = Style { slice: Some((1, at)), ..Style::of(3) };
+            // What moves stands a little beside its row.
+            let rows = (0..20).map(|k| (f64::from(k) + 0.5) * l0);
+            let of_row =
+                |y: f64| [-1e-4, -1e-15, 0.0, 1e-4].map(|off| style.shows(DVec3::Y * (y + off * l0), l0));
+            rows.flat_map(of_row).filter(|shows| *shows).count()
+        };
+        assert_eq!([0.2, 0.19, 0.21, 0.1].map(shown), [8, 4, 4, 8]);
+        assert!(Style::of(3).shows(DVec3::ONE, l0));
     }
 
     #[test]
