@@ -166,6 +166,36 @@ fn a_standing_block_touches_the_incline() {
     }
 }
 
+/// One that is to stand and hangs is told of, with the way down to what is under it; a later body may be that.
+#[test]
+fn a_standing_body_that_hangs_is_told_of() {
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[[plane]]\nname = \"slope\"\ncenter = [0, 0, 0]\n\
+                normal = [0.6, 0, 0.8]\nalong = [0.8, 0, -0.6]\nsize = [3, 1.2]\n[contact]\nspring = 1e5\n";
+    let body = |name: &str, shape: &str, z: f64, standing: bool| {
+        format!(
+            "[[body]]\nname = \"{name}\"\n{shape}\ncenter = [0, 0, {z}]\ndensity = 1000\nstanding = {standing}\n"
+        )
+    };
+    let told = |bodies: &[String], law: &str| {
+        let scene = build(&format!("{text}law = \"{law}\"\n{}", bodies.concat())).unwrap();
+        scene.notes.into_iter().filter(|n| n.contains("stands on nothing")).collect::<Vec<_>>()
+    };
+    // A ball of radius r touches the slope r / 0.8 above it, a cube of half edge h 1.4 h / 0.8.
+    for (shape, touches) in
+        [("shape = \"sphere\"\nradius = 0.06", 0.075), ("size = [0.12, 0.12, 0.12]", 0.105)]
+    {
+        let [high, low] = [0.03, -0.01].map(|off| body("b", shape, touches + off, true));
+        let notes = told(&[high], "smooth");
+        assert!(notes.len() == 1 && notes[0].contains("wall `slope` 0.0300"), "{notes:?}");
+        assert_eq!(told(&[low], "smooth"), [""; 0]);
+        assert_eq!(told(&[body("b", shape, touches + 0.03, false)], "smooth"), [""; 0]);
+        // The law "paper" touches earlier.
+        assert_eq!(told(&[body("b", shape, touches + 0.005, true)], "paper"), [""; 0]);
+    }
+    let cube = |name: &str, z: f64, standing: bool| body(name, "size = [0.12, 0.12, 0.12]", z, standing);
+    assert_eq!(told(&[cube("upper", 0.25, true), cube("lower", 0.13, true)], "smooth").len(), 1);
+}
+
 #[test]
 fn tank_faces_as_boxes() {
     let scene = Scene::build(&case("hydrostatic", &[])).unwrap();

@@ -313,6 +313,7 @@ impl<'a> Builder<'a> {
             near.add(placed.center - reach, placed.center + reach);
         };
         self.moving_walls.iter().for_each(|wall| add(&mut near, wall));
+        let up = (gravity.length() > 0.0).then(|| -gravity.normalize());
         for (k, body) in case.body.iter().enumerate() {
             let made = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
             let mut solid = match made {
@@ -330,7 +331,7 @@ impl<'a> Builder<'a> {
                 near: &near,
                 law,
                 spacing: case.run.spacing,
-                up: (gravity.length() > 0.0).then(|| -gravity.normalize()),
+                up,
             };
             match surroundings.place(&mut solid, body.standing) {
                 Ok(note) => self.notes.extend(note),
@@ -361,6 +362,7 @@ impl<'a> Builder<'a> {
             add(&mut near, &solid);
             self.bodies.push(solid);
         }
+        self.hanging(&near, law, up);
         self.water.keep_what_is_left(&self.grid);
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));

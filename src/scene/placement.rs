@@ -18,6 +18,12 @@ pub(crate) const CONTACT_DISTANCE: f64 = 1.224_744_871_391_589;
 /// Overlap that is no more than a touch, over the spacing [-].
 const TOUCHING: f64 = 1e-4;
 
+/// What a body may hang above the next solid and stand on it all the same, over the spacing [-].
+const HANGING: f64 = 1e-3;
+
+/// Most steps on the way down to what a body hangs above.
+const MOST_STEPS: f64 = 2000.0;
+
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {
     pub fixed: &'a Fixed,
@@ -76,6 +82,44 @@ impl Surroundings<'_> {
         )))
     }
 
+    /// Says so where a standing body has nothing under it, once all that was asked for is placed.
+    pub fn hangs(&self, body: &Solid) -> Option<String> {
+        let up = self.up.filter(|_| body.is_free())?;
+        let mut lower = body.clone();
+        let mut met = |way: f64| {
+            lower.position = body.position - way * up;
+            self.deepest(&lower).map(|contact| contact.with)
+        };
+        let least = HANGING * self.spacing;
+        if met(least).is_some() {
+            return None;
+        }
+        // Far enough to be below everything.
+        let all = self.obstructions(body, -up, f64::MAX.sqrt());
+        let lowest =
+            all.iter().map(|b| b.placed.center.dot(up) - b.placed.reach(-up)).fold(f64::INFINITY, f64::min);
+        let own = body.placed();
+        let most = own.center.dot(up) + own.reach(up) - lowest;
+        let step = (0.25 * self.spacing).max(most / MOST_STEPS);
+        let ways = (1..).map(|k| least + f64::from(k) * step).take_while(|way| *way < most);
+        let says =
+            format!("body `{}`: stands on nothing, `standing` lifts it and never lowers it", body.name);
+        let Some((mut way, mut with)) = ways.into_iter().find_map(|way| Some((way, met(way)?))) else {
+            return Some(format!("{says}: there is no solid below it; leave `standing` out"));
+        };
+        let mut free = way - step;
+        for _ in 0..20 {
+            let middle = 0.5 * (free + way);
+            match met(middle) {
+                Some(other) => (way, with) = (middle, other),
+                None => free = middle,
+            }
+        }
+        Some(format!(
+            "{says}: it would meet {with} {free:.6} m further down; lower its `center` by that, or leave `standing` out"
+        ))
+    }
+
     /// The earlier solid of that number.
     fn solid(&self, k: usize) -> &Solid {
         let [walls, bodies] = self.earlier;
@@ -83,13 +127,13 @@ impl Surroundings<'_> {
     }
 
     /// Earlier solids that may be in the way of `body` on its way by `most` [m] along `up`, and a `margin` [m] beside
-    /// it, by their numbers. Prescribed bodies may reach into what does not move under forces: a table of motion is
+    /// it, by their numbers; never itself. Prescribed bodies may reach into what does not move under forces: a table of motion is
     /// the user's word.
     fn near(&self, body: &Solid, up: DVec3, most: f64, margin: f64) -> impl Iterator<Item = (usize, &Solid)> {
         let (low, high) = way(body, up, most, margin);
         let free = body.is_free();
         let found = self.near.meeting(low, high).into_iter().map(|k| (k, self.solid(k)));
-        found.filter(move |(_, solid)| free || solid.is_free())
+        found.filter(move |(_, solid)| (free || solid.is_free()) && solid.name != body.name)
     }
 
     /// The fixed walls, and the earlier solids near the way of `body` by `most` [m] along `up`.

@@ -1,13 +1,33 @@
-//! Bodies that stand beside or below the tank, where nothing is ever in their way.
+//! Bodies with nothing under them: beside or below the tank, where nothing is ever in their way, or though they are to stand.
 
 use super::build::{AXES, Builder};
+use super::near::Near;
 use super::oriented::Placed;
-use super::placement::point;
+use super::placement::{Surroundings, point};
 use super::{Drive, Solid};
+use crate::case::Law;
 use crate::error::Problem;
 use glam::DVec3;
+use std::collections::HashSet;
 
 impl Builder<'_> {
+    /// Tells of bodies that are to stand and have nothing under them.
+    pub(super) fn hanging(&mut self, near: &Near, law: Law, up: Option<DVec3>) {
+        let placed = Surroundings {
+            fixed: &self.fixed,
+            earlier: [&self.moving_walls, &self.bodies],
+            near,
+            law,
+            spacing: self.case.run.spacing,
+            up,
+        };
+        let standing: HashSet<&str> =
+            self.case.body.iter().filter(|b| b.standing).map(|b| b.name.as_str()).collect();
+        let bodies = self.bodies.iter().filter(|b| standing.contains(b.name.as_str()));
+        let notes: Vec<String> = bodies.filter_map(|body| placed.hangs(body)).collect();
+        self.notes.extend(notes);
+    }
+
     /// Complains of free bodies outside of the tank with nothing beneath them: they would fall for ever.
     pub(super) fn unsupported(&mut self) {
         let (Some(tank), gravity) = (&self.case.tank, self.gravity()) else { return };
