@@ -188,7 +188,9 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
         // A point has held what it measured against them; the errors of its curves are new.
         rows.iter_mut().for_each(|row| definition.hold(&mut row.measured));
         let errors: Vec<String> = definition.error.iter().map(|e| e.name()).collect();
-        let mut report = work_precision::report(&definition.name, &definition.title, rows, &errors, wanted);
+        let scenes = definition.scene_axes();
+        let mut report =
+            work_precision::report((&definition.name, &definition.title), rows, &errors, &scenes, wanted);
         report.charts.extend(compare::charts(&definition, rows, &read)?);
         report.findings.extend(definition.idle_limits(rows.iter()));
         Ok(report)

@@ -129,7 +129,29 @@ pub struct Axis {
     /// Settings of several keys, instead of `key` and `values`.
     #[serde(default)]
     pub choices: Vec<Choice>,
+    /// Whether its values are other scenes, each of which asks for a setting of its own, and no settings to choose from. Absent: whether all of
+    /// its keys are those of a scene, of water, walls, bodies and openings.
+    pub scene: Option<bool>,
 }
+
+/// Keys of what a case is about; others say how it is computed.
+const SCENE: [&str; 15] = [
+    "run.gravity",
+    "tank",
+    "obstacle",
+    "plane",
+    "moving_wall",
+    "absorber",
+    "inflow",
+    "outflow",
+    "body",
+    "fluid.density",
+    "fluid.viscosity",
+    "fluid.block",
+    "fluid.shape",
+    "fluid.fill",
+    "contact.friction",
+];
 
 /// A setting of several keys at once.
 #[derive(Clone, Debug, Deserialize)]
@@ -208,6 +230,17 @@ struct Pick {
 }
 
 impl Axis {
+    /// Whether its values are other scenes.
+    fn is_scene(&self) -> bool {
+        let set = self.choices.iter().flat_map(|c| &c.set).filter_map(|set| set.split_once('='));
+        let mut keys = set.map(|(key, _)| key.trim()).chain(self.key.as_deref()).peekable();
+        let of_scene = |key: &str| {
+            let rest = SCENE.iter().filter_map(|scene| key.strip_prefix(scene));
+            rest.into_iter().any(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        self.scene.unwrap_or_else(|| keys.peek().is_some() && keys.all(of_scene))
+    }
+
     fn picks(&self, full: bool) -> Result<Vec<Pick>> {
         let pick = |name: String, set, processor| Pick { axis: self.name.clone(), name, set, processor };
         let mut picks = Vec::new();
@@ -353,6 +386,12 @@ impl Definition {
             return Err(Error::key("axis", text, ""));
         }
         Ok(jobs.into_iter().map(|(job, _)| job).collect())
+    }
+
+    /// Names of the axes whose values are other scenes.
+    pub fn scene_axes(&self) -> BTreeSet<&str> {
+        let axes = self.axis.iter().chain(self.grid.iter().flat_map(|g| &g.axis));
+        axes.filter(|axis| axis.is_scene()).map(|axis| axis.name.as_str()).collect()
     }
 
     /// Holds what was `measured` against the limits.
@@ -546,6 +585,29 @@ value = "e [-]"
         assert_eq!(points(grid, true).unwrap().len(), 2);
         let refused = points(grid, false).err().expect("there is no point").to_string();
         assert!(refused.contains("--full"), "{refused}");
+    }
+
+    #[test]
+    fn an_axis_is_of_the_scene_by_its_keys_or_by_word() {
+        let axes = |more: &str| {
+            let study = Definition::parse("s.toml", &format!("{STUDY}{more}")).unwrap();
+            study.scene_axes().into_iter().map(str::to_owned).collect::<Vec<_>>()
+        };
+        let by_key = |key: &str| axes(&format!("[[axis]]\nname = \"c\"\nkey = \"{key}\"\nvalues = [1]\n"));
+        for key in ["body.0.density", "fluid.block.0.max", "fluid.density", "tank.max"] {
+            assert_eq!(by_key(key), ["c"], "{key}");
+        }
+        for key in ["run.spacing", "fluid.densit", "fluid.solver.tolerance", "contact.spring"] {
+            assert_eq!(by_key(key), [""; 0], "{key}");
+        }
+        let by_choice = |set: &str, more: &str| {
+            axes(&format!("[[axis]]\nname = \"c\"\n{more}choices = [{{ name = \"x\", set = [{set}] }}]\n"))
+        };
+        assert_eq!(by_choice("'body.0.mass=1', 'tank.max=[1,1,1]'", ""), ["c"]);
+        // A spacing of its own with what fits it.
+        assert_eq!(by_choice("'run.spacing=0.1', 'tank.max=[1,1,1]'", ""), [""; 0]);
+        assert_eq!(by_choice("'tank.max=[1,1,1]'", "scene = false\n"), [""; 0]);
+        assert_eq!(by_choice("", "scene = true\n"), ["c"]);
     }
 
     #[test]

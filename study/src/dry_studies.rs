@@ -51,7 +51,7 @@ fn law_name(law: Law) -> &'static str {
 fn finished(name: &'static str, title: &'static str, errors: &'static [&'static str]) -> super::Finish {
     Box::new(move |rows: &mut [Row], wanted| {
         let errors: Vec<String> = errors.iter().map(|e| (*e).to_string()).collect();
-        let mut report = work_precision::report(name, title, rows, &errors, wanted);
+        let mut report = work_precision::report((name, title), rows, &errors, &Default::default(), wanted);
         // Particle-steps mean nothing here: one body.
         report.charts.retain(|(file, _)| !file.ends_with("-work"));
         Ok(report)

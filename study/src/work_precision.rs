@@ -44,6 +44,9 @@ impl Cost {
     }
 }
 
+/// Names of the front in a chart, and of its points.
+const FRONT: [&str; 2] = ["Pareto front", "on the front"];
+
 /// Points that ended well enough to be compared.
 fn candidates(rows: &[Row], error: &str, cost: Cost) -> Vec<Candidate> {
     let usable = rows.iter().enumerate().filter(|(_, r)| r.measured.class <= Class::Degraded);
@@ -89,7 +92,7 @@ pub fn chart(title: &str, rows: &[Row], error: &str, cost: Cost) -> Option<Chart
     }
     let mut series = Vec::new();
     let best: Vec<[f64; 2]> = front(&all).iter().map(|c| [c.cost, c.error]).collect();
-    series.push(Series::line("Pareto front", "#bbbbbb", Stroke::Dashed, best.clone()));
+    series.push(Series::line(FRONT[0], "#bbbbbb", Stroke::Dashed, best.clone()));
     let marks = [Mark::Circle, Mark::Square, Mark::Triangle];
     for (k, method) in methods(rows).into_iter().enumerate() {
         let mut own: Vec<&Candidate> = all.iter().filter(|c| rows[c.row].method == method).collect();
@@ -105,7 +108,7 @@ pub fn chart(title: &str, rows: &[Row], error: &str, cost: Cost) -> Option<Chart
             mark: Some((marks[k / COLORS.len() % marks.len()], 4.5)),
         });
     }
-    series.push(Series::marks("on the front", "#000000", Mark::Cross, 6.0, best));
+    series.push(Series::marks(FRONT[1], "#000000", Mark::Cross, 6.0, best));
     Some(Chart {
         title: format!("{title}: {error}"),
         subtitle: machines(rows),
@@ -115,33 +118,35 @@ pub fn chart(title: &str, rows: &[Row], error: &str, cost: Cost) -> Option<Chart
     })
 }
 
+/// A point in words: its setting, error and cost.
+fn told(row: &Row, c: &Candidate) -> String {
+    let time = row.measured.timing.map_or_else(String::new, |t| {
+        format!(
+            "; {} s (median of {}, {} to {} s)",
+            short(t.median_s),
+            t.repetitions,
+            short(t.shortest_s),
+            short(t.longest_s)
+        )
+    });
+    let degraded = if row.measured.class == Class::Degraded {
+        format!(" (degraded: {})", row.measured.reason)
+    } else {
+        String::new()
+    };
+    format!(
+        "{}: error {}{time}, {} particle-steps, on {}{degraded}",
+        row.label(),
+        short(c.error),
+        short(row.measured.work.particle_steps as f64),
+        row.measured.machine
+    )
+}
+
 /// The setting to take for a wanted error, in words.
 pub fn words(rows: &[Row], error: &str, wanted: f64) -> String {
     let all = candidates(rows, error, Cost::WallTime);
-    let tell = |c: &Candidate| {
-        let row = &rows[c.row];
-        let time = row.measured.timing.map_or_else(String::new, |t| {
-            format!(
-                "; {} s (median of {}, {} to {} s)",
-                short(t.median_s),
-                t.repetitions,
-                short(t.shortest_s),
-                short(t.longest_s)
-            )
-        });
-        let degraded = if row.measured.class == Class::Degraded {
-            format!(" (degraded: {})", row.measured.reason)
-        } else {
-            String::new()
-        };
-        format!(
-            "{}: error {}{time}, {} particle-steps, on {}{degraded}",
-            row.label(),
-            short(c.error),
-            short(row.measured.work.particle_steps as f64),
-            row.measured.machine
-        )
-    };
+    let tell = |c: &Candidate| told(&rows[c.row], c);
     match recommend(&all, wanted) {
         Recommendation::Meets(c) => {
             format!("For a {error} of at most {} take {}.", short(wanted), tell(&c))
@@ -160,26 +165,77 @@ pub fn words(rows: &[Row], error: &str, wanted: f64) -> String {
     }
 }
 
-/// Charts and words for every one of `errors`; `wanted` is the error that the user asks for, or half of the
-/// decades that the points cover.
-pub fn report(name: &str, title: &str, rows: &[Row], errors: &[String], wanted: Option<f64>) -> Report {
+/// The rows of each scene, with what it has on the axes `scenes` in words, in the order of their first rows; all rows if there are no such axes.
+fn by_scene(rows: &[Row], scenes: &BTreeSet<&str>) -> Vec<(String, Vec<Row>)> {
+    let mut groups: Vec<(String, Vec<Row>)> = Vec::new();
+    for row in rows {
+        let of_scene = row.parameters.iter().filter(|(axis, _)| scenes.contains(axis.as_str()));
+        let parts: Vec<String> = of_scene.map(|(axis, value)| format!("{axis} = {value}")).collect();
+        let name = parts.join(", ");
+        match groups.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, own)) => own.push(row.clone()),
+            None => groups.push((name, vec![row.clone()])),
+        }
+    }
+    groups
+}
+
+/// The middle of the decades from the least to the largest error of `all`.
+fn middle(all: &[Candidate]) -> Option<f64> {
+    let errors = all.iter().map(|c| c.error).filter(|e| *e > 0.0);
+    let (least, most) = errors.fold((f64::INFINITY, 0.0_f64), |(a, b), e| (a.min(e), b.max(e)));
+    (most > 0.0).then(|| (least * most).sqrt())
+}
+
+/// Charts and words for every one of `errors` of the study with that name and title. `wanted` is the error that the user asks for; the middle of
+/// those that the points have if absent. Points of different scenes, apart on the axes `scenes`, are not weighed against each other.
+pub fn report(
+    (name, title): (&str, &str),
+    rows: &[Row],
+    errors: &[String],
+    scenes: &BTreeSet<&str>,
+    wanted: Option<f64>,
+) -> Report {
     let mut report = Report::default();
+    let groups = by_scene(rows, scenes);
     for error in errors {
         for cost in [Cost::WallTime, Cost::ParticleSteps] {
-            if let Some(chart) = chart(title, rows, error, cost) {
+            if let Some(mut chart) = chart(title, rows, error, cost) {
+                if groups.len() > 1 {
+                    chart.series.retain(|series| !FRONT.contains(&series.name.as_str()));
+                }
                 report.charts.push((file_name(name, error, cost.file()), chart));
             }
         }
-        let all = candidates(rows, error, Cost::WallTime);
-        let (least, most) = all
-            .iter()
-            .filter(|c| c.error > 0.0)
-            .fold((f64::INFINITY, 0.0_f64), |(a, b), c| (a.min(c.error), b.max(c.error)));
-        let middle = if most > 0.0 { (least * most).sqrt() } else { 0.0 };
-        report.findings.push(words(rows, error, wanted.unwrap_or(middle)));
-        let best: Vec<String> = front(&all).iter().map(|c| rows[c.row].label()).collect();
-        if best.len() > 1 {
-            report.findings.push(format!("Pareto front of {error}, cheapest first: {}.", best.join(" -> ")));
+        for (scene, own) in &groups {
+            let at = if scene.is_empty() { String::new() } else { format!("At {scene}: ") };
+            let all = candidates(own, error, Cost::WallTime);
+            if let ([only], false) = (all.as_slice(), scene.is_empty()) {
+                report.findings.push(format!("{at}one setting, {}.", told(&own[only.row], only)));
+                continue;
+            }
+            let bound = wanted.or_else(|| middle(&all));
+            let mut finding = at.clone() + &words(own, error, bound.unwrap_or(0.0));
+            if let (None, Some(bound)) = (wanted, bound) {
+                let bound = short(bound);
+                finding += &format!(
+                    " {bound} is midway, in decades, between the least and the largest error of these points; --error X asks for yours."
+                );
+            }
+            report.findings.push(finding);
+            let best: Vec<String> = front(&all).iter().map(|c| own[c.row].label()).collect();
+            if best.len() > 1 {
+                report
+                    .findings
+                    .push(format!("{at}Pareto front of {error}, cheapest first: {}.", best.join(" -> ")));
+            }
+        }
+        if groups.len() > 1 && !report.findings.is_empty() {
+            let axes: Vec<&str> = scenes.iter().copied().collect();
+            report.findings.push(format!(
+                "Scenes that differ in {} are not weighed against each other; `scene = false` in an [[axis]] makes its values settings to choose from.",
+                axes.join(", ")
+            ));
         }
     }
     report
@@ -233,5 +289,50 @@ mod tests {
         // 0.2 at 1 s, 0.05 at 1.1 s, 0.01 at 9 s; the paper's fine run is beaten.
         assert_eq!(chart.series[0].points, [[1.0, 0.2], [1.1, 0.05], [9.0, 0.01]]);
         assert_eq!(file_name("s", "pressure error [-]", "time"), "s-pressure_error-time");
+    }
+
+    fn findings(rows: &[Row], scenes: &[&str], wanted: Option<f64>) -> (Vec<String>, usize) {
+        let scenes = scenes.iter().copied().collect();
+        let report = report(("s", "t"), rows, &["e [-]".to_owned()], &scenes, wanted);
+        (report.findings, report.charts[0].1.series.len())
+    }
+
+    #[test]
+    fn a_bound_that_nobody_gave_says_where_it_comes_from() {
+        let (told, _) = findings(&rows(), &[], None);
+        assert!(
+            told[0].contains("at most 0.04472")
+                && told[0].contains("between the least and the largest error"),
+            "{told:?}"
+        );
+        let (told, _) = findings(&rows(), &[], Some(0.06));
+        assert!(told[0].contains("at most 0.06") && !told[0].contains("between"), "{told:?}");
+    }
+
+    #[test]
+    fn scenes_are_not_weighed_against_each_other() {
+        let mut rows = rows();
+        for row in &mut rows {
+            let density = if row.method == "paper" { "300" } else { "700" };
+            row.parameters.insert("density".into(), density.into());
+        }
+        let (told, lines) = findings(&rows, &["density"], Some(0.15));
+        assert!(
+            told[0].starts_with("At density = 300: For a e [-] of at most 0.15 take paper, spacing = 0.025"),
+            "{told:?}"
+        );
+        assert!(
+            told[2]
+                .starts_with("At density = 700: For a e [-] of at most 0.15 take accurate, spacing = 0.05"),
+            "{told:?}"
+        );
+        assert!(
+            told.last().unwrap().starts_with("Scenes that differ in density are not weighed"),
+            "{told:?}"
+        );
+        assert_eq!(lines, 2, "the methods, and no front");
+        // One point each: nothing to choose from, and nothing is recommended.
+        let (told, _) = findings(&rows, &["density", "spacing"], None);
+        assert!(told[..4].iter().all(|t| t.contains(": one setting, ") && !t.contains("take")), "{told:?}");
     }
 }
