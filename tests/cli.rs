@@ -403,6 +403,17 @@ fn schema_and_adapters_answer_on_stdout() {
     assert!(json(&adapters.out).is_array());
 }
 
+/// A key is found as messages and --set name it, and a case file without its ending is asked about.
+#[test]
+fn names_as_one_types_them_are_understood() {
+    let keys = ran(&["keys", "body.0.density"]);
+    assert!(keys.code == 0 && keys.out.contains("[[body]] density"), "{} {}", keys.out, keys.err);
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let missing = ran(&["plan", case.strip_suffix(".toml").unwrap()]);
+    assert!(missing.code == 2 && missing.err.contains(&format!("did you mean `{case}`?")), "{}", missing.err);
+}
+
 /// Start a long run and wait until it has written a frame.
 #[cfg(unix)]
 fn long_run(case: &str, root: &Path) -> std::process::Child {
@@ -488,6 +499,19 @@ fn plan_tells_where_free_bodies_stand_and_what_they_weigh() {
     }
     let words = ran(&["plan", &case]).out;
     assert!(words.contains("`ramp`: 4.5000e0 kg, 9.0000e-3 m3; x 1.2000 to 1.5000"), "{words}");
+    // No water is around it: nine kilograms are what it displaces in all.
+    assert!(words.contains("displaces 9.000e0 kg of water when all under: it floats"), "{words}");
+    let aloft = std::fs::read_to_string(&case).unwrap();
+    let afloat = aloft.replace("center = [1.4, 0.2, 0.7]", "center = [0.3, 0.2, 0.45]");
+    std::fs::write(&case, afloat.replace("density = 500", "density = 500\ndisplaces_fluid = true")).unwrap();
+    let plan = ran(&["plan", &case, "--json"]);
+    assert_eq!(plan.code, 0, "{}", plan.err);
+    let body = &json(&plan.out)["bodies"][0]["buoyancy"];
+    // From z = 0.35 to 0.65, in water up to 0.5 m: of its side, a triangle that narrows upwards, three quarters are under.
+    let close = |key: &str, wanted: f64, within: f64| (body[key].as_f64().unwrap() - wanted).abs() < within;
+    let half = 0.35 + 0.3 * (1.0 - 0.5_f64.sqrt());
+    assert!(close("as_it_stands_kg", 6.75, 0.03) && close("lower_m", half - 0.5, 1e-3), "{body}");
+    std::fs::write(&case, aloft).unwrap();
     let held = "locked = [\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\"]";
     std::fs::write(&case, std::fs::read_to_string(&case).unwrap().replace("density = 500", held)).unwrap();
     let words = ran(&["plan", &case]);

@@ -1,9 +1,11 @@
 //! `seixo plan`: what a run would compute.
 
+mod afloat;
 mod words;
 
 use super::setup::{self, Setup};
 use super::{CaseArgs, Exit};
+use afloat::Buoyancy;
 use glam::DMat3;
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
@@ -106,6 +108,8 @@ struct BodyLine {
     /// Lower and upper corner of the box around it at t = 0.
     min_m: [f64; 3],
     max_m: [f64; 3],
+    /// Of the first [`MOST_BODIES`], if there is water.
+    buoyancy: Option<Buoyancy>,
 }
 
 impl BodyLine {
@@ -118,8 +122,19 @@ impl BodyLine {
             volume_m3: solid.shape.volume(),
             min_m: (solid.shape_center() + lo).to_array(),
             max_m: (solid.shape_center() + hi).to_array(),
+            buoyancy: None,
         })
     }
+}
+
+/// The free bodies of `scene`, in water of this density [kg/m3].
+fn bodies(scene: &Scene, density: f64) -> Vec<BodyLine> {
+    let mut lines: Vec<BodyLine> = scene.solids.iter().filter_map(BodyLine::new).collect();
+    let free = scene.solids.iter().filter(|solid| solid.is_free());
+    for (line, solid) in lines.iter_mut().zip(free).take(MOST_BODIES) {
+        line.buoyancy = Buoyancy::new(scene, solid, density);
+    }
+    lines
 }
 
 /// Constants of the fluid's scheme.
@@ -175,6 +190,8 @@ struct Report {
     advice: Vec<String>,
 }
 
+/// Free bodies that are told of; more would be no list.
+const MOST_BODIES: usize = 12;
 /// Fluid particles up to which the scene is built whole; more are estimated from a coarser one.
 const WHOLE: f64 = 1.6e7;
 /// Fluid particles of that coarser scene.
@@ -314,7 +331,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         particles: count,
         solids: called(false),
         fixed_solids: called(true),
-        bodies: scene.solids.iter().filter_map(BodyLine::new).collect(),
+        bodies: bodies(scene, params.density),
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },

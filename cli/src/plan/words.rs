@@ -1,6 +1,6 @@
 //! What `seixo plan` tells, as a person reads it.
 
-use super::{BodyLine, Report, StageLine, WaveLine};
+use super::{BodyLine, MOST_BODIES, Report, StageLine, WaveLine};
 use seixo::backend::gpu::forecast::Forecast;
 use seixo::case::Case;
 use seixo::error::{CaseError, Error};
@@ -8,9 +8,6 @@ use seixo::estimate::{Estimate, bytes};
 use seixo::output::digits::of_place;
 use seixo::plan::Stage;
 use seixo::share::Outlook;
-
-/// Free bodies that are told of; more would be no list.
-const MOST_BODIES: usize = 12;
 
 /// Memory of a usual large GPU [bytes].
 const LARGE_GPU: u64 = 24_000_000_000;
@@ -40,8 +37,9 @@ impl BodyLine {
         let span = |k: usize| format!("{:.places$} to {:.places$}", self.min_m[k], self.max_m[k]);
         // One that nothing moves needs no mass.
         let mass = if self.mass_kg > 0.0 { format!("{:.4e} kg", self.mass_kg) } else { "held".into() };
+        let afloat = self.buoyancy.as_ref().map_or(String::new(), |b| "\n".to_owned() + &b.words(places));
         format!(
-            "  `{}`: {mass}, {:.4e} m3; x {}, y {}, z {} m",
+            "  `{}`: {mass}, {:.4e} m3; x {}, y {}, z {} m{afloat}",
             self.name,
             self.volume_m3,
             span(0),
