@@ -267,7 +267,7 @@ impl Plan {
                 Stage::Openings if scene.openings.is_empty() => Err("no inflow and no outflow"),
                 Stage::Openings => wet("water comes in or goes out"),
                 Stage::Viscosity if params.viscosity == 0.0 => Err("viscosity is zero"),
-                Stage::Viscosity => wet("viscosity is given"),
+                Stage::Viscosity => wet("viscosity is above zero"),
                 Stage::MoveSolids if !moving => Err("nothing solid moves"),
                 Stage::MoveSolids => wet("solids move in the fluid"),
                 Stage::WallFriction if params.wall_friction == 0.0 => Err("the friction of walls is zero"),

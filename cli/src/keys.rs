@@ -49,9 +49,12 @@ pub fn keys(args: &KeysArgs) -> Exit {
         say(markdown(&tables).trim_end());
         return Ok(0);
     }
-    let text = text(&tables, args.word.as_deref().unwrap_or_default());
+    // As messages and --set name it: `body.0.density` is the key `density` of [[body]].
+    let asked = args.word.clone().unwrap_or_default();
+    let names = asked.split('.').filter(|part| part.parse::<usize>().is_err());
+    let word = Some(names.collect::<Vec<_>>().join(".")).filter(|word| !word.is_empty()).unwrap_or(asked);
+    let text = text(&tables, &word);
     if text.is_empty() {
-        let word = args.word.as_deref().unwrap_or_default();
         let words = format!("no key has `{word}` in its path or description: `seixo keys` lists all");
         return Err(Error::usage("WORD", words));
     }

@@ -31,6 +31,7 @@ use std::path::PathBuf;
 
 const EXIT_CODES: &str = "Exit codes:
   0    done
+  1    compare: GPU and CPU differ by more than single precision explains
   2    the case or the command line is wrong
   3    no suitable GPU, or the device was lost
   4    the computation diverged (its last state is kept), or its result means nothing

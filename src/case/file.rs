@@ -260,7 +260,9 @@ fn missing(path: &Path) -> String {
         .collect();
     let names: Vec<&str> = files.iter().map(String::as_str).collect();
     let wanted = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let hint = closest(&wanted, &names).map(|n| format!("; did you mean `{}`?", folder.join(n).display()));
+    let whole = format!("{wanted}.toml");
+    let like = names.iter().copied().find(|name| *name == whole).or_else(|| closest(&wanted, &names));
+    let hint = like.map(|n| format!("; did you mean `{}`?", folder.join(n).display()));
     format!("no case file at `{}`{}", path.display(), hint.unwrap_or_default())
 }
 
