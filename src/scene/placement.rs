@@ -101,10 +101,10 @@ impl Surroundings<'_> {
         let own = body.placed();
         let most = own.center.dot(up) + own.reach(up) - lowest;
         let step = (0.25 * self.spacing).max(most / MOST_STEPS);
-        let ways = (1..).map(|k| least + f64::from(k) * step).take_while(|way| *way < most);
+        let mut ways = (1..).map(|k| least + f64::from(k) * step).take_while(|way| *way < most);
         let says =
             format!("body `{}`: stands on nothing, `standing` lifts it and never lowers it", body.name);
-        let Some((mut way, mut with)) = ways.into_iter().find_map(|way| Some((way, met(way)?))) else {
+        let Some((mut way, mut with)) = ways.find_map(|way| Some((way, met(way)?))) else {
             return Some(format!("{says}: there is no solid below it; leave `standing` out"));
         };
         let mut free = way - step;

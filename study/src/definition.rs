@@ -235,8 +235,8 @@ impl Axis {
         let set = self.choices.iter().flat_map(|c| &c.set).filter_map(|set| set.split_once('='));
         let mut keys = set.map(|(key, _)| key.trim()).chain(self.key.as_deref()).peekable();
         let of_scene = |key: &str| {
-            let rest = SCENE.iter().filter_map(|scene| key.strip_prefix(scene));
-            rest.into_iter().any(|rest| rest.is_empty() || rest.starts_with('.'))
+            let mut rest = SCENE.iter().filter_map(|scene| key.strip_prefix(scene));
+            rest.any(|rest| rest.is_empty() || rest.starts_with('.'))
         };
         self.scene.unwrap_or_else(|| keys.peek().is_some() && keys.all(of_scene))
     }

@@ -318,12 +318,15 @@ mod tests {
         }
         let (told, lines) = findings(&rows, &["density"], Some(0.15));
         assert!(
-            told[0].starts_with("At density = 300: For a e [-] of at most 0.15 take paper, spacing = 0.025"),
+            told[0].starts_with(
+                "At density = 300: For a e [-] of at most 0.15 take paper, density = 300, spacing = 0.025"
+            ),
             "{told:?}"
         );
         assert!(
-            told[2]
-                .starts_with("At density = 700: For a e [-] of at most 0.15 take accurate, spacing = 0.05"),
+            told[2].starts_with(
+                "At density = 700: For a e [-] of at most 0.15 take accurate, density = 700, spacing = 0.05"
+            ),
             "{told:?}"
         );
         assert!(
