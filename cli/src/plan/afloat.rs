@@ -65,6 +65,10 @@ impl Buoyancy {
             (None, _) => String::new(),
             (Some(false), _) => ": it sinks".into(),
             (Some(true), None) => ": it floats".into(),
+            // No more than is told.
+            (Some(true), Some(lower)) if 2.0 * lower.abs() < 0.1_f64.powi(places as i32) => {
+                ": it floats as it stands".into()
+            }
             (Some(true), Some(lower)) => {
                 let side = if lower < 0.0 { "higher" } else { "lower" };
                 format!(": it floats {:.places$} m {side}, turned as it is", lower.abs())
