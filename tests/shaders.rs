@@ -54,7 +54,11 @@ fn every_shader_has_a_twin_and_every_twin_a_shader() {
 
 /// The switches that a file asks for.
 fn asked(text: &str) -> Vec<&'static str> {
-    shader::SWITCHES.into_iter().filter(|s| text.contains(&format!("//#if {s}\n"))).collect()
+    shader::SWITCHES
+        .iter()
+        .map(|(name, _)| *name)
+        .filter(|s| text.contains(&format!("//#if {s}\n")))
+        .collect()
 }
 
 /// Every combination of the switches that a file asks for.

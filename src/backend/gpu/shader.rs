@@ -11,53 +11,36 @@ use crate::scheme::{Collision, FreeSurface, Gradient, Source};
 /// Appended to every kernel.
 pub const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 
-/// Names that `//#if NAME` may ask for.
-pub const SWITCHES: [&str; 18] = [
-    "ABSORBER",
-    "ALONG",
-    "CONSISTENT",
-    "COUPLED",
-    "FILLED",
-    "FORCE",
-    "MIXED",
-    "MOVING",
-    "MULTIGRID",
-    "PERIODIC",
-    "RANKS",
-    "REACTION",
-    "SHARED_COLLISIONS",
-    "STATIC",
-    "SURFACE_PRESSURE",
-    "THRESHOLD_OFFSET",
-    "TWO_DIMENSIONS",
-    "VISCOSITY",
+/// A name that `//#if NAME` may ask for, and whether it is on for a scene.
+pub type Switch = (&'static str, fn(&Params, &Plan) -> bool);
+
+/// The switches.
+pub const SWITCHES: &[Switch] = &[
+    ("ABSORBER", |_, plan| plan.needs(Arrays::Absorber)),
+    // Viscosity or friction acts before collisions.
+    ("ALONG", |_, plan| plan.has(Stage::Viscosity) || plan.has(Stage::WallFriction)),
+    ("CONSISTENT", |params, _| params.gradient != Gradient::Minimum),
+    ("COUPLED", |_, plan| plan.needs(Arrays::Coupling)),
+    ("FILLED", |_, plan| plan.needs(Arrays::Level)),
+    ("FORCE", |_, plan| plan.needs(Arrays::Force)),
+    ("MIXED", |params, _| params.source == Source::Mixed),
+    ("MOVING", |_, plan| plan.needs(Arrays::Solids)),
+    ("MULTIGRID", |_, plan| plan.needs(Arrays::Multigrid)),
+    ("PERIODIC", |params, _| params.periodic.is_any()),
+    // Of a device that is one of many ranks'; see `rank`.
+    ("RANKS", |_, _| false),
+    ("REACTION", |_, plan| plan.needs(Arrays::Reaction)),
+    ("SHARED_COLLISIONS", |params, _| params.collision == Collision::Shared),
+    ("STATIC", |_, plan| plan.needs(Arrays::FixedWalls)),
+    ("SURFACE_PRESSURE", |_, plan| plan.needs(Arrays::SurfacePressure)),
+    ("THRESHOLD_OFFSET", |params, _| params.free_surface == FreeSurface::ThresholdOffset),
+    ("TWO_DIMENSIONS", |params, _| params.dimensions == 2),
+    ("VISCOSITY", |_, plan| plan.has(Stage::Viscosity)),
 ];
 
 /// The switches that are on for a scene.
 pub fn switches(params: &Params, plan: &Plan) -> Vec<&'static str> {
-    let on = [
-        plan.needs(Arrays::Absorber),
-        // Viscosity or friction acts before collisions.
-        plan.has(Stage::Viscosity) || plan.has(Stage::WallFriction),
-        params.gradient != Gradient::Minimum,
-        plan.needs(Arrays::Coupling),
-        plan.needs(Arrays::Level),
-        plan.needs(Arrays::Force),
-        params.source == Source::Mixed,
-        plan.needs(Arrays::Solids),
-        plan.needs(Arrays::Multigrid),
-        params.periodic.is_any(),
-        // Of a device that is one of many ranks'; see `rank`.
-        false,
-        plan.needs(Arrays::Reaction),
-        params.collision == Collision::Shared,
-        plan.needs(Arrays::FixedWalls),
-        plan.needs(Arrays::SurfacePressure),
-        params.free_surface == FreeSurface::ThresholdOffset,
-        params.dimensions == 2,
-        plan.has(Stage::Viscosity),
-    ];
-    SWITCHES.into_iter().zip(on).filter_map(|(name, on)| on.then_some(name)).collect()
+    SWITCHES.iter().filter(|(_, is_on)| is_on(params, plan)).map(|(name, _)| *name).collect()
 }
 
 /// Text of a kernel with the lines between `//#if NAME` (or `//#else`) and `//#endif` left out where the
