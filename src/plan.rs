@@ -44,6 +44,11 @@ macro_rules! stages {
             }
         }
 
+        impl ParticleStage {
+            /// All of them, in the order of the step.
+            pub const ALL: &'static [Self] = &[$($(Self::$particles,)?)*];
+        }
+
         impl From<ParticleStage> for Stage {
             fn from(stage: ParticleStage) -> Self {
                 match stage {
@@ -292,7 +297,14 @@ impl Plan {
                 Stage::Contact if !moving => Err("nothing solid moves"),
                 Stage::Contact if !free => Ok("solids follow their tables of motion"),
                 Stage::Contact => Ok("bodies move"),
-                _ => wet("fluid"),
+                Stage::Predict
+                | Stage::CellList
+                | Stage::NeighbourList
+                | Stage::NumberDensity
+                | Stage::PressureSource
+                | Stage::ConjugateGradient
+                | Stage::PressureGradient
+                | Stage::Correct => wet("fluid"),
             };
             (stage, reason)
         });

@@ -1,8 +1,11 @@
 //! One time step: the algorithm of the paper's section 2, with the solids of section 3.
 
 use crate::error::{Error, Result};
-use crate::plan::Stage;
+use crate::plan::{ParticleStage, Stage};
 use crate::simulation::{Simulation, StepReport};
+
+// Each of the stages with a call of its own has an arm below.
+const _: () = assert!(Stage::ALL.len() - ParticleStage::ALL.len() == 5);
 
 impl Simulation {
     /// Advance by one time step.

@@ -13,7 +13,7 @@ use seixo::compute::{Host, Program};
 use seixo::contact::device::paper::{self, PaperBlock, PaperLaw, PaperPair, PaperPose};
 use seixo::contact::device::smooth::{self, SmoothPair, SmoothPose};
 use seixo::params::Params;
-use seixo::plan::{ContactPlan, Plan};
+use seixo::plan::{ContactPlan, ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::scheme::Preconditioner;
 use std::collections::BTreeSet;
@@ -43,6 +43,8 @@ fn every_shader_has_a_twin_and_every_twin_a_shader() {
     assert_eq!(of_particles, files("src/kernels", ".rs", "mod"));
     let listed: BTreeSet<String> = kernels::programs().map(|p| p.name.to_owned()).collect();
     assert_eq!(shaders, listed);
+    let without: Vec<_> = ParticleStage::ALL.iter().filter(|stage| kernels::of(**stage).is_none()).collect();
+    assert_eq!(without, [&ParticleStage::CellList], "stages without a kernel over particles");
     for Program { name, text, .. } in kernels::programs() {
         let path = twin(name);
         assert!(text.contains(&format!("// Twin: {path}")), "{name}: head comment names no twin");

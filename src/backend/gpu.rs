@@ -41,7 +41,7 @@ use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::cells::Grid;
 use crate::compute::{Compute, Id, Kernel};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::kernels::body_force::RowPressure;
 pub use crate::kernels::device as kernels;
@@ -163,10 +163,14 @@ impl Backend for Gpu {
         self.context.begin(Some(stage.into()));
         self.set_step(step)?;
         self.book(stage)?;
-        let Some((kernel, over)) = kernels::of(stage) else { return self.cell_list() };
+        if stage == ParticleStage::CellList {
+            return self.cell_list();
+        }
+        let none = || Error::gpu(format!("{}: it has no kernel over particles", Stage::from(stage).name()));
+        let (kernel, over) = kernels::of(stage).ok_or_else(none)?;
         let s = self.sizes;
         let threads = match over {
-            Over::Fluid | Over::Own => s.fluid,
+            Over::Fluid => s.fluid,
             Over::FluidAndReaction => s.fluid + s.reacting,
             Over::Rows => s.pressure,
         };

@@ -53,8 +53,6 @@ pub mod device {
         FluidAndReaction,
         /// Rows of the neighbour lists.
         Rows,
-        /// A stage with commands of its own.
-        Own,
     }
 
     /// A shader of the list.
@@ -63,8 +61,8 @@ pub mod device {
         pub program: Program,
         /// What needs it.
         pub serves: Serves,
-        /// What its threads run over.
-        pub over: Over,
+        /// What its threads run over; `None` if it has commands of its own.
+        pub over: Option<Over>,
     }
 
     macro_rules! files {
@@ -74,14 +72,16 @@ pub mod device {
             pub const FILES: &[File] = &[$(File {
                 program: Program { name: stringify!($file), text: $file::TEXT, kernels: $file::ALL, buffers: &[] },
                 serves: files!(@ $serves $what),
-                over: Over::$over,
+                over: files!(@over $over),
             }),*];
         };
+        (@over Own) => { None };
+        (@over $over:ident) => { Some(Over::$over) };
         (@ Stage $what:ident) => { Serves::Stage(Stage::$what) };
         (@ Arrays $what:ident) => { Serves::Arrays(Arrays::$what) };
     }
 
-    // File [threads of a workgroup], what needs it, what the threads run over: its kernels.
+    // File [threads of a workgroup], what needs it, what the threads run over (`Own`: commands of its own): its kernels.
     files! {
         absorber[super::WORKGROUP] Stage(Absorber), Fluid: absorber;
         body_force[super::WORKGROUP] Stage(BodyForce), Own: body_force;
@@ -155,7 +155,6 @@ pub mod device {
     /// Kernel of a stage that is one kernel over particles, and what it runs over; nothing for one with more.
     pub fn of(stage: ParticleStage) -> Option<(Kernel, Over)> {
         let file = FILES.iter().find(|f| f.serves == Serves::Stage(stage.into()))?;
-        let kernel = *file.program.kernels.first()?;
-        (file.over != Over::Own).then_some((kernel, file.over))
+        Some((*file.program.kernels.first()?, file.over?))
     }
 }

@@ -176,7 +176,9 @@ pub fn differences(stage: Stage, gpu: &Fields, cpu: &Fields, params: &Params) ->
         Stage::ConjugateGradient => vec![scalar("pressure", &gpu.pressure, &cpu.pressure)],
         Stage::PressureGradient => vec![acceleration()],
         Stage::NeighbourList | Stage::BodyForce | Stage::Contact => Vec::new(),
-        _ => vec![position(), velocity()],
+        Stage::Absorber | Stage::Predict | Stage::MoveSolids | Stage::Correct | Stage::Shift => {
+            vec![position(), velocity()]
+        }
     }
 }
 
