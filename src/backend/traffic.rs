@@ -103,23 +103,25 @@ impl Sizes {
     pub fn traffic(&self) -> Traffic {
         let Self { fluid, rows, cells, pairs, number, vector, weight, pressure, pressure_pairs, .. } = *self;
         let update = fluid * 5 * vector; // position and velocity in and out, acceleration in
-        let stages = [
-            (Stage::Viscosity, pressure_pairs * 4 + rows * 2 * vector + fluid * vector),
-            (Stage::Absorber, fluid * 3 * vector),
-            (Stage::Openings, fluid * vector),
-            (Stage::Predict, update),
-            (Stage::CellList, fluid * 2 * (2 * vector + number + 5) + cells * 8),
-            (Stage::NeighbourList, rows * vector + pairs * 4),
-            (Stage::WallFriction, fluid * (4 + vector) + update),
-            (Stage::Collision, rows + update),
-            (Stage::NumberDensity, pairs * (4 + weight) + rows * (vector + number + 1)),
-            (Stage::SurfacePressure, rows * (number + 1)),
-            (Stage::PressureSource, pairs * (4 + weight) + rows * (2 * vector + 3 * number)),
-            (Stage::PressureGradient, pairs * (4 + weight) + rows * (vector + number) + fluid * vector),
-            (Stage::Correct, update),
-            (Stage::Shift, fluid * 4 * vector),
-        ];
-        Traffic { pairs, rows, slots: pressure, stages: stages.into(), solve: self.solve() }
+        let bytes = |stage| match stage {
+            Stage::Viscosity => pressure_pairs * 4 + rows * 2 * vector + fluid * vector,
+            Stage::Absorber => fluid * 3 * vector,
+            Stage::Openings => fluid * vector,
+            Stage::Predict => update,
+            Stage::CellList => fluid * 2 * (2 * vector + number + 5) + cells * 8,
+            Stage::NeighbourList => rows * vector + pairs * 4,
+            Stage::WallFriction => fluid * (4 + vector) + update,
+            Stage::Collision => rows + update,
+            Stage::NumberDensity => pairs * (4 + weight) + rows * (vector + number + 1),
+            Stage::SurfacePressure => rows * (number + 1),
+            Stage::PressureSource => pairs * (4 + weight) + rows * (2 * vector + 3 * number),
+            Stage::PressureGradient => pairs * (4 + weight) + rows * (vector + number) + fluid * vector,
+            Stage::Correct => update,
+            Stage::Shift => fluid * 4 * vector,
+            Stage::MoveSolids | Stage::BodyForce | Stage::ConjugateGradient | Stage::Contact => 0,
+        };
+        let stages = Stage::ALL.into_iter().map(|stage| (stage, bytes(stage))).collect();
+        Traffic { pairs, rows, slots: pressure, stages, solve: self.solve() }
     }
 
     fn solve(&self) -> Solve {

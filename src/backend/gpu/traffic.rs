@@ -49,37 +49,39 @@ impl Gpu {
         let equation = buffers::source_diagonal.size();
         // What slots between solids bring a wall-layer particle.
         let slots = if self.plan.needs(Arrays::Coupling) { 4 * buffers::coupling.size() } else { 0 };
-        let stages = [
-            (Stage::Viscosity, f * (3 * v + k) + followed * (4 * v + k) + k * rows.fluid_near),
-            (Stage::Absorber, f * 3 * v),
-            (Stage::Openings, f * v),
-            (Stage::Predict, if viscous { update } else { f * 4 * v }),
-            (Stage::MoveSolids, 2 * s.moving * 4 * v),
+        let bytes = |stage| match stage {
+            Stage::Viscosity => f * (3 * v + k) + followed * (4 * v + k) + k * rows.fluid_near,
+            Stage::Absorber => f * 3 * v,
+            Stage::Openings => f * v,
+            Stage::Predict => {
+                if viscous {
+                    update
+                } else {
+                    f * 4 * v
+                }
+            }
+            Stage::MoveSolids => 2 * s.moving * 4 * v,
             // Keys: counted, scanned in three kernels, searched. Particles: key, arrival and order; then moved and
             // copied back.
-            (
-                Stage::CellList,
-                keys * k * 6 + s.sorted() * (2 * v + 9 * k) + f * 4 * (2 * v + n) + k * s.moving,
-            ),
-            (Stage::NeighbourList, p * (v + k) + lists + k * (keys + s.cells) + walls),
-            (Stage::WallFriction, (f + followed) * k + f * v + update),
-            (Stage::Collision, p.min(f + followed) * k + f * 4 * v),
-            (Stage::NumberDensity, p * (v + n + 2 * k) + lists + walls),
-            (Stage::SurfacePressure, p * (k + n)),
-            (Stage::PressureSource, p * (k + equation) + rows.used * (2 * v + n + k) + lists + 2 * walls),
-            (Stage::PressureGradient, f * (gradient + n + 2 * k) + lists * f / rows.used.max(1) + walls),
-            (Stage::Correct, update),
-            (Stage::Shift, f * 4 * v),
-            (Stage::BodyForce, s.moving_wall * (buffers::wall_layer.size() + v + n + k + slots)),
-        ];
+            Stage::CellList => {
+                keys * k * 6 + s.sorted() * (2 * v + 9 * k) + f * 4 * (2 * v + n) + k * s.moving
+            }
+            Stage::NeighbourList => p * (v + k) + lists + k * (keys + s.cells) + walls,
+            Stage::WallFriction => (f + followed) * k + f * v + update,
+            Stage::Collision => p.min(f + followed) * k + f * 4 * v,
+            Stage::NumberDensity => p * (v + n + 2 * k) + lists + walls,
+            Stage::SurfacePressure => p * (k + n),
+            Stage::PressureSource => p * (k + equation) + rows.used * (2 * v + n + k) + lists + 2 * walls,
+            Stage::PressureGradient => f * (gradient + n + 2 * k) + lists * f / rows.used.max(1) + walls,
+            Stage::Correct => update,
+            Stage::Shift => f * 4 * v,
+            Stage::BodyForce => s.moving_wall * (buffers::wall_layer.size() + v + n + k + slots),
+            Stage::ConjugateGradient | Stage::Contact => 0,
+        };
         let unknowns = self.unknowns()?;
-        Ok(Traffic {
-            pairs,
-            rows: rows.used,
-            slots: p,
-            stages: stages.into_iter().filter(|(stage, _)| self.plan.has(*stage)).collect(),
-            solve: self.solve_traffic(&rows, unknowns)?,
-        })
+        let planned = Stage::ALL.into_iter().filter(|&stage| self.plan.has(stage));
+        let stages = planned.map(|stage| (stage, bytes(stage))).collect();
+        Ok(Traffic { pairs, rows: rows.used, slots: p, stages, solve: self.solve_traffic(&rows, unknowns)? })
     }
 
     fn unknowns(&mut self) -> Result<u64> {
