@@ -56,15 +56,15 @@ impl Placed {
         let q = self.axes.transpose() * (p - self.center);
         if self.shape.as_cuboid().is_some() { self.shape.outside(q) } else { self.shape.distance(q).0 }
     }
-    /// See [`Shape::has_cavities`].
+    /// See [`crate::shape::Geometry::has_cavities`].
     pub fn has_cavities(&self) -> bool {
         self.shape.has_cavities()
     }
-    /// See [`Shape::in_cavity`].
+    /// See [`crate::shape::Geometry::in_cavity`].
     pub fn in_cavity(&self, p: DVec3) -> bool {
         self.shape.in_cavity(self.axes.transpose() * (p - self.center))
     }
-    /// See [`Shape::is_convex`].
+    /// See [`crate::shape::Geometry::is_convex`].
     pub fn is_convex(&self) -> bool {
         self.shape.is_convex()
     }

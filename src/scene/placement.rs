@@ -7,7 +7,7 @@
 use super::near::Near;
 use super::oriented::Placed;
 use super::walls::Fixed;
-use super::{Shape, Solid, WallShape};
+use super::{Solid, WallShape};
 use crate::case::Law;
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
@@ -340,18 +340,9 @@ impl Obstruction<'_> {
 
 /// Points of the surface of a shape, in the world: those above its wall layer and its corners.
 fn surface_points<'a>(at: &'a Placed, solid: Option<&'a Solid>) -> Box<dyn Iterator<Item = DVec3> + 'a> {
-    let corners: Vec<DVec3> = match (&at.shape, at.shape.as_cuboid()) {
-        #[cfg(feature = "mesh")]
-        (Shape::Mesh(mesh), _) => mesh.vertices().to_vec(),
-        (Shape::Polygon(polygon), _) => polygon.corners().collect(),
-        (_, Some(cuboid)) => (0..8)
-            .map(|k| cuboid.half * DVec3::from_array([0, 1, 2].map(|b| f64::from(k >> b & 1) * 2.0 - 1.0)))
-            .collect(),
-        _ => vec![],
-    };
     let layer = solid.into_iter().flat_map(|s| s.wall_offset.iter().zip(&s.wall_to_surface));
     let layer = layer.map(|(offset, to_surface)| *offset + *to_surface);
-    Box::new(corners.into_iter().chain(layer).map(|q| at.center + at.axes * q))
+    Box::new(at.shape.corners().into_iter().chain(layer).map(|q| at.center + at.axes * q))
 }
 
 /// A pair of wall-layer particles: from the other one to the body's.

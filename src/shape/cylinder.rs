@@ -45,6 +45,10 @@ impl Geometry for Cylinder {
         self.radius.hypot(self.half_height)
     }
 
+    fn is_convex(&self) -> bool {
+        true
+    }
+
     fn reach(&self, n: DVec3) -> f64 {
         self.radius * n.x.hypot(n.y) + self.half_height * n.z.abs()
     }

@@ -35,6 +35,10 @@ impl Geometry for Disc {
         self.radius
     }
 
+    fn is_convex(&self) -> bool {
+        true
+    }
+
     fn reach(&self, n: DVec3) -> f64 {
         self.radius * (n * IN_PLANE).length() + 0.5 * self.width * n.y.abs()
     }

@@ -105,70 +105,6 @@ impl Shape {
         Self::Box(Cuboid { half: 0.5 * size })
     }
 
-    /// Turn from its frame to the one it was given in: of a mesh, from its principal axes to the file's.
-    pub fn frame(&self) -> DQuat {
-        match self {
-            #[cfg(feature = "mesh")]
-            Self::Mesh(shape) => shape.frame(),
-            _ => DQuat::IDENTITY,
-        }
-    }
-
-    /// The same with the sides alone that are not `covered`: asked for places in its frame [m] and the normals there. `None` if
-    /// it has all of them, none, or no sides.
-    pub(crate) fn uncovered(&self, spacing: f64, covered: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Self> {
-        match self {
-            #[cfg(feature = "mesh")]
-            Self::Mesh(shape) => shape.uncovered(spacing, covered).map(Self::Mesh),
-            Self::Polygon(shape) => shape.uncovered(spacing, covered).map(Self::Polygon),
-            _ => None,
-        }
-    }
-
-    /// Whether planes tell it apart from what does not touch it.
-    pub fn is_convex(&self) -> bool {
-        !self.is_faceted()
-    }
-
-    /// Whether its faces look any way: their numbers say only along which axis they look most.
-    pub fn is_faceted(&self) -> bool {
-        match self {
-            #[cfg(feature = "mesh")]
-            Self::Mesh(_) => true,
-            Self::Polygon(_) => true,
-            _ => false,
-        }
-    }
-
-    /// Whether it encloses room that nothing gets into.
-    pub(crate) fn has_cavities(&self) -> bool {
-        match self {
-            #[cfg(feature = "mesh")]
-            Self::Mesh(shape) => shape.has_cavities(),
-            _ => false,
-        }
-    }
-
-    /// Whether a point lies in such room, or in the solid and nearest to it.
-    #[cfg_attr(not(feature = "mesh"), allow(unused_variables))]
-    pub(crate) fn in_cavity(&self, q: DVec3) -> bool {
-        match self {
-            #[cfg(feature = "mesh")]
-            Self::Mesh(shape) => shape.in_cavity(q),
-            _ => false,
-        }
-    }
-
-    /// Its centre in the coordinates of its file or section [m], before [`Shape::frame`] is left.
-    pub(crate) fn origin(&self) -> DVec3 {
-        match self {
-            Self::Polygon(shape) => shape.center(),
-            #[cfg(feature = "mesh")]
-            Self::Mesh(shape) => shape.center(),
-            _ => DVec3::ZERO,
-        }
-    }
-
     /// Lower and upper corner of the box around it, from its centre of mass [m], where `axes` takes its frame to that of the box.
     pub fn bounds(&self, axes: DMat3) -> (DVec3, DVec3) {
         let to_shape = axes.transpose();
@@ -223,6 +159,24 @@ pub trait Geometry: std::fmt::Debug + Sync {
     /// Radius of the sphere about the centre that holds it [m].
     fn radius(&self) -> f64;
 
+    /// Whether planes tell it apart from what does not touch it.
+    fn is_convex(&self) -> bool;
+
+    /// Whether its faces look any way: their numbers say only along which axis they look most.
+    fn is_faceted(&self) -> bool {
+        !self.is_convex()
+    }
+
+    /// Turn from its frame to the one it was given in: of a mesh, from its principal axes to the file's.
+    fn frame(&self) -> DQuat {
+        DQuat::IDENTITY
+    }
+
+    /// Its centre in the coordinates of its file or section [m], before [`Geometry::frame`] is left.
+    fn origin(&self) -> DVec3 {
+        DVec3::ZERO
+    }
+
     /// Largest coordinate of its points along the unit vector `n` [m].
     fn reach(&self, n: DVec3) -> f64;
 
@@ -263,6 +217,27 @@ pub trait Geometry: std::fmt::Debug + Sync {
                 visit(Node::point(s, width), inside);
             }
         });
+    }
+
+    /// Corners [m] of one that has some: what of its surface may reach further than the places above its wall layer.
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    /// Whether it encloses room that nothing gets into.
+    fn has_cavities(&self) -> bool {
+        false
+    }
+
+    /// Whether `q` lies in such room, or in the solid and nearest to it.
+    fn in_cavity(&self, _: DVec3) -> bool {
+        false
+    }
+
+    /// The same with the sides alone that are not `covered`: asked for places in its frame [m] and the normals there. `None` if
+    /// it has all of them, none, or no sides.
+    fn uncovered(&self, _spacing: f64, _covered: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Shape> {
+        None
     }
 
     /// Particles about `spacing` [m] apart: the wall layer and what lies below it, hollow beyond `layers`.

@@ -29,6 +29,10 @@ impl Geometry for Sphere {
         self.radius
     }
 
+    fn is_convex(&self) -> bool {
+        true
+    }
+
     fn reach(&self, _: DVec3) -> f64 {
         self.radius
     }

@@ -53,6 +53,10 @@ impl Geometry for Cuboid {
         self.half.length()
     }
 
+    fn is_convex(&self) -> bool {
+        true
+    }
+
     fn reach(&self, n: DVec3) -> f64 {
         n.abs().dot(self.half)
     }
@@ -99,6 +103,11 @@ impl Geometry for Cuboid {
         visit: &mut dyn FnMut(Node, Inside),
     ) {
         self.each_node(line, faces, least, visit);
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        let way = |k: i32| DVec3::from_array([0, 1, 2].map(|b| f64::from(k >> b & 1) * 2.0 - 1.0));
+        (0..8).map(|k| self.half * way(k)).collect()
     }
 
     /// n = max(2, round(L / l0)) along an edge, L / n apart, so that the outermost stand half a spacing inside

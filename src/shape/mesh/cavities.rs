@@ -10,17 +10,12 @@ use std::sync::Arc;
 const ON: f64 = 1e-9;
 
 impl Mesh {
-    fn cavities(&self) -> &[TriMesh] {
+    pub(super) fn cavities(&self) -> &[TriMesh] {
         self.cavities.get_or_init(|| of(&self.triangles))
     }
 
-    /// Whether it encloses room that nothing gets into.
-    pub(crate) fn has_cavities(&self) -> bool {
-        !self.cavities().is_empty()
-    }
-
     /// Whether `q` lies in a sealed cavity, or in the solid and nowhere nearer to the surface than to that of a cavity.
-    pub(crate) fn in_cavity(&self, q: DVec3) -> bool {
+    pub(super) fn lies_in_cavity(&self, q: DVec3) -> bool {
         let ((nearest, in_solid), on) = (self.nearest(q), ON * self.radius);
         let off = q.distance(nearest);
         self.cavities().iter().any(|cavity| {

@@ -10,7 +10,7 @@ static OPENED: open::Made<Mesh> = Mutex::new(Vec::new());
 
 impl Mesh {
     /// The same with the triangles alone that are not `covered` in full.
-    pub(in super::super) fn uncovered(
+    pub(super) fn with_open(
         &self,
         spacing: f64,
         covered: &dyn Fn(DVec3, DVec3) -> bool,

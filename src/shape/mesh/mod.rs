@@ -19,7 +19,7 @@ mod skin;
 mod thickness;
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer, face, nodes_between};
+use super::{Faces, Geometry, Inside, Node, Particles, Shape, WallLayer, face, nodes_between};
 use glam::{DQuat, DVec3};
 use mass::Mass;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
@@ -232,16 +232,6 @@ impl Mesh {
         Thickness { place: self.frame * thickness.place + self.center, ..thickness }
     }
 
-    /// Turn from the frame of its principal axes to the file's.
-    pub fn frame(&self) -> DQuat {
-        self.frame
-    }
-
-    /// Its centre of mass in the file's coordinates, scaled [m].
-    pub fn center(&self) -> DVec3 {
-        self.center
-    }
-
     /// Whether it comes from a file.
     pub(crate) fn is_file(&self) -> bool {
         self.is_file
@@ -341,6 +331,18 @@ impl Geometry for Mesh {
         self.radius
     }
 
+    fn is_convex(&self) -> bool {
+        false
+    }
+
+    fn frame(&self) -> DQuat {
+        self.frame
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.center
+    }
+
     fn reach(&self, n: DVec3) -> f64 {
         self.hull.iter().map(|v| v.dot(n)).fold(f64::NEG_INFINITY, f64::max)
     }
@@ -399,6 +401,22 @@ impl Geometry for Mesh {
     fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, _: f64, visit: &mut dyn FnMut(Node, Inside)) {
         let crossings = self.crossings(line.0, line.1, line.2);
         nodes_between(self, line, crossings, faces, visit);
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        self.vertices().to_vec()
+    }
+
+    fn has_cavities(&self) -> bool {
+        !self.cavities().is_empty()
+    }
+
+    fn in_cavity(&self, q: DVec3) -> bool {
+        self.lies_in_cavity(q)
+    }
+
+    fn uncovered(&self, spacing: f64, covered: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Shape> {
+        self.with_open(spacing, covered).map(Shape::Mesh)
     }
 
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {

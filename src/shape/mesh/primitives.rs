@@ -93,7 +93,7 @@ mod tests {
         let (r, h) = (0.3, 0.8);
         let cone = Mesh::cone(r, h).expect("a cone");
         assert!((cone.volume() / (PI * r * r * h / 3.0) - 1.0).abs() < 1e-12, "{}", cone.volume());
-        assert!((cone.center() - 0.25 * h * DVec3::Z).length() < 1e-12, "{}", cone.center());
+        assert!((cone.origin() - 0.25 * h * DVec3::Z).length() < 1e-12, "{}", cone.origin());
         let across = 0.6 * (0.25 * r * r + h * h / 16.0);
         let exact = DVec3::new(across, across, 0.3 * r * r);
         let mut moments = cone.inertia(1.0).to_array();
@@ -106,6 +106,6 @@ mod tests {
         let size = DVec3::new(0.6, 0.4, 0.3);
         let wedge = Mesh::wedge(size).expect("a wedge");
         assert!((wedge.volume() - 0.036).abs() < 1e-12, "{}", wedge.volume());
-        assert!((wedge.center() - DVec3::new(0.4, 0.2, 0.1)).length() < 1e-12, "{}", wedge.center());
+        assert!((wedge.origin() - DVec3::new(0.4, 0.2, 0.1)).length() < 1e-12, "{}", wedge.origin());
     }
 }

@@ -11,7 +11,9 @@ use super::open;
 use super::surface::Surface;
 use super::thickness::{Surface as Outline, Way, thinnest};
 use super::thin::Thin;
-use super::{APART, Faces, Geometry, Inside, Node, PLANE_FACES, Particles, WallLayer, face, nodes_between};
+use super::{
+    APART, Faces, Geometry, Inside, Node, PLANE_FACES, Particles, Shape, WallLayer, face, nodes_between,
+};
 use glam::{DVec2, DVec3};
 use std::sync::Mutex;
 
@@ -113,11 +115,7 @@ impl Polygon {
     }
 
     /// The same with the sides alone that are not `covered` in full.
-    pub(super) fn uncovered(
-        &self,
-        spacing: f64,
-        covered: &dyn Fn(DVec3, DVec3) -> bool,
-    ) -> Option<&'static Self> {
+    fn with_open(&self, spacing: f64, covered: &dyn Fn(DVec3, DVec3) -> bool) -> Option<&'static Self> {
         let is_open = |[a, b]: [DVec2; 2]| {
             let (count, normal) = (open::looks(a.distance(b), spacing), -space((b - a).normalize().perp()));
             let place = |k: u32| a.lerp(b, (f64::from(k) + 0.5) / f64::from(count));
@@ -127,16 +125,6 @@ impl Polygon {
             let left = self.sides().zip(is_open).filter(|(_, open)| **open).map(|(side, _)| side);
             Self { open: Some(left.collect()), ..self.clone() }
         })
-    }
-
-    /// Its centroid in the coordinates that it was given in [m].
-    pub fn center(&self) -> DVec3 {
-        space(self.center)
-    }
-
-    /// Its corners [m].
-    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.corners.iter().copied().map(space)
     }
 
     /// Where it is thinnest: how thin [m], and the middle of a side there, in the coordinates that it was given in [m].
@@ -220,6 +208,14 @@ impl Geometry for Polygon {
         self.radius
     }
 
+    fn is_convex(&self) -> bool {
+        false
+    }
+
+    fn origin(&self) -> DVec3 {
+        space(self.center)
+    }
+
     fn reach(&self, n: DVec3) -> f64 {
         let most = self.corners.iter().map(|c| c.dot(plane(n))).fold(f64::NEG_INFINITY, f64::max);
         most + 0.5 * self.width * n.y.abs()
@@ -259,6 +255,14 @@ impl Geometry for Polygon {
     fn nodes(&self, line: (DVec3, DVec3, f64), faces: Faces, _: f64, visit: &mut dyn FnMut(Node, Inside)) {
         let crossings = self.crossings(plane(line.0), plane(line.1), line.2);
         nodes_between(self, line, crossings, faces, visit);
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        self.corners.iter().copied().map(space).collect()
+    }
+
+    fn uncovered(&self, spacing: f64, covered: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Shape> {
+        self.with_open(spacing, covered).map(Shape::Polygon)
     }
 
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
@@ -310,7 +314,7 @@ impl Geometry for Polygon {
         });
         let (mut points, mut faces): (Vec<DVec3>, Vec<Faces>) = above.unzip();
         let mut corners: Vec<DVec3> = vec![];
-        for (at, corner) in self.corners().zip(&self.corners) {
+        for (at, corner) in self.corners().into_iter().zip(&self.corners) {
             if corners.iter().all(|c| c.distance(at) > 0.4 * spacing) {
                 corners.push(at);
                 points.push(at);
