@@ -10,14 +10,7 @@ impl Checker<'_> {
         if let Some(every) = gauges.every {
             self.positive("gauge.every", every, "s");
         }
-        let names = |gauges: &mut dyn Iterator<Item = &String>| gauges.cloned().collect::<Vec<_>>();
-        let kinds = [
-            ("pressure", names(&mut gauges.pressure.iter().map(|g| &g.name))),
-            ("level", names(&mut gauges.level.iter().map(|g| &g.name))),
-            ("force", names(&mut gauges.force.iter().map(|g| &g.name))),
-            ("velocity", names(&mut gauges.velocity.iter().map(|g| &g.name))),
-            ("volume", names(&mut gauges.volume.iter().map(|g| &g.name))),
-        ];
+        let kinds = gauges.names();
         let moves = case.body.iter().any(|b| b.can_move(self.flat()));
         for (kind, names) in &kinds {
             // what bodies press there is without water, too
@@ -27,12 +20,11 @@ impl Checker<'_> {
                 self.add(key, "there is no [fluid] to measure", "remove the gauge or add [fluid]");
             }
         }
-        let path = |(kind, names): &(&str, Vec<String>)| {
-            let kind = kind.to_string();
-            let names = names.clone().into_iter().enumerate();
-            names.map(move |(k, name)| (format!("gauge.{kind}.{k}.name"), name)).collect::<Vec<_>>()
+        let named = |kind: &str, names: &[&str]| -> Vec<(String, String)> {
+            let key = |(k, name): (usize, &&str)| (format!("gauge.{kind}.{k}.name"), (*name).to_owned());
+            names.iter().enumerate().map(key).collect()
         };
-        let names: Vec<(String, String)> = kinds.iter().flat_map(path).collect();
+        let names: Vec<_> = kinds.iter().flat_map(|(kind, names)| named(kind, names)).collect();
         self.unique(&names, "gauge");
         for (k, gauge) in gauges.level.iter().enumerate() {
             self.in_tank(&format!("gauge.level.{k}.at"), [gauge.at, gauge.at], "the line");

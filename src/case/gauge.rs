@@ -26,6 +26,20 @@ pub struct Gauges {
     pub volume: Vec<VolumeGauge>,
 }
 
+impl Gauges {
+    /// The kinds of gauges, each with the names of its own.
+    pub(super) fn names(&self) -> [(&'static str, Vec<&str>); 5] {
+        let Self { every: _, mean: _, pressure, level, force, velocity, volume } = self;
+        [
+            ("pressure", pressure.iter().map(|g| g.name.as_str()).collect()),
+            ("level", level.iter().map(|g| g.name.as_str()).collect()),
+            ("force", force.iter().map(|g| g.name.as_str()).collect()),
+            ("velocity", velocity.iter().map(|g| g.name.as_str()).collect()),
+            ("volume", volume.iter().map(|g| g.name.as_str()).collect()),
+        ]
+    }
+}
+
 /// Pressure at a point on a wall.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]

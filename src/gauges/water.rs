@@ -1,7 +1,7 @@
 //! What is read of the water's particles as they are.
 
 use super::level;
-use crate::case::Case;
+use crate::case::{Case, Gauges};
 use crate::fields::Fields;
 use crate::kernels::body_force::missing_head;
 use crate::output::table::{Cell, vector_cells, vector_columns};
@@ -24,11 +24,10 @@ pub(super) enum InWater {
 impl InWater {
     /// Those of `case`, in the order of their columns.
     pub fn all(case: &Case) -> Vec<Self> {
-        let gauges = &case.gauge;
-        let levels = gauges.level.iter().map(|g| Self::Level(g.name.clone(), g.at));
-        let velocities = gauges.velocity.iter().map(|g| Self::Velocity(g.name.clone(), g.point.into()));
-        let volumes = gauges.volume.iter();
-        let volumes = volumes.map(|g| Self::Volume(g.name.clone(), [g.min.into(), g.max.into()]));
+        let Gauges { every: _, mean: _, pressure: _, force: _, level, velocity, volume } = &case.gauge;
+        let levels = level.iter().map(|g| Self::Level(g.name.clone(), g.at));
+        let velocities = velocity.iter().map(|g| Self::Velocity(g.name.clone(), g.point.into()));
+        let volumes = volume.iter().map(|g| Self::Volume(g.name.clone(), [g.min.into(), g.max.into()]));
         levels.chain(velocities).chain(volumes).collect()
     }
 
