@@ -2,6 +2,7 @@
 
 use super::check::{Checker, face, length};
 use super::names::{is_pattern, stands_for};
+use super::shape::ShapeKey;
 use super::{BodyShape, Face, Form, Tank, Vector};
 use crate::periodic::CELLS_MIN;
 use std::collections::HashMap;
@@ -209,15 +210,9 @@ impl Checker<'_> {
                 }
             }
             self.open(path, keys.open);
-            let foreign = [
-                ("radius", form.radius.is_some(), "cylinder"),
-                ("height", form.height.is_some(), "cylinder"),
-                ("section", form.section.is_some(), "prism"),
-                ("file", form.file.is_some(), "mesh"),
-            ];
-            for (name, _, shape) in foreign.into_iter().filter(|f| f.1) {
+            for ShapeKey { name, of, .. } in form.shape_keys().into_iter().filter(|key| key.given) {
                 let message = format!("{label} is a box: `{name}` does not belong to it");
-                self.add(key(name), message, format!("remove `{name}`, or set shape = \"{shape}\""));
+                self.add(key(name), message, format!("remove `{name}`, or set shape = \"{of}\""));
             }
             let of_shapes = [
                 ("center", keys.places[0].is_some()),

@@ -2,6 +2,7 @@
 
 use super::check::{Checker, length};
 use super::section::flaw;
+use super::shape::ShapeKey;
 use super::{Axis, Body, BodyShape, Contact, Form, Freedom, Law};
 use glam::DMat3;
 
@@ -227,32 +228,19 @@ impl Checker<'_> {
         }
         let path = |key: &str| format!("{at}.{key}");
         let (name, needed) = form.shape.keys();
-        let keys = [
-            ("size", form.size.is_some(), "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
-            ("radius", form.radius.is_some(), "0.1", "[m]"),
-            ("height", form.height.is_some(), "0.2", "the length along the axis [m]"),
-            ("section", form.section.is_some(), "[[0, 0], [1, 0], [1, 0.5]]", "its corners x and z [m]"),
-            ("file", form.file.is_some(), "\"hull.stl\"", "an STL or OBJ file"),
-        ];
         let flat = self.flat();
         let mut complete = true;
-        for (key, given, example, what) in keys {
+        for ShapeKey { name: key, given, of, example, what } in form.shape_keys() {
             // A slice is as wide as the spacing, whatever the solid's length.
             if needed.contains(&key) && !given && !(flat && key == "height") {
                 complete = false;
                 let message = format!("{label} is a {name} without `{key}`");
                 self.add(at, message, format!("add `{key} = {example}`, {what}"));
             } else if given && !needed.contains(&key) {
-                let other = match key {
-                    "size" => "box",
-                    "section" => "prism",
-                    "file" => "mesh",
-                    _ => "cylinder",
-                };
                 self.add(
                     path(key),
                     format!("{label} is a {name}: `{key}` does not belong to it"),
-                    format!("remove `{key}`, or set shape = \"{other}\""),
+                    format!("remove `{key}`, or set shape = \"{of}\""),
                 );
             }
         }

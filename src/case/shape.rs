@@ -224,7 +224,37 @@ impl Body {
     }
 }
 
+/// A key of which shapes are made.
+pub(super) struct ShapeKey {
+    pub name: &'static str,
+    /// Whether the solid has it.
+    pub given: bool,
+    /// A shape that has it.
+    pub of: &'static str,
+    pub example: &'static str,
+    /// What it is.
+    pub what: &'static str,
+}
+
 impl Form<'_> {
+    /// The keys of which shapes are made, in the order in which they are told.
+    pub(super) fn shape_keys(&self) -> [ShapeKey; 5] {
+        let key = |name, given, of, example, what| ShapeKey { name, given, of, example, what };
+        [
+            key("size", self.size.is_some(), "box", "[0.2, 0.2, 0.2]", "the edge lengths [m]"),
+            key("radius", self.radius.is_some(), "cylinder", "0.1", "[m]"),
+            key("height", self.height.is_some(), "cylinder", "0.2", "the length along the axis [m]"),
+            key(
+                "section",
+                self.section.is_some(),
+                "prism",
+                "[[0, 0], [1, 0], [1, 0.5]]",
+                "its corners x and z [m]",
+            ),
+            key("file", self.file.is_some(), "mesh", "\"hull.stl\"", "an STL or OBJ file"),
+        ]
+    }
+
     /// A key of a box without `size` that another shape has, and that shape: `shape` was forgotten.
     pub(super) fn forgotten(&self, flat: bool) -> Option<(&'static str, &'static str)> {
         let round = if flat || self.height.is_some() { "cylinder" } else { "sphere" };
