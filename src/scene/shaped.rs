@@ -216,7 +216,7 @@ impl Builder<'_> {
         let mut told = HashSet::new();
         for form in walls.chain(water).chain(case.body.iter().map(Body::form)) {
             let Some(file) = form.file.filter(|file| told.insert(*file)) else { continue };
-            let steps = match form.shape(self.lattice.spacing, self.lattice.plane) {
+            let steps: Option<(f64, f64)> = match form.shape(self.lattice.spacing, self.lattice.plane) {
                 #[cfg(feature = "mesh")]
                 Ok((Shape::Mesh(mesh), _)) => mesh.steps(),
                 _ => None,
