@@ -7,7 +7,7 @@ use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
-use crate::shape::Cells;
+use crate::shape::PointCells;
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
@@ -169,7 +169,7 @@ impl Builder<'_> {
         let mut areas: Vec<DVec3> =
             solid.wall_area.iter().zip(&shares).map(|(a, share)| *a * *share).collect();
         let stays: Vec<usize> = (0..kept.len()).filter(|&k| kept[k]).collect();
-        let mut near = Cells::new(l0);
+        let mut near = PointCells::new(l0);
         stays.iter().for_each(|&k| near.add(at(k)));
         for k in (0..kept.len()).filter(|&k| !kept[k] && shares[k] > 0.0) {
             let taker = near.nearest(at(k), 1.5 * l0).map(|j| stays[j]);

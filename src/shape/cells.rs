@@ -4,13 +4,13 @@ use glam::{DVec3, IVec3};
 use std::collections::HashMap;
 
 /// Points in cells.
-pub struct Cells {
+pub struct PointCells {
     edge: f64,
     points: Vec<DVec3>,
     cells: HashMap<IVec3, Vec<usize>>,
 }
 
-impl Cells {
+impl PointCells {
     pub fn new(edge: f64) -> Self {
         Self { edge, points: vec![], cells: HashMap::new() }
     }

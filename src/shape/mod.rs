@@ -21,7 +21,7 @@ mod surface;
 mod thickness;
 mod thin;
 
-pub(crate) use cells::Cells;
+pub(crate) use cells::PointCells;
 pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;
 pub(crate) use cuboid::{ALL_FACES, face_normal};

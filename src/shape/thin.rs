@@ -4,7 +4,7 @@
 //! Where the layers of two sides that look away from each other would come too near, one in the middle takes their place, and one stands in the
 //! middle where none of them reaches.
 
-use super::cells::Cells;
+use super::cells::PointCells;
 use super::{APART, Particles};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -71,9 +71,15 @@ impl<F: Fn(DVec3) -> (f64, DVec3) + Sync> Thin<F> {
 
     /// Puts dummies into the middle below `places`, close to each other and `above` spacings deep, as many layers as have their particles: as many as fill
     /// the part with those of both sides. Too many push the water away, too few pull it.
-    pub fn fill(&self, above: f64, places: impl Iterator<Item = DVec3>, taken: &Cells, out: &mut Particles) {
+    pub fn fill(
+        &self,
+        above: f64,
+        places: impl Iterator<Item = DVec3>,
+        taken: &PointCells,
+        out: &mut Particles,
+    ) {
         let l0 = self.spacing;
-        let mut put = Cells::new(2.0 * l0);
+        let mut put = PointCells::new(2.0 * l0);
         for at in places.filter_map(|at| self.middle(at, (self.distance)(at), (0.5 + MERGED) * l0)) {
             let (distance, outward) = (self.distance)(at);
             let room = 2.0 * (-distance / l0 - above);

@@ -2,7 +2,7 @@
 
 use super::super::areas::{self, Piece};
 use super::super::blocks;
-use super::super::cells::Cells;
+use super::super::cells::PointCells;
 use super::super::thin::Thin;
 use super::super::{ALL_FACES, APART, Geometry, Particles};
 use super::Mesh;
@@ -91,7 +91,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     let fits = found.iter().all(|f| f.1 > border || off(f.1) <= FITS * spacing && is_gentle(f.2));
     let skin = (!fits).then(|| Skin::new(mesh, spacing));
     let mut out = Particles::default();
-    let mut taken = Cells::new(spacing);
+    let mut taken = PointCells::new(spacing);
     let thin = Thin::new(|x| mesh.distance(x), spacing, false);
     for layer in 0..layers {
         let (above, depth) = (f64::from(layer) * border, (f64::from(layer) + 0.5) * spacing);
@@ -139,7 +139,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
 fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Place> {
     let reach = REACH * spacing;
     for look in 0..LOOKS {
-        let mut cells = Cells::new(reach + MARGIN * spacing);
+        let mut cells = PointCells::new(reach + MARGIN * spacing);
         places.iter().for_each(|p| cells.add(p.at));
         let around: Vec<Vec<usize>> =
             places.par_iter().map(|p| if p.fixed { vec![] } else { cells.numbers(p.at) }).collect();

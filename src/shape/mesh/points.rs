@@ -1,6 +1,6 @@
 //! Points of a mesh that contact presses, and the part of the surface that each stands for.
 
-use super::super::cells::Cells;
+use super::super::cells::PointCells;
 use super::super::nearest::Nearest;
 use super::super::{ALL_FACES, Faces, Geometry, Surface, WallLayer};
 use super::particles::pieces;
@@ -29,7 +29,7 @@ pub(super) fn surface(mesh: &Mesh, particles: &WallLayer, spacing: f64) -> Surfa
         faces.push(face(outward));
         meeting.push(1.0);
     }
-    let mut thinned = Cells::new(APART * spacing);
+    let mut thinned = PointCells::new(APART * spacing);
     for &(a, b, on) in &mesh.sharp {
         let pieces = (a.distance(b) / (ALONG * spacing)).ceil().max(1.0);
         for k in 0..=pieces as i32 {

@@ -6,7 +6,7 @@
 //! taken out until as many are left as belong there (weighted sample elimination, after Yuksel 2015, Comput. Graph. Forum 34).
 
 use super::super::APART;
-use super::super::cells::Cells;
+use super::super::cells::PointCells;
 use super::super::nearest::Nearest;
 use super::Mesh;
 use super::particles::Place;
@@ -173,14 +173,14 @@ impl<'a> Skin<'a> {
 
     /// Places of the layer at `depth` [m]. Those of `offered`, of the lattice that fills the mesh, stand where its faces have none of their own;
     /// `taken` are the particles of the layers above.
-    pub fn layer(&self, depth: f64, offered: Vec<Place>, taken: &Cells) -> Vec<Place> {
+    pub fn layer(&self, depth: f64, offered: Vec<Place>, taken: &PointCells) -> Vec<Place> {
         let spacing = self.spacing;
         let mut lattices: Vec<Option<Lattice>> =
             self.faces.iter().map(|face| face.lattice(depth, spacing)).collect();
         let mut order: Vec<usize> = (0..self.faces.len()).filter(|&k| lattices[k].is_some()).collect();
         order.sort_by(|&a, &b| self.faces[b].area.total_cmp(&self.faces[a].area));
         let mut places = vec![];
-        let mut here = Cells::new(spacing);
+        let mut here = PointCells::new(spacing);
         for k in order {
             let (Some(lattice), face) = (&mut lattices[k], &self.faces[k]) else { continue };
             let [columns, rows] = lattice.count;
@@ -203,9 +203,9 @@ impl<'a> Skin<'a> {
                 }
             }
         }
-        let mut rough = Cells::new(spacing);
+        let mut rough = PointCells::new(spacing);
         for place in offered {
-            let near = |cells: &Cells, reach: f64| cells.nearest(place.at, reach * spacing).is_some();
+            let near = |cells: &PointCells, reach: f64| cells.nearest(place.at, reach * spacing).is_some();
             if !(near(&here, LATTICES_APART) || near(&rough, SAME) || near(taken, APART)) {
                 rough.add(place.at);
                 places.push(place);
@@ -217,7 +217,7 @@ impl<'a> Skin<'a> {
         };
         let left = self.candidates(depth, held).into_par_iter().filter_map(|c| {
             let place = self.below(c, depth, 1e-3 * spacing)?;
-            let near = |cells: &Cells, reach: f64| cells.nearest(place.at, reach * spacing).is_some();
+            let near = |cells: &PointCells, reach: f64| cells.nearest(place.at, reach * spacing).is_some();
             (!near(&here, CLAIMED) && !near(&rough, CLAIMED_ROUGHLY) && !near(taken, APART)).then_some(place)
         });
         let left: Vec<Place> = left.collect();
@@ -369,10 +369,10 @@ fn corner(at: DVec3, normals: &[DVec3]) -> Vec<Gap> {
 }
 
 /// `wanted` of the places `left`, as evenly as they go with those that stand.
-fn thinned(standing: &Cells, left: Vec<Place>, wanted: usize, spacing: f64) -> Vec<Place> {
+fn thinned(standing: &PointCells, left: Vec<Place>, wanted: usize, spacing: f64) -> Vec<Place> {
     let reach = HEXAGONAL * spacing;
     let weight = |d: f64| (1.0 - d / reach).max(0.0).powi(8);
-    let mut cells = Cells::new(reach);
+    let mut cells = PointCells::new(reach);
     left.iter().for_each(|p| cells.add(p.at));
     let near: Vec<Vec<usize>> = left.par_iter().map(|p| cells.numbers(p.at)).collect();
     let crowd = |k: usize| -> f64 {

@@ -6,7 +6,7 @@
 mod layer;
 
 use super::areas;
-use super::cells::Cells;
+use super::cells::PointCells;
 use super::open;
 use super::surface::Surface;
 use super::thickness::{Surface as Outline, Way, thinnest};
@@ -267,7 +267,7 @@ impl Geometry for Polygon {
 
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
         let mut out = Particles::default();
-        let mut taken = Cells::new(spacing);
+        let mut taken = PointCells::new(spacing);
         let thin = Thin::new(|x| self.distance(x), spacing, true);
         for layer in 0..layers {
             let depth = (f64::from(layer) + 0.5) * spacing;
