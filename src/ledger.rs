@@ -7,6 +7,7 @@
 use crate::body::{Pose, Wrench};
 use crate::checkpoint::Archive;
 use crate::error::Result;
+use crate::share::Share;
 
 /// A part of the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,6 +111,12 @@ impl Ledger {
     /// Entry by entry with another one.
     pub fn plus(mut self, other: &Self) -> Self {
         self.0.iter_mut().zip(other.0).for_each(|(a, b)| *a += b);
+        self
+    }
+
+    /// Summed over the ranks.
+    pub(crate) fn of_ranks(mut self, share: &Share) -> Self {
+        share.sum(&mut self.0);
         self
     }
 

@@ -84,6 +84,11 @@ impl Counters {
         self.lost + self.swallowed.iter().sum::<u64>()
     }
 
+    /// Those of all ranks in one.
+    fn of_ranks(all: Vec<Self>) -> Self {
+        all.into_iter().reduce(Self::plus).unwrap_or_default()
+    }
+
     /// Those of two ranks in one.
     fn plus(mut self, other: Self) -> Self {
         self.lost += other.lost;

@@ -8,6 +8,7 @@ use seixo::backend::traffic::Solve;
 use seixo::backend::{Backend, Commands, Timing};
 use seixo::case::Case;
 use seixo::error::Result;
+use seixo::machine::memory_peak;
 use seixo::params::Params;
 use seixo::plan::{Plan, Stage};
 use seixo::pressure::{PressureReport, Settings};
@@ -168,13 +169,6 @@ pub fn host_bandwidth() -> f64 {
     (0..5).map(copy).fold(0.0, f64::max)
 }
 
-/// Most memory that this process has held [bytes], on Linux.
-pub fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
-}
-
 /// Steps before the clock runs.
 const WARM_UP: u64 = 3;
 
@@ -265,7 +259,7 @@ pub fn measure(case: &Case, from: f64, steps: u64, bandwidth: f64, make: &Make) 
         density_error_mean: monitor.density_error_mean,
         bandwidth,
         bytes_held: sim.backend.bytes(),
-        peak_memory: peak_memory(),
+        peak_memory: memory_peak(),
         timing,
         dispatches: device.dispatches,
         submits: device.submits,

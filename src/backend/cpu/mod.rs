@@ -31,7 +31,7 @@ use crate::kernels::body_force::RowPressure;
 use crate::kernels::cell_list::{CellList, Scratch};
 use crate::kernels::openings::{Emission, Outlet};
 use crate::kernels::{Particles, collision, correct, monitor};
-use crate::ledger::{Entry, Ledger};
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::neighbours::{Chunk, Neighbours};
 use crate::params::{Params, Step};
@@ -255,20 +255,12 @@ impl Backend for Cpu {
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {
         let own = self.ledger.as_ref().map(|ledger| ledger.work);
-        let Some((share, own)) = self.share.as_ref().zip(own) else { return Ok(own) };
-        let mut works = Entry::ALL.map(|entry| own.get(entry));
-        share.sum(&mut works);
-        let mut all = Ledger::default();
-        Entry::ALL.into_iter().zip(works).for_each(|(entry, work)| all.add(entry, work));
-        Ok(Some(all))
+        Ok(own.map(|own| self.share.as_ref().map_or(own, |share| own.of_ranks(share))))
     }
 
     fn counters(&mut self) -> Result<Counters> {
         Ok(match &self.share {
-            Some(share) => {
-                let all = share.gather_all(vec![self.counters.clone()]);
-                all.into_iter().reduce(Counters::plus).unwrap_or_default()
-            }
+            Some(share) => Counters::of_ranks(share.gather_all(vec![self.counters.clone()])),
             None => self.counters.clone(),
         })
     }

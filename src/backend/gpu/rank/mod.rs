@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::fields::Fields;
 use crate::kernels::body_force::RowPressure;
 use crate::kernels::openings::{Emission, Outlet};
-use crate::ledger::{Entry, Ledger};
+use crate::ledger::Ledger;
 use crate::monitor::FluidMonitor;
 use crate::params::{Params, Step};
 use crate::plan::{ContactPlan, ParticleStage, Plan, Stage};
@@ -218,16 +218,11 @@ impl Backend for GpuRank {
 
     fn counters(&mut self) -> Result<Counters> {
         let own = self.gpu.counters()?;
-        Ok(self.share.gather_all(vec![own]).into_iter().reduce(Counters::plus).unwrap_or_default())
+        Ok(Counters::of_ranks(self.share.gather_all(vec![own])))
     }
 
     fn ledger(&mut self) -> Result<Option<Ledger>> {
-        let Some(own) = self.gpu.ledger()? else { return Ok(None) };
-        let mut works = Entry::ALL.map(|entry| own.get(entry));
-        self.share.sum(&mut works);
-        let mut all = Ledger::default();
-        Entry::ALL.into_iter().zip(works).for_each(|(entry, work)| all.add(entry, work));
-        Ok(Some(all))
+        Ok(self.gpu.ledger()?.map(|own| own.of_ranks(&self.share)))
     }
 
     fn monitor(&mut self) -> Result<FluidMonitor> {
