@@ -47,6 +47,10 @@ macro_rules! stages {
         impl ParticleStage {
             /// All of them, in the order of the step.
             pub const ALL: &'static [Self] = &[$($(Self::$particles,)?)*];
+
+            /// From places to the pressure equation, where neither viscosity nor collisions count.
+            pub const TO_SOURCE: [Self; 4] =
+                [Self::CellList, Self::NeighbourList, Self::NumberDensity, Self::PressureSource];
         }
 
         impl From<ParticleStage> for Stage {
@@ -347,6 +351,36 @@ impl Plan {
             filled,
             ledger,
             fixed_walls,
+        }
+    }
+
+    /// Every stage runs, of a scene with bodies and fixed walls.
+    #[cfg(test)]
+    pub(crate) fn every_stage() -> Self {
+        Self {
+            reasons: Stage::ALL.map(|stage| (stage, Ok("planned"))).to_vec(),
+            preconditioner: Preconditioner::Multigrid,
+            coupled: true,
+            excess: Told::All,
+            reaction: Told::Moving,
+            contact: ContactPlan::default(),
+            fixed_walls: true,
+            filled: false,
+            ledger: false,
+        }
+    }
+
+    /// No stage runs.
+    #[cfg(test)]
+    pub(crate) fn no_stage() -> Self {
+        Self {
+            reasons: Stage::ALL.map(|stage| (stage, Err("no fluid"))).to_vec(),
+            preconditioner: Preconditioner::Jacobi,
+            coupled: false,
+            excess: Told::None,
+            reaction: Told::None,
+            fixed_walls: false,
+            ..Self::every_stage()
         }
     }
 

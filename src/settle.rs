@@ -56,12 +56,7 @@ pub(crate) fn settle(
     let step = still.step(0.0, 1.0, 0.0).whole();
     let step = Step { relaxation: RATE, pressure_max: f64::INFINITY, ..step };
     for _ in 0..MOST_STEPS {
-        for stage in [
-            ParticleStage::CellList,
-            ParticleStage::NeighbourList,
-            ParticleStage::NumberDensity,
-            ParticleStage::PressureSource,
-        ] {
+        for stage in ParticleStage::TO_SOURCE {
             cpu.run(stage, &step)?;
         }
         cpu.solve_pressure(&step)?;

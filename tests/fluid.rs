@@ -39,12 +39,7 @@ fn stopped_at_the_source(text: &seixo::case::Case, scene: &Scene) -> (Cpu, Param
     let plan = Plan::new(text, scene, &params);
     let mut cpu = Cpu::new(scene, &params, &plan, TIGHT).unwrap();
     let step = params.step(0.0, text.run.time_step, 1.0);
-    for stage in [
-        ParticleStage::CellList,
-        ParticleStage::NeighbourList,
-        ParticleStage::NumberDensity,
-        ParticleStage::PressureSource,
-    ] {
+    for stage in ParticleStage::TO_SOURCE {
         cpu.run(stage, &step).unwrap();
     }
     (cpu, params, step)

@@ -59,12 +59,7 @@ fn prepared(case: &Case) -> (Cpu, Params) {
     let plan = Plan::new(case, &scene, &params);
     let mut cpu = Cpu::new(&scene, &params, &plan, TIGHT).expect("the CPU can");
     let step = params.step(0.0, case.run.time_step, 1.0);
-    for stage in [
-        ParticleStage::CellList,
-        ParticleStage::NeighbourList,
-        ParticleStage::NumberDensity,
-        ParticleStage::PressureSource,
-    ] {
+    for stage in ParticleStage::TO_SOURCE {
         cpu.run(stage, &step).expect("the CPU runs");
     }
     (cpu, params)

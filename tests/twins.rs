@@ -526,12 +526,7 @@ fn conjugate_gradient_from_zero_and_from_a_bad_start() {
     let few = Settings { max_iterations: 3, ..pair.settings };
     let mut gpu = Gpu::new(&pair.scene, &pair.params, &pair.plan, few, None).expect("the device can");
     gpu.write(&bad).expect("writable");
-    for stage in [
-        ParticleStage::CellList,
-        ParticleStage::NeighbourList,
-        ParticleStage::NumberDensity,
-        ParticleStage::PressureSource,
-    ] {
+    for stage in ParticleStage::TO_SOURCE {
         gpu.run(stage, &pair.step).expect("runs");
     }
     let report = gpu.solve_pressure(&pair.step).expect("solves");

@@ -75,12 +75,7 @@ impl Moment {
         backend.write(&self.fields)?;
         backend.run(ParticleStage::Predict, &self.step)?;
         backend.move_solids(&self.poses)?;
-        for stage in [
-            ParticleStage::CellList,
-            ParticleStage::NeighbourList,
-            ParticleStage::NumberDensity,
-            ParticleStage::PressureSource,
-        ] {
+        for stage in ParticleStage::TO_SOURCE {
             backend.run(stage, &self.step)?;
         }
         Ok(())

@@ -87,12 +87,7 @@ impl Column {
 
     /// `backend`, stopped before the solve.
     pub(super) fn prepare(&self, backend: &mut dyn Backend) -> Result<()> {
-        for stage in [
-            ParticleStage::CellList,
-            ParticleStage::NeighbourList,
-            ParticleStage::NumberDensity,
-            ParticleStage::PressureSource,
-        ] {
+        for stage in ParticleStage::TO_SOURCE {
             backend.run(stage, &self.step)?;
         }
         Ok(())

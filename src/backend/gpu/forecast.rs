@@ -156,8 +156,6 @@ impl Forecast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Stage;
-    use crate::scheme::Preconditioner;
 
     fn sizes() -> Sizes {
         // The transport case at l0 = 7.5 mm.
@@ -180,24 +178,14 @@ mod tests {
         }
     }
 
-    fn plan() -> Plan {
-        let reasons = Stage::ALL.map(|s| (s, Ok("planned"))).to_vec();
-        Plan {
-            reasons,
-            preconditioner: Preconditioner::Multigrid,
-            coupled: true,
-            excess: crate::plan::Told::All,
-            reaction: crate::plan::Told::Moving,
-            contact: Default::default(),
-            fixed_walls: true,
-            filled: false,
-            ledger: false,
-        }
-    }
-
     fn forecast(particles: u64) -> Forecast {
-        Forecast::new(&sizes(), &plan(), &["COUPLED", "MIXED", "MOVING", "MULTIGRID", "STATIC"], particles)
-            .expect("the shaders are valid")
+        Forecast::new(
+            &sizes(),
+            &Plan::every_stage(),
+            &["COUPLED", "MIXED", "MOVING", "MULTIGRID", "STATIC"],
+            particles,
+        )
+        .expect("the shaders are valid")
     }
 
     #[test]
@@ -221,7 +209,7 @@ mod tests {
         assert!(hundred.bytes < 80_000_000_000 && hundred.excesses.is_empty(), "{hundred:?}");
         assert_eq!(hundred.parts[0].0, "neighbour_list");
         // No part is larger than what is bound, and together they are what there is.
-        let memory = Memory::new(&sizes().refined(1.0 / hundred.spacing_ratio), &plan());
+        let memory = Memory::new(&sizes().refined(1.0 / hundred.spacing_ratio), &Plan::every_stage());
         for buffer in &memory.buffers {
             let (part, parts) = (buffer.part(BINDING_MAX), buffer.parts(BINDING_MAX));
             assert!(part <= BINDING_MAX && part * parts >= buffer.bytes && part * (parts - 1) < buffer.bytes);
@@ -232,7 +220,7 @@ mod tests {
         assert!(bindings(&ten) <= 8 && bindings(&hundred) < 64 && hundred.rows > 1, "{hundred:?}");
         // A room of nothing but cells asks for thousands, which no shader is written for.
         let empty = Sizes { cells: 1 << 50, ..sizes() };
-        let none = Forecast::at(&empty, &plan(), &[], 1.0).expect("nothing is written");
+        let none = Forecast::at(&empty, &Plan::every_stage(), &[], 1.0).expect("nothing is written");
         assert!(none.bindings.is_none() && none.parts.iter().any(|p| p.1 > 1000), "{none:?}");
         // What cannot be divided is named.
         let thousand = forecast(1_000_000_000);
@@ -241,7 +229,7 @@ mod tests {
 
     #[test]
     fn every_byte_has_a_purpose() {
-        let memory = Memory::new(&sizes(), &plan());
+        let memory = Memory::new(&sizes(), &Plan::every_stage());
         let groups = groups(&memory);
         assert_eq!(groups.iter().map(|g| g.bytes).sum::<u64>(), memory.total());
         assert_eq!((groups[0].name, groups[0].largest), ("neighbour lists", "neighbour_list"));

@@ -225,8 +225,6 @@ impl Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Stage;
-    use crate::scheme::Preconditioner;
 
     /// The transport case at l0 = 7.5 mm, and nine times as many particles; a good half carries pressure.
     #[test]
@@ -248,18 +246,7 @@ mod tests {
             capacity: 64,
             rows_per_thread: 1,
         };
-        let reasons = Stage::ALL.map(|s| (s, Ok("planned"))).to_vec();
-        let plan = Plan {
-            reasons,
-            preconditioner: Preconditioner::Multigrid,
-            coupled: true,
-            excess: crate::plan::Told::All,
-            reaction: crate::plan::Told::Moving,
-            contact: Default::default(),
-            fixed_walls: true,
-            filled: false,
-            ledger: false,
-        };
+        let plan = Plan::every_stage();
         let (middle, large) = (Memory::new(&scene(1), &plan), Memory::new(&scene(9), &plan));
         assert!(middle.total() < 206_000_000, "{}", middle.total());
         // What wgpu binds on any adapter, software included.
@@ -271,18 +258,6 @@ mod tests {
 
     #[test]
     fn a_dry_scene_takes_nothing() {
-        let reasons = Stage::ALL.map(|s| (s, Err("no fluid"))).to_vec();
-        let plan = Plan {
-            reasons,
-            preconditioner: Preconditioner::Jacobi,
-            coupled: false,
-            excess: crate::plan::Told::None,
-            reaction: crate::plan::Told::None,
-            contact: Default::default(),
-            fixed_walls: false,
-            filled: false,
-            ledger: false,
-        };
-        assert_eq!(Memory::new(&Sizes::default(), &plan).total(), 0);
+        assert_eq!(Memory::new(&Sizes::default(), &Plan::no_stage()).total(), 0);
     }
 }
