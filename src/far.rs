@@ -1,7 +1,7 @@
 //! Things out of all proportion: one length that is far too large makes an empty room that takes all memory there is. It
 //! shows in the numbers of a case, before anything is built.
 
-use crate::case::Case;
+use crate::case::{AXES, Case};
 use crate::error::{CaseError, Problem, Result};
 use crate::estimate::{Estimate, bytes};
 use crate::extents::{self, Bounds, Extent, Of};
@@ -135,7 +135,7 @@ fn problems(case: &Case) -> Vec<Problem> {
         let message = format!(
             "{key}: it reaches to {} = {} m and makes the scene {} times as long as all else does: {:.1e} particles and \
              {:.1e} cells of search would take {} of memory",
-            ["x", "y", "z"][axis],
+            AXES[axis],
             number(end),
             number(times),
             estimate.particles,

@@ -5,7 +5,7 @@ use super::{Exit, counted};
 use clap::ValueEnum;
 use glam::DVec3;
 use rayon::prelude::*;
-use seixo::case::{Case, OutputKind};
+use seixo::case::{AXES, Case, OutputKind};
 use seixo::console::{remark, tell};
 use seixo::error::{Error, Result};
 use seixo::output::digits::of_time;
@@ -164,7 +164,7 @@ fn size(text: &str) -> std::result::Result<[usize; 2], String> {
 fn slice(text: &str) -> std::result::Result<(usize, f64), String> {
     let wrong = || "write an axis and a place, e.g. y=0.25".to_owned();
     let (axis, at) = text.split_once('=').ok_or_else(wrong)?;
-    let axis = ["x", "y", "z"].iter().position(|a| *a == axis.trim()).ok_or_else(wrong)?;
+    let axis = AXES.iter().position(|a| *a == axis.trim()).ok_or_else(wrong)?;
     Ok((axis, super::finite(at).map_err(|_| wrong())?))
 }
 
@@ -240,7 +240,7 @@ impl Show {
         let (low, high) = self.scene.domain;
         let mut notes = Vec::new();
         if let Some((axis, at)) = look.slice.filter(|&(k, at)| at < low[k] || at > high[k]) {
-            let (name, low, high) = (["x", "y", "z"][axis], low[axis], high[axis]);
+            let (name, low, high) = (AXES[axis], low[axis], high[axis]);
             notes.push(format!(
                 "note: --slice {name}={at:e} shows no water: the scene reaches from {name} = {low:.4} to {high:.4} m"
             ));

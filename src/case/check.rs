@@ -2,7 +2,7 @@
 //!
 //! Everything is listed at once; `file` adds line and column from the dotted path of each problem.
 
-use super::{Case, Choice, Face, Fluid, Vector};
+use super::{AXES, Case, Choice, Face, Fluid, Vector};
 use crate::error::{CaseError, Problem, Result};
 
 /// Most iterations of a solve: beyond, a step would not come to its end.
@@ -351,7 +351,7 @@ impl Checker<'_> {
         let apart =
             |k: &usize| !periodic[*k] && (region.max[*k] <= tank.min[*k] || region.min[*k] >= tank.max[*k]);
         if let Some(k) = self.axes().find(apart) {
-            let axis = ["x", "y", "z"][k];
+            let axis = AXES[k];
             self.add(
                 key,
                 format!("{path}.region lies outside of the tank along {axis}: its frames would hold nothing"),

@@ -3,7 +3,7 @@
 use super::check::{Checker, face, length};
 use super::names::{is_pattern, stands_for};
 use super::shape::ShapeKey;
-use super::{BodyShape, Face, Form, Tank, Vector};
+use super::{AXES, BodyShape, Face, Form, Tank, Vector};
 use crate::periodic::CELLS_MIN;
 use std::collections::HashMap;
 
@@ -11,7 +11,6 @@ use std::collections::HashMap;
 const MOST_CELLS: f64 = 1e11;
 /// Cells that a place may lie away from the origin: they are numbered in 32 bits.
 const FARTHEST: f64 = 1e9;
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The keys of a wall beside those of its shape.
 pub(super) struct WallKeys<'a> {
@@ -95,7 +94,7 @@ impl Checker<'_> {
         let case = self.case;
         for (i, &axis) in tank.periodic.iter().enumerate() {
             let (k, path) = (axis as usize, format!("tank.periodic.{i}"));
-            let name = ["x", "y", "z"][k];
+            let name = AXES[k];
             if tank.periodic[..i].contains(&axis) {
                 self.add(path, format!("\"{name}\" is listed twice"), "remove one of them");
                 continue;

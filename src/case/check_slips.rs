@@ -1,8 +1,7 @@
 //! The part of the check that warns of values that run but are hardly meant: slips of a unit, a sign or a place.
 
 use super::check::{Checker, length};
-use super::check_geometry::AXES;
-use super::{Face, OutputKind, Preset, Tank, Vector, output};
+use super::{AXES, Face, OutputKind, Preset, Tank, Vector, output};
 use crate::scheme::Gradient;
 use glam::{DMat3, DVec3};
 

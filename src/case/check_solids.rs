@@ -3,7 +3,7 @@
 use super::check::{Checker, length};
 use super::section::flaw;
 use super::shape::ShapeKey;
-use super::{Axis, Body, BodyShape, Contact, Form, Freedom, Law};
+use super::{AXES, Axis, Body, BodyShape, Contact, Form, Freedom, Law};
 use glam::DMat3;
 
 /// Most sub-steps of a step that a case can ask for.
@@ -73,18 +73,11 @@ impl Checker<'_> {
                 ("standing", body.standing),
                 ("hinge", body.hinge.is_some()),
                 ("mass_offset", body.mass_offset.is_some()),
+                ("velocity", length(&body.velocity) > 0.0),
+                ("angular_velocity", length(&body.angular_velocity) > 0.0),
             ];
             for (key, given) in unheard {
                 if given {
-                    self.add(
-                        path(key),
-                        format!("body `{}` follows a given motion: `{key}` has no effect", body.name),
-                        format!("remove `{key}`, or what moves the body"),
-                    );
-                }
-            }
-            for (key, v) in [("velocity", &body.velocity), ("angular_velocity", &body.angular_velocity)] {
-                if length(v) > 0.0 {
                     self.add(
                         path(key),
                         format!("body `{}` follows a given motion: `{key}` has no effect", body.name),
@@ -126,8 +119,7 @@ impl Checker<'_> {
         ];
         for (key, freedoms, speed, turns) in speeds {
             if let Some(axis) = (0..3).find(|&k| speed[k] != 0.0 && held(k, freedoms[k], turns)) {
-                let (what, axis) =
-                    (if hinged.is_some() { "its hinge" } else { "`locked`" }, ["x", "y", "z"][axis]);
+                let (what, axis) = (if hinged.is_some() { "its hinge" } else { "`locked`" }, AXES[axis]);
                 let message =
                     format!("{what} holds body `{}`: it cannot have `{key}` along {axis}", body.name);
                 self.add(format!("{path}.{key}"), message, "set that number to 0, or let it go");

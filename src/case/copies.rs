@@ -5,7 +5,7 @@
 
 use super::check::Checker;
 use super::scatter::{Scatter, Standing, scattered};
-use super::{Body, Case, Form, Obstacle, Turn, Vector};
+use super::{AXES, Body, Case, Form, Obstacle, Turn, Vector};
 use crate::error::{CaseError, Problem, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -371,7 +371,7 @@ impl Checker<'_> {
                 self.add(&at, message, "set the second number to 1, or run.dimensions = 3");
             }
             for axis in 0..3 {
-                let name = ["x", "y", "z"][axis];
+                let name = AXES[axis];
                 if !step[axis].is_finite() || count[axis] > 1 && step[axis] == 0.0 {
                     let message = format!("{} along {name} would all stand in one place", count[axis]);
                     self.add(format!("{path}.array.step"), message, "give the way from one to the next [m]");

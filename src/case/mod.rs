@@ -55,6 +55,9 @@ pub use wave::{Sine, Swing, WaveMaker};
 
 use serde::{Deserialize, Serialize};
 
+/// Names of the axes.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// A three-component vector as written in a case file.
 pub type Vector = [f64; 3];
 

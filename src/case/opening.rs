@@ -1,7 +1,7 @@
 //! Openings of the tank: walls that emit water at a given velocity or discharge, and walls or holes that swallow it.
 
 use super::check::{Checker, face};
-use super::{Case, Face, TANK_FACES, Tank, Vector};
+use super::{AXES, Case, Face, TANK_FACES, Tank, Vector};
 use serde::{Deserialize, Serialize};
 
 /// Outflows of a case at most: a device counts what each swallows.
@@ -280,13 +280,12 @@ impl Checker<'_> {
         if !min.iter().chain(&max).all(|x| x.is_finite()) {
             return;
         }
-        let names = ["x", "y", "z"];
         for k in self.axes().collect::<Vec<_>>() {
             let wrong = if k == axis { min[k] > max[k] } else { min[k] >= max[k] };
             if wrong {
                 let message = format!(
                     "the opening is empty along {}: min {} is not below max {}",
-                    names[k], min[k], max[k]
+                    AXES[k], min[k], max[k]
                 );
                 self.add(format!("{path}.max"), message, "min must be smaller than max along the face");
                 return;
@@ -297,12 +296,12 @@ impl Checker<'_> {
         if min[axis] > at + 0.5 * l0 || max[axis] < at - 0.5 * l0 {
             let message = format!(
                 "the box from {} = {} to {} m does not meet `{}`, which lies at {at} m",
-                names[axis],
+                AXES[axis],
                 min[axis],
                 max[axis],
                 face(opening.face)
             );
-            self.add(format!("{path}.min"), message, format!("let it hold {} = {at}", names[axis]));
+            self.add(format!("{path}.min"), message, format!("let it hold {} = {at}", AXES[axis]));
         }
         for k in self.axes().filter(|&k| k != axis).collect::<Vec<_>>() {
             let across = max[k].min(high[k]) - min[k].max(low[k]);
@@ -310,11 +309,11 @@ impl Checker<'_> {
                 let message = format!(
                     "of the opening {:.4} m along {} lie in the face, less than one particle of {l0} m",
                     across.max(0.0),
-                    names[k]
+                    AXES[k]
                 );
                 let remedy = format!(
                     "let it reach into {} = {} to {} m, or use a smaller run.spacing",
-                    names[k], low[k], high[k]
+                    AXES[k], low[k], high[k]
                 );
                 self.add(format!("{path}.min"), message, remedy);
             }

@@ -13,6 +13,7 @@ use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::{Flow, Water};
 use super::{Scene, Solid, wall_at};
+pub(super) use crate::case::AXES;
 use crate::case::{Case, Law, stands_for};
 use crate::error::{CaseError, Problem, Result};
 use crate::periodic::Periodic;
@@ -398,5 +399,3 @@ impl<'a> Builder<'a> {
         }
     }
 }
-
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
