@@ -22,7 +22,7 @@ use seixo::error::Result;
 use seixo::estimate::Estimate;
 use seixo::gauges::Gauges;
 use seixo::machine;
-use seixo::output::digits::of_time;
+use seixo::output::digits::of_moment;
 use seixo::params::{Params, RELAXATION_MAX, Relaxation};
 use seixo::plan::{ParticleStage, Plan, Stage};
 use seixo::pressure::Settings;
@@ -289,7 +289,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
             holds(&found, scene)?;
         }
         let (step, time) = (found.origin.step, found.origin.time);
-        let decimals = of_time(case).max(4);
+        let decimals = of_moment(case);
         advice.push(format!("run.from: it begins with the state of step {step}, t = {time:.decimals$} s"));
         advice.extend(found.damaged.iter().map(|why| format!("run.from: an older state is taken: {why}")));
     }

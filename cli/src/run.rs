@@ -15,7 +15,7 @@ use seixo::console::{remark, say, tell};
 use seixo::error::{Error, FolderError, Result};
 use seixo::estimate::{Estimate, bytes};
 use seixo::machine;
-use seixo::output::digits::{of_place, of_time};
+use seixo::output::digits::{of_moment, of_place, of_time};
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
 use seixo::params::Params;
@@ -220,7 +220,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
                     .for_each(|why| remark(&format!("warning: an older state is taken: {why}")));
                 if !args.quiet {
                     let (step, time) = (found.origin.step, found.origin.time);
-                    let decimals = of_time(&loaded.case).max(4);
+                    let decimals = of_moment(&loaded.case);
                     remark(&format!("going on from step {step}, t = {time:.decimals$} s"));
                     if found.origin.name != asked.name {
                         remark(&format!("its files keep their name, {}", found.origin.name));
@@ -314,7 +314,7 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
     let mut lines = vec![format!(
         "{}: {own} steps{before} to t = {:.*} s in {} ({:.3e} s a step) on {}",
         ended,
-        of_time(case).max(4),
+        of_moment(case),
         summary.time_s,
         clock(Duration::from_secs_f64(summary.wall_s)),
         summary.wall_s / own.max(1) as f64,

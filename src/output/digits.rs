@@ -17,6 +17,11 @@ pub fn of_time(case: &Case) -> usize {
     telling(if every > 0.0 { every.min(end) } else { 0.1 * end })
 }
 
+/// Those of a moment of a run of `case` [s] that is told by itself: 4 or more.
+pub fn of_moment(case: &Case) -> usize {
+    of_time(case).max(4)
+}
+
 /// Those of places in particles of the spacing `l0` [m]: tenths of a spacing differ in them; 4 or more.
 pub fn of_place(l0: f64) -> usize {
     telling(0.1 * l0).max(4)

@@ -17,7 +17,7 @@ use seixo::case::file::load;
 use seixo::case::{Case, OutputField, OutputKind};
 use seixo::console::{remark, tell};
 use seixo::error::{FolderError, Result};
-use seixo::output::digits::of_time;
+use seixo::output::digits::{of_moment, of_time};
 use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
 use seixo::output::spare::spare;
@@ -204,7 +204,7 @@ fn what(run: &Run) -> String {
         "Steps",
         r["steps"].as_u64().map(|n| {
             let time = number("time_s").unwrap_or(f64::NAN);
-            format!("{n}, to t = {time:.0$} s", of_time(&run.case).max(4))
+            format!("{n}, to t = {time:.0$} s", of_moment(&run.case))
         }),
     );
     let wall = number("wall_s").and_then(|s| Duration::try_from_secs_f64(s).ok());
