@@ -42,6 +42,7 @@ pub mod needs;
 pub mod pareto;
 pub mod plot;
 mod plot_svg;
+mod points;
 pub mod pressure_size;
 pub mod pressure_solve;
 pub mod random_scenes;
