@@ -199,37 +199,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     seixo::threads::start(args.device.threads)?;
     let asked = Asked::new(args)?;
     let loaded = setup::read(&CaseArgs { case: asked.case.clone(), changes: args.changes.clone() })?;
-    let start = match (asked.resume, args.force) {
-        (false, true) => Start::Replace,
-        (false, false) => Start::New,
-        (true, _) => match standing(&asked.out, &loaded.case)? {
-            Standing::Nothing => Start::New,
-            Standing::Lost => Start::Replace,
-            Standing::Done(result) => {
-                if args.json {
-                    say(result.trim_end());
-                } else if !args.quiet {
-                    tell(&format!("the run in {} is done", asked.out.display()));
-                }
-                return Ok(0);
-            }
-            Standing::Stopped(found) => {
-                found
-                    .damaged
-                    .iter()
-                    .for_each(|why| remark(&format!("warning: an older state is taken: {why}")));
-                if !args.quiet {
-                    let (step, time) = (found.origin.step, found.origin.time);
-                    let decimals = of_moment(&loaded.case);
-                    remark(&format!("going on from step {step}, t = {time:.decimals$} s"));
-                    if found.origin.name != asked.name {
-                        remark(&format!("its files keep their name, {}", found.origin.name));
-                    }
-                }
-                Start::Resume(found)
-            }
-        },
-    };
+    let Some(start) = begin(args, &asked, &loaded.case)? else { return Ok(0) };
     seixo::far::refuse(&loaded.case).map_err(|e| loaded.placed(e))?;
     fits(args, &asked, &loaded.case, place)?;
     let setup = Setup::build(loaded, asked.name.clone(), args.quiet)?;
@@ -256,22 +226,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
         inputs: asked.inputs,
     };
     if !args.quiet {
-        // Those of the scene were shown when it was built.
-        let more = &simulation.scene.notes[setup.scene.notes.len()..];
-        more.iter().for_each(|note| remark(&format!("note: {note}")));
-        let groups = simulation.groups;
-        let device = simulation.backend.description();
-        remark(&format!(
-            "{}: {} particles, {} of water, on {device}",
-            setup.name,
-            groups.total() - setup.scene.reserve,
-            setup.scene.water()
-        ));
-        let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
-        words.iter().for_each(|line| remark(line));
-        let step = shortest(&simulation.case, &setup.scene, &simulation.params);
-        let advice = simulation.solids.advice(step);
-        advice.words.iter().for_each(|line| remark(line));
+        announce(&setup, &simulation);
     }
     let mut display = Display::new(args.quiet, simulation.plan.wet(), of_time(&simulation.case));
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
@@ -293,6 +248,61 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
         (None, None) if finished.resumable => Ok(RESUME),
         (None, None) => Ok(0),
     }
+}
+
+/// How the run begins; `None` if it is done, which is told.
+fn begin(args: &RunArgs, asked: &Asked, case: &Case) -> Result<Option<Start>> {
+    Ok(Some(match (asked.resume, args.force) {
+        (false, true) => Start::Replace,
+        (false, false) => Start::New,
+        (true, _) => match standing(&asked.out, case)? {
+            Standing::Nothing => Start::New,
+            Standing::Lost => Start::Replace,
+            Standing::Done(result) => {
+                if args.json {
+                    say(result.trim_end());
+                } else if !args.quiet {
+                    tell(&format!("the run in {} is done", asked.out.display()));
+                }
+                return Ok(None);
+            }
+            Standing::Stopped(found) => {
+                found
+                    .damaged
+                    .iter()
+                    .for_each(|why| remark(&format!("warning: an older state is taken: {why}")));
+                if !args.quiet {
+                    let (step, time) = (found.origin.step, found.origin.time);
+                    let decimals = of_moment(case);
+                    remark(&format!("going on from step {step}, t = {time:.decimals$} s"));
+                    if found.origin.name != asked.name {
+                        remark(&format!("its files keep their name, {}", found.origin.name));
+                    }
+                }
+                Start::Resume(found)
+            }
+        },
+    }))
+}
+
+/// What is computed, and on what.
+fn announce(setup: &Setup, simulation: &Simulation) {
+    // Those of the scene were shown when it was built.
+    let more = &simulation.scene.notes[setup.scene.notes.len()..];
+    more.iter().for_each(|note| remark(&format!("note: {note}")));
+    let groups = simulation.groups;
+    let device = simulation.backend.description();
+    remark(&format!(
+        "{}: {} particles, {} of water, on {device}",
+        setup.name,
+        groups.total() - setup.scene.reserve,
+        setup.scene.water()
+    ));
+    let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
+    words.iter().for_each(|line| remark(line));
+    let step = shortest(&simulation.case, &setup.scene, &simulation.params);
+    let advice = simulation.solids.advice(step);
+    advice.words.iter().for_each(|line| remark(line));
 }
 
 /// So many bodies are named at the end.
