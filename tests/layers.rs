@@ -94,6 +94,18 @@ fn modules_import_lower_layers_only() {
 }
 
 #[test]
+fn the_files_to_touch_exist() {
+    let text = std::fs::read_to_string(Path::new(ROOT).join("docs/architecture.md")).expect("readable");
+    let rows = text.split("## To add").nth(1).expect("docs/architecture.md says what to touch");
+    let named = rows.split('`').skip(1).step_by(2).filter(|word| word.contains(['/', '.']));
+    let missing: Vec<&str> = named
+        .filter(|path| !path.contains(char::is_uppercase) && !path.contains('*'))
+        .filter(|path| !["", "src"].iter().any(|folder| Path::new(ROOT).join(folder).join(path).exists()))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
 fn imports_are_found_in_every_form() {
     let text = "use crate::case::Case;\nuse crate::{body, scene::Scene};\n// crate::comment\nlet x = crate::plan::Plan;\n\
                 #[cfg(test)]\nmod tests { use crate::unit; }\n";
