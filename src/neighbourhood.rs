@@ -33,8 +33,8 @@ pub const EIGENVALUE_MIN: f64 = 0.1;
 
 /// d / n0.
 #[inline(always)]
-pub fn scale(on: Particles) -> f64 {
-    f64::from(on.params.dimensions) / on.params.number_density
+pub fn scale(params: &Params) -> f64 {
+    f64::from(params.dimensions) / params.number_density
 }
 
 /// w / r^2 of a pair of weight `w` = re / r - 1 [1/m2]: without a division, and finite where the weight is, at r = 0.
@@ -46,7 +46,7 @@ pub(crate) fn weight_over_square(w: f64, re: f64) -> f64 {
 
 /// (d / n0) w r / r^2 of slot `i` and neighbour `j` of weight `w` [1/m].
 pub(crate) fn pair_vector(i: usize, j: usize, w: f64, on: Particles) -> DVec3 {
-    scale(on) * weight_over_square(w, on.params.effective_radius) * on.offset(i, j)
+    scale(on.params) * weight_over_square(w, on.params.effective_radius) * on.offset(i, j)
 }
 
 /// M of slot `i` over `all` its neighbours [-].

@@ -206,11 +206,6 @@ impl Params {
         let l0 = run.spacing;
         let fluid = case.fluid.as_ref();
         let paper = fluid.is_some_and(|f| f.preset == Preset::Paper);
-        let (gradient, free_surface) = if paper {
-            (Gradient::Minimum, FreeSurface::Threshold)
-        } else {
-            (Gradient::Consistent, FreeSurface::ThresholdOffset)
-        };
         let (gravity, periodic) = (scene.periodic.across(scene.gravity), scene.periodic);
         let g = gravity.length();
         let derived_speed = derived_speed(g, l0, scene.depth);
@@ -251,8 +246,8 @@ impl Params {
             },
             filled,
             source,
-            gradient: fluid.and_then(|f| f.gradient).unwrap_or(gradient),
-            free_surface: fluid.and_then(|f| f.free_surface).unwrap_or(free_surface),
+            gradient: fluid.map_or(Gradient::Consistent, Fluid::gradient),
+            free_surface: fluid.map_or(FreeSurface::ThresholdOffset, Fluid::free_surface),
             speed_at_start: scene.fastest(),
             relaxation,
             follows_flow,
@@ -341,9 +336,14 @@ impl Params {
         (self.domain_max - self.domain_min).max_element()
     }
 
-    /// Mass of a fluid particle [kg]; in two dimensions of a slice l0 wide.
+    /// Volume of a fluid particle [m3]; in two dimensions of a slice l0 wide.
+    pub fn particle_volume(&self) -> f64 {
+        self.spacing.powi(3)
+    }
+
+    /// Mass of a fluid particle [kg].
     pub fn particle_mass(&self) -> f64 {
-        self.density * self.spacing.powi(3)
+        self.density * self.particle_volume()
     }
 
     /// alpha of Eq. (8) for a step of `dt` [s] [1/Pa]; never 0, or the pressure of a closed pocket has no level, and as small as the relaxation

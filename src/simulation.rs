@@ -253,7 +253,7 @@ impl Simulation {
         let emitted = self.openings.emitted().map(|(_, n)| n);
         let counts =
             std::iter::once(fluid.particles).chain(emitted).chain(counters.swallowed.iter().copied());
-        let volume = self.params.spacing.powi(3);
+        let volume = self.params.particle_volume();
         self.openings.columns().into_iter().zip(counts.map(|n| n as f64 * volume)).collect()
     }
 

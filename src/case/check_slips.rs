@@ -1,7 +1,7 @@
 //! The part of the check that warns of values that run but are hardly meant: slips of a unit, a sign or a place.
 
 use super::check::{Checker, length};
-use super::{AXES, Face, OutputKind, Preset, Tank, Vector, output};
+use super::{AXES, Face, OutputKind, Tank, Vector, output};
 use crate::scheme::Gradient;
 use glam::{DMat3, DVec3};
 
@@ -49,10 +49,7 @@ impl Checker<'_> {
         let Some(fluid) = &case.fluid else { return };
         let radius = case.run.effective_radius;
         // The paper's gradient has no pressure of the surface.
-        let consistent = fluid
-            .gradient
-            .map_or(fluid.preset == Preset::Accurate, |gradient| gradient == Gradient::Consistent);
-        if consistent && radius > MOST_RADIUS && radius.is_finite() {
+        if fluid.gradient() == Gradient::Consistent && radius > MOST_RADIUS && radius.is_finite() {
             let message = format!(
                 "with {radius} the pressure below a free surface is too small: 20 spacings of still water weigh 0.6 % too little on their \
                  floor with 3.1, 2 % with 4.1"

@@ -113,6 +113,22 @@ impl Fluid {
         })
     }
 
+    /// Pressure gradient, typed or the preset's.
+    pub fn gradient(&self) -> Gradient {
+        self.gradient.unwrap_or(match self.preset {
+            Preset::Paper => Gradient::Minimum,
+            Preset::Accurate => Gradient::Consistent,
+        })
+    }
+
+    /// Which particles lie on the free surface, typed or the preset's.
+    pub fn free_surface(&self) -> FreeSurface {
+        self.free_surface.unwrap_or(match self.preset {
+            Preset::Paper => FreeSurface::Threshold,
+            Preset::Accurate => FreeSurface::ThresholdOffset,
+        })
+    }
+
     /// The weight of explicit viscosity that goes with the source, for an effective radius of `radius` spacings.
     pub(crate) fn shear(&self, dimensions: u32, radius: f64) -> Shear {
         match self.source() {

@@ -74,7 +74,7 @@ impl InWater {
                     inside.x && inside.z && (flat || inside.y)
                 };
                 let count = water().filter(|&i| within(fields.position[i])).count();
-                vec![Cell::from(count as f64 * params.spacing.powi(3))]
+                vec![Cell::from(count as f64 * params.particle_volume())]
             }
         }
     }

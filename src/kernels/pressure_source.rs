@@ -27,6 +27,12 @@ pub fn laplacian_coefficient(params: &Params) -> f64 {
     2.0 * f64::from(params.dimensions) / (params.laplacian * params.number_density)
 }
 
+/// alpha rho / dt^2 [1/m2], by which the compressibility adds to the diagonal.
+#[inline(always)]
+pub fn compressible_diagonal(params: &Params, step: &Step) -> f64 {
+    step.compressibility * (params.density / step.dt) / step.dt
+}
+
 /// Right side b [Pa/m2] and diagonal [1/m2] of slot `i` with number density `n`. `all` holds every
 /// neighbour, of which the first `carry` carry pressure; `surface_pressure` is empty where it is 0.
 pub fn pressure_source(
@@ -64,7 +70,7 @@ pub fn pressure_source(
     } else {
         all.iter().take(carry).map(|(j, w)| w * surface_pressure[j]).sum()
     };
-    (b + c * known, c * links + leak + step.compressibility * per_time / step.dt)
+    (b + c * known, c * links + leak + compressible_diagonal(params, step))
 }
 
 /// Part of divergence and deviation that slot `i` undoes [-]: all of them in water and on a flat wall under it. Its

@@ -204,7 +204,7 @@ impl Totals {
     /// What came in and went out, of a scene with openings.
     fn water(&self, simulation: &Simulation) -> Option<Water> {
         let openings = &simulation.openings;
-        let volume = simulation.params.spacing.powi(3);
+        let volume = simulation.params.particle_volume();
         let passed = |name: &str, particles: u64| Passed {
             name: name.to_owned(),
             particles,

@@ -78,12 +78,13 @@ fn pressure_gradient(
     w[..n].copy_from_slice(&all.weight[..n]);
     w[n..].fill(0.0);
     pair_vectors(r, w, on.params.effective_radius, e);
-    let gradient = scale(on) * e.weighted_sum(p);
+    let gradient = scale(on.params) * e.weighted_sum(p);
     if !consistent {
         return (gradient, DVec3::ZERO);
     }
-    let one_side = scale(on) * DVec3::new(sum(&e.x[..filled]), sum(&e.y[..filled]), sum(&e.z[..filled]));
-    let moment = moment(r, e, filled, scale(on), on.params.dimensions);
+    let one_side =
+        scale(on.params) * DVec3::new(sum(&e.x[..filled]), sum(&e.y[..filled]), sum(&e.z[..filled]));
+    let moment = moment(r, e, filled, scale(on.params), on.params.dimensions);
     (inverse(moment, on.params.dimensions).map_or(gradient, |inverse| inverse * gradient), one_side)
 }
 

@@ -6,7 +6,7 @@ use super::wide::wide;
 use crate::fields::State;
 use crate::kernels::Particles;
 use crate::kernels::pressure_source::{
-    Boundary, laplacian_coefficient, leak_of, number_density_source, wet_share,
+    Boundary, compressible_diagonal, laplacian_coefficient, leak_of, number_density_source, wet_share,
 };
 use crate::lattice::{reach, smooth_weight};
 use crate::neighbourhood::{inverse, scale};
@@ -29,7 +29,7 @@ wide! {
     ) {
         let ((density, state), (source, diagonal)) = (given, out);
         let c = laplacian_coefficient(on.params);
-        let compressible = step.compressibility * (on.params.density / step.dt) / step.dt;
+        let compressible = compressible_diagonal(on.params, step);
         for k in 0..source.len() {
             (source[k], diagonal[k]) = (0.0, 1.0);
             if state[k] != State::Inner {
@@ -83,7 +83,7 @@ fn mixed_source(
     let solids = all.neighbour.partition_point(|&j| (j as usize) < on.fluid);
     let room = 1.0 + sum(&s[solids..]);
     pair_vectors(r, w, params.effective_radius, e);
-    let m = moment(r, e, filled, scale(on), params.dimensions);
+    let m = moment(r, e, filled, scale(on.params), params.dimensions);
     let inverse = inverse(m, params.dimensions).unwrap_or(DMat3::IDENTITY);
     v.differences(i, all.neighbour, on.velocity);
     // Fluid comes first in a row.
@@ -98,7 +98,7 @@ fn mixed_source(
     let wet = wet_share(i, sum(s), room, boundary.bodies, on);
     let first_moment = r.weighted_sum(s);
     corrected_products(inverse, e, v, s);
-    let divergence = scale(on) * (sum(s) - boundary.slide(i, inverse, on));
+    let divergence = scale(on.params) * (sum(s) - boundary.slide(i, inverse, on));
     let per_time = params.density / step.dt;
     let source = wet * step.relaxation * per_time / step.dt * deviation
         - wet * (1.0 - step.relaxation) * per_time * divergence

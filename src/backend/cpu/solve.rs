@@ -22,7 +22,7 @@ impl Cpu {
     /// The free bodies in the pressure equation; takes the forces that are known off its right side.
     fn couple(&mut self) -> Vec<CoupledBody> {
         let (params, fluid, share) = (&self.params, self.groups.fluid, self.share.as_deref());
-        let density_over_volume = params.density / params.spacing.powi(3);
+        let density_over_volume = params.density / params.particle_volume();
         let Fields { state, reaction, source, diagonal, .. } = &mut self.fields;
         let link = laplacian_coefficient(params) * params.number_density;
         for slot in self.slots.iter().filter(|slot| slot.seep.link > 0.0) {

@@ -5,7 +5,9 @@ use crate::cells::Grid;
 pub use crate::compute::{MONITOR_WIDTH, WORKGROUP};
 use crate::kernels::body_force::missing_head;
 use crate::kernels::openings;
+use crate::kernels::pressure_source::{compressible_diagonal, laplacian_coefficient};
 use crate::monitor::SPEED_BINS;
+use crate::neighbourhood::scale;
 use crate::params::{Params, Step, Zone};
 use crate::pressure::Settings;
 use crate::scene::Groups;
@@ -268,11 +270,6 @@ pub struct MonitorSum {
     pub pad: u32,
 }
 
-/// Coefficient c of the Laplacian, by which the device's PPE is divided [1/m2].
-pub fn laplacian_coefficient(params: &Params) -> f64 {
-    crate::kernels::pressure_source::laplacian_coefficient(params)
-}
-
 /// Origin of the device's positions [m]: the middle of the domain, where f32 is finest. In two dimensions
 /// the plane y = 0 stays in place.
 pub fn middle(params: &Params) -> DVec3 {
@@ -346,7 +343,7 @@ impl Constants {
             restitution: params.collision_restitution as f32,
             viscosity: crate::kernels::viscosity::coefficient(params) as f32,
             particle_mass: params.particle_mass() as f32,
-            gradient_scale: (f64::from(params.dimensions) / params.number_density) as f32,
+            gradient_scale: scale(params) as f32,
             density: params.density as f32,
             tolerance_squared: (settings.tolerance * settings.tolerance) as f32,
             smooth_density: params.smooth_density as f32,
@@ -373,14 +370,14 @@ impl Coefficients {
     /// In f64 as far as possible, rounded once.
     pub fn new(params: &Params, step: &Step) -> Self {
         let per_time = params.density / step.dt;
+        // The device's PPE is divided by it.
         let c = laplacian_coefficient(params);
-        let divergence = f64::from(params.dimensions) / params.number_density;
         let range = crate::kernels::monitor::speed_range(params, step.dt);
         Self {
             dt: step.dt as f32,
             source_density: (step.relaxation * per_time / step.dt / c) as f32,
-            source_divergence: ((1.0 - step.relaxation) * per_time * divergence / c) as f32,
-            compressibility: (step.compressibility * per_time / step.dt / c) as f32,
+            source_divergence: ((1.0 - step.relaxation) * per_time * scale(params) / c) as f32,
+            compressibility: (compressible_diagonal(params, step) / c) as f32,
             pressure_max: step.pressure_max as f32,
             speed_per_bin: (range / SPEED_BINS as f64) as f32,
             shift_speed: step.shift_speed as f32,

@@ -6,6 +6,7 @@ use crate::body::slots::SlotRow;
 use crate::body::{FreeBody, Pose, Wrench};
 use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
+use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::plan::{Arrays, Stage};
 use glam::{DMat3, DVec3, Vec3};
 use std::collections::BTreeMap;
@@ -30,7 +31,7 @@ impl Gpu {
     /// Free bodies and rows at slots for the next solves.
     pub(super) fn show_free_bodies(&mut self, bodies: &[FreeBody], slots: &[SlotRow]) -> Result<()> {
         let p = &self.params;
-        let factor = p.density / p.spacing.powi(3) / layout::laplacian_coefficient(p);
+        let factor = p.density / p.particle_volume() / laplacian_coefficient(p);
         let with = |v: DVec3, w: f64| v.as_vec3().extend(w as f32).to_array();
         let four = |v: DVec3| with(v, 0.0);
         let device = |(solid, (body, &(first, count))): (usize, (&FreeBody, &(usize, usize)))| {

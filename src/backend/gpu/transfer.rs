@@ -1,11 +1,12 @@
 //! Fields between host (f64, absolute) and device (f32, relative to the middle of the domain).
 
-use super::layout::{Remainder, counter, laplacian_coefficient, number_of, word_of};
+use super::layout::{Remainder, counter, number_of, word_of};
 use super::{Gpu, buffers};
 use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, State};
 use crate::kernels::cell_list::counting_sort;
+use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::plan::Arrays;
 use crate::scene::Kind;
 use glam::{DVec3, Vec3};
