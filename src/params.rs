@@ -125,7 +125,7 @@ pub struct Params {
     pub free_surface: FreeSurface,
     /// Speed of the fastest water at t = 0 [m/s].
     pub speed_at_start: f64,
-    /// gamma.
+    /// gamma of Eq. (8), typed or from a speed.
     pub relaxation: Relaxation,
     /// Whether its speed is the largest of a derived one, which follows the flow.
     pub follows_flow: bool,

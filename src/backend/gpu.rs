@@ -86,6 +86,7 @@ pub struct Gpu {
     coefficients: Coefficients,
     /// What swallows on the device.
     outlets: Vec<layout::Outlet>,
+    /// Length of the step [s].
     dt: f64,
     expected_iterations: f64,
     /// Levels of the multigrid preconditioner, if that is planned.

@@ -62,7 +62,7 @@ pub struct Cpu {
     facing: Vec<DVec3>,
     /// The same where the solids are now, world axes.
     outward: Vec<DVec3>,
-    /// [`collision::lightness`] of each wall-layer slot of the moving solids.
+    /// [`collision::lightness`] of each wall-layer slot of the moving solids [-].
     lightness: Vec<f64>,
     fields: Fields,
     grid: Grid,
@@ -82,8 +82,9 @@ pub struct Cpu {
     ledger: Option<Box<WaterLedger>>,
     /// How unevenly the neighbours of the fluid's particles lie [1/m], where a shift asks for it.
     imbalance: Vec<DVec3>,
-    /// Weights of the walls beside each particle of water, summed by the friction on them.
+    /// Weights of the walls beside each particle of water, summed by the friction on them [-].
     wall_weights: Vec<f64>,
+    /// Length of the step [s].
     dt: f64,
     excess: WallExcess,
     /// Whether [`Fields::reaction`] is kept of walls that never move, and which stage of a step begins it.
