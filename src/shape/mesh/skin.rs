@@ -30,6 +30,8 @@ const CLAIMED: f64 = 0.5;
 const CLAIMED_ROUGHLY: f64 = 0.65;
 /// Places of that lattice that come so close are one, over the spacing; others are pushed apart.
 const SAME: f64 = 0.25;
+/// Between two faces is what is nearer to one of them by no more, over the spacing.
+const BETWEEN: f64 = 1e-4;
 /// Distance of two neighbours on a hexagonal lattice of one particle for each square of the spacing, over the spacing.
 const HEXAGONAL: f64 = 1.0746;
 
@@ -164,8 +166,9 @@ impl<'a> Skin<'a> {
         }
         let (nearest, inside) = self.mesh.nearest(x);
         let way = nearest - x;
-        // Inside an edge, where the layers of two faces meet, either is the nearest one.
-        let sound = inside && way.length() >= depth - off;
+        // Inside an edge, where the layers of two faces meet, either may be the nearest one.
+        let is_between = way.length() >= depth - BETWEEN * self.spacing;
+        let sound = inside && (is_between || nearest.distance(at) <= off);
         let known = self.mesh.planes.as_ref().and_then(|planes| planes.distance(x));
         let outward = known.map_or_else(|| way.normalize_or(outward), |known| known.1);
         sound.then(|| Place { at: x, inside: (way.length(), outward), fixed: false })
