@@ -44,6 +44,8 @@ pub(crate) fn viscous_weight(q: f64) -> f64 {
 /// Sums over the lattice of a weight of explicit viscosity.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Shear {
+    /// Sum w [-].
+    pub sum: f64,
     /// Sum w r^2 over l0^2 [-]; lambda n0 of Eq. (6) with the weight of Eq. (3).
     pub moment: f64,
     /// Weight of a pair of fluid and wall over that of others [-], see [`Self::smooth`].
@@ -84,7 +86,7 @@ impl Shear {
         // The diagonal is 2 d sum w / moment.
         let d = f64::from(dimensions);
         let walls = d * layer / sum * (wall - eigenvalue).max(0.0);
-        Self { moment, wall, limit: moment / sum / ((eigenvalue + walls) * d) }
+        Self { sum, moment, wall, limit: moment / sum / ((eigenvalue + walls) * d) }
     }
 }
 

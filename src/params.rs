@@ -1,5 +1,6 @@
 //! Constants of a run: the scheme's switches, what follows from the initial lattice, the step's coefficients.
 
+use crate::body::drag::Drag;
 use crate::case::{self, Case, Fluid, Preset};
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, Shear};
@@ -113,6 +114,8 @@ pub struct Params {
     pub body_wall: usize,
     /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
     pub wall_friction: f64,
+    /// How fast the water takes the lightest body along.
+    pub drag: Drag,
     /// Free-surface threshold beta [-]; 0, which no density is below, where the water fills all its room.
     pub free_surface_threshold: f64,
     /// Whether the water fills all its room and stays so: there is no free surface, and the pressure has no level.
@@ -221,7 +224,7 @@ impl Params {
         // The paper's source takes the density's deviation for the pressure: its mean is the level.
         let filled = scene.filled && source == Source::Mixed;
         let friction = fluid.and_then(|f| f.wall_friction).unwrap_or(if paper { 0.0 } else { WALL_FRICTION });
-        Ok(Self {
+        let params = Self {
             dimensions: run.dimensions,
             spacing: l0,
             effective_radius: re * l0,
@@ -239,6 +242,7 @@ impl Params {
             wall_depth: lattice.wall_depth,
             body_wall: scene.solids.iter().filter(|s| s.is_body).map(|s| s.wall_slots.len()).sum(),
             wall_friction: friction / (l0 * lattice.wall_contact),
+            drag: Drag::default(),
             free_surface_threshold: if filled {
                 0.0
             } else {
@@ -260,7 +264,8 @@ impl Params {
             domain_min: scene.domain.0,
             domain_max: scene.domain.1,
             periodic,
-        })
+        };
+        Ok(Self { drag: Drag::new(scene, &params), ..params })
     }
 
     /// Depth below the water's surface at which P = 0 holds [m].

@@ -5,7 +5,7 @@ use crate::contact::Solids;
 use crate::error::{CaseError, Problem, Result};
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::time_step::{collapse_speed, expected_speed, time_step};
+use crate::time_step::{Bounds, DRAG_LIMIT, collapse_speed, expected_speed, time_step};
 
 /// v dt / l0 of the collapse from rest beyond which a fixed step means nothing: particles pass through each other.
 const COURANT_REFUSED: f64 = 4.0;
@@ -23,6 +23,7 @@ pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> R
     let dt = time_step(params, case.run.time_step, case.run.adaptive && wet, expected_speed(params));
     if wet {
         problems.extend(too_long(case, params));
+        problems.extend(too_light(case, params));
         problems.extend(too_soft(case, params, dt));
     }
     problems.extend(solids.refuses(dt));
@@ -39,6 +40,21 @@ fn too_long(case: &Case, params: &Params) -> Option<CaseError> {
             "{dt} s takes water that collapses at {speed:.2} m/s {courant:.1} particles far in a step"
         );
         let remedy = format!("use {:.1e} s or less, or run.adaptive = true", 0.35 * l0 / speed);
+        Problem::new("run.time_step", message, remedy).into()
+    })
+}
+
+/// A fixed time step against how fast the water takes a light body along.
+fn too_light(case: &Case, params: &Params) -> Option<CaseError> {
+    let (dt, bound) = (case.run.time_step, Bounds::new(params, expected_speed(params)).drag);
+    let number = dt / bound;
+    (!case.run.adaptive && number > DRAG_LIMIT).then(|| {
+        let message = format!(
+            "{dt} s is too long for the body `{}`, which viscosity and wall friction take along within {bound:.1e} s where it is under \
+             water: from {DRAG_LIMIT} times that on it is unstable",
+            params.drag.body
+        );
+        let remedy = format!("use {bound:.1e} s or less, or run.adaptive = true");
         Problem::new("run.time_step", message, remedy).into()
     })
 }

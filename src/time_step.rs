@@ -12,6 +12,8 @@ const COURANT_FASTEST: f64 = 0.6;
 const SPRAY: f64 = 0.25;
 /// c_s dt / l0 at most [-].
 pub(crate) const SOUND_MAX: f64 = 0.7;
+/// The rate at which water takes free bodies along, times a fixed dt, from which on it is unstable whatever the water does [-].
+pub(crate) const DRAG_LIMIT: f64 = 2.0;
 /// nu dt / l0^2 at most, as a part of the limit of explicit viscosity [-].
 pub(crate) const VISCOUS_MAX: f64 = 0.5;
 
@@ -24,6 +26,8 @@ pub struct Bounds {
     pub sound: f64,
     /// Of explicit viscosity.
     pub viscous: f64,
+    /// Of light bodies, which viscosity and the friction of walls take along.
+    pub drag: f64,
 }
 
 impl Bounds {
@@ -41,12 +45,13 @@ impl Bounds {
         } else {
             f64::INFINITY
         };
-        Self { flow: COURANT_MAX * l0 / speed.max(1e-9), sound, viscous }
+        let drag = params.drag.rate(speed).recip();
+        Self { flow: COURANT_MAX * l0 / speed.max(1e-9), sound, viscous, drag }
     }
 
     /// The shortest of them [s].
     pub fn shortest(&self) -> f64 {
-        self.flow.min(self.sound).min(self.viscous)
+        self.flow.min(self.sound).min(self.viscous).min(self.drag)
     }
 }
 

@@ -299,6 +299,15 @@ fn plan_and_run_know_the_same_bounds_of_the_time_step() {
     assert!((planned / taken - 1.0).abs() < 1e-12 && planned < 1e-3, "{planned} planned, {taken} taken");
     let advice = plan["advice"].to_string();
     assert!(advice.contains("viscosity") && !advice.contains("contact"), "{advice}");
+    // A light body asks for shorter steps than the honey around it.
+    let foam = "[[body]]\nname = \"foam\"\nsize = [0.06, 0.06, 0.06]\ncenter = [0.1, 0.1, 0.05]\ndensity = 30\n\
+                displaces_fluid = true\n";
+    std::fs::write(&path, format!("{text}{foam}")).unwrap();
+    let plan = json(&ran(&["plan", &case, "--json"]).out);
+    let run = ran(&["run", &case, "--steps", "1", "--backend", "cpu", "-o", &out, "--force", "--json"]);
+    let (with, taken) = (plan["time_step_s"].as_f64().unwrap(), json(&run.out)["time_s"].as_f64().unwrap());
+    assert!((with / taken - 1.0).abs() < 1e-12 && with < 0.2 * planned, "{with} with it, {taken} taken");
+    assert!(plan["advice"].to_string().contains("the drag on the body `foam`"), "{plan}");
 }
 
 /// Too many particles to build are estimated from a coarser scene, with what is divided for them.

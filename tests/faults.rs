@@ -23,6 +23,7 @@ fn run_and_plan_refuse_the_same_and_leave_no_folder() {
     let body = "body=[{name=\"b\",size=[0.2,0.05,0.2],center=[X,0,Z],density=500}]";
     let at = |x: &str, z: &str| body.replace('X', x).replace('Z', z);
     let contact = "contact={spring=1e5}";
+    let light = at("1.3", "1.5").replace("500", "5");
     let (beside, below, over) = (at("3.0", "0.3"), at("1.0", "-1.0"), at("1.3", "1.5"));
     for (sets, words) in [
         (vec!["run.gravity=[0,0,0,-9.81]"], "4 elements"),
@@ -30,6 +31,7 @@ fn run_and_plan_refuse_the_same_and_leave_no_folder() {
         (vec!["fluid.compressibility=1"], "fluid.compressibility: 1e0 1/Pa"),
         (vec!["fluid.density=-1e300"], "fluid.density: -1e300 is out of range"),
         (vec!["fluid.viscosity=1e300"], "nu dt / l0^2 = 4.000e299 is unstable"),
+        (vec![&light, contact, "fluid.viscosity=0.3"], "too long for the body `b`, which viscosity"),
         (vec![&beside, contact], "body `b` at (3.0000, 0.0000, 0.3000) lies outside of the tank"),
         (vec![&below, contact], "which spans 0 to 1 m along z, with nothing beneath it"),
         (vec![&over, "contact={spring=1e9,substeps=1}"], "contact.substeps = 1 is unstable"),

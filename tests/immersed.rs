@@ -3,6 +3,7 @@
 use crate::common;
 use common::*;
 use glam::DVec3;
+use seixo::backend::Processor;
 use seixo::case::Case;
 use seixo::kernels::body_force;
 use seixo::params::Params;
@@ -330,6 +331,63 @@ fn a_body_that_turns_feels_the_stress_that_shear_leaves_out() {
     let expected = -2.0 * 1000.0 * 0.01 * 0.2 * 0.3 * 0.1 * omega;
     println!("{force} N, {torque} for {expected} N m");
     assert!(force.length() < 1e-9 && (torque - expected).length() < 0.03 * expected.length(), "{torque}");
+}
+
+/// A square of five spacings in the middle of a full tank in the plane.
+fn square(fluid: &str, body: &str, adaptive: bool) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 6e-5\nadaptive = {adaptive}\nend = 1.0\ndimensions = 2\ngravity = [0, 0, 0]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.4]\nopen = []\n\
+         [fluid]\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.4]\n[contact]\nspring = 1e4\n\
+         [[body]]\nname = \"foam\"\nsize = [0.1, 0.02, 0.1]\ncenter = [0.2, 0, 0.2]\ndisplaces_fluid = true\n{body}\n"
+    ))
+}
+
+#[test]
+fn what_viscosity_takes_along_sets_the_step_of_a_light_body() {
+    // Twice the step that its turns allow: fifty times the turn that it began with after as many steps, before there was a bound.
+    let text = "density = 50\nvelocity = [0.1, 0, 0]\nangular_velocity = [0, 1, 0]";
+    let light = square("viscosity = 1\nwall_friction = 0", text, true);
+    let mut sim = simulation(&light);
+    let bound = sim.params.drag.rate(0.0).recip();
+    for _ in 0..40 {
+        let step = sim.step().expect("nothing grows");
+        let pose = &sim.solids.poses()[0];
+        assert!((step.dt / bound - 1.0).abs() < 1e-9, "{}", step.dt);
+        let (v, turn) = (pose.velocity.length(), pose.angular_velocity.length());
+        assert!(v < 0.1001 && turn < 1.001, "{v} m/s, {turn} rad/s");
+    }
+    let fixed = square("viscosity = 1\nwall_friction = 0", text, false);
+    let refused = Simulation::on(&fixed, Scene::build(&fixed).expect("builds"), &Processor::Cpu);
+    let said = refused.err().expect("a fixed step of four times the bound").to_string();
+    assert!(said.contains("run.time_step") && said.contains("`foam`"), "{said}");
+    // One as heavy as water goes by the water's own bound, and in thin water none is near one.
+    let free = |fluid: &str, body: &str| simulation(&square(fluid, body, false)).params.drag.rate(1.0) * 6e-5;
+    assert!(free("viscosity = 1", "density = 1000") < 1.0);
+    assert!(free("viscosity = 1e-6", text) < 1e-2);
+}
+
+#[test]
+fn the_friction_of_walls_takes_a_body_along_by_its_surface() {
+    // C_f |u| over the mass on an area: of a square held from turning 4 C_f / (s a).
+    let rate = |a: f64, s: f64| {
+        let body = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-4\nend = 1.0\ndimensions = 2\ngravity = [0, 0, 0]\n[fluid]\nviscosity = 0\nwall_friction = 0.01\n\
+             [[fluid.block]]\nmin = [-1, 0, -1]\nmax = [1, 0, 1]\n[contact]\nspring = 1e4\n[[body]]\nname = \"b\"\n\
+             size = [{a}, 0.02, {a}]\ncenter = [0, 0, 0]\ndensity = {}\ndisplaces_fluid = true\n\
+             locked = [\"rotation_y\"]\n",
+            1000.0 * s
+        );
+        let case = case(&body);
+        let drag = Params::new(&case, &Scene::build(&case).expect("builds")).expect("valid").drag;
+        assert!(drag.viscous == 0.0 && drag.body == "b", "{drag:?}");
+        drag.friction * s * a / (4.0 * 0.01)
+    };
+    for (a, s) in [(0.4, 0.01), (0.4, 2.0), (0.8, 0.1)] {
+        let over = rate(a, s);
+        println!("{a} m, {s}: {over:.3}");
+        assert!((over - 1.0).abs() < 0.01, "{a} m, {s}: {over}");
+    }
 }
 
 #[test]

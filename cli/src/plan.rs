@@ -414,7 +414,10 @@ fn fastest(case: &Case, scene: &Scene, params: &Params) -> f64 {
 fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) {
     let (typed, adaptive) = (case.run.time_step, case.run.adaptive);
     let bounds = Bounds::new(params, speed);
-    let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous)];
+    let body = format!("the drag on the body `{}`", params.drag.body);
+    // Of next to no body: it is told where it says something.
+    let drag = Some(bounds.drag).filter(|dt| *dt < typed).unwrap_or(f64::INFINITY);
+    let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous), (&body, drag)];
     let further = further.iter().filter(|(_, dt)| dt.is_finite());
     let further: String = further.map(|(what, dt)| format!(", {what} {dt:.3e} s")).collect();
     let mut advice = vec![format!(

@@ -381,6 +381,7 @@ fn limits(run: &Run) -> Result<String> {
         ("run.time_step, as typed", 0),
         ("the sound speed", 0),
         ("viscosity", 0),
+        ("the drag on a light body", 0),
         ("the speed of water or solids", 0),
     ];
     let steps: Vec<f64> = points.iter().map(|p| p[1]).filter(|dt| *dt > 0.0).collect();
@@ -391,8 +392,11 @@ fn limits(run: &Run) -> Result<String> {
             1
         } else if same(dt, bounds.viscous) {
             2
-        } else {
+        } else if (dt / bounds.drag - 1.0).abs() < 0.01 {
+            // A little of it goes by the speed of the water.
             3
+        } else {
+            4
         };
         counts[which].1 += 1;
     }

@@ -1,0 +1,149 @@
+//! How fast water takes free bodies along by its viscosity and by its friction on their walls.
+//!
+//! What the water does to a body is found with the body's velocity at the start of the step, so that a step is at most the time in
+//! which the body would take over the water's velocity, 1 / rate: short for one that is light for its surface.
+//! The rate is the largest eigenvalue of M^-1 D, M the body's mass and inertia and D u the force and torque with which water at
+//! rest resists the motion u, six numbers, of a body that is wholly under water:
+//!
+//! D = sum k J^T J over the wall layer, J u the velocity there, k the force over it [kg/s].
+//!
+//! In steps of 1 / rate, and no longer than what a particle of water allows, nothing grows: sum k (v - J u)^2 is at most twice
+//! sum k v^2 + sum k (J u)^2, so that no eigenvalue of body and water together is more than twice the larger of theirs. The water
+//! that moves along with the body (its added mass) is left out: turns of round bodies have none.
+
+use super::{Body, Wrench};
+use crate::contact::broad::PointGrid;
+use crate::kernels::number_density;
+use crate::kernels::viscosity::{coefficient, pair_weight};
+use crate::params::Params;
+use crate::scene::{Scene, Solid};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Iterations that find the largest eigenvalue; it is among six, and half of it would do for the order of a step.
+const ITERATIONS: usize = 60;
+
+/// Of the body that the water takes along the fastest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Drag {
+    /// Rate by viscosity [1/s].
+    pub viscous: f64,
+    /// Rate by the friction of its walls over the speed of the water past it [1/m].
+    pub friction: f64,
+    /// Name of the body.
+    pub body: String,
+}
+
+impl Drag {
+    /// Of the free bodies of `scene`; zero where none is, or nothing drags.
+    pub fn new(scene: &Scene, params: &Params) -> Self {
+        let dry = scene.groups.fluid == 0 || (params.viscosity == 0.0 && params.wall_friction == 0.0);
+        let free = scene.solids.iter().filter(|solid| !dry && solid.gives_way());
+        let each = free.map(|solid| Self::of(solid, params));
+        each.fold(Self::default(), |most, one| {
+            let first = (one.viscous, one.friction) > (most.viscous, most.friction);
+            Self {
+                viscous: most.viscous.max(one.viscous),
+                friction: most.friction.max(one.friction),
+                body: if first { one.body } else { most.body },
+            }
+        })
+    }
+
+    /// The rate in water that goes past at `speed` [m/s] [1/s].
+    pub fn rate(&self, speed: f64) -> f64 {
+        self.viscous + self.friction * speed
+    }
+
+    fn of(solid: &Solid, params: &Params) -> Self {
+        let body = Body::new(solid, params.dimensions);
+        let own = solid.wall_offset.iter().chain(&solid.dummy_offset).copied().collect();
+        let own = PointGrid::new(own, params.effective_radius);
+        let (mut viscous, mut friction) = (Resistance::default(), Resistance::default());
+        let shear = coefficient(params) * params.shear.wall;
+        for (k, &x) in solid.wall_offset.iter().enumerate() {
+            // Water stands where the body's own particles do not.
+            let (mut sheared, mut rubbed) = (params.shear.sum, params.number_density);
+            own.near(x, params.effective_radius, |n| {
+                let r2 = own.point(n).distance_squared(x);
+                if r2 > 0.0 {
+                    sheared -= pair_weight(r2, params);
+                    rubbed -= number_density::pair_weight(r2, params);
+                }
+            });
+            let (at, to_surface) = (solid.orientation * x, solid.orientation * solid.wall_to_surface[k]);
+            let arm = at + to_surface;
+            viscous.add(params.particle_mass() * shear * sheared.max(0.0), at, arm);
+            friction.add(params.particle_mass() * params.wall_friction * rubbed.max(0.0), at, arm);
+            let area = solid.orientation * solid.wall_area[k];
+            viscous.turn(params.density * params.viscosity, arm, area);
+        }
+        let [viscous, friction] = [viscous, friction].map(|resistance| resistance.rate(&body));
+        Self { viscous, friction, body: solid.name.clone() }
+    }
+}
+
+/// D, by its sums.
+#[derive(Clone, Copy, Debug)]
+struct Resistance {
+    /// sum k [kg/s].
+    sum: f64,
+    /// sum k r [kg m/s].
+    first: DVec3,
+    /// What resists turns [kg m2/s].
+    turns: DMat3,
+}
+
+impl Default for Resistance {
+    fn default() -> Self {
+        // A matrix is by default the identity.
+        Self { sum: 0.0, first: DVec3::ZERO, turns: DMat3::ZERO }
+    }
+}
+
+impl Resistance {
+    /// A particle of the wall layer with `k` [kg/s]: its velocity is that `at` its centre, and the force acts on the surface, at `arm` [m].
+    fn add(&mut self, k: f64, at: DVec3, arm: DVec3) {
+        self.sum += k;
+        self.first += k * 0.5 * (at + arm);
+        self.turn(k, arm, at);
+    }
+
+    /// The torque -k arm x (omega x b), symmetric: of a force, or of [`crate::kernels::body_force::turning`].
+    fn turn(&mut self, k: f64, arm: DVec3, b: DVec3) {
+        let one = k * around(arm, b);
+        self.turns += 0.5 * (one + one.transpose());
+    }
+
+    /// D u.
+    fn of(&self, velocity: DVec3, turn: DVec3) -> Wrench {
+        Wrench {
+            force: self.sum * velocity + turn.cross(self.first),
+            torque: self.first.cross(velocity) + self.turns * turn,
+        }
+    }
+
+    /// Largest eigenvalue of M^-1 D [1/s].
+    fn rate(&self, body: &Body) -> f64 {
+        let answer = |w: Wrench| (body.inverse_mass * w.force, body.inverse_inertia * w.torque);
+        // Something of every mode: no shape is symmetric to this.
+        let mut u = answer(Wrench { force: DVec3::new(1.0, 1.3, 0.7), torque: DVec3::new(0.6, 0.9, 1.1) });
+        let mut rate = 0.0;
+        for _ in 0..ITERATIONS {
+            let resisted = self.of(u.0, u.1);
+            let power = resisted.force.dot(u.0) + resisted.torque.dot(u.1);
+            if power <= 0.0 {
+                break;
+            }
+            let next = answer(resisted);
+            rate = (resisted.force.dot(next.0) + resisted.torque.dot(next.1)) / power;
+            u = (next.0 / rate, next.1 / rate);
+        }
+        rate
+    }
+}
+
+/// The matrix of omega -> a x (omega x b).
+fn around(a: DVec3, b: DVec3) -> DMat3 {
+    a.dot(b) * DMat3::IDENTITY - DMat3::from_cols(b * a.x, b * a.y, b * a.z)
+}
