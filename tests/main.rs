@@ -17,6 +17,7 @@ mod contact_forces;
 mod contact_hard;
 mod contact_impacts;
 mod contact_pairs;
+mod contact_small;
 mod copies;
 mod device;
 mod errors;

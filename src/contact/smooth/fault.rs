@@ -1,6 +1,7 @@
 //! What the smooth law cannot be trusted with, found before it becomes a force: solids that go through each other
 //! between two sub-steps, come out on the wrong side, or are driven into each other.
 
+use super::frame::Frame;
 use super::pair::{Other, Pair};
 use super::walls::WallBox;
 use super::{STOP_DEPTH, Smooth};
@@ -20,6 +21,8 @@ pub(super) const DRIVEN: f64 = 1.0;
 const WAY: f64 = 0.5;
 /// Way of a sub-step over the depth of the stop, at most, into what has not been touched yet.
 const UNSEEN: f64 = 0.5;
+/// Depth over half of a solid's thickness that says nothing of two whose middles are in each other.
+const UNTOLD: f64 = 1e-3;
 /// Ways of a sub-step that are looked ahead for the stop: forces may add to the speed.
 const AHEAD: f64 = 1.5;
 
@@ -98,7 +101,7 @@ impl Smooth {
             let others = self.evaluated().iter().filter(beside).map(|p| p.before).filter(|d| d.is_finite());
             others.fold(pair.before, f64::max)
         };
-        self.evaluated().iter().filter(deep).find_map(|pair| {
+        let too_deep = self.evaluated().iter().filter(deep).find_map(|pair| {
             let [middle_a, middle_b] = self.middles.of(pair);
             let (in_a, in_b) = pair.deepest();
             let closing = Self::closing(pair, now);
@@ -131,6 +134,35 @@ impl Smooth {
                     pair.depth
                 ))
             })
+        });
+        too_deep.or_else(|| self.first_unseen(now))
+    }
+
+    /// The first pair of which one solid has its middle in the other, [m] below its surface, while no point of either tells of it: no
+    /// force would ever part them.
+    fn first_unseen(&self, now: &Now) -> Option<Fault> {
+        let depth = |from: &Frame, to: &Frame| {
+            let inside = to.shape.depth(to.local(from.center), to.faces)?;
+            // of a ring there is nothing in the middle
+            from.shape.depth(DVec3::ZERO, from.faces).map(|_| inside.depth)
+        };
+        self.evaluated().iter().find_map(|pair| {
+            let [middle_a, middle_b] = self.middles.of(pair);
+            if pair.depth > UNTOLD * middle_a.min(middle_b) {
+                return None;
+            }
+            let own = Frame::body(&now.bodies[pair.a], self.surfaces[pair.a].all_faces);
+            let other = pair.other(now.bodies, &self.surfaces, &self.walls);
+            // most are but neighbours
+            if own.center.distance(other.center) > own.shape.radius().max(other.shape.radius()) {
+                return None;
+            }
+            let depth = depth(&own, &other).or_else(|| depth(&other, &own))?;
+            let what = format!(
+                "is in it with its middle, {depth:.3e} m deep, where no point of their surfaces tells: contact would leave \
+                 them so; use a smaller run.spacing, for more points, or a smaller run.time_step"
+            );
+            Some(Fault { a: pair.a, b: self.against(pair.b), what })
         })
     }
 

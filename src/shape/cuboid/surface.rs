@@ -10,13 +10,32 @@ const LACKS: f64 = 1e-9;
 /// Share of its weight that a point keeps.
 const LEAST: f64 = 0.2;
 
+/// Points inside of the faces that have none, with their faces: halfway between the two rows of particles that such a face is wide, in
+/// its middle if it is no longer than that. With its border alone it would go unseen through another of the same width: points on the
+/// border of the other's face are in line with its sides, where no depth is.
+fn between_rows(points: &[DVec3], faces: &[Faces]) -> (Vec<DVec3>, Vec<Faces>) {
+    let mut found = vec![];
+    for face in 0..6_u8 {
+        let on: Vec<_> = points.iter().zip(faces).filter(|(_, f)| *f & (1 << face) != 0).collect();
+        let fewest = on.iter().map(|(_, f)| f.count_ones()).min().unwrap_or(1);
+        for &(p, f) in on.iter().filter(|(_, f)| fewest > 1 && f.count_ones() == fewest) {
+            let is_row = |axis: u8| axis == face / 2 || f >> (2 * axis) & 3 == 0;
+            let at = DVec3::from_array([0, 1, 2].map(|k| if is_row(k) { p[usize::from(k)] } else { 0.0 }));
+            if !found.contains(&(at, 1 << face)) {
+                found.push((at, 1 << face));
+            }
+        }
+    }
+    found.into_iter().unzip()
+}
+
 impl Surface {
     /// The surface of a box of half edges `half` [m]. A point on several faces gets the mean of its shares of them: constant
     /// weights are what makes the law conservative, so they may not depend on the face that touches.
     /// What the particles along an edge would weigh is spread over its length.
     pub fn cuboid(half: DVec3, wall: &WallLayer, dimensions: u32) -> Self {
-        let points: Vec<DVec3> = wall.offset.iter().zip(wall.to_surface).map(|(o, s)| *o + *s).collect();
-        let faces: Vec<Faces> = wall
+        let mut points: Vec<DVec3> = wall.offset.iter().zip(wall.to_surface).map(|(o, s)| *o + *s).collect();
+        let mut faces: Vec<Faces> = wall
             .to_surface
             .iter()
             .map(|s| {
@@ -27,6 +46,9 @@ impl Surface {
                 })
             })
             .collect();
+        let (inner, of) = between_rows(&points, &faces);
+        points.extend(inner);
+        faces.extend(of);
         let on = |face: u8| faces.iter().filter(|f| *f & (1 << face) != 0).count();
         let share: Vec<f64> = (0..6).map(|face| 1.0 / on(face).max(1) as f64).collect();
         let weights: Vec<f64> = faces
@@ -179,6 +201,8 @@ impl Surface {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::Geometry;
+    use super::super::Cuboid;
     use super::*;
 
     #[test]
@@ -203,6 +227,47 @@ mod tests {
             );
             let all: f64 = surface.weights.iter().sum();
             assert!((all - 2.0).abs() < 1e-12, "{dimensions}: {all}");
+        }
+    }
+
+    #[test]
+    fn every_face_has_points_inside_of_it_and_rocks_like_an_even_pressure() {
+        let l0 = 0.01;
+        for size in [
+            [1.0, 1.0, 1.0],
+            [2.0, 2.0, 2.0],
+            [2.4, 2.4, 2.4],
+            [2.0, 2.0, 10.0],
+            [10.0, 10.0, 2.0],
+            [2.0, 4.0, 8.0],
+        ] {
+            for dimensions in [2, 3] {
+                let cuboid = Cuboid { half: 0.5 * l0 * DVec3::from(size) };
+                let all = cuboid.particles(l0, dimensions, 3);
+                let surface = cuboid.surface(
+                    &WallLayer { offset: &all.wall, to_surface: &all.to_surface },
+                    l0,
+                    dimensions,
+                );
+                let samples = surface.samples();
+                for face in (0..6_u8).filter(|face| surface.all_faces >> face & 1 == 1) {
+                    let inside = surface.faces.iter().filter(|f| **f == 1 << face).count();
+                    let on = samples.iter().filter(|s| s.2 >> face & 1 == 1);
+                    let sum: f64 = on.clone().map(|s| s.1).sum();
+                    let axis = usize::from(face / 2);
+                    let second = |k: usize| {
+                        on.clone().map(|s| s.1 * (s.0[k] / cuboid.half[k]).powi(2)).sum::<f64>() / sum
+                    };
+                    let even =
+                        [1, 2].map(|n| (axis + n) % 3).into_iter().filter(|&k| dimensions == 3 || k != 1);
+                    let off = even.map(|k| (3.0 * second(k) - 1.0).abs()).fold(0.0, f64::max);
+                    let at = format!("{size:?} {dimensions}D face {face}: {inside} weigh {sum}, {off} off");
+                    // the border is shared by faces of different proportions
+                    let cube = size[0] == size[1] && size[1] == size[2];
+                    assert!(inside > 0 && off < if cube { 1e-9 } else { 0.12 }, "{at}");
+                    assert!(if cube { (sum - 1.0).abs() < 1e-9 } else { sum > 0.5 && sum < 1.6 }, "{at}");
+                }
+            }
         }
     }
 }
