@@ -111,6 +111,26 @@ fn a_result_that_means_nothing_is_no_success() {
     assert_eq!(json(&some.out)["verdict"]["grade"], "degraded");
 }
 
+#[test]
+fn water_that_a_piston_presses_out_of_a_full_tank_is_told_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("piston.toml");
+    let text = "[run]\nspacing = 0.02\ntime_step = 0.001\nadaptive = true\nend = 0.5\ndimensions = 2\n\
+                [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.02, 0.6]\n\
+                [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.02, 0.4]\n\
+                [[moving_wall]]\nname = \"lid\"\nmin = [0, 0, 0.4]\nmax = [0.4, 0.02, 0.46]\n\
+                motion = [[0, 0, 0, 0], [0.5, 0, 0, -0.1]]\n";
+    std::fs::write(&path, text).unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let ran = ran(&["run", path.to_str().unwrap(), "--backend", "cpu", "-q", "-o", &out]);
+    assert_eq!(ran.code, 4, "{}", ran.err);
+    assert!(
+        ran.err.contains("have left the domain") && ran.err.contains("water that `lid` leaves no room"),
+        "{}",
+        ran.err
+    );
+}
+
 /// Walls that move give the water energy; a typed speed of sound, or an inflow without water yet, excuses nothing.
 #[test]
 fn a_verdict_knows_what_energy_a_scene_has_at_hand() {

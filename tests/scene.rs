@@ -284,6 +284,24 @@ fn problems_at_the_start_name_who_and_what_to_do() {
 }
 
 #[test]
+fn without_gravity_nobody_is_told_of_a_lift_and_a_small_overlap_is_told_as_such() {
+    let with = |gravity: f64, l0: f64| {
+        let (edge, low) = (5.0 * l0, 2.45 * l0);
+        let text = format!(
+            "[run]\nspacing = {l0:e}\ntime_step = 1e-6\nend = 1e-3\ngravity = [0, 0, {gravity}]\n[contact]\nspring = 1\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [{0:e}, {0:e}, {0:e}]\n[[body]]\nname = \"b\"\nsize = [{edge:e}, {edge:e}, {edge:e}]\n\
+             center = [{edge:e}, {edge:e}, {low:e}]\ndensity = 2000\n",
+            10.0 * l0
+        );
+        build(&text).unwrap_err()
+    };
+    let weightless = with(0.0, 0.02);
+    assert!(weightless.contains("its center by 0.00100") && !weightless.contains("lifting"), "{weightless}");
+    let tiny = with(-9.81, 2e-7);
+    assert!(tiny.contains("raise its center by 1.01e-8 m"), "{tiny}");
+}
+
+#[test]
 fn water_without_walls_needs_weightlessness() {
     let text = "[run]\nspacing = 0.1\ntime_step = 1e-3\nend = 1.0\nGRAVITY\n[fluid]\n[[fluid.block]]\nmin = [0,0,0]\nmax = [1,1,1]\n";
     let message = build(&text.replace("GRAVITY", "")).unwrap_err();
@@ -361,11 +379,11 @@ fn contact_at_the_start_is_refused() {
         "closer than d_c",
         "by 0.005619 m",
         "standing = true",
-        "0.005620 m",
+        "raise its center by 0.005619 m",
     ] {
         assert!(message.contains(word), "`{word}` is not in: {message}");
     }
-    let raised = case("resting_cube", &["body.0.standing=false", "body.0.center=[0.4, 0.4, 0.10562]"]);
+    let raised = case("resting_cube", &["body.0.standing=false", "body.0.center=[0.4, 0.4, 0.105619]"]);
     assert!(Scene::build(&raised).is_ok());
 }
 

@@ -38,7 +38,7 @@ pub use curve::Curve;
 pub use motion::Motion;
 pub use opening::{Course, Opening, Passes};
 pub(crate) use part::Still;
-pub(crate) use placement::CONTACT_DISTANCE;
+pub(crate) use placement::{CONTACT_DISTANCE, point};
 
 use crate::periodic::Periodic;
 use crate::shape::{Surface, WallLayer};

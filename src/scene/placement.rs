@@ -24,6 +24,9 @@ const HANGING: f64 = 1e-3;
 /// Most steps on the way down to what a body hangs above.
 const MOST_STEPS: f64 = 2000.0;
 
+/// What a remedy asks for more than what just does, over the spacing [-].
+const MARGIN: f64 = 1e-6;
+
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {
     pub fixed: &'a Fixed,
@@ -57,25 +60,28 @@ impl Surroundings<'_> {
             .map(|up| (self.lift(body, up), up))
             .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
         let says = format!("body `{}` overlaps {with} by {} m at t = 0", body.name, metres(overlap));
+        let margin = MARGIN * self.spacing;
         let Some((lift, up)) = lift else {
             let away = out.map_or("move it away".into(), |n| {
-                let n = point(n);
-                format!("move it away, its center by {:.6} m along {n}", overlap + 1e-6)
+                format!("move it away, its center by {} m along {}", at_least(overlap + margin), point(n))
             });
-            return Err((says, format!("{away}, lifting it would take more than half its height")));
+            let why =
+                if self.up.is_some() { ", lifting it would take more than half its height" } else { "" };
+            return Err((says, away + why));
         };
         if !standing {
-            let more = lift + 1e-6;
-            let remedy = format!("set `standing = true`, or raise its center by {more:.6} m against gravity");
+            let more = at_least(lift + margin);
+            let remedy = format!("set `standing = true`, or raise its center by {more} m against gravity");
             return Err((says, remedy));
         }
+        let lifted = metres(lift);
         let from = body.shape_center();
         body.position += lift * up;
         if let Some(Contact { with, .. }) = self.deepest(body) {
-            return Err((says, format!("move it away, lifted by {lift:.6} m it would still overlap {with}")));
+            return Err((says, format!("move it away, lifted by {lifted} m it would still overlap {with}")));
         }
         Ok(Some(format!(
-            "body `{}`: lifted by {lift:.6} m to stand free of contact, center {} becomes {}",
+            "body `{}`: lifted by {lifted} m to stand free of contact, center {} becomes {}",
             body.name,
             point(from),
             point(body.shape_center())
@@ -177,7 +183,7 @@ impl Surroundings<'_> {
             .filter(|(overlap, _)| *overlap > 1e-9 * d_c)
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(overlap, with)| Contact {
-                with: format!("{} (particles closer than d_c = {d_c:.6} m)", self.pair_name(with)),
+                with: format!("{} (particles closer than d_c = {} m)", self.pair_name(with), metres(d_c)),
                 overlap,
                 out: None,
             })
@@ -366,7 +372,33 @@ fn metres(length: f64) -> String {
     if length < 1e-3 { format!("{length:.2e}") } else { format!("{length:.6}") }
 }
 
-/// A point for messages.
-pub(super) fn point(p: DVec3) -> String {
-    format!("({:.4}, {:.4}, {:.4})", p.x, p.y, p.z)
+/// The same, but rounded up: whoever goes that far has gone far enough.
+fn at_least(length: f64) -> String {
+    let unit = if length < 1e-3 { 10_f64.powi(length.log10().floor() as i32 - 2) } else { 1e-6 };
+    metres((length / unit).ceil() * unit)
+}
+
+/// A point for messages: four decimals, and as many more as its largest coordinate needs.
+pub(crate) fn point(p: DVec3) -> String {
+    let largest = p.abs().max_element();
+    let zeros = if largest > 0.0 { (-largest.log10()).floor().clamp(0.0, 300.0) as usize } else { 0 };
+    format!("({:.*}, {:.*}, {:.*})", 4 + zeros, p.x, 4 + zeros, p.y, 4 + zeros, p.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_and_points_are_told_at_any_scale() {
+        let lengths =
+            [(0.0100002, "0.010001"), (0.00561, "0.005610"), (5.001e-8, "5.01e-8"), (9.999e-4, "1.00e-3")];
+        for (length, told) in lengths {
+            let told_length: f64 = at_least(length).parse().expect("a number");
+            assert!(at_least(length) == told && told_length >= length, "{length}: {}", at_least(length));
+        }
+        assert_eq!(point(DVec3::new(0.3, -12.0, 1e-9)), "(0.3000, -12.0000, 0.0000)");
+        assert_eq!(point(DVec3::new(3e-6, 2e-6, 4.5e-7)), "(0.000003000, 0.000002000, 0.000000450)");
+        assert_eq!(point(DVec3::ZERO), "(0.0000, 0.0000, 0.0000)");
+    }
 }

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
+use crate::scene::{Drive, point};
 
 /// Steps between looks at the counters and the fastest particles.
 const LOOK_EVERY: u64 = 10;
@@ -30,6 +31,18 @@ impl Simulation {
         Ok(())
     }
 
+    /// A remedy for water that has been pressed through walls, if a solid is driven that may do so.
+    fn may_be_pressed(&self) -> String {
+        let drives =
+            |k: &usize| matches!(self.scene.solids[*k].drive, Drive::Prescribed(_)) && !self.scene.stands(*k);
+        let Some(k) = (0..self.scene.followed()).find(drives) else { return String::new() };
+        format!(
+            "; water that `{}` leaves no room (a piston into a part that is full) is pressed through the walls: leave it \
+             a way out",
+            self.solids.name(k)
+        )
+    }
+
     pub(super) fn check_bodies(&self, step: &Step) -> Result<()> {
         let (min, max) = (self.params.domain_min, self.params.domain_max);
         for (k, pose) in self.solids.poses().iter().enumerate() {
@@ -46,9 +59,9 @@ impl Simulation {
                 |k: &usize| !(self.params.periodic.is_along(*k) || self.params.dimensions == 2 && *k == 1);
             if (0..3).filter(bounded).any(|k| x[k] < min[k] || x[k] > max[k]) {
                 let what = format!(
-                    "{name} left the domain at ({:.4}, {:.4}, {:.4}) m; a wall is missing there, or contact.spring is \
-                     too soft for this fall",
-                    x.x, x.y, x.z
+                    "{name} left the domain at {} m; a wall is missing there, or contact.spring is too soft for this \
+                     fall",
+                    point(x)
                 );
                 return Err(self.diverged(step, Stage::Contact, what));
             }
@@ -101,16 +114,17 @@ impl Simulation {
         }
         let fluid = self.scene.water() as u64 + self.openings.total_emitted();
         if counters.lost as f64 > (LOST_MAX * fluid as f64).max(10.0) {
+            let overflows = if self.openings.total_emitted() > 0 {
+                "; a tank that overflows needs an [[outflow]], or an earlier run.end"
+            } else {
+                ""
+            };
             let what = format!(
                 "{} of {} fluid particles have left the domain; see fluid_lost in monitors.csv for when it began, and \
-                 enlarge run.domain if they may go there{}",
+                 enlarge run.domain if they may go there{overflows}{}",
                 counters.lost,
                 fluid,
-                if self.openings.total_emitted() > 0 {
-                    "; a tank that overflows needs an [[outflow]], or an earlier run.end"
-                } else {
-                    ""
-                }
+                self.may_be_pressed()
             );
             return Err(self.diverged(step, Stage::CellList, what));
         }
