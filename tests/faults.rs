@@ -201,9 +201,16 @@ fn pressures_that_are_cut_are_judged() {
     summary.pressure.unknowns_mean = 2000.0;
     for (clamps, grade) in [(0, Grade::Fine), (10, Grade::Fine), (400, Grade::Degraded)] {
         summary.pressure.clamps = clamps;
-        let verdict = judge(&summary, scale);
+        let verdict = judge(&summary, scale, false);
         assert_eq!(verdict.grade, grade, "{clamps}: {verdict}");
         assert_eq!(clamps == 400, verdict.to_string().contains("were cut at their upper bound"), "{verdict}");
+    }
+    // What a run does already is no remedy.
+    summary.monitors.solid_courant_max = 1.5;
+    for adaptive in [false, true] {
+        let verdict = judge(&summary, scale, adaptive).to_string();
+        assert!(verdict.contains("a shorter run.time_step"), "{verdict}");
+        assert_eq!(verdict.contains("run.adaptive = true"), !adaptive, "{verdict}");
     }
 }
 

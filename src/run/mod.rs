@@ -299,7 +299,7 @@ impl Run {
         summary.status = status;
         summary.verdict = match error {
             Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()], left_out: vec![] },
-            None => verdict::judge(&summary, scale),
+            None => verdict::judge(&summary, scale, simulation.case.run.adaptive),
         };
         summary.exit_reason = reason;
         if summary.status == Status::Done && summary.verdict.grade == Grade::Failed {

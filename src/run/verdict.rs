@@ -41,8 +41,8 @@ impl Judge {
     }
 }
 
-/// The verdict on a run that reached its end or was stopped.
-pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
+/// The verdict on a run that reached its end or was stopped, with steps that are `adaptive` or not.
+pub fn judge(summary: &Summary, scale: Scale, adaptive: bool) -> Verdict {
     let (p, m) = (&summary.pressure, &summary.monitors);
     let mut judge = Judge(Vec::new());
     let solves = p.solves.max(1) as f64;
@@ -80,7 +80,8 @@ pub fn judge(summary: &Summary, scale: Scale) -> Verdict {
     if wet {
         judge.bound(m.solid_courant_max, SOLID_COURANT, || {
             let way = m.solid_courant_max;
-            format!("a solid moved {way:.1} particles far in a step; use a shorter run.time_step, or run.adaptive = true")
+            let or = if adaptive { "" } else { ", or run.adaptive = true" };
+            format!("a solid moved {way:.1} particles far in a step; use a shorter run.time_step{or}")
         });
     }
     judge.bound(m.penetration_max_over_l0, PENETRATION, || {
