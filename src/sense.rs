@@ -46,13 +46,14 @@ fn too_long(case: &Case, params: &Params) -> Option<CaseError> {
 
 /// A fixed time step against how fast the water takes a light body along.
 fn too_light(case: &Case, params: &Params) -> Option<CaseError> {
-    let (dt, bound) = (case.run.time_step, Bounds::new(params, expected_speed(params)).drag);
+    let (dt, speed) = (case.run.time_step, expected_speed(params));
+    let bound = Bounds::new(params, speed).drag;
     let number = dt / bound;
     (!case.run.adaptive && number > DRAG_LIMIT).then(|| {
         let message = format!(
             "{dt} s is too long for the body `{}`, which viscosity and wall friction take along within {bound:.1e} s where it is under \
              water: from {DRAG_LIMIT} times that on it is unstable",
-            params.drag.body
+            params.drag.body(speed)
         );
         let remedy = format!("use {bound:.1e} s or less, or run.adaptive = true");
         Problem::new("run.time_step", message, remedy).into()

@@ -511,6 +511,9 @@ fn plan_tells_where_free_bodies_stand_and_what_they_weigh() {
     // No water is around it: nine kilograms are what it displaces in all.
     assert!(words.contains("displaces 9.000e0 kg of water when all under: it floats"), "{words}");
     let aloft = std::fs::read_to_string(&case).unwrap();
+    std::fs::write(&case, aloft.replace("density = 500", "density = 1000")).unwrap();
+    let words = ran(&["plan", &case]).out;
+    assert!(words.contains("of water when all under\n"), "as heavy as its water it does neither: {words}");
     let afloat = aloft.replace("center = [1.4, 0.2, 0.7]", "center = [0.3, 0.2, 0.45]");
     std::fs::write(&case, afloat.replace("density = 500", "density = 500\ndisplaces_fluid = true")).unwrap();
     let plan = ran(&["plan", &case, "--json"]);

@@ -1,5 +1,6 @@
 //! Bodies from files as they are used: a hull rights itself as its metacentric height has it, armour units come to rest.
 
+use crate::cli::{json, ran};
 use crate::common::dry::{Dry, G};
 use crate::common::{case, cpu_simulation};
 use crate::meshes::{Triangles, ball, cuboid, file, stl};
@@ -196,6 +197,14 @@ fn a_sealed_cavity_is_empty_unless_water_is_put_into_it() {
             }
         }
     }
+    // Of 1200 kg/m3 it weighs 7.5 kg, and displaces 8 with its cavity.
+    let case_file = folder.path().join("hull.toml");
+    let body = "density = 1200\ndisplaces_fluid = true";
+    std::fs::write(&case_file, [tank, around, &solid("body", &path, body)].concat()).expect("a case");
+    let plan = ran(&["plan", &case_file.to_string_lossy(), "--json"]);
+    let buoyancy = &json(&plan.out)["bodies"][0]["buoyancy"];
+    let kilograms = buoyancy["all_under_kg"].as_f64().expect(&plan.err);
+    assert!(buoyancy["floats"] == true && (kilograms - 8.0).abs() < 0.1, "{buoyancy}");
     // Along the lattice all cells on one side of a wall are as deep in it: neither side counts for the other.
     for off in [0.004, 0.006] {
         let upright = format!(

@@ -380,7 +380,7 @@ fn the_friction_of_walls_takes_a_body_along_by_its_surface() {
         );
         let case = case(&body);
         let drag = Params::new(&case, &Scene::build(&case).expect("builds")).expect("valid").drag;
-        assert!(drag.viscous == 0.0 && drag.body == "b", "{drag:?}");
+        assert!(drag.viscous == 0.0 && drag.body(1.0) == "b", "{drag:?}");
         drag.friction * s * a / (4.0 * 0.01)
     };
     for (a, s) in [(0.4, 0.01), (0.4, 2.0), (0.8, 0.1)] {

@@ -128,10 +128,11 @@ impl BodyLine {
 }
 
 /// The free bodies of `scene`, in water of this density [kg/m3].
-fn bodies(scene: &Scene, density: f64) -> Vec<BodyLine> {
+fn bodies(scene: &Scene, density: f64, built: bool) -> Vec<BodyLine> {
     let mut lines: Vec<BodyLine> = scene.solids.iter().filter_map(BodyLine::new).collect();
     let free = scene.solids.iter().filter(|solid| solid.is_free());
-    for (line, solid) in lines.iter_mut().zip(free).take(MOST_BODIES) {
+    // The level of a coarser scene is off by its spacing.
+    for (line, solid) in lines.iter_mut().zip(free).take(if built { MOST_BODIES } else { 0 }) {
         line.buoyancy = Buoyancy::new(scene, solid, density);
     }
     lines
@@ -331,7 +332,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         particles: count,
         solids: called(false),
         fixed_solids: called(true),
-        bodies: bodies(scene, params.density),
+        bodies: bodies(scene, params.density, built),
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },
@@ -414,7 +415,7 @@ fn fastest(case: &Case, scene: &Scene, params: &Params) -> f64 {
 fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) {
     let (typed, adaptive) = (case.run.time_step, case.run.adaptive);
     let bounds = Bounds::new(params, speed);
-    let body = format!("the drag on the body `{}`", params.drag.body);
+    let body = format!("the drag on the body `{}`", params.drag.body(speed));
     // Of next to no body: it is told where it says something.
     let drag = Some(bounds.drag).filter(|dt| *dt < typed).unwrap_or(f64::INFINITY);
     let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous), (&body, drag)];

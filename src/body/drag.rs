@@ -18,34 +18,38 @@ use crate::kernels::viscosity::{coefficient, pair_weight};
 use crate::params::Params;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Iterations that find the largest eigenvalue; it is among six, and half of it would do for the order of a step.
 const ITERATIONS: usize = 60;
 
-/// Of the body that the water takes along the fastest.
+/// Of the bodies that the water takes along the fastest, by viscosity and by friction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drag {
     /// Rate by viscosity [1/s].
     pub viscous: f64,
     /// Rate by the friction of its walls over the speed of the water past it [1/m].
     pub friction: f64,
-    /// Name of the body.
-    pub body: String,
+    /// Names of the two.
+    pub bodies: [String; 2],
 }
 
 impl Drag {
     /// Of the free bodies of `scene`; zero where none is, or nothing drags.
     pub fn new(scene: &Scene, params: &Params) -> Self {
         let dry = scene.groups.fluid == 0 || (params.viscosity == 0.0 && params.wall_friction == 0.0);
-        let free = scene.solids.iter().filter(|solid| !dry && solid.gives_way());
-        let each = free.map(|solid| Self::of(solid, params));
-        each.fold(Self::default(), |most, one| {
-            let first = (one.viscous, one.friction) > (most.viscous, most.friction);
+        let free: Vec<&Solid> = scene.solids.iter().filter(|solid| !dry && solid.gives_way()).collect();
+        let each: Vec<Self> = free.par_iter().map(|solid| Self::of(solid, params)).collect();
+        each.into_iter().fold(Self::default(), |most, one| {
+            let ([viscous, friction], [by_viscosity, by_friction]) = (most.bodies, one.bodies);
             Self {
                 viscous: most.viscous.max(one.viscous),
                 friction: most.friction.max(one.friction),
-                body: if first { one.body } else { most.body },
+                bodies: [
+                    if one.viscous > most.viscous { by_viscosity } else { viscous },
+                    if one.friction > most.friction { by_friction } else { friction },
+                ],
             }
         })
     }
@@ -53,6 +57,11 @@ impl Drag {
     /// The rate in water that goes past at `speed` [m/s] [1/s].
     pub fn rate(&self, speed: f64) -> f64 {
         self.viscous + self.friction * speed
+    }
+
+    /// Name of the body that has most of it.
+    pub fn body(&self, speed: f64) -> &str {
+        &self.bodies[usize::from(self.friction * speed > self.viscous)]
     }
 
     fn of(solid: &Solid, params: &Params) -> Self {
@@ -79,7 +88,7 @@ impl Drag {
             viscous.turn(params.density * params.viscosity, arm, area);
         }
         let [viscous, friction] = [viscous, friction].map(|resistance| resistance.rate(&body));
-        Self { viscous, friction, body: solid.name.clone() }
+        Self { viscous, friction, bodies: [0, 1].map(|_| solid.name.clone()) }
     }
 }
 

@@ -56,7 +56,8 @@ pub(crate) struct Body {
     /// Impulse [N s] and angular impulse [N m s] of contact since they were last taken, whether or not the solid gives
     /// way.
     pub touched: Wrench,
-    /// Velocity [m/s] and angular velocity [rad/s] that forces, without friction, have given it in the sub-step.
+    /// Velocity [m/s] and angular velocity [rad/s] that forces, without friction, have given it in the sub-step; zero of driven solids, whose
+    /// change of velocity counts as slip from before.
     pub forced: (DVec3, DVec3),
     /// Shape.
     pub shape: Shape,

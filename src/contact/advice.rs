@@ -60,7 +60,8 @@ impl Solids {
             Err(e) => words.extend([e.to_string(), format!("{numbers}: refused, see above")]),
         }
         // Where nothing can fall, nothing asks for one.
-        if let Some((wanted, soft)) = recommended.filter(|_| energy > 0.0) {
+        let recommended = recommended.filter(|_| energy > 0.0);
+        if let Some((wanted, soft)) = &recommended {
             words.push(format!(
                 "contact: the heaviest body ({heaviest:.3e} kg) at {:.1} m/s asks for a spring of about {wanted:.1e} \
                  N/m; the case has {spring:.1e}",

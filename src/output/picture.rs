@@ -94,7 +94,7 @@ pub struct Style {
     pub field: Field,
     /// Values of its first and last colour; from gravity and depth of the scene if absent.
     pub range: Option<[f64; 2]>,
-    /// Leave out all water but that within [`SLICE`] spacings of a plane: its axis and place [m].
+    /// Leave out all water but that within three quarters of a spacing of a plane: its axis and place [m].
     pub slice: Option<(usize, f64)>,
     /// Write time and colour bar.
     pub labels: bool,

@@ -151,8 +151,8 @@ pub struct WallShape {
     pub half: DVec3,
     /// Orientation of the box (columns are its axes in the world).
     pub axes: DMat3,
-    /// Where torques on it count about [m]: of a face of the tank the middle of its surface, without what of the layers reaches beyond; of a plane its
-    /// `center`, on its surface; else the centre.
+    /// Where torques on it count about [m]: of a face of the tank the middle of its surface, without what of the layers reaches beyond; of a plane the
+    /// `center` of the case, on its surface; else the centre of the box.
     pub middle: DVec3,
 }
 

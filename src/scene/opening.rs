@@ -258,7 +258,8 @@ impl Builder<'_> {
         Planned { opening, cells, wall }
     }
 
-    /// The walls that move in the openings, as solids that contact takes for still ones; after all others.
+    /// The walls that move in the openings, as solids that stand still; after all others. Laws of particles press on them, `smooth` on the tank's
+    /// wall.
     pub(super) fn opening_walls(&mut self) {
         let (lattice, layers) = (self.lattice, self.layers);
         let first = self.moving_walls.len();

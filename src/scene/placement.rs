@@ -20,6 +20,8 @@ const TOUCHING: f64 = 1e-4;
 
 /// What a body may hang above the next solid and stand on it all the same, over the spacing [-].
 const HANGING: f64 = 1e-3;
+/// The same where one of two is a prism or a mesh: they meet by points there, off the place where round ones touch.
+const HANGING_BY_POINTS: f64 = 0.1;
 
 /// Most steps on the way down to what a body hangs above.
 const MOST_STEPS: f64 = 2000.0;
@@ -90,13 +92,16 @@ impl Surroundings<'_> {
 
     /// Says so where a standing body has nothing under it, once all that was asked for is placed.
     pub fn hangs(&self, body: &Solid) -> Option<String> {
-        let up = self.up.filter(|_| body.is_free())?;
+        let up = self.up.filter(|_| body.gives_way())?;
         let mut lower = body.clone();
         let mut met = |way: f64| {
             lower.position = body.position - way * up;
             self.deepest(&lower).map(|contact| contact.with)
         };
-        let least = HANGING * self.spacing;
+        let reach = HANGING_BY_POINTS * self.spacing;
+        let near = self.obstructions(body, -up, reach);
+        let by_points = !body.shape.is_convex() || near.iter().any(|b| !b.placed.shape.is_convex());
+        let least = if by_points { reach } else { HANGING * self.spacing };
         if met(least).is_some() {
             return None;
         }
@@ -122,7 +127,8 @@ impl Surroundings<'_> {
             }
         }
         Some(format!(
-            "{says}: it would meet {with} {free:.6} m further down; lower its `center` by that, or leave `standing` out"
+            "{says}: it would meet {with} {} m further down; lower its `center` by that, or leave `standing` out",
+            metres(free)
         ))
     }
 

@@ -134,7 +134,7 @@ pub struct Axis {
 }
 
 /// Keys of what a case is about; others say how it is computed.
-const SCENE: [&str; 15] = [
+const SCENE: [&str; 17] = [
     "run.gravity",
     "tank",
     "obstacle",
@@ -150,6 +150,8 @@ const SCENE: [&str; 15] = [
     "fluid.shape",
     "fluid.fill",
     "contact.friction",
+    "contact.restitution",
+    "contact.viscous_friction",
 ];
 
 impl Axis {

@@ -210,8 +210,8 @@ pub fn report(
         for (scene, own) in &groups {
             let at = if scene.is_empty() { String::new() } else { format!("At {scene}: ") };
             let all = candidates(own, error, Cost::WallTime);
-            if let ([only], false) = (all.as_slice(), scene.is_empty()) {
-                report.findings.push(format!("{at}one setting, {}.", told(&own[only.row], only)));
+            if let ([only], false, None) = (all.as_slice(), scene.is_empty(), wanted) {
+                report.findings.push(format!("{at}one setting for {error}, {}.", told(&own[only.row], only)));
                 continue;
             }
             let bound = wanted.or_else(|| middle(&all));
@@ -230,13 +230,13 @@ pub fn report(
                     .push(format!("{at}Pareto front of {error}, cheapest first: {}.", best.join(" -> ")));
             }
         }
-        if groups.len() > 1 && !report.findings.is_empty() {
-            let axes: Vec<&str> = scenes.iter().copied().collect();
-            report.findings.push(format!(
-                "Scenes that differ in {} are not weighed against each other; `scene = false` in an [[axis]] makes its values settings to choose from.",
-                axes.join(", ")
-            ));
-        }
+    }
+    if groups.len() > 1 && !report.findings.is_empty() {
+        let axes: Vec<&str> = scenes.iter().copied().collect();
+        report.findings.push(format!(
+            "Scenes that differ in {} are not weighed against each other; `scene = false` in an [[axis]] makes its values settings to choose from.",
+            axes.join(", ")
+        ));
     }
     report
 }
@@ -334,8 +334,14 @@ mod tests {
             "{told:?}"
         );
         assert_eq!(lines, 2, "the methods, and no front");
+        let both =
+            report(("s", "t"), &rows, &["e [-]".into(), "e [-]".into()], &["density"].into(), None).findings;
+        assert_eq!(both.iter().filter(|told| told.starts_with("Scenes that differ")).count(), 1, "{both:?}");
         // One point each: nothing to choose from, and nothing is recommended.
         let (told, _) = findings(&rows, &["density", "spacing"], None);
-        assert!(told[..4].iter().all(|t| t.contains(": one setting, ") && !t.contains("take")), "{told:?}");
+        assert!(
+            told[..4].iter().all(|t| t.contains(": one setting for ") && !t.contains("take")),
+            "{told:?}"
+        );
     }
 }

@@ -17,7 +17,7 @@ pub struct Buoyancy {
     all_under_kg: f64,
     /// The same as it stands; nothing where there is no water around it.
     as_it_stands_kg: Option<f64>,
-    /// Whether it floats; nothing for one that is held.
+    /// Whether it floats; nothing for one that is held, or as heavy as its water.
     floats: Option<bool>,
     /// How much lower it floats than it stands, as it is turned [m].
     lower_m: Option<f64>,
@@ -36,20 +36,35 @@ impl Buoyancy {
         let center = solid.shape_center();
         let spread = (0..POINTS).map(|k| (DVec3::splat(0.5) + f64::from(k) * SPREAD).fract());
         let points = spread.map(|part| low + part * (high - low));
-        let inside = points.filter(|p| solid.shape.outside(axes.transpose() * *p) < 0.0);
+        // What a sealed cavity keeps out is displaced too.
+        let inside = points.filter(|p| {
+            let q = axes.transpose() * *p;
+            solid.shape.outside(q) < 0.0 || solid.shape.in_cavity(q)
+        });
         let mut heights: Vec<f64> = inside.map(|p| (center + p).dot(up)).collect();
         heights.sort_by(f64::total_cmp);
         if heights.is_empty() {
             return None;
         }
-        let all = density * solid.shape.volume();
-        let level = level(scene, (center + low, center + high), up);
+        let volume = if solid.shape.has_cavities() {
+            (high - low).element_product() * heights.len() as f64 / f64::from(POINTS)
+        } else {
+            solid.shape.volume()
+        };
+        let all = density * volume;
+        // Ballast in a cavity goes with the body.
+        let held = |x: DVec3| solid.shape.in_cavity(axes.transpose() * (x - center));
+        let ballast =
+            if solid.shape.has_cavities() { water(scene).filter(|x| held(*x)).count() as f64 } else { 0.0 };
+        let mass = free.mass + ballast * density * scene.spacing.powi(3);
+        let level = level(scene, (center + low, center + high), up, held);
         let under = |level: f64| heights.partition_point(|h| *h <= level) as f64 / heights.len() as f64;
         let moves = (0..3).all(|k| up[k].abs() < 1e-9 || !free.locked_translation[k]);
-        let floats = (moves && free.mass > 0.0).then_some(free.mass < all);
-        let line = floats
-            .filter(|floats| *floats)
-            .map(|_| heights[(free.mass / all * heights.len() as f64) as usize]);
+        // One as heavy as its water does neither.
+        let apart = (mass - all).abs() > 1e-3 * all;
+        let floats = (moves && mass > 0.0 && apart).then_some(mass < all);
+        let line =
+            floats.filter(|floats| *floats).map(|_| heights[(mass / all * heights.len() as f64) as usize]);
         Some(Self {
             all_under_kg: all,
             as_it_stands_kg: level.map(|level| all * under(level)),
@@ -63,7 +78,7 @@ impl Buoyancy {
         let here = self.as_it_stands_kg.map_or(String::new(), |kg| format!(", {kg:.3e} kg as it stands"));
         let end = match (self.floats, self.lower_m) {
             (None, _) => String::new(),
-            (Some(false), _) => ": it sinks".into(),
+            (Some(false), _) => ": its own volume does not carry it".into(),
             (Some(true), None) => ": it floats".into(),
             // No more than is told.
             (Some(true), Some(lower)) if 2.0 * lower.abs() < 0.1_f64.powi(places as i32) => {
@@ -78,13 +93,17 @@ impl Buoyancy {
     }
 }
 
-/// Height along `up` [m] of the water within two spacings of a box, beside or below it; none where there is none.
-fn level(scene: &Scene, (low, high): (DVec3, DVec3), up: DVec3) -> Option<f64> {
+/// Places of the water's particles [m].
+fn water(scene: &Scene) -> impl Iterator<Item = DVec3> {
+    (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid).map(|i| scene.position[i])
+}
+
+/// Height along `up` [m] of the water within two spacings of a box, beside or below it, but for what the body has `held`; none where there is none.
+fn level(scene: &Scene, (low, high): (DVec3, DVec3), up: DVec3, held: impl Fn(DVec3) -> bool) -> Option<f64> {
     let beside = |x: DVec3| {
         let out = (low - x).max(x - high).max(DVec3::ZERO);
         (out - out.dot(up.abs()) * up.abs()).length() < 2.0 * scene.spacing
     };
-    let water = (0..scene.groups.fluid).filter(|&i| scene.kind[i] == Kind::Fluid).map(|i| scene.position[i]);
-    let top = water.filter(|x| beside(*x)).map(|x| x.dot(up)).reduce(f64::max)?;
+    let top = water(scene).filter(|x| beside(*x) && !held(*x)).map(|x| x.dot(up)).reduce(f64::max)?;
     Some(top + 0.5 * scene.spacing)
 }

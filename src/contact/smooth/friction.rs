@@ -20,7 +20,7 @@
 //!
 //! which is of second order in h, never turns a slip round, stops it as eta grows, and has the slip X^-1 d of a steady slide for any h. A Coulomb
 //! impulse j of the patch is A j more of d: the patch then answers with D^-1 (1 + X / 2) A instead of A, and
-//! sticks below the same limit as without drag, which is nothing on what stands.
+//! sticks below the same limit as without drag, which is nothing on what stands. Patches of one body follow one another, each with its share of d.
 
 use super::coulomb::{ARM, System, root_of, sticks};
 use super::pair::{Other, Pair};
@@ -85,6 +85,8 @@ struct Slip {
 pub(crate) struct Friction {
     /// Patches with friction, of the last sub-step.
     slips: Vec<Slip>,
+    /// Normal force of all patches of each body, and of those that are dragged already [N].
+    pressed: Vec<[f64; 2]>,
 }
 
 impl Friction {
@@ -92,6 +94,14 @@ impl Friction {
     /// pairs' normal forces.
     pub fn apply(&mut self, pairs: &[Pair], bodies: &mut [Body], eta: f64, h: f64) {
         self.slips.clear();
+        if eta > 0.0 {
+            self.pressed.clear();
+            self.pressed.resize(bodies.len(), [0.0; 2]);
+            for pair in pairs {
+                let all: f64 = pair.patches.iter().map(|p| p.force).sum();
+                pair.bodies().for_each(|k| self.pressed[k][0] += all);
+            }
+        }
         for pair in pairs {
             let mu = pair.constants.friction;
             if mu == 0.0 && eta == 0.0 {
@@ -101,16 +111,17 @@ impl Friction {
             for patch in &pair.patches {
                 let mut slip = Slip::new(pair, patch, bodies, mu * patch.force * h);
                 if eta > 0.0 && all > 0.0 {
-                    slip.drag(bodies, eta * h * patch.force / all);
+                    pair.bodies().for_each(|k| self.pressed[k][1] += patch.force);
+                    slip.drag(bodies, eta * h * patch.force / all, patch.force, &self.pressed);
                 }
                 self.slips.push(slip);
             }
         }
-        let rubs = |slip: &&mut Slip| slip.cap > 0.0;
-        let sweeps = if self.slips.iter_mut().filter(rubs).count() == 1 { 1 } else { SWEEPS };
+        let rubbing = self.slips.iter().filter(|slip| slip.cap > 0.0).count();
+        let sweeps = if rubbing == 1 { 1 } else { SWEEPS };
         for _ in 0..sweeps {
             let mut open = false;
-            for slip in self.slips.iter_mut().filter(rubs) {
+            for slip in self.slips.iter_mut().filter(|slip| slip.cap > 0.0) {
                 open |= slip.solve(bodies);
             }
             if !open {
@@ -193,19 +204,19 @@ impl Slip {
     }
 
     /// Slip of `a` against `b`, each with the velocity and the angular velocity that `of` tells: two velocities and the spin times the arm [m/s].
-    fn slip(&self, bodies: &[Body], of: impl Fn(&Body) -> (DVec3, DVec3)) -> DVec3 {
-        let parts = |body: &Body, arm: DVec3| {
+    fn slip(&self, of: impl Fn(usize) -> (DVec3, DVec3)) -> DVec3 {
+        let parts = |body: usize, arm: DVec3| {
             let (velocity, turning) = of(body);
             let v = velocity + turning.cross(arm);
             DVec3::new(v.dot(self.tangent[0]), v.dot(self.tangent[1]), turning.dot(self.spin))
         };
-        let b = self.b.solid().map_or(DVec3::ZERO, |b| parts(&bodies[b], self.arm_b));
-        parts(&bodies[self.a], self.arm_a) - b
+        let b = self.b.solid().map_or(DVec3::ZERO, |b| parts(b, self.arm_b));
+        parts(self.a, self.arm_a) - b
     }
 
     /// The slip as it is [m/s].
     fn velocity(&self, bodies: &[Body]) -> DVec3 {
-        self.slip(bodies, |body| (body.pose.velocity, body.pose.angular_velocity))
+        self.slip(|k| (bodies[k].pose.velocity, bodies[k].pose.angular_velocity))
     }
 
     /// One visit: the patch's impulse for the velocities as they are. Whether it changed.
@@ -241,13 +252,19 @@ impl Slip {
         change.length() > TOLERANCE * self.cap
     }
 
-    /// Drag `eta_h` [kg] times the slip, and its part in what Coulomb friction is yet to do.
-    fn drag(&mut self, bodies: &mut [Body], eta_h: f64) {
+    /// Drag `eta_h` [kg] times the slip, and its part in what Coulomb friction is yet to do. Of what the forces of the sub-step have changed it
+    /// takes the share of its normal `force` [N] in all that is `pressed` on a body, and leaves that of later patches to them.
+    fn drag(&mut self, bodies: &mut [Body], eta_h: f64, force: f64, pressed: &[[f64; 2]]) {
+        let of = |k: usize, share: f64| {
+            let (velocity, turning) = bodies[k].forced;
+            (share * velocity, share * turning)
+        };
+        let forced = self.slip(|k| of(k, force / pressed[k][0]));
+        let later = self.slip(|k| of(k, 1.0 - pressed[k][1] / pressed[k][0]));
         let x = eta_h * self.response;
         let half = DMat3::IDENTITY + 0.5 * x;
         let damped = (half + 0.5 * x + 0.5 * x * x).inverse();
-        let forced = self.slip(bodies, |body| body.forced);
-        self.drag = -eta_h * (damped * (half * self.velocity(bodies) - 0.5 * forced));
+        self.drag = -eta_h * (damped * (half * (self.velocity(bodies) - later) - 0.5 * forced));
         self.dragged = Some(damped * half);
         self.response = damped * half * self.response;
         self.inverse = self.response.inverse();

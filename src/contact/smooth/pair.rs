@@ -80,6 +80,11 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
+    /// The solids of it that move.
+    pub fn bodies(&self) -> impl Iterator<Item = usize> {
+        std::iter::once(self.a).chain(self.b.solid())
+    }
+
     pub fn new(a: usize, b: Other, image: DVec3) -> Self {
         Self {
             a,
