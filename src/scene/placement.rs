@@ -381,7 +381,8 @@ fn metres(length: f64) -> String {
 /// The same, but rounded up: whoever goes that far has gone far enough.
 fn at_least(length: f64) -> String {
     let unit = if length < 1e-3 { 10_f64.powi(length.log10().floor() as i32 - 2) } else { 1e-6 };
-    metres((length / unit).ceil() * unit)
+    // What is a whole number of units but for rounding is none more.
+    metres((length / unit - 1e-6).ceil() * unit)
 }
 
 /// A point for messages: four decimals, and as many more as its largest coordinate needs.
@@ -398,7 +399,7 @@ mod tests {
     #[test]
     fn lengths_and_points_are_told_at_any_scale() {
         let lengths =
-            [(0.0100002, "0.010001"), (0.00561, "0.005610"), (5.001e-8, "5.01e-8"), (9.999e-4, "1.00e-3")];
+            [(0.0100002, "0.010001"), (0.00561, "0.005610"), (5.001e-8, "5.01e-8"), (9.999e-4, "0.001000")];
         for (length, told) in lengths {
             let told_length: f64 = at_least(length).parse().expect("a number");
             assert!(at_least(length) == told && told_length >= length, "{length}: {}", at_least(length));
