@@ -49,7 +49,9 @@ fn a_drag_of_any_strength_stops_a_block_and_lets_it_creep_on_a_slope() {
                 force.x
             );
             assert!((speed - creeps).abs() < 1e-3 * creeps + 1e-12, "{friction} {eta}: {speed} for {creeps}");
-            assert!(slowest > -1e-12, "{friction} {eta}: {slowest}");
+            // Patches follow one another: a stop on two swings back by less than a hundredth of what a step's gravity gives.
+            let back = if rails { 1e-2 * 1e-3 * G * tilt.sin() } else { 1e-12 };
+            assert!(slowest > -back, "{friction} {eta}: {slowest}");
             let weight = 1.728 * G * tilt.sin();
             assert!((force.x + weight).abs() < 1e-3 * weight, "{friction} {eta}: {force} for {weight}");
         }
