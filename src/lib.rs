@@ -78,6 +78,7 @@ pub mod compute;
 pub mod console;
 pub mod contact;
 mod cover;
+pub mod drag;
 pub mod error;
 pub mod estimate;
 mod extents;

@@ -1,6 +1,5 @@
 //! Constants of a run: the scheme's switches, what follows from the initial lattice, the step's coefficients.
 
-use crate::body::drag::Drag;
 use crate::case::{self, Case, Fluid, Preset};
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, Shear};
@@ -77,6 +76,29 @@ impl Zone {
     }
 }
 
+/// Of the bodies that the water takes along the fastest, by viscosity and by friction.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Drag {
+    /// Rate by viscosity [1/s].
+    pub viscous: f64,
+    /// Rate by the friction of its walls over the speed of the water past it [1/m].
+    pub friction: f64,
+    /// Names of the two.
+    pub bodies: [String; 2],
+}
+
+impl Drag {
+    /// The rate in water that goes past at `speed` [m/s] [1/s].
+    pub fn rate(&self, speed: f64) -> f64 {
+        self.viscous + self.friction * speed
+    }
+
+    /// Name of the body that has most of it.
+    pub fn body(&self, speed: f64) -> &str {
+        &self.bodies[usize::from(self.friction * speed > self.viscous)]
+    }
+}
+
 /// Constants of a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Params {
@@ -114,7 +136,7 @@ pub struct Params {
     pub body_wall: usize,
     /// Friction of walls, C_f over l0 and [`Lattice::wall_contact`] [1/m].
     pub wall_friction: f64,
-    /// How fast the water takes the lightest body along.
+    /// How fast the water takes bodies along: of [`crate::drag::params`], else zero.
     pub drag: Drag,
     /// Free-surface threshold beta [-]; 0, which no density is below, where the water fills all its room.
     pub free_surface_threshold: f64,
@@ -265,7 +287,7 @@ impl Params {
             domain_max: scene.domain.1,
             periodic,
         };
-        Ok(Self { drag: Drag::new(scene, &params), ..params })
+        Ok(params)
     }
 
     /// Depth below the water's surface at which P = 0 holds [m].

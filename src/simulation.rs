@@ -129,7 +129,7 @@ impl Simulation {
         make: impl FnOnce(&Arc<Scene>, &Params, &Plan, Settings) -> Result<Box<dyn Backend>>,
     ) -> Result<Self> {
         let scene: Arc<Scene> = scene.into();
-        let params = Params::new(case, &scene)?;
+        let params = crate::drag::params(case, &scene)?;
         let fastest = params.speed_at_start;
         let plan = Plan::new(case, &scene, &params);
         let settings = settings(case);

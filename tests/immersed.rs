@@ -379,7 +379,7 @@ fn the_friction_of_walls_takes_a_body_along_by_its_surface() {
             1000.0 * s
         );
         let case = case(&body);
-        let drag = Params::new(&case, &Scene::build(&case).expect("builds")).expect("valid").drag;
+        let drag = seixo::drag::params(&case, &Scene::build(&case).expect("builds")).expect("valid").drag;
         assert!(drag.viscous == 0.0 && drag.body(1.0) == "b", "{drag:?}");
         drag.friction * s * a / (4.0 * 0.01)
     };

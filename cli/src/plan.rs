@@ -254,7 +254,7 @@ pub fn plan(args: &PlanArgs) -> Exit {
 
 fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let (case, scene, built) = (&seen.case, &seen.setup.scene, seen.coarser == 1.0);
-    let params = Params::new(case, scene)?;
+    let params = seixo::drag::params(case, scene)?;
     let plan = Plan::new(case, scene, &params);
     let speed = fastest(case, scene, &params);
     let dt = shortest(case, scene, &params);

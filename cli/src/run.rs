@@ -18,7 +18,6 @@ use seixo::machine;
 use seixo::output::digits::{of_moment, of_place, of_time};
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
-use seixo::params::Params;
 use seixo::ranks::Team;
 use seixo::run::resume::{Standing, standing};
 use seixo::run::{Options, Start, run as run_simulation};
@@ -205,7 +204,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     let setup = Setup::build(loaded, asked.name.clone(), args.quiet)?;
     if !matches!(start, Start::Resume(_)) {
         let case = &setup.loaded.case;
-        let params = Params::new(case, &setup.scene).map_err(|e| setup.loaded.placed(e))?;
+        let params = seixo::drag::params(case, &setup.scene).map_err(|e| setup.loaded.placed(e))?;
         fits_disk(args, &asked, case, shortest(case, &setup.scene, &params))?;
     }
     call.tell(&setup.loaded.text);

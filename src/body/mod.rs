@@ -4,7 +4,6 @@
 //! follows from the momentum and the orientation, so that a free body keeps its momentum to round-off
 //! while it tumbles. A prescribed solid is a body of infinite mass that follows its table.
 
-pub mod drag;
 mod pose;
 pub mod slots;
 mod turn;

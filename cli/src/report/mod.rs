@@ -22,7 +22,6 @@ use seixo::output::folder::case_name;
 use seixo::output::replay::Frame;
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
-use seixo::params::Params;
 use seixo::scene::Scene;
 use seixo::time_step::{Bounds, expected_speed};
 use serde_json::Value;
@@ -374,7 +373,7 @@ fn limits(run: &Run) -> Result<String> {
         return Ok(String::new());
     };
     let scene = Scene::build(&run.case)?;
-    let params = Params::new(&run.case, &scene)?;
+    let params = seixo::drag::params(&run.case, &scene)?;
     let bounds = Bounds::new(&params, expected_speed(&params));
     let same = |a: f64, b: f64| (a - b).abs() < 1e-6 * b;
     let mut counts = [

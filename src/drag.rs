@@ -11,85 +11,72 @@
 //! sum k v^2 + sum k (J u)^2, so that no eigenvalue of body and water together is more than twice the larger of theirs. The water
 //! that moves along with the body (its added mass) is left out: turns of round bodies have none.
 
-use super::{Body, Wrench};
+use crate::body::{Body, Wrench};
+use crate::case::Case;
 use crate::contact::broad::PointGrid;
+use crate::error::Result;
 use crate::kernels::number_density;
 use crate::kernels::viscosity::{coefficient, pair_weight};
-use crate::params::Params;
+use crate::params::{Drag, Params};
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// Iterations that find the largest eigenvalue; it is among six, and half of it would do for the order of a step.
 const ITERATIONS: usize = 60;
 
-/// Of the bodies that the water takes along the fastest, by viscosity and by friction.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Drag {
-    /// Rate by viscosity [1/s].
-    pub viscous: f64,
-    /// Rate by the friction of its walls over the speed of the water past it [1/m].
-    pub friction: f64,
-    /// Names of the two.
-    pub bodies: [String; 2],
+/// The constants of a run of `case` in `scene`, with what bounds its steps.
+///
+/// # Errors
+/// Those of [`Params::new`].
+pub fn params(case: &Case, scene: &Scene) -> Result<Params> {
+    let params = Params::new(case, scene)?;
+    Ok(Params { drag: of_bodies(scene, &params), ..params })
 }
 
-impl Drag {
-    /// Of the free bodies of `scene`; zero where none is, or nothing drags.
-    pub fn new(scene: &Scene, params: &Params) -> Self {
-        let dry = scene.groups.fluid == 0 || (params.viscosity == 0.0 && params.wall_friction == 0.0);
-        let free: Vec<&Solid> = scene.solids.iter().filter(|solid| !dry && solid.gives_way()).collect();
-        let each: Vec<Self> = free.par_iter().map(|solid| Self::of(solid, params)).collect();
-        each.into_iter().fold(Self::default(), |most, one| {
-            let ([viscous, friction], [by_viscosity, by_friction]) = (most.bodies, one.bodies);
-            Self {
-                viscous: most.viscous.max(one.viscous),
-                friction: most.friction.max(one.friction),
-                bodies: [
-                    if one.viscous > most.viscous { by_viscosity } else { viscous },
-                    if one.friction > most.friction { by_friction } else { friction },
-                ],
-            }
-        })
-    }
-
-    /// The rate in water that goes past at `speed` [m/s] [1/s].
-    pub fn rate(&self, speed: f64) -> f64 {
-        self.viscous + self.friction * speed
-    }
-
-    /// Name of the body that has most of it.
-    pub fn body(&self, speed: f64) -> &str {
-        &self.bodies[usize::from(self.friction * speed > self.viscous)]
-    }
-
-    fn of(solid: &Solid, params: &Params) -> Self {
-        let body = Body::new(solid, params.dimensions);
-        let own = solid.wall_offset.iter().chain(&solid.dummy_offset).copied().collect();
-        let own = PointGrid::new(own, params.effective_radius);
-        let (mut viscous, mut friction) = (Resistance::default(), Resistance::default());
-        let shear = coefficient(params) * params.shear.wall;
-        for (k, &x) in solid.wall_offset.iter().enumerate() {
-            // Water stands where the body's own particles do not.
-            let (mut sheared, mut rubbed) = (params.shear.sum, params.number_density);
-            own.near(x, params.effective_radius, |n| {
-                let r2 = own.point(n).distance_squared(x);
-                if r2 > 0.0 {
-                    sheared -= pair_weight(r2, params);
-                    rubbed -= number_density::pair_weight(r2, params);
-                }
-            });
-            let (at, to_surface) = (solid.orientation * x, solid.orientation * solid.wall_to_surface[k]);
-            let arm = at + to_surface;
-            viscous.add(params.particle_mass() * shear * sheared.max(0.0), at, arm);
-            friction.add(params.particle_mass() * params.wall_friction * rubbed.max(0.0), at, arm);
-            let area = solid.orientation * solid.wall_area[k];
-            viscous.turn(params.density * params.viscosity, arm, area);
+/// Of the free bodies of `scene`; zero where none is, or nothing drags.
+fn of_bodies(scene: &Scene, params: &Params) -> Drag {
+    let dry = scene.groups.fluid == 0 || (params.viscosity == 0.0 && params.wall_friction == 0.0);
+    let free: Vec<&Solid> = scene.solids.iter().filter(|solid| !dry && solid.gives_way()).collect();
+    let each: Vec<Drag> = free.par_iter().map(|solid| of(solid, params)).collect();
+    each.into_iter().fold(Drag::default(), |most, one| {
+        let ([viscous, friction], [by_viscosity, by_friction]) = (most.bodies, one.bodies);
+        Drag {
+            viscous: most.viscous.max(one.viscous),
+            friction: most.friction.max(one.friction),
+            bodies: [
+                if one.viscous > most.viscous { by_viscosity } else { viscous },
+                if one.friction > most.friction { by_friction } else { friction },
+            ],
         }
-        let [viscous, friction] = [viscous, friction].map(|resistance| resistance.rate(&body));
-        Self { viscous, friction, bodies: [0, 1].map(|_| solid.name.clone()) }
+    })
+}
+
+fn of(solid: &Solid, params: &Params) -> Drag {
+    let body = Body::new(solid, params.dimensions);
+    let own = solid.wall_offset.iter().chain(&solid.dummy_offset).copied().collect();
+    let own = PointGrid::new(own, params.effective_radius);
+    let (mut viscous, mut friction) = (Resistance::default(), Resistance::default());
+    let shear = coefficient(params) * params.shear.wall;
+    for (k, &x) in solid.wall_offset.iter().enumerate() {
+        // Water stands where the body's own particles do not.
+        let (mut sheared, mut rubbed) = (params.shear.sum, params.number_density);
+        own.near(x, params.effective_radius, |n| {
+            let r2 = own.point(n).distance_squared(x);
+            if r2 > 0.0 {
+                sheared -= pair_weight(r2, params);
+                rubbed -= number_density::pair_weight(r2, params);
+            }
+        });
+        let (at, to_surface) = (solid.orientation * x, solid.orientation * solid.wall_to_surface[k]);
+        let arm = at + to_surface;
+        viscous.add(params.particle_mass() * shear * sheared.max(0.0), at, arm);
+        friction.add(params.particle_mass() * params.wall_friction * rubbed.max(0.0), at, arm);
+        let area = solid.orientation * solid.wall_area[k];
+        viscous.turn(params.density * params.viscosity, arm, area);
     }
+    let [viscous, friction] = [viscous, friction].map(|resistance| resistance.rate(&body));
+    Drag { viscous, friction, bodies: [0, 1].map(|_| solid.name.clone()) }
 }
 
 /// D, by its sums.
