@@ -246,7 +246,7 @@ impl Params {
         // The paper's source takes the density's deviation for the pressure: its mean is the level.
         let filled = scene.filled && source == Source::Mixed;
         let friction = fluid.and_then(|f| f.wall_friction).unwrap_or(if paper { 0.0 } else { WALL_FRICTION });
-        let params = Self {
+        Ok(Self {
             dimensions: run.dimensions,
             spacing: l0,
             effective_radius: re * l0,
@@ -286,8 +286,7 @@ impl Params {
             domain_min: scene.domain.0,
             domain_max: scene.domain.1,
             periodic,
-        };
-        Ok(params)
+        })
     }
 
     /// Depth below the water's surface at which P = 0 holds [m].

@@ -127,13 +127,13 @@ impl BodyLine {
     }
 }
 
-/// The free bodies of `scene`, in water of this density [kg/m3].
-fn bodies(scene: &Scene, density: f64, built: bool) -> Vec<BodyLine> {
+/// The free bodies of `scene`, in the water of `params` unless the scene is a coarser one.
+fn bodies(scene: &Scene, params: &Params, built: bool) -> Vec<BodyLine> {
     let mut lines: Vec<BodyLine> = scene.solids.iter().filter_map(BodyLine::new).collect();
     let free = scene.solids.iter().filter(|solid| solid.is_free());
     // The level of a coarser scene is off by its spacing.
     for (line, solid) in lines.iter_mut().zip(free).take(if built { MOST_BODIES } else { 0 }) {
-        line.buoyancy = Buoyancy::new(scene, solid, density);
+        line.buoyancy = Buoyancy::new(scene, solid, params);
     }
     lines
 }
@@ -332,7 +332,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         particles: count,
         solids: called(false),
         fixed_solids: called(true),
-        bodies: bodies(scene, params.density, built),
+        bodies: bodies(scene, &params, built),
         waves: scene.solids.iter().filter_map(|s| WaveLine::new(s, params.spacing)).collect(),
         stages: stages.collect(),
         contact: ContactLine { device: plan.contact.program.is_some(), reason: plan.contact.reason.clone() },

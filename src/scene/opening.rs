@@ -235,7 +235,7 @@ impl Builder<'_> {
             // To the sides a spacing more, for what has been pressed between the particles of the wall.
             (box_behind(4.0 * f64::from(self.layers) * l0, l0), None)
         };
-        let is_hole = passes == Passes::Free;
+        let is_hole = keys.is_hole();
         let mut opening = Opening {
             name: keys.name.to_owned(),
             passes,

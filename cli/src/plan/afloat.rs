@@ -1,6 +1,7 @@
 //! Whether a body floats, and where: what its shape displaces, by points spread evenly in it.
 
 use glam::{DMat3, DVec3};
+use seixo::params::Params;
 use seixo::scene::{Drive, Kind, Scene, Solid};
 use serde::Serialize;
 
@@ -24,8 +25,8 @@ pub struct Buoyancy {
 }
 
 impl Buoyancy {
-    /// Of a free body in water of this `density` [kg/m3]; none without gravity or water.
-    pub fn new(scene: &Scene, solid: &Solid, density: f64) -> Option<Self> {
+    /// Of a free body in the water of `params`; none without gravity or water.
+    pub fn new(scene: &Scene, solid: &Solid, params: &Params) -> Option<Self> {
         let Drive::Free(free) = &solid.drive else { return None };
         let up = -scene.gravity.normalize_or_zero();
         if up == DVec3::ZERO || scene.groups.fluid == 0 {
@@ -51,12 +52,11 @@ impl Buoyancy {
         } else {
             solid.shape.volume()
         };
-        let all = density * volume;
+        let all = params.density * volume;
         // Ballast in a cavity goes with the body.
         let held = |x: DVec3| solid.shape.in_cavity(axes.transpose() * (x - center));
-        let ballast =
-            if solid.shape.has_cavities() { water(scene).filter(|x| held(*x)).count() as f64 } else { 0.0 };
-        let mass = free.mass + ballast * density * scene.spacing.powi(3);
+        let ballast = water(scene).filter(|x| held(*x)).count() as f64 * params.particle_mass();
+        let mass = free.mass + ballast;
         let level = level(scene, (center + low, center + high), up, held);
         let under = |level: f64| heights.partition_point(|h| *h <= level) as f64 / heights.len() as f64;
         let moves = (0..3).all(|k| up[k].abs() < 1e-9 || !free.locked_translation[k]);

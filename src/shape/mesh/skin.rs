@@ -169,9 +169,11 @@ impl<'a> Skin<'a> {
         // Inside an edge, where the layers of two faces meet, either may be the nearest one.
         let is_between = way.length() >= depth - BETWEEN * self.spacing;
         let sound = inside && (is_between || nearest.distance(at) <= off);
-        let known = self.mesh.planes.as_ref().and_then(|planes| planes.distance(x));
-        let outward = known.map_or_else(|| way.normalize_or(outward), |known| known.1);
-        sound.then(|| Place { at: x, inside: (way.length(), outward), fixed: false })
+        sound.then(|| {
+            let known = self.mesh.planes.as_ref().and_then(|planes| planes.distance(x));
+            let outward = known.map_or_else(|| way.normalize_or(outward), |known| known.1);
+            Place { at: x, inside: (way.length(), outward), fixed: false }
+        })
     }
 
     /// Places of the layer at `depth` [m]. Those of `offered`, of the lattice that fills the mesh, stand where its faces have none of their own;
