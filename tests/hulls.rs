@@ -105,23 +105,46 @@ fn sides_at_45_degrees_have_a_particle_for_each_square_of_the_spacing() {
 
 /// Where the layers of two faces meet inside an edge either face may be taken for the nearest one. Particles between the rows there are
 /// too many: the wall's pressure beside them was three times that of still water.
+/// Most of 1 - d / l0 that the neighbours of a particle of a wall layer sum up to: at the edge of two faces, whose rows stand a spacing from
+/// it, or on a lattice 0, of one between two rows 1 and more.
+fn crowding(shape: &str, l0: f64) -> f64 {
+    let scene = Scene::build(&case(&format!(
+        "[run]\nspacing = {l0}\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [0.5, 0.6, 0.5]\n\
+         [[obstacle]]\nname = \"body\"\n{shape}\n"
+    )));
+    let layer = &scene.expect("builds").solids[0].wall_offset;
+    let crowd =
+        |x: &DVec3| -> f64 { layer.iter().map(|y| (1.0 - x.distance(*y) / l0).max(0.0)).sum::<f64>() - 1.0 };
+    layer.iter().map(crowd).fold(0.0, f64::max)
+}
+
 #[test]
 fn no_particle_stands_between_the_rows_along_an_edge() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = file(&folder, "hull.stl", &stl(&hull()));
+    let hull = format!("shape = \"mesh\"\nfile = \"{path}\"\nposition = [0.04, 0.28, 0.1]");
     for l0 in [0.01, 0.0125, 0.014, 0.02] {
-        let scene = Scene::build(&case(&format!(
-            "[run]\nspacing = {l0}\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [0.28, 0.56, 0.42]\n\
-             [[obstacle]]\nname = \"hull\"\nshape = \"mesh\"\nfile = \"{path}\"\nposition = [0.04, 0.28, 0.1]\n"
-        )));
-        let layer = &scene.expect("builds").solids[0].wall_offset;
-        // Of a row along an edge, with the rows of both faces a spacing away, none is nearer than a spacing.
-        let crowd = |x: &DVec3| -> f64 {
-            layer.iter().map(|y| (1.0 - x.distance(*y) / l0).max(0.0)).sum::<f64>() - 1.0
-        };
-        let most = layer.iter().map(crowd).fold(0.0, f64::max);
-        println!("{l0} {most} {}", layer.len());
+        let most = crowding(&hull, l0);
         assert!(most < 0.6, "{most} at {l0} m");
+    }
+}
+
+/// What the lattices of two faces leave between them where they meet at an angle is no whole number of particles.
+#[test]
+fn a_particle_has_more_than_half_of_its_room_where_lattices_meet() {
+    let at = "center = [0.25, 0.3, 0.25]\nsize = [0.2, 0.16, 0.12]";
+    for shape in [
+        format!("shape = \"wedge\"\n{at}"),
+        "shape = \"cone\"\ncenter = [0.25, 0.3, 0.25]\nradius = 0.1\nheight = 0.2".into(),
+        "shape = \"prism\"\nposition = [0.15, 0.4, 0.15]\nheight = 0.2\n\
+         section = [[0, 0], [0.2, 0], [0.25, 0.1], [0.1, 0.2], [-0.05, 0.1]]"
+            .into(),
+    ] {
+        for l0 in [0.01, 0.0125, 0.02] {
+            let most = crowding(&shape, l0);
+            println!("{most}");
+            assert!(most < 0.6, "{most} at {l0} m of {shape}");
+        }
     }
 }
 

@@ -23,6 +23,9 @@ const STRIDE: f64 = 0.3;
 const ROUNDS: usize = 15;
 const LOOKS: usize = 2;
 const MARGIN: f64 = 0.5;
+/// Sum of 1 - d / l0 over neighbours nearer than a spacing from which on a particle is one too many: 0 on a lattice, 1.2 in the middle of its
+/// squares.
+const CROWDED: f64 = 0.5;
 /// A piece of the surface that goes to one particle is no longer, over the spacing.
 const PIECE: f64 = 0.4;
 
@@ -175,8 +178,31 @@ fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Pl
                 put.unwrap_or_else(|| if last { p.settled(mesh) } else { *p })
             })
             .collect();
+        if !last {
+            places = without_crowded(places, spacing);
+        }
     }
     places
+}
+
+/// `places` without those that may be moved and lack [`CROWDED`] of their room: what lattices leave between them is no whole number of
+/// particles.
+fn without_crowded(places: Vec<Place>, spacing: f64) -> Vec<Place> {
+    let mut cells = PointCells::new(spacing);
+    places.iter().for_each(|p| cells.add(p.at));
+    let mut stays = vec![true; places.len()];
+    let crowd = |k: usize, stays: &[bool]| -> f64 {
+        let others = cells.within(places[k].at, spacing).filter(|&(j, _)| j != k && stays[j]);
+        others.map(|(_, distance)| 1.0 - distance / spacing).sum()
+    };
+    let loose = (0..places.len()).filter(|&k| !places[k].fixed);
+    let mut crowded: Vec<(f64, usize)> = loose.map(|k| (crowd(k, &stays), k)).collect();
+    crowded.retain(|c| c.0 > CROWDED);
+    crowded.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, k) in crowded {
+        stays[k] = crowd(k, &stays) <= CROWDED;
+    }
+    places.into_iter().zip(stays).filter_map(|(place, stays)| stays.then_some(place)).collect()
 }
 
 /// The surface in small pieces, of which none is longer than [`PIECE`]: triangles, halved across their longest edge.
