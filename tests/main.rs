@@ -47,6 +47,7 @@ mod output;
 mod output_fields;
 mod packages;
 mod periodic;
+mod pictures;
 mod pockets;
 mod prisms;
 mod ranks;

@@ -123,6 +123,8 @@ pub struct Painter {
     style: Style,
     range: [f64; 2],
     number_density: f64,
+    /// Width of the slice that a scene of two dimensions is [m].
+    slice: Option<f64>,
     /// Fixed walls, drawn once.
     walls: Canvas,
 }
@@ -173,7 +175,8 @@ impl Painter {
             Field::Pressure => [0.0, (params.density * scene.gravity.length() * scene.depth).max(1e-9)],
             Field::Density => [0.9, 1.1],
         });
-        Self { camera, style: style.clone(), range, number_density: params.number_density, walls }
+        let slice = flat.then_some(scene.spacing);
+        Self { camera, style: style.clone(), range, number_density: params.number_density, slice, walls }
     }
 
     /// The picture at `time` [s] with the solids of `scene` in `poses` (positions and orientations; none for one that is
@@ -224,7 +227,7 @@ impl Painter {
             // Its distances are dear to ask for.
             #[cfg(feature = "mesh")]
             Shape::Mesh(mesh) => canvas.faces(&self.camera, mesh.faces(), pose, paint),
-            shape => canvas.solid(&self.camera, shape, pose, paint),
+            shape => canvas.solid(&self.camera, (shape, self.slice), pose, paint),
         }
     }
 }

@@ -37,10 +37,14 @@ pub struct View {
 pub struct Camera {
     /// Samples across and down.
     samples: [usize; 2],
+    /// Middle of the scene [m]: all of a picture is told from it, so that single precision holds the depths of a scene
+    /// far from the origin, at the coordinates of a site.
+    origin: DVec3,
     right: DVec3,
     up: DVec3,
     /// Into the picture.
     pub forward: DVec3,
+    /// Middle of the picture, to the right and up of the origin [m].
     center: [f64; 2],
     /// Samples a metre.
     scale: f64,
@@ -53,31 +57,25 @@ impl Camera {
         let right = DVec3::new(ca, sa, 0.0);
         let forward = DVec3::new(-sa * ce, ca * ce, -se);
         let up = right.cross(forward);
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in 0..8 {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { min[axis] } else { max[axis] };
-            let x = DVec3::new(pick(0), pick(1), pick(2));
-            for (k, along) in [right, up].into_iter().enumerate() {
-                low[k] = low[k].min(along.dot(x));
-                high[k] = high[k].max(along.dot(x));
-            }
-        }
+        let origin = 0.5 * (min + max);
         let samples = view.size.map(|n| n * SAMPLES);
         let free = 1.0 - 2.0 * MARGIN;
-        let fit = |k: usize| free * samples[k] as f64 / (high[k] - low[k]).max(1e-9);
-        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
+        // The box as it is seen is as wide as its edges are together.
+        let fit = |k: usize, along: DVec3| free * samples[k] as f64 / along.abs().dot(max - min).max(1e-9);
         Self {
             samples,
+            origin,
             right,
             up,
             forward,
-            center: view.target.map_or(middle, |t| [right.dot(t), up.dot(t)]),
-            scale: view.zoom * fit(0).min(fit(1)),
+            center: view.target.map_or([0.0; 2], |t| [right, up].map(|along| along.dot(t - origin))),
+            scale: view.zoom * fit(0, right).min(fit(1, up)),
         }
     }
 
-    /// Column, row [samples] and depth [m] of a point.
+    /// Column, row [samples] and depth behind the origin [m] of a point.
     fn project(&self, x: DVec3) -> (f64, f64, f64) {
+        let x = x - self.origin;
         let column = (self.right.dot(x) - self.center[0]) * self.scale + self.samples[0] as f64 / 2.0;
         let row = self.samples[1] as f64 / 2.0 - (self.up.dot(x) - self.center[1]) * self.scale;
         (column, row, self.forward.dot(x))
@@ -87,7 +85,7 @@ impl Camera {
     fn behind(&self, column: f64, row: f64) -> DVec3 {
         let along = (column - self.samples[0] as f64 / 2.0) / self.scale + self.center[0];
         let up = (self.samples[1] as f64 / 2.0 - row) / self.scale + self.center[1];
-        along * self.right + up * self.up
+        self.origin + along * self.right + up * self.up
     }
 
     /// A direction as the light sees it: right, up, out of the picture.
@@ -146,15 +144,24 @@ impl Canvas {
         });
     }
 
-    /// Draw `shape` in a pose; `paint` tells the colour from a point of its surface in its own frame.
+    /// Draw `shape` in a pose; `paint` tells the colour from a point of its surface in its own frame. A shape of two
+    /// dimensions has no ends: it is cut to a `slice` of this width along y [m].
     pub fn solid(
         &mut self,
         camera: &Camera,
-        shape: &Shape,
+        (shape, slice): (&Shape, Option<f64>),
         (position, orientation): (DVec3, DQuat),
         paint: impl Fn(DVec3) -> Vec3,
     ) {
-        let (center, radius) = (camera.project(position), shape.radius());
+        let half = slice.map(|width| 0.5 * width);
+        let (center, radius) = (camera.project(position), shape.radius().hypot(half.unwrap_or(0.0)));
+        // What is cut is the common part of the shape and of the slice: no nearer than the farther one of them.
+        let distance = |q: DVec3| match (half, shape.distance(q)) {
+            (Some(half), (distance, _)) if q.y.abs() - half > distance => {
+                (q.y.abs() - half, q.y.signum() * DVec3::Y)
+            }
+            (_, own) => own,
+        };
         let to_own = orientation.conjugate();
         let forward = to_own * camera.forward;
         let convex = shape.is_convex();
@@ -163,7 +170,7 @@ impl Canvas {
             let start = camera.behind(i as f64, j as f64) + (center.2 - radius) * camera.forward;
             let (mut q, mut way) = (to_own * (start - position), 0.0);
             for _ in 0..STEPS {
-                let (distance, slope) = shape.distance(q);
+                let (distance, slope) = distance(q);
                 if distance < NEAR * radius {
                     let normal = camera.seen(orientation * slope);
                     canvas.put(at, center.2 - radius + way, lit(paint(q), normal));
@@ -369,7 +376,7 @@ mod tests {
             let camera = Camera::new(&view, -half, half);
             let mut canvas = Canvas::new(&camera);
             let pose = (DVec3::ZERO, DQuat::IDENTITY);
-            canvas.solid(&camera, &Shape::cuboid(2.0 * half), pose, |_| Vec3::ONE);
+            canvas.solid(&camera, (&Shape::cuboid(2.0 * half), None), pose, |_| Vec3::ONE);
             let (mut drawn, mut wrong) = (0, 0);
             for at in 0..canvas.depth.len() {
                 let (column, row) = ((at % canvas.width) as f64, (at / canvas.width) as f64);
