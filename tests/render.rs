@@ -92,6 +92,29 @@ fn frames_become_pictures_as_the_run_itself_draws_them() {
     }
 }
 
+/// A colour bar tells nothing where nothing is coloured: frames of bodies alone look alike whatever its range.
+#[test]
+fn pictures_without_water_have_no_colour_bar() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = small_case(folder.path());
+    let shown = folder.path().join("a").display().to_string();
+    let series = "output.series=[{name=\"wet\",every=0.02,kinds=[\"fluid\"]}]";
+    let sets = ["--set", "output.kinds=[\"body\"]", "--set", series];
+    let run =
+        ran(&[&["run", &case, "-o", &shown, "--backend", "cpu", "-q", "--steps", "1"][..], &sets].concat());
+    assert_eq!(run.code, 0, "{}", run.err);
+    let draw = |range: &str, more: &[&str]| {
+        let out = folder.path().join(range).display().to_string();
+        let args =
+            ["render", &shown, "-q", "-o", &out, "--size", "320x200", "--times", "0", "--range", range];
+        let drawn = ran(&[&args[..], more].concat());
+        assert_eq!((drawn.code, drawn.err.as_str()), (0, ""));
+        read(&Path::new(&out).join("frame_0000.png")).3
+    };
+    assert!(draw("0,1", &[]) == draw("0,2", &[]));
+    assert!(differing(&draw("0,1", &["--series", "wet"]), &draw("0,2", &["--series", "wet"])) > 20);
+}
+
 #[test]
 fn what_cannot_be_drawn_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();

@@ -232,6 +232,8 @@ impl Show {
         if style.range.is_none() {
             style.range = range_of(frames, &style, &params);
         }
+        // `output.kinds`, or the region of a series, may leave out all water.
+        style.bar = waters(frames, 1).any(|water| !water.is_empty());
         Ok(Self { painter: Painter::new(&scene, &style, &params), scene })
     }
 
@@ -270,12 +272,16 @@ impl Show {
 /// Frames that are looked at for the range of the colours.
 const LOOKED_AT: usize = 5;
 
+/// The water of every so many of `frames` that can be read, from the end on, so that a start from rest alone sets no range.
+fn waters(frames: &[(usize, Frame)], step: usize) -> impl Iterator<Item = Particles> + '_ {
+    let files = frames.iter().rev().step_by(step).filter_map(|(_, frame)| frame.fluid.as_deref());
+    files.filter_map(|file| particles(file).ok())
+}
+
 /// The range of what `frames` show, from some of them. What cannot be read is told of when it is to be drawn.
 fn range_of(frames: &[(usize, Frame)], style: &Style, params: &Params) -> Option<[f64; 2]> {
     let step = frames.len().div_ceil(LOOKED_AT).max(1);
-    // From the end on, so that a start from rest alone sets no range.
-    let files = frames.iter().rev().step_by(step).filter_map(|(_, frame)| frame.fluid.as_deref());
-    let waters: Vec<Particles> = files.filter_map(|file| particles(file).ok()).collect();
+    let waters: Vec<Particles> = waters(frames, step).collect();
     let drops = waters.iter().flat_map(drops_of);
     let mut values: Vec<f64> = drops.map(|drop| style.field.of(&drop, params.number_density)).collect();
     style.field.range(&mut values)

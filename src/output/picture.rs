@@ -98,6 +98,8 @@ pub struct Style {
     pub slice: Option<(usize, f64)>,
     /// Write time and colour bar.
     pub labels: bool,
+    /// With the bar: where no picture has water there is nothing to read on it.
+    pub bar: bool,
     /// Decimals of the time, see [`super::digits`].
     pub decimals: usize,
 }
@@ -107,7 +109,7 @@ impl Style {
     pub fn of(dimensions: u32) -> Self {
         let (azimuth, elevation) = if dimensions == 2 { (0.0, 0.0) } else { (0.38, 0.42) };
         let view = View { size: [960, 480], azimuth, elevation, zoom: 1.0, target: None };
-        Self { view, field: Field::Speed, range: None, slice: None, labels: true, decimals: 3 }
+        Self { view, field: Field::Speed, range: None, slice: None, labels: true, bar: true, decimals: 3 }
     }
 
     /// Whether water at `x` [m] is drawn, at the spacing `l0` [m].
@@ -214,7 +216,7 @@ impl Painter {
         if self.style.labels {
             let told = format!("t = {time:.0$} s", self.style.decimals);
             picture.time(&told);
-            if scene.groups.fluid > 0 {
+            if self.style.bar && scene.groups.fluid > 0 {
                 picture.bar(self.style.field.name(), self.range, &told);
             }
         }
