@@ -1,6 +1,7 @@
 //! What a case will take in memory and on disk, from the case alone: nothing is built, and no number overflows.
 
 use crate::case::{Case, Choice, Encoding, Face, OutputField, OutputKind, OutputRegion, Series, Vector};
+use crate::checkpoint::size::{AT_ONCE, Held};
 use crate::extents::{self, Bounds, Extent, Of, in_double};
 use crate::lattice::Lattice;
 use serde::Serialize;
@@ -24,14 +25,13 @@ const LATTICE_CELL: f64 = 1.0;
 /// The program itself, and with MPI.
 const PROGRAM: f64 = 16e6;
 const PROGRAM_OF_RANK: f64 = 30e6;
-/// Bytes of a particle in a frame with all fields, by encoding, and in a checkpoint.
+/// Bytes of a particle in a frame with all fields, by encoding.
 const FRAME_BASE64: f64 = 45.0;
 const FRAME_RAW: f64 = 50.0;
 /// Bytes of the position and the cell of a particle in a frame, before it is packed.
 const POINT: f64 = 21.0;
 /// More of them where places are in double precision.
 const IN_DOUBLE: f64 = 12.0;
-const CHECKPOINT: f64 = 120.0;
 /// Bytes of a row of the tables, and more for each solid.
 const ROW: f64 = 700.0;
 const ROW_OF_SOLID: f64 = 400.0;
@@ -84,8 +84,13 @@ pub struct Estimate {
     pub row_bytes: f64,
     /// Bytes of the tables.
     pub table_bytes: f64,
-    /// Bytes of the checkpoints that are kept.
+    /// Bytes of the checkpoints that are there at once.
     pub checkpoint_bytes: f64,
+    /// How many of them, and what each holds.
+    #[serde(skip)]
+    states: f64,
+    #[serde(skip)]
+    held: Held,
 }
 
 impl Estimate {
@@ -203,7 +208,19 @@ impl Estimate {
         };
         let moving = (case.body.len() + case.moving_wall.len()) as f64;
         let rows = run.end / output.table_every.unwrap_or(run.time_step).max(run.time_step);
-        let saves = run.checkpoint.wall > 0.0 || run.checkpoint.every.is_some();
+        // By the clock there may be any number of states; otherwise those that are asked for, and that of the end.
+        let asked = run.checkpoint.every.map_or(0.0, |every| (run.end / every).floor() + 1.0);
+        let states = if run.checkpoint.wall > 0.0 { AT_ONCE } else { asked.min(AT_ONCE) };
+        let viscous = case.fluid.as_ref().is_some_and(|f| f.viscosity > 0.0);
+        let held = Held {
+            water: slots,
+            moving: solids,
+            pressure: kept,
+            slots: kept,
+            neighbours: if viscous { neighbours } else { 0.0 },
+            solids: parts.len() as f64,
+            text: 0.0,
+        };
         let largest = parts.into_iter().max_by(|a, b| a.2.total_cmp(&b.2));
         let mostly = largest.filter(|one| one.2 > 0.5 * particles).map(|(name, size, _)| (name, size));
         Self {
@@ -221,7 +238,9 @@ impl Estimate {
             series: output.series.iter().map(series).collect(),
             row_bytes: ROW + moving * ROW_OF_SOLID,
             table_bytes: rows * (ROW + moving * ROW_OF_SOLID),
-            checkpoint_bytes: if saves { 3.0 * CHECKPOINT * kept } else { 0.0 },
+            checkpoint_bytes: held.all(states),
+            states,
+            held,
         }
     }
 
@@ -233,6 +252,12 @@ impl Estimate {
         self.mostly.as_ref().map(told).unwrap_or_default()
     }
 
+    /// Of a run whose states hold what `built` says of a scene that has been built.
+    pub fn holding(self, built: impl FnOnce(Held) -> Held) -> Self {
+        let held = built(self.held);
+        Self { checkpoint_bytes: held.all(self.states), held, ..self }
+    }
+
     /// Of a run of `case` whose steps are `dt` [s] long: those that its scene allows.
     pub fn at_step(self, case: &Case, dt: f64) -> Self {
         let rows = case.run.end / case.output.table_every.unwrap_or(dt).max(dt);
@@ -240,7 +265,7 @@ impl Estimate {
         Self { table_bytes: rows * self.row_bytes, ..self }.at_most(Some(steps as u64))
     }
 
-    /// Of a run that stops after `steps`, if any: no step has two frames.
+    /// Of a run that stops after `steps`, if any: no step has two frames or two states.
     pub fn at_most(self, steps: Option<u64>) -> Self {
         let Some(steps) = steps.map(|n| n as f64) else { return self };
         let frames = self.frames.min(steps + 2.0);
@@ -250,7 +275,9 @@ impl Estimate {
         };
         let series = self.series.iter().map(fewer).collect();
         let table_bytes = self.table_bytes.min(steps * self.row_bytes);
-        Self { frames, series, table_bytes, ..self }
+        let states = self.states.min(steps.max(1.0));
+        let checkpoint_bytes = self.held.all(states);
+        Self { frames, series, table_bytes, states, checkpoint_bytes, ..self }
     }
 
     /// Memory of the first and of each other one of `ranks`, on CPUs: each has its part of the water and of the walls, with what lies beside, and the
@@ -333,6 +360,23 @@ mod tests {
             "{estimate:?}, {}",
             scene.groups.total()
         );
+    }
+
+    #[test]
+    fn there_are_no_more_states_than_steps_and_moments_for_them() {
+        let states = |checkpoint: &str, steps: u64| {
+            let estimate =
+                Estimate::new(&case(&format!("checkpoint = {{ {checkpoint} }}\n"))).at_most(Some(steps));
+            estimate.checkpoint_bytes / estimate.held.bytes()
+        };
+        let told = [
+            ("", 100),
+            ("", 1),
+            ("wall = 0", 100),
+            ("wall = 0, every = 0.9", 100),
+            ("wall = 0, every = 1e-3", 100),
+        ];
+        assert_eq!(told.map(|(checkpoint, steps)| states(checkpoint, steps)), [3.0, 1.0, 0.0, 2.0, 3.0]);
     }
 
     #[test]

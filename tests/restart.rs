@@ -321,6 +321,30 @@ fn a_damaged_state_is_passed_over_for_the_older_one() {
     assert!(lost.code == 2 && lost.err.matches("cut off").count() == 2, "{}", lost.err);
 }
 
+/// What `plan` tells of the disk is no less than what the states take, and not much more.
+#[test]
+fn states_take_no_more_room_than_was_told() {
+    let sets = [
+        "run.dimensions=3",
+        "tank={min=[0,0,0],max=[2,0.5,1],open=[\"z_max\"]}",
+        "fluid={viscosity=1e-4,block=[{min=[0,0,0],max=[0.5,0.5,0.5]}]}",
+        "moving_wall=[]",
+        "gauge={}",
+        "run.checkpoint={every=1e-3,wall=0}",
+        "output.every=1",
+    ];
+    let case = Case::new(&sets, "cpu");
+    let sets = sets.map(|set| ["--set", set]).concat();
+    let plan = json(&ran(&[&["plan", &case.path, "--json"], &sets[..]].concat()).out);
+    // Two that are kept, and the one that is being written.
+    let told = plan["estimate"]["checkpoint_bytes"].as_f64().unwrap() / 3.0;
+    assert_eq!(case.run("a", &["--steps", "20"]).code, 0);
+    for file in seixo::checkpoint::file::files(&case.root("a").join("checkpoint")).unwrap() {
+        let real = std::fs::metadata(file).unwrap().len() as f64;
+        assert!((1.0..1.6).contains(&(told / real)), "{real} bytes of {told}");
+    }
+}
+
 /// Another interval holds from then on, whatever multiples of the old one have been reached.
 #[test]
 fn a_run_goes_on_with_states_at_other_times() {

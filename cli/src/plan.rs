@@ -186,7 +186,7 @@ struct Report {
     /// Memory of the first of them and of each other one, on CPUs.
     #[serde(skip_serializing_if = "Option::is_none")]
     memory_of_ranks_bytes: Option<[f64; 2]>,
-    /// From the case alone, as `run` judges it.
+    /// As `run` judges it: from the case alone, but for states, which hold what the scene has.
     estimate: Estimate,
     advice: Vec<String>,
 }
@@ -294,7 +294,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         advice.push(format!("run.from: it begins with the state of step {step}, t = {time:.decimals$} s"));
         advice.extend(found.damaged.iter().map(|why| format!("run.from: an older state is taken: {why}")));
     }
-    let estimate = Estimate::new(case).at_step(case, dt);
+    let estimate = if built { seen.setup.estimate(dt) } else { Estimate::new(case).at_step(case, dt) };
     let free = |n: Option<u64>| n.map_or(f64::INFINITY, |n| n as f64);
     if estimate.memory_beside_device > free(machine::memory()) {
         advice.push("memory: this machine has less free than the run takes; `seixo run` refuses it".into());

@@ -109,8 +109,8 @@ fn fits(args: &RunArgs, asked: &Asked, case: &Case, place: Option<Place>) -> Res
 }
 
 /// Refuses results for which there is no room, with steps of `dt` [s].
-fn fits_disk(args: &RunArgs, asked: &Asked, case: &Case, dt: f64) -> Result<()> {
-    let estimate = Estimate::new(case).at_step(case, dt).at_most(args.steps);
+fn fits_disk(args: &RunArgs, asked: &Asked, setup: &Setup, dt: f64) -> Result<()> {
+    let estimate = setup.estimate(dt).at_most(args.steps);
     let free = machine::disk(&asked.out).map_or(f64::INFINITY, |n| n as f64);
     if estimate.disk() > free && !args.force_disk {
         let text = format!(
@@ -205,7 +205,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
     if !matches!(start, Start::Resume(_)) {
         let case = &setup.loaded.case;
         let params = seixo::drag::params(case, &setup.scene).map_err(|e| setup.loaded.placed(e))?;
-        fits_disk(args, &asked, case, shortest(case, &setup.scene, &params))?;
+        fits_disk(args, &asked, &setup, shortest(case, &setup.scene, &params))?;
     }
     call.tell(&setup.loaded.text);
     let mut simulation = match team {

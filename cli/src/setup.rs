@@ -2,8 +2,10 @@
 
 use super::{CaseArgs, DeviceArgs, device};
 use seixo::case::file::{Loaded, load, load_text, read_text};
+use seixo::checkpoint::size::Held;
 use seixo::console::remark;
 use seixo::error::{Error, Result};
+use seixo::estimate::Estimate;
 use seixo::run::from;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
@@ -43,6 +45,21 @@ impl Setup {
             few(&scene.notes).for_each(|n| remark(&format!("note: {n}")));
         }
         Ok(Self { name, loaded, scene })
+    }
+
+    /// What a run of the case takes, in steps of `dt` [s]; its states as the scene has it.
+    pub fn estimate(&self, dt: f64) -> Estimate {
+        let (case, groups) = (&self.loaded.case, &self.scene.groups);
+        let built = |held: Held| Held {
+            water: groups.fluid as f64,
+            moving: groups.moving_slots().count() as f64,
+            pressure: groups.pressure() as f64,
+            slots: groups.total() as f64,
+            solids: self.scene.solids.len() as f64,
+            text: self.loaded.text.len() as f64,
+            ..held
+        };
+        Estimate::new(case).holding(built).at_step(case, dt)
     }
 
     /// The simulation, on the processor that `args` ask for.

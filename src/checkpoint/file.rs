@@ -27,7 +27,7 @@ const FORMAT: u32 = 4;
 const LONGEST_HEADER: u64 = 1 << 28;
 const LARGEST: u64 = 1 << 40;
 /// Files that are kept.
-const KEPT: usize = 2;
+pub(super) const KEPT: usize = 2;
 
 /// What a state belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

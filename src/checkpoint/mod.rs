@@ -2,6 +2,7 @@
 
 pub mod archive;
 pub mod file;
+pub mod size;
 
 pub use archive::Archive;
 pub use file::{Found, Origin};
