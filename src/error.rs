@@ -192,9 +192,9 @@ pub enum FolderError {
         /// The file that a folder of results holds.
         marker: &'static str,
     },
-    /// Another run writes there.
+    /// Somebody else writes there.
     #[error(
-        "{} is in use: another run writes there; wait for its end, or choose another folder with --out", .0.display()
+        "{} is in use: another process writes there; wait for its end, or choose another folder with --out", .0.display()
     )]
     InUse(PathBuf),
     /// A result would take the place of this input.

@@ -3,6 +3,7 @@
 use seixo::Error;
 use seixo::checkpoint::Found;
 use seixo::checkpoint::file::{newest, write};
+use seixo::output::lock::Beside;
 use seixo::stop::Stop;
 use seixo_study::engine::{Context, cpu_only};
 use seixo_study::row::{Measured, Timing};
@@ -206,6 +207,10 @@ tolerance = 0.1
         let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
         (out.status.code().unwrap_or(-1), text)
     };
+    std::fs::create_dir(folder.join("busy")).expect("a folder");
+    let held = seixo::output::lock::hold(&folder.join("busy"), ".seixo-points", Beside::Nobody);
+    let (code, text) = validate(&["tank.toml", "-o", "busy", "--shard", "1/2"]);
+    assert!(held.is_ok() && code == 2 && text.contains("busy is in use"), "{code}: {text}");
     let (code, text) = validate(&["tank.toml", "--runs", "2", "-o", "one", "--shard", "1/2"]);
     assert_eq!(code, 0, "{text}");
     assert!(text.contains("2 of 4 points are still to be computed"), "{text}");
@@ -417,6 +422,9 @@ fn a_sweep_that_is_interrupted_says_so_and_goes_on() {
         let child = seixo(folder, &["small.toml", "-o", "out"]).spawn().expect("the program starts");
         // After set-up, where there is nothing to save yet and it would end at once.
         std::thread::sleep(Duration::from_millis(1500));
+        // Two sweeps in one folder would write each other's states.
+        let (second, text) = run(folder, &["small.toml", "-o", "out"]);
+        assert!(second == 2 && text.contains("out is in use"), "{second}: {text}");
         // Twice in a moment, as `timeout` does.
         for _ in 0..2 {
             let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");

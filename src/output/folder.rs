@@ -3,11 +3,12 @@
 //! A file `.seixo` marks a folder as one of seixo's own and is locked as long as a run writes there. Only in a
 //! marked folder does `--force` remove anything, and only files with the names that a run gives.
 
+use super::lock::{Beside, hold};
 use crate::checkpoint::file::is_checkpoint;
 use crate::error::{Error, FolderError, Result};
 use crate::whole::{UNFINISHED, write_whole};
 use serde::{Deserialize, Serialize};
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -104,7 +105,7 @@ impl Folder {
             return Err(FolderError::NotEmpty(root.to_path_buf()).into());
         }
         std::fs::create_dir_all(root).map_err(Error::io(root))?;
-        folder.lock = Arc::new(folder.take()?);
+        folder.lock = Arc::new(Some(folder.take()?));
         if let (Mode::Replace, Some(earlier)) = (mode, earlier) {
             folder.clear(&earlier.name)?;
         }
@@ -140,22 +141,11 @@ impl Folder {
         }
     }
 
-    /// Locks the marker and writes it; returns the lock, nothing where the file system knows none.
-    fn take(&self) -> Result<Option<File>> {
-        let path = self.file(MARKER);
-        let options = File::options().read(true).write(true).create(true).truncate(false).open(&path);
-        let file = options.map_err(Error::io(&path))?;
-        let locked = match file.try_lock() {
-            Ok(()) => true,
-            Err(TryLockError::WouldBlock) => {
-                return Err(FolderError::InUse(self.root.clone()).into());
-            }
-            // Some network file systems have no locks; then it is the user who keeps runs apart.
-            Err(TryLockError::Error(e)) if matches!(e.kind(), ErrorKind::Unsupported) => false,
-            Err(TryLockError::Error(e)) => return Err(Error::io(&path)(e)),
-        };
-        self.mark(&path, &file)?;
-        Ok(locked.then_some(file))
+    /// Locks the marker and writes it; returns the lock.
+    fn take(&self) -> Result<File> {
+        let file = hold(&self.root, MARKER, Beside::Nobody)?;
+        self.mark(&self.file(MARKER), &file)?;
+        Ok(file)
     }
 
     /// Writes the marker into its `file`: in place, for a rename would leave the lock on a file that is gone; and not

@@ -21,6 +21,7 @@
 pub mod digits;
 pub mod folder;
 pub mod label;
+pub mod lock;
 pub mod particles;
 pub mod picture;
 pub mod pieces;

@@ -51,7 +51,7 @@ pub struct StudyArgs {
 /// Run `args` until `stop` asks to end. Findings go to stdout, progress to stderr.
 ///
 /// # Errors
-/// [`Error::Case`] for a study that cannot be set up, [`Error::Io`], [`Error::Interrupted`]. Points that fail are results.
+/// [`Error::Case`] for a study that cannot be set up, [`Error::Folder`] for a folder in use, [`Error::Io`], [`Error::Interrupted`]. Points that fail are results.
 pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
     let computers = args.computers.start()?;
     let make: &Make = &|processor, scene, params, plan, settings| {
@@ -89,8 +89,9 @@ pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
         manifest.write(&out)?;
         study.conclude(&out, rows, args.error)?
     } else {
-        manifest.write(&out)?;
         let options = Options { out: out.clone(), shard: args.shard, quiet: args.quiet, collect: None };
+        let _alone = options.hold()?;
+        manifest.write(&out)?;
         let context = Context {
             repetitions: args.repetitions,
             stop: stop.clone(),

@@ -10,12 +10,14 @@ use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::console::remark;
 use seixo::error::{Error, GpuError, Result};
+use seixo::output::lock::{Beside, hold};
 use seixo::output::write_whole;
 use seixo::params::Params;
 use seixo::plan::Plan;
 use seixo::pressure::Settings;
 use seixo::scene::Scene;
 use seixo::stop::Stop;
+use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -151,6 +153,25 @@ pub struct Options {
     pub quiet: bool,
     /// Read finished points only, also from these folders.
     pub collect: Option<Vec<PathBuf>>,
+}
+
+/// The file of a folder of results that is locked as long as points are computed into it.
+const LOCK: &str = ".seixo-points";
+
+impl Options {
+    /// Makes the folder, and holds it until what is returned is dropped: alone, or as a shard with other shards.
+    /// Nothing where nothing is computed.
+    ///
+    /// # Errors
+    /// [`Error::Folder`] if points are computed into it already, [`Error::Io`].
+    pub fn hold(&self) -> Result<Option<File>> {
+        if self.collect.is_some() {
+            return Ok(None);
+        }
+        std::fs::create_dir_all(&self.out).map_err(Error::io(&self.out))?;
+        let beside = if self.shard.is_some() { Beside::Others } else { Beside::Nobody };
+        hold(&self.out, LOCK, beside).map(Some)
+    }
 }
 
 /// Rows of the points that are there at the end, in the order of `jobs`.
@@ -336,6 +357,23 @@ mod tests {
         let text = std::fs::read_to_string(&file).unwrap();
         std::fs::write(&file, text.replace(&format!("\"{VERSION}\""), "\"0.0.1\"")).unwrap();
         assert_eq!(sweep(false)[0].version, "0.0.1");
+    }
+
+    #[test]
+    fn a_folder_has_one_sweep_or_many_shards() {
+        let folder = tempfile::tempdir().unwrap();
+        let hold = |shard: Option<&str>| {
+            let shard = shard.map(|s| s.parse().unwrap());
+            Options { out: folder.path().join("new"), shard, ..Options::default() }.hold()
+        };
+        let refused = |shard| hold(shard).unwrap_err().to_string().contains("is in use");
+        let whole = hold(None).unwrap();
+        assert!(refused(None) && refused(Some("1/2")));
+        drop(whole);
+        let shards = [hold(Some("1/2")).unwrap(), hold(Some("2/2")).unwrap()];
+        assert!(refused(None));
+        drop(shards);
+        assert!(hold(None).is_ok());
     }
 
     #[test]

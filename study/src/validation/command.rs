@@ -53,8 +53,8 @@ pub struct ValidateArgs {
 /// Run `args` until `stop` asks to end. A line for each check goes to stdout, progress to stderr.
 ///
 /// # Errors
-/// [`seixo::error::Error::Case`] for a validation that cannot be set up, [`seixo::error::Error::Io`]. Points that
-/// fail, and checks that do, are results.
+/// [`seixo::error::Error::Case`] for a validation that cannot be set up, [`seixo::error::Error::Folder`] for a folder in
+/// use, [`seixo::error::Error::Io`]. Points that fail, and checks that do, are results.
 pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
     if args.names == ["list"] {
         for name in cases::names("validation") {
@@ -89,6 +89,7 @@ pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
         quiet: args.quiet,
         collect: (!args.join.is_empty()).then(|| args.join.clone()),
     };
+    let _alone = options.hold()?;
     let make: &Make = &|processor, scene, params, plan, settings| {
         computers.backend(processor, scene, params, plan, settings)
     };
