@@ -321,7 +321,7 @@ fn a_damaged_state_is_passed_over_for_the_older_one() {
     assert!(lost.code == 2 && lost.err.matches("cut off").count() == 2, "{}", lost.err);
 }
 
-/// What `plan` tells of the disk is no less than what the states take, and not much more.
+/// What `plan` tells of the disk is no less than what the states take, and not many times it: places on a lattice pack well.
 #[test]
 fn states_take_no_more_room_than_was_told() {
     let sets = [
@@ -341,7 +341,7 @@ fn states_take_no_more_room_than_was_told() {
     assert_eq!(case.run("a", &["--steps", "20"]).code, 0);
     for file in seixo::checkpoint::file::files(&case.root("a").join("checkpoint")).unwrap() {
         let real = std::fs::metadata(file).unwrap().len() as f64;
-        assert!((1.0..2.2).contains(&(told / real)), "{real} bytes of {told}");
+        assert!((1.0..4.0).contains(&(told / real)), "{real} bytes of {told}");
     }
 }
 
