@@ -326,10 +326,10 @@ fn a_damaged_state_is_passed_over_for_the_older_one() {
 fn states_take_no_more_room_than_was_told() {
     let sets = [
         "run.dimensions=3",
-        "tank={min=[0,0,0],max=[2,0.5,1],open=[\"z_max\"]}",
-        "fluid={viscosity=1e-4,block=[{min=[0,0,0],max=[0.5,0.5,0.5]}]}",
-        "moving_wall=[]",
-        "gauge={}",
+        "tank.max=[2,0.5,1]",
+        "fluid.viscosity=1e-4",
+        "fluid.block.0.max=[0.5,0.5,0.5]",
+        "moving_wall.0.max=[0.8,0.5,0.8]",
         "run.checkpoint={every=1e-3,wall=0}",
         "output.every=1",
     ];
