@@ -301,10 +301,14 @@ impl Form<'_> {
 
     /// Turn of the shape's frame, [`Shape::frame`] left aside; a cylinder stands along the z axis of its own.
     pub(crate) fn turn(&self, plane: bool) -> DQuat {
-        let turn = self.orientation();
+        self.orientation() * self.upended(plane)
+    }
+
+    /// What `axis` says, an `orientation` left aside.
+    pub(crate) fn upended(&self, plane: bool) -> DQuat {
         match self.axis {
-            Some(axis) if !plane => turn * DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
-            _ => turn,
+            Some(axis) if !plane => DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
+            _ => DQuat::IDENTITY,
         }
     }
 

@@ -209,6 +209,8 @@ pub struct Solid {
     pub shape_offset: DVec3,
     /// Initial orientation.
     pub orientation: DQuat,
+    /// Turn from its frame to that in which the keys of its shape (file, section, axis) describe it, before `orientation`.
+    pub frame: DQuat,
     /// How it moves.
     pub drive: Drive,
     /// Slots of the wall layer, counted from the first particle; they lie within the moving-wall group.
@@ -260,6 +262,12 @@ impl Solid {
             (false, true) => "obstacle",
             (false, false) => "moving wall",
         }
+    }
+
+    /// Turn from the shape as its keys describe it to where `orientation`, that of a pose, has it: what users are told. At the start
+    /// it is the `orientation` of the case.
+    pub fn turn(&self, orientation: DQuat) -> DQuat {
+        (orientation * self.frame.inverse()).normalize()
     }
 
     /// Centre of the shape at t = 0 [m].

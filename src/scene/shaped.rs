@@ -38,6 +38,7 @@ fn wall(
         shape,
         position,
         orientation: turn * shape.frame(),
+        frame: form.upended(plane) * shape.frame(),
         drive: Drive::Prescribed(moved.map_or_else(Motion::still, |w| wall_motion(w, case, position))),
         wall_slots: 0..0,
         dummy_slots: 0..0,

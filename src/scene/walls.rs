@@ -232,6 +232,7 @@ pub(super) fn moving_wall(
         shape: Shape::cuboid(hi - lo),
         position,
         orientation: DQuat::IDENTITY,
+        frame: DQuat::IDENTITY,
         drive: Drive::Prescribed(wall_motion(wall, case, position)),
         wall_slots: 0..0,
         dummy_slots: 0..0,

@@ -262,7 +262,7 @@ impl Recorder {
             let followed = simulation.scene.followed();
             for (k, pose) in simulation.solids.poses().iter().take(followed).enumerate() {
                 let (x, v) = (simulation.solids.path(k), pose.velocity);
-                let up = pose.orientation * DVec3::Z;
+                let up = simulation.scene.solids[k].turn(pose.orientation) * DVec3::Z;
                 let tilt = up.z.clamp(-1.0, 1.0).acos().to_degrees();
                 let values = [x[0], x[1], x[2], v.x, v.y, v.z, tilt];
                 of_solid(simulation.solids.name(k))
