@@ -315,16 +315,9 @@ impl<'a> Builder<'a> {
         };
         self.moving_walls.iter().for_each(|wall| add(&mut near, wall));
         let up = (gravity.length() > 0.0).then(|| -gravity.normalize());
-        for (k, body) in case.body.iter().enumerate() {
-            let made = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
-            let mut solid = match made {
-                Ok(solid) => solid,
-                Err(problem) => {
-                    let key = format!("body.{k}.{}", problem.key);
-                    self.problems.push(Problem { key, ..*problem });
-                    continue;
-                }
-            };
+        let mut numbers = Vec::new();
+        for (k, mut solid) in self.in_order_of_placement(up) {
+            let body = &case.body[k];
             self.thin(&format!("body.{k}"), &solid);
             let surroundings = Surroundings {
                 fixed: &self.fixed,
@@ -362,11 +355,45 @@ impl<'a> Builder<'a> {
             }
             add(&mut near, &solid);
             self.bodies.push(solid);
+            numbers.push(k);
         }
         self.hanging(&near, law, up);
+        // From here on they stand as the case lists them.
+        let mut placed: Vec<(usize, Solid)> =
+            numbers.into_iter().zip(std::mem::take(&mut self.bodies)).collect();
+        placed.sort_by_key(|(k, _)| *k);
+        self.bodies = placed.into_iter().map(|(_, solid)| solid).collect();
         self.water.keep_what_is_left(&self.grid);
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
+    }
+
+    /// The bodies with their numbers in the case, in the order in which they are placed: those that stand last, from the lowest up, each
+    /// on what is there.
+    fn in_order_of_placement(&mut self, up: Option<DVec3>) -> Vec<(usize, Solid)> {
+        let case = self.case;
+        let mut made = Vec::new();
+        for (k, body) in case.body.iter().enumerate() {
+            match bodies::body(body, case.run.spacing, case.run.dimensions, self.layers) {
+                Ok(solid) => made.push((k, solid)),
+                Err(problem) => {
+                    let key = format!("body.{k}.{}", problem.key);
+                    self.problems.push(Problem { key, ..*problem });
+                }
+            }
+        }
+        if let Some(up) = up {
+            let bottom = |(k, solid): &(usize, Solid)| {
+                let placed = solid.placed();
+                if case.body[*k].standing {
+                    placed.center.dot(up) - placed.reach(-up)
+                } else {
+                    f64::NEG_INFINITY
+                }
+            };
+            made.sort_by(|a, b| bottom(a).total_cmp(&bottom(b)));
+        }
+        made
     }
 
     /// Whether a box of the lattice of this `size` [m] is one particle thick.
