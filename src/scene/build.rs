@@ -33,6 +33,7 @@ impl Scene {
         builder.walls();
         builder.water();
         builder.bodies();
+        builder.meetings();
         builder.room();
         builder.overfilled();
         builder.gauges();

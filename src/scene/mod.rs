@@ -21,6 +21,7 @@ mod inflow_depth;
 mod jitter;
 mod lattice;
 mod layout;
+mod meetings;
 mod motion;
 mod near;
 mod opening;
