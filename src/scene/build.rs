@@ -380,7 +380,8 @@ impl<'a> Builder<'a> {
         // Of the solids in openings, which come last, no gauge tells anything.
         let own = self.moving_walls.len() - self.openings.iter().filter(|o| o.wall.is_some()).count();
         let solids = self.moving_walls[..own].iter().chain(&self.bodies);
-        let still = solids.filter(|s| s.is_still()).flat_map(Solid::wall_positions);
+        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = solids.partition(|s| s.stays());
+        let still = still.into_iter().flat_map(Solid::wall_positions);
         let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
         for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
             let mut at: DVec3 = gauge.point.into();
@@ -388,13 +389,25 @@ impl<'a> Builder<'a> {
                 at.y = 0.0;
             }
             if let Err(nearest) = wall_at(&walls, at, reach, self.lattice.spacing) {
+                let key = format!("gauge.pressure.{k}.point");
+                let is_on = |s: &Solid| {
+                    wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
+                };
+                if let Some(solid) = moving.iter().find(|s| is_on(s)) {
+                    let (what, on) = (solid.what(), &solid.name);
+                    let message =
+                        format!("gauge.pressure `{}`: it lies on {what} `{on}`, which may move", gauge.name);
+                    let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
+                    self.problems.push(Problem::new(key, message, remedy));
+                    continue;
+                }
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
                     format!("the nearest stands at {}", point(nearest))
                 });
                 let (name, at) = (&gauge.name, point(at));
                 let message = format!("gauge.pressure `{name}` at {at}: no fixed wall there, {hint}");
                 let remedy = "move the point onto a wall; where water comes in or goes out there is none";
-                self.problems.push(Problem::new(format!("gauge.pressure.{k}.point"), message, remedy));
+                self.problems.push(Problem::new(key, message, remedy));
             }
         }
     }

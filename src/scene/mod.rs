@@ -243,6 +243,11 @@ impl Solid {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
     }
 
+    /// Whether it stays where it is: it stands still for ever, or is free but held in all that it could do.
+    pub(crate) fn stays(&self) -> bool {
+        self.is_still() || self.is_free() && !self.gives_way()
+    }
+
     /// Whether forces move it: it is free, and not held in all that it could do.
     pub fn gives_way(&self) -> bool {
         matches!(&self.drive, Drive::Free(free) if free.gives_way())
@@ -322,10 +327,10 @@ impl Scene {
         self.solids[k].is_still() && k < self.followed()
     }
 
-    /// Slots of the wall layers that never move: of fixed walls, then of the solids that stand still for ever.
+    /// Slots of the wall layers that never move: of fixed walls, then of the solids that stand still for ever or are held.
     pub fn still_slots(&self) -> impl Iterator<Item = usize> {
-        let solids = self.solids.iter().enumerate().filter(|(k, _)| self.stands(*k));
-        self.groups.static_wall_range().chain(solids.flat_map(|(_, solid)| solid.wall_slots.clone()))
+        let solids = self.solids[..self.followed()].iter().filter(|solid| solid.stays());
+        self.groups.static_wall_range().chain(solids.flat_map(|solid| solid.wall_slots.clone()))
     }
 
     /// Solids that tables follow: all but the walls in openings, which come last.
