@@ -16,6 +16,7 @@ mod nearest;
 mod nodes;
 mod open;
 mod polygon;
+mod rings;
 mod sphere;
 mod surface;
 mod thickness;
