@@ -30,6 +30,7 @@ pub use cylinder::Cylinder;
 pub use disc::Disc;
 #[cfg(feature = "mesh")]
 pub use mesh::{Mesh, Thickness, Unfit};
+pub(crate) use nearest::Nearest;
 pub use nodes::Node;
 use nodes::nodes_between;
 pub use polygon::Polygon;
