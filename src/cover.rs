@@ -13,6 +13,8 @@ use glam::{DMat3, DQuat, DVec3};
 const AT: [f64; 2] = [0.1, 0.5];
 /// The same of free bodies, with what is covered then: as much as [`crate::slots`] takes for a slot, up to a gap of 1.1 spacings.
 const FADING: [(f64, f64); 2] = [(0.7, 2.0 / 3.0), (0.9, 1.0 / 3.0)];
+/// A point that lies on a solid's surface up to this much, over l0, is half in it, or round-off would tell where it is.
+const SLACK: f64 = 1e-6;
 /// Edge of the cells that faces are found in, over l0.
 pub(crate) const CELL: f64 = 4.0;
 /// Points along an edge of a face, in the plane and in space.
@@ -55,19 +57,29 @@ impl Standing {
         }
     }
 
-    /// Whether its surface is nearer to `x` than `reach` [m], or `x` inside.
-    fn is_near(&self, x: DVec3, reach: f64, periodic: &Periodic) -> bool {
+    /// How far its surface is from `x` [m], negative inside; infinite if no nearer than `reach` [m].
+    fn outside(&self, x: DVec3, reach: f64, periodic: &Periodic) -> f64 {
         let way = x - self.position;
         let most = self.radius + reach;
-        let near = |way: DVec3| {
-            way.length_squared() < most * most && self.shape.outside(self.to_shape * way) < reach
+        let outside = |way: DVec3| {
+            let is_near = way.length_squared() < most * most;
+            if is_near { self.shape.outside(self.to_shape * way) } else { f64::INFINITY }
         };
+        let own = outside(way);
         // What spans a periodic axis reaches over its sides.
-        near(way) || periodic.is_any() && near(periodic.nearest(way))
+        if own >= reach && periodic.is_any() { own.min(outside(periodic.nearest(way))) } else { own }
     }
 
-    fn holds(&self, x: DVec3, periodic: &Periodic) -> bool {
-        self.is_near(x, 0.0, periodic)
+    /// How much of the points about `x` lies inside [-]: half of them where its surface runs through, within `slack` [m].
+    fn holds(&self, x: DVec3, slack: f64, periodic: &Periodic) -> f64 {
+        let outside = self.outside(x, slack, periodic);
+        if outside.abs() <= slack {
+            0.5
+        } else if outside < 0.0 {
+            1.0
+        } else {
+            0.0
+        }
     }
 }
 
@@ -136,7 +148,8 @@ impl Tiles {
 
     /// Part of the face around `center` that looks along `normal` before which water may stand [-].
     pub fn bare(&self, center: DVec3, normal: DVec3, solids: &[&Standing]) -> f64 {
-        let near = |s: &&Standing| s.is_near(center, 2.0 * self.spacing, &self.periodic);
+        let reach = 2.0 * self.spacing;
+        let near = |s: &&Standing| s.outside(center, reach, &self.periodic) < reach;
         let solids: Vec<&Standing> = solids.iter().copied().filter(near).collect();
         if solids.is_empty() {
             return 1.0;
@@ -147,12 +160,20 @@ impl Tiles {
         let n = POINTS[usize::from(!self.plane)];
         let place = |k: u32| l0 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
         let covered = |x: DVec3| {
-            let at = |d: f64, s: &Standing| s.holds(x + d * l0 * normal, &self.periodic);
-            let fading = |s: &Standing| {
-                FADING.into_iter().filter(|f| s.is_free && at(f.0, s)).map(|f| f.1).fold(0.0, f64::max)
+            let at = |d: f64, s: &Standing| s.holds(x + d * l0 * normal, SLACK * l0, &self.periodic);
+            let most = |parts: [(f64, f64); 2], s: &Standing| {
+                parts.into_iter().map(|(d, part)| part * at(d, s)).fold(0.0, f64::max)
             };
-            let by = |s: &&Standing| if AT.iter().any(|&d| at(d, s)) { 1.0 } else { fading(s) };
-            solids.iter().map(by).fold(0.0, f64::max)
+            // Of two that meet at the point each has a half.
+            let (mut whole, mut fading) = (0.0_f64, 0.0_f64);
+            for s in &solids {
+                let own = most(AT.map(|d| (d, 1.0)), s);
+                whole += own;
+                if s.is_free && own < 1.0 {
+                    fading = fading.max(most(FADING, s));
+                }
+            }
+            whole.min(1.0).max(fading)
         };
         let mut sum = 0.0;
         let rows = if self.plane { 1 } else { n };

@@ -10,6 +10,7 @@ use crate::gauges::Gauges;
 use crate::output::table::Cell;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, StepReport};
+use glam::DQuat;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -31,8 +32,10 @@ pub struct SolidState<'a> {
     pub name: &'a str,
     /// `true` for a body, `false` for a moving wall.
     pub is_body: bool,
-    /// Position, orientation and velocities.
+    /// Position, orientation of its own frame, and velocities.
     pub pose: &'a Pose,
+    /// Turn from the shape as the keys of the case (file, section, axis) describe it: at t = 0 their `orientation`.
+    pub turn: DQuat,
     /// Force [N] and torque [N m] of the fluid in the last step.
     pub fluid: Wrench,
 }
@@ -100,6 +103,7 @@ impl Simulation {
             name: &solid.name,
             is_body: solid.is_body,
             pose,
+            turn: solid.turn(pose.orientation),
             fluid,
         })
     }

@@ -12,8 +12,9 @@ use crate::params::{Params, Step};
 use crate::plan::{ParticleStage, Plan};
 use crate::pressure::Settings;
 use crate::scene::{Kind, Scene};
-use glam::{DVec3, IVec3};
-use std::collections::HashSet;
+use crate::shape::Nearest;
+use glam::DVec3;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Part of the deviation that a step undoes [-].
@@ -105,24 +106,18 @@ fn near(scene: &Scene, params: &Params) -> (Vec<usize>, Vec<usize>) {
         off.abs().max_element() < SLACK
     };
     let solids = scene.position[scene.groups.fluid..].iter().copied();
-    let mut off: HashSet<IVec3> = HashSet::new();
-    let width = (REACH * l0).max(params.effective_radius);
-    let block = |x: DVec3| (x / width).floor().as_ivec3();
-    off.extend(solids.filter(|&x| !on_lattice(x)).map(block));
+    let off: Vec<[f64; 3]> = solids.filter(|&x| !on_lattice(x)).map(|x| x.to_array()).collect();
     if off.is_empty() {
         return (Vec::new(), Vec::new());
     }
     if params.periodic.is_any() {
         return (water.collect(), Vec::new());
     }
-    let grown = |blocks: &HashSet<IVec3>| -> HashSet<IVec3> {
-        let around = |&b: &IVec3| (0..27).map(move |k| b + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1));
-        blocks.iter().flat_map(around).collect()
+    let off = Nearest::new(off);
+    let reach = ((REACH + SLACK) * l0).max(params.effective_radius);
+    let within = |slots: Vec<usize>, reach: f64| -> (Vec<usize>, Vec<usize>) {
+        slots.into_par_iter().partition(|&i| off.has_within(scene.position[i].to_array(), reach))
     };
-    let moves = grown(&off);
-    let around = grown(&moves);
-    let in_any = |i: &usize, blocks: &HashSet<IVec3>| blocks.contains(&block(scene.position[*i]));
-    let own: Vec<usize> = water.clone().filter(|i| in_any(i, &moves)).collect();
-    let held = water.filter(|i| !in_any(i, &moves) && in_any(i, &around)).collect();
-    (own, held)
+    let (near, _) = within(water.collect(), 2.0 * reach);
+    within(near, reach)
 }

@@ -236,6 +236,91 @@ fn faces_behind_solids_of_any_shape_see_no_water() {
 }
 
 #[test]
+fn where_a_scene_lies_changes_no_force_on_its_walls() {
+    // The edges of the box run through the middle of faces of the tank: round-off told on which side of the points.
+    let area = |[x, y, z]: [f64; 3]| {
+        let scene = Scene::build(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n\
+             [tank]\nmin = [{x}, {y}, {z}]\nmax = [{}, {}, {}]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.fill]]\nseed = [{}, {}, {}]\nlevel = {}\n\
+             [[obstacle]]\nname = \"box\"\nshape = \"box\"\nsize = [0.06, 0.06, 0.08]\ncenter = [{}, {}, {}]\n",
+            x + 0.4, y + 0.16, z + 0.2, x + 0.05, y + 0.02, z + 0.05, z + 0.1, x + 0.2, y + 0.08, z + 0.04
+        )))
+        .expect("it builds");
+        let floor = FixedWall::find(&scene, "tank.z_min").expect("a floor");
+        floor.areas(&scene, &[]).into_iter().sum::<DVec3>().z
+    };
+    for at in [[0.2, 0.0, 0.0], [0.4, 0.4, 0.6], [1000.2, 2000.0, -300.0], [-0.3, 0.1, 0.7]] {
+        let area = area(at);
+        assert!((area - (0.4 * 0.16 - 0.06 * 0.06)).abs() < 1e-9, "{at:?}: {area} m2");
+    }
+}
+
+#[test]
+fn each_face_of_a_tank_has_what_looks_along_it_however_the_scene_is_turned() {
+    // The rim of a hole in a corner of the end; that of a hole across z went to the end.
+    let on = |k: usize| {
+        let turned = |v: [f64; 3]| [0, 1, 2].map(|axis| v[(axis + k) % 3]);
+        let axis = |of: usize| ["x", "y", "z"][(of + 3 - k) % 3];
+        let scene = Scene::build(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = {:?}\n\
+             [tank]\nmin = [0, 0, 0]\nmax = {:?}\nopen = [\"{}_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = {:?}\n\
+             [[outflow]]\nname = \"hole\"\nface = \"{}_max\"\nmin = {:?}\nmax = {:?}\n",
+            turned([0.0, 0.0, -9.81]),
+            turned([0.3, 0.16, 0.3]),
+            axis(2),
+            turned([0.2, 0.16, 0.1]),
+            axis(0),
+            turned([0.3, 0.0, 0.0]),
+            turned([0.3, 0.12, 0.2])
+        )))
+        .expect("it builds");
+        ["x_min", "x_max", "y_min", "y_max", "z_min"].map(|face| {
+            let name = format!("tank.{}{}", axis("xyz".find(&face[..1]).expect("an axis")), &face[1..]);
+            let wall = FixedWall::find(&scene, &name).expect("a wall");
+            let area: DVec3 = wall.areas(&scene, &[]).into_iter().sum();
+            let own = "xyz".find(&name[5..6]).expect("an axis");
+            assert!((area.length() - area[own].abs()).abs() < 1e-12, "{name}, turned {k}: {area}");
+            area[own]
+        })
+    };
+    let first = on(0);
+    for k in [1, 2] {
+        let turned = on(k);
+        assert!(first.iter().zip(turned).all(|(a, b)| (a - b).abs() < 1e-12), "{first:?} {turned:?}");
+    }
+}
+
+#[test]
+fn a_pressure_gauge_reads_a_body_that_is_held_and_names_one_that_is_not() {
+    let with = |more: &str| {
+        case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+             [fluid]\nsound_speed = 4\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.32, 0, 0.2]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.32, 0, 0.3]\nopen = [\"z_max\"]\n[contact]\nspring = 1e5\n\
+             [[gauge.pressure]]\nname = \"p\"\npoint = [0.16, 0, 0.1]\n{more}"
+        ))
+    };
+    let body = "[[body]]\nname = \"b\"\nsize = [0.12, 0.02, 0.1]\ncenter = [0.16, 0, 0.15]\ndensity = 500\ndisplaces_fluid = true\n";
+    let held = with(&format!("{body}locked = [\"x\", \"z\", \"rotation_y\"]\n"));
+    let pressure = means(&held, &Processor::Cpu, 0.05, 0.15)["p [Pa]"];
+    let statics = 1000.0 * 9.81 * 0.1;
+    assert!((pressure / statics - 1.0).abs() < 0.03, "{pressure} Pa for {statics}");
+    let wall = "[[moving_wall]]\nname = \"w\"\nmin = [0.1, 0, 0.1]\nmax = [0.22, 0, 0.2]\nmotion = [[0, 0, 0, 0], [1, 0, 0, 0.1]]\n";
+    for (more, on) in [(body, "it lies on body `b`"), (wall, "it lies on moving wall `w`")] {
+        match Scene::build(&with(more)) {
+            Err(seixo::Error::Case(why)) => {
+                let problem = &why.problems[0];
+                assert!(problem.key == "gauge.pressure.0.point" && problem.message.contains(on), "{why}");
+                assert!(problem.remedy.contains("gauge.force"), "{why}");
+            }
+            other => panic!("expected a refusal, got {:?}", other.map(|_| ())),
+        }
+    }
+}
+
+#[test]
 fn torques_on_a_face_of_the_tank_count_about_the_middle_of_its_surface() {
     let on = faces("", DVec3::ZERO);
     for name in ["tank.x_min", "tank.x_max", "tank.z_min"] {

@@ -70,6 +70,7 @@ mod study;
 mod study_files;
 mod study_measures;
 mod surface;
+mod tables;
 mod twins;
 mod wall_layers;
 mod water;

@@ -378,3 +378,15 @@ fn a_plank_slides_down_the_groove_of_one_prism_by_the_forces_of_both_flanks() {
         assert!((speed / exact - 1.0).abs() < 1e-2, "flanks of {flank}: {speed} for {exact}");
     }
 }
+
+#[test]
+fn what_is_left_out_beyond_the_tank_is_told_with_where_the_prism_stands() {
+    // Its `position` is not its middle along y.
+    let block = "[[obstacle]]\nname = \"it\"\nshape = \"prism\"\nsection = [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]\nheight = 0.16\n";
+    for (y, told) in [(0.0, false), (0.08, true)] {
+        let case = case(&still(3, &format!("{block}position = [0.3, {y}, 0]\n")));
+        let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}"));
+        let note = "beyond the tank's, it reaches from y = 0.0800 to 0.2400 m";
+        assert_eq!(scene.notes.iter().any(|n| n.ends_with(note)), told, "{:?}", scene.notes);
+    }
+}

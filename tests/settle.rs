@@ -121,6 +121,34 @@ fn a_scene_that_fits_its_lattice_starts_on_it() {
 }
 
 #[test]
+fn a_scene_starts_the_same_wherever_it_lies_and_mirrored() {
+    // Force of the first step beside a turned body, in a tank at `at` spacings along x or mirrored in x = 0.
+    let force = |at: f64, way: f64| {
+        let [low, high, center] = [0.0, 0.4, 0.17].map(|x| way * (x + 0.02 * at));
+        let case = case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
+             [tank]\nmin = [{}, 0, 0]\nmax = [{}, 0.3, 0.3]\nopen = [\"z_max\"]\n\
+             [[fluid.block]]\nmin = [{}, 0, 0]\nmax = [{}, 0.3, 0.2]\n[contact]\nspring = 1e4\n\
+             [[body]]\nname = \"b\"\nsize = [0.12, 0.1, 0.1]\ncenter = [{center}, 0.14, 0.2]\ndensity = 500\n\
+             orientation = {{ axis = [0, 1, 0], angle_deg = {} }}\ndisplaces_fluid = true\n",
+            low.min(high),
+            low.max(high),
+            low.min(high),
+            low.max(high),
+            way * 15.0
+        ));
+        let mut run = simulation(&case);
+        run.step().expect("a step");
+        let force = run.fluid_force[0].force;
+        DVec3::new(way * force.x, force.y, force.z)
+    };
+    let first = force(0.0, 1.0);
+    let others = [(1.0, 1.0), (2.0, 1.0), (7.0, 1.0), (0.0, -1.0)].map(|(at, way)| force(at, way));
+    println!("{first}: {:?}", others.map(|f| f - first));
+    assert!(others.iter().all(|f| f.distance(first) < 1e-4 * first.length()), "{first} {others:?}");
+}
+
+#[test]
 fn stiff_water_around_a_body_runs_on() {
     let (shape, center) = ODD[0];
     let mut run = simulation(&tank(0.02, "sound_speed = 14", &body(shape, center, 1000.0)));

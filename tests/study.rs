@@ -358,7 +358,7 @@ fn slots_for_what_comes_in_are_no_particles() {
     // K = N m v^2 / 2 with the water that there was.
     let of = |name: &str| measured.value(name).expect("measured");
     let square = of("spurious speed [-]").powi(2) * 9.80665 * 0.2;
-    let particles = 2.0 * of("kinetic energy [J]") / (1000.0 * 0.02_f64.powi(3) * square);
+    let particles = 2.0 * of("kinetic energy [J/m]") / (1000.0 * 0.02_f64.powi(2) * square);
     let water = scene.water() as f64;
     assert!(particles > 0.99 * water && particles < 1.05 * water, "{particles} of {water}");
     let make = |s: &_, p: &_, plan: &_, settings| cpu_only(Default::default(), s, p, plan, settings);
@@ -450,30 +450,30 @@ fn a_study_without_a_reference_tells_results() {
             "[[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n\"\"\"\n[measure]\nof = [\"gauges\"]\nevery = 0.01\n\
              [[axis]]\nname = \"preset\"\nkey = \"fluid.preset\"\nvalues = [\"accurate\"]\n\
              [[axis]]\nname = \"spacing\"\nkey = \"run.spacing\"\nvalues = [0.02, 0.01]\n\
-             [[result]]\nname = \"mean force on the floor [N]\"\ncurve = \"{curve}\"\ntake = \"{take}\"\nwindow = [0.02, 0.1]\n"
+             [[result]]\nname = \"mean force on the floor [N/m]\"\ncurve = \"{curve}\"\ntake = \"{take}\"\nwindow = [0.02, 0.1]\n"
         )
     };
     // The text of the case ends where the gauge goes.
     let head = head.trim_end().trim_end_matches("\"\"\"").to_owned();
     let path = folder.path().join("floor.toml");
-    std::fs::write(&path, head.clone() + &rest("floor_force_z [N]", "mean")).unwrap();
+    std::fs::write(&path, head.clone() + &rest("floor_force_z [N/m]", "mean")).unwrap();
     let (code, said) = run(folder.path(), &["floor.toml", "-o", "out", "--quiet"]);
     assert_eq!(code, 0, "{said}");
     let table = std::fs::read_to_string(folder.path().join("out/results.csv")).unwrap();
     let mut lines = table.lines();
-    let place = lines.next().unwrap().split(',').position(|c| c == "mean force on the floor [N]").unwrap();
+    let place = lines.next().unwrap().split(',').position(|c| c == "mean force on the floor [N/m]").unwrap();
     let forces: Vec<f64> = lines.map(|l| l.split(',').nth(place).unwrap().parse().unwrap()).collect();
     println!("{forces:?}");
-    // Of a slice one spacing wide: the weight of the water in it.
-    for (force, l0) in forces.iter().zip([0.02, 0.01]) {
-        let weight = 1000.0 * 9.80665 * 0.2 * 0.2 * l0;
+    // Of slices of two widths for each metre across: the weight of the water.
+    let weight = 1000.0 * 9.80665 * 0.2 * 0.2;
+    for force in forces {
         assert!((-force / weight - 1.0).abs() < 0.05, "{force} for {weight}");
     }
     std::fs::write(&path, head.clone() + &rest("flor_force_z [N]", "mean")).unwrap();
     let (_, said) = run(folder.path(), &["floor.toml", "-o", "wrong", "--quiet"]);
     let report = std::fs::read_to_string(folder.path().join("wrong/report.md")).unwrap_or(said);
     assert!(report.contains("there is no curve `flor_force_z [N]`"), "{report}");
-    std::fs::write(&path, head + &rest("floor_force_z [N]", "lag")).unwrap();
+    std::fs::write(&path, head + &rest("floor_force_z [N/m]", "lag")).unwrap();
     let (code, said) = run(folder.path(), &["floor.toml", "-o", "lag", "--quiet"]);
     assert!(code != 0 && said.contains("asks for a second curve"), "{code}: {said}");
 }

@@ -95,6 +95,10 @@ fn what_cannot_be_made_is_told_with_line_and_remedy() {
         (regular("height = 0.08"), "without `period`"),
         (regular("height = 0.08, period = 1.5, seed = 3"), "has no `seed`"),
         (regular("height = 0.08, period = 1.5, direction = [0, 0, 1]"), "horizontal direction"),
+        (
+            regular("height = 0.08, period = 1.5, direction = [1, 0.1, 0]"),
+            "its face looks along x | turn it by `orientation` (a box with `size` and `center`), or use [1.0, 0.0, 0.0]",
+        ),
         (regular("height = -0.08, period = 1.5"), "out of range"),
         ("wave = { kind = \"solitary\", height = 0.17 }".into(), "0.78 d"),
         ("wave = { kind = \"solitary\", height = 0.05, ramp = 1 }".into(), "has no `ramp`"),

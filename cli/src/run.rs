@@ -335,8 +335,10 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
             "pressure: {:.1} iterations a solve (at most {}) with {}, {} failures; density error {:.2e} mean, {:.2e} max",
             p.iterations_mean, p.iterations_max, p.preconditioner.unwrap_or("nothing"), p.failures, m.density_error_mean, m.density_error_max
         ));
+        let seen =
+            if m.steps_seen < own { format!("in {} steps of {own}", m.steps_seen) } else { "at most".into() };
         lines.push(format!(
-            "water: Courant number at most {:.2}; {} of {fluid} particles lost",
+            "water: Courant number {seen} {:.2}; {} of {fluid} particles lost",
             m.courant_max, m.lost_particles
         ));
     }
@@ -355,9 +357,7 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
     if summary.verdict.grade == Grade::Fine {
         lines.push("verdict: fine".into());
     }
-    if let Some(left_out) = summary.verdict.left_out.first() {
-        lines.push(format!("not judged: {left_out}"));
-    }
+    lines.extend(summary.verdict.left_out.iter().map(|left_out| format!("not judged: {left_out}")));
     lines.push(format!("results in {}", out.display()));
     lines.join("\n")
 }

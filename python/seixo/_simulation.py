@@ -68,7 +68,8 @@ class Solid:
     is_body: bool
     #: Centre of mass [m], (3,).
     position: Floats
-    #: Unit quaternion w, x, y, z that turns the shape of the case into the world, (4,).
+    #: Unit quaternion w, x, y, z that turns the shape, as its keys (file, section, axis) describe it, into the world; at the start what
+    #: `orientation` says, (4,).
     orientation: Floats
     #: Velocity of the centre of mass [m/s], (3,).
     velocity: Floats

@@ -177,7 +177,7 @@ impl Simulation {
     fn solids(&self) -> PyResult<Vec<Solid>> {
         let inner = self.lock()?;
         let solid = |s: seixo::SolidState<'_>| {
-            let (pose, q) = (s.pose, s.pose.orientation);
+            let (pose, q) = (s.pose, s.turn);
             (
                 s.name.to_owned(),
                 s.is_body,

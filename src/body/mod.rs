@@ -100,6 +100,7 @@ impl Body {
         };
         match &solid.drive {
             Drive::Prescribed(motion) => {
+                (body.pose.velocity, body.pose.angular_velocity) = motion.velocity(0.0);
                 body.motion = Some((solid.position, body.pose.orientation, motion.clone()));
             }
             // What is held in all that it could do is a wall to others.
@@ -329,6 +330,7 @@ mod tests {
             shape: Shape::cuboid(DVec3::new(0.6, 0.4, 0.2)),
             position: DVec3::ZERO,
             orientation: DQuat::from_rotation_x(0.4),
+            frame: DQuat::IDENTITY,
             drive: Drive::Free(FreeBody {
                 mass: 12.0,
                 inertia: DVec3::new(0.2, 0.4, 0.52),

@@ -1,13 +1,17 @@
 //! The part of the check that judges motion: tables, formulas, and waves against what theory and resolution allow.
 
 use super::check::{Checker, length};
-use super::{Guide, MovingWall, Vector};
+use super::{AXES, Guide, MovingWall, Vector};
 use crate::waves::{MCCOWAN, SECOND_ORDER, WaveKind, miche};
+use glam::DVec3;
 
 /// Shortest wave over the spacing that a piston is asked for [-].
 const SHORTEST: f64 = 10.0;
 /// Height over the spacing below which a wave is lost to the particles soon [-].
 const LOW: f64 = 4.0;
+
+/// Sine of the angle between a piston's way and the normal of its face up to which these are one.
+const ASKEW: f64 = 0.01;
 
 /// What a table of rows is at t = 0, on straight lines between them.
 fn at_start(rows: &[[f64; 4]]) -> Vector {
@@ -144,6 +148,8 @@ impl Checker<'_> {
             let axes = if self.flat() { "x" } else { "x, y" };
             let message = format!("a piston pushes along a horizontal direction, {axes}");
             self.add(key("direction"), message, "e.g. [1, 0, 0], or leave it out");
+        } else if let Some(facing) = w.facing() {
+            self.faces(&key("direction"), &direction, facing);
         }
         let g = self.case.run.gravity;
         if g[2] >= 0.0 || g[0] != 0.0 || !self.flat() && g[1] != 0.0 {
@@ -183,6 +189,22 @@ impl Checker<'_> {
         self.resolved(path, &wave, height);
         self.steady(path, wave.formula.fastest(0.0, f64::INFINITY));
         self.kept(path, w, wave.formula.reach());
+    }
+
+    /// A piston makes the wave of its stroke only where its face stands across it: its nearest one looks along `facing`.
+    fn faces(&mut self, path: &str, direction: &Vector, facing: DVec3) {
+        if facing.cross(DVec3::from(*direction).normalize()).length() < ASKEW {
+            return;
+        }
+        let tidy = facing.to_array().map(|x| (x * 1e4).round() / 1e4 + 0.0);
+        let along = match tidy.iter().position(|x| x.abs() == 1.0) {
+            Some(axis) => AXES[axis].to_owned(),
+            None => format!("{tidy:?}"),
+        };
+        let turn = "turn it by `orientation` (a box with `size` and `center`)";
+        let use_it = if tidy[2] == 0.0 { format!(", or use {tidy:?}") } else { String::new() };
+        let message = format!("the piston would push along {direction:?}, and its face looks along {along}");
+        self.add(path, message, format!("{turn}{use_it}"));
     }
 
     /// The wave against the spacing, and against what second order describes.

@@ -69,20 +69,24 @@ impl Checker<'_> {
         self.held(&format!("body.{k}"), body);
         if body.is_driven() {
             let unheard = [
-                ("locked", !body.locked.is_empty()),
-                ("standing", body.standing),
-                ("hinge", body.hinge.is_some()),
-                ("mass_offset", body.mass_offset.is_some()),
-                ("velocity", length(&body.velocity) > 0.0),
-                ("angular_velocity", length(&body.angular_velocity) > 0.0),
+                ("locked", !body.locked.is_empty(), false),
+                ("standing", body.standing, false),
+                ("hinge", body.hinge.is_some(), false),
+                ("mass_offset", body.mass_offset.is_some(), false),
+                ("velocity", length(&body.velocity) > 0.0, false),
+                ("angular_velocity", length(&body.angular_velocity) > 0.0, false),
+                // What it is made of contradicts no motion: it is told alone.
+                ("density", body.density.is_some(), true),
+                ("mass", body.mass.is_some(), true),
+                ("inertia", body.inertia.is_some(), true),
             ];
-            for (key, given) in unheard {
-                if given {
-                    self.add(
-                        path(key),
-                        format!("body `{}` follows a given motion: `{key}` has no effect", body.name),
-                        format!("remove `{key}`, or what moves the body"),
-                    );
+            for (key, _, harmless) in unheard.into_iter().filter(|u| u.1) {
+                let message = format!("body `{}` follows a given motion: `{key}` has no effect", body.name);
+                let remedy = format!("remove `{key}`, or what moves the body");
+                if harmless {
+                    self.warn(&path(key), message, &remedy);
+                } else {
+                    self.add(path(key), message, remedy);
                 }
             }
         }
@@ -381,5 +385,24 @@ impl Checker<'_> {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::case::check::check;
+
+    #[test]
+    fn what_a_driven_body_is_made_of_is_told_to_have_no_effect() {
+        let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[contact]\nspring = 1e5\n[[body]]\nname = \"d\"\n\
+                    size = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0]\nmass = 5\ninertia = [1, 1, 1]\n";
+        let told = |more: &str| {
+            let problems = check(&format!("{text}{more}").parse().unwrap());
+            problems.into_iter().map(|p| (p.key, p.warning)).collect::<Vec<_>>()
+        };
+        let heard = ["body.0.mass", "body.0.inertia"].map(|key| (key.to_owned(), true));
+        let driven = told("motion = [[0, 0, 0, 0], [1, 0.1, 0, 0]]\n");
+        assert!(heard.iter().all(|h| driven.contains(h)), "{driven:?}");
+        assert!(told("").iter().all(|t| !heard.contains(t)));
     }
 }

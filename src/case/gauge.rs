@@ -14,7 +14,8 @@ pub struct Gauges {
     /// Pressures and forces of a row are means over the steps since the row before, each with its length, and not those of the last step.
     /// What is read of the water itself (levels, velocities, volumes) is of the moment.
     pub mean: bool,
-    /// Pressure on a fixed wall: mean over the wall particles within half an effective radius of the point.
+    /// Pressure on what stays where it is, a wall of the tank, an obstacle, a body that is held: mean over the wall particles within half an
+    /// effective radius of the point.
     pub pressure: Vec<PressureGauge>,
     /// Height of the water surface along a vertical line.
     pub level: Vec<LevelGauge>,

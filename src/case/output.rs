@@ -95,7 +95,8 @@ pub struct Output {
     pub region: Option<OutputRegion>,
     /// Encoding of the VTU files.
     pub encoding: Encoding,
-    /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent.
+    /// Interval between rows of bodies.csv and monitors.csv [s]; every step if absent. On a GPU the largest speeds of the run and its
+    /// verdict then know these steps and each tenth alone.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub table_every: Option<f64>,
     /// Keep the energy ledger: the work of every stage in monitors.csv and result.json.

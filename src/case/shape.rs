@@ -34,7 +34,8 @@ pub enum BodyShape {
     /// edge at x max. Its centroid lies two thirds of the way along x and one third up.
     Wedge,
     /// What the closed line through the corners of `section` encloses, in x and z, over a `height` along y. A body's
-    /// `center` is where its centre of mass goes; a wall's section has the coordinates of the case, moved by `position`.
+    /// `center` is where its centre of mass goes; a wall's section has the coordinates of the case and its height begins at y = 0,
+    /// both moved by `position`.
     Prism,
     /// The watertight surface in the STL or OBJ `file` (three dimensions). A body's `center` is where its centre of mass
     /// goes.
@@ -301,10 +302,14 @@ impl Form<'_> {
 
     /// Turn of the shape's frame, [`Shape::frame`] left aside; a cylinder stands along the z axis of its own.
     pub(crate) fn turn(&self, plane: bool) -> DQuat {
-        let turn = self.orientation();
+        self.orientation() * self.upended(plane)
+    }
+
+    /// What `axis` says, an `orientation` left aside.
+    pub(crate) fn upended(&self, plane: bool) -> DQuat {
         match self.axis {
-            Some(axis) if !plane => turn * DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
-            _ => turn,
+            Some(axis) if !plane => DQuat::from_rotation_arc(DVec3::Z, DVec3::from(axis).normalize()),
+            _ => DQuat::IDENTITY,
         }
     }
 

@@ -20,7 +20,8 @@ pub struct WaterShape {
     /// Radius of a sphere, cylinder or cone [m].
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub radius: Option<f64>,
-    /// Length of a cylinder or cone along its axis, of a prism along y [m]; in two dimensions it may be left out.
+    /// Length of a cylinder or cone along its axis, of a prism along y, from y = 0 upwards, moved by `position` [m]; in two
+    /// dimensions it may be left out.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub height: Option<f64>,
     /// Corners x and z of a prism's section [m], in order; the last leads back to the first.

@@ -2,6 +2,7 @@
 
 use super::{Body, Case, Face, MovingWall, Vector};
 use crate::waves::{Component, Formula, Profile, Wanted, Wave, WaveKind};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -63,7 +64,7 @@ pub struct WaveMaker {
     /// Depth of the still water [m]; that of the block of water at the piston's face if absent.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub depth: Option<f64>,
-    /// Horizontal direction in which the piston pushes (any length); [1, 0, 0] if absent.
+    /// Horizontal direction in which the piston pushes (any length), along which a face of it looks; [1, 0, 0] if absent.
     pub direction: Option<Vector>,
     /// Time over which the motion grows to its size, smoothly [s]; one `period` if absent.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
@@ -183,6 +184,17 @@ impl MovingWall {
             .zip(self.size)
             .filter(|_| self.orientation.is_none() && self.shape == super::BodyShape::Box);
         self.corners().or_else(|| placed.map(|(center, size)| about(center, size)))
+    }
+
+    /// The normal that is nearest to the direction in which it pushes, of the faces of a box as it stands; of no other shape.
+    pub(crate) fn facing(&self) -> Option<DVec3> {
+        let direction = DVec3::from(self.wave.as_ref()?.direction());
+        let turn = self.form(None).orientation();
+        let box_like = self.corners().is_some() || self.shape == super::BodyShape::Box;
+        let normals = DVec3::AXES.map(|axis| turn * axis);
+        let nearest =
+            normals.into_iter().max_by(|a, b| a.dot(direction).abs().total_cmp(&b.dot(direction).abs()));
+        nearest.filter(|_| box_like).map(|n| n * n.dot(direction).signum())
     }
 
     /// Axis and sign of the direction in which it pushes, and where its face is along that axis [m].

@@ -96,6 +96,14 @@ impl Archive {
         Ok(())
     }
 
+    /// A count that states of older versions lack: `value` stays as it is then.
+    ///
+    /// # Errors
+    /// None so far.
+    pub fn count_of_late(&mut self, name: &str, value: &mut u64) -> Result<()> {
+        if self.saving || self.numbers.contains_key(name) { self.count(name, value) } else { Ok(()) }
+    }
+
     /// A count of `what` that must be the same in the state and in the case.
     ///
     /// # Errors

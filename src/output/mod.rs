@@ -29,6 +29,7 @@ pub mod pvd;
 pub mod render;
 pub mod replay;
 pub mod result;
+pub mod slice;
 pub mod spare;
 pub mod surface;
 pub mod table;

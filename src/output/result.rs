@@ -97,7 +97,12 @@ pub struct Pressure {
 /// Extremes over the run.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Monitors {
-    /// Largest |n / n0 - 1| of an inner fluid particle [-].
+    /// Steps after which the fluid was looked at, for its speeds and its density: all on a CPU, those of the rows of monitors.csv and each
+    /// tenth on a device.
+    pub steps_seen: u64,
+    /// Steps after which the energy was summed: those of the rows, and of the looks in a scene without free bodies.
+    pub energy_steps_seen: u64,
+    /// Largest |n / n0 - 1| of an inner fluid particle [-], in the steps seen as those below.
     pub density_error_max: f64,
     /// Mean over the run of the mean of n / n0 - 1 [-].
     pub density_error_mean: f64,
@@ -132,14 +137,14 @@ pub struct Monitors {
     pub driven_contact_work: f64,
 }
 
-/// A body or moving wall at the end.
+/// A body, a moving wall, or an obstacle that is no box along the lattice, at the end.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Body {
     /// Name.
     pub name: String,
     /// Centre of mass [m]; of a hinged body a place on its hinge.
     pub position_m: [f64; 3],
-    /// Orientation, unit quaternion w, x, y, z.
+    /// Turn from the shape as its keys (file, section, axis) describe it, before `orientation`: unit quaternion w, x, y, z.
     pub orientation_wxyz: [f64; 4],
     /// Velocity [m/s].
     pub velocity_m_s: [f64; 3],

@@ -20,8 +20,10 @@ pub struct Totals {
     iterations: u64,
     pressure: Pressure,
     monitors: Monitors,
-    looks: u64,
     density_error: f64,
+    /// Steps at the last [`Self::look`] and [`Self::weigh`]: no step counts twice.
+    looked: Option<u64>,
+    weighed: Option<u64>,
     /// Work of each part of the step, if it is kept.
     pub ledger: Option<Ledger>,
     /// Particles of water, and those that each outflow had swallowed, when last looked at.
@@ -44,18 +46,18 @@ impl Totals {
             iterations,
             pressure,
             monitors,
-            looks,
             density_error,
             speed,
+            // Only that a last row makes no second look of the same process.
+            looked: _,
+            weighed: _,
             // Read from the simulation at the next row, and at the end.
             ledger: _,
             water: _,
             // By the clock of each process.
             output: _,
         } = self;
-        for (name, value) in
-            [("solves", solves), ("unknowns", unknowns), ("iterations", iterations), ("looks", looks)]
-        {
+        for (name, value) in [("solves", solves), ("unknowns", unknowns), ("iterations", iterations)] {
             archive.count(&format!("totals.{name}"), value)?;
         }
         archive.number("totals.density_error", density_error)?;
@@ -76,6 +78,8 @@ impl Totals {
         archive.number("totals.relative_residual_max", relative_residual_max)?;
         archive.count("totals.failures", failures)?;
         let Monitors {
+            steps_seen,
+            energy_steps_seen,
             density_error_max,
             density_error_mean: _,
             courant_max,
@@ -105,6 +109,10 @@ impl Totals {
         ] {
             archive.number(&format!("totals.{name}"), value)?;
         }
+        archive.count("totals.looks", steps_seen)?;
+        // Once both were of the same steps.
+        *energy_steps_seen = if archive.is_saving() { *energy_steps_seen } else { *steps_seen };
+        archive.count_of_late("totals.weighed", energy_steps_seen)?;
         archive.count("totals.lost_particles", lost_particles)?;
         archive.small("totals.neighbours_max", neighbours_max)?;
         archive.small("totals.contact_substeps_max", contact_substeps_max)
@@ -137,31 +145,40 @@ impl Totals {
         self.pressure.clamps = counters.pressure_clamps;
     }
 
-    /// Count in what a table row shows: the fluid, the guards and the bodies' energy [J].
-    pub fn look(&mut self, fluid: &FluidMonitor, counters: &Counters, bodies: f64, dt: f64, l0: f64) {
+    /// Count in a look at the water and the guards after so many `steps`; the last one was `dt` [s] long, with l0 [m].
+    pub fn look(&mut self, steps: u64, (fluid, counters): (&FluidMonitor, &Counters), dt: f64, l0: f64) {
         self.see(fluid, counters);
         self.speed = fluid.speed_max;
-        self.looks += 1;
-        self.density_error += fluid.density_error_mean;
         let monitors = &mut self.monitors;
+        if self.looked.replace(steps) != Some(steps) {
+            monitors.steps_seen += 1;
+            self.density_error += fluid.density_error_mean;
+        }
         monitors.density_error_max = monitors.density_error_max.max(fluid.density_error_max);
         monitors.courant_max = monitors.courant_max.max(fluid.speed_max * dt / l0);
         monitors.speed_max = monitors.speed_max.max(fluid.speed_max);
-        monitors.energy_end = fluid.kinetic + fluid.potential + bodies;
-        // The sum may not be a number, and then is not to be passed over.
-        if monitors.energy_end.partial_cmp(&monitors.energy_max).is_none_or(std::cmp::Ordering::is_gt) {
-            monitors.energy_max = monitors.energy_end;
-        }
         monitors.lost_particles = counters.lost;
         monitors.neighbours_max = counters.neighbours_max;
     }
 
+    /// Count in the energy of fluid and bodies [J] after so many `steps`.
+    pub fn weigh(&mut self, steps: u64, energy: f64) {
+        let monitors = &mut self.monitors;
+        monitors.energy_steps_seen += u64::from(self.weighed.replace(steps) != Some(steps));
+        monitors.energy_end = energy;
+        // The sum may not be a number, and then is not to be passed over.
+        if monitors.energy_end.partial_cmp(&monitors.energy_max).is_none_or(std::cmp::Ordering::is_gt) {
+            monitors.energy_max = monitors.energy_end;
+        }
+    }
+
     /// The energy seen last is that of the start.
     pub fn start(&mut self) {
-        self.monitors.energy_start = self.monitors.energy_end;
-        self.monitors.energy_max = self.monitors.energy_end;
+        let monitors = &mut self.monitors;
+        monitors.energy_start = monitors.energy_end;
+        monitors.energy_max = monitors.energy_end;
         // Before the first step there is no number density to be wrong.
-        (self.looks, self.density_error) = (0, 0.0);
+        (monitors.steps_seen, monitors.energy_steps_seen, self.density_error) = (0, 0, 0.0);
     }
 
     /// The summary, but for how the run ended.
@@ -174,7 +191,7 @@ impl Totals {
         pressure.unknowns_mean = per(self.unknowns, self.solves);
         pressure.iterations_mean = per(self.iterations, self.solves);
         let mut monitors = self.monitors;
-        monitors.density_error_mean = self.density_error / self.looks.max(1) as f64;
+        monitors.density_error_mean = self.density_error / monitors.steps_seen.max(1) as f64;
         let precision = simulation.backend.precision();
         Summary {
             version: env!("CARGO_PKG_VERSION"),
@@ -251,7 +268,7 @@ fn bodies(simulation: &Simulation) -> Vec<Body> {
     let known = simulation.knows_fluid_force();
     poses
         .map(|(k, (pose, wrench))| {
-            let q = pose.orientation;
+            let q = simulation.scene.solids[k].turn(pose.orientation);
             Body {
                 name: simulation.solids.name(k).to_string(),
                 position_m: simulation.solids.path(k).to_array(),

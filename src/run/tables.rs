@@ -28,6 +28,8 @@ pub struct Tables {
     due: Due,
     gauges_due: Due,
     stages: Vec<Stage>,
+    /// No body is free: the energy is that of the water.
+    water_alone: bool,
     since: Since,
     /// Step of the last row.
     last: Option<u64>,
@@ -119,6 +121,7 @@ impl Tables {
             due: Due::new(every),
             gauges_due: Due::new(simulation.case.gauge.every),
             stages,
+            water_alone: (0..scene.solids.len()).all(|k| !simulation.solids.is_free(k)),
             since: Since::default(),
             last: None,
             gauged: None,
@@ -130,7 +133,18 @@ impl Tables {
     /// # Errors
     /// [`crate::error::Error::Folder`] if one is shorter than that, [`crate::error::Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self { monitors, bodies, gauges, due, gauges_due, stages: _, since, last, gauged } = self;
+        let Self {
+            monitors,
+            bodies,
+            gauges,
+            due,
+            gauges_due,
+            stages: _,
+            water_alone: _,
+            since,
+            last,
+            gauged,
+        } = self;
         monitors.exchange(archive)?;
         for table in bodies.iter_mut().chain(gauges.as_mut().map(|(_, table)| table)) {
             table.exchange(archive)?;
@@ -183,6 +197,8 @@ impl Tables {
         since.substeps = since.substeps.max(report.contact.substeps);
         if self.due.reached(simulation.time) {
             self.write(report, simulation, totals)?;
+        } else if report.look.is_some() || simulation.backend.timing() == Timing::Host {
+            self.look(report, simulation, totals)?;
         }
         if let Some((gauges, _)) = &mut self.gauges {
             gauges.follow(simulation, report.dt)?;
@@ -216,11 +232,23 @@ impl Tables {
         Ok(())
     }
 
+    /// A step without a row, for the extremes of the run: of the water, at which a look takes one pass over it where no device is waited for. The
+    /// energy of free bodies takes another search for contacts, and is left to the rows.
+    fn look(&self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
+        let (fluid, counters) = observe(simulation, report)?;
+        totals.look(simulation.steps, (&fluid, &counters), report.dt, simulation.params.spacing);
+        if self.water_alone {
+            totals.weigh(simulation.steps, fluid.kinetic + fluid.potential);
+        }
+        Ok(())
+    }
+
     fn write(&mut self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
         self.last = Some(simulation.steps);
         let (fluid, counters) = observe(simulation, report)?;
         let bodies = simulation.solids.energy();
-        totals.look(&fluid, &counters, bodies.total(), report.dt, simulation.params.spacing);
+        totals.look(simulation.steps, (&fluid, &counters), report.dt, simulation.params.spacing);
+        totals.weigh(simulation.steps, fluid.kinetic + fluid.potential + bodies.total());
         let since = std::mem::take(&mut self.since);
         let mut row = self.monitor_row(report, simulation, &fluid, &counters, bodies, &since);
         let ledger = simulation.ledger()?;
@@ -234,10 +262,11 @@ impl Tables {
             let followed = simulation.scene.followed();
             let known = simulation.knows_fluid_force();
             for (k, pose) in simulation.solids.poses().iter().enumerate().take(followed) {
-                let q = pose.orientation;
+                let q = simulation.scene.solids[k].turn(pose.orientation);
                 let (fluid, contact) = (simulation.fluid_force[k], simulation.solids.contact_wrenches()[k]);
                 let nothing = Wrench { force: DVec3::NAN, torque: DVec3::NAN };
                 let fluid = if known { fluid } else { nothing };
+                let contact = if simulation.has_stepped() { contact } else { nothing };
                 let mut row = vec![Cell::time(simulation.time), Cell::from(simulation.solids.name(k))];
                 row.extend(vector_cells(simulation.solids.path(k)));
                 row.extend([q.w, q.x, q.y, q.z].map(Cell::Number));
@@ -264,13 +293,18 @@ impl Tables {
         bodies: Energy,
         since: &Since,
     ) -> Vec<Cell> {
-        let mut row = vec![Cell::from(simulation.steps), Cell::time(simulation.time), Cell::from(report.dt)];
+        // Before the first step there is nothing yet that a step has done.
+        let stepped = simulation.has_stepped();
+        let of_step = |value: f64| if stepped { value } else { f64::NAN };
+        let count = |n: u32| if stepped { Cell::from(u64::from(n)) } else { Cell::from(f64::NAN) };
+        let mut row = vec![Cell::from(simulation.steps), Cell::time(simulation.time)];
         row.extend(
             [
-                fluid.speed_max * report.dt / simulation.params.spacing,
+                of_step(report.dt),
+                of_step(fluid.speed_max * report.dt / simulation.params.spacing),
                 fluid.speed_max,
-                fluid.density_error_mean,
-                fluid.density_error_max,
+                of_step(fluid.density_error_mean),
+                of_step(fluid.density_error_max),
                 fluid.kinetic,
                 fluid.potential,
                 bodies.kinetic,
@@ -283,17 +317,17 @@ impl Tables {
         for vector in [fluid.momentum, fluid.centroid, fluid.extent_max] {
             row.extend(vector.map(Cell::Number));
         }
-        row.extend([Cell::from(u64::from(since.iterations)), Cell::from(since.residual)]);
+        row.extend([count(since.iterations), Cell::from(of_step(since.residual))]);
         row.push(Cell::from(since.outcome.filter(|_| simulation.plan.wet()).map_or("", outcome_name)));
         row.extend([
-            Cell::from(since.penetration),
-            Cell::from(u64::from(since.substeps)),
-            Cell::from(since.omega_dt),
+            Cell::from(of_step(since.penetration)),
+            count(since.substeps),
+            Cell::from(of_step(since.omega_dt)),
             Cell::from(counters.lost),
             Cell::from(counters.displacement_clamps),
             Cell::from(counters.pressure_clamps),
             Cell::from(counters.negative_pressures),
-            Cell::from(u64::from(counters.neighbours_max)),
+            count(counters.neighbours_max),
         ]);
         // A stage whose time nothing tells gets an empty cell.
         let told = simulation.backend.timing() != Timing::Waits || simulation.wait_for_stages;

@@ -41,6 +41,22 @@ impl Judge {
     }
 }
 
+/// What went on in steps that nobody looked at, of a run with water (`wet`) or without.
+fn unseen(summary: &Summary, wet: bool) -> Vec<String> {
+    let (m, steps) = (&summary.monitors, summary.steps - summary.steps_before);
+    let water = (m.steps_seen, "speeds and density of the water");
+    let told = |(seen, what): (u64, &str)| {
+        let all = "without output.table_every each gets a row";
+        (seen < steps)
+            .then(|| format!("steps between the rows: {what} were seen in {seen} of {steps} steps; {all}"))
+    };
+    if wet && m.energy_steps_seen == m.steps_seen {
+        return told((m.steps_seen, "speeds, density and energy")).into_iter().collect();
+    }
+    let energy = (m.energy_steps_seen, "the energies");
+    [Some(water).filter(|_| wet), Some(energy)].into_iter().flatten().filter_map(told).collect()
+}
+
 /// The verdict on a run that reached its end or was stopped, with steps that are `adaptive` or not.
 pub fn judge(summary: &Summary, scale: Scale, adaptive: bool) -> Verdict {
     let (p, m) = (&summary.pressure, &summary.monitors);
@@ -104,7 +120,7 @@ pub fn judge(summary: &Summary, scale: Scale, adaptive: bool) -> Verdict {
     };
     let gain = rise - m.driven_contact_work - drawn - passing;
     let energy = scale.energy + passing;
-    let mut left_out = vec![];
+    let mut left_out = unseen(summary, wet);
     if scale.stirred && work.is_none() && gain > GAIN.0 * energy {
         let why = "the energy: solids that go to and fro put in work, which output.ledger = true would tell";
         left_out.push(why.to_owned());

@@ -23,7 +23,8 @@ pub(super) fn body(
     let in_plane =
         |x: case::Vector| if plane { DVec3::from(x) * DVec3::new(1.0, 0.0, 1.0) } else { x.into() };
     let center = in_plane(body.center);
-    let orientation = form.turn(plane) * shape.frame();
+    let frame = form.upended(plane) * shape.frame();
+    let orientation = form.orientation() * frame;
     // `orientation` turns it, an `axis` does not.
     let mass = orientation.inverse() * (form.orientation() * body.mass_offset.map_or(DVec3::ZERO, in_plane));
     // What it moves and turns about, and where that is.
@@ -42,6 +43,7 @@ pub(super) fn body(
         position: center + orientation * about,
         shape_offset: -about,
         orientation,
+        frame,
         drive,
         wall_slots: 0..0,
         dummy_slots: 0..0,

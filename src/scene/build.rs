@@ -33,6 +33,7 @@ impl Scene {
         builder.walls();
         builder.water();
         builder.bodies();
+        builder.meetings();
         builder.room();
         builder.overfilled();
         builder.gauges();
@@ -315,16 +316,9 @@ impl<'a> Builder<'a> {
         };
         self.moving_walls.iter().for_each(|wall| add(&mut near, wall));
         let up = (gravity.length() > 0.0).then(|| -gravity.normalize());
-        for (k, body) in case.body.iter().enumerate() {
-            let made = bodies::body(body, case.run.spacing, case.run.dimensions, self.layers);
-            let mut solid = match made {
-                Ok(solid) => solid,
-                Err(problem) => {
-                    let key = format!("body.{k}.{}", problem.key);
-                    self.problems.push(Problem { key, ..*problem });
-                    continue;
-                }
-            };
+        let mut numbers = Vec::new();
+        for (k, mut solid) in self.in_order_of_placement(up) {
+            let body = &case.body[k];
             self.thin(&format!("body.{k}"), &solid);
             let surroundings = Surroundings {
                 fixed: &self.fixed,
@@ -362,11 +356,45 @@ impl<'a> Builder<'a> {
             }
             add(&mut near, &solid);
             self.bodies.push(solid);
+            numbers.push(k);
         }
         self.hanging(&near, law, up);
+        // From here on they stand as the case lists them.
+        let mut placed: Vec<(usize, Solid)> =
+            numbers.into_iter().zip(std::mem::take(&mut self.bodies)).collect();
+        placed.sort_by_key(|(k, _)| *k);
+        self.bodies = placed.into_iter().map(|(_, solid)| solid).collect();
         self.water.keep_what_is_left(&self.grid);
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
+    }
+
+    /// The bodies with their numbers in the case, in the order in which they are placed: those that stand last, from the lowest up, each
+    /// on what is there.
+    fn in_order_of_placement(&mut self, up: Option<DVec3>) -> Vec<(usize, Solid)> {
+        let case = self.case;
+        let mut made = Vec::new();
+        for (k, body) in case.body.iter().enumerate() {
+            match bodies::body(body, case.run.spacing, case.run.dimensions, self.layers) {
+                Ok(solid) => made.push((k, solid)),
+                Err(problem) => {
+                    let key = format!("body.{k}.{}", problem.key);
+                    self.problems.push(Problem { key, ..*problem });
+                }
+            }
+        }
+        if let Some(up) = up {
+            let bottom = |(k, solid): &(usize, Solid)| {
+                let placed = solid.placed();
+                if case.body[*k].standing {
+                    placed.center.dot(up) - placed.reach(-up)
+                } else {
+                    f64::NEG_INFINITY
+                }
+            };
+            made.sort_by(|a, b| bottom(a).total_cmp(&bottom(b)));
+        }
+        made
     }
 
     /// Whether a box of the lattice of this `size` [m] is one particle thick.
@@ -380,7 +408,8 @@ impl<'a> Builder<'a> {
         // Of the solids in openings, which come last, no gauge tells anything.
         let own = self.moving_walls.len() - self.openings.iter().filter(|o| o.wall.is_some()).count();
         let solids = self.moving_walls[..own].iter().chain(&self.bodies);
-        let still = solids.filter(|s| s.is_still()).flat_map(Solid::wall_positions);
+        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = solids.partition(|s| s.stays());
+        let still = still.into_iter().flat_map(Solid::wall_positions);
         let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
         for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
             let mut at: DVec3 = gauge.point.into();
@@ -388,13 +417,25 @@ impl<'a> Builder<'a> {
                 at.y = 0.0;
             }
             if let Err(nearest) = wall_at(&walls, at, reach, self.lattice.spacing) {
+                let key = format!("gauge.pressure.{k}.point");
+                let is_on = |s: &Solid| {
+                    wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
+                };
+                if let Some(solid) = moving.iter().find(|s| is_on(s)) {
+                    let (what, on) = (solid.what(), &solid.name);
+                    let message =
+                        format!("gauge.pressure `{}`: it lies on {what} `{on}`, which may move", gauge.name);
+                    let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
+                    self.problems.push(Problem::new(key, message, remedy));
+                    continue;
+                }
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
                     format!("the nearest stands at {}", point(nearest))
                 });
                 let (name, at) = (&gauge.name, point(at));
                 let message = format!("gauge.pressure `{name}` at {at}: no fixed wall there, {hint}");
                 let remedy = "move the point onto a wall; where water comes in or goes out there is none";
-                self.problems.push(Problem::new(format!("gauge.pressure.{k}.point"), message, remedy));
+                self.problems.push(Problem::new(key, message, remedy));
             }
         }
     }

@@ -21,6 +21,7 @@ mod inflow_depth;
 mod jitter;
 mod lattice;
 mod layout;
+mod meetings;
 mod motion;
 mod near;
 mod opening;
@@ -209,6 +210,8 @@ pub struct Solid {
     pub shape_offset: DVec3,
     /// Initial orientation.
     pub orientation: DQuat,
+    /// Turn from its frame to that in which the keys of its shape (file, section, axis) describe it, before `orientation`.
+    pub frame: DQuat,
     /// How it moves.
     pub drive: Drive,
     /// Slots of the wall layer, counted from the first particle; they lie within the moving-wall group.
@@ -243,6 +246,11 @@ impl Solid {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
     }
 
+    /// Whether it stays where it is: it stands still for ever, or is free but held in all that it could do.
+    pub(crate) fn stays(&self) -> bool {
+        self.is_still() || self.is_free() && !self.gives_way()
+    }
+
     /// Whether forces move it: it is free, and not held in all that it could do.
     pub fn gives_way(&self) -> bool {
         matches!(&self.drive, Drive::Free(free) if free.gives_way())
@@ -260,6 +268,12 @@ impl Solid {
             (false, true) => "obstacle",
             (false, false) => "moving wall",
         }
+    }
+
+    /// Turn from the shape as its keys describe it to where `orientation`, that of a pose, has it: what users are told. At the start
+    /// it is the `orientation` of the case.
+    pub fn turn(&self, orientation: DQuat) -> DQuat {
+        (orientation * self.frame.inverse()).normalize()
     }
 
     /// Centre of the shape at t = 0 [m].
@@ -322,10 +336,10 @@ impl Scene {
         self.solids[k].is_still() && k < self.followed()
     }
 
-    /// Slots of the wall layers that never move: of fixed walls, then of the solids that stand still for ever.
+    /// Slots of the wall layers that never move: of fixed walls, then of the solids that stand still for ever or are held.
     pub fn still_slots(&self) -> impl Iterator<Item = usize> {
-        let solids = self.solids.iter().enumerate().filter(|(k, _)| self.stands(*k));
-        self.groups.static_wall_range().chain(solids.flat_map(|(_, solid)| solid.wall_slots.clone()))
+        let solids = self.solids[..self.followed()].iter().filter(|solid| solid.stays());
+        self.groups.static_wall_range().chain(solids.flat_map(|solid| solid.wall_slots.clone()))
     }
 
     /// Solids that tables follow: all but the walls in openings, which come last.

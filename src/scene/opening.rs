@@ -285,6 +285,7 @@ impl Builder<'_> {
                 shape: Shape::cuboid(hi - lo),
                 position,
                 orientation: DQuat::IDENTITY,
+                frame: DQuat::IDENTITY,
                 drive: Drive::Prescribed(Motion::still()),
                 wall_slots: 0..0,
                 dummy_slots: 0..0,

@@ -389,12 +389,35 @@ fn at_least(length: f64) -> String {
 pub(crate) fn point(p: DVec3) -> String {
     let largest = p.abs().max_element();
     let zeros = if largest > 0.0 { (-largest.log10()).floor().clamp(0.0, 300.0) as usize } else { 0 };
-    format!("({:.*}, {:.*}, {:.*})", 4 + zeros, p.x, 4 + zeros, p.y, 4 + zeros, p.z)
+    let digits = 4 + zeros;
+    // What is told as zero has no sign.
+    let tidy = |x: f64| if x.abs() < 0.5 * 0.1_f64.powi(digits as i32) { 0.0 } else { x };
+    format!("({:.digits$}, {:.digits$}, {:.digits$})", tidy(p.x), tidy(p.y), tidy(p.z))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn what_stands_on_another_does_so_in_any_order() {
+        let case = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\n\
+                    [contact]\nspring = 1e5\n";
+        let body = |name: &str, z: f64| {
+            format!(
+                "[[body]]\nname = \"{name}\"\nsize = [0.1, 0.1, 0.04]\ncenter = [0.2, 0.2, {z}]\ndensity = 500\nstanding = true\n"
+            )
+        };
+        let (top, low) = (body("top", 0.055), body("low", 0.015));
+        let heights = |bodies: String| {
+            let scene = Scene::build(&format!("{case}{bodies}").parse().unwrap()).unwrap();
+            scene.solids.iter().map(|s| (s.name.clone(), (s.position.z * 1e6).round())).collect::<Vec<_>>()
+        };
+        let expected = [("top".to_owned(), 60_000.0), ("low".to_owned(), 20_000.0)];
+        assert_eq!(heights(format!("{top}{low}")), expected);
+        assert_eq!(heights(format!("{low}{top}")), [expected[1].clone(), expected[0].clone()]);
+    }
 
     #[test]
     fn lengths_and_points_are_told_at_any_scale() {
@@ -407,5 +430,6 @@ mod tests {
         assert_eq!(point(DVec3::new(0.3, -12.0, 1e-9)), "(0.3000, -12.0000, 0.0000)");
         assert_eq!(point(DVec3::new(3e-6, 2e-6, 4.5e-7)), "(0.000003000, 0.000002000, 0.000000450)");
         assert_eq!(point(DVec3::ZERO), "(0.0000, 0.0000, 0.0000)");
+        assert_eq!(point(DVec3::new(-1e-17, -0.0, -1.0)), "(0.0000, 0.0000, -1.0000)");
     }
 }

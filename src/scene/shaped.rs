@@ -1,6 +1,6 @@
 //! Obstacles and moving walls of any shape: solids that stand still or follow a table, with water around them.
 
-use super::build::Builder;
+use super::build::{AXES, Builder};
 use super::oriented::Placed;
 use super::placement::point;
 use super::walls::{closed, near_solid, wall_motion};
@@ -38,6 +38,7 @@ fn wall(
         shape,
         position,
         orientation: turn * shape.frame(),
+        frame: form.upended(plane) * shape.frame(),
         drive: Drive::Prescribed(moved.map_or_else(Motion::still, |w| wall_motion(w, case, position))),
         wall_slots: 0..0,
         dummy_slots: 0..0,
@@ -150,9 +151,22 @@ impl Builder<'_> {
             let remedy = "it lies beyond the tank's walls or inside others: move it, or check `scale`";
             self.problems.push(Problem::new(key, message, remedy));
         } else if gone > 0 {
-            self.notes
-                .push(format!("{label}: {gone} particles left out inside other walls and beyond the tank's"));
+            let beyond = self.beyond(solid);
+            self.notes.push(format!(
+                "{label}: {gone} particles left out inside other walls and beyond the tank's{beyond}"
+            ));
         }
+    }
+
+    /// From where to where a solid reaches that goes beyond the tank's sides along an axis, for a note: that a prism stands from its `position`
+    /// on and not about it is seen by that.
+    fn beyond(&self, solid: &Solid) -> String {
+        let (low, high) = solid.placed().ends();
+        let l0 = self.lattice.spacing;
+        let sides = self.closed_sides().unwrap_or((DVec3::NEG_INFINITY, DVec3::INFINITY));
+        let goes = |k: &usize| low[*k] < sides.0[*k] - 0.5 * l0 || high[*k] > sides.1[*k] + 0.5 * l0;
+        let axes = (0..3).filter(|&k| !(self.lattice.plane && k == 1)).filter(goes);
+        axes.map(|k| format!(", it reaches from {} = {:.4} to {:.4} m", AXES[k], low[k], high[k])).collect()
     }
 
     /// The areas of a solid's particles as far as they lie between the tank's sides: one at a side keeps a part, and what one beyond it has

@@ -75,7 +75,7 @@ impl Fixed {
                 self.dummy.push(lattice.center(c));
                 continue;
             }
-            let (mut normal, mut of) = (DVec3::ZERO, u32::MAX);
+            let (mut normal, mut of, mut on_rim) = (DVec3::ZERO, u32::MAX, false);
             for axis in 0..3 {
                 let side = if below[axis] > 0 {
                     0
@@ -85,7 +85,12 @@ impl Fixed {
                     continue;
                 };
                 normal[axis] = if side == 0 { 1.0 } else { -1.0 };
-                of = shape[axis][side];
+                // One on the rim of a hole is of the face that looks into it.
+                let opens = grid.get(c + normal.as_ivec3() * IVec3::AXES[axis]) == BLOCKED;
+                if opens || !on_rim {
+                    of = shape[axis][side];
+                }
+                on_rim |= opens;
             }
             self.push_wall(lattice.center(c), normal, of);
         }
@@ -232,6 +237,7 @@ pub(super) fn moving_wall(
         shape: Shape::cuboid(hi - lo),
         position,
         orientation: DQuat::IDENTITY,
+        frame: DQuat::IDENTITY,
         drive: Drive::Prescribed(wall_motion(wall, case, position)),
         wall_slots: 0..0,
         dummy_slots: 0..0,

@@ -15,6 +15,8 @@ const TURN: f64 = 1.5;
 const ALIKE: f64 = 0.5;
 /// That middle is no farther than this from the nearest point of the surface, over the spacing.
 const FAR: f64 = 2.0;
+/// A piece is shared by those whose distances from it differ by no more, over the spacing: which of them is the nearest is round-off.
+pub(super) const AS_NEAR: f64 = 1e-6;
 /// Pieces that are looked up together.
 const TOGETHER: usize = 1 << 16;
 /// Conditions of still water on the areas.
@@ -45,8 +47,11 @@ pub(super) fn share(
         if some.is_empty() {
             break;
         }
-        let found = tree.to_each(&some, |(at, area)| seen(*at, area.normalize_or_zero()));
-        for ((at, area), k) in some.into_iter().zip(found).filter_map(|(piece, k)| Some((piece, k?))) {
+        let found = tree.to_each(&some, |(at, area)| seen(*at, area.normalize_or_zero()), AS_NEAR * spacing);
+        let shared = some.into_iter().zip(&found).flat_map(|((at, area), nearest)| {
+            nearest.iter().map(move |&k| (at, area / nearest.len() as f64, k))
+        });
+        for (at, area, k) in shared {
             particles.area[k] += area;
             if area.dot(normals[k]) > ALIKE * area.length() {
                 middles[k].0 += area.length() * at;

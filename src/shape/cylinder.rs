@@ -1,6 +1,7 @@
 //! A cylinder with flat ends about the z axis of its frame: rings and a side, particles on rings.
 
-use super::surface::{Ring, Side, Surface};
+use super::rings::{Ring, rings};
+use super::surface::{Ring as Circle, Side, Surface};
 use super::{ALL_FACES, Faces, Geometry, Inside, Particles, WallLayer};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -101,17 +102,15 @@ impl Geometry for Cylinder {
         start.z.min(end.z) < self.half_height + margin && start.z.max(end.z) > -self.half_height - margin
     }
 
-    /// Rings about the axis, a spacing apart in every direction.
+    /// Rings about the axis, about a spacing apart in every direction.
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
         let mut out = Particles::default();
-        let across = (self.radius / spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
+        let (step_r, rings) = rings(self.radius, spacing);
+        let across = rings.len() as i32;
         let along = (2.0 * self.half_height / spacing + 0.5 + 1e-6).floor().max(2.0) as i32;
-        let (step_r, step_z) = (self.radius / f64::from(across), 2.0 * self.half_height / f64::from(along));
+        let step_z = 2.0 * self.half_height / f64::from(along);
         let hollow = across > layers && along - 2 * layers >= 2;
-        for i in 0..across {
-            let r = self.radius - (f64::from(i) + 0.5) * step_r;
-            let n = (TAU * r / spacing).round().max(3.0) as usize;
-            let annulus = PI * ((r + 0.5 * step_r).powi(2) - (r - 0.5 * step_r).powi(2));
+        for (i, Ring { radius: r, area: annulus, count: n }) in (0..).zip(rings) {
             for j in 0..along {
                 let z = (f64::from(j) + 0.5) * step_z - self.half_height;
                 let end = if j == 0 {
@@ -146,7 +145,7 @@ impl Geometry for Cylinder {
         let mut rings = vec![];
         for (z, face) in [(-self.half_height, 4), (self.half_height, 5)] {
             for (radius, weight) in [(self.radius, 1.0 / 3.0), (0.5 * self.radius, 2.0 / 3.0)] {
-                rings.push(Ring { z, radius, weight, faces: 1 << face });
+                rings.push(Circle { z, radius, weight, faces: 1 << face });
             }
         }
         let side = Side { half_height: self.half_height, radius: self.radius };

@@ -1,5 +1,6 @@
 //! A round slice in the plane y = 0: the cylinder of two dimensions. It has no ends.
 
+use super::rings::{Ring, rings};
 use super::surface::Surface;
 use super::{Faces, Geometry, Inside, Particles, WallLayer};
 use glam::DVec3;
@@ -63,15 +64,13 @@ impl Geometry for Disc {
         self.distance(nearest).0 < margin
     }
 
-    /// Rings a spacing apart, the outermost half of one below the rim.
+    /// Rings about a spacing apart, the outermost half of one below the rim.
     fn particles(&self, spacing: f64, _: u32, layers: i32) -> Particles {
         let mut out = Particles::default();
-        let count = (self.radius / spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
-        let step = self.radius / f64::from(count);
+        let (step, rings) = rings(self.radius, spacing);
+        let count = rings.len() as i32;
         let kept = if count > layers { layers.max(1) } else { count };
-        for depth in 0..kept {
-            let r = self.radius - (f64::from(depth) + 0.5) * step;
-            let n = (TAU * r / spacing).round().max(3.0) as usize;
+        for (depth, Ring { radius: r, count: n, .. }) in (0..kept).zip(rings) {
             // the chords of a regular polygon and its apothem
             let area = TAU * self.radius * self.width / n as f64;
             for k in 0..n {

@@ -16,6 +16,7 @@ mod nearest;
 mod nodes;
 mod open;
 mod polygon;
+mod rings;
 mod sphere;
 mod surface;
 mod thickness;
@@ -29,6 +30,7 @@ pub use cylinder::Cylinder;
 pub use disc::Disc;
 #[cfg(feature = "mesh")]
 pub use mesh::{Mesh, Thickness, Unfit};
+pub(crate) use nearest::Nearest;
 pub use nodes::Node;
 use nodes::nodes_between;
 pub use polygon::Polygon;

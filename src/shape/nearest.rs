@@ -8,7 +8,7 @@ const FEW: usize = 8;
 const IN_ROW: usize = 256;
 
 /// Points of `D` coordinates.
-pub(super) struct Nearest<const D: usize> {
+pub struct Nearest<const D: usize> {
     points: Vec<[f64; D]>,
     /// Their numbers: the middle one of a stretch of them divides the others along its axis.
     order: Vec<usize>,
@@ -32,17 +32,49 @@ impl<const D: usize> Nearest<D> {
         (found.1 < self.points.len()).then_some(found.1)
     }
 
-    /// [`Nearest::to`] each of `places`, most of which lie beside the one before them.
-    pub fn to_each<T: Sync>(&self, places: &[T], at: impl Fn(&T) -> [f64; D] + Sync) -> Vec<Option<usize>> {
+    /// The numbers of those that are the nearest to each of `places` or farther from it by no more than `slack`. Most of these lie beside the one
+    /// before them.
+    pub fn to_each<T: Sync>(
+        &self,
+        places: &[T],
+        at: impl Fn(&T) -> [f64; D] + Sync,
+        slack: f64,
+    ) -> Vec<Vec<usize>> {
         let of_some = |some: &[T]| {
             let mut last = None;
             let next = |place| {
-                last = self.to(at(place), last);
-                last
+                let x = at(place);
+                last = self.to(x, last);
+                let mut found = vec![];
+                if let Some(k) = last {
+                    let reach = self.square(x, k).sqrt() + slack;
+                    self.visit(x, reach * reach, (0, self.order.len()), &mut |k| found.push(k));
+                }
+                found
             };
             some.iter().map(next).collect::<Vec<_>>()
         };
         places.par_chunks(IN_ROW).flat_map_iter(of_some).collect()
+    }
+
+    /// Calls `visit` with each of a stretch of them no farther from `x` than the root of `square`.
+    fn visit(&self, x: [f64; D], square: f64, (from, to): (usize, usize), visit: &mut impl FnMut(usize)) {
+        if to - from <= FEW {
+            self.order[from..to].iter().filter(|&&k| self.square(x, k) <= square).for_each(|&k| visit(k));
+            return;
+        }
+        let middle = from + (to - from) / 2;
+        let k = self.order[middle];
+        let beyond = x[self.axes[middle]] - self.points[k][self.axes[middle]];
+        if self.square(x, k) <= square {
+            visit(k);
+        }
+        if beyond < 0.0 || beyond * beyond <= square {
+            self.visit(x, square, (from, middle), visit);
+        }
+        if beyond >= 0.0 || beyond * beyond <= square {
+            self.visit(x, square, (middle + 1, to), visit);
+        }
     }
 
     fn look(&self, x: [f64; D], from: usize, to: usize, found: &mut (f64, usize)) {
@@ -71,8 +103,7 @@ impl<const D: usize> Nearest<D> {
     }
 
     fn has(&self, x: [f64; D], square: f64, from: usize, to: usize) -> bool {
-        let is_near =
-            |k: usize| x.iter().zip(&self.points[k]).map(|(x, p)| (x - p) * (x - p)).sum::<f64>() < square;
+        let is_near = |k: usize| self.square(x, k) < square;
         if to - from <= FEW {
             return self.order[from..to].iter().any(|&k| is_near(k));
         }
@@ -85,8 +116,13 @@ impl<const D: usize> Nearest<D> {
             || beyond * beyond < square && self.has(x, square, far.0, far.1)
     }
 
+    /// Square of the distance of `x` from one of them.
+    fn square(&self, x: [f64; D], k: usize) -> f64 {
+        x.iter().zip(&self.points[k]).map(|(x, p)| (x - p) * (x - p)).sum()
+    }
+
     fn compare(&self, x: [f64; D], k: usize, found: &mut (f64, usize)) {
-        let off = x.iter().zip(&self.points[k]).map(|(x, p)| (x - p) * (x - p)).sum();
+        let off = self.square(x, k);
         if (off, k) < *found {
             *found = (off, k);
         }
@@ -133,6 +169,11 @@ mod tests {
             let least = nearest.map_or(f64::NAN, |k| off(&points[k]).sqrt());
             assert!(tree.has_within(x, 1.000_001 * least) && !tree.has_within(x, 0.999_999 * least), "{x:?}");
         }
+        // Half-way between two of a row.
+        let row = Nearest::new((0..40).map(|k| [0.1 * f64::from(k)]).collect());
+        let mut both = row.to_each(&[0.75, 0.76], |x| [*x], 1e-6);
+        both.iter_mut().for_each(|numbers| numbers.sort_unstable());
+        assert_eq!(both, [vec![7, 8], vec![8]]);
         assert_eq!(Nearest::<3>::new(vec![]).to([0.0; 3], None), None);
     }
 }

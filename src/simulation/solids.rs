@@ -39,9 +39,10 @@ impl Simulation {
         self.own_steps() > 0
     }
 
-    /// Whether [`Self::fluid_force`] is what acts: it is left at zero where nothing asks for the force on walls that move.
+    /// Whether [`Self::fluid_force`] is what acts: it is left at zero before the first step, and where nothing asks for the force on
+    /// walls that move.
     pub fn knows_fluid_force(&self) -> bool {
-        !self.plan.wet() || self.plan.has(Stage::BodyForce)
+        self.has_stepped() && (!self.plan.wet() || self.plan.has(Stage::BodyForce))
     }
 
     /// Rows of free bodies at slots, in the poses that [`Solids::predict`](crate::contact::Solids::predict) gave last; none where no free body stands in the

@@ -192,6 +192,7 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
         let mut report =
             work_precision::report((&definition.name, &definition.title), rows, &errors, &scenes, wanted);
         report.charts.extend(compare::charts(&definition, rows, &read)?);
+        report.findings.extend(definition.idle_errors(rows.iter()));
         report.findings.extend(definition.idle_limits(rows.iter()));
         Ok(report)
     });
@@ -206,7 +207,7 @@ mod tests {
     #[test]
     fn limits_are_of_errors_of_curves_too_and_one_of_nothing_is_told() {
         let text = "name = 's'\ntitle = 't'\nmethod = 'm'\ntext = ''\n[measure]\nof = []\n\
-                    [[error]]\ncurve = 'c'\nagainst = 'finest'\n\
+                    [[error]]\ncurve = 'c'\nagainst = 'finest'\n[[error]]\ncurve = 'd'\nagainst = 'finest'\n\
                     [limit]\n'c against finest [-]' = 0.1\n'v [-]' = 1\n'w [-]' = 1\n";
         let study = of_points(Definition::parse("s", text).unwrap(), BTreeMap::new());
         let mut rows = [0, 1].map(|index| {
@@ -227,6 +228,8 @@ mod tests {
             "{told:?}"
         );
         let idle: Vec<&String> = report.findings.iter().filter(|f| f.starts_with("[limit]")).collect();
+        let none = "[[error]] `d`: no finished point has this curve; there are c.";
+        assert!(report.findings.iter().any(|f| f == none), "{:?}", report.findings);
         assert!(idle.len() == 1 && idle[0].contains("`w [-]`") && idle[0].contains("v [-]"), "{idle:?}");
     }
 

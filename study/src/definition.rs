@@ -293,6 +293,22 @@ impl Definition {
         idle.map(told).collect()
     }
 
+    /// Curves of `[[error]]` that none of the finished points in `rows` has, in words with those that there are.
+    pub fn idle_errors<'a>(&self, rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
+        let ended = || rows.clone().filter(|r| r.measured.class <= Class::Degraded);
+        let known: BTreeSet<&str> =
+            ended().flat_map(|r| r.measured.curves.keys().map(String::as_str)).collect();
+        if ended().next().is_none() {
+            return Vec::new();
+        }
+        let curves: BTreeSet<&str> = self.error.iter().filter_map(|e| e.curve.as_deref()).collect();
+        let there: Vec<&str> = known.iter().copied().collect();
+        let told = |name: &&str| {
+            format!("[[error]] `{name}`: no finished point has this curve; there are {}.", there.join(", "))
+        };
+        curves.difference(&known).map(told).collect()
+    }
+
     /// Refuses a `[[check]]` that is for points that no grid has.
     ///
     /// # Errors

@@ -203,6 +203,7 @@ fn lattice_box(
         shape: Shape::cuboid(size),
         position,
         orientation,
+        frame: DQuat::IDENTITY,
         drive,
         wall_slots: 0..offsets.len(),
         dummy_slots: 0..0,

@@ -331,6 +331,9 @@ impl Sampler {
             out.curves.insert("height".into(), std::mem::take(&mut self.height));
         }
         self.recorder.finish(&mut out);
+        if simulation.params.dimensions == 2 {
+            out.of_slice(simulation.params.spacing);
+        }
         Ok(out)
     }
 }

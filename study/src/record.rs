@@ -7,6 +7,9 @@
 //! | `fluid` | `fluid x [m]` of the centroid, `fluid kinetic [J]`, `fluid momentum x [kg m/s]` |
 //! | `spread` | `fluid spread x [m]`: standard deviation of the water's places; half a semi-axis of an ellipse |
 //! | `measure.profile` | the profile's name: mean over the window against a coordinate |
+//!
+//! In two dimensions forces, torques, energies, momenta and volumes are those of each metre across, and are called so:
+//! `NAME_force_x [N/m]`.
 
 use super::measure::{Measure, Spec};
 use super::row::Measured;
@@ -262,7 +265,7 @@ impl Recorder {
             let followed = simulation.scene.followed();
             for (k, pose) in simulation.solids.poses().iter().take(followed).enumerate() {
                 let (x, v) = (simulation.solids.path(k), pose.velocity);
-                let up = pose.orientation * DVec3::Z;
+                let up = simulation.scene.solids[k].turn(pose.orientation) * DVec3::Z;
                 let tilt = up.z.clamp(-1.0, 1.0).acos().to_degrees();
                 let values = [x[0], x[1], x[2], v.x, v.y, v.z, tilt];
                 of_solid(simulation.solids.name(k))
@@ -294,9 +297,10 @@ impl Recorder {
 
     /// The curves of the whole run.
     pub fn finish(self, out: &mut Measured) {
-        // Points that follow each other among the times have nothing left out between them.
+        // Points that follow each other among the times have nothing left out between them. Before the first step there is no pressure.
         let place = |t: f64| self.times.partition_point(|at| *at < t);
-        let broken = |c: &Vec<[f64; 2]>| c.windows(2).any(|w| place(w[1][0]) - place(w[0][0]) > 1);
+        let late = |c: &Vec<[f64; 2]>| c.first().is_some_and(|p| place(p[0]) > 1);
+        let broken = |c: &Vec<[f64; 2]>| late(c) || c.windows(2).any(|w| place(w[1][0]) - place(w[0][0]) > 1);
         if self.curves.values().any(broken) {
             out.sampled.clone_from(&self.times);
         }

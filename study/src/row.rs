@@ -1,13 +1,14 @@
 //! A point of a study: what was asked, how it ended, what was measured.
 
 use seixo::error::Error;
+use seixo::output::slice::per_metre;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Version of the files of finished points. A change of meaning of any measure raises it, so that older points
 /// are computed again.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// How a point ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -93,7 +94,7 @@ pub struct Measured {
     /// Names of the curves that are profiles: their rows are bins, of which each weighs alike in a mean.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub profiles: BTreeSet<String>,
-    /// Times at which curves over time were sampled [s], if one of them has gaps.
+    /// Times at which curves over time were sampled [s], if one of them has gaps or begins late.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sampled: Vec<f64>,
     /// Wall-clock time.
@@ -144,16 +145,31 @@ impl Measured {
         }
     }
 
-    /// A curve, with a row that has no number wherever it was sampled between its points and had no value.
+    /// What was measured of a slice in two dimensions, `spacing` [m] wide, for each metre across: points of other spacings share that.
+    pub fn of_slice(&mut self, spacing: f64) {
+        let Self { values, curves, profiles, .. } = self;
+        let names: Vec<String> = values.keys().chain(curves.keys()).cloned().collect();
+        // A profile is called as the study says and is of no slice.
+        for name in names.into_iter().filter(|name| !profiles.contains(name)) {
+            let Some(new) = per_metre(&name) else { continue };
+            if let Some(value) = values.remove(&name) {
+                values.insert(new.clone(), value / spacing);
+            }
+            if let Some(mut curve) = curves.remove(&name) {
+                curve.iter_mut().for_each(|p| p[1] /= spacing);
+                curves.insert(new, curve);
+            }
+        }
+    }
+
+    /// A curve, with a row that has no number wherever it was sampled up to its last point and had no value. The first sample counts
+    /// only with a value: before the first step there is no pressure.
     pub fn curve(&self, name: &str) -> Option<Vec<[f64; 2]>> {
         let (curve, mut places) = (self.curves.get(name)?, self.sampled.iter());
         let mut marked = Vec::with_capacity(curve.len());
         for point in curve {
-            for t in places.by_ref().take_while(|t| **t != point[0]) {
-                if !marked.is_empty() {
-                    marked.push([*t, f64::NAN]);
-                }
-            }
+            let missed = places.by_ref().take_while(|t| **t != point[0]);
+            marked.extend(missed.filter(|t| **t != self.sampled[0]).map(|t| [*t, f64::NAN]));
             marked.push(*point);
         }
         // One over places, or over other times, has none of these.
@@ -257,7 +273,29 @@ mod tests {
         measured.curves.insert("profile".into(), vec![[0.1, 1.0], [0.25, 2.0]]);
         let level = measured.curve("level").unwrap();
         assert!(level.len() == 3 && level[1][0] == 0.2 && level[1][1].is_nan(), "{level:?}");
+        measured.curves.insert("late".into(), vec![[0.2, 1.0], [0.3, 2.0]]);
+        let late = measured.curve("late").unwrap();
+        assert!(late.len() == 3 && late[0][0] == 0.1 && late[0][1].is_nan(), "{late:?}");
         assert_eq!(measured.curve("profile").unwrap(), measured.curves["profile"]);
+    }
+
+    #[test]
+    fn what_a_slice_has_is_told_for_each_metre_across() {
+        let mut measured = Measured::default();
+        measured.put("kinetic energy [J]", 3.0);
+        measured.put("volume [-]", 1.0);
+        for name in ["wall_force_x [N]", "P [Pa]", "profile [N]"] {
+            measured.curves.insert(name.into(), vec![[0.5, 2.0]]);
+        }
+        measured.profiles.insert("profile [N]".into());
+        measured.of_slice(0.5);
+        assert_eq!(
+            [measured.value("kinetic energy [J/m]"), measured.value("volume [-]")],
+            [Some(6.0), Some(1.0)]
+        );
+        let names: Vec<&str> = measured.curves.keys().map(String::as_str).collect();
+        assert_eq!(names, ["P [Pa]", "profile [N]", "wall_force_x [N/m]"]);
+        assert_eq!([measured.curves[names[0]][0], measured.curves[names[2]][0]], [[0.5, 2.0], [0.5, 4.0]]);
     }
 
     #[test]

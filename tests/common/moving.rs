@@ -134,6 +134,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
             position: middle,
             shape_offset: DVec3::ZERO,
             orientation: DQuat::IDENTITY,
+            frame: DQuat::IDENTITY,
             drive,
             wall_slots: start.0..fluid.len() + moving_wall.len(),
             // Moved behind the other groups below.

@@ -5,6 +5,7 @@ use glam::{DQuat, DVec3};
 use seixo::case::file::load;
 use seixo::error::{Error, FolderError, Result};
 use seixo::output::folder::case_name;
+use seixo::output::slice::per_metre;
 use serde_json::Value;
 use std::collections::HashMap;
 use std::path::Path;
@@ -41,9 +42,6 @@ pub struct Run {
     pub flat: bool,
 }
 
-/// Units of what a slice has in proportion to its width.
-const OF_SLICE: [&str; 6] = ["J", "N", "N m", "m3", "m3/s", "kg m/s"];
-
 impl Run {
     /// The run in `root`, to be called `name`.
     ///
@@ -79,10 +77,8 @@ impl Run {
     /// Energies, forces, momenta and volumes of the slice for each metre across, which slices of other widths share.
     pub fn per_metre(&mut self) {
         for quantity in &mut self.curves {
-            let Some((name, unit)) = quantity.name.rsplit_once(" [") else { continue };
-            let unit = unit.trim_end_matches(']');
-            if OF_SLICE.contains(&unit) {
-                quantity.name = format!("{name} [{unit}/m]");
+            if let Some(name) = per_metre(&quantity.name) {
+                quantity.name = name;
                 quantity.points.iter_mut().for_each(|p| p[1] /= self.spacing);
             }
         }

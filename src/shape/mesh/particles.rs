@@ -28,6 +28,8 @@ const MARGIN: f64 = 0.5;
 const CROWDED: f64 = 0.5;
 /// A piece of the surface that goes to one particle is no longer, over the spacing.
 const PIECE: f64 = 0.4;
+/// Part of a length that may be round-off.
+const SLACK: f64 = 1e-9;
 
 /// A place of a layer.
 #[derive(Clone, Copy)]
@@ -213,8 +215,11 @@ pub(super) fn pieces(mesh: &Mesh, spacing: f64) -> impl Iterator<Item = Piece> +
             loop {
                 let [a, b, c] = open.pop()?;
                 let edges = [[a, b, c], [b, c, a], [c, a, b]].map(|edge| (edge[0].distance(edge[1]), edge));
-                let (length, [from, to, apex]) = edges.into_iter().max_by(|s, t| s.0.total_cmp(&t.0))?;
-                if length <= PIECE * spacing {
+                let longest = edges.iter().map(|edge| edge.0).fold(0.0, f64::max);
+                // Of edges as long up to round-off it is always the same one.
+                let (length, [from, to, apex]) =
+                    edges.into_iter().rfind(|e| e.0 >= longest * (1.0 - SLACK))?;
+                if length <= PIECE * spacing * (1.0 + SLACK) {
                     return Some(((a + b + c) / 3.0, 0.5 * (b - a).cross(c - a)));
                 }
                 let middle = 0.5 * (from + to);

@@ -1,5 +1,6 @@
 //! Points of a mesh that contact presses, and the part of the surface that each stands for.
 
+use super::super::areas::AS_NEAR;
 use super::super::cells::PointCells;
 use super::super::nearest::Nearest;
 use super::super::{ALL_FACES, Faces, Geometry, Surface, WallLayer};
@@ -55,7 +56,7 @@ pub(super) fn surface(mesh: &Mesh, particles: &WallLayer, spacing: f64) -> Surfa
     Surface { parts: of_each.collect(), ..Surface::even(points, faces, ALL_FACES) }
 }
 
-/// Area [m2] of the surface to which each of `points` is the nearest.
+/// Area [m2] of the surface to which each of `points` is the nearest, shared where several are.
 fn parts(mesh: &Mesh, points: &[DVec3], spacing: f64) -> Vec<f64> {
     let tree = Nearest::new(points.iter().map(|at| at.to_array()).collect());
     let mut parts = vec![0.0; points.len()];
@@ -65,9 +66,34 @@ fn parts(mesh: &Mesh, points: &[DVec3], spacing: f64) -> Vec<f64> {
         if some.is_empty() {
             return parts;
         }
-        let found = tree.to_each(&some, |(at, _)| at.to_array());
-        for ((_, area), k) in some.iter().zip(found).filter_map(|(piece, k)| Some((piece, k?))) {
-            parts[k] += area.length();
+        let found = tree.to_each(&some, |(at, _)| at.to_array(), AS_NEAR * spacing);
+        for ((_, area), nearest) in some.iter().zip(found) {
+            nearest.iter().for_each(|&k| parts[k] += area.length() / nearest.len() as f64);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_point_has_the_same_part_of_the_surface_at_every_scale() {
+        // The sides of a cone are alike, and many a piece lies half-way between two points.
+        let parts = |scale: f64| {
+            let mesh = Mesh::cone(0.06 * scale, 0.1 * scale).expect("a cone");
+            let all = mesh.particles(0.02 * scale, 3, 2);
+            let layer = WallLayer { offset: &all.wall, to_surface: &all.to_surface };
+            let areas: f64 = all.area.iter().map(|a| a.length() / (scale * scale)).sum();
+            println!("{scale}: {} {areas}", all.wall.len());
+            surface(mesh, &layer, 0.02 * scale).parts
+        };
+        let one = parts(1.0);
+        for scale in [10.0, 0.1, 3.0, 0.001] {
+            let other = parts(scale);
+            let off = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            println!("{scale}: {off} of {}", one.len());
+            assert!(one.len() == other.len() && off < 1e-6, "{scale}: {off}");
         }
     }
 }

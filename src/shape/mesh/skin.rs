@@ -99,7 +99,7 @@ impl<'a> Skin<'a> {
         let of_edge = super::edges(triangles);
         let edges = |k: usize| (0..3).map(move |e| (triangles[k][e], triangles[k][(e + 1) % 3]));
         let mut order: Vec<usize> = (0..triangles.len()).collect();
-        order.sort_by(|&a, &b| cross(&triangles[b]).length().total_cmp(&cross(&triangles[a]).length()));
+        order.sort_by_cached_key(|&k| rank(cross(&triangles[k]).length() / (spacing * spacing)));
         let mut face_of = vec![usize::MAX; triangles.len()];
         let mut faces: Vec<Face> = vec![];
         for &first in &order {
@@ -183,7 +183,7 @@ impl<'a> Skin<'a> {
         let mut lattices: Vec<Option<Lattice>> =
             self.faces.iter().map(|face| face.lattice(depth, spacing)).collect();
         let mut order: Vec<usize> = (0..self.faces.len()).filter(|&k| lattices[k].is_some()).collect();
-        order.sort_by(|&a, &b| self.faces[b].area.total_cmp(&self.faces[a].area));
+        order.sort_by_key(|&k| rank(self.faces[k].area / (spacing * spacing)));
         let mut places = vec![];
         let mut here = PointCells::new(spacing);
         for k in order {
@@ -281,13 +281,14 @@ impl Face {
             return None;
         }
         let mut longest: Vec<&Border> = self.border.iter().collect();
-        longest.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        longest.sort_by_key(|b| rank(length(b) / spacing));
         longest.truncate(64);
         let way = |b: &Border| (b.ends[1] - b.ends[0]).normalize_or_zero();
         let parallel =
             |a: DVec3| longest.iter().map(|b| length(b) * f64::from(way(b).dot(a).abs() > 1.0 - 1e-6)).sum();
         let weighted = longest.iter().map(|b| (parallel(way(b)), way(b)));
-        let along: (f64, DVec3) = weighted.fold((0.0, DVec3::ZERO), |a, b| if b.0 > a.0 { b } else { a });
+        let along: (f64, DVec3) = weighted
+            .fold((0.0, DVec3::ZERO), |a, b| if rank(b.0 / spacing) < rank(a.0 / spacing) { b } else { a });
         // In the plane of the first triangle.
         let across = self.normal.cross(along.1).normalize_or_zero();
         let axes = [across.cross(self.normal), across];
@@ -333,6 +334,11 @@ impl Face {
         let count = ((last - start) / step + 1e-6).floor() as i32 + 1;
         (start.is_finite() && count > 0).then_some((start, step, count))
     }
+}
+
+/// A key that puts the largest first, and what is as large but for round-off in the order in which it came.
+fn rank(size: f64) -> std::cmp::Reverse<i64> {
+    std::cmp::Reverse((size * 1e6).round() as i64)
 }
 
 /// A place of the unit square folded into the triangle below its diagonal.

@@ -22,11 +22,13 @@ pub enum Take {
     Range,
     /// Integral over the window, e.g. an impulse.
     Integral,
-    /// Time at which the curve first rises above `level`. Where it does so over a gap, and with the next two, the end of the gap.
+    /// Time at which the curve first rises above `level`: one that begins above it has to come back first. Where it does so over a gap,
+    /// and with the next two, the end of the gap.
     FirstAbove,
-    /// Time at which the curve first falls below `level`.
+    /// Time at which the curve first falls below `level`, likewise.
     FirstBelow,
-    /// Time from when the curve first rises above `level` to when it first rises above `to`.
+    /// Time from when the curve first rises above `level` to when it first rises above `to`; where `to` is less than `level`, from
+    /// when it first falls below the one to when it does below the other.
     Passage,
     /// Value at the time `level`; none in a gap.
     At,
@@ -108,7 +110,7 @@ pub fn prepared(curve: Curve, since: Option<f64>, width: f64) -> Option<(Curve, 
 /// The curve with its time counted from when it has moved by `distance` from its start, and that moment; `None` if
 /// it never does.
 pub fn since_moved(curve: &[[f64; 2]], distance: f64) -> Option<(Curve, f64)> {
-    let start = curve.first()?[1];
+    let start = curve.iter().find(|p| p[1].is_finite())?[1];
     let moved = curve.iter().position(|p| (p[1] - start).abs() >= distance)?;
     let origin = if moved == 0 {
         curve[0][0]
@@ -128,12 +130,14 @@ fn later(curve: &[[f64; 2]], origin: f64) -> Curve {
     curve.iter().map(|p| [p[0] - origin, p[1]]).collect()
 }
 
-/// First x at which the curve crosses `level` upwards; over a gap the far end of that, which alone is known.
-fn first_above(curve: &[[f64; 2]], level: f64) -> Option<f64> {
-    let above = curve.iter().position(|p| p[1] >= level)?;
-    let [x1, y1] = curve[above];
-    let before = above.checked_sub(1).map(|k| curve[k]).filter(|p| p[1].is_finite());
-    Some(before.map_or(x1, |[x0, y0]| x0 + (x1 - x0) * (level - y0) / (y1 - y0)))
+/// First x at which the curve crosses `level`, upwards or downwards; over a gap the far end of that, which alone is known. A curve
+/// that begins beyond the level has to come back first; one that begins in a gap has not been there.
+fn crossing(curve: &[[f64; 2]], level: f64, upwards: bool) -> Option<f64> {
+    let beyond = |y: f64| if upwards { y > level } else { y < level };
+    let near = (0..curve.len()).find(|&k| !beyond(curve[k][1]) && (k == 0 || curve[k][1].is_finite()))?;
+    let far = (near + 1..curve.len()).find(|&k| beyond(curve[k][1]))?;
+    let ([x0, y0], [x1, y1]) = (curve[far - 1], curve[far]);
+    Some(if y0.is_finite() { x0 + (x1 - x0) * (level - y0) / (y1 - y0) } else { x1 })
 }
 
 /// The curve at `x`, linear between its points; `None` outside and in a gap.
@@ -235,12 +239,9 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
             let stretches = marked.split(|p| !p[1].is_finite());
             Some(stretches.filter_map(|stretch| integral(stretch).pop()).sum())
         }
-        Take::FirstAbove => first_above(marked, level),
-        Take::FirstBelow => {
-            let mirrored: Curve = marked.iter().map(|p| [p[0], -p[1]]).collect();
-            first_above(&mirrored, -level)
-        }
-        Take::Passage => Some(first_above(marked, to)? - first_above(marked, level)?),
+        Take::FirstAbove => crossing(marked, level, true),
+        Take::FirstBelow => crossing(marked, level, false),
+        Take::Passage => Some(crossing(marked, to, to >= level)? - crossing(marked, level, to >= level)?),
         Take::At => at(marked, level),
         Take::Deviation => Some(deviation(marked)),
         Take::Slope => fit::<2>(curve).map(|c| c[1]),
@@ -369,7 +370,7 @@ mod tests {
             assert!((found - expected).abs() < 0.01, "{found} for {expected}");
         }
         assert_eq!(reduce(Take::FirstAbove, &curve, [9.0; 2]), None);
-        assert!((reduce(Take::FirstBelow, &curve, [2.0; 2]).unwrap()).abs() < 1e-12);
+        assert_eq!(reduce(Take::FirstBelow, &curve, [2.0; 2]), None, "it begins there and rises");
         assert_eq!(cut(&curve, Some([0.2, 0.4])).len(), 21);
         let (moved, origin) = since_moved(&curve, 0.5).unwrap();
         assert!((origin - 0.5).abs() < 1e-3 && (moved[0][0] + 0.5).abs() < 1e-3);
@@ -432,7 +433,9 @@ mod tests {
         ];
         let take = |take, level| reduce(take, &curve, [level, 5.0]);
         assert_eq!([take(Take::FirstAbove, 4.0), take(Take::FirstAbove, 7.0)], [Some(9.0), None]);
-        assert_eq!([take(Take::FirstBelow, 1.5), take(Take::Passage, 2.0)], [Some(12.0), Some(9.0)]);
+        assert_eq!([take(Take::FirstBelow, 1.5), take(Take::Passage, 4.0)], [Some(12.0), Some(0.0)]);
+        let back = [[0.0, 6.0], [1.0, gap], [2.0, 6.0]];
+        assert_eq!(reduce(Take::FirstAbove, &back, [4.0; 2]), None, "it was there before the gap");
         assert_eq!(
             reduce(Take::FirstAbove, &curve[2..], [1.0; 2]),
             Some(9.0),
@@ -441,6 +444,28 @@ mod tests {
         let (inside, ends) =
             ([1.5, 3.0, 8.0, 8.5].map(|x| take(Take::At, x)), [1.0, 9.0].map(|x| take(Take::At, x)));
         assert_eq!((inside, ends), ([None; 4], [Some(2.0), Some(6.0)]));
+    }
+
+    #[test]
+    fn a_curve_that_begins_beyond_a_level_crosses_it_once_it_has_come_back() {
+        // A fall from 1.9 m, and a swing.
+        let fall: Curve =
+            (0..=300).map(|k| f64::from(k) / 1000.0).map(|t| [t, 1.9 - 0.5 * 9.81 * t * t]).collect();
+        let when = |z: f64| (2.0 * (1.9 - z) / 9.81_f64).sqrt();
+        for (take, level, expected) in [
+            (Take::FirstAbove, 1.7, None),
+            (Take::FirstBelow, 1.95, None),
+            (Take::FirstBelow, 1.7, Some(when(1.7))),
+            (Take::Passage, 1.7, Some(when(1.5) - when(1.7))),
+            (Take::Passage, 1.9, Some(when(1.5))),
+            (Take::Passage, 1.95, None),
+        ] {
+            let found = reduce(take, &fall, [level, 1.5]);
+            let near = found.zip(expected).is_some_and(|(a, b)| (a - b).abs() < 1e-4);
+            assert!(near || found == expected, "{take:?} {level}: {found:?} for {expected:?}");
+        }
+        let swing = [[0.0, 1.0], [1.0, -1.0], [2.0, 1.0]];
+        assert_eq!(reduce(Take::FirstAbove, &swing, [0.0; 2]), Some(1.5));
     }
 
     #[test]
