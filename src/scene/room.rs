@@ -2,6 +2,7 @@
 
 use super::build::Builder;
 use super::lattice::{FACE, FLUID, FREE};
+use super::opening::Passes;
 use super::oriented::Placed;
 use super::{Drive, Solid};
 use crate::periodic::Periodic;
@@ -48,9 +49,16 @@ impl Builder<'_> {
     /// solids may neither make room nor take it.
     pub(super) fn room(&mut self) {
         let shut = self.case.inflow.is_empty() && self.case.outflow.is_empty();
-        self.filled = self.filled && shut && self.keeps_room();
+        let full = self.filled;
+        self.filled = full && shut && self.keeps_room();
         if self.filled {
             self.notes.push("the water fills all its room: the smallest pressure is 0".into());
+        } else if full && !shut && self.openings.iter().all(|o| !matches!(o.opening.passes, Passes::Free)) {
+            self.notes.push(
+                "the water fills all its room and every opening has a rate: nothing sets the level of its pressure, which may be a hundred times \
+                 the flow's; make one [[outflow]] a hole (without `velocity` and `discharge`), or open a face (tank.open)"
+                    .into(),
+            );
         }
     }
 
