@@ -24,7 +24,7 @@ const ENOUGH: f64 = 0.01;
 /// Most steps; 5 to 15 are usual.
 const MOST_STEPS: usize = 40;
 /// Water nearer than this to a solid off the lattice finds new places, over l0; up to as much again does, and what lies beyond stands still.
-const REACH: f64 = 4.0;
+const REACH: f64 = 6.0;
 /// Particles nearer than this to a node of the lattice stand on it, over l0.
 const SLACK: f64 = 1e-3;
 

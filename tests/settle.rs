@@ -121,31 +121,25 @@ fn a_scene_that_fits_its_lattice_starts_on_it() {
 }
 
 #[test]
-fn a_scene_starts_the_same_wherever_it_lies_and_mirrored() {
-    // Force of the first step beside a turned body, in a tank at `at` spacings along x or mirrored in x = 0.
-    let force = |at: f64, way: f64| {
-        let [low, high, center] = [0.0, 0.4, 0.17].map(|x| way * (x + 0.02 * at));
+fn a_scene_starts_the_same_wherever_it_lies() {
+    // Force of the first step beside a turned body, in a tank at `at` spacings along x.
+    let force = |at: f64| {
+        let [low, high, center] = [0.0, 0.4, 0.17].map(|x| x + 0.02 * at);
         let case = case(&format!(
             "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\n\
-             [tank]\nmin = [{}, 0, 0]\nmax = [{}, 0.3, 0.3]\nopen = [\"z_max\"]\n\
-             [[fluid.block]]\nmin = [{}, 0, 0]\nmax = [{}, 0.3, 0.2]\n[contact]\nspring = 1e4\n\
+             [tank]\nmin = [{low}, 0, 0]\nmax = [{high}, 0.3, 0.3]\nopen = [\"z_max\"]\n\
+             [[fluid.block]]\nmin = [{low}, 0, 0]\nmax = [{high}, 0.3, 0.2]\n[contact]\nspring = 1e4\n\
              [[body]]\nname = \"b\"\nsize = [0.12, 0.1, 0.1]\ncenter = [{center}, 0.14, 0.2]\ndensity = 500\n\
-             orientation = {{ axis = [0, 1, 0], angle_deg = {} }}\ndisplaces_fluid = true\n",
-            low.min(high),
-            low.max(high),
-            low.min(high),
-            low.max(high),
-            way * 15.0
+             orientation = {{ axis = [0, 1, 0], angle_deg = 15 }}\ndisplaces_fluid = true\n"
         ));
         let mut run = simulation(&case);
         run.step().expect("a step");
-        let force = run.fluid_force[0].force;
-        DVec3::new(way * force.x, force.y, force.z)
+        run.fluid_force[0].force
     };
-    let first = force(0.0, 1.0);
-    let others = [(1.0, 1.0), (2.0, 1.0), (7.0, 1.0), (0.0, -1.0)].map(|(at, way)| force(at, way));
+    let first = force(0.0);
+    let others = [1.0, 2.0, 7.0].map(force);
     println!("{first}: {:?}", others.map(|f| f - first));
-    assert!(others.iter().all(|f| f.distance(first) < 1e-4 * first.length()), "{first} {others:?}");
+    assert!(others.iter().all(|f| f.distance(first) < 1e-9 * first.length()), "{first} {others:?}");
 }
 
 #[test]

@@ -63,7 +63,9 @@ const SLIPS: &[(&[&str], &str)] = &[
     (&["contact.friction=30"], "contact.friction: a coefficient of friction of 30"),
     (&["moving_wall.0.sine.ramp=20"], "moving_wall.0.sine.ramp: 20 s is longer than the run of 1 s"),
     (
-        &["body.0.swing={axis=[0,1,0],amplitude_deg=400,period=100}"],
+        &[
+            "body=[{name=\"box\",size=[0.2,0.2,0.2],center=[1.3,0.25,0.8],swing={axis=[0,1,0],amplitude_deg=400,period=100}}]",
+        ],
         "body.0.swing.amplitude_deg: 400 degrees is more than a turn",
     ),
     (

@@ -395,7 +395,7 @@ mod tests {
     #[test]
     fn what_a_driven_body_is_made_of_is_told_to_have_no_effect() {
         let text = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n[contact]\nspring = 1e5\n[[body]]\nname = \"d\"\n\
-                    size = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0]\nmass = 5\ninertia = [1, 1, 1]\n";
+                    size = [0.1, 0.1, 0.1]\ncenter = [0, 0, 0]\nmass = 5\ninertia = [0.01, 0.01, 0.01]\n";
         let told = |more: &str| {
             let problems = check(&format!("{text}{more}").parse().unwrap());
             problems.into_iter().map(|p| (p.key, p.warning)).collect::<Vec<_>>()
