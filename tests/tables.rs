@@ -110,8 +110,9 @@ fn what_is_not_turned_has_the_turn_of_nothing() {
     let solids = |orientation: &str, dimensions: u32| {
         let all = shapes.iter().enumerate().filter(|(k, _)| dimensions == 3 || *k < 2);
         let of = |(k, shape): (usize, &String)| {
-            let at = if matches!(k, 1 | 4) { "position" } else { "center" };
-            format!("[[body]]\nname = \"b{k}\"\n{shape}\n{at} = [{k}, 0, 0]\ndensity = 500\n{orientation}\n")
+            format!(
+                "[[body]]\nname = \"b{k}\"\n{shape}\ncenter = [{k}, 0, 0]\ndensity = 500\n{orientation}\n"
+            )
         };
         let obstacle = format!("[[obstacle]]\nname = \"o\"\n{prism}\nposition = [0, 0, 2]\n{orientation}\n");
         format!(
