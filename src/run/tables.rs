@@ -232,8 +232,8 @@ impl Tables {
         Ok(())
     }
 
-    /// A step without a row, for the extremes of the run: of the water, at which a look takes one pass over it where no device is waited for. The
-    /// energy of free bodies takes another search for contacts, and is left to the rows.
+    /// The extremes of a step without a row: one pass over the water where no device is waited for. The energy of free bodies takes another
+    /// search for contacts, and is left to the rows.
     fn look(&self, report: &StepReport, simulation: &mut Simulation, totals: &mut Totals) -> Result<()> {
         let (fluid, counters) = observe(simulation, report)?;
         totals.look(simulation.steps, (&fluid, &counters), report.dt, simulation.params.spacing);
