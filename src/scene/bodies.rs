@@ -2,7 +2,7 @@
 
 use super::oriented::Placed;
 use super::walls::motion;
-use super::{Drive, FreeBody, Shape, Solid};
+use super::{Drive, FreeBody, Motion, Shape, Solid};
 use crate::case::{self, Axis, Freedom};
 use crate::error::Problem;
 use glam::{DMat3, DQuat, DVec3};
@@ -106,6 +106,14 @@ impl Solid {
     pub(super) fn placed(&self) -> Placed {
         Placed { center: self.shape_center(), shape: self.shape, axes: DMat3::from_quat(self.orientation) }
     }
+
+    /// The same at time `t` [s] of the `motion` that drives it.
+    pub(super) fn placed_at(&self, motion: &Motion, t: f64) -> Placed {
+        let orientation = motion.turn(t) * self.orientation;
+        let center = self.position + motion.displacement(t) + orientation * self.shape_offset;
+        Placed { center, shape: self.shape, axes: DMat3::from_quat(orientation) }
+    }
+
     /// Positions of the wall layer in the world [m].
     pub(super) fn wall_positions(&self) -> impl Iterator<Item = DVec3> {
         self.wall_offset.iter().map(|&o| self.position + self.orientation * o)

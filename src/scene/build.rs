@@ -14,7 +14,7 @@ use super::walls::{self, Fixed, PlaneFrame};
 use super::water::{Flow, Water};
 use super::{Scene, Solid, wall_at};
 pub(super) use crate::case::AXES;
-use crate::case::{Case, Law, stands_for};
+use crate::case::{Case, Law, PressureGauge, stands_for};
 use crate::error::{CaseError, Problem, Result};
 use crate::periodic::Periodic;
 use glam::{DMat3, DVec3, IVec3};
@@ -397,6 +397,12 @@ impl<'a> Builder<'a> {
         made
     }
 
+    /// Moving walls, obstacles off the lattice and bodies: all solids but those in openings, which come last of the walls.
+    pub(super) fn solids_of_case(&self) -> impl Iterator<Item = &Solid> {
+        let own = self.moving_walls.len() - self.openings.iter().filter(|o| o.wall.is_some()).count();
+        self.moving_walls[..own].iter().chain(&self.bodies)
+    }
+
     /// Whether a box of the lattice of this `size` [m] is one particle thick.
     fn is_thin(&self, size: DVec3) -> bool {
         (0..3).any(|k| size[k] < 1.5 * self.lattice.spacing && !(self.lattice.plane && k == 1))
@@ -405,38 +411,34 @@ impl<'a> Builder<'a> {
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     fn gauges(&mut self) {
         let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
-        // Of the solids in openings, which come last, no gauge tells anything.
-        let own = self.moving_walls.len() - self.openings.iter().filter(|o| o.wall.is_some()).count();
-        let solids = self.moving_walls[..own].iter().chain(&self.bodies);
-        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = solids.partition(|s| s.stays());
+        // Of the solids in openings no gauge tells anything.
+        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = self.solids_of_case().partition(|s| s.stays());
         let still = still.into_iter().flat_map(Solid::wall_positions);
         let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
-        for (k, gauge) in self.case.gauge.pressure.iter().enumerate() {
+        let wrong = |(k, gauge): (usize, &PressureGauge)| {
             let mut at: DVec3 = gauge.point.into();
             if self.lattice.plane {
                 at.y = 0.0;
             }
-            if let Err(nearest) = wall_at(&walls, at, reach, self.lattice.spacing) {
-                let key = format!("gauge.pressure.{k}.point");
-                let is_on = |s: &Solid| {
-                    wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
-                };
-                if let Some(solid) = moving.iter().find(|s| is_on(s)) {
-                    let (what, on) = (solid.what(), &solid.name);
-                    let message =
-                        format!("gauge.pressure `{}`: it lies on {what} `{on}`, which may move", gauge.name);
-                    let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
-                    self.problems.push(Problem::new(key, message, remedy));
-                    continue;
-                }
-                let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
-                    format!("the nearest stands at {}", point(nearest))
-                });
-                let (name, at) = (&gauge.name, point(at));
-                let message = format!("gauge.pressure `{name}` at {at}: no fixed wall there, {hint}");
-                let remedy = "move the point onto a wall; where water comes in or goes out there is none";
-                self.problems.push(Problem::new(key, message, remedy));
+            let (key, name) = (format!("gauge.pressure.{k}.point"), &gauge.name);
+            let nearest = wall_at(&walls, at, reach, self.lattice.spacing).err()?;
+            let is_on = |s: &&&Solid| {
+                wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
+            };
+            if let Some(solid) = moving.iter().find(is_on) {
+                let (what, on) = (solid.what(), &solid.name);
+                let message = format!("gauge.pressure `{name}`: it lies on {what} `{on}`, which may move");
+                let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
+                return Some(Problem::new(key, message, remedy));
             }
-        }
+            let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
+                format!("the nearest stands at {}", point(nearest))
+            });
+            let message = format!("gauge.pressure `{name}` at {}: no fixed wall there, {hint}", point(at));
+            let remedy = "move the point onto a wall; where water comes in or goes out there is none";
+            Some(Problem::new(key, message, remedy))
+        };
+        let problems: Vec<Problem> = self.case.gauge.pressure.iter().enumerate().filter_map(wrong).collect();
+        self.problems.extend(problems);
     }
 }

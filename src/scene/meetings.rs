@@ -2,9 +2,7 @@
 
 use super::build::Builder;
 use super::near::Near;
-use super::oriented::Placed;
 use super::{Drive, Motion, Solid};
-use glam::DMat3;
 
 /// Moments of a run at which two of them are held against each other.
 const MOMENTS: u32 = 400;
@@ -19,10 +17,7 @@ impl Builder<'_> {
     /// Tells of driven solids of the case that meet before the end of the run. Those that reach into each other from the start are the
     /// user's word, and of what is not convex planes do not tell.
     pub(super) fn meetings(&mut self) {
-        // The solids in openings come last.
-        let own = self.moving_walls.len() - self.openings.iter().filter(|o| o.wall.is_some()).count();
-        let solids = self.moving_walls[..own].iter().chain(&self.bodies);
-        let driven = solids.filter_map(|solid| match &solid.drive {
+        let driven = self.solids_of_case().filter_map(|solid| match &solid.drive {
             Drive::Prescribed(motion) if solid.placed().is_convex() => Some((solid, motion)),
             _ => None,
         });
@@ -32,7 +27,7 @@ impl Builder<'_> {
         let (mut near, mut notes) = (Near::default(), Vec::new());
         for &(solid, motion) in &driven {
             let ends = times.iter().map(|&t| {
-                let placed = at(solid, motion, t);
+                let placed = solid.placed_at(motion, t);
                 (placed.center - placed.bounds(), placed.center + placed.bounds())
             });
             let Some((low, high)) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else { continue };
@@ -42,7 +37,7 @@ impl Builder<'_> {
                     continue;
                 }
                 let meets = |t: &&f64| {
-                    let (own, beside) = (at(solid, motion, **t), at(other, others, **t));
+                    let (own, beside) = (solid.placed_at(motion, **t), other.placed_at(others, **t));
                     own.apart(&beside).0 <= 0.0 && own.way_out(&beside).0 > tolerance
                 };
                 if let Some(t) = times.iter().find(meets).filter(|t| **t > 0.0) {
@@ -61,13 +56,6 @@ impl Builder<'_> {
         }
         self.notes.extend(notes);
     }
-}
-
-/// Where `solid` is at time `t` [s] of its `motion`.
-fn at(solid: &Solid, motion: &Motion, t: f64) -> Placed {
-    let orientation = motion.turn(t) * solid.orientation;
-    let center = solid.position + motion.displacement(t) + orientation * solid.shape_offset;
-    Placed { center, shape: solid.shape, axes: DMat3::from_quat(orientation) }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::opening::Passes;
 use super::oriented::Placed;
 use super::{Drive, Solid};
 use crate::periodic::Periodic;
-use glam::{DMat3, DVec3, IVec3};
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 /// Part of a room by which it may grow or shrink and counts as of one size: the water's density bears it.
@@ -36,14 +36,6 @@ impl Barrier {
     }
 }
 
-/// A driven solid where it stands at time `t` [s].
-fn driven(solid: &Solid, t: f64) -> Option<Placed> {
-    let Drive::Prescribed(motion) = &solid.drive else { return None };
-    let start = solid.placed();
-    let axes = DMat3::from_quat(motion.turn(t)) * start.axes;
-    Some(Placed { center: start.center + motion.displacement(t), axes, ..start })
-}
-
 impl Builder<'_> {
     /// Judges whether water that fills its room does so for all of the run, and notes it: nothing may let in or out, and driven
     /// solids may neither make room nor take it.
@@ -67,6 +59,10 @@ impl Builder<'_> {
         let (still, solids): (Vec<&Solid>, Vec<&Solid>) =
             self.moving_walls.iter().chain(&self.bodies).partition(|s| s.is_still());
         let images = |shape: Placed| Barrier::images(shape, &self.periodic);
+        let driven = |s: &&Solid, t: f64| match &s.drive {
+            Drive::Prescribed(motion) => Some(s.placed_at(motion, t)),
+            Drive::Free(_) => None,
+        };
         let at = |t: f64| -> Vec<Barrier> {
             solids.iter().filter_map(|s| driven(s, t)).flat_map(images).collect()
         };
