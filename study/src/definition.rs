@@ -275,38 +275,23 @@ impl Definition {
     }
 
     /// Limits of values that none of the finished points in `rows` has, in words with those that there are.
-    pub fn idle_limits<'a>(&self, rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
-        let ended = || rows.clone().filter(|r| r.measured.class <= Class::Degraded);
-        let known: BTreeSet<&str> =
-            ended().flat_map(|r| r.measured.values.keys().map(String::as_str)).collect();
-        if ended().next().is_none() {
-            return Vec::new();
-        }
-        let idle = self.limit.keys().filter(|name| !known.contains(name.as_str()));
-        let there: Vec<&str> = known.iter().copied().collect();
-        let told = |name: &String| {
+    pub fn idle_limits<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Vec<String> {
+        let limits = self.limit.keys().map(String::as_str).collect();
+        let told = |name: &str, there: &str| {
             format!(
-                "[limit] `{name}` is held against nothing: no finished point has this value; there are {}.",
-                there.join(", ")
+                "[limit] `{name}` is held against nothing: no finished point has this value; there are {there}."
             )
         };
-        idle.map(told).collect()
+        idle(&limits, rows, |measured| measured.values.keys().map(String::as_str).collect(), told)
     }
 
-    /// Curves of `[[error]]` that none of the finished points in `rows` has, in words with those that there are.
-    pub fn idle_errors<'a>(&self, rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
-        let ended = || rows.clone().filter(|r| r.measured.class <= Class::Degraded);
-        let known: BTreeSet<&str> =
-            ended().flat_map(|r| r.measured.curves.keys().map(String::as_str)).collect();
-        if ended().next().is_none() {
-            return Vec::new();
-        }
-        let curves: BTreeSet<&str> = self.error.iter().filter_map(|e| e.curve.as_deref()).collect();
-        let there: Vec<&str> = known.iter().copied().collect();
-        let told = |name: &&str| {
-            format!("[[error]] `{name}`: no finished point has this curve; there are {}.", there.join(", "))
+    /// Curves of `[[error]]` that none of the finished points in `rows` has, likewise.
+    pub fn idle_errors<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Vec<String> {
+        let curves = self.error.iter().filter_map(|e| e.curve.as_deref()).collect();
+        let told = |name: &str, there: &str| {
+            format!("[[error]] `{name}`: no finished point has this curve; there are {there}.")
         };
-        curves.difference(&known).map(told).collect()
+        idle(&curves, rows, |measured| measured.curves.keys().map(String::as_str).collect(), told)
     }
 
     /// Refuses a `[[check]]` that is for points that no grid has.
@@ -337,6 +322,24 @@ impl Definition {
         }
         Ok(())
     }
+}
+
+/// Which of `asked` none of the finished points in `rows` has among its `names`, each as it is `told` with those that there are; none while no point
+/// has finished.
+fn idle<'a>(
+    asked: &BTreeSet<&str>,
+    rows: impl Iterator<Item = &'a Row>,
+    names: impl Fn(&'a Measured) -> Vec<&'a str>,
+    told: impl Fn(&str, &str) -> String,
+) -> Vec<String> {
+    let ended = rows.map(|r| &r.measured).filter(|m| m.class <= Class::Degraded);
+    let mut ended = ended.peekable();
+    if ended.peek().is_none() {
+        return Vec::new();
+    }
+    let known: BTreeSet<&str> = ended.flat_map(names).collect();
+    let there = known.iter().copied().collect::<Vec<_>>().join(", ");
+    asked.difference(&known).map(|name| told(name, &there)).collect()
 }
 
 #[cfg(test)]
