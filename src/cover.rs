@@ -11,8 +11,9 @@ use glam::{DMat3, DQuat, DVec3};
 /// Distances before a face, over l0, at which a point that lies in a solid tells that no water stands between: nearly at the face, where a solid ends
 /// in a wedge, and half a particle away, where it stands a little off the lattice.
 const AT: [f64; 2] = [0.1, 0.5];
-/// The same of free bodies, with what is covered then: as much as [`crate::slots`] takes for a slot, up to a gap of 1.1 spacings.
-const FADING: [(f64, f64); 2] = [(0.7, 2.0 / 3.0), (0.9, 1.0 / 3.0)];
+/// Distance before a face, over l0, at which a point in a solid tells that the face is within it: a surface that bends lies as much behind the plane of a
+/// row's face at its ends.
+const WITHIN: f64 = -0.15;
 /// A point that lies on a solid's surface up to this much, over l0, is half in it, or round-off would tell where it is.
 const SLACK: f64 = 1e-6;
 /// Edge of the cells that faces are found in, over l0.
@@ -29,7 +30,6 @@ pub(crate) struct Standing {
     position: DVec3,
     to_shape: DMat3,
     radius: f64,
-    is_free: bool,
 }
 
 impl Standing {
@@ -40,7 +40,6 @@ impl Standing {
             position: position + orientation * solid.shape_offset,
             to_shape: DMat3::from_quat(orientation.inverse()),
             radius: solid.shape.radius(),
-            is_free: solid.is_free(),
         }
     }
 
@@ -53,7 +52,6 @@ impl Standing {
             shape,
             position: wall.center,
             to_shape: wall.axes.transpose(),
-            is_free: false,
         }
     }
 
@@ -146,43 +144,65 @@ impl Tiles {
         out
     }
 
+    /// The middles of the parts of a face about `center` that looks along `normal`: two halves in the plane, quarters in space.
+    pub fn quarters(&self, center: DVec3, normal: DVec3) -> Vec<DVec3> {
+        let (along, across) = self.tangents(normal.normalize_or_zero());
+        let ends = [-0.25, 0.25].map(|k| center + k * self.spacing * along);
+        let both = |x: DVec3| [-0.25, 0.25].map(|k| x + k * self.spacing * across);
+        if self.plane { ends.to_vec() } else { ends.into_iter().flat_map(both).collect() }
+    }
+
+    fn tangents(&self, normal: DVec3) -> (DVec3, DVec3) {
+        if self.plane { (normal.cross(DVec3::Y), DVec3::ZERO) } else { normal.any_orthonormal_pair() }
+    }
+
     /// Part of the face around `center` that looks along `normal` before which water may stand [-].
     pub fn bare(&self, center: DVec3, normal: DVec3, solids: &[&Standing]) -> f64 {
-        let reach = 2.0 * self.spacing;
-        let near = |s: &&Standing| s.outside(center, reach, &self.periodic) < reach;
-        let solids: Vec<&Standing> = solids.iter().copied().filter(near).collect();
-        if solids.is_empty() {
-            return 1.0;
-        }
+        1.0 - self.mean(center, normal, solids, |x, near| {
+            let at = |d: f64, s: &Standing| self.holds(x + d * self.spacing * normal, s);
+            // Of two that meet at the point each has a half.
+            near.iter().map(|s| AT.map(|d| at(d, s)).into_iter().fold(0.0, f64::max)).sum::<f64>().min(1.0)
+        })
+    }
+
+    /// Part of the same face that does not lie within `solids` [-].
+    fn outside(&self, center: DVec3, normal: DVec3, solids: &[&Standing]) -> f64 {
+        let at = |x: DVec3| x + WITHIN * self.spacing * normal;
+        1.0 - self.mean(center, normal, solids, |x, near| {
+            near.iter().map(|s| self.holds(at(x), s)).sum::<f64>().min(1.0)
+        })
+    }
+
+    fn holds(&self, x: DVec3, solid: &Standing) -> f64 {
+        solid.holds(x, SLACK * self.spacing, &self.periodic)
+    }
+
+    /// Mean of `of` over points of the face around `center` that looks along `normal`, each with the `solids` near; 0 where there are none.
+    fn mean(
+        &self,
+        center: DVec3,
+        normal: DVec3,
+        solids: &[&Standing],
+        of: impl Fn(DVec3, &[&Standing]) -> f64,
+    ) -> f64 {
         let l0 = self.spacing;
-        let (along, across) =
-            if self.plane { (normal.cross(DVec3::Y), DVec3::ZERO) } else { normal.any_orthonormal_pair() };
+        let reach = 2.0 * l0;
+        let near = |s: &&Standing| s.outside(center, reach, &self.periodic) < reach;
+        let near: Vec<&Standing> = solids.iter().copied().filter(near).collect();
+        if near.is_empty() {
+            return 0.0;
+        }
+        let (along, across) = self.tangents(normal);
         let n = POINTS[usize::from(!self.plane)];
         let place = |k: u32| l0 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
-        let covered = |x: DVec3| {
-            let at = |d: f64, s: &Standing| s.holds(x + d * l0 * normal, SLACK * l0, &self.periodic);
-            let most = |parts: [(f64, f64); 2], s: &Standing| {
-                parts.into_iter().map(|(d, part)| part * at(d, s)).fold(0.0, f64::max)
-            };
-            // Of two that meet at the point each has a half.
-            let (mut whole, mut fading) = (0.0_f64, 0.0_f64);
-            for s in &solids {
-                let own = most(AT.map(|d| (d, 1.0)), s);
-                whole += own;
-                if s.is_free && own < 1.0 {
-                    fading = fading.max(most(FADING, s));
-                }
-            }
-            whole.min(1.0).max(fading)
-        };
         let mut sum = 0.0;
         let rows = if self.plane { 1 } else { n };
         for j in 0..rows {
             for i in 0..n {
-                sum += covered(center + place(i) * along + place(j) * across);
+                sum += of(center + place(i) * along + place(j) * across, &near);
             }
         }
-        1.0 - sum / f64::from(rows * n)
+        sum / f64::from(rows * n)
     }
 }
 
@@ -209,7 +229,6 @@ mod tests {
                         position: at,
                         to_shape: DMat3::IDENTITY,
                         radius: shape.radius(),
-                        is_free: true,
                     }
                 })
                 .collect();

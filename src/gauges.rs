@@ -237,8 +237,9 @@ impl Gauges {
             Target::Solid(solid) => simulation.fluid_force[*solid],
             Target::Fixed(wall) => {
                 let areas = wall.areas(&simulation.scene, simulation.solids.poses());
-                let mut sum = wall.force(next(wall.slots.len()), &areas, params);
-                sum += wall.slot_force(&pushes, &simulation.scene);
+                let told = next(wall.slots.len());
+                let mut sum = wall.force(told, &areas, params);
+                sum += wall.slot_force(&pushes, (told, &areas), &simulation.scene, params);
                 sum
             }
         };

@@ -20,13 +20,17 @@
 //! step's pressures say. Slots that do not hang together have a field each.
 //!
 //! A body that others enclose has slots without a rim (`slots/enclosed.rs`); water that solids and their slots enclose has the pressure
-//! that comes through them (`slots/pockets.rs`).
+//! that comes through them (`slots/pockets.rs`). Solids that no force moves have slots where their forces are told (`slots/held.rs`).
 
 mod enclosed;
+mod held;
 mod pockets;
 mod pushes;
 
 pub use enclosed::Pressed;
+pub(crate) use held::bending;
+pub use held::{Held, HeldForces};
+pub(crate) use pushes::face_before;
 pub use pushes::{Opposite, Push};
 
 use crate::body::slots::{Seep, SlotRow};
@@ -39,7 +43,7 @@ use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
 /// at all: gaps of 0.9 and of 1.1 spacings. Particles of water come in between from 0.85 on; in narrower gaps they stay where they
@@ -57,6 +61,9 @@ const STIFFENING: f64 = 0.1;
 /// A solid's wall layer, in its frame.
 struct Layer {
     free: bool,
+    /// Whether no force moves it and its slots are told.
+    holds: bool,
+    still: bool,
     /// Slot of its first row.
     first: usize,
     offset: Vec<DVec3>,
@@ -65,10 +72,14 @@ struct Layer {
     radius: f64,
     grid: PointGrid,
     adjacent: Vec<Vec<u32>>,
+    /// Of one that holds, which rows lie where its surface bends.
+    bends: Vec<bool>,
+    /// Of one that never moves, how its rows lie before what never moves either.
+    faced: OnceLock<Arc<[Faced]>>,
 }
 
 impl Layer {
-    fn new(solid: &Solid, l0: f64) -> Self {
+    fn new(solid: &Solid, l0: f64, holds: bool) -> Self {
         let free = solid.is_free();
         let offset = solid.wall_offset.clone();
         let grid = PointGrid::new(offset.clone(), CELL * l0);
@@ -78,9 +89,13 @@ impl Layer {
             found.retain(|&n| n as usize != k);
             found
         };
-        let adjacent = if free { offset.iter().enumerate().map(near).collect() } else { Vec::new() };
+        let adjacent = if free || holds { offset.iter().enumerate().map(near).collect() } else { Vec::new() };
         Self {
             free,
+            holds,
+            still: solid.is_still(),
+            bends: if holds { bending(&offset, &solid.wall_area, l0) } else { Vec::new() },
+            faced: OnceLock::new(),
             first: solid.wall_slots.start,
             radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
             area: solid.wall_area.clone(),
@@ -132,10 +147,10 @@ impl Layer {
         sum / count
     }
 
-    /// Of each row in `slot`, the area that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
+    /// Of each row in `slot`, the part of its `area` (solid's frame) that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
     /// is what looks as its neighbours deep in there do.
-    fn areas(&self, slot: &Slot, pose: &Pose) -> Vec<DVec3> {
-        let area = |n: usize| pose.orientation * self.area[n];
+    fn areas(&self, area: &[DVec3], slot: &Slot, pose: &Pose) -> Vec<DVec3> {
+        let area = |n: usize| pose.orientation * area[n];
         let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
         let is_deep = |n: &usize| slot.inside.binary_search_by_key(n, |row| row.0).is_ok() && !at_mouth(*n);
         let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
@@ -178,8 +193,6 @@ struct Faced {
     share: f64,
     /// What it faces nearest.
     opposite: Option<Opposite>,
-    /// Row of the solid that is.
-    row: u32,
 }
 
 /// A slot as it is found.
@@ -217,7 +230,7 @@ impl Field {
     }
 }
 
-/// Finds the slots of the free bodies of a scene.
+/// Finds the slots of the solids of a scene.
 pub struct Slots {
     spacing: f64,
     /// Weight of the water [N/m3].
@@ -235,10 +248,14 @@ pub struct Slots {
 }
 
 impl Slots {
-    /// The slots of the free bodies of `scene`, in the water of `params`.
-    pub fn new(scene: &Scene, params: &Params) -> Self {
+    /// The slots of the free bodies of `scene`, in the water of `params`, and if forces are `told` those of other solids.
+    pub fn new(scene: &Scene, params: &Params, told: bool) -> Self {
         let l0 = scene.spacing;
         let (fixed, fixed_of) = fixed_walls(scene);
+        let layer = |(k, solid): (usize, &Solid)| {
+            let holds = told && k < scene.followed() && !solid.is_free();
+            Layer::new(solid, l0, holds)
+        };
         Self {
             periodic: scene.periodic,
             spacing: l0,
@@ -248,7 +265,7 @@ impl Slots {
             domain: scene.domain,
             fixed: PointGrid::new(fixed, CELL * l0),
             fixed_of,
-            layers: scene.solids.iter().map(|solid| Layer::new(solid, l0)).collect(),
+            layers: scene.solids.iter().enumerate().map(layer).collect(),
         }
     }
 
@@ -334,25 +351,25 @@ impl Slots {
         let share = |(&offset, &area): (&DVec3, &DVec3)| {
             let outward = pose.orientation * area.normalize_or_zero();
             let x = pose.position + pose.orientation * offset;
-            let (mut nearest, mut opposite, mut row) = (reach, None, 0);
-            let mut see = |r: DVec3, of: Opposite, n: u32| {
+            let (mut nearest, mut opposite) = (reach, None);
+            let mut see = |r: DVec3, of: Opposite| {
                 let distance = r.length();
                 if r.dot(outward) > AHEAD * distance && distance < nearest {
-                    (nearest, opposite, row) = (distance, Some(of), n);
+                    (nearest, opposite) = (distance, Some(of));
                 }
             };
             if at_walls {
                 let of = |n: u32| Opposite::Wall(self.fixed_of[n as usize]);
-                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, of(n), n));
+                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, of(n)));
             }
             for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
                 let local = pose.orientation.inverse() * (x - way - pose.position);
                 let way = |n: u32| pose.orientation * (layer.grid.point(n) - local);
-                layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other), n));
+                layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other, n as usize)));
             }
             let share = ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-            Faced { share, opposite, row }
+            Faced { share, opposite }
         };
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }
@@ -389,7 +406,7 @@ impl Slots {
         let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
-        let areas = layer.areas(slot, pose);
+        let areas = layer.areas(&layer.area, slot, pose);
         for (&(n, share), &area) in slot.inside.iter().zip(&areas).filter(|(row, _)| under_water(row.0)) {
             let row = row(area, on_surface(n));
             let head = self.weight.dot(on_surface(n) - middle);

@@ -9,6 +9,7 @@ use seixo::gauges::Gauges;
 use seixo::gauges::wall_force::FixedWall;
 use seixo::kernels::body_force::RowPressure;
 use seixo::output::table::Cell;
+use seixo::params::Params;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 use seixo::slots::{Opposite, Push};
@@ -223,7 +224,7 @@ fn faces_behind_solids_of_any_shape_see_no_water() {
         ("gate a little off the floor", gate, up(0.4), 0.56, 0.4),
         ("gate that has gone up", gate, up(1.0), 0.6, 0.4),
         ("block", block, up(0.0), 0.5, 0.4),
-        ("block at half of where its slot ends", block, up(0.8), 0.6 - 0.1 / 3.0, 0.4),
+        ("block that its slot tells of", block, up(0.8), 0.6, 0.4),
         ("block that has come up", block, up(2.0), 0.6, 0.4),
     ] {
         let on = faces(more, way);
@@ -361,9 +362,12 @@ fn what_a_slot_presses_on_a_floor_beyond_a_seam_acts_where_its_image_is() {
     let floor = FixedWall::find(&scene, "tank.z_min").expect("a floor");
     let own = |&k: &usize| scene.static_wall_shape[k] as usize == floor.shape();
     let on = (0..scene.static_wall_shape.len()).find(own).map(Opposite::Wall).expect("its particles");
+    let params = Params::new(&case, &scene).expect("valid");
+    let (told, areas) =
+        (vec![RowPressure::default(); floor.slots.len()], vec![DVec3::ZERO; floor.slots.len()]);
     let torque = |x: f64| {
-        let push = Push { on, at: DVec3::new(x, 0.12, 0.0), force: -2.0 * DVec3::Z };
-        floor.slot_force(&[push], &scene).torque
+        let push = Push { on, at: DVec3::new(x, 0.12, 0.0), pressure: 2.0, area: -DVec3::Z };
+        floor.slot_force(&[push], (&told, &areas), &scene, &params).torque
     };
     // By a body that lies over the side; the arm was longer by the tank.
     for (beyond, image) in [(0.27, 0.03), (-0.05, 0.19)] {
@@ -712,4 +716,67 @@ fn a_dry_scene_has_the_blow_of_a_body_on_a_post_and_nothing_of_water() {
     let still = text.replace("velocity = [1, 0, 0]", "motion = [[0, 0, 0, 0], [1, 0.1, 0, 0]]");
     let wrong = still.parse::<Case>().unwrap_err().to_string();
     assert!(wrong.contains("no [fluid] to measure"), "{wrong}");
+}
+
+/// A slice of still water 0.8 m long and 0.3 m deep with `solid` in it, called `pipe`.
+fn with_pipe(solid: &str) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.0125\ntime_step = 1e-3\nadaptive = true\nend = 1.0\ndimensions = 2\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.3]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.4]\nopen = [\"z_max\"]\n{solid}\
+         [[gauge.force]]\nname = \"pipe\"\non = \"pipe\"\n[[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n"
+    ))
+}
+
+#[test]
+fn a_pipe_on_the_bed_has_its_lift_and_the_bed_its_load_whatever_the_gap() {
+    let processors = processors("gauges before slots on a device are not tested");
+    let slice = 1000.0 * 9.81 * 0.0125;
+    let disc = |kind: &str, gap: f64, more: &str| {
+        let z = 0.1 + 0.0125 * gap;
+        with_pipe(&format!(
+            "[[{kind}]]\nname = \"pipe\"\nshape = \"cylinder\"\nradius = 0.1\ncenter = [0.4, 0, {z}]\n{more}"
+        ))
+    };
+    let drive = "motion = [[0, 0, 0, 0], [10, 0, 0, 0]]\n";
+    let held = "density = 1000\ndisplaces_fluid = true\n\
+                locked = [\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\"]\n[contact]\nspring = 1e5\n";
+    let mut cases = vec![("driven", 0.0, disc("moving_wall", 0.0, drive))];
+    cases.extend([0.0, 0.3, 0.7, 1.0].map(|gap| ("obstacle", gap, disc("obstacle", gap, ""))));
+    cases.extend([0.0, 0.5, 0.9].map(|gap| ("held", gap, disc("body", gap, held))));
+    for processor in processors {
+        for (kind, gap, case) in &cases {
+            if !matches!(processor, Processor::Cpu) && *gap > 0.0 {
+                continue;
+            }
+            let mean = means(case, &processor, 0.15, 0.25);
+            let lift = mean["pipe_force_z [N]"] / slice / (0.01 * std::f64::consts::PI);
+            let load = mean["floor_force_z [N]"] / slice / (-0.8 * 0.3);
+            println!("{kind}, gap {gap}: lift {lift:.4}, load {load:.4} of statics");
+            // The obstacle on the bed had 0.1 of its lift; the bed under a held body bore it up to 1.03 times.
+            assert!((lift - 1.0).abs() < 0.035, "{kind} {gap}: {lift}");
+            assert!((load - 1.0).abs() < 0.01, "{kind} {gap}: {load}");
+        }
+    }
+}
+
+#[test]
+fn what_stands_on_the_bed_with_a_face_has_no_lift_and_what_hovers_above_it_has() {
+    let slice = 1000.0 * 9.81 * 0.0125;
+    for (gap, lift, load) in
+        [(0.0, -0.2 * 0.1, 0.6 * 0.3), (0.7, 0.2 * 0.2, 0.8 * 0.3), (0.9, 0.2 * 0.2, 0.8 * 0.3)]
+    {
+        // Off the lattice, or it would be a box of it.
+        let z = 0.1 + 0.0125 * gap;
+        let case = with_pipe(&format!(
+            "[[obstacle]]\nname = \"pipe\"\nshape = \"box\"\nsize = [0.2, 0.1, 0.2]\ncenter = [0.404, 0, {z}]\n"
+        ));
+        let mean = means(&case, &Processor::Cpu, 0.15, 0.25);
+        let (own, floor) = (mean["pipe_force_z [N]"] / slice, -mean["floor_force_z [N]"] / slice);
+        println!("gap {gap}: {own:.5} m2 for {lift:.5}, floor {floor:.5} m2 for {load:.5}");
+        assert!(
+            (own - lift).abs() < 0.02 * 0.04 && (floor / load - 1.0).abs() < 0.015,
+            "{gap}: {own} {floor}"
+        );
+    }
 }

@@ -94,7 +94,7 @@ fn pockets(case: &Case, moved: f64) -> (usize, f64) {
     let scene = Scene::build(case).expect("it builds");
     let mut poses = Solids::new(&scene, case.contact.as_ref()).expect("bodies").poses().to_vec();
     poses[0].position.x += moved;
-    let slots = Slots::new(&scene, &Params::new(case, &scene).expect("valid"));
+    let slots = Slots::new(&scene, &Params::new(case, &scene).expect("valid"), false);
     let rows = slots.rows(&poses, |rows| Ok(vec![1000.0; rows.len()])).expect("nothing is read");
     let linked = rows.iter().filter(|row| row.seep.link > 0.0);
     linked.fold((0, 0.0), |(count, sum), row| (count + 1, sum + row.seep.known))

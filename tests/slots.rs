@@ -31,7 +31,7 @@ fn what_a_rim_passes_on_is_a_linear_pressure_with_the_weight_of_water() {
     let scene = Scene::build(&case).expect("the scene builds");
     let start = Solids::new(&scene, case.contact.as_ref()).expect("one body").poses()[0];
     let at = |position: DVec3| [Pose { position, ..start }];
-    let slots = Slots::new(&scene, &Params::new(&case, &scene).expect("valid"));
+    let slots = Slots::new(&scene, &Params::new(&case, &scene).expect("valid"), false);
     let solid = &scene.solids[0];
     let still = |slots: &[usize]| Ok(vec![0.0; slots.len()]);
     let rows = slots.rows(&at(solid.position), still).expect("nothing is read");

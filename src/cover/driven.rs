@@ -1,7 +1,8 @@
 //! Faces of driven solids at which other solids stand: a closed gate's foot on the floor, its sides at the walls, the joint of two walls that move
 //! as one. No water presses there, but rows near the edge of such a face carry the pressure of the water beside it.
 //!
-//! Free bodies have [`crate::slots`] instead, as what presses on them moves them.
+//! Free bodies have [`crate::slots`] instead, as what presses on them moves them; so have surfaces that bend away from what they touch, in the
+//! accurate scheme.
 
 use super::{CELL, Standing, Tiles, moving, still};
 use crate::body::Pose;
@@ -37,6 +38,8 @@ pub struct Covered {
     pub row: usize,
     /// Outward area, world axes [m2].
     pub area: DVec3,
+    /// The part of it that lies within other solids [m2].
+    pub within: DVec3,
 }
 
 /// The driven solids of a scene.
@@ -76,11 +79,13 @@ impl DrivenFaces {
                 let others = reached.iter().map(|&k| all[k]).filter(|s| s.solid != Some(driven.solid));
                 let (center, area) =
                     (pose.position + pose.orientation * face.center, pose.orientation * face.area);
-                let bare = self.tiles.bare(center, area.normalize_or_zero(), &others.collect::<Vec<_>>());
+                let (normal, others) = (area.normalize_or_zero(), others.collect::<Vec<_>>());
+                let bare = self.tiles.bare(center, normal, &others);
                 (bare < 1.0).then(|| Covered {
                     solid: driven.solid,
                     row: face.row,
                     area: (1.0 - bare) * area,
+                    within: (1.0 - self.tiles.outside(center, normal, &others)) * area,
                 })
             };
             driven.faces.par_iter().zip(reached).filter_map(of).collect::<Vec<_>>()

@@ -8,7 +8,7 @@ use crate::cover::{self, CELL, Standing, Tiles};
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::slots::{Opposite, Push};
+use crate::slots::{Opposite, Push, face_before};
 use glam::{DMat3, DVec3, IVec3};
 use std::collections::HashSet;
 
@@ -31,6 +31,8 @@ struct Face {
 pub struct FixedWall {
     /// Index into [`Scene::walls`].
     shape: usize,
+    /// Whether it is a box of the lattice.
+    on_lattice: bool,
     /// Slots of its wall particles that face the fluid.
     pub slots: Vec<usize>,
     position: Vec<DVec3>,
@@ -54,7 +56,7 @@ impl FixedWall {
         let l0 = scene.spacing;
         let tiles = Tiles::new(scene);
         let (about, still) = (scene.walls[shape].middle, cover::still(scene, Some(shape)));
-        let mut out = Self { shape, about, still, tiles, ..Self::default() };
+        let mut out = Self { shape, on_lattice, about, still, tiles, ..Self::default() };
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
         let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
         let cell = |x: DVec3| ((scene.periodic.wrap(x) - origin) / l0).round().as_ivec3();
@@ -141,14 +143,46 @@ impl FixedWall {
         sum
     }
 
-    /// Force and torque of the `pushes` of slots that are on it [N, N m].
-    pub fn slot_force(&self, pushes: &[Push], scene: &Scene) -> Wrench {
-        let own = |push: &&Push| matches!(push.on, Opposite::Wall(k) if scene.static_wall_shape[k] as usize == self.shape);
+    /// Force and torque of the `pushes` of slots that are on it [N, N m], in place of what its slots have `told` there of their bare `areas`.
+    pub fn slot_force(
+        &self,
+        pushes: &[Push],
+        (told, areas): (&[RowPressure], &[DVec3]),
+        scene: &Scene,
+        params: &Params,
+    ) -> Wrench {
         let mut sum = Wrench::default();
-        for push in pushes.iter().filter(own) {
+        for push in pushes {
+            let Opposite::Wall(wall) = push.on else { continue };
+            if scene.static_wall_shape[wall] as usize != self.shape {
+                continue;
+            }
+            let normal = scene.static_wall_normal[wall];
+            let normal = if self.on_lattice { face_before(normal, push.area) } else { normal };
+            let mut force = push.pressure * push.area_on(normal);
+            let places = self.tiles.quarters(push.at, normal);
+            let each = 1.0 / places.len() as f64;
+            for row in places.iter().filter_map(|x| self.row_at(scene.periodic.wrap(*x), normal)) {
+                force -= each * push.told_by(normal, &told[row], self.to_surface[row], areas[row], params);
+            }
             let arm = scene.periodic.nearest(push.at - self.about);
-            sum += Wrench { force: push.force, torque: arm.cross(push.force) };
+            sum += Wrench { force, torque: arm.cross(force) };
         }
         sum
+    }
+
+    /// The row before whose face along `normal` `x` [m] is; none where solids stand before all of it.
+    fn row_at(&self, x: DVec3, normal: DVec3) -> Option<usize> {
+        let l0 = self.tiles.spacing;
+        let mut found = None;
+        self.centers.near(x, 1.5 * l0, |k| {
+            let face = &self.faces[k as usize];
+            let way = x - face.center;
+            let along = way - way.dot(normal) * normal;
+            if face.normal.dot(normal) > 0.9 && along.abs().max_element() <= 0.5 * l0 * (1.0 + 1e-9) {
+                found = found.or(Some(face.row));
+            }
+        });
+        found
     }
 }

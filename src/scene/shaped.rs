@@ -8,6 +8,7 @@ use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
 use crate::shape::PointCells;
+use crate::slots::bending;
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
@@ -118,7 +119,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Takes away what of a fixed solid lies inside other walls or beyond the tank's, and the areas that face them.
+    /// Takes away what of a fixed solid lies inside other walls or beyond the tank's, and the areas that face them; before surfaces that bend the
+    /// gap opens, and [`crate::cover`] tells what is covered.
     fn bury(&mut self, key: &str, solid: &mut Solid) {
         let l0 = self.lattice.spacing;
         let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
@@ -127,7 +129,9 @@ impl Builder<'_> {
             solid.dummy_offset.iter().filter(|o| !self.buried(at(o), true)).copied().collect();
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
         let mut areas = self.cut(solid, &kept);
-        for (area, offset) in areas.iter_mut().zip(&solid.wall_offset) {
+        let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
+        let flat = areas.iter_mut().zip(&solid.wall_offset).zip(&bends).filter(|(_, bends)| !**bends);
+        for ((area, offset), _) in flat {
             for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
                 let own = solid.orientation.inverse() * e;
                 let faces = area.dot(own);

@@ -152,7 +152,7 @@ fn has_slots(scene: &Scene, params: &Params) -> Result<bool> {
         angular_velocity: DVec3::ZERO,
     };
     let poses: Vec<Pose> = scene.solids.iter().map(pose).collect();
-    let rows = Slots::new(scene, params).rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
+    let rows = Slots::new(scene, params, false).rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
     Ok(!rows.is_empty())
 }
 

@@ -10,7 +10,9 @@ use crate::error::{Error, Result};
 use crate::ledger::Entry;
 use crate::params::Step;
 use crate::plan::{Arrays, Stage};
-use crate::slots::{Opposite, Pressed, Push};
+use crate::slots::{Opposite, Pressed, Push, face_before};
+use glam::DVec3;
+use std::collections::HashMap;
 
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
@@ -75,8 +77,15 @@ impl Simulation {
     /// A device that is lost.
     pub fn slot_pushes(&mut self) -> Result<Vec<Push>> {
         let Some(found) = &self.slots else { return Ok(vec![]) };
-        let backend = &mut *self.backend;
-        found.pushes(self.solids.poses(), |slots| row_pressures(backend, slots))
+        let (backend, poses) = (&mut *self.backend, self.solids.poses());
+        let mut pushes = found.pushes(poses, |slots| row_pressures(backend, slots))?;
+        if self.held {
+            let held = found.held(poses, &self.driven_faces.covered(&self.scene, poses));
+            let forces =
+                found.held_forces(&held, poses, &self.params, |rows| backend.wall_pressures(rows))?;
+            pushes.extend(forces.pushes);
+        }
+        Ok(pushes)
     }
 
     /// Fluid force, contact and motion of the solids; their particles follow.
@@ -110,10 +119,14 @@ impl Simulation {
     }
 
     /// Force of the water on each solid: the sum over its rows, and what that does not know of driven solids. No water presses where another solid
-    /// stands, and under a free body that of its slot does. A body that is held has slots as a free one, and their part in its sum.
+    /// stands, and under a free body that of its slot does. A body that is held has slots as a free one, and their part in its sum; slots of other solids are
+    /// looked for where forces are told.
     fn force_of_water(&mut self) -> Result<Vec<Wrench>> {
         let (scene, poses, backend) = (&self.scene, self.solids.predicted(), &mut *self.backend);
-        let covered = self.driven_faces.covered(scene, poses);
+        let mut covered = self.driven_faces.covered(scene, poses);
+        let slots = self.slots.as_ref().filter(|_| self.held);
+        let held = slots.map(|slots| (slots, slots.held(poses, &covered)));
+        held.iter().for_each(|(slots, held)| slots.uncover(held, &mut covered));
         let row = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;
         let rows: Vec<usize> = covered.iter().map(row).collect();
         let (mut sums, mut pushes) = (None, vec![]);
@@ -139,12 +152,36 @@ impl Simulation {
         for &(k, load) in &self.enclosed {
             sum[k] += load;
         }
-        for push in pushes {
-            let Opposite::Solid(k) = push.on else { continue };
-            if !scene.solids[k].is_free() {
-                let arm = self.params.periodic.nearest(push.at - poses[k].position);
-                sum[k] += Wrench { force: push.force, torque: arm.cross(push.force) };
-            }
+        if let Some((slots, held)) = held {
+            let forces =
+                slots.held_forces(&held, poses, &self.params, |rows| backend.wall_pressures(rows))?;
+            forces.loads.into_iter().for_each(|(k, load)| sum[k] += load);
+            pushes.extend(forces.pushes);
+        }
+        let of_held = pushes.into_iter().filter_map(|push| match push.on {
+            Opposite::Solid(k, row) if !scene.solids[k].is_free() => Some((push, k, row)),
+            _ => None,
+        });
+        let of_held: Vec<(Push, usize, usize)> = of_held.collect();
+        let rows: Vec<usize> =
+            of_held.iter().map(|&(_, k, row)| scene.solids[k].wall_slots.start + row).collect();
+        let told = if rows.is_empty() { vec![] } else { backend.wall_pressures(&rows)? };
+        let mut taken: HashMap<(usize, usize), DVec3> = HashMap::new();
+        covered.iter().for_each(|c| *taken.entry((c.solid, c.row)).or_default() += c.area);
+        for ((push, k, row), told) in of_held.into_iter().zip(told) {
+            let (solid, turn) = (&scene.solids[k], poses[k].orientation);
+            let bare = turn * solid.wall_area[row] - taken.get(&(k, row)).copied().unwrap_or_default();
+            let to_surface = turn * solid.wall_to_surface[row];
+            // A row at an edge of a box belongs to several faces.
+            let own = solid.wall_to_surface[row];
+            let normal = match own.length() < 0.6 * self.params.spacing {
+                true => own.normalize_or_zero(),
+                false => face_before(own, turn.inverse() * push.area),
+            };
+            let told = push.told_by(turn * normal, &told, to_surface, bare, &self.params);
+            let force = push.pressure * push.area_on(turn * normal) - told;
+            let arm = self.params.periodic.nearest(push.at - poses[k].position);
+            sum[k] += Wrench { force, torque: arm.cross(force) };
         }
         Ok(sum)
     }

@@ -58,8 +58,8 @@ fn beside(found: &[Found]) -> Vec<BTreeSet<usize>> {
     let mut beside = vec![BTreeSet::new(); found.len()];
     for (k, (f, rows)) in found.iter().zip(&all).enumerate() {
         for &n in rows {
-            let Faced { opposite: Some(Opposite::Solid(solid)), row, .. } = f.faced[n] else { continue };
-            if let Some(&other) = slot_of.get(&(solid, row as usize)) {
+            let Faced { opposite: Some(Opposite::Solid(solid, row)), .. } = f.faced[n] else { continue };
+            if let Some(&other) = slot_of.get(&(solid, row)) {
                 beside[k].insert(other);
                 beside[other].insert(k);
             }

@@ -4,6 +4,8 @@ use super::{Field, Found, Slots};
 use crate::body::Pose;
 use crate::contact::broad::meeting_images;
 use crate::error::Result;
+use crate::kernels::body_force::RowPressure;
+use crate::params::Params;
 use glam::DVec3;
 
 /// What a body's slot lies before.
@@ -11,19 +13,50 @@ use glam::DVec3;
 pub enum Opposite {
     /// One of the fixed walls' particles.
     Wall(usize),
-    /// A solid, by its index.
-    Solid(usize),
+    /// A solid by its index, and the row of its layer.
+    Solid(usize, usize),
 }
 
-/// Force of the water in a slot on what stands opposite to the body.
+/// What the water in a slot presses on what stands opposite to the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
     /// What it acts on.
     pub on: Opposite,
     /// Where [m].
     pub at: DVec3,
-    /// Force [N].
-    pub force: DVec3,
+    /// Pressure [Pa].
+    pub pressure: f64,
+    /// Area, out of the body and into what it acts on [m2].
+    pub area: DVec3,
+}
+
+impl Push {
+    /// Its area as a face that looks along `normal` counts it [m2].
+    pub fn area_on(&self, normal: DVec3) -> DVec3 {
+        self.area.dot(normal) * normal
+    }
+
+    /// What the `row` of that face tells of the same area, of which as much is counted as is `bare`, world axes [m2], with the surface
+    /// `to_surface` from it: force to be replaced [N].
+    pub fn told_by(
+        &self,
+        normal: DVec3,
+        row: &RowPressure,
+        to_surface: DVec3,
+        bare: DVec3,
+        params: &Params,
+    ) -> DVec3 {
+        let counted = (bare.dot(normal) / (params.spacing * params.spacing)).clamp(0.0, 1.0);
+        counted * row.in_force(to_surface, params) * self.area_on(normal)
+    }
+}
+
+/// The direction of that face of a box's row, of those that its `normals` sum up, into which `area` looks most, both in its frame.
+pub(crate) fn face_before(normals: DVec3, area: DVec3) -> DVec3 {
+    let own = (0..3).filter(|&k| normals[k].abs() > 1e-6);
+    let most =
+        own.max_by(|&a, &b| (-area[a] * normals[a].signum()).total_cmp(&(-area[b] * normals[b].signum())));
+    most.map_or(DVec3::ZERO, |k| normals[k].signum() * DVec3::AXES[k])
 }
 
 impl Slots {
@@ -47,29 +80,50 @@ impl Slots {
         let found = self.find(poses);
         let pressure = self.at_rims(&found, read)?;
         let of = |(f, told): (&Found, &Vec<(usize, f64)>)| {
-            let (slot, pose) = (&f.slot, &poses[f.slot.solid]);
-            let row_place = |n: usize| pose.orientation * self.layers[slot.solid].offset[n];
-            let field = match slot.rim.is_empty() {
-                true => self.lent(&found, &pressure, f, poses),
-                false => {
-                    let passing = self.passing(told.clone(), row_place);
-                    Some(self.field(pose, &passing, self.places(slot, pose, told)))
-                        .filter(|field| field.any_wet)
-                }
-            };
-            field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, pose))
+            let field = self.field_of(&found, &pressure, (f, told), poses);
+            field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, &poses[f.slot.solid]))
         };
         Ok(found.iter().zip(&pressure).flat_map(of).collect())
+    }
+
+    /// The pressure in one of the slots `found`, whose rim has the pressures `told`, by its own rim or by those of others that lend it theirs; `None`
+    /// where it is dry. `pressure` is that of all rims.
+    pub(super) fn field_of(
+        &self,
+        found: &[Found],
+        pressure: &[Vec<(usize, f64)>],
+        (f, told): (&Found, &Vec<(usize, f64)>),
+        poses: &[Pose],
+    ) -> Option<Field> {
+        let (slot, pose) = (&f.slot, &poses[f.slot.solid]);
+        if slot.rim.is_empty() {
+            return self.lent(found, pressure, f, poses);
+        }
+        let passing = self.passing(told.clone(), |n| pose.orientation * self.layers[slot.solid].offset[n]);
+        Some(self.field(pose, &passing, self.places(slot, pose, told))).filter(|field| field.any_wet)
+    }
+
+    /// The middle of that face of row `n` of solid `k` which looks along `area` [m].
+    pub(super) fn on_face(&self, k: usize, pose: &Pose, n: usize, area: DVec3) -> DVec3 {
+        let (layer, way) = (&self.layers[k], area.normalize_or_zero());
+        let to_surface = pose.orientation * layer.to_surface[n];
+        pose.position + pose.orientation * layer.offset[n] + to_surface.dot(way) * way
     }
 
     fn pushes_of(&self, found: &Found, field: &Field, pose: &Pose) -> Vec<Push> {
         let Found { slot, faced, .. } = found;
         let push = |n: usize, area: DVec3| {
-            let (p, on_surface) = self.on_row(field, slot.solid, pose, n);
+            let (p, _) = self.on_row(field, slot.solid, pose, n);
             let on = faced[n].opposite?;
-            Some(Push { on, at: pose.position + on_surface, force: faced[n].share * p * area })
+            Some(Push {
+                on,
+                at: self.on_face(slot.solid, pose, n, area),
+                pressure: p,
+                area: faced[n].share * area,
+            })
         };
-        let areas = self.layers[slot.solid].areas(slot, pose);
+        let layer = &self.layers[slot.solid];
+        let areas = layer.areas(&layer.area, slot, pose);
         slot.inside.iter().zip(areas).filter_map(|(row, area)| push(row.0, area)).collect()
     }
 }

@@ -1,0 +1,195 @@
+//! Slots of solids that no force moves, where forces on them are told: a pipe on the bed, a drum gate on its sill. Their gauges would miss
+//! what stands in the gap, and the bed's would, too. What flat faces stand on has no water between (a pillar, a gate that is
+//! closed); where a surface bends away from what it touches the gap is open.
+
+use super::{Faced, Field, Found, Layer, Opposite, Push, Slots, enclosed};
+use crate::body::{Pose, Wrench};
+use crate::contact::broad::meeting_images;
+use crate::cover::driven::Covered;
+use crate::error::Result;
+use crate::kernels::body_force::RowPressure;
+use crate::params::Params;
+use crate::shape::PointCells;
+use glam::DVec3;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+/// Angles between the directions of rows beside each other at which a surface bends [rad]: below them it is flat, beyond them it has an edge.
+const BENDING: (f64, f64) = (1e-3, 0.6);
+
+/// Of rows at `offset` with outward `area`, which lie where the surface bends on from one to the next, so that it touches others along a line or
+/// in a point.
+pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], spacing: f64) -> Vec<bool> {
+    let mut cells = PointCells::new(super::ADJACENT * spacing);
+    offset.iter().for_each(|&x| cells.add(x));
+    let way: Vec<DVec3> = area.iter().map(|a| a.normalize_or_zero()).collect();
+    let bends = |(k, &x): (usize, &DVec3)| {
+        let angle = |n: usize| way[k].cross(way[n]).length().atan2(way[k].dot(way[n]));
+        let is_bent = |n: usize| (BENDING.0..BENDING.1).contains(&angle(n));
+        way[k] != DVec3::ZERO && cells.numbers(x).into_iter().any(|n| n != k && is_bent(n))
+    };
+    offset.iter().enumerate().map(bends).collect()
+}
+
+/// The slots of solids that no force moves.
+pub struct Held {
+    found: Vec<Found>,
+    /// By solid, the areas of its rows that water may press on from a slot, in its frame [m2].
+    area: HashMap<usize, Vec<DVec3>>,
+}
+
+/// What they do beside the pressures of the rows in them.
+#[derive(Default)]
+pub struct HeldForces {
+    /// Solids, and what is to be added to their sums of rows [N], [N m].
+    pub loads: Vec<(usize, Wrench)>,
+    /// What the water in them presses on what stands opposite.
+    pub pushes: Vec<Push>,
+}
+
+impl Held {
+    /// How much of a row lies in a slot of a surface that bends, so that what [`Covered`] says of it does not hold [-].
+    fn open(&self, layers: &[Layer]) -> HashMap<(usize, usize), f64> {
+        let of = |f: &Found| {
+            let solid = f.slot.solid;
+            let bent = |row: &(usize, f64)| layers[solid].bends[row.0];
+            f.slot
+                .inside
+                .iter()
+                .copied()
+                .filter(bent)
+                .map(|(n, share)| ((solid, n), share))
+                .collect::<Vec<_>>()
+        };
+        self.found.iter().flat_map(of).collect()
+    }
+}
+
+impl Slots {
+    /// The slots of solids that no force moves with the solids at `poses`, of which other solids cover what `covered` says.
+    pub fn held(&self, poses: &[Pose], covered: &[Covered]) -> Held {
+        let boxes = self.boxes(poses);
+        let holds = |k: usize| self.layers[k].holds;
+        let mut others = vec![vec![]; boxes.len()];
+        for (a, b, turns) in meeting_images(&boxes, &self.periodic) {
+            if holds(a) && holds(b) {
+                others[a].push((b, self.periodic.way(turns)));
+                others[b].push((a, self.periodic.way(-turns)));
+            }
+        }
+        let mut area = HashMap::new();
+        let mut found = vec![];
+        for k in (0..boxes.len()).filter(|&k| holds(k)) {
+            let layer = &self.layers[k];
+            let at_walls = self.at_walls(layer, &poses[k], super::FACING.1 * self.spacing);
+            if !at_walls && others[k].is_empty() {
+                continue;
+            }
+            let is_still = layer.still && others[k].iter().all(|(other, _)| self.layers[*other].still);
+            let look = || Arc::<[Faced]>::from(self.faced(k, at_walls, &others[k], poses));
+            let faced = if is_still { layer.faced.get_or_init(look).clone() } else { look() };
+            let mut open = layer.area.clone();
+            let to_frame = poses[k].orientation.inverse();
+            for c in covered.iter().filter(|c| c.solid == k) {
+                open[c.row] -= to_frame * if layer.bends[c.row] { c.within } else { c.area };
+            }
+            // What is left of a face that stands on another by round-off is nothing.
+            let is_open = |n: usize| open[n].length_squared() > 1e-4 * layer.area[n].length_squared();
+            let shares: Vec<f64> =
+                faced.iter().enumerate().map(|(n, row)| if is_open(n) { row.share } else { 0.0 }).collect();
+            let slots = layer.slots(k, &shares).into_iter();
+            found.extend(slots.map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }));
+            area.insert(k, open);
+        }
+        Held { found: enclosed::lend(found), area }
+    }
+
+    /// What of `covered` water in the slots `held` presses on is not covered.
+    pub fn uncover(&self, held: &Held, covered: &mut [Covered]) {
+        let open = held.open(&self.layers);
+        for c in covered {
+            c.area *= 1.0 - open.get(&(c.solid, c.row)).copied().unwrap_or(0.0);
+        }
+    }
+
+    /// Forces of the water in the slots `held`, beside those of rows. `read` tells what slots of particles have.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn held_forces(
+        &self,
+        held: &Held,
+        poses: &[Pose],
+        params: &Params,
+        read: impl FnOnce(&[usize]) -> Result<Vec<RowPressure>>,
+    ) -> Result<HeldForces> {
+        let Held { found, area } = held;
+        let own = |f: &Found| {
+            let first = self.layers[f.slot.solid].first;
+            f.slot.inside.iter().map(move |row| first + row.0).collect::<Vec<_>>()
+        };
+        let inside: Vec<usize> = found.iter().flat_map(own).collect();
+        let mut told = vec![];
+        let at_rims = self.at_rims(found, |rims| {
+            let mut all = read(&[&inside, rims].concat())?;
+            let rims = all.split_off(inside.len());
+            told = all;
+            Ok(rims.iter().map(|row| row.pressure).collect())
+        })?;
+        let pressed: HashSet<(usize, usize)> =
+            found.iter().flat_map(|f| f.slot.inside.iter().map(|row| (f.slot.solid, row.0))).collect();
+        let (mut out, mut told) = (HeldForces::default(), told.into_iter());
+        for (f, rim) in found.iter().zip(&at_rims) {
+            let (k, pose) = (f.slot.solid, &poses[f.slot.solid]);
+            let field = self.field_of(found, &at_rims, (f, rim), poses);
+            let mut load = Wrench::default();
+            let areas = self.layers[k].areas(&area[&k], &f.slot, pose);
+            for ((&(n, share), into), row) in f.slot.inside.iter().zip(areas).zip(&mut told) {
+                let (slot, arm) = self.in_held(field.as_ref(), k, pose, n);
+                let alone = row.in_force(pose.orientation * self.layers[k].to_surface[n], params);
+                let counted = if self.layers[k].bends[n] { self.layers[k].area[n] } else { area[&k][n] };
+                let rest = pose.orientation * (area[&k][n] - counted);
+                let force = -share * ((slot - alone) * into + alone * rest);
+                load += Wrench { force, torque: arm.cross(force) };
+                // What has slots of its own there has its part from them.
+                let is_pressed =
+                    |of| matches!(of, Opposite::Solid(other, row) if pressed.contains(&(other, row)));
+                if let Some(on) = f.faced[n].opposite.filter(|&of| !is_pressed(of)) {
+                    let at = self.on_face(k, pose, n, into);
+                    out.pushes.push(Push { on, at, pressure: slot, area: share * into });
+                }
+            }
+            out.loads.push((k, load));
+        }
+        Ok(out)
+    }
+
+    /// Pressure in a slot on the surface before row `n` of solid `k` [Pa], none where it is dry, and where that is, from the solid's place [m].
+    fn in_held(&self, field: Option<&Field>, k: usize, pose: &Pose, n: usize) -> (f64, DVec3) {
+        let layer = &self.layers[k];
+        let dry = || (0.0, pose.orientation * (layer.offset[n] + layer.to_surface[n]));
+        field.map_or_else(dry, |field| self.on_row(field, k, pose, n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Shape;
+
+    #[test]
+    fn round_surfaces_bend_and_faces_do_not() {
+        let l0 = 0.01;
+        let of = |shape: Shape| {
+            let layer = shape.particles(l0, 3, 1);
+            let bends = bending(&layer.wall, &layer.area, l0);
+            (bends.iter().filter(|b| **b).count(), bends.len())
+        };
+        let (bent, _) = of(Shape::cuboid(DVec3::new(0.1, 0.13, 0.08)));
+        assert_eq!(bent, 0);
+        for radius in [0.025, 0.05, 0.2] {
+            let (bent, all) = of(Shape::sphere(radius));
+            assert_eq!(bent, all, "{radius}");
+        }
+    }
+}
