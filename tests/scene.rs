@@ -418,3 +418,49 @@ fn a_cone_fits_a_domain_that_ends_below_its_base() {
     let cut = within(0.01);
     assert!(cut.as_ref().is_err_and(|e| e.contains("from z = 0.0010 to 0.4010 m")), "{cut:?}");
 }
+
+#[test]
+fn where_ballast_and_hinges_are_changes_nothing_of_where_a_body_is_found_to_be() {
+    // In a trough clear of its sides, and a cylinder that stands on its bottom: the points of the surface were counted from the centre of mass.
+    let trough = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.2\n[contact]\nspring = 2e4\n\
+                  [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.6, 0.6]\nopen = [\"z_max\"]\n\
+                  [[obstacle]]\nname = \"u\"\nshape = \"prism\"\nheight = 0.4\nposition = [0, 0.1, 0]\n\
+                  section = [[0.1, 0], [0.5, 0], [0.5, 0.4], [0.44, 0.4], [0.44, 0.06], [0.16, 0.06], [0.16, 0.4], [0.1, 0.4]]\n";
+    let boxed =
+        "[[body]]\nname = \"b\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.27, 0.3, 0.165]\ndensity = 500\n";
+    let round = "[[body]]\nname = \"b\"\nshape = \"cylinder\"\nradius = 0.08\nheight = 0.2\naxis = [0, 1, 0]\n\
+                 center = [0.3, 0.3, 0.12]\ndensity = 500\nstanding = true\n";
+    for more in ["", "mass_offset = [0.04, 0, 0]\n", "hinge = { at = [0.27, 0.3, 0.26], axis = \"y\" }\n"] {
+        let found = build(&format!("{trough}{boxed}{more}"));
+        assert!(found.is_ok(), "{more}: {:?}", found.err());
+    }
+    let height = |more: &str| {
+        let scene = build(&format!("{trough}{round}{more}")).expect("it builds");
+        let solid = scene.solids.iter().find(|s| s.name == "b").expect("the cylinder");
+        solid.shape_center().z
+    };
+    let exact = height("");
+    for more in ["mass_offset = [0, 0, 0.05]\n", "mass_offset = [0, 0, -0.05]\n"] {
+        assert!((height(more) - exact).abs() < 1e-3, "{more}: {} for {exact}", height(more));
+    }
+}
+
+#[test]
+fn what_a_body_half_a_spacing_off_the_lattice_displaces_has_its_symmetries() {
+    // Its faces run through the middles of cells, of which half go: which ones a number of their places alone said.
+    for (dimensions, size) in [(2, 0.1), (2, 0.14), (3, 0.06), (3, 0.1)] {
+        let scene = build(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.2\ndimensions = {dimensions}\n[contact]\nspring = 2e4\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.4, 0.4]\n\
+             [[body]]\nname = \"b\"\nsize = [{size}, {size}, {size}]\ncenter = [0.2, 0.2, 0.2]\ndensity = 500\n\
+             displaces_fluid = true\n"
+        ))
+        .expect("it builds");
+        let water = &scene.position[..scene.water()];
+        let mean = water.iter().map(|x| *x - 0.2).sum::<DVec3>() / water.len() as f64;
+        println!("{dimensions} dimensions, {size} m: {} particles, mean {mean}", water.len());
+        assert!(mean.x.abs() < 1e-12, "{mean}");
+        assert!(dimensions == 2 || mean.y.abs() < 1e-12, "{mean}");
+    }
+}

@@ -138,6 +138,9 @@ impl Solids {
         let mut momenta: Vec<DVec3> = self.bodies.iter().map(|b| b.momentum).collect();
         archive.array(POSES, &mut now, true)?;
         archive.array(MOMENTA, &mut momenta, true)?;
+        // Momenta are those in the middle of the last sub-step, so that the next kick spans half of it, too.
+        archive.number("solids.substep", &mut self.substep)?;
+        archive.number("solids.whole_substep", &mut self.whole)?;
         if self.periodic.is_any() {
             archive.array(TURNS, &mut self.turns, true)?;
         }

@@ -15,6 +15,7 @@ mod bodies;
 mod build;
 mod cavities;
 mod curve;
+mod displaced;
 mod domain;
 mod fits;
 mod inflow_depth;

@@ -352,8 +352,10 @@ impl Obstruction<'_> {
 
 /// Points of the surface of a shape, in the world: those above its wall layer and its corners.
 fn surface_points<'a>(at: &'a Placed, solid: Option<&'a Solid>) -> Box<dyn Iterator<Item = DVec3> + 'a> {
-    let layer = solid.into_iter().flat_map(|s| s.wall_offset.iter().zip(&s.wall_to_surface));
-    let layer = layer.map(|(offset, to_surface)| *offset + *to_surface);
+    let of = |s: &'a Solid| {
+        s.wall_offset.iter().zip(&s.wall_to_surface).map(|(x, way)| *x - s.shape_offset + *way)
+    };
+    let layer = solid.into_iter().flat_map(of);
     Box::new(at.shape.corners().into_iter().chain(layer).map(|q| at.center + at.axes * q))
 }
 

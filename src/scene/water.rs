@@ -1,5 +1,6 @@
 //! Water at t = 0: filling the free cells, making room for bodies, and looking for leaks.
 
+use super::displaced::{Cut, deepest_on_each_side};
 use super::lattice::{BLOCKED, Cells, FACE, FLUID, FREE, Grid, Lattice, REACHED};
 use super::oriented::Placed;
 use super::placement::point;
@@ -175,7 +176,7 @@ impl Water {
     /// it alone.
     pub fn displace(body: &Placed, lattice: &Lattice, grid: &mut Grid) -> usize {
         let near: Vec<IVec3> = around(body, lattice, grid).iter().filter(|&c| grid.get(c) == FLUID).collect();
-        let cut = near.into_par_iter().filter_map(|c| cut(body, c, lattice).map(|cut| (cut, c)));
+        let cut = near.into_par_iter().filter_map(|c| Cut::of(body, c, lattice).map(|cut| (cut, c)));
         let cut = deepest_on_each_side(body, cut, |&c| lattice.center(c));
         cut.iter().for_each(|&c| grid.set(c, FREE));
         cut.len()
@@ -200,7 +201,7 @@ impl Water {
     pub fn remove(&mut self, wall: &Placed, from: usize, lattice: &Lattice, grid: &mut Grid) {
         let near = around(wall, lattice, grid);
         let depth = |(k, &c): (usize, &IVec3)| {
-            let cut = near.contains(c).then(|| cut(wall, c, lattice))?;
+            let cut = near.contains(c).then(|| Cut::of(wall, c, lattice))?;
             cut.map(|cut| (cut, k))
         };
         let found = self.cell.par_iter().enumerate().skip(from).filter_map(depth);
@@ -310,44 +311,6 @@ pub(super) fn around(shape: &Placed, lattice: &Lattice, grid: &Grid) -> Cells {
     let reach = shape.bounds() + lattice.spacing;
     let Cells { lo, hi } = lattice.cells(shape.center - reach, shape.center + reach);
     Cells { lo: lo.max(grid.cells.lo), hi: hi.min(grid.cells.hi) }
-}
-
-/// What of a cell a shape displaces: signed distance of the cell's centre, in whole percents of l0, its place among
-/// those on one face, of which an even choice is taken, and the part of it [-]. `None` if that is nothing.
-fn cut(shape: &Placed, c: IVec3, lattice: &Lattice) -> Option<(i64, u64, f64)> {
-    let off = shape.distance(lattice.center(c)) / lattice.spacing;
-    (off < 0.5 - 1e-6).then(|| ((100.0 * off).round() as i64, even(c), (0.5 - off).min(1.0)))
-}
-
-/// The deepest of what is [`cut`], as many as its parts come to.
-fn deepest<T>(mut cut: Vec<((i64, u64, f64), T)>) -> Vec<T> {
-    let displaced: f64 = cut.iter().map(|((.., share), _)| share).sum();
-    cut.sort_by_key(|&((off, even, _), _)| (off, even));
-    cut.truncate(displaced.round() as usize);
-    cut.into_iter().map(|(_, of)| of).collect()
-}
-
-/// [`deepest`] of what is [`cut`] by `shape` at the places `at`, at its sealed cavities and elsewhere each on its own: what stands in a cavity may
-/// be taken out of it, and may not count for what stands outside.
-fn deepest_on_each_side<T: Send>(
-    shape: &Placed,
-    cut: impl ParallelIterator<Item = ((i64, u64, f64), T)>,
-    at: impl Fn(&T) -> DVec3 + Sync,
-) -> Vec<T> {
-    if !shape.has_cavities() {
-        return deepest(cut.collect());
-    }
-    let (within, around): (Vec<_>, Vec<_>) = cut.partition(|(_, of)| shape.in_cavity(at(of)));
-    [within, around].into_iter().flat_map(deepest).collect()
-}
-
-/// An order of cells, any part of which is spread evenly: the fractional part of a plane's multiples that no lattice repeats (Roberts 2018).
-fn even(c: IVec3) -> u64 {
-    const BY: [u64; 3] = [0xd1b5_4a32_d192_ed03, 0xabc9_8388_fb8f_ac03, 0x8cb9_2ba7_2f3d_8dd7];
-    c.to_array()
-        .into_iter()
-        .zip(BY)
-        .fold(0, |sum, (k, by)| sum.wrapping_add((i64::from(k) as u64).wrapping_mul(by)))
 }
 
 /// How far inside a shape water may stand [m]. The lattice of a round body's layers is never the water's: as
