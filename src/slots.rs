@@ -28,7 +28,6 @@ mod pockets;
 mod pushes;
 
 pub use enclosed::Pressed;
-pub(crate) use held::bending;
 pub use held::{Held, HeldForces};
 pub(crate) use pushes::face_before;
 pub use pushes::{Opposite, Push};
@@ -41,6 +40,7 @@ use crate::kernels::coupling::row;
 use crate::params::Params;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
+use crate::shape::bending;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};

@@ -7,8 +7,7 @@ use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
-use crate::shape::PointCells;
-use crate::slots::bending;
+use crate::shape::{PointCells, bending};
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 

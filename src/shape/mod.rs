@@ -4,6 +4,7 @@
 //! for its depth below a point and for what of its surface presses into others ([`Surface`]).
 
 mod areas;
+mod bends;
 pub(crate) mod blocks;
 mod cells;
 mod convex;
@@ -22,6 +23,7 @@ mod surface;
 mod thickness;
 mod thin;
 
+pub(crate) use bends::bending;
 pub(crate) use cells::PointCells;
 pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;

@@ -1,0 +1,45 @@
+//! Where the surface of a solid bends.
+
+use super::PointCells;
+use glam::DVec3;
+
+/// Rows of a layer this near each other, over l0, are neighbours in it.
+const ADJACENT: f64 = 1.2;
+/// Angles between the directions of rows beside each other at which a surface bends [rad]: below them it is flat, beyond them it has an edge.
+const BENDING: (f64, f64) = (1e-3, 0.6);
+
+/// Of rows at `offset` with outward `area`, which lie where the surface bends on from one to the next, so that it touches others along a line or
+/// in a point.
+pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], spacing: f64) -> Vec<bool> {
+    let mut cells = PointCells::new(ADJACENT * spacing);
+    offset.iter().for_each(|&x| cells.add(x));
+    let way: Vec<DVec3> = area.iter().map(|a| a.normalize_or_zero()).collect();
+    let bends = |(k, &x): (usize, &DVec3)| {
+        let angle = |n: usize| way[k].cross(way[n]).length().atan2(way[k].dot(way[n]));
+        let is_bent = |n: usize| (BENDING.0..BENDING.1).contains(&angle(n));
+        way[k] != DVec3::ZERO && cells.numbers(x).into_iter().any(|n| n != k && is_bent(n))
+    };
+    offset.iter().enumerate().map(bends).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::Shape;
+
+    #[test]
+    fn round_surfaces_bend_and_faces_do_not() {
+        let l0 = 0.01;
+        let of = |shape: Shape| {
+            let layer = shape.particles(l0, 3, 1);
+            let bends = bending(&layer.wall, &layer.area, l0);
+            (bends.iter().filter(|b| **b).count(), bends.len())
+        };
+        let (bent, _) = of(Shape::cuboid(DVec3::new(0.1, 0.13, 0.08)));
+        assert_eq!(bent, 0);
+        for radius in [0.025, 0.05, 0.2] {
+            let (bent, all) = of(Shape::sphere(radius));
+            assert_eq!(bent, all, "{radius}");
+        }
+    }
+}
