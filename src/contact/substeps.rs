@@ -43,6 +43,8 @@ pub(crate) struct Limits {
     pub lambda: Vec<Lambda>,
     /// Mass of the lightest free body [kg].
     pub lightest: f64,
+    /// Of gravity, its size [m/s2].
+    pub gravity: f64,
     /// Fastest speed that the case's heights and starting velocities allow [m/s].
     pub fastest: f64,
     /// Speed [m/s] of a body that falls from where it starts to the lowest wall.
@@ -111,6 +113,7 @@ impl Limits {
             forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),
             lambda: vec![Lambda::default(); bodies.len()],
             lightest,
+            gravity: scene.gravity.length(),
             fastest: fastest_speed(scene),
             falling: falling_speed(scene),
             longest_step: 0.0,
