@@ -47,7 +47,7 @@ pub struct Contact {
     /// Damping over the critical one of the lightest body, C / (2 sqrt(K m)) [-], Eq. (15).
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub damping_ratio: Option<f64>,
-    /// Normal restitution e of a free impact of two solids [-] (law "smooth"): 1 elastic, 0 plastic; what presses a much lighter body
+    /// Normal restitution e of a free impact of two solids [-] (law "smooth"): 1 elastic, 0 plastic (as 0.01); what presses a much lighter body
     /// against a third solid comes back with more. 0.5 if none of the three is given with law "smooth"; law "paper" is then undamped.
     #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub restitution: Option<f64>,

@@ -5,6 +5,8 @@ use crate::error::CaseError;
 
 /// Mass of the heaviest body over that of the lightest from which a restitution between them is spoken of.
 const HEAVIER: f64 = 10.0;
+/// Depth over the spacing to which a weight alone may press, beyond which it is spoken of.
+pub(super) const SIZABLE: f64 = 0.25;
 
 /// What contact will do at a time step, for `seixo plan`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,6 +78,15 @@ impl Solids {
                 "contact: {substeps} sub-steps carry {:.1e} N/m on the lightest body, so its contact is softened \
                  to that; a smaller run.time_step raises it",
                 worst.softest
+            ));
+        }
+        let weight = heaviest * self.limits.gravity;
+        let resting = weight / worst.softest / self.spacing;
+        if law.softens() && resting > SIZABLE {
+            words.push(format!(
+                "contact: the weight of the heaviest body alone presses {resting:.2} spacings deep, and may squeeze a small one out; \
+                 a spring of {:.1e} N/m makes it a tenth of one, where the sub-steps carry it",
+                weight / (0.1 * self.spacing)
             ));
         }
         let sinks = self.limits.falling * (heaviest / worst.softest).sqrt() / self.spacing;

@@ -72,6 +72,7 @@ impl Solids {
             forced: _,
             lambda: _,
             lightest: _,
+            gravity: _,
             fastest: _,
             falling: _,
             longest_step,

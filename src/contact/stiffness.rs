@@ -10,6 +10,9 @@ use crate::error::{Error, Result};
 
 /// Restitution of the smooth law if the case says nothing of damping: undamped bodies never come to rest.
 const DEFAULT_RESTITUTION: f64 = 0.5;
+/// Least restitution, whose rebound is 1e-4 of the height. The damping ratio of less grows without bound, to 16 at 1e-3,
+/// and with it the sub-steps that the dashpot asks for.
+const LEAST_RESTITUTION: f64 = 0.01;
 
 /// Largest eigenvalues of a body's contact, unit spring and unit dashpot [1/kg].
 #[derive(Clone, Copy, Debug, Default)]
@@ -83,9 +86,9 @@ pub fn restitution(damping_ratio: f64) -> f64 {
     }
 }
 
-/// Damping ratio [-] that gives the restitution `e`; e below 1e-3 counts as 1e-3.
+/// Damping ratio [-] that gives the restitution `e`; e below 0.01 counts as 0.01.
 pub fn damping_ratio(e: f64) -> f64 {
-    let e = e.clamp(1e-3, 1.0);
+    let e = e.clamp(LEAST_RESTITUTION, 1.0);
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);

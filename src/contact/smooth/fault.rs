@@ -6,6 +6,7 @@ use super::pair::{Other, Pair};
 use super::walls::WallBox;
 use super::{STOP_DEPTH, Smooth};
 use crate::body::Body;
+use crate::contact::advice::SIZABLE;
 use crate::contact::candidates::reduced_mass;
 use crate::contact::law::{Fault, Now};
 use crate::contact::substeps::{Cut, Limits, MOST_SUBSTEPS};
@@ -23,6 +24,8 @@ const WAY: f64 = 0.5;
 const UNSEEN: f64 = 0.5;
 /// Depth over half of a solid's thickness that says nothing of two whose middles are in each other.
 const UNTOLD: f64 = 1e-3;
+/// Depth over the spacing, or over half of the thinner solid, for which a spring is named that carries a weight.
+const CARRIED: f64 = 0.1;
 /// Ways of a sub-step that are looked ahead for the stop: forces may add to the speed.
 const AHEAD: f64 = 1.5;
 
@@ -160,10 +163,50 @@ impl Smooth {
             let depth = depth(&own, &other).or_else(|| depth(&other, &own))?;
             let what = format!(
                 "is in it with its middle, {depth:.3e} m deep, where no point of their surfaces tells: contact would leave \
-                 them so; use a smaller run.spacing, for more points, or a smaller run.time_step"
+                 them so; use {}",
+                self.weight_needs(pair, now).unwrap_or_else(|| {
+                    "a smaller run.spacing, for more points, or a smaller run.time_step".into()
+                })
             );
             Some(Fault { a: pair.a, b: self.against(pair.b), what })
         })
+    }
+
+    /// Masses [kg] of what touches either of the pair's solids, and a third.
+    fn leaning<'a>(&'a self, pair: &'a Pair, now: &'a Now) -> impl Iterator<Item = f64> + 'a {
+        let mine = |k: usize| k == pair.a || pair.b.solid() == Some(k);
+        let touching = self.evaluated().iter().filter(|p| p.contact_count() > 0);
+        let leaning = touching.filter_map(move |p| match p.b {
+            Other::Solid(b) if mine(p.a) != mine(b) => Some(if mine(b) { p.a } else { b }),
+            _ => None,
+        });
+        leaning.map(|k| now.bodies[k].mass).filter(|m| m.is_finite())
+    }
+
+    /// What carries the heaviest of the pair's solids and of those that touch them, if its weight alone presses it in by a
+    /// sizable part of the spacing or of the thinner solid.
+    fn weight_needs(&self, pair: &Pair, now: &Now) -> Option<String> {
+        let own = [Some(pair.a), pair.b.solid()].into_iter().flatten().map(|k| now.bodies[k].mass);
+        let heaviest = own.filter(|m| m.is_finite()).chain(self.leaning(pair, now)).fold(0.0, f64::max);
+        let weight = heaviest * now.limits.gravity;
+        let [middle_a, middle_b] = self.middles.of(pair);
+        let reach = self.spacing.min(middle_a).min(middle_b);
+        let carried = |limits: &Limits| self.constants_of(pair, limits, now.bodies).spring;
+        let sinks = weight / carried(now.limits);
+        if sinks <= SIZABLE * reach {
+            return None;
+        }
+        let spring = weight / (CARRIED * reach);
+        let softened = carried(&Limits { spring, ..now.limits.clone() });
+        let step = now.limits.longest_step * (softened / spring).sqrt();
+        let step = if softened < 0.99 * spring {
+            format!(" with run.time_step = {step:.1e} or less")
+        } else {
+            String::new()
+        };
+        Some(format!(
+            "contact.spring = {spring:.1e} or more{step}: a weight of {weight:.1e} N presses {sinks:.1e} m deep"
+        ))
     }
 
     /// What stops the pair's solids a little before the middle of the thinner one.
@@ -171,12 +214,7 @@ impl Smooth {
         let [middle_a, middle_b] = self.middles.of(pair);
         let wanted = 0.5 * middle_a.min(middle_b);
         // what leans on either of both presses as well
-        let mine = |k: usize| k == pair.a || pair.b.solid() == Some(k);
-        let leaning = self.evaluated().iter().filter(|p| p.contact_count() > 0).flat_map(|p| match p.b {
-            Other::Solid(b) if mine(p.a) != mine(b) => Some(if mine(b) { p.a } else { b }),
-            _ => None,
-        });
-        let leaning: f64 = leaning.map(|k| now.bodies[k].mass).filter(|m| m.is_finite()).sum();
+        let leaning: f64 = self.leaning(pair, now).sum();
         let mass = reduced_mass(now.bodies, pair.a, pair.b.solid()) + leaning;
         let energy = pair.energy + 0.5 * mass * pair.approach().powi(2);
         // the energy goes as the square of the depth, or faster

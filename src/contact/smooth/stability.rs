@@ -6,7 +6,7 @@ use crate::body::Body;
 use crate::contact::between::Between;
 use crate::contact::candidates::reduced_mass;
 use crate::contact::stiffness::{Damping, Lambda};
-use crate::contact::substeps::{DAMPING_STEP, Limits, MOST_SUBSTEPS, STOP_OMEGA_STEP, Worst};
+use crate::contact::substeps::{DAMPING_STEP, Limits, MOST_SUBSTEPS, STOP_OMEGA_STEP, TAKEN_STEP, Worst};
 use crate::shape::Surface;
 use glam::DVec3;
 
@@ -89,14 +89,25 @@ pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> 
             let between = Between { damping, ..limits.between.usual };
             let c = limits.constants(bodies, a, b, between, law.surfaces[a].smallest_weight, reach);
             let stopping = c.damping * (c.stop / c.spring).sqrt();
+            let most_damping = most_damping(damping, reduced_mass(bodies, a, b), damped);
             let for_spring = dt * (c.spring * spring).sqrt() / limits.omega_step();
             let for_stop = dt * (c.stop * spring).sqrt() / limits.omega_step().max(STOP_OMEGA_STEP);
-            worst.wanted = worst.wanted.max(for_spring).max(dt * c.damping * damped / DAMPING_STEP);
-            worst.hardest = worst.hardest.max(for_stop).max(dt * stopping * damped / DAMPING_STEP);
+            worst.wanted = worst.wanted.max(for_spring).max(dt * c.damping / most_damping);
+            worst.hardest = worst.hardest.max(for_stop).max(dt * stopping / most_damping);
             worst.softest = worst.softest.min(c.spring);
         }
     }
     worst
+}
+
+/// Largest C dt [kg] of a sub-step on a pair of the reduced mass `mass` [kg] and the eigenvalue `damped` [1/kg]. That of a
+/// restitution takes 1 - exp(-C dt / m) of the speed (`Constants::discretise`).
+fn most_damping(damping: Damping, mass: f64, damped: f64) -> f64 {
+    let most = DAMPING_STEP / damped;
+    match damping {
+        Damping::Ratio(_) => most.max(-mass * (-TAKEN_STEP).ln_1p()),
+        Damping::Coefficient(_) => most,
+    }
 }
 
 impl Limits {
@@ -116,7 +127,7 @@ impl Limits {
         let both = |of: fn(&Lambda) -> f64| of(&self.lambda[a]) + b.map_or(0.0, |b| of(&self.lambda[b]));
         let shortest = self.longest_step / f64::from(self.forced.unwrap_or(MOST_SUBSTEPS));
         let carried = |omega_step: f64| (omega_step / shortest).powi(2) / both(|l| l.spring);
-        let carried_damping = DAMPING_STEP / shortest / both(|l| l.damping);
+        let carried_damping = most_damping(between.damping, mass, both(|l| l.damping)) / shortest;
         // a dashpot that does not fit would be a weaker one, and the restitution another
         let fits = match between.damping {
             Damping::Ratio(ratio) => (0.5 * carried_damping / ratio).powi(2) / mass,
