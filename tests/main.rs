@@ -18,6 +18,7 @@ mod contact_hard;
 mod contact_impacts;
 mod contact_pairs;
 mod contact_small;
+mod contact_turning;
 mod copies;
 mod device;
 mod errors;
