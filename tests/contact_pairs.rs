@@ -170,7 +170,7 @@ fn the_order_of_the_tables_changes_no_contact() {
         [(ball, ball), (ball, roll), (ball, brick), (brick, roll), (roll, roll), (brick, brick)]
     {
         let upper = format!(
-            "name = \"upper\"\n{upper}center = [0.01, -0.01, 0.2]\ndensity = 900\nvelocity = [0, 0, -1]\nangular_velocity = [4, 0, 0]\n"
+            "name = \"upper\"\n{upper}center = [0.01, -0.01, 0.2]\ndensity = 900\nvelocity = [0, 0, -2]\nangular_velocity = [4, 0, 0]\n"
         );
         let lower = format!(
             "name = \"lower\"\n{lower}center = [0, 0, 0.08]\ndensity = 700\nangular_velocity = [1, 3, 2]\n"
