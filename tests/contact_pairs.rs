@@ -148,3 +148,41 @@ fn pairs_that_mean_nothing_are_refused_with_what_there_is() {
         assert!(wrong.contains(said), "{said} in {wrong}");
     }
 }
+
+/// Two solids that fall onto a floor, one on the other, with the tables of `solids` in that order.
+fn one_on_the_other(solids: [&str; 2]) -> Dry {
+    Dry::new(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -{G}]\n\
+         [[obstacle]]\nname = \"floor\"\nmin = [-0.3, -0.3, -0.1]\nmax = [0.3, 0.3, 0]\n\
+         [[body]]\n{}[[body]]\n{}\
+         [contact]\nspring = 2e4\nfriction = 0.3\nrestitution = 0.4\n\
+         [[contact.pair]]\nbetween = [\"upper\", \"lower\"]\nrestitution = 0.8\n",
+        solids[0], solids[1]
+    ))
+}
+
+#[test]
+fn the_order_of_the_tables_changes_no_contact() {
+    let ball = "shape = \"sphere\"\nradius = 0.04\n";
+    let roll = "shape = \"cylinder\"\nradius = 0.04\nheight = 0.12\naxis = [0, 1, 0.2]\n";
+    let brick = "size = [0.12, 0.1, 0.08]\norientation = { axis = [1, 0.3, 0.2], angle_deg = 8 }\n";
+    for (upper, lower) in
+        [(ball, ball), (ball, roll), (ball, brick), (brick, roll), (roll, roll), (brick, brick)]
+    {
+        let upper = format!(
+            "name = \"upper\"\n{upper}center = [0.01, -0.01, 0.2]\ndensity = 900\nvelocity = [0, 0, -2]\nangular_velocity = [4, 0, 0]\n"
+        );
+        let lower = format!(
+            "name = \"lower\"\n{lower}center = [0, 0, 0.08]\ndensity = 700\nangular_velocity = [1, 3, 2]\n"
+        );
+        let mut there = one_on_the_other([&upper, &lower]);
+        let mut back = one_on_the_other([&lower, &upper]);
+        let (there, back) = (there.run(0.15), back.run(0.15));
+        for (p, q) in [(there[0], back[1]), (there[1], back[0])] {
+            let turned = (p.angular_velocity - q.angular_velocity).length();
+            let apart = (p.velocity - q.velocity).length();
+            println!("{:.4} {:.4}: {apart:.1e} m/s, {turned:.1e} rad/s", p.velocity, q.velocity);
+            assert!(apart < 1e-10 && turned < 1e-8, "{p:?} {q:?}\n{upper}{lower}");
+        }
+    }
+}

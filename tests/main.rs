@@ -18,6 +18,7 @@ mod contact_hard;
 mod contact_impacts;
 mod contact_pairs;
 mod contact_small;
+mod contact_turning;
 mod contact_weight;
 mod copies;
 mod device;

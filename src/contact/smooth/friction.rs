@@ -59,6 +59,8 @@ struct Slip {
     arm_a: DVec3,
     arm_b: DVec3,
     tangent: [DVec3; 2],
+    /// What of the slip the sub-step's turns add, see [`turned`] [m/s].
+    turned: DVec3,
     /// Normal times the arm [m].
     spin: DVec3,
     /// Root of the second moments over the arm, in the tangents; `None` for a point.
@@ -109,7 +111,7 @@ impl Friction {
             }
             let all: f64 = pair.patches.iter().map(|p| p.force).sum();
             for patch in &pair.patches {
-                let mut slip = Slip::new(pair, patch, bodies, mu * patch.force * h);
+                let mut slip = Slip::new(pair, patch, bodies, mu * patch.force * h, h);
                 if eta > 0.0 && all > 0.0 {
                     pair.bodies().for_each(|k| self.pressed[k][1] += patch.force);
                     slip.drag(bodies, eta * h * patch.force / all, patch.force, &self.pressed);
@@ -144,8 +146,21 @@ impl Friction {
     }
 }
 
+/// What the slip of `a` against `b` in the middle of a sub-step of `h` [s] has beyond that at its start, as the arms change [m/s].
+///
+/// A solid's centre goes straight on for the sub-step, while the places of one that turns go along chords: what sticks to it
+/// would be left outside by r w^2 h / 2. The place of the touch goes with the free solid's centre, which is right of what rolls
+/// as well as of what turns along; between two free ones with the mean of both.
+fn turned(bodies: &[Body], a: usize, b: Option<usize>, h: f64) -> Option<DVec3> {
+    let (first, second) = (&bodies[a], &bodies[b?]);
+    let way = 0.5 * h * (first.pose.velocity - second.pose.velocity);
+    let share = if second.is_free() { 0.5 } else { 1.0 };
+    let (turn_a, turn_b) = (first.pose.angular_velocity, second.pose.angular_velocity);
+    Some(((share - 1.0) * turn_a - share * turn_b).cross(way))
+}
+
 impl Slip {
-    fn new(pair: &Pair, patch: &Patch, bodies: &[Body], cap: f64) -> Self {
+    fn new(pair: &Pair, patch: &Patch, bodies: &[Body], cap: f64, h: f64) -> Self {
         let (a, b) = (pair.a, pair.b.solid());
         let first = patch.normal.any_orthonormal_vector();
         let tangent = [first, patch.normal.cross(first)];
@@ -190,6 +205,8 @@ impl Slip {
             arm_a,
             arm_b,
             tangent,
+            turned: turned(bodies, a, b, h)
+                .map_or(DVec3::ZERO, |v| DVec3::new(v.dot(tangent[0]), v.dot(tangent[1]), 0.0)),
             spin,
             spread,
             cap,
@@ -214,9 +231,9 @@ impl Slip {
         parts(self.a, self.arm_a) - b
     }
 
-    /// The slip as it is [m/s].
+    /// The slip as it is, in the mean over the sub-step [m/s].
     fn velocity(&self, bodies: &[Body]) -> DVec3 {
-        self.slip(|k| (bodies[k].pose.velocity, bodies[k].pose.angular_velocity))
+        self.slip(|k| (bodies[k].pose.velocity, bodies[k].pose.angular_velocity)) + self.turned
     }
 
     /// One visit: the patch's impulse for the velocities as they are. Whether it changed.

@@ -86,6 +86,8 @@ pub(crate) struct Smooth {
     pub walls: Vec<WallBox>,
     /// Which solids press nothing as such: they are among `walls`, or are layers in openings, of which the tank's wall is as high.
     still: Vec<bool>,
+    /// Places of the solids in the order of their heights at the start: what the pairs follow, and not the order of the case's tables.
+    rank: Vec<usize>,
     /// Smallest weight of a point of a free body [-].
     lightest_point: f64,
     pub pairs: Vec<Pair>,
@@ -130,6 +132,20 @@ fn shared(scene: &Scene) -> Vec<Arc<Surface>> {
     surfaces
 }
 
+/// Places of the solids in the order of their heights at the start. Sweeps over friction end before all digits are settled, so that their
+/// order shows.
+fn rank(scene: &Scene) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..scene.solids.len()).collect();
+    let place = |k: usize| scene.solids[k].position;
+    order.sort_by(|&i, &j| {
+        let (p, q) = (place(i), place(j));
+        p.z.total_cmp(&q.z).then(p.y.total_cmp(&q.y)).then(p.x.total_cmp(&q.x))
+    });
+    let mut rank = vec![0; order.len()];
+    order.into_iter().enumerate().for_each(|(place, k)| rank[k] = place);
+    rank
+}
+
 impl Smooth {
     pub fn new(scene: &Scene, bodies: &[Body], limits: &mut Limits) -> Self {
         let surfaces = shared(scene);
@@ -146,6 +162,7 @@ impl Smooth {
             surfaces,
             walls,
             still,
+            rank: rank(scene),
             lightest_point,
             middles,
             harmless,
@@ -191,9 +208,27 @@ impl Smooth {
         }
         for &Close { a, b, image } in candidates.close.iter().filter(|close| !self.still[close.b]) {
             let skin = candidates.skin(a) + candidates.skin(b);
+            let swap = bodies[b].is_free() && self.rank[b] < self.rank[a];
+            let (a, b, image) = if swap { (b, a, -image) } else { (a, b, image) };
             pairs.push((Pair::new(a, Other::Solid(b), image), skin));
         }
+        let place = |(pair, _): &(Pair, f64)| match pair.b {
+            Other::Wall(w) => (false, self.rank[pair.a], w),
+            Other::Solid(b) => (true, self.rank[pair.a], self.rank[b]),
+        };
+        pairs.sort_by_key(place);
         pairs
+    }
+
+    /// Smallest weight that a touch of `a` and `b` may have [-]: that of a corner of either, as far as forces move it; a ball
+    /// touches as a whole.
+    fn lightest_touch(&self, a: usize, b: Option<usize>, bodies: &[Body]) -> f64 {
+        let either = || std::iter::once(a).chain(b);
+        if either().any(|k| self.surfaces[k].ball.is_some()) {
+            return 1.0;
+        }
+        let free = either().filter(|&k| bodies[k].is_free());
+        free.map(|k| self.surfaces[k].smallest_weight).fold(1.0, f64::min)
     }
 
     /// Hands the depths of the pairs before on to `pairs`: what had none was apart.
@@ -253,7 +288,7 @@ impl Smooth {
     /// Constants of `pair` for the longest sub-steps of `limits`.
     fn constants_of(&self, pair: &Pair, limits: &Limits, bodies: &[Body]) -> Constants {
         let [a, b] = self.middles.of(pair);
-        let weight = self.surfaces[pair.a].smallest_weight;
+        let weight = self.lightest_touch(pair.a, pair.b.solid(), bodies);
         let between = limits.between.of(pair.a, self.against(pair.b));
         limits.constants(bodies, pair.a, pair.b.solid(), between, weight, self.spacing.min(a).min(b))
     }

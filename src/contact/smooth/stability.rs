@@ -84,10 +84,11 @@ pub(super) fn worst(law: &Smooth, limits: &Limits, bodies: &[Body], dt: f64) -> 
     for (a, b) in limits.extremes(bodies) {
         let (spring, damped) = limits.lambda_of(a, b);
         let reach = law.spacing.min(law.middles.between(a, b));
+        let weight = law.lightest_touch(a, b, bodies);
         for damping in limits.between.dampings() {
             limits.ask(&mut worst, bodies, (a, b), damping, dt, 0.0);
             let between = Between { damping, ..limits.between.usual };
-            let c = limits.constants(bodies, a, b, between, law.surfaces[a].smallest_weight, reach);
+            let c = limits.constants(bodies, a, b, between, weight, reach);
             let stopping = c.damping * (c.stop / c.spring).sqrt();
             let most_damping = most_damping(damping, reduced_mass(bodies, a, b), damped);
             let for_spring = dt * (c.spring * spring).sqrt() / limits.omega_step();

@@ -66,7 +66,11 @@ impl Pair {
         };
         let share = if theirs.is_some() { 0.5 } else { 1.0 };
         match (surfaces[self.a].ball, theirs.and_then(|s| s.ball)) {
-            (Some(radius), _) => round::ball(&own, radius, &other, &mut |p| add(1.0, p)),
+            // halfway between both surfaces, so that neither has the longer arm
+            (Some(radius), Some(_)) => round::ball(&own, radius, &other, &mut |p| {
+                add(1.0, round::Pressed { at: p.at + 0.5 * p.depth * p.normal, ..p });
+            }),
+            (Some(radius), None) => round::ball(&own, radius, &other, &mut |p| add(1.0, p)),
             (None, Some(radius)) => round::ball(&other, radius, &own, &mut |p| add(-1.0, p)),
             (None, None) => {
                 round::press(&own, &surfaces[self.a], &other, share, &mut |p| add(1.0, p));
