@@ -40,22 +40,26 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         var on_surface = p + surface_head(pose, wall);
 //#if MIXED
         let under_water = excess[k] < DRY;
-        on_surface -= excess[k];
+        on_surface -= vec3f(excess[k]);
 //#else
         let under_water = state[params.fluid + k] == INNER;
-        on_surface = max(on_surface, 0.0);
+        on_surface = max(on_surface, vec3f(0.0));
 //#endif
+        var pressed = vec3f(0.0);
         if under_water {
-            let area = rotate(pose.orientation, wall.area.xyz);
-            force = -on_surface * area - params.dynamic_viscosity * cross(pose.angular_velocity.xyz, area);
+            var part = 1.0;
 //#if COUPLED
-            force *= 1.0 - coupling[4u * k].w;
+            part -= coupling[4u * k].w;
 //#endif
+            pressed = -part * rotate(pose.orientation, on_surface * wall.area.xyz);
+            let area = rotate(pose.orientation, wall.area.xyz);
+            force = -part * params.dynamic_viscosity * cross(pose.angular_velocity.xyz, area);
         }
 //#if REACTION
         force += reaction[k].xyz;
 //#endif
-        torque = cross(rotate(pose.orientation, wall.arm.xyz), force);
+        torque = cross(rotate(pose.orientation, wall.arm.xyz), force) + cross(pressed_arm(pose, wall), pressed);
+        force += pressed;
 //#if COUPLED
         if under_water {
             force += p * coupling[4u * k].xyz + coupling[4u * k + 2u].xyz;

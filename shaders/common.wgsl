@@ -109,7 +109,7 @@ struct Pose {
 // the particle to the surface.
 struct WallParticle {
     area: vec4f, // and its lightness in collisions
-    arm: vec4f,
+    arm: vec4f, // and 1 of a box, whose particles at edges have a part of each face there
     to_surface: vec4f, // and cut_share of src/kernels/wall_excess.rs
 }
 
@@ -490,8 +490,17 @@ fn coupled_row(k: u32) -> u32 {
     return 4u * params.moving_wall + 2u * k;
 }
 
-// Pressure of still water on the true surface of a moving solid over that of a wall-layer particle, half a spacing inside.
-// See head in src/kernels/body_force.rs.
-fn surface_head(pose: Pose, wall: WallParticle) -> f32 {
-    return params.density * dot(params.gravity, rotate(pose.orientation, wall.to_surface.xyz)) + params.surface_head;
+// Pressures of still water on the true surface of a moving solid over that of a wall-layer particle, half a spacing inside: on its face along
+// each axis of the solid's frame of a box, else thrice the same. See head and on_faces in src/kernels/body_force.rs.
+fn surface_head(pose: Pose, wall: WallParticle) -> vec3f {
+    if wall.arm.w == 0.0 {
+        return vec3f(params.density * dot(params.gravity, rotate(pose.orientation, wall.to_surface.xyz)) + params.surface_head);
+    }
+    let back = vec4f(-pose.orientation.xyz, pose.orientation.w);
+    return params.density * rotate(back, params.gravity) * wall.to_surface.xyz + params.surface_head;
+}
+
+// From the centre of mass to where pressures act: those on the faces of a box act along the ways to them.
+fn pressed_arm(pose: Pose, wall: WallParticle) -> vec3f {
+    return rotate(pose.orientation, wall.arm.xyz - wall.arm.w * wall.to_surface.xyz);
 }

@@ -95,10 +95,14 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         var force = vec3f(0.0);
         if excess[k] < DRY {
             let slot = coupling[4u * k];
+            let face_arm = per_spacing * pressed_arm(pose, wall);
             row.force = (slot.w - 1.0) * rotate(pose.orientation, wall.area.xyz);
-            row.torque = cross(arm, row.force);
-            force = (surface_head(pose, wall) - excess[k]) * row.force
-                + params.dynamic_viscosity * cross(pose.angular_velocity.xyz, row.force);
+            row.torque = cross(face_arm, row.force);
+            let at_zero = surface_head(pose, wall) - vec3f(excess[k]);
+            let pressed = (slot.w - 1.0) * rotate(pose.orientation, at_zero * wall.area.xyz);
+            known.force += pressed;
+            known.torque += cross(face_arm, pressed);
+            force = params.dynamic_viscosity * cross(pose.angular_velocity.xyz, row.force);
             let of_torque = coupling[4u * k + 1u];
             let head = coupling[4u * k + 2u];
             row.force += slot.xyz;

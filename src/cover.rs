@@ -5,12 +5,9 @@ pub mod driven;
 use crate::body::Pose;
 use crate::contact::broad::PointGrid;
 use crate::periodic::Periodic;
-use crate::scene::{Scene, Shape, Solid, WallShape};
+use crate::scene::{COVERED, Scene, Shape, Solid, WallShape};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Distances before a face, over l0, at which a point that lies in a solid tells that no water stands between: nearly at the face, where a solid ends
-/// in a wedge, and half a particle away, where it stands a little off the lattice.
-const AT: [f64; 2] = [0.1, 0.5];
 /// Distance before a face, over l0, at which a point in a solid tells that the face is within it: a surface that bends lies as much behind the plane of a
 /// row's face at its ends.
 const WITHIN: f64 = -0.15;
@@ -100,7 +97,7 @@ pub(crate) fn moving(scene: &Scene, poses: &[Pose]) -> Vec<Standing> {
     solids.map(|(k, (s, pose))| Standing::new(k, s, pose.position, pose.orientation)).collect()
 }
 
-/// Faces of wall particles, each a square with an edge of a spacing.
+/// Faces of wall particles, each a square.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tiles {
     pub spacing: f64,
@@ -144,6 +141,12 @@ impl Tiles {
         out
     }
 
+    /// Edge of a face of `area` [m2]. One that others cut is a stretch as long as a spacing, with its middle no farther from where it ends.
+    pub fn edge(&self, area: f64) -> f64 {
+        let across = area / self.spacing;
+        if self.plane { across } else { across.min(area.sqrt()) }
+    }
+
     /// The middles of the parts of a face about `center` that looks along `normal`: two halves in the plane, quarters in space.
     pub fn quarters(&self, center: DVec3, normal: DVec3) -> Vec<DVec3> {
         let (along, across) = self.tangents(normal.normalize_or_zero());
@@ -156,19 +159,22 @@ impl Tiles {
         if self.plane { (normal.cross(DVec3::Y), DVec3::ZERO) } else { normal.any_orthonormal_pair() }
     }
 
-    /// Part of the face around `center` that looks along `normal` before which water may stand [-].
-    pub fn bare(&self, center: DVec3, normal: DVec3, solids: &[&Standing]) -> f64 {
-        1.0 - self.mean(center, normal, solids, |x, near| {
+    /// Part of the face around `center` with an `edge` [m] that looks along `normal` before which water may stand [-].
+    pub fn bare(&self, (center, edge): (DVec3, f64), normal: DVec3, solids: &[&Standing]) -> f64 {
+        1.0 - self.mean((center, edge), normal, solids, |x, near| {
             let at = |d: f64, s: &Standing| self.holds(x + d * self.spacing * normal, s);
             // Of two that meet at the point each has a half.
-            near.iter().map(|s| AT.map(|d| at(d, s)).into_iter().fold(0.0, f64::max)).sum::<f64>().min(1.0)
+            near.iter()
+                .map(|s| COVERED.map(|d| at(d, s)).into_iter().fold(0.0, f64::max))
+                .sum::<f64>()
+                .min(1.0)
         })
     }
 
     /// Part of the same face that does not lie within `solids` [-].
-    fn outside(&self, center: DVec3, normal: DVec3, solids: &[&Standing]) -> f64 {
+    fn outside(&self, (center, edge): (DVec3, f64), normal: DVec3, solids: &[&Standing]) -> f64 {
         let at = |x: DVec3| x + WITHIN * self.spacing * normal;
-        1.0 - self.mean(center, normal, solids, |x, near| {
+        1.0 - self.mean((center, edge), normal, solids, |x, near| {
             near.iter().map(|s| self.holds(at(x), s)).sum::<f64>().min(1.0)
         })
     }
@@ -180,13 +186,12 @@ impl Tiles {
     /// Mean of `of` over points of the face around `center` that looks along `normal`, each with the `solids` near; 0 where there are none.
     fn mean(
         &self,
-        center: DVec3,
+        (center, edge): (DVec3, f64),
         normal: DVec3,
         solids: &[&Standing],
         of: impl Fn(DVec3, &[&Standing]) -> f64,
     ) -> f64 {
-        let l0 = self.spacing;
-        let reach = 2.0 * l0;
+        let reach = 2.0 * self.spacing;
         let near = |s: &&Standing| s.outside(center, reach, &self.periodic) < reach;
         let near: Vec<&Standing> = solids.iter().copied().filter(near).collect();
         if near.is_empty() {
@@ -194,7 +199,7 @@ impl Tiles {
         }
         let (along, across) = self.tangents(normal);
         let n = POINTS[usize::from(!self.plane)];
-        let place = |k: u32| l0 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
+        let place = |k: u32| edge * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
         let mut sum = 0.0;
         let rows = if self.plane { 1 } else { n };
         for j in 0..rows {

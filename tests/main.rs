@@ -24,6 +24,7 @@ mod copies;
 mod device;
 mod errors;
 mod examples;
+mod faces;
 mod far;
 mod faults;
 mod filled;

@@ -1061,19 +1061,21 @@ fn body_force() {
             let (mut sum, mut size, mut torques) = (Wrench::default(), 0.0, 0.0);
             for k in 0..solid.wall_slots.len() {
                 let (&i, row) = rows.next().expect("a row of each");
-                let to_surface = pose.orientation * solid.wall_to_surface[k];
-                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let arm = pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k]);
                 let wet = fields.state[i] == State::Inner;
-                let pressed =
-                    body_force::surface_pressure(row.pressure, row.excess, to_surface, &pair.params);
+                let pressure =
+                    |way| body_force::surface_pressure(row.pressure, row.excess, way, &pair.params);
+                let pressed = body_force::on_faces(solid, k, pose, 1.0, pressure);
                 let area = pose.orientation * solid.wall_area[k];
                 let reaction = fields.reaction[i - pair.scene.groups.fluid];
                 let turning = body_force::turning(pose.angular_velocity, area, &pair.params);
-                let (pressed, turning) = if wet { (pressed, turning) } else { (0.0, DVec3::ZERO) };
-                let force = body_force::body_force(pressed, area, reaction + turning);
+                let (pressed, turning) =
+                    if wet { (pressed, turning) } else { (Wrench::default(), DVec3::ZERO) };
+                let force = reaction + turning;
+                sum += pressed;
                 sum += Wrench { force, torque: arm.cross(force) };
-                size += force.length();
-                torques += arm.length() * force.length();
+                size += (pressed.force + force).length();
+                torques += arm.length() * (pressed.force + force).length();
             }
             println!("forces of {size:.3} in all, off by {:.1e}", (g.force - sum.force).length());
             assert!(size > 0.1);

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug)]
 struct Face {
     row: usize,
+    to_surface: DVec3,
     center: DVec3,
     area: DVec3,
 }
@@ -36,6 +37,8 @@ pub struct Covered {
     pub solid: usize,
     /// Index of the row in the solid's wall layer.
     pub row: usize,
+    /// From the row's particle to the middle of the face, world axes [m].
+    pub to_surface: DVec3,
     /// Outward area, world axes [m2].
     pub area: DVec3,
     /// The part of it that lies within other solids [m2].
@@ -80,10 +83,12 @@ impl DrivenFaces {
                 let (center, area) =
                     (pose.position + pose.orientation * face.center, pose.orientation * face.area);
                 let (normal, others) = (area.normalize_or_zero(), others.collect::<Vec<_>>());
+                let center = (center, self.tiles.edge(area.length()));
                 let bare = self.tiles.bare(center, normal, &others);
                 (bare < 1.0).then(|| Covered {
                     solid: driven.solid,
                     row: face.row,
+                    to_surface: pose.orientation * face.to_surface,
                     area: (1.0 - bare) * area,
                     within: (1.0 - self.tiles.outside(center, normal, &others)) * area,
                 })
@@ -99,8 +104,9 @@ fn faces(solid: &Solid) -> Vec<Face> {
     let is_box = solid.shape.as_cuboid().is_some();
     let rows = solid.wall_offset.iter().zip(&solid.wall_area).zip(&solid.wall_to_surface).enumerate();
     rows.flat_map(|(row, ((&offset, &area), &to_surface))| {
-        let one = [Face { row, center: offset + to_surface, area }];
-        let of_axis = |e: DVec3| Face { row, center: offset + to_surface * e, area: area * e };
+        let face = |to_surface: DVec3, area| Face { row, to_surface, center: offset + to_surface, area };
+        let one = [face(to_surface, area)];
+        let of_axis = |e: DVec3| face(to_surface * e, area * e);
         let of_box = DVec3::AXES.map(of_axis);
         let own = if is_box { of_box.to_vec() } else { one.to_vec() };
         own.into_iter().filter(|face| face.area != DVec3::ZERO)

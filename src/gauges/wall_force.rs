@@ -87,7 +87,7 @@ impl FixedWall {
             let face = |(normal, still): (DVec3, Vec<usize>)| {
                 let center = x + 0.5 * l0 * normal;
                 let near: Vec<&Standing> = still.iter().map(|&k| &out.still[k]).collect();
-                let bare = tiles.bare(center, normal, &near);
+                let bare = tiles.bare((center, l0), normal, &near);
                 (bare > 0.0).then_some(Face { row: out.slots.len(), center, normal, still, bare })
             };
             let faces: Vec<Face> = normals.into_iter().zip(reached.by_ref()).filter_map(face).collect();
@@ -125,7 +125,7 @@ impl FixedWall {
             } else {
                 let near = reached.iter().map(|&k| &moving[k]);
                 let all: Vec<&Standing> = near.chain(face.still.iter().map(|&k| &self.still[k])).collect();
-                self.tiles.bare(face.center, face.normal, &all)
+                self.tiles.bare((face.center, l0), face.normal, &all)
             };
             areas[face.row] += bare * l0 * l0 * face.normal;
         }

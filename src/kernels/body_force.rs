@@ -2,7 +2,9 @@
 //! viscosity and collisions.
 //! GPU twin: shaders/body_force.wgsl
 
+use crate::body::{Pose, Wrench};
 use crate::params::Params;
+use crate::scene::Solid;
 use crate::scheme::Source;
 use glam::DVec3;
 
@@ -43,6 +45,26 @@ pub fn surface_pressure(pressure: f64, excess: f64, to_surface: DVec3, params: &
     }
 }
 
+/// Force on what of the faces of row `k` of `solid`, of which `part` counts, and torque about its place [N, N m]. `pressure` tells that on the surface [Pa] by the
+/// way there from the particle [m], world axes. A particle at an edge of a box has a part of each face there, with middles that lie
+/// in different depths; any other has one.
+pub fn on_faces(solid: &Solid, k: usize, pose: &Pose, part: f64, pressure: impl Fn(DVec3) -> f64) -> Wrench {
+    let turn = pose.orientation;
+    let mut sum = Wrench::default();
+    let mut add = |area: DVec3, way: DVec3| {
+        let way = turn * way;
+        let force = -part * pressure(way) * (turn * area);
+        sum += Wrench { force, torque: (turn * solid.wall_offset[k] + way).cross(force) };
+    };
+    let (area, to_surface) = (solid.wall_area[k], solid.wall_to_surface[k]);
+    if solid.shape.as_cuboid().is_some() {
+        DVec3::AXES.into_iter().for_each(|e| add(area * e, to_surface * e));
+    } else {
+        add(area, to_surface);
+    }
+    sum
+}
+
 /// Pressure on the true surface of water at rest over that of a particle, from which it lies `to_surface` [m]: rho g . to_surface [Pa].
 #[inline(always)]
 pub fn head(to_surface: DVec3, params: &Params) -> f64 {
@@ -60,10 +82,4 @@ pub fn missing_head(params: &Params) -> f64 {
 #[inline(always)]
 pub fn turning(angular_velocity: DVec3, area: DVec3, params: &Params) -> DVec3 {
     -params.density * params.viscosity * angular_velocity.cross(area)
-}
-
-/// Force of one wall-layer particle [N]: -P A + reaction, with `area` in world axes [m2].
-#[inline(always)]
-pub fn body_force(surface_pressure: f64, area: DVec3, reaction: DVec3) -> DVec3 {
-    reaction - surface_pressure * area
 }

@@ -41,6 +41,7 @@ pub use motion::Motion;
 pub use opening::{Course, Opening, Passes};
 pub(crate) use part::Still;
 pub(crate) use placement::{CONTACT_DISTANCE, point};
+pub(crate) use shaped::COVERED;
 
 use crate::periodic::Periodic;
 use crate::shape::{Surface, WallLayer};

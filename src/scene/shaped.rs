@@ -7,12 +7,17 @@ use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall};
 use crate::error::Problem;
-use crate::shape::{PointCells, bending};
+use crate::shape::{Particles, PointCells, bending};
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
 /// Steps of a file's coordinates over the spacing that are worth a word [-].
 const COARSE: f64 = 1e-3;
+/// Distances before a face, over l0, at which a point that lies in a solid tells that no water stands between: nearly at the face, where a solid ends
+/// in a wedge, and half a particle away, where it stands a little off the lattice.
+pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
+/// Nearer to a particle of a solid than this, over the spacing, other walls may face pieces of the surface that are its.
+const MEETING: f64 = 3.0;
 
 /// A wall without particles, where it stands; `moved` if it moves.
 fn wall(
@@ -129,8 +134,16 @@ impl Builder<'_> {
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
         let mut areas = self.cut(solid, &kept);
         let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
-        let flat = areas.iter_mut().zip(&solid.wall_offset).zip(&bends).filter(|(_, bends)| !**bends);
-        for ((area, offset), _) in flat {
+        let flat = |k: &usize| !bends[*k];
+        let freed = self.freed(solid, &kept);
+        if let Some(freed) = &freed {
+            for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..).filter(|(k, _)| flat(k)) {
+                areas[k] = freed.area[row];
+                solid.wall_to_surface[k] = freed.to_surface[row];
+            }
+        }
+        for k in (0..kept.len()).filter(|k| freed.is_none() && flat(k)) {
+            let (area, offset) = (&mut areas[k], &solid.wall_offset[k]);
             for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
                 let own = solid.orientation.inverse() * e;
                 let faces = area.dot(own);
@@ -159,6 +172,29 @@ impl Builder<'_> {
                 "{label}: {gone} particles left out inside other walls and beyond the tank's{beyond}"
             ));
         }
+    }
+
+    /// Those particles of a solid that are `kept`, with what of its surface faces no other wall: of one whose particles have no face each of their own, where others
+    /// come near it.
+    fn freed(&self, solid: &Solid, kept: &[bool]) -> Option<Particles> {
+        let l0 = self.lattice.spacing;
+        let at = |x: DVec3| solid.position + solid.orientation * x;
+        let mut met = PointCells::new(MEETING * l0);
+        for (&offset, kept) in solid.wall_offset.iter().zip(kept) {
+            let ways = DVec3::AXES.into_iter().flat_map(|e| [e, -e]);
+            let mut around = ways.flat_map(|e| [1.0, 2.0].map(|d| at(offset) + d * l0 * e));
+            if !kept || around.any(|x| self.buried(x, false)) {
+                met.add(at(offset));
+            }
+        }
+        let free = |x: DVec3, normal: DVec3| {
+            let (x, normal) = (at(x), solid.orientation * normal);
+            met.nearest(x, MEETING * l0).is_none()
+                || COVERED.iter().all(|d| !self.buried(x + *d * l0 * normal, false))
+        };
+        let wall: Vec<DVec3> =
+            solid.wall_offset.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect();
+        if met.is_empty() { None } else { solid.shape.freed(&wall, l0, &free) }
     }
 
     /// From where to where a solid reaches that goes beyond the tank's sides along an axis, for a note: that a prism stands from its `position`

@@ -32,6 +32,29 @@ pub(super) fn share(
     particles: &mut Particles,
     spacing: f64,
     volume: f64,
+    pieces: impl Iterator<Item = Piece>,
+    nearest: impl Fn(DVec3) -> DVec3,
+) {
+    give(particles, spacing, pieces, nearest);
+    close(particles, volume);
+}
+
+/// Those `pieces` alone of the surface on the particles `wall` of its layer: one that faces none of them has no area.
+pub(super) fn of_some(
+    wall: &[DVec3],
+    spacing: f64,
+    pieces: impl Iterator<Item = Piece>,
+    nearest: impl Fn(DVec3) -> DVec3,
+) -> Particles {
+    let mut out = Particles::default();
+    wall.iter().for_each(|&x| out.add(0, x, DVec3::ZERO, nearest(x) - x));
+    give(&mut out, spacing, pieces, nearest);
+    out
+}
+
+fn give(
+    particles: &mut Particles,
+    spacing: f64,
     mut pieces: impl Iterator<Item = Piece>,
     nearest: impl Fn(DVec3) -> DVec3,
 ) {
@@ -65,7 +88,6 @@ pub(super) fn share(
         let along = off - off.dot(normals[k]) * normals[k];
         particles.to_surface[k] = nearest(above + along.clamp_length_max(FAR * spacing)) - particles.wall[k];
     }
-    close(particles, volume);
 }
 
 /// Corrects areas that are even only nearly, by as little as it takes: an even pressure may not push, and one that grows along x_k must push with the

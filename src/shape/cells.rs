@@ -15,6 +15,10 @@ impl PointCells {
         Self { edge, points: vec![], cells: HashMap::new() }
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
     fn cell(&self, x: DVec3) -> IVec3 {
         (x / self.edge).floor().as_ivec3()
     }

@@ -247,6 +247,17 @@ pub trait Geometry: std::fmt::Debug + Sync {
     /// Particles about `spacing` [m] apart: the wall layer and what lies below it, hollow beyond `layers`.
     fn particles(&self, spacing: f64, dimensions: u32, layers: i32) -> Particles;
 
+    /// The particles `wall` of its wall layer with the areas of those pieces of its surface alone that are `free`: asked for places in its frame [m]
+    /// and the normals there. `None` of shapes of which each particle has a face of its own.
+    fn freed(
+        &self,
+        _wall: &[DVec3],
+        _spacing: f64,
+        _free: &dyn Fn(DVec3, DVec3) -> bool,
+    ) -> Option<Particles> {
+        None
+    }
+
     /// What of its surface presses into other solids; `particles` are its own.
     fn surface(&self, particles: &WallLayer, spacing: f64, dimensions: u32) -> Surface;
 }

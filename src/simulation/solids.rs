@@ -144,9 +144,8 @@ impl Simulation {
         };
         for (c, pressure) in covered.iter().zip(pressures) {
             let (solid, turn) = (&scene.solids[c.solid], poses[c.solid].orientation);
-            let to_surface = turn * solid.wall_to_surface[c.row];
-            let force = pressure.in_force(to_surface, &self.params) * c.area;
-            let arm = turn * solid.wall_offset[c.row] + to_surface;
+            let force = pressure.in_force(c.to_surface, &self.params) * c.area;
+            let arm = turn * solid.wall_offset[c.row] + c.to_surface;
             sum[c.solid] += Wrench { force, torque: arm.cross(force) };
         }
         for &(k, load) in &self.enclosed {
@@ -171,13 +170,14 @@ impl Simulation {
         for ((push, k, row), told) in of_held.into_iter().zip(told) {
             let (solid, turn) = (&scene.solids[k], poses[k].orientation);
             let bare = turn * solid.wall_area[row] - taken.get(&(k, row)).copied().unwrap_or_default();
-            let to_surface = turn * solid.wall_to_surface[row];
             // A row at an edge of a box belongs to several faces.
             let own = solid.wall_to_surface[row];
             let normal = match own.length() < 0.6 * self.params.spacing {
                 true => own.normalize_or_zero(),
                 false => face_before(own, turn.inverse() * push.area),
             };
+            let is_box = solid.shape.as_cuboid().is_some();
+            let to_surface = turn * if is_box { own * normal.abs() } else { own };
             let told = push.told_by(turn * normal, &told, to_surface, bare, &self.params);
             let force = push.pressure * push.area_on(turn * normal) - told;
             let arm = self.params.periodic.nearest(push.at - poses[k].position);

@@ -49,20 +49,18 @@ impl Cpu {
                 let own = owns(share, i);
                 let slot = slot(k);
                 let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
-                let to_surface = pose.orientation * solid.wall_to_surface[k];
-                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
-                let mut pressure = 0.0;
+                let arm = pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k]);
                 let mut reaction = reaction_on(&fields.reaction, i - fluid);
                 if own && fields.state[i] == State::Inner {
                     total.add(fields.pressure[i], &slot.per_pascal);
                     total += slot.head;
                     let excess = self.excess.of(i - fluid);
-                    pressure = body_force::surface_pressure(fields.pressure[i], excess, to_surface, params);
+                    let pressure =
+                        |way| body_force::surface_pressure(fields.pressure[i], excess, way, params);
+                    total += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, pressure);
                     reaction += body_force::turning(pose.angular_velocity, area, params);
                 }
-                let force = body_force::body_force(pressure, area, reaction);
-                total.force += force;
-                total.torque += arm.cross(force);
+                total += Wrench { force: reaction, torque: arm.cross(reaction) };
             }
             total
         });

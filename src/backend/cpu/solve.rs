@@ -8,7 +8,7 @@ use crate::body::slots;
 use crate::body::{FreeBody, Wrench};
 use crate::fields::{Fields, State};
 use crate::kernels::pressure_source::laplacian_coefficient;
-use crate::kernels::{body_force, coupling, pressure_level};
+use crate::kernels::{body_force, pressure_level};
 use crate::neighbours::CHUNK;
 use crate::params::Step;
 use crate::pressure::PressureReport;
@@ -44,8 +44,7 @@ impl Cpu {
             // On many ranks the load is added once, after the sum over them.
             let mut sum = if share.is_some() { Wrench::default() } else { body.load };
             let wall = |(k, i): (usize, usize)| {
-                let to_surface = pose.orientation * solid.wall_to_surface[k];
-                let arm = pose.orientation * solid.wall_offset[k] + to_surface;
+                let arm = pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k]);
                 let reaction = reaction_on(reaction, i - fluid);
                 let slot = slot(k);
                 if !owns(share, i) || state[i] != State::Inner {
@@ -53,14 +52,15 @@ impl Cpu {
                     sum += Wrench { force: reaction, torque: arm.cross(reaction) };
                     return Wrench::default();
                 }
-                let area = pose.orientation * solid.wall_area[k] * (1.0 - slot.taken);
+                let part = 1.0 - slot.taken;
+                let area = pose.orientation * solid.wall_area[k] * part;
                 // What acts at a pressure of zero.
-                let known = body_force::surface_pressure(0.0, excess.of(i - fluid), to_surface, params);
-                let turning = body_force::turning(pose.angular_velocity, area, params);
-                let force = body_force::body_force(known, area, reaction + turning);
+                let known = |way| body_force::surface_pressure(0.0, excess.of(i - fluid), way, params);
+                sum += body_force::on_faces(solid, k, pose, part, known);
+                let force = reaction + body_force::turning(pose.angular_velocity, area, params);
                 sum += Wrench { force, torque: arm.cross(force) };
                 sum += slot.head;
-                let mut row = coupling::row(area, arm);
+                let mut row = body_force::on_faces(solid, k, pose, part, |_| 1.0);
                 row += slot.per_pascal;
                 row
             };

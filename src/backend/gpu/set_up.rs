@@ -205,12 +205,13 @@ impl Gpu {
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
                 let felt = cut_share(solid, &self.params);
+                let in_faces = if solid.shape.as_cuboid().is_some() { 1.0 } else { 0.0 };
                 let lightness = collision::lightness(solid, &self.params);
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
                     layer[first + p] = WallParticle {
                         area: four(solid.wall_area[p], lightness as f32),
-                        arm: four(solid.wall_offset[p] + to_surface, 0.0),
+                        arm: four(solid.wall_offset[p] + to_surface, in_faces),
                         to_surface: four(to_surface, felt as f32),
                     };
                 }

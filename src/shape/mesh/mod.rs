@@ -423,6 +423,10 @@ impl Geometry for Mesh {
         particles::fill(self, spacing, layers)
     }
 
+    fn freed(&self, wall: &[DVec3], spacing: f64, free: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Particles> {
+        Some(particles::freed(self, wall, spacing, free))
+    }
+
     fn surface(&self, particles: &WallLayer, spacing: f64, _: u32) -> Surface {
         points::surface(self, particles, spacing)
     }

@@ -140,6 +140,17 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     out
 }
 
+/// Its wall layer `wall` with the areas of the pieces alone that are `free`.
+pub(super) fn freed(
+    mesh: &Mesh,
+    wall: &[DVec3],
+    spacing: f64,
+    free: &dyn Fn(DVec3, DVec3) -> bool,
+) -> Particles {
+    let pieces = pieces(mesh, spacing).filter(|(at, area)| free(*at, area.normalize_or_zero()));
+    areas::of_some(wall, spacing, pieces, |x| mesh.nearest(x).0)
+}
+
 /// The places of a layer at `depth` [m], pushed apart along it until they lie evenly.
 fn even(mesh: &Mesh, mut places: Vec<Place>, depth: f64, spacing: f64) -> Vec<Place> {
     let reach = REACH * spacing;

@@ -5,7 +5,7 @@
 
 mod layer;
 
-use super::areas;
+use super::areas::{self, Piece};
 use super::cells::PointCells;
 use super::open;
 use super::surface::Surface;
@@ -19,6 +19,8 @@ use std::sync::Mutex;
 
 /// Pieces of a side that go to the nearest particle each, over the spacing.
 const PIECE: f64 = 0.1;
+/// The same where others cut a side: what of it is left is known as well as that.
+const CUT: f64 = 0.02;
 
 /// A closed line of straight sides in the plane y = 0, and what it encloses.
 #[derive(Clone, Debug)]
@@ -81,6 +83,15 @@ fn nearest_of(sides: impl Iterator<Item = [DVec2; 2]>, q: DVec2) -> (DVec2, DVec
 }
 
 impl Polygon {
+    /// Its sides in pieces of `length` [m] at most.
+    fn pieces(&self, length: f64) -> impl Iterator<Item = Piece> + '_ {
+        self.sides().flat_map(move |[a, b]| {
+            let count = (a.distance(b) / length).ceil().max(1.0);
+            let area = -space((b - a).perp()) * self.width / count;
+            (0..count as usize).map(move |k| (space(a.lerp(b, (k as f64 + 0.5) / count)), area))
+        })
+    }
+
     /// The slice of `width` [m] along y of what the closed line through `corners`, x and z [m], encloses; it does not cross itself.
     pub fn new(corners: &[[f64; 2]], width: f64) -> &'static Self {
         let given: Vec<DVec2> = corners.iter().map(|&c| c.into()).collect();
@@ -297,13 +308,14 @@ impl Geometry for Polygon {
             let places = stretches.iter().flat_map(|s| s.divided(PIECE * spacing)).map(space);
             thin.fill(above, places, &taken, &mut out);
         }
-        let pieces = self.sides().flat_map(|[a, b]| {
-            let count = (a.distance(b) / (PIECE * spacing)).ceil().max(1.0);
-            let area = -space((b - a).perp()) * self.width / count;
-            (0..count as usize).map(move |k| (space(a.lerp(b, (k as f64 + 0.5) / count)), area))
-        });
+        let pieces = self.pieces(PIECE * spacing);
         areas::share(&mut out, spacing, self.volume(), pieces, |x| space(self.nearest(plane(x)).0));
         out
+    }
+
+    fn freed(&self, wall: &[DVec3], spacing: f64, free: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Particles> {
+        let pieces = self.pieces(CUT * spacing).filter(|(at, area)| free(*at, area.normalize_or_zero()));
+        Some(areas::of_some(wall, spacing, pieces, |x| space(self.nearest(plane(x)).0)))
     }
 
     /// Points alone, all of one weight, which sum to 1 over the side that has most of them.
