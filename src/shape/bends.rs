@@ -25,7 +25,7 @@ pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], spacing: f64) -> Vec<boo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::Shape;
+    use crate::shape::{Shape, Sphere};
 
     #[test]
     fn round_surfaces_bend_and_faces_do_not() {
@@ -38,7 +38,7 @@ mod tests {
         let (bent, _) = of(Shape::cuboid(DVec3::new(0.1, 0.13, 0.08)));
         assert_eq!(bent, 0);
         for radius in [0.025, 0.05, 0.2] {
-            let (bent, all) = of(Shape::sphere(radius));
+            let (bent, all) = of(Shape::Sphere(Sphere { radius }));
             assert_eq!(bent, all, "{radius}");
         }
     }
