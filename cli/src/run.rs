@@ -256,7 +256,15 @@ fn begin(args: &RunArgs, asked: &Asked, case: &Case) -> Result<Option<Start>> {
         (false, false) => Start::New,
         (true, _) => match standing(&asked.out, case)? {
             Standing::Nothing => Start::New,
-            Standing::Lost => Start::Replace,
+            Standing::Lost => {
+                if !args.quiet {
+                    remark(&format!(
+                        "no state was saved in {}: the run begins again at t = 0",
+                        asked.out.display()
+                    ));
+                }
+                Start::Replace
+            }
             Standing::Done(result) => {
                 if args.json {
                     say(result.trim_end());

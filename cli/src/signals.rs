@@ -60,6 +60,11 @@ pub fn watch(quiet: bool) -> Result<Stop> {
             .and_then(|_| signal_hook::flag::register_usize(signal, asked, signal as usize))
             .map_err(Error::io("signal handler"))?;
     }
+    // A file that may not grow is an error of the write and no end of the program.
+    #[cfg(unix)]
+    // SAFETY: the closure does nothing.
+    unsafe { signal_hook::low_level::register(signal_hook::consts::SIGXFSZ, || {}) }
+        .map_err(Error::io("signal handler"))?;
     if !quiet {
         tell(stop.clone());
     }

@@ -194,6 +194,7 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
         report.charts.extend(compare::charts(&definition, rows, &read)?);
         report.findings.extend(definition.idle_errors(rows.iter()));
         report.findings.extend(definition.idle_limits(rows.iter()));
+        report.findings.extend(definition.idle_results(rows.iter()));
         Ok(report)
     });
     Study { name, title, question, jobs: Vec::new(), finish }
@@ -203,6 +204,29 @@ pub fn of_points(definition: Definition, references: BTreeMap<String, String>) -
 mod tests {
     use super::*;
     use crate::row::Row;
+
+    #[test]
+    fn each_scene_has_a_finest_row_of_its_own() {
+        let text = "name = 's'\ntitle = 't'\nmethod = 'm'\ntext = ''\n[measure]\nof = []\n\
+                    [[axis]]\nname = 'h'\nscene = true\nchoices = [{ name = 'low', set = [] }, { name = 'high', set = [] }]\n\
+                    [[error]]\ncurve = 'c'\nagainst = 'finest'\n";
+        let study = of_points(Definition::parse("s", text).unwrap(), BTreeMap::new());
+        // Low water comes to 1, high water to 10 with more particles; the coarse ones are a tenth off.
+        let mut rows = [("low", 1.1, 10), ("low", 1.0, 20), ("high", 11.0, 40), ("high", 10.0, 80)].map(
+            |(h, level, particles)| {
+                let mut row = Row { index: particles, method: "m".into(), ..Row::default() };
+                row.parameters.insert("h".into(), h.into());
+                row.measured.curves.insert("c".into(), vec![[0.0, level], [1.0, level]]);
+                row.measured.work.particles = particles as u64;
+                row
+            },
+        );
+        (study.finish)(&mut rows, None).unwrap();
+        let errors = rows.each_ref().map(|row| row.measured.values.get("c against finest [-]").copied());
+        assert!(errors[0].is_some_and(|e| (e - 0.1).abs() < 1e-12), "{errors:?}");
+        assert!(errors[2].is_some_and(|e| (e - 0.1).abs() < 1e-12), "{errors:?}");
+        assert_eq!((errors[1], errors[3]), (None, None));
+    }
 
     #[test]
     fn limits_are_of_errors_of_curves_too_and_one_of_nothing_is_told() {

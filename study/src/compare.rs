@@ -5,6 +5,7 @@ use super::row::{Class, Row};
 use super::validation::reduce::distance;
 use crate::plot::{Axis, COLORS, Chart, Mark, Series, Stroke};
 use seixo::error::{Error, Result};
+use std::collections::BTreeMap;
 
 impl ErrorMeasure {
     /// Name of the error, as in the tables.
@@ -43,11 +44,11 @@ pub fn difference(curve: &[[f64; 2]], reference: &[[f64; 2]]) -> Option<f64> {
     distance(curve, reference).map(|(rms, _)| rms)
 }
 
-/// The row to compare with: the one with the most particles, and of those the most steps, that has `curve`.
-pub fn finest<'a>(rows: &'a [Row], curve: &str) -> Option<&'a Row> {
-    let usable = |r: &&Row| r.measured.class <= Class::Degraded && r.measured.curves.contains_key(curve);
+/// The row to compare with: the one of `rows` with the most particles, and of those the most steps, that has `curve`.
+pub fn finest<'a>(rows: &[&'a Row], curve: &str) -> Option<&'a Row> {
+    let usable = |r: &&'a Row| r.measured.class <= Class::Degraded && r.measured.curves.contains_key(curve);
     let key = |r: &Row| (r.measured.work.particles, r.measured.work.steps);
-    rows.iter().filter(usable).max_by_key(|r| key(r))
+    rows.iter().copied().filter(usable).max_by_key(|r| key(r))
 }
 
 /// Points of a reference of the curve `name` that a run with `curve` could come to: an experiment's tank may be longer than
@@ -109,6 +110,16 @@ pub fn charts(study: &Definition, rows: &[Row], files: &Files) -> Result<Vec<(St
     Ok(charts)
 }
 
+/// Places in `rows` of those of the same scene, by the values of the axes that make one.
+fn by_scene(study: &Definition, rows: &[Row]) -> Vec<Vec<usize>> {
+    let axes = study.scene_axes();
+    let mut scenes: BTreeMap<Vec<Option<&String>>, Vec<usize>> = BTreeMap::new();
+    for (k, row) in rows.iter().enumerate() {
+        scenes.entry(axes.iter().map(|axis| row.parameters.get(*axis)).collect()).or_default().push(k);
+    }
+    scenes.into_values().collect()
+}
+
 /// Put the errors of all curves into `rows`.
 ///
 /// # Errors
@@ -117,18 +128,26 @@ pub fn curves(study: &Definition, rows: &mut [Row], files: &Files) -> Result<()>
     for error in &study.error {
         let (Some(curve), Some(against)) = (&error.curve, &error.against) else { continue };
         let name = error.name();
-        let (reference, own) = if against == "finest" {
-            let Some(row) = finest(rows, curve) else { continue };
-            (row.measured.curve(curve).unwrap_or_default(), Some(row.index))
-        } else {
-            (table(against, &files(against)?)?, None)
-        };
-        let range = reference.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
-        for row in rows.iter_mut().filter(|r| Some(r.index) != own) {
-            let Some(points) = row.measured.curve(curve) else { continue };
-            let inside = if own.is_some() { reference.clone() } else { within(curve, &reference, &points) };
-            if let Some(rms) = difference(&points, &inside) {
-                row.measured.put(&name, rms / range);
+        let table = if against == "finest" { None } else { Some(table(against, &files(against)?)?) };
+        // A scene is held against its own finest row.
+        for scene in by_scene(study, rows) {
+            let own: Vec<&Row> = scene.iter().map(|&k| &rows[k]).collect();
+            let (reference, finest) = match (&table, finest(&own, curve)) {
+                (Some(table), _) => (table.clone(), None),
+                (None, Some(row)) => (row.measured.curve(curve).unwrap_or_default(), Some(row.index)),
+                (None, None) => continue,
+            };
+            let range = reference.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
+            for k in scene {
+                let row = &mut rows[k];
+                let Some(points) = row.measured.curve(curve).filter(|_| Some(row.index) != finest) else {
+                    continue;
+                };
+                let inside =
+                    if finest.is_some() { reference.clone() } else { within(curve, &reference, &points) };
+                if let Some(rms) = difference(&points, &inside) {
+                    row.measured.put(&name, rms / range);
+                }
             }
         }
     }

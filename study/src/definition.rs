@@ -294,6 +294,17 @@ impl Definition {
         idle(&curves, rows, |measured| measured.curves.keys().map(String::as_str).collect(), told)
     }
 
+    /// `[[result]]`s that come to nothing in all of the finished points in `rows`, likewise.
+    pub fn idle_results<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Vec<String> {
+        let names = self.result.iter().map(|r| r.name.as_str()).collect();
+        let told = |name: &str, _: &str| {
+            format!(
+                "[[result]] `{name}`: in no finished point does its curve have such a number (`take`, `level`, `window`)."
+            )
+        };
+        idle(&names, rows, |measured| measured.values.keys().map(String::as_str).collect(), told)
+    }
+
     /// Refuses a `[[check]]` that is for points that no grid has.
     ///
     /// # Errors

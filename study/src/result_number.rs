@@ -12,6 +12,7 @@ use super::row::{Class, Measured};
 use super::validation::reduce::{Curve, Take, cut, prepared, reduce, reduce_bins};
 use seixo::error::{Error, Result};
 use serde::Deserialize;
+use std::cmp::Ordering;
 
 /// What is told.
 #[derive(Clone, Debug, Deserialize)]
@@ -30,11 +31,9 @@ pub struct ResultNumber {
     #[serde(default)]
     pub smooth: f64,
     /// Level or time that `take` asks for.
-    #[serde(default)]
-    pub level: f64,
+    pub level: Option<f64>,
     /// Second level, of `passage`.
-    #[serde(default)]
-    pub to: f64,
+    pub to: Option<f64>,
     /// Time counts from the moment at which the curve has moved by this much from its start.
     pub since_moved: Option<f64>,
 }
@@ -48,6 +47,29 @@ impl ResultNumber {
         if matches!(self.take, Take::Distance | Take::Lag) {
             let text = format!("result `{}`: `take` asks for a second curve: that is a [[check]]", self.name);
             return Err(Error::key("result", text, ""));
+        }
+        let wrong = |what: &str, remedy: &str| {
+            Err(Error::key("result", format!("result `{}`: {what}", self.name), remedy))
+        };
+        let (levelled, passes) = match self.take {
+            Take::FirstAbove | Take::FirstBelow | Take::At => (true, false),
+            Take::Passage => (true, true),
+            _ => (false, false),
+        };
+        if levelled && !self.level.is_some_and(f64::is_finite) {
+            return wrong(
+                "`take` asks for a `level`",
+                "give `level`: the level that is crossed, or the time of `at`",
+            );
+        }
+        if passes && !self.to.is_some_and(f64::is_finite) {
+            return wrong("`take = \"passage\"` asks for a second level", "give `to`");
+        }
+        if !(self.smooth.is_finite() && self.smooth >= 0.0) {
+            return wrong("`smooth` is a width of time, 0 or more", "");
+        }
+        if self.window.is_some_and(|[from, to]| from.partial_cmp(&to) != Some(Ordering::Less)) {
+            return wrong("`window` ends before it begins", "give its first time, then its last");
         }
         Ok(())
     }
@@ -70,11 +92,37 @@ impl ResultNumber {
         };
         let curve = prepared(curve, self.since_moved, self.smooth);
         let reduced = if measured.profiles.contains(&self.curve) { reduce_bins } else { reduce };
-        let number =
-            |(curve, _): (Curve, f64)| reduced(self.take, &cut(&curve, self.window), [self.level, self.to]);
+        let levels = [self.level, self.to].map(Option::unwrap_or_default);
+        let number = |(curve, _): (Curve, f64)| reduced(self.take, &cut(&curve, self.window), levels);
         if let Some(value) = curve.and_then(number) {
             measured.put(&self.name, value);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_number_asks_for_has_to_be_there() {
+        let sound = |more: &str| {
+            let text = format!("name = \"n\"\ncurve = \"c\"\n{more}");
+            toml::from_str::<ResultNumber>(&text).expect("it reads").sound().map_err(|e| e.to_string())
+        };
+        for (more, word) in [
+            ("take = \"first_below\"", "level"),
+            ("take = \"at\"", "level"),
+            ("take = \"passage\"\nlevel = 1", "second level"),
+            ("take = \"mean\"\nwindow = [0.3, 0.1]", "window"),
+            ("take = \"mean\"\nsmooth = -1", "smooth"),
+        ] {
+            let told = sound(more).expect_err(more);
+            assert!(told.contains("result `n`") && told.contains(word), "{more}: {told}");
+        }
+        for more in ["take = \"mean\"", "take = \"at\"\nlevel = 0", "take = \"passage\"\nlevel = 1\nto = 2"] {
+            assert!(sound(more).is_ok(), "{more}");
+        }
     }
 }

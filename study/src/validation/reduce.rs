@@ -140,6 +140,14 @@ fn crossing(curve: &[[f64; 2]], level: f64, upwards: bool) -> Option<f64> {
     Some(if y0.is_finite() { x0 + (x1 - x0) * (level - y0) / (y1 - y0) } else { x1 })
 }
 
+/// How long the curve takes from where it first crosses `level` on the way `to` another one until it crosses that.
+fn passage(curve: &[[f64; 2]], level: f64, to: f64) -> Option<f64> {
+    let start = crossing(curve, level, to >= level)?;
+    let rest: Curve =
+        std::iter::once([start, level]).chain(curve.iter().copied().filter(|p| p[0] > start)).collect();
+    Some(crossing(&rest, to, to >= level)? - start)
+}
+
 /// The curve at `x`, linear between its points; `None` outside and in a gap.
 pub fn at(curve: &[[f64; 2]], x: f64) -> Option<f64> {
     let k = curve.partition_point(|p| p[0] < x);
@@ -241,7 +249,7 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
         }
         Take::FirstAbove => crossing(marked, level, true),
         Take::FirstBelow => crossing(marked, level, false),
-        Take::Passage => Some(crossing(marked, to, to >= level)? - crossing(marked, level, to >= level)?),
+        Take::Passage => passage(marked, level, to),
         Take::At => at(marked, level),
         Take::Deviation => Some(deviation(marked)),
         Take::Slope => fit::<2>(curve).map(|c| c[1]),
@@ -320,6 +328,17 @@ fn wave(periods: f64, decay: f64) -> Curve {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_passage_is_a_way_from_one_level_to_the_other() {
+        // From between the levels up, down again, and then the whole way.
+        let curve = [[0.0, 1.5], [1.0, 2.5], [2.0, 0.5], [4.0, 2.5]];
+        let passage = |level, to| reduce(Take::Passage, &curve, [level, to]);
+        assert_eq!(passage(1.0, 2.0), Some(1.0));
+        assert_eq!(passage(2.0, 1.0), Some(0.5));
+        assert_eq!(passage(1.0, 3.0), None);
+        assert_eq!(reduce(Take::Passage, &curve[..3], [1.0, 2.0]), None);
+    }
 
     #[test]
     fn period_and_decay_of_a_damped_wave() {
