@@ -245,6 +245,8 @@ pub struct Plan {
     /// Whether bodies move in the fluid as its pressure acts on them. With the paper's source, the number density alone,
     /// they follow the pressure a step later, as in the paper.
     pub coupled: bool,
+    /// Whether slots of solids that no force moves are looked for: where forces are told of these, or of walls before them.
+    pub held: bool,
     /// Of which walls the pressure on the surface is told, where their rows undo a divergence.
     pub excess: Told,
     /// Of which walls it is told what viscosity, friction and collisions of the water do to them.
@@ -324,6 +326,9 @@ impl Plan {
         let coupled = fluid && free && params.source == Source::Mixed;
         let fixed_walls = fluid && !scene.groups.static_range().is_empty();
         let ledger = case.output.ledger;
+        let any_held = scene.solids[..scene.followed()].iter().any(|s| !s.is_free());
+        let asked = !case.gauge.force.is_empty() || ledger;
+        let held = fluid && any_held && asked && params.source == Source::Mixed;
         let filled = params.filled;
         let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
         let pressed = fluid && moving && (told || ledger);
@@ -345,6 +350,7 @@ impl Plan {
             reasons: reasons.to_vec(),
             preconditioner,
             coupled,
+            held,
             excess,
             reaction,
             contact,
@@ -361,6 +367,7 @@ impl Plan {
             reasons: Stage::ALL.map(|stage| (stage, Ok("planned"))).to_vec(),
             preconditioner: Preconditioner::Multigrid,
             coupled: true,
+            held: false,
             excess: Told::All,
             reaction: Told::Moving,
             contact: ContactPlan::default(),
@@ -377,6 +384,7 @@ impl Plan {
             reasons: Stage::ALL.map(|stage| (stage, Err("no fluid"))).to_vec(),
             preconditioner: Preconditioner::Jacobi,
             coupled: false,
+            held: false,
             excess: Told::None,
             reaction: Told::None,
             fixed_walls: false,

@@ -81,10 +81,8 @@ pub struct Simulation {
     pub groups: Groups,
     /// Work of and on the solids, and the energy of the free ones [J], if the ledger is kept.
     solids_ledger: Option<(Ledger, f64)>,
-    /// Slots between free bodies and other solids, where free bodies stand in the pressure equation, and of other solids where these are `held`.
+    /// Slots between free bodies and other solids, where free bodies stand in the pressure equation, and those of other solids that the plan asks for.
     slots: Option<Slots>,
-    /// Whether forces are told of solids that no force moves, or of walls before them.
-    held: bool,
     /// Bodies that others enclose, and what the water between presses on each in this step.
     enclosed: Vec<(usize, Wrench)>,
     /// Faces of driven solids at which others may stand, where forces are told.
@@ -152,18 +150,15 @@ impl Simulation {
             };
             return Err(Error::key("contact.device", message, remedy));
         }
-        let any_held = scene.solids[..scene.followed()].iter().any(|s| !s.is_free());
-        let told = !case.gauge.force.is_empty() || case.output.ledger;
-        let held = any_held && told && plan.wet() && params.source == Source::Mixed;
         Ok(Self {
             backend,
-            driven_faces: if plan.has(Stage::BodyForce) || held {
+            driven_faces: if plan.has(Stage::BodyForce) || plan.held {
                 DrivenFaces::new(&scene)
             } else {
                 DrivenFaces::default()
             },
-            slots: (plan.needs(Arrays::Coupling) || held).then(|| Slots::new(&scene, &params, held)),
-            held,
+            slots: (plan.needs(Arrays::Coupling) || plan.held)
+                .then(|| Slots::new(&scene, &params, plan.held)),
             enclosed: vec![],
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,

@@ -203,8 +203,8 @@ pub struct Solid {
     pub name: String,
     /// `true` for a `[[body]]`, `false` for a `[[moving_wall]]`.
     pub is_body: bool,
-    /// Shape, in the solid's frame. A rank of many is told none: it has the particles, and contact is on the first one.
-    #[serde(skip, default = "untold")]
+    /// Shape, in the solid's frame. A rank of many is told whether it is a box and no more: it has the particles, and contact is on the first one.
+    #[serde(with = "boxes")]
     pub shape: Shape,
     /// Initial position of what it moves and turns about [m]: of a free body the centre of mass or a place on its hinge.
     pub position: DVec3,
@@ -232,9 +232,21 @@ pub struct Solid {
     pub wall_to_surface: Vec<DVec3>,
 }
 
-/// A shape in the place of one that is not told.
-fn untold() -> Shape {
-    Shape::cuboid(DVec3::ZERO)
+/// Whether a shape is a box, and one without size in the place of that which is not told.
+mod boxes {
+    use super::Shape;
+    use crate::shape::Sphere;
+    use glam::DVec3;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(shape: &Shape, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_bool(shape.as_cuboid().is_some())
+    }
+
+    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Shape, D::Error> {
+        let is_box = bool::deserialize(from)?;
+        Ok(if is_box { Shape::cuboid(DVec3::ZERO) } else { Shape::Sphere(Sphere { radius: 0.0 }) })
+    }
 }
 
 impl Solid {

@@ -6,6 +6,7 @@ use super::loads::Loads;
 use super::model::Model;
 use crate::body::Pose;
 use crate::cells::Grid;
+use crate::cover::driven::DrivenFaces;
 use crate::error::Result;
 use crate::kernels::multigrid_levels::level_cells;
 use crate::params::Params;
@@ -115,8 +116,8 @@ impl Outlook {
         };
         let border: Vec<u64> = wet.iter().map(|[_, border]| *border).collect();
         let said = Said::new(&shared, count.len(), &border, wet[shared.len()][0]);
-        // Pressures at the rims of slots are a round of their own.
-        let slots = u64::from(plan.coupled && has_slots(scene, params)?);
+        // Pressures at the rims of slots are a round of their own, and what forces on driven solids ask for.
+        let slots = slot_rounds(scene, params, plan)?;
         let told = Self {
             unevenness: unevenness(water, &cuts),
             parts: (0..ranks).map(part).collect(),
@@ -143,8 +144,12 @@ impl Outlook {
     }
 }
 
-/// Whether a body stands so near another solid that the pressure at the rim of their slot is read.
-fn has_slots(scene: &Scene, params: &Params) -> Result<bool> {
+/// How often a step reads pressures of rows for slots, with the solids where they are at the start.
+fn slot_rounds(scene: &Scene, params: &Params, plan: &Plan) -> Result<u64> {
+    let told = plan.held && plan.has(Stage::BodyForce);
+    if !plan.coupled && !told {
+        return Ok(0);
+    }
     let pose = |solid: &Solid| Pose {
         position: solid.position,
         orientation: solid.orientation,
@@ -152,8 +157,15 @@ fn has_slots(scene: &Scene, params: &Params) -> Result<bool> {
         angular_velocity: DVec3::ZERO,
     };
     let poses: Vec<Pose> = scene.solids.iter().map(pose).collect();
-    let rows = Slots::new(scene, params, false).rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
-    Ok(!rows.is_empty())
+    let slots = Slots::new(scene, params, told);
+    let rows = slots.rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
+    let covered = if told { DrivenFaces::new(scene).covered(scene, &poses) } else { Vec::new() };
+    let of_forces = if told || plan.has(Stage::BodyForce) {
+        slots.reads(&slots.held(&poses, &covered), &poses)
+    } else {
+        0
+    };
+    Ok(u64::from(plan.coupled && !rows.is_empty()) + of_forces)
 }
 
 /// What devices say of borders with so much water, and with so much that carries pressure; of all cells, and of those with water.

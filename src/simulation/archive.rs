@@ -72,7 +72,6 @@ impl Simulation {
             gone,
             // Follows from the case.
             slots: _,
-            held: _,
             enclosed: _,
             driven_faces: _,
             // Times by the clock are those of each process.

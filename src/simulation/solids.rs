@@ -79,7 +79,7 @@ impl Simulation {
         let Some(found) = &self.slots else { return Ok(vec![]) };
         let (backend, poses) = (&mut *self.backend, self.solids.poses());
         let mut pushes = found.pushes(poses, |slots| row_pressures(backend, slots))?;
-        if self.held {
+        if self.plan.held {
             let held = found.held(poses, &self.driven_faces.covered(&self.scene, poses));
             let forces =
                 found.held_forces(&held, poses, &self.params, |rows| backend.wall_pressures(rows))?;
@@ -124,7 +124,7 @@ impl Simulation {
     fn force_of_water(&mut self) -> Result<Vec<Wrench>> {
         let (scene, poses, backend) = (&self.scene, self.solids.predicted(), &mut *self.backend);
         let mut covered = self.driven_faces.covered(scene, poses);
-        let slots = self.slots.as_ref().filter(|_| self.held);
+        let slots = self.slots.as_ref().filter(|_| self.plan.held);
         let held = slots.map(|slots| (slots, slots.held(poses, &covered)));
         held.iter().for_each(|(slots, held)| slots.uncover(held, &mut covered));
         let row = |c: &Covered| scene.solids[c.solid].wall_slots.start + c.row;

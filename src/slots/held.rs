@@ -30,6 +30,11 @@ pub struct HeldForces {
 }
 
 impl Held {
+    /// Solids and rows of theirs that lie in slots.
+    fn pressed(&self) -> HashSet<(usize, usize)> {
+        self.found.iter().flat_map(|f| f.slot.inside.iter().map(|row| (f.slot.solid, row.0))).collect()
+    }
+
     /// How much of a row lies in a slot of a surface that bends, so that what [`Covered`] says of it does not hold [-].
     fn open(&self, layers: &[Layer]) -> HashMap<(usize, usize), f64> {
         let of = |f: &Found| {
@@ -94,6 +99,19 @@ impl Slots {
         }
     }
 
+    /// How often the pressures of rows are read for the slots `held`, and for what those and the slots of free bodies press on solids that no force
+    /// moves, with the solids at `poses`.
+    pub fn reads(&self, held: &Held, poses: &[Pose]) -> u64 {
+        let pressed = held.pressed();
+        let on_held = |of: &Opposite| matches!(*of, Opposite::Solid(k, row) if !self.layers[k].free && !pressed.contains(&(k, row)));
+        let presses = |f: &Found| {
+            let before = |row: &(usize, f64)| f.faced[row.0].opposite;
+            f.slot.inside.iter().filter_map(before).any(|of| on_held(&of))
+        };
+        let any = self.find(poses).iter().chain(&held.found).any(presses);
+        u64::from(!held.found.is_empty()) + u64::from(any)
+    }
+
     /// Forces of the water in the slots `held`, beside those of rows. `read` tells what slots of particles have.
     ///
     /// # Errors
@@ -118,8 +136,7 @@ impl Slots {
             told = all;
             Ok(rims.iter().map(|row| row.pressure).collect())
         })?;
-        let pressed: HashSet<(usize, usize)> =
-            found.iter().flat_map(|f| f.slot.inside.iter().map(|row| (f.slot.solid, row.0))).collect();
+        let pressed = held.pressed();
         let (mut out, mut told) = (HeldForces::default(), told.into_iter());
         for (f, rim) in found.iter().zip(&at_rims) {
             let (k, pose) = (f.slot.solid, &poses[f.slot.solid]);
