@@ -144,7 +144,7 @@ fn crossing(curve: &[[f64; 2]], level: f64, upwards: bool) -> Option<f64> {
 fn passage(curve: &[[f64; 2]], level: f64, to: f64) -> Option<f64> {
     let start = crossing(curve, level, to >= level)?;
     let rest: Curve =
-        std::iter::once([start, level]).chain(curve.iter().copied().filter(|p| p[0] > start)).collect();
+        std::iter::once([start, level]).chain(curve.iter().copied().filter(|p| p[0] >= start)).collect();
     Some(crossing(&rest, to, to >= level)? - start)
 }
 
