@@ -171,10 +171,10 @@ impl Tiles {
         })
     }
 
-    /// Part of the same face that does not lie within `solids` [-].
-    fn outside(&self, (center, edge): (DVec3, f64), normal: DVec3, solids: &[&Standing]) -> f64 {
+    /// Part of the same `face` that lies within `solids` [-].
+    fn within(&self, face: (DVec3, f64), normal: DVec3, solids: &[&Standing]) -> f64 {
         let at = |x: DVec3| x + WITHIN * self.spacing * normal;
-        1.0 - self.mean((center, edge), normal, solids, |x, near| {
+        self.mean(face, normal, solids, |x, near| {
             near.iter().map(|s| self.holds(at(x), s)).sum::<f64>().min(1.0)
         })
     }

@@ -7,6 +7,8 @@ use crate::error::CaseError;
 const HEAVIER: f64 = 10.0;
 /// Depth over the spacing to which a weight alone may press, beyond which it is spoken of.
 pub(super) const SIZABLE: f64 = 0.25;
+/// Depth over the spacing, or over half of the thinner solid, for which a spring is named that carries a weight.
+pub(super) const CARRIED: f64 = 0.1;
 
 /// What contact will do at a time step, for `seixo plan`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,7 +88,7 @@ impl Solids {
             words.push(format!(
                 "contact: the weight of the heaviest body alone presses {resting:.2} spacings deep, and may squeeze a small one out; \
                  a spring of {:.1e} N/m makes it a tenth of one, where the sub-steps carry it",
-                weight / (0.1 * self.spacing)
+                weight / (CARRIED * self.spacing)
             ));
         }
         let sinks = self.limits.falling * (heaviest / worst.softest).sqrt() / self.spacing;

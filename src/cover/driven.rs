@@ -90,7 +90,7 @@ impl DrivenFaces {
                     row: face.row,
                     to_surface: pose.orientation * face.to_surface,
                     area: (1.0 - bare) * area,
-                    within: (1.0 - self.tiles.outside(center, normal, &others)) * area,
+                    within: self.tiles.within(center, normal, &others) * area,
                 })
             };
             driven.faces.par_iter().zip(reached).filter_map(of).collect::<Vec<_>>()
@@ -99,17 +99,16 @@ impl DrivenFaces {
     }
 }
 
-/// The faces of a solid: rows at edges of a box belong to several of them, others to one.
+/// The faces of a solid's rows that have an area.
 fn faces(solid: &Solid) -> Vec<Face> {
-    let is_box = solid.shape.as_cuboid().is_some();
-    let rows = solid.wall_offset.iter().zip(&solid.wall_area).zip(&solid.wall_to_surface).enumerate();
-    rows.flat_map(|(row, ((&offset, &area), &to_surface))| {
-        let face = |to_surface: DVec3, area| Face { row, to_surface, center: offset + to_surface, area };
-        let one = [face(to_surface, area)];
-        let of_axis = |e: DVec3| face(to_surface * e, area * e);
-        let of_box = DVec3::AXES.map(of_axis);
-        let own = if is_box { of_box.to_vec() } else { one.to_vec() };
-        own.into_iter().filter(|face| face.area != DVec3::ZERO)
-    })
-    .collect()
+    let of = |row: usize| {
+        let face = move |(area, to_surface)| Face {
+            row,
+            to_surface,
+            center: solid.wall_offset[row] + to_surface,
+            area,
+        };
+        solid.faces(row).map(face)
+    };
+    (0..solid.wall_offset.len()).flat_map(of).filter(|face| face.area != DVec3::ZERO).collect()
 }

@@ -45,22 +45,15 @@ pub fn surface_pressure(pressure: f64, excess: f64, to_surface: DVec3, params: &
     }
 }
 
-/// Force on what of the faces of row `k` of `solid`, of which `part` counts, and torque about its place [N, N m]. `pressure` tells that on the surface [Pa] by the
-/// way there from the particle [m], world axes. A particle at an edge of a box has a part of each face there, with middles that lie
-/// in different depths; any other has one.
+/// Force on what of the faces of row `k` of `solid`, of which `part` counts, and torque about its place [N, N m]. `pressure` tells that on the
+/// surface [Pa] by the way there from the particle [m], world axes.
 pub fn on_faces(solid: &Solid, k: usize, pose: &Pose, part: f64, pressure: impl Fn(DVec3) -> f64) -> Wrench {
     let turn = pose.orientation;
     let mut sum = Wrench::default();
-    let mut add = |area: DVec3, way: DVec3| {
+    for (area, way) in solid.faces(k) {
         let way = turn * way;
         let force = -part * pressure(way) * (turn * area);
         sum += Wrench { force, torque: (turn * solid.wall_offset[k] + way).cross(force) };
-    };
-    let (area, to_surface) = (solid.wall_area[k], solid.wall_to_surface[k]);
-    if solid.shape.as_cuboid().is_some() {
-        DVec3::AXES.into_iter().for_each(|e| add(area * e, to_surface * e));
-    } else {
-        add(area, to_surface);
     }
     sum
 }

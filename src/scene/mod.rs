@@ -12,6 +12,7 @@
 //! | moving dummy | [`Kind::Dummy`], [`Kind::BodyDummy`] of a moving solid | with its solid | no |
 
 mod bodies;
+mod boxes;
 mod build;
 mod cavities;
 mod curve;
@@ -232,23 +233,6 @@ pub struct Solid {
     pub wall_to_surface: Vec<DVec3>,
 }
 
-/// Whether a shape is a box, and one without size in the place of that which is not told.
-mod boxes {
-    use super::Shape;
-    use crate::shape::Sphere;
-    use glam::DVec3;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub fn serialize<S: Serializer>(shape: &Shape, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_bool(shape.as_cuboid().is_some())
-    }
-
-    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Shape, D::Error> {
-        let is_box = bool::deserialize(from)?;
-        Ok(if is_box { Shape::cuboid(DVec3::ZERO) } else { Shape::Sphere(Sphere { radius: 0.0 }) })
-    }
-}
-
 impl Solid {
     /// Whether forces move it.
     pub fn is_free(&self) -> bool {
@@ -282,6 +266,15 @@ impl Solid {
             (false, true) => "obstacle",
             (false, false) => "moving wall",
         }
+    }
+
+    /// The faces of row `k`: outward area [m2], and the way to the middle [m], in its frame. A particle at an edge of a box has a part of each
+    /// face there, with middles that lie in different depths; any other has one.
+    pub(crate) fn faces(&self, k: usize) -> impl Iterator<Item = (DVec3, DVec3)> {
+        let (area, to_surface) = (self.wall_area[k], self.wall_to_surface[k]);
+        let of_box = DVec3::AXES.map(|e| (area * e, to_surface * e));
+        let is_box = self.shape.as_cuboid().is_some();
+        of_box.into_iter().filter(move |_| is_box).chain((!is_box).then_some((area, to_surface)))
     }
 
     /// Turn from the shape as its keys describe it to where `orientation`, that of a pose, has it: what users are told. At the start

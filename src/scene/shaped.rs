@@ -135,21 +135,16 @@ impl Builder<'_> {
         let mut areas = self.cut(solid, &kept);
         let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
         let flat = |k: &usize| !bends[*k];
-        let freed = self.freed(solid, &kept);
-        if let Some(freed) = &freed {
-            for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..).filter(|(k, _)| flat(k)) {
-                areas[k] = freed.area[row];
-                solid.wall_to_surface[k] = freed.to_surface[row];
-            }
-        }
-        for k in (0..kept.len()).filter(|k| freed.is_none() && flat(k)) {
-            let (area, offset) = (&mut areas[k], &solid.wall_offset[k]);
-            for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
-                let own = solid.orientation.inverse() * e;
-                let faces = area.dot(own);
-                if faces > 0.0 && self.buried(at(offset) + l0 * e, false) {
-                    *area -= faces * own;
+        match self.freed(solid, &kept) {
+            Some(freed) => {
+                for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..).filter(|(k, _)| flat(k)) {
+                    areas[k] = freed.area[row];
+                    solid.wall_to_surface[k] = freed.to_surface[row];
                 }
+            }
+            None => {
+                let flat = (0..kept.len()).filter(flat);
+                flat.for_each(|k| areas[k] = self.unfaced(solid, areas[k], at(&solid.wall_offset[k])));
             }
         }
         fn left<T: Copy>(all: &[T], kept: &[bool]) -> Vec<T> {
@@ -172,6 +167,18 @@ impl Builder<'_> {
                 "{label}: {gone} particles left out inside other walls and beyond the tank's{beyond}"
             ));
         }
+    }
+
+    /// What of the `area` of a solid's particle `at` a place faces no other wall along the axes.
+    fn unfaced(&self, solid: &Solid, mut area: DVec3, at: DVec3) -> DVec3 {
+        for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
+            let own = solid.orientation.inverse() * e;
+            let faces = area.dot(own);
+            if faces > 0.0 && self.buried(at + self.lattice.spacing * e, false) {
+                area -= faces * own;
+            }
+        }
+        area
     }
 
     /// Those particles of a solid that are `kept`, with what of its surface faces no other wall: of one whose particles have no face each of their own, where others

@@ -4,7 +4,7 @@ use super::PointCells;
 use glam::DVec3;
 
 /// Rows of a layer this near each other, over l0, are neighbours in it.
-const ADJACENT: f64 = 1.2;
+pub(crate) const ADJACENT: f64 = 1.2;
 /// Angles between the directions of rows beside each other at which a surface bends [rad]: below them it is flat, beyond them it has an edge.
 const BENDING: (f64, f64) = (1e-3, 0.6);
 

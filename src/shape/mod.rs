@@ -23,7 +23,7 @@ mod surface;
 mod thickness;
 mod thin;
 
-pub(crate) use bends::bending;
+pub(crate) use bends::{ADJACENT, bending};
 pub(crate) use cells::PointCells;
 pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;

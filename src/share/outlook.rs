@@ -160,10 +160,9 @@ fn slot_rounds(scene: &Scene, params: &Params, plan: &Plan) -> Result<u64> {
     let slots = Slots::new(scene, params, told);
     let rows = slots.rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
     let covered = if told { DrivenFaces::new(scene).covered(scene, &poses) } else { Vec::new() };
-    let of_forces = if told || plan.has(Stage::BodyForce) {
-        slots.reads(&slots.held(&poses, &covered), &poses)
-    } else {
-        0
+    let of_forces = match plan.has(Stage::BodyForce) {
+        true => slots.reads(&slots.held(&poses, &covered), &poses),
+        false => 0,
     };
     Ok(u64::from(plan.coupled && !rows.is_empty()) + of_forces)
 }

@@ -7,17 +7,61 @@ use crate::body::{Pose, Wrench};
 use crate::contact::ContactReport;
 use crate::cover::driven::Covered;
 use crate::error::{Error, Result};
+use crate::kernels::body_force::RowPressure;
 use crate::ledger::Entry;
-use crate::params::Step;
+use crate::params::{Params, Step};
 use crate::plan::{Arrays, Stage};
+use crate::scene::Scene;
 use crate::slots::{Opposite, Pressed, Push, face_before};
 use glam::DVec3;
 use std::collections::HashMap;
+
+/// A row that lies farther from the true surface than this, over l0, is at an edge and belongs to several faces.
+const OF_ONE_FACE: f64 = 0.6;
 
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
     Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
 }
+
+/// What the `pushes` of slots do to solids of `scene` that no force moves, at their `poses` and `covered` in part, in place of what their rows tell there [N, N m].
+fn on_driven(
+    scene: &Scene,
+    params: &Params,
+    backend: &mut dyn Backend,
+    poses: &[Pose],
+    covered: &[Covered],
+    pushes: &[Push],
+) -> Result<Vec<(usize, Wrench)>> {
+    let on_driven = |push: &'_ Push| match push.on {
+        Opposite::Solid(k, row) if !scene.solids[k].is_free() => Some((*push, k, row)),
+        _ => None,
+    };
+    let pushes: Vec<(Push, usize, usize)> = pushes.iter().filter_map(on_driven).collect();
+    if pushes.is_empty() {
+        return Ok(vec![]);
+    }
+    let rows: Vec<usize> = pushes.iter().map(|&(_, k, row)| scene.solids[k].wall_slots.start + row).collect();
+    let mut taken: HashMap<(usize, usize), DVec3> = HashMap::new();
+    covered.iter().for_each(|c| *taken.entry((c.solid, c.row)).or_default() += c.area);
+    let force = |((push, k, row), told): ((Push, usize, usize), RowPressure)| {
+        let (solid, turn) = (&scene.solids[k], poses[k].orientation);
+        let bare = turn * solid.wall_area[row] - taken.get(&(k, row)).copied().unwrap_or_default();
+        let own = solid.wall_to_surface[row];
+        let normal = match own.length() < OF_ONE_FACE * params.spacing {
+            true => own.normalize_or_zero(),
+            false => face_before(own, turn.inverse() * push.area),
+        };
+        let is_box = solid.shape.as_cuboid().is_some();
+        let to_surface = turn * if is_box { own * normal.abs() } else { own };
+        let told = push.told_by(turn * normal, &told, to_surface, bare, params);
+        let force = push.pressure * push.area_on(turn * normal) - told;
+        let arm = params.periodic.nearest(push.at - poses[k].position);
+        (k, Wrench { force, torque: arm.cross(force) })
+    };
+    Ok(pushes.into_iter().zip(backend.wall_pressures(&rows)?).map(force).collect())
+}
+
 impl Simulation {
     /// Solids move as they would without the fluid's force in this step.
     pub(crate) fn move_solids(&mut self, step: &Step) -> Result<()> {
@@ -157,32 +201,8 @@ impl Simulation {
             forces.loads.into_iter().for_each(|(k, load)| sum[k] += load);
             pushes.extend(forces.pushes);
         }
-        let of_held = pushes.into_iter().filter_map(|push| match push.on {
-            Opposite::Solid(k, row) if !scene.solids[k].is_free() => Some((push, k, row)),
-            _ => None,
-        });
-        let of_held: Vec<(Push, usize, usize)> = of_held.collect();
-        let rows: Vec<usize> =
-            of_held.iter().map(|&(_, k, row)| scene.solids[k].wall_slots.start + row).collect();
-        let told = if rows.is_empty() { vec![] } else { backend.wall_pressures(&rows)? };
-        let mut taken: HashMap<(usize, usize), DVec3> = HashMap::new();
-        covered.iter().for_each(|c| *taken.entry((c.solid, c.row)).or_default() += c.area);
-        for ((push, k, row), told) in of_held.into_iter().zip(told) {
-            let (solid, turn) = (&scene.solids[k], poses[k].orientation);
-            let bare = turn * solid.wall_area[row] - taken.get(&(k, row)).copied().unwrap_or_default();
-            // A row at an edge of a box belongs to several faces.
-            let own = solid.wall_to_surface[row];
-            let normal = match own.length() < 0.6 * self.params.spacing {
-                true => own.normalize_or_zero(),
-                false => face_before(own, turn.inverse() * push.area),
-            };
-            let is_box = solid.shape.as_cuboid().is_some();
-            let to_surface = turn * if is_box { own * normal.abs() } else { own };
-            let told = push.told_by(turn * normal, &told, to_surface, bare, &self.params);
-            let force = push.pressure * push.area_on(turn * normal) - told;
-            let arm = self.params.periodic.nearest(push.at - poses[k].position);
-            sum[k] += Wrench { force, torque: arm.cross(force) };
-        }
+        let of_driven = on_driven(scene, &self.params, backend, poses, &covered, &pushes)?;
+        of_driven.into_iter().for_each(|(k, force)| sum[k] += force);
         Ok(sum)
     }
 

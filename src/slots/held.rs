@@ -4,7 +4,6 @@
 
 use super::{Faced, Field, Found, Layer, Opposite, Push, Slots, enclosed};
 use crate::body::{Pose, Wrench};
-use crate::contact::broad::meeting_images;
 use crate::cover::driven::Covered;
 use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
@@ -55,19 +54,10 @@ impl Held {
 impl Slots {
     /// The slots of solids that no force moves with the solids at `poses`, of which other solids cover what `covered` says.
     pub fn held(&self, poses: &[Pose], covered: &[Covered]) -> Held {
-        let boxes = self.boxes(poses);
-        let holds = |k: usize| self.layers[k].holds;
-        let mut others = vec![vec![]; boxes.len()];
-        for (a, b, turns) in meeting_images(&boxes, &self.periodic) {
-            if holds(a) && holds(b) {
-                others[a].push((b, self.periodic.way(turns)));
-                others[b].push((a, self.periodic.way(-turns)));
-            }
-        }
+        let others = self.others(poses, |a, b| a.holds && b.holds);
         let mut area = HashMap::new();
         let mut found = vec![];
-        for k in (0..boxes.len()).filter(|&k| holds(k)) {
-            let layer = &self.layers[k];
+        for (k, layer) in self.layers.iter().enumerate().take(others.len()).filter(|(_, layer)| layer.holds) {
             let at_walls = self.at_walls(layer, &poses[k], super::FACING.1 * self.spacing);
             if !at_walls && others[k].is_empty() {
                 continue;
@@ -77,7 +67,9 @@ impl Slots {
             let faced = if is_still { layer.faced.get_or_init(look).clone() } else { look() };
             let mut open = layer.area.clone();
             let to_frame = poses[k].orientation.inverse();
-            for c in covered.iter().filter(|c| c.solid == k) {
+            // They come in the order of solids.
+            let own = covered.partition_point(|c| c.solid < k)..covered.partition_point(|c| c.solid <= k);
+            for c in &covered[own] {
                 open[c.row] -= to_frame * if layer.bends[c.row] { c.within } else { c.area };
             }
             // What is left of a face that stands on another by round-off is nothing.

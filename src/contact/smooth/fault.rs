@@ -6,7 +6,7 @@ use super::pair::{Other, Pair};
 use super::walls::WallBox;
 use super::{STOP_DEPTH, Smooth};
 use crate::body::Body;
-use crate::contact::advice::SIZABLE;
+use crate::contact::advice::{CARRIED, SIZABLE};
 use crate::contact::candidates::reduced_mass;
 use crate::contact::law::{Fault, Now};
 use crate::contact::substeps::{Cut, Limits, MOST_SUBSTEPS};
@@ -24,8 +24,6 @@ const WAY: f64 = 0.5;
 const UNSEEN: f64 = 0.5;
 /// Depth over half of a solid's thickness that says nothing of two whose middles are in each other.
 const UNTOLD: f64 = 1e-3;
-/// Depth over the spacing, or over half of the thinner solid, for which a spring is named that carries a weight.
-const CARRIED: f64 = 0.1;
 /// Ways of a sub-step that are looked ahead for the stop: forces may add to the speed.
 const AHEAD: f64 = 1.5;
 

@@ -1,0 +1,123 @@
+//! The wall layer of a solid: which of its rows hang together, and what of them looks into a slot.
+
+use super::{CELL, Faced, Slot};
+use crate::body::Pose;
+use crate::contact::broad::{Bounds, PointGrid};
+use crate::scene::Solid;
+use crate::shape::{ADJACENT, bending};
+use glam::DVec3;
+use std::sync::{Arc, OnceLock};
+
+/// A solid's wall layer, in its frame.
+pub(super) struct Layer {
+    pub free: bool,
+    /// Whether no force moves it and its slots are told.
+    pub holds: bool,
+    pub still: bool,
+    /// Slot of its first row.
+    pub first: usize,
+    pub offset: Vec<DVec3>,
+    pub area: Vec<DVec3>,
+    pub to_surface: Vec<DVec3>,
+    pub radius: f64,
+    pub grid: PointGrid,
+    pub adjacent: Vec<Vec<u32>>,
+    /// Of one that holds, which rows lie where its surface bends.
+    pub bends: Vec<bool>,
+    /// Of one that never moves, how its rows lie before what never moves either.
+    pub faced: OnceLock<Arc<[Faced]>>,
+}
+
+impl Layer {
+    pub fn new(solid: &Solid, l0: f64, holds: bool) -> Self {
+        let free = solid.is_free();
+        let offset = solid.wall_offset.clone();
+        let grid = PointGrid::new(offset.clone(), CELL * l0);
+        let near = |(k, &x): (usize, &DVec3)| {
+            let mut found = vec![];
+            grid.near(x, ADJACENT * l0, |n| found.push(n));
+            found.retain(|&n| n as usize != k);
+            found
+        };
+        let adjacent = if free || holds { offset.iter().enumerate().map(near).collect() } else { Vec::new() };
+        Self {
+            free,
+            holds,
+            still: solid.is_still(),
+            bends: if holds { bending(&offset, &solid.wall_area, l0) } else { Vec::new() },
+            faced: OnceLock::new(),
+            first: solid.wall_slots.start,
+            radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
+            area: solid.wall_area.clone(),
+            to_surface: solid.wall_to_surface.clone(),
+            offset,
+            grid,
+            adjacent,
+        }
+    }
+
+    /// Slots whose rows hang together, by how much of each row lies in one: what lies in them, and their rims, which may
+    /// be empty.
+    pub fn slots(&self, solid: usize, shares: &[f64]) -> Vec<Slot> {
+        let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
+        let mut out = vec![];
+        for first in 0..shares.len() {
+            if std::mem::replace(&mut seen[first], true) {
+                continue;
+            }
+            let (mut rows, mut at) = (vec![first], 0);
+            while at < rows.len() {
+                for &m in &self.adjacent[rows[at]] {
+                    if !std::mem::replace(&mut seen[m as usize], true) {
+                        rows.push(m as usize);
+                    }
+                }
+                at += 1;
+            }
+            rows.sort_unstable();
+            let beside = rows.iter().flat_map(|&n| &self.adjacent[n]).map(|&m| m as usize);
+            let mut rim: Vec<usize> = beside.filter(|&m| shares[m] == 0.0).collect();
+            rim.sort_unstable();
+            rim.dedup();
+            let at_rim = |n: &usize| self.adjacent[*n].iter().any(|&m| shares[m as usize] == 0.0);
+            let mouth: Vec<usize> = rows.iter().copied().filter(at_rim).collect();
+            let edge = rim.iter().map(|&m| self.edge(m, &mouth)).collect();
+            let inside = rows.into_iter().map(|n| (n, shares[n])).collect();
+            out.push(Slot { solid, rim, edge, mouth, inside });
+        }
+        out
+    }
+
+    /// Where the slot ends before row `m` of its rim, on the surface of the rows at its `mouth`.
+    fn edge(&self, m: usize, mouth: &[usize]) -> DVec3 {
+        let beside = self.adjacent[m].iter().map(|&n| n as usize).filter(|n| mouth.binary_search(n).is_ok());
+        let (sum, count) = beside.fold((DVec3::ZERO, 0.0), |(sum, count), n| {
+            (sum + self.offset[n] + self.to_surface[n], count + 1.0)
+        });
+        sum / count
+    }
+
+    /// Of each row in `slot`, the part of its `area` (solid's frame) that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
+    /// is what looks as its neighbours deep in there do.
+    pub fn areas(&self, area: &[DVec3], slot: &Slot, pose: &Pose) -> Vec<DVec3> {
+        let area = |n: usize| pose.orientation * area[n];
+        let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
+        let is_deep = |n: &usize| slot.inside.binary_search_by_key(n, |row| row.0).is_ok() && !at_mouth(*n);
+        let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
+        let inwards = |n: usize| {
+            if !at_mouth(n) {
+                return area(n);
+            }
+            let near = self.adjacent[n].iter().map(|&m| m as usize).filter(is_deep);
+            let near: DVec3 = near.map(area).sum();
+            let way = if near == DVec3::ZERO { all } else { near }.normalize_or_zero();
+            area(n).dot(way).max(0.0) * way
+        };
+        slot.inside.iter().map(|row| inwards(row.0)).collect()
+    }
+
+    pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {
+        let reach = DVec3::splat(self.radius + margin);
+        (pose.position - reach, pose.position + reach)
+    }
+}
