@@ -234,9 +234,39 @@ pub enum FolderError {
     /// There is no run in it to go on with.
     #[error("{}", no_run(.0))]
     NoRun(PathBuf),
-    /// A file of it is shorter than when the run stopped.
-    #[error("{}: it is shorter than when the run stopped", .0.display())]
-    Shorter(PathBuf),
+    /// A file of it that the run goes on with is not there.
+    #[error("{} is gone, and the run was to go on with it: put it back, or start again with --force", .0.display())]
+    Gone(PathBuf),
+    /// A file of it was changed since the run stopped.
+    #[error(
+        "{}: since the run stopped somebody has changed it, {what}: put it back as it was (its first {bytes} bytes), or start \
+         again with --force", file.display()
+    )]
+    Edited {
+        /// The file.
+        file: PathBuf,
+        /// What is other than the run wrote it.
+        what: Edit,
+        /// Bytes that the run keeps of it.
+        bytes: u64,
+    },
+}
+
+/// What somebody has done to a file that a run goes on with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Edit {
+    /// Something at its end is missing.
+    #[error("it is shorter")]
+    Shorter,
+    /// Its start is another one.
+    #[error("it does not begin as the run wrote it")]
+    Start,
+    /// A line is where it was, but longer.
+    #[error("a line goes on where the run had written its last one")]
+    Line,
+    /// As long as before, with something else in it.
+    #[error("its lines are not those that the run wrote")]
+    Rows,
 }
 
 /// What the system says of the file or folder at `path`.

@@ -752,3 +752,45 @@ fn a_run_that_diverges_keeps_its_last_good_state() {
     let again = case.run("a", &["--resume"]);
     assert!(again.err.contains("--force") && !again.err.contains("run.from"), "{}", again.err);
 }
+
+#[test]
+fn a_table_that_was_edited_is_not_gone_on_with() {
+    let case = Case::new(&[], "cpu");
+    assert_eq!(case.run("whole", &[]).code, 0);
+    // Another digit somewhere in the second line.
+    let other = |text: &str| {
+        let line = text.find('\n').unwrap() + 1;
+        let at = line + text[line..].find(|c: char| c.is_ascii_digit()).unwrap();
+        let digit = if &text[at..=at] == "1" { "2" } else { "1" };
+        text[..at].to_owned() + digit + &text[at + 1..]
+    };
+    type Edit<'a> = &'a dyn Fn(&str) -> String;
+    let edits: [(&str, &str, Edit<'_>, &str); 7] = [
+        ("lines", "bodies.csv", &|text| text.replace('\n', "\r\n"), "it does not begin"),
+        ("header", "bodies.csv", &|text| text.replacen("time [s]", "time (s)", 1), "it does not begin"),
+        ("longer", "bodies.csv", &|text| text.replacen("\n", "\n ", 1), "a line goes on"),
+        ("value", "bodies.csv", &other, "its lines are not those"),
+        ("shorter", "bodies.csv", &|text| text[..text.len() - 1].to_owned(), "it is shorter"),
+        ("frames", "small.pvd", &|text| text.replace("fluid_0000", "fluid_0001"), "its lines are not those"),
+        ("gone", "monitors.csv", &|_| String::new(), "monitors.csv is gone"),
+    ];
+    for (name, file, edit, words) in edits {
+        assert_eq!(case.run(name, &["--steps", "20"]).code, 0);
+        let path = case.root(name).join(file);
+        let written = std::fs::read_to_string(&path).unwrap();
+        match edit(&written) {
+            none if none.is_empty() => std::fs::remove_file(&path).unwrap(),
+            edited => std::fs::write(&path, edited).unwrap(),
+        }
+        let told = case.run(name, &["--resume"]);
+        assert!(
+            told.code == 2 && told.err.contains(file) && told.err.contains(words),
+            "{name}: {}",
+            told.err
+        );
+        // What was told is done, and rows behind those that count do no harm.
+        std::fs::write(&path, written + "0.7,a").unwrap();
+        assert_eq!(case.run(name, &["--resume"]).code, 0, "{name}");
+        assert_same(&case.root("whole"), &case.root(name), name);
+    }
+}

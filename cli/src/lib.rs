@@ -229,6 +229,7 @@ fn hush_device_select() {
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     #[cfg(target_os = "linux")]
     hush_device_select();
+    signals::survive_limits();
     seixo::console::fit([width::of_stdout(), width::of_stderr()]);
     let args = match Args::try_parse_from(words) {
         Ok(args) => args,

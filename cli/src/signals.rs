@@ -60,15 +60,18 @@ pub fn watch(quiet: bool) -> Result<Stop> {
             .and_then(|_| signal_hook::flag::register_usize(signal, asked, signal as usize))
             .map_err(Error::io("signal handler"))?;
     }
-    // A file that may not grow is an error of the write and no end of the program.
-    #[cfg(unix)]
-    // SAFETY: the closure does nothing.
-    unsafe { signal_hook::low_level::register(signal_hook::consts::SIGXFSZ, || {}) }
-        .map_err(Error::io("signal handler"))?;
     if !quiet {
         tell(stop.clone());
     }
     Ok(stop)
+}
+
+/// From now on a file that comes to its limit (`ulimit -f`) is an error of the write, and no end of the program.
+pub fn survive_limits() {
+    // Where the system takes no handler it ends the program, as it would have.
+    #[cfg(unix)]
+    // SAFETY: the closure does nothing.
+    let _ = unsafe { signal_hook::low_level::register(signal_hook::consts::SIGXFSZ, || {}) };
 }
 
 /// Whether a signal at `now` [ms] is a second one, and not the first, nor that again; `first` holds when that came, 0 before.

@@ -20,6 +20,7 @@
 
 pub mod digits;
 pub mod folder;
+mod kept;
 pub mod label;
 pub mod lock;
 pub mod particles;

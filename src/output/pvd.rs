@@ -1,9 +1,10 @@
 //! The PVD file: which VTU files make up which moment.
 
+use super::kept::{Kept, reopen};
 use super::table::even;
 use super::write_whole;
 use crate::checkpoint::Archive;
-use crate::error::{Error, FolderError, Result};
+use crate::error::{Error, Result};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -18,33 +19,35 @@ const FOOT: &str = "  </Collection>\n</VTKFile>\n";
 pub struct Pvd {
     path: PathBuf,
     file: Option<File>,
-    /// Bytes before the end tags.
-    entries: u64,
+    /// What stands before the end tags.
+    entries: Kept,
 }
 
 impl Pvd {
     /// A list without frames; nothing is written yet.
     pub fn new(path: PathBuf) -> Self {
-        Self { path, file: None, entries: HEAD.len() as u64 }
+        Self { path, file: None, entries: Kept::of(HEAD.as_bytes()) }
     }
 
-    /// Save how long the list is, or cut the file back to what it was. `prefix` tells lists of one run apart.
+    /// Save how long the list is and what it holds, or cut the file back to what it was. `prefix` tells lists of one run
+    /// apart.
     ///
     /// # Errors
-    /// [`Error::Folder`] if the file is shorter than that, [`Error::Io`].
+    /// [`Error::Folder`] if the file is shorter than that or holds something else, [`Error::Io`].
     pub(crate) fn exchange(&mut self, prefix: &str, archive: &mut Archive) -> Result<()> {
         let Self { path, file, entries } = self;
-        archive.count(&format!("{prefix}pvd.bytes"), entries)?;
-        if archive.is_saving() || *entries <= HEAD.len() as u64 {
+        let due = entries.exchange(&format!("{prefix}pvd"), archive)?;
+        if archive.is_saving() || entries.bytes() <= HEAD.len() as u64 {
             return Ok(());
         }
+        let mut opened = reopen(path)?;
+        entries.found(&mut opened, path, HEAD.as_bytes(), due)?;
         let io = |e| Error::io(&*path)(e);
-        let mut opened = File::options().read(true).write(true).open(&*path).map_err(io)?;
-        if opened.metadata().map_err(io)?.len() < *entries {
-            return Err(FolderError::Shorter(path.to_path_buf()).into());
-        }
-        opened.seek(SeekFrom::Start(*entries)).and_then(|_| opened.write_all(FOOT.as_bytes())).map_err(io)?;
-        opened.set_len(*entries + FOOT.len() as u64).map_err(io)?;
+        opened
+            .seek(SeekFrom::Start(entries.bytes()))
+            .and_then(|_| opened.write_all(FOOT.as_bytes()))
+            .map_err(io)?;
+        opened.set_len(entries.bytes() + FOOT.len() as u64).map_err(io)?;
         *file = Some(opened);
         Ok(())
     }
@@ -63,9 +66,9 @@ impl Pvd {
             );
             writeln!(text, "{line}").expect("a String takes everything");
         }
-        let added = text.len() as u64;
+        let added = text.len();
         text.push_str(FOOT);
-        let at = self.entries;
+        let at = self.entries.bytes();
         let file = match &mut self.file {
             Some(file) => file,
             none => {
@@ -81,7 +84,7 @@ impl Pvd {
             let _ = file.set_len(at).and_then(|()| put(file, FOOT));
             return Err(Error::io(&self.path)(e));
         }
-        self.entries += added;
+        self.entries.add(&text.as_bytes()[..added]);
         Ok(())
     }
 }

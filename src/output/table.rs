@@ -1,7 +1,8 @@
 //! CSV tables: one header with units, then rows that reach the file whole.
 
+use super::kept::{Kept, reopen};
 use crate::checkpoint::Archive;
-use crate::error::{Error, FolderError, Result};
+use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -11,8 +12,10 @@ use std::path::{Path, PathBuf};
 pub struct Table {
     path: PathBuf,
     file: File,
-    /// Bytes of whole rows in the file.
-    whole: u64,
+    /// The first line.
+    head: Vec<u8>,
+    /// Whole rows in the file.
+    whole: Kept,
     columns: usize,
     pending: Vec<u8>,
 }
@@ -75,10 +78,10 @@ impl Table {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(path: &Path, header: &[String]) -> Result<Self> {
-        let file = File::create(path).map_err(Error::io(path))?;
-        let mut table =
-            Self { path: path.to_path_buf(), file, whole: 0, columns: header.len(), pending: Vec::new() };
-        table.push(header)?;
+        // A run that gives up a step reads what it keeps.
+        let opened = File::options().read(true).write(true).create(true).truncate(true).open(path);
+        let mut table = Self::of(path, opened.map_err(Error::io(path))?, header)?;
+        table.pending.clone_from(&table.head);
         table.flush()?;
         Ok(table)
     }
@@ -86,28 +89,36 @@ impl Table {
     /// The table of a run that goes on; its state says where.
     ///
     /// # Errors
-    /// [`Error::Io`] if there is none.
+    /// [`Error::Folder`] if there is none, [`Error::Io`].
     pub(crate) fn reopen(path: &Path, header: &[String]) -> Result<Self> {
-        let file = File::options().read(true).write(true).open(path).map_err(Error::io(path))?;
-        Ok(Self { path: path.to_path_buf(), file, whole: 0, columns: header.len(), pending: Vec::new() })
+        Self::of(path, reopen(path)?, header)
     }
 
-    /// Save how long the table is, once it has reached the disk, or cut it back to what it was.
+    fn of(path: &Path, file: File, header: &[String]) -> Result<Self> {
+        let (path, columns) = (path.to_path_buf(), header.len());
+        let mut table =
+            Self { path, file, head: Vec::new(), whole: Kept::default(), columns, pending: Vec::new() };
+        table.push(header)?;
+        table.head = std::mem::take(&mut table.pending);
+        Ok(table)
+    }
+
+    /// Save how long the table is and what it holds, once it has reached the disk, or cut it back to what it was.
     ///
     /// # Errors
-    /// [`Error::Folder`] if it is shorter than that, [`Error::Io`].
+    /// [`Error::Folder`] if it is shorter than that or holds something else, [`Error::Io`].
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
-        let Self { path, file, whole, columns: _, pending: _ } = self;
+        let Self { path, file, head, whole, columns: _, pending: _ } = self;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        archive.count(&format!("{name}.bytes"), whole)?;
+        let due = whole.exchange(&name, archive)?;
         let io = |e| Error::io(&*path)(e);
         if archive.is_saving() {
             return if archive.is_lasting() { file.sync_data().map_err(io) } else { Ok(()) };
         }
-        if file.metadata().map_err(io)?.len() < *whole {
-            return Err(FolderError::Shorter(path.to_path_buf()).into());
-        }
-        file.set_len(*whole).and_then(|()| file.seek(SeekFrom::Start(*whole)).map(|_| ())).map_err(io)
+        whole.found(file, path, head, due)?;
+        file.set_len(whole.bytes())
+            .and_then(|()| file.seek(SeekFrom::Start(whole.bytes())).map(|_| ()))
+            .map_err(io)
     }
 
     /// Add a row; it reaches the file with the next [`Table::flush`].
@@ -132,14 +143,13 @@ impl Table {
     /// [`Error::Io`], e.g. when the disk is full.
     pub fn flush(&mut self) -> Result<()> {
         let written = self.file.write_all(&self.pending);
-        let bytes = self.pending.len() as u64;
-        self.pending.clear();
         if written.is_ok() {
-            self.whole += bytes;
+            self.whole.add(&self.pending);
         } else {
             // What went wrong is told below; a file that cannot even be cut was none to begin with.
-            let _ = self.file.set_len(self.whole);
+            let _ = self.file.set_len(self.whole.bytes());
         }
+        self.pending.clear();
         written.map_err(Error::io(&self.path))
     }
 }
