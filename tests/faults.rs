@@ -131,6 +131,21 @@ fn water_that_a_piston_presses_out_of_a_full_tank_is_told_as_such() {
     );
 }
 
+#[test]
+fn a_typed_step_that_no_flow_takes_is_told_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("step.toml");
+    let text = "[run]\nspacing = 0.02\ntime_step = 1e4\nadaptive = true\nend = 2e4\ndimensions = 2\n\
+                [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.6]\n\
+                [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.1, 0.3]\n";
+    std::fs::write(&path, text).unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let ran = ran(&["run", path.to_str().unwrap(), "--backend", "cpu", "-q", "-o", &out]);
+    let words = ["where run.time_step is 1e4 s", "falls through a spacing in 6.4e-2 s"];
+    assert!(ran.code == 4 && words.iter().all(|w| ran.err.contains(w)), "{}: {}", ran.code, ran.err);
+    assert!(!ran.err.contains("no room left"), "{}", ran.err);
+}
+
 /// Walls that move give the water energy; a typed speed of sound, or an inflow without water yet, excuses nothing.
 #[test]
 fn a_verdict_knows_what_energy_a_scene_has_at_hand() {

@@ -94,6 +94,8 @@ fn a_time_that_is_far_from_all_frames_is_told() {
         let words = "note: no frame is at 5, 0.014 s (--times): the nearest is taken, at 0.03, 0.01 s";
         assert!(told.code == 0 && told.err.contains(words), "{args:?}: {}", told.err);
     }
+    let told = ran(&["measure", &out, "--point", "0.2,0.1,0.1", "--times", "-1,0"]);
+    assert!(told.code == 0 && told.err.contains("no frame is at -1 s (--times)"), "{}", told.err);
     let told = ran(&["measure", &out, "--point", "0.2,0.1,0.1", "--times", "0,0.0101,0.02"]);
     assert_eq!((told.code, told.err.as_str()), (0, ""));
     // A frame that is asked for twice is read once.

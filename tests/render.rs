@@ -130,6 +130,9 @@ fn what_cannot_be_drawn_is_refused_in_words() {
         (vec!["render", &shown, "--slice", "w=1"], "an axis and a place"),
         (vec!["render", &shown, "--range", "2,1"], "is to be larger"),
         (vec!["render", &shown, "--zoom", "nan"], "--zoom"),
+        (vec!["render", &shown, "--zoom", "-1"], "write a number from 0.01 to 1000"),
+        (vec!["surface", &shown, "--cell", "-1"], "write a number from 0.1 to 2"),
+        (vec!["render", &shown, "--times", "-1,x"], "not a number"),
         (vec!["render", &shown, "--elevation", "100"], "-90 to 90"),
     ] {
         let drawn = ran(&args);

@@ -140,6 +140,9 @@ fn what_cannot_be_is_refused() {
         assert!(said.contains(words), "{set}: `{words}` is not in {said}");
         assert!(!said.contains("0000000000"), "{said}");
     }
+    // A step that the flow may shorten is no longer than the run either.
+    let said = read(&["run.adaptive=true", "run.time_step=2.0"]).expect_err("refused");
+    assert!(said.contains("run.time_step: a step of 2 s is longer than the whole run of 1 s"), "{said}");
     let long = format!("fluid.preset={}", "a".repeat(5000));
     assert!(read(&[&long]).expect_err("refused").matches('a').count() < 2000);
 }

@@ -38,7 +38,7 @@ pub struct MeasureArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
     /// Only the frames nearest to these times [s], e.g. 0.5,1,1.5.
-    #[arg(long, value_name = "T,T,..", value_delimiter = ',', value_parser = finite, conflicts_with = "every")]
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite, conflicts_with = "every")]
     times: Vec<f64>,
     /// File for the table; it is printed if absent.
     #[arg(short, long, value_name = "FILE")]

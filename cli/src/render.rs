@@ -35,7 +35,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
     /// Only the frames nearest to these times [s], e.g. 0.5,1,1.5.
-    #[arg(long, value_name = "T,T,..", value_delimiter = ',', value_parser = super::finite, conflicts_with = "every")]
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = super::finite, conflicts_with = "every")]
     times: Vec<f64>,
     /// Put all pictures on one sheet, so many in a row: sheet.png.
     #[arg(long, value_name = "COLUMNS", value_parser = clap::value_parser!(u16).range(1..))]
@@ -61,7 +61,7 @@ pub struct LookArgs {
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = angle)]
     elevation: Option<f64>,
     /// Magnification.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = magnification)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = magnification)]
     zoom: f64,
     /// Point in the middle of the picture [m].
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point)]

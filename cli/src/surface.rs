@@ -27,10 +27,10 @@ pub struct SurfaceArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
     /// Only the frames nearest to these times [s], e.g. 0.5,1,1.5.
-    #[arg(long, value_name = "T,T,..", value_delimiter = ',', value_parser = finite, conflicts_with = "every")]
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite, conflicts_with = "every")]
     times: Vec<f64>,
     /// Edge of a cell of the grid that the surface is found on, over the particle spacing.
-    #[arg(long, value_name = "X", default_value_t = 0.5, value_parser = edge)]
+    #[arg(long, value_name = "X", default_value_t = 0.5, allow_negative_numbers = true, value_parser = edge)]
     cell: f64,
     /// Format of the files.
     #[arg(long, value_enum, default_value_t = Format::Ply)]

@@ -160,9 +160,7 @@ impl Checker<'_> {
         if run.from.as_deref() == Some("") {
             self.add("run.from", "it names nothing", "name the folder of a run, or leave it out");
         }
-        // The flow shortens an adaptive step; nothing else does.
-        let adapts = run.adaptive && self.case.fluid.is_some();
-        if run.time_step > run.end && run.end > 0.0 && run.time_step.is_finite() && !adapts {
+        if run.time_step > run.end && run.end > 0.0 && run.time_step.is_finite() {
             let message =
                 format!("a step of {} s is longer than the whole run of {} s", run.time_step, run.end);
             self.add("run.time_step", message, "use a smaller run.time_step or a larger run.end");

@@ -15,20 +15,36 @@ const LOOK_EVERY: u64 = 10;
 const LOST_MAX: f64 = 0.02;
 /// An adaptive step this much shorter than the typed one is that of a run that will not end.
 const SHORTEST_STEP: f64 = 1e-6;
+/// A typed step of so many times the fall through a spacing is far beyond what any flow leaves of it.
+const LONGEST_STEP: f64 = 1e3;
 
 impl Simulation {
     /// An error if a step has become so short that the run would not end.
     pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
-        if step.dt < SHORTEST_STEP * self.case.run.time_step {
-            let what = format!(
-                "the flow or a solid asks for steps of {:.1e} s, the run would not end; water that has no room left \
-                 (more of it in a closed tank than that holds, a piston into a part that is full) is pressed like \
-                 this: leave it a way out",
-                step.dt
-            );
-            return Err(self.diverged(step, Stage::Predict, what));
+        let typed = self.case.run.time_step;
+        if step.dt >= SHORTEST_STEP * typed {
+            return Ok(());
         }
-        Ok(())
+        let fall = self.fall_of_a_spacing();
+        let why = if typed > LONGEST_STEP * fall {
+            format!(
+                "no flow takes a step like that, water falls through a spacing in {fall:.1e} s: write no more than this"
+            )
+        } else {
+            "the run would not end; water that has no room left (more of it in a closed tank than that holds, a \
+             piston into a part that is full) is pressed like this: leave it a way out"
+                .to_owned()
+        };
+        let what = format!(
+            "the flow or a solid asks for steps of {:.1e} s where run.time_step is {typed:e} s; {why}",
+            step.dt
+        );
+        Err(self.diverged(step, Stage::Predict, what))
+    }
+
+    /// Time in which what is let go falls through a spacing [s]; without gravity no time is long.
+    fn fall_of_a_spacing(&self) -> f64 {
+        (2.0 * self.params.spacing / self.params.gravity.length()).sqrt()
     }
 
     /// A remedy for water that has been pressed through walls, if a solid is driven that may do so.

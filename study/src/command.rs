@@ -26,7 +26,7 @@ pub struct StudyArgs {
     #[arg(long)]
     pub full: bool,
     /// The error that you want to stay below, for the recommendation, e.g. 0.01.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = bound)]
     pub error: Option<f64>,
     /// Compute one part of the points, e.g. 2/8; `collect` joins them.
     #[arg(long, value_name = "I/N")]
@@ -46,6 +46,12 @@ pub struct StudyArgs {
     /// No progress on stderr.
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// An error to stay below.
+fn bound(text: &str) -> std::result::Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|x: &f64| *x > 0.0 && x.is_finite());
+    number.ok_or_else(|| "write a number of more than 0".into())
 }
 
 /// Run `args` until `stop` asks to end. Findings go to stdout, progress to stderr.
