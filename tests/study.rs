@@ -142,6 +142,10 @@ fn mistakes_are_told_before_anything_runs() {
     };
     mistake("key.toml", "run.spacing", "run.spacings");
     mistake("method.toml", "{preset}", "{nope}");
+    let results = "[[result]]\nname = \"r\"\ncurve = \"c\"\ntake = \"first_below\"\n";
+    mistake("level.toml", "[[error]]", &format!("{results}\n[[error]]"));
+    let check = "[[check]]\nname = \"c\"\nvalue = \"v\"\nreference = 1\ntolerance = 0.1\nwindow = [2, 1]\n";
+    mistake("window.toml", "[[error]]", &format!("{check}\n[[error]]"));
     mistake("from.toml", "end = 0.3", "end = 0.3\nfrom = \"out/earlier\"");
     for (arguments, expected) in [
         (&["hydrostatik"][..], "did you mean `hydrostatic`"),
@@ -151,8 +155,11 @@ fn mistakes_are_told_before_anything_runs() {
         (&["collect", "."][..], "holds no study"),
         (&["key.toml"][..], "the case of every point is refused"),
         (&["from.toml"][..], "run.from: a point of a study begins at t = 0"),
+        (&["level.toml"][..], "result.0.level: `take` asks for a `level`"),
+        (&["window.toml"][..], "window.toml:43:1"),
         (&["method.toml"][..], "method: there is no axis `nope`"),
         (&["gallery", "--set", "run.end=1"][..], "--set does not apply"),
+        (&["hydrostatic", "--error", "-1"][..], "write a number of more than 0"),
     ] {
         let (code, text) = run(folder.path(), arguments);
         assert_eq!(code, 2, "{arguments:?}: {text}");

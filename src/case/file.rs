@@ -9,6 +9,7 @@ use super::surplus::surplus;
 use super::values::from_table;
 use super::{Case, overrides};
 use crate::error::{CaseError, Error, Problem, Result};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -187,6 +188,25 @@ pub fn parse_as<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Resul
     from_table(&table).map_err(|e| wrong(explain(e.message(), e.span(), Some(table.get_ref()))))
 }
 
+/// `problem` with a key of such a file, as an error that shows where it stands; `name` and `text` as of [`parse_as`].
+pub fn located(name: &str, text: &str, problem: &Problem) -> Error {
+    let span = DeTable::parse(text).map_or(0..0, |table| span_of(&table, &problem.key));
+    let message = message_of(problem, span);
+    CaseError::new(vec![message.problem(name, text)], render(name, text, &[message])).into()
+}
+
+/// A problem that stands at `span`.
+fn message_of(p: &Problem, span: Range<usize>) -> Message {
+    Message {
+        span,
+        key: p.key.clone(),
+        title: format!("{}: {}", p.key, p.message),
+        label: p.message.clone(),
+        remedy: Some(p.remedy.clone()).filter(|r| !r.is_empty()),
+        warning: p.warning,
+    }
+}
+
 /// [`parse`], of a text that is `overridden` already, or not.
 fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec<String>)> {
     let wrong = |messages: &[Message]| {
@@ -206,14 +226,7 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
     }
     let mut case: Case =
         from_table(&table).map_err(|e| unread(explain(e.message(), e.span(), Some(table.get_ref()))))?;
-    let located = |p: &Problem| Message {
-        span: span_of(&table, &p.key),
-        key: p.key.clone(),
-        title: format!("{}: {}", p.key, p.message),
-        label: p.message.clone(),
-        remedy: Some(p.remedy.clone()),
-        warning: p.warning,
-    };
+    let located = |p: &Problem| message_of(p, span_of(&table, &p.key));
     let too_long = surplus(table.get_ref(), &case).into_iter().map(|s| {
         let message = format!("{} elements, of which only the first {} would be read", s.written, s.read);
         Problem::new(s.path, message, format!("write {} elements", s.read))

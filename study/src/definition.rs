@@ -31,8 +31,8 @@ pub use super::points::Setup;
 use super::result_number::ResultNumber;
 use super::row::{Class, Measured, Row};
 use super::validation::check::Check;
-use seixo::case::file::parse_as;
-use seixo::error::{Error, Result};
+use seixo::case::file::{located, parse_as};
+use seixo::error::{Error, Problem, Result};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -200,6 +200,30 @@ pub struct ErrorMeasure {
     pub name: Option<String>,
 }
 
+impl ErrorMeasure {
+    /// What is wrong with it, if anything, with the key in its table.
+    fn fault(&self) -> Option<Problem> {
+        match (&self.value, &self.curve, &self.against) {
+            (Some(_), None, None) | (None, Some(_), Some(_)) => None,
+            (None, None, _) => Some(Problem::new(
+                "value",
+                "an error is a value or of a curve",
+                "give `value`, or `curve` and `against`",
+            )),
+            (None, Some(_), None) => Some(Problem::new(
+                "against",
+                "a curve is no error by itself",
+                "give `against`: \"finest\", or a CSV file of two columns",
+            )),
+            (Some(_), ..) => Some(Problem::new(
+                "value",
+                "a value is an error by itself",
+                "leave out `curve` and `against`, or `value`",
+            )),
+        }
+    }
+}
+
 /// A file that a study refers to.
 pub type Files<'a> = dyn Fn(&str) -> Result<String> + 'a;
 
@@ -232,19 +256,23 @@ impl Definition {
         let wrong =
             |key: &str, what: &dyn std::fmt::Display| Error::file(name, key, format!("{name}: {what}"));
         let study: Self = parse_as(name, text)?;
-        for e in &study.error {
-            let whole =
-                matches!((&e.value, &e.curve, &e.against), (Some(_), None, None) | (None, Some(_), Some(_)));
-            if !whole {
-                return Err(wrong("error", &"error: give `value`, or `curve` and `against`"));
-            }
+        // What is wrong with the k-th table of its kind, where it stands.
+        let placed = |kind: &str, k: usize, problem: Problem| {
+            located(
+                name,
+                text,
+                &Problem::new(format!("{kind}.{k}.{}", problem.key), problem.message, problem.remedy),
+            )
+        };
+        for (k, e) in study.error.iter().enumerate() {
+            e.fault().map_or(Ok(()), |p| Err(placed("error", k, p)))?;
         }
-        for check in &study.check {
-            check.sound().map_err(|e| wrong("check", &e))?;
+        for (k, check) in study.check.iter().enumerate() {
+            let fault = check.fault().map_or_else(|| study.unreached(check), |p| Ok(Some(p)))?;
+            fault.map_or(Ok(()), |p| Err(placed("check", k, p)))?;
         }
-        study.reaches().map_err(|e| wrong("check.only", &e))?;
-        for result in &study.result {
-            result.sound().map_err(|e| wrong("result", &e))?;
+        for (k, result) in study.result.iter().enumerate() {
+            result.fault().map_or(Ok(()), |p| Err(placed("result", k, p)))?;
         }
         if study.error.is_empty() && study.check.is_empty() && study.result.is_empty() {
             return Err(wrong("error", &"give [[error]], [[result]] or [[check]]: what is to be found out"));
@@ -305,33 +333,30 @@ impl Definition {
         idle(&names, rows, |measured| measured.values.keys().map(String::as_str).collect(), told)
     }
 
-    /// Refuses a `[[check]]` that is for points that no grid has.
+    /// What is wrong with a `check` that is for points that no grid has.
     ///
     /// # Errors
-    /// [`Error::Case`] with the axes, or their values, that there are.
-    fn reaches(&self) -> Result<()> {
+    /// Axes that cannot be read.
+    fn unreached(&self, check: &Check) -> Result<Option<Problem>> {
         let axes: Vec<&Axis> = self.axis.iter().chain(self.grid.iter().flat_map(|g| &g.axis)).collect();
-        for check in &self.check {
-            for (name, value) in &check.only {
-                let picks = axes.iter().filter(|a| a.name == *name).map(|a| a.picks(true));
-                let values: Vec<String> =
-                    picks.collect::<Result<Vec<_>>>()?.concat().into_iter().map(|p| p.name).collect();
-                if values.contains(value) {
-                    continue;
-                }
-                let what = if values.is_empty() {
-                    let names: BTreeSet<&str> = axes.iter().map(|a| a.name.as_str()).collect();
-                    let names: Vec<&str> = names.into_iter().collect();
-                    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                    format!("there is no axis `{name}`; there are: {names}")
-                } else {
-                    format!("the axis `{name}` has no value \"{value}\"; it has: {}", values.join(", "))
-                };
-                let text = format!("check `{}`: only: {what}", check.name);
-                return Err(Error::key("check.only", text, "no point would be held against it"));
+        for (name, value) in &check.only {
+            let picks = axes.iter().filter(|a| a.name == *name).map(|a| a.picks(true));
+            let values: Vec<String> =
+                picks.collect::<Result<Vec<_>>>()?.concat().into_iter().map(|p| p.name).collect();
+            if values.contains(value) {
+                continue;
             }
+            let what = if values.is_empty() {
+                let names: BTreeSet<&str> = axes.iter().map(|a| a.name.as_str()).collect();
+                let names: Vec<&str> = names.into_iter().collect();
+                let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                format!("there is no axis `{name}`; there are: {names}")
+            } else {
+                format!("the axis `{name}` has no value \"{value}\"; it has: {}", values.join(", "))
+            };
+            return Ok(Some(Problem::new("only", what, "no point would be held against it")));
         }
-        Ok(())
+        Ok(None)
     }
 }
 

@@ -10,9 +10,8 @@
 
 use super::row::{Class, Measured};
 use super::validation::reduce::{Curve, Take, cut, prepared, reduce, reduce_bins};
-use seixo::error::{Error, Result};
+use seixo::error::{Error, Problem, Result};
 use serde::Deserialize;
-use std::cmp::Ordering;
 
 /// What is told.
 #[derive(Clone, Debug, Deserialize)]
@@ -39,39 +38,13 @@ pub struct ResultNumber {
 }
 
 impl ResultNumber {
-    /// What is wrong with it, if anything.
-    ///
-    /// # Errors
-    /// [`Error::Case`] naming it.
-    pub fn sound(&self) -> Result<()> {
+    /// What is wrong with it, if anything, with the key in its table.
+    pub fn fault(&self) -> Option<Problem> {
         if matches!(self.take, Take::Distance | Take::Lag) {
-            let text = format!("result `{}`: `take` asks for a second curve: that is a [[check]]", self.name);
-            return Err(Error::key("result", text, ""));
+            let remedy = "write a [[check]], which knows `against` and `behind`, or take something else";
+            return Some(Problem::new("take", "it asks for a second curve", remedy));
         }
-        let wrong = |what: &str, remedy: &str| {
-            Err(Error::key("result", format!("result `{}`: {what}", self.name), remedy))
-        };
-        let (levelled, passes) = match self.take {
-            Take::FirstAbove | Take::FirstBelow | Take::At => (true, false),
-            Take::Passage => (true, true),
-            _ => (false, false),
-        };
-        if levelled && !self.level.is_some_and(f64::is_finite) {
-            return wrong(
-                "`take` asks for a `level`",
-                "give `level`: the level that is crossed, or the time of `at`",
-            );
-        }
-        if passes && !self.to.is_some_and(f64::is_finite) {
-            return wrong("`take = \"passage\"` asks for a second level", "give `to`");
-        }
-        if !(self.smooth.is_finite() && self.smooth >= 0.0) {
-            return wrong("`smooth` is a width of time, 0 or more", "");
-        }
-        if self.window.is_some_and(|[from, to]| from.partial_cmp(&to) != Some(Ordering::Less)) {
-            return wrong("`window` ends before it begins", "give its first time, then its last");
-        }
-        Ok(())
+        self.take.fault([self.level, self.to], self.window, self.smooth)
     }
 
     /// Puts the number among what a run `measured`. A curve that is not there is a mistake of the study; what does not come to pass in
@@ -107,22 +80,23 @@ mod tests {
 
     #[test]
     fn what_a_number_asks_for_has_to_be_there() {
-        let sound = |more: &str| {
+        let fault = |more: &str| {
             let text = format!("name = \"n\"\ncurve = \"c\"\n{more}");
-            toml::from_str::<ResultNumber>(&text).expect("it reads").sound().map_err(|e| e.to_string())
+            toml::from_str::<ResultNumber>(&text).expect("it reads").fault()
         };
-        for (more, word) in [
+        for (more, key) in [
             ("take = \"first_below\"", "level"),
             ("take = \"at\"", "level"),
-            ("take = \"passage\"\nlevel = 1", "second level"),
+            ("take = \"passage\"\nlevel = 1", "to"),
             ("take = \"mean\"\nwindow = [0.3, 0.1]", "window"),
             ("take = \"mean\"\nsmooth = -1", "smooth"),
+            ("take = \"lag\"", "take"),
         ] {
-            let told = sound(more).expect_err(more);
-            assert!(told.contains("result `n`") && told.contains(word), "{more}: {told}");
+            let told = fault(more).expect(more);
+            assert!(told.key == key && !told.remedy.is_empty(), "{more}: {told:?}");
         }
         for more in ["take = \"mean\"", "take = \"at\"\nlevel = 0", "take = \"passage\"\nlevel = 1\nto = 2"] {
-            assert!(sound(more).is_ok(), "{more}");
+            assert!(fault(more).is_none(), "{more}");
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::compare::within;
 use crate::definition::Files;
 use crate::engine::first_line;
 use crate::row::{Class, Measured};
-use seixo::error::{Error, Result};
+use seixo::error::{Error, Problem, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -47,11 +47,9 @@ pub struct Check {
     #[serde(default)]
     pub smooth: f64,
     /// Level or time that `take` asks for.
-    #[serde(default)]
-    pub level: f64,
+    pub level: Option<f64>,
     /// Second level, of `passage`.
-    #[serde(default)]
-    pub to: f64,
+    pub to: Option<f64>,
     /// Added to the measured curve.
     #[serde(default)]
     pub plus: f64,
@@ -185,40 +183,48 @@ impl Check {
         }
     }
 
-    /// What is wrong with it, if anything.
-    ///
-    /// # Errors
-    /// [`Error::Case`] naming the check.
-    pub fn sound(&self) -> Result<()> {
-        let wrong = |what: &str| Err(Error::key("check", format!("check `{}`: {what}", self.name), ""));
+    /// What is wrong with it, if anything, with the key in its table.
+    pub fn fault(&self) -> Option<Problem> {
+        let wrong = |key: &str, what: &str, remedy: &str| Some(Problem::new(key, what, remedy));
         if self.value.is_some() == self.curve.is_some() {
-            return wrong("give `value` or `curve`, one of them");
+            return wrong(
+                "value",
+                "a check is of a value or of a curve",
+                "give `value` or `curve`, one of them",
+            );
         }
         if self.reference.is_some() == self.against.is_some() {
-            return wrong("give `reference` or `against`, one of them");
+            let remedy = "give `reference` or `against`, one of them";
+            return wrong("reference", "a check is against a number or a curve", remedy);
         }
         if (self.take == Take::Lag) != self.behind.is_some() {
-            return wrong("`take = \"lag\"` and `behind` go together: the curve that comes first");
+            let remedy = "give both, or neither: `behind` is the curve that comes first";
+            return wrong("behind", "`take = \"lag\"` and `behind` go together", remedy);
         }
         if self.take == Take::Lag && self.reference.is_none() {
-            return wrong("a lag needs a `reference`");
+            return wrong("reference", "a lag is held against a number", "give `reference` [s]");
         }
         if self.take == Take::Lag && self.since_moved.is_some() {
-            return wrong("`since_moved` would shift one curve of a lag and not the other: leave it out");
+            return wrong(
+                "since_moved",
+                "it would shift one curve of a lag and not the other",
+                "leave it out",
+            );
         }
         if self.value.is_some() && self.against.is_some() {
-            return wrong("`against` needs a `curve`");
+            return wrong("against", "a value is no curve", "give `curve`, or `reference`");
         }
         if self.curve.is_some() && self.take == Take::Distance && self.against.is_none() {
-            return wrong("give `take`, or a curve to compare with as `against`");
+            let remedy = "give `take`, or a curve to compare with as `against`";
+            return wrong("take", "nothing says which number of the curve counts", remedy);
         }
         if self.reference == Some(0.0) && self.per.is_none() {
-            return wrong("the reference is 0: give `per`, what the error is divided by");
+            return wrong("per", "the reference is 0", "give `per`, what the error is divided by");
         }
         if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
-            return wrong("`tolerance` must be more than 0");
+            return wrong("tolerance", "no error would be within it", "use a number of more than 0");
         }
-        Ok(())
+        self.take.fault([self.level, self.to], self.window, self.smooth)
     }
 
     /// Whether it is for a point with `parameters`.
@@ -246,6 +252,10 @@ impl Check {
         prepared(curve, self.since_moved, self.smooth)
     }
 
+    fn levels(&self) -> [f64; 2] {
+        [self.level, self.to].map(Option::unwrap_or_default)
+    }
+
     /// The number of a curve that is prepared, against that of the reference.
     fn of_curve(&self, curve: &[[f64; 2]], is_profile: bool, reference: &Reference) -> Option<Verdict> {
         let expected = reference.curve.as_ref().map(|c| cut(c, self.window));
@@ -261,9 +271,9 @@ impl Check {
             });
         }
         let reduced = if is_profile { reduce_bins } else { reduce };
-        let result = reduced(self.take, &cut(curve, self.window), [self.level, self.to])?;
+        let result = reduced(self.take, &cut(curve, self.window), self.levels())?;
         let expected = match expected {
-            Some(curve) => reduce(self.take, &smooth(&curve, self.smooth), [self.level, self.to])?,
+            Some(curve) => reduce(self.take, &smooth(&curve, self.smooth), self.levels())?,
             None => self.reference?,
         };
         self.of_numbers(result, expected)
@@ -298,9 +308,7 @@ impl Check {
             return self.of_curve(curve, false, reference);
         }
         let expected = match &reference.curve {
-            Some(curve) => {
-                reduce(self.take, &smooth(&cut(curve, self.window), self.smooth), [self.level, self.to])?
-            }
+            Some(curve) => reduce(self.take, &smooth(&cut(curve, self.window), self.smooth), self.levels())?,
             None => self.reference?,
         };
         self.of_numbers(self.peers[k].value?, expected)
@@ -328,7 +336,7 @@ mod tests {
             "name = 'n'\ncurve = 'c'\ntake = 'largest'\nplus = 1\ntimes = 2\nagainst = 'f'\ncolumns = ['t', 'b']\n\
              tolerance = 0.1\npeers = [{ name = 'they', value = 8 }, { name = 'others', against = 'f', columns = ['t', 'a'] }]",
         );
-        check.sound().unwrap();
+        assert_eq!(check.fault(), None);
         let files = |_: &str| Ok("# source\nt,a,b\n0,1,2\n1,5,4\n2,0,0\n".to_string());
         let reference = check.read(&files).unwrap();
         let verdict = check.judge(&run(&[[0.0, 0.0], [1.0, 1.5], [2.0, 0.0]]), &reference).unwrap();
@@ -363,16 +371,16 @@ mod tests {
             whole.replace("value", "curve"),
             whole.replace("0.1", "0"),
         ] {
-            assert!(check(&wrong).sound().is_err(), "{wrong}");
+            assert!(check(&wrong).fault().is_some(), "{wrong}");
         }
         let lag = "name = 'n'\ncurve = 'c'\ntake = 'lag'\nbehind = 'd'\nreference = 1\ntolerance = 0.1\n";
-        assert!(check(lag).sound().is_ok());
-        assert!(
-            check(&format!("{lag}since_moved = 0.1"))
-                .sound()
-                .unwrap_err()
-                .to_string()
-                .contains("since_moved")
-        );
+        assert!(check(lag).fault().is_none());
+        for (more, key) in
+            [("since_moved = 0.1", "since_moved"), ("window = [1, 1]", "window"), ("smooth = nan", "smooth")]
+        {
+            assert_eq!(check(&format!("{lag}{more}")).fault().unwrap().key, key);
+        }
+        let at = "name = 'n'\ncurve = 'c'\ntake = 'at'\nreference = 1\ntolerance = 0.1\n";
+        assert_eq!(check(at).fault().unwrap().key, "level");
     }
 }

@@ -1,7 +1,9 @@
 //! A curve as one number: what a measured and a reference curve are compared by.
 
 use crate::time_mean::{deviation, mean};
+use seixo::error::Problem;
 use serde::Deserialize;
+use std::cmp::Ordering;
 
 /// What is taken from a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -45,6 +47,37 @@ pub enum Take {
     /// Last amplitude over the first, to the power of one over the periods between: what a period leaves of the
     /// amplitude.
     Decay,
+}
+
+impl Take {
+    /// What is wrong with the keys that say how a number is taken, if anything, with the key in their table.
+    pub fn fault(
+        self,
+        [level, to]: [Option<f64>; 2],
+        window: Option<[f64; 2]>,
+        smooth: f64,
+    ) -> Option<Problem> {
+        let wrong = |key: &str, what: &str, remedy: &str| Some(Problem::new(key, what, remedy));
+        let (levelled, passes) = match self {
+            Self::FirstAbove | Self::FirstBelow | Self::At => (true, false),
+            Self::Passage => (true, true),
+            _ => (false, false),
+        };
+        if levelled && !level.is_some_and(f64::is_finite) {
+            let remedy = "give `level`: the level that is crossed, or the time of `at`";
+            return wrong("level", "`take` asks for a `level`", remedy);
+        }
+        if passes && !to.is_some_and(f64::is_finite) {
+            return wrong("to", "`take = \"passage\"` asks for a second level", "give `to`");
+        }
+        if !(smooth.is_finite() && smooth >= 0.0) {
+            return wrong("smooth", "it is a width of time", "use 0 or more, in seconds");
+        }
+        if window.is_some_and(|[from, to]| from.partial_cmp(&to) != Some(Ordering::Less)) {
+            return wrong("window", "it ends before it begins", "give its first time, then its last");
+        }
+        None
+    }
 }
 
 /// A curve: time or place against a value. A row whose value is no number is a gap.
