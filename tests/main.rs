@@ -46,6 +46,7 @@ mod measure;
 mod meshes;
 mod motion_file;
 mod openings;
+mod openings_covered;
 mod output;
 mod output_fields;
 mod packages;

@@ -426,9 +426,17 @@ fn what_is_wrong_with_a_file_is_said_with_the_key_and_the_place() {
     let nested: Triangles = solid.iter().copied().chain(beside(0.05, 0.1)).collect();
     let mut inside_out = overlapping[..12].to_vec();
     inside_out.extend(beside(0.3, 0.1).map(|[a, b, c]| [a, c, b]));
+    let twice: Triangles = solid.iter().copied().chain([solid[4]]).collect();
+    // With a face in common, and with an edge.
+    let next = |off: DVec3| solid.iter().map(move |t| t.map(|v| v + off));
+    let face: Triangles = solid.iter().copied().chain(next(0.2 * DVec3::X)).collect();
+    let edge: Triangles = solid.iter().copied().chain(next(DVec3::new(0.2, 0.2, 0.0))).collect();
     for (name, text, key, parts) in [
         ("open.stl", stl(&open), "body.0.file", &["open", "3 edges", "triangle", "watertight"][..]),
         ("turned.stl", stl(&turned), "body.0.file", &["triangles", "and 4", "opposite ways"]),
+        ("twice.stl", stl(&twice), "body.0.file", &["5 and 13", "same corners", "remove the duplicate"]),
+        ("face.stl", stl(&face), "body.0.file", &["triangles", "unite the parts"]),
+        ("edge.stl", stl(&edge), "body.0.file", &["of 4 that meet in one edge", "unite the parts"]),
         ("thin.stl", stl(&thin), "body.0.file", &["1.00e-2 m thin", "run.spacing"]),
         ("huge.stl", stl(&huge), "body.0.scale", &["100 m long", "millimetres", "scale = 0.001"]),
         ("overlapping.stl", stl(&overlapping), "body.0.file", &["lie in each other", "m3 count twice"]),
@@ -534,6 +542,29 @@ fn coordinates_of_a_site_are_read_to_their_last_digit() {
         let told = notes.iter().any(|n| n.contains("binary.stl") && n.contains("steps of 6.5e-1 m"));
         assert_eq!(told, noted, "{notes:?}");
     }
+}
+
+#[test]
+fn a_file_that_its_steps_spoil_is_refused_with_them_and_gauges_on_it_with_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let away = DVec3::new(453_123.0, 5_412_345.0, 12.0);
+    let there: Triangles = cuboid(DVec3::splat(0.2)).into_iter().map(|t| t.map(|v| v + away)).collect();
+    let path = file(&folder, "binary.stl", "");
+    std::fs::write(&path, binary(b"made by hand", &there)).expect("written");
+    let text = format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\n\
+         [tank]\nmin = [453123, 5412345, 12]\nmax = [453124, 5412346, 13]\n\
+         [fluid]\n[[fluid.block]]\nmin = [453123, 5412345, 12]\nmax = [453124, 5412346, 12.5]\n\
+         [[obstacle]]\nname = \"it\"\nshape = \"mesh\"\nfile = \"{path}\"\n\
+         [gauge]\nevery = 0.1\n[[gauge.pressure]]\nname = \"p\"\npoint = [453123.1, 5412345.1, 12.2]\n"
+    );
+    let Err(Error::Case(why)) = Scene::build(&case(&text)) else { panic!("expected a refusal") };
+    assert_eq!(why.problems.len(), 1, "{why}");
+    let problem = &why.problems[0];
+    assert_eq!(problem.key, "obstacle.0.file");
+    let starts =
+        "a binary STL file has single precision, steps of 6.5e-1 m at its coordinates of up to 5412345 m";
+    assert!(problem.remedy.starts_with(starts) && problem.remedy.contains("even so"), "{}", problem.remedy);
 }
 
 #[test]

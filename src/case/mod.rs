@@ -12,6 +12,7 @@ mod check_geometry;
 mod check_motion;
 mod check_slips;
 mod check_solids;
+mod coarse;
 mod contact;
 mod copies;
 pub mod file;
@@ -34,6 +35,7 @@ mod water;
 mod wave;
 
 pub use absorber::Absorber;
+pub(crate) use coarse::coarse;
 pub use contact::{Contact, ContactDevice, ContactPair, Law};
 pub use copies::{Array, Written};
 pub use fluid::{Block, Fluid, Preconditioner, Preset, Solver};

@@ -1,6 +1,8 @@
 //! Shapes that a solid may have: the keys that each needs and what it makes of them. With the shape's own file and its
 //! arm in `src/shape` all that a new one takes.
 
+#[cfg(feature = "mesh")]
+use super::coarse::refused;
 use super::section::flaw;
 use super::{Body, Freedom, MovingWall, Obstacle, Tank, Turn, Vector};
 use crate::error::Problem;
@@ -351,9 +353,11 @@ impl Form<'_> {
                 let height = self.height.unwrap_or_default();
                 return Ok(Shape::Mesh(Mesh::prism(section, height).map_err(unfit("section"))?));
             }
-            BodyShape::Terrain => Mesh::terrain(path, scale, spacing).map_err(unfit("file"))?,
-            _ => Mesh::open(path, scale).map_err(unfit("file"))?,
+            BodyShape::Terrain => Mesh::terrain(path, scale, spacing),
+            _ => Mesh::open(path, scale),
         };
+        let mesh =
+            mesh.map_err(|e| refused(e, Mesh::steps_of_file(path, scale), spacing)).map_err(unfit("file"))?;
         let size = mesh.size().max_element();
         if self.scale.is_none() && size > self.large {
             let message = format!("{path}: it would be {size} m long: are its lengths millimetres?");

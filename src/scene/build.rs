@@ -82,6 +82,8 @@ pub(super) struct Builder<'a> {
     pub(super) water: Water,
     pub(super) depth: f64,
     pub(super) filled: bool,
+    /// Whether a wall of the case could not be built: of gauges nothing is said then, for they may be on it.
+    pub(super) lacks_walls: bool,
     pub(super) notes: Vec<String>,
     pub(super) problems: Vec<Problem>,
 }
@@ -132,6 +134,7 @@ impl<'a> Builder<'a> {
             water: Water::default(),
             depth: 0.0,
             filled: false,
+            lacks_walls: false,
             notes: Vec::new(),
             problems: Vec::new(),
         })
@@ -438,7 +441,8 @@ impl<'a> Builder<'a> {
             let remedy = "move the point onto a wall; where water comes in or goes out there is none";
             Some(Problem::new(key, message, remedy))
         };
-        let problems: Vec<Problem> = self.case.gauge.pressure.iter().enumerate().filter_map(wrong).collect();
+        let gauges = self.case.gauge.pressure.iter().enumerate().filter(|_| !self.lacks_walls);
+        let problems: Vec<Problem> = gauges.filter_map(wrong).collect();
         self.problems.extend(problems);
     }
 }

@@ -7,6 +7,7 @@ use super::water::around;
 use super::{Passes, Solid};
 use crate::case::HURRY;
 use glam::{DVec3, IVec3};
+use std::collections::HashSet;
 
 /// Levels that are tried.
 const LEVELS: u32 = 100;
@@ -73,7 +74,7 @@ impl Builder<'_> {
             .openings
             .iter()
             .map(|planned| {
-                let (lo, hi) = (self.lattice.corner(planned.cells.lo), self.lattice.corner(planned.cells.hi));
+                let (lo, hi) = (self.lattice.corner(planned.ends.lo), self.lattice.corner(planned.ends.hi));
                 let (bottom, top) = (DVec3::select(falls, hi, lo), DVec3::select(falls, lo, hi));
                 let edges = [bottom, top].map(|x| (deepest - x.clamp(low, high)).dot(down));
                 let sill = self.sill(planned, tank, |c| (deepest - self.lattice.center(c)).dot(down));
@@ -161,12 +162,12 @@ impl Builder<'_> {
         };
         let before = |planned: &Planned| {
             let out = planned.opening.outward.as_ivec3();
-            Cells { lo: planned.cells.lo - out, hi: planned.cells.hi - out }
+            planned.cells.iter().map(|c| c - out).collect::<Vec<_>>()
         };
-        let there = before(outflow);
+        let there: HashSet<IVec3> = before(outflow).into_iter().collect();
         let sill = |inflow: &Planned| {
             let ways = self.lattice.ways();
-            self.grid.lowest_way(before(inflow).iter(), ways, rank, |c| there.contains(c))
+            self.grid.lowest_way(before(inflow).into_iter(), ways, rank, |c| there.contains(&c))
         };
         let inflows = self.openings.iter().filter(|o| o.opening.is_inflow());
         // The upper side of the cell.

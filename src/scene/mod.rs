@@ -15,6 +15,7 @@ mod bodies;
 mod boxes;
 mod build;
 mod cavities;
+mod covered;
 mod curve;
 mod displaced;
 mod domain;

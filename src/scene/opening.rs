@@ -1,6 +1,7 @@
 //! Openings of the tank: where they are, what moves in them, and how much water may pass.
 
 use super::build::{AXES, Builder};
+use super::covered::Covers;
 use super::lattice::{BLOCKED, Cells, SOLID};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{HURRY, OpeningKeys, Rate, TANK_FACES, room_behind, stands_for};
@@ -109,7 +110,9 @@ impl Opening {
 pub(super) struct Planned {
     pub opening: Opening,
     /// Cells of the tank's wall layer that it takes.
-    pub cells: Cells,
+    pub cells: Vec<IVec3>,
+    /// The box around them.
+    pub ends: Cells,
     /// Place of its wall among the moving walls.
     pub wall: Option<usize>,
 }
@@ -117,7 +120,8 @@ pub(super) struct Planned {
 impl Builder<'_> {
     /// Takes the cells of the openings out of the tank's wall, before that is built.
     pub(super) fn carve(&mut self) {
-        let Some(tank) = self.tank else { return };
+        let Some(tank) = self.tank.filter(|_| self.case.openings().next().is_some()) else { return };
+        let covers = Covers::of(self.case, &self.lattice, self.layers);
         for keys in self.case.openings() {
             let (axis, side) = keys.side();
             let mut cells = tank;
@@ -136,14 +140,19 @@ impl Builder<'_> {
                 self.problems.push(Problem::new(format!("{path}.min"), message, remedy));
                 continue;
             }
-            if let Some(other) = self.openings.iter().find(|o| overlap(o.cells, cells)) {
+            if let Some(other) = self.openings.iter().find(|o| o.cells.iter().any(|c| cells.contains(*c))) {
                 let message = format!("{} `{}` overlaps `{}`", keys.key, keys.name, other.opening.name);
                 self.problems.push(Problem::new(path, message, "move one of them, or make it smaller"));
                 continue;
             }
             self.rounded_opening(&keys, cells, axis);
             self.not_measured(&keys);
-            let planned = self.plan_opening(&keys, cells, (axis, side));
+            let out = IVec3::AXES[axis] * if side == 0 { -1 } else { 1 };
+            let Some(left) = self.uncovered(&keys, cells, out, &covers) else { continue };
+            let planned = self.plan_opening(&keys, left, (axis, side));
+            if planned.opening.layer < cells.iter().count() {
+                self.hurries(&keys, planned.opening.fastest(0.0, self.case.run.end));
+            }
             self.openings.push(planned);
         }
         for planned in &self.openings {
@@ -152,11 +161,12 @@ impl Builder<'_> {
             let hole = planned.opening.solid.is_none();
             let sideways = self.lattice.step(1) * (IVec3::ONE - out.abs());
             for depth in 0..self.layers {
-                let shift = depth * out;
-                let cells = Cells { lo: planned.cells.lo + shift, hi: planned.cells.hi + shift };
-                let cells = if hole { cells.grown(depth * sideways) } else { cells };
                 let state = if hole { BLOCKED } else { SOLID };
-                cells.iter().for_each(|c| self.grid.set(c, state));
+                for c in planned.cells.iter().map(|c| c + depth * out) {
+                    let rim = if hole { depth * sideways } else { IVec3::ZERO };
+                    let cells = Cells { lo: c, hi: c + 1 }.grown(rim);
+                    cells.iter().for_each(|c| self.grid.set(c, state));
+                }
             }
         }
     }
@@ -191,9 +201,16 @@ impl Builder<'_> {
         }
     }
 
-    fn plan_opening(&mut self, keys: &OpeningKeys, cells: Cells, (axis, side): (usize, usize)) -> Planned {
+    fn plan_opening(
+        &mut self,
+        keys: &OpeningKeys,
+        cells: Vec<IVec3>,
+        (axis, side): (usize, usize),
+    ) -> Planned {
         let l0 = self.lattice.spacing;
-        let layer = cells.iter().count();
+        let layer = cells.len();
+        let ends = cells.iter().map(|&c| Cells { lo: c, hi: c + 1 }).reduce(Cells::union);
+        let ends = ends.unwrap_or(Cells { lo: IVec3::ZERO, hi: IVec3::ZERO });
         let area = layer as f64 * l0 * l0;
         // A discharge in two dimensions is that of a metre across, of which the slice is l0 wide.
         let across = if self.lattice.plane { l0 } else { 1.0 };
@@ -207,7 +224,7 @@ impl Builder<'_> {
         };
         let mut outward = DVec3::ZERO;
         outward[axis] = if side == 0 { -1.0 } else { 1.0 };
-        let (lo, hi) = (self.lattice.corner(cells.lo), self.lattice.corner(cells.hi));
+        let (lo, hi) = (self.lattice.corner(ends.lo), self.lattice.corner(ends.hi));
         let face = if side == 0 { hi } else { lo };
         // From the face on so deep, and so much wider than the opening.
         let box_behind = |deep: f64, wider: f64| {
@@ -224,8 +241,7 @@ impl Builder<'_> {
             (low, high)
         };
         let (behind, room) = if passes == Passes::Free {
-            let guided =
-                |k: usize| self.tank.is_some_and(|t| (t.lo[k], t.hi[k]) == (cells.lo[k], cells.hi[k]));
+            let guided = |k: usize| self.tank.is_some_and(|t| (t.lo[k], t.hi[k]) == (ends.lo[k], ends.hi[k]));
             let aside = (0..3).filter(|&k| k != axis && !(self.lattice.plane && k == 1));
             let (deep, wider) = room_behind(aside.map(|k| (hi[k] - lo[k], guided(k), self.gravity()[k])), l0);
             // No step takes water through what is behind the room.
@@ -247,7 +263,7 @@ impl Builder<'_> {
             area,
             layer,
             wet: 0,
-            lid: if is_hole { cells.iter().map(|c| self.lattice.center(c)).collect() } else { vec![] },
+            lid: if is_hole { cells.iter().map(|&c| self.lattice.center(c)).collect() } else { vec![] },
         };
         let mut wall = None;
         if !is_hole {
@@ -255,7 +271,7 @@ impl Builder<'_> {
             // Counted from the bodies' end in `number_openings`.
             opening.solid = wall;
         }
-        Planned { opening, cells, wall }
+        Planned { opening, cells, ends, wall }
     }
 
     /// The walls that move in the openings, as solids that stand still; after all others. Laws of particles press on them, `smooth` on the tank's
@@ -271,8 +287,8 @@ impl Builder<'_> {
             // A wall that moves in leaves up to a spacing behind itself.
             let deep = layers + i32::from(opening.is_inflow());
             let last = (layers - 1) * out;
-            let lo = lattice.corner(planned.cells.lo + last.min(IVec3::ZERO));
-            let hi = lattice.corner(planned.cells.hi + last.max(IVec3::ZERO));
+            let lo = lattice.corner(planned.ends.lo + last.min(IVec3::ZERO));
+            let hi = lattice.corner(planned.ends.hi + last.max(IVec3::ZERO));
             let position = 0.5 * (lo + hi);
             let offset =
                 |depth: i32| planned.cells.iter().map(move |c| lattice.center(c + depth * out) - position);
@@ -309,7 +325,7 @@ impl Builder<'_> {
             let out = planned.opening.outward.as_ivec3();
             Opening {
                 solid: planned.wall.map(|k| self.bodies.len() + k),
-                wet: planned.cells.iter().filter(|&c| water.contains(&(c - out))).count(),
+                wet: planned.cells.iter().filter(|c| water.contains(&(*c - out))).count(),
                 ..planned.opening.clone()
             }
         };
@@ -362,10 +378,6 @@ impl Builder<'_> {
         self.notes.push(format!("water: {there} particles at the start, room for {room} more that come in"));
         room
     }
-}
-
-fn overlap(a: Cells, b: Cells) -> bool {
-    a.lo.cmplt(b.hi).all() && b.lo.cmplt(a.hi).all()
 }
 
 #[cfg(test)]

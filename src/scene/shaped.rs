@@ -5,14 +5,12 @@ use super::oriented::Placed;
 use super::placement::point;
 use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
-use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall};
+use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall, coarse};
 use crate::error::Problem;
 use crate::shape::{Particles, PointCells, bending};
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
-/// Steps of a file's coordinates over the spacing that are worth a word [-].
-const COARSE: f64 = 1e-3;
 /// Distances before a face, over l0, at which a point that lies in a solid tells that no water stands between: nearly at the face, where a solid ends
 /// in a wedge, and half a particle away, where it stands a little off the lattice.
 pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
@@ -75,6 +73,11 @@ fn walls(case: &Case) -> Vec<(String, bool, Result<Solid, Box<Problem>>)> {
     shaped.collect()
 }
 
+/// Those of them that are fixed and can be built.
+pub(super) fn fixed(case: &Case) -> impl Iterator<Item = Solid> {
+    walls(case).into_iter().filter(|wall| wall.1).filter_map(|wall| wall.2.ok())
+}
+
 /// Corners of the boxes around all of them [m]; what cannot be read is reported where it is built.
 pub(super) fn boxes(case: &Case) -> Vec<(Vector, Vector)> {
     let around = |solid: Solid| {
@@ -102,6 +105,7 @@ impl Builder<'_> {
                 Err(problem) => {
                     let key = format!("{key}.{}", problem.key);
                     self.problems.push(Problem { key, ..*problem });
+                    self.lacks_walls = true;
                     continue;
                 }
             };
@@ -161,6 +165,7 @@ impl Builder<'_> {
                 format!("{label}: nothing of it stands free, its middle is at {}", point(solid.position));
             let remedy = "it lies beyond the tank's walls or inside others: move it, or check `scale`";
             self.problems.push(Problem::new(key, message, remedy));
+            self.lacks_walls = true;
         } else if gone > 0 {
             let beyond = self.beyond(solid);
             self.notes.push(format!(
@@ -281,11 +286,8 @@ impl Builder<'_> {
                 Ok((Shape::Mesh(mesh), _)) => mesh.steps(),
                 _ => None,
             };
-            if let Some((step, at)) = steps.filter(|(step, _)| *step > COARSE * self.lattice.spacing) {
-                self.notes.push(format!(
-                    "{file}: a binary STL file has single precision, steps of {step:.1e} m at its coordinates of up to {at:.0} m: \
-                     export it as OBJ or as STL in text, or about an origin nearby"
-                ));
+            if let Some(coarse) = coarse(steps, self.lattice.spacing) {
+                self.notes.push(format!("{file}: {coarse}"));
             }
         }
     }

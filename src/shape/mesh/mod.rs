@@ -240,8 +240,14 @@ impl Mesh {
     /// Steps in which a file in single precision tells its coordinates where they are largest, and these [m].
     pub(crate) fn steps(&self) -> Option<(f64, f64)> {
         let (low, high) = (self.center + self.along_file.0, self.center + self.along_file.1);
-        let largest = low.abs().max(high.abs()).max_element();
-        self.is_single.then_some((largest * f64::from(f32::EPSILON), largest))
+        self.is_single.then(|| read::steps(&[low, high]))
+    }
+
+    /// The same of the file `path`, whose lengths times `scale` are metres, whether or not it is a solid; `None` if it cannot be read.
+    pub(crate) fn steps_of_file(path: &str, scale: f64) -> Option<(f64, f64)> {
+        let bytes = read::bytes(path).ok().filter(|bytes| read::is_single(path, bytes))?;
+        let (step, largest) = read::steps(&read::soup(path, &bytes).ok()?.0);
+        Some((scale * step, scale * largest))
     }
 
     /// Where it is thinnest.

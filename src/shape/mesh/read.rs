@@ -60,6 +60,12 @@ pub(super) fn is_single(path: &str, bytes: &[u8]) -> bool {
     end.eq_ignore_ascii_case("stl") && text(bytes).is_none()
 }
 
+/// Steps between numbers in single precision as large as the largest coordinate, and that [m].
+pub(super) fn steps(vertices: &[DVec3]) -> (f64, f64) {
+    let largest = vertices.iter().map(|v| v.abs().max_element()).fold(0.0, f64::max);
+    (largest * f64::from(f32::EPSILON), largest)
+}
+
 fn stl(path: &str, bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, Unfit> {
     let repair = "save it again as binary STL";
     let wrong = |e: std::io::Error| Unfit::new(format!("{path}: no STL file: {e}"), repair);
@@ -190,21 +196,43 @@ pub(super) fn directed(
     let mut edges: HashMap<(u32, u32), usize> = HashMap::new();
     for (k, t) in triangles.iter().enumerate() {
         for e in 0..3 {
-            if let Some(other) = edges.insert((t[e], t[(e + 1) % 3]), k) {
-                let at = vertices[t[e] as usize];
-                let message = format!(
-                    "{path}: triangles {} and {} at {at} m turn opposite ways or lie on each other",
-                    other + 1,
-                    k + 1
-                );
-                return Err(Unfit::new(
-                    message,
-                    "let the program that made it turn all normals outwards and save it again",
-                ));
+            let edge = (t[e], t[(e + 1) % 3]);
+            if let Some(other) = edges.insert(edge, k) {
+                return Err(clash(path, vertices, triangles, edge, [other, k]));
             }
         }
     }
     Ok(edges)
+}
+
+/// What is wrong with two triangles that go along an `edge` the same way: one stands twice, parts meet there, or one of them is turned.
+fn clash(
+    path: &str,
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    edge: (u32, u32),
+    pair: [usize; 2],
+) -> Unfit {
+    let at = vertices[edge.0 as usize];
+    let meet: Vec<usize> = (0..triangles.len())
+        .filter(|&k| triangles[k].contains(&edge.0) && triangles[k].contains(&edge.1))
+        .collect();
+    let sorted = |k: usize| {
+        let mut corners = triangles[k];
+        corners.sort_unstable();
+        corners
+    };
+    let twin = |&k: &usize| meet.iter().find(|&&j| j > k && sorted(j) == sorted(k)).map(|&j| [k, j]);
+    let remedy = "remove the duplicate, or unite the parts that meet there in the program that made it (a Boolean union)";
+    let named = |[a, b]: [usize; 2]| format!("{path}: triangles {} and {} at {at} m", a + 1, b + 1);
+    if let Some(twins) = meet.iter().find_map(twin) {
+        return Unfit::new(format!("{} have the same corners", named(twins)), remedy);
+    }
+    if meet.len() > 2 {
+        return Unfit::new(format!("{} are of {} that meet in one edge", named(pair), meet.len()), remedy);
+    }
+    let remedy = "let the program that made it turn all normals outwards and save it again";
+    Unfit::new(format!("{} turn opposite ways", named(pair)), remedy)
 }
 
 /// A solid's surface has no border, and its triangles turn the same way round.
