@@ -16,6 +16,8 @@ use std::collections::HashSet;
 pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
 /// Nearer to a particle of a solid than this, over the spacing, other walls may face pieces of the surface that are its.
 const MEETING: f64 = 3.0;
+/// Area of a particle with what it is handed on, over its own, from which it is handed on something [-].
+const HANDED: f64 = 1.05;
 
 /// A wall without particles, where it stands; `moved` if it moves.
 fn wall(
@@ -141,7 +143,11 @@ impl Builder<'_> {
         let flat = |k: &usize| !bends[*k];
         match self.freed(solid, &kept) {
             Some(freed) => {
-                for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..).filter(|(k, _)| flat(k)) {
+                // Where it bends what faces walls counts, too; but what particles that are left out have had is handed on.
+                let handed = |k: usize, area: DVec3| area.dot(areas[k]) > HANDED * areas[k].length_squared();
+                let rows = (0..kept.len()).filter(|&k| kept[k]).zip(0..);
+                let rows = rows.filter(|&(k, row)| flat(&k) || handed(k, freed.area[row]));
+                for (k, row) in rows.collect::<Vec<_>>() {
                     areas[k] = freed.area[row];
                     solid.wall_to_surface[k] = freed.to_surface[row];
                 }
