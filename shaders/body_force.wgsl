@@ -39,22 +39,27 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let p = pressure[params.fluid + k];
         var on_surface = p + surface_head(pose, wall);
 //#if MIXED
-        let under_water = excess[k] < DRY;
+        let under_water = excess[k] < DRY && !is_known_row(excess[k]);
         on_surface -= vec3f(excess[k]);
 //#else
         let under_water = state[params.fluid + k] == INNER;
         on_surface = max(on_surface, vec3f(0.0));
 //#endif
         var pressed = vec3f(0.0);
-        if under_water {
-            var part = 1.0;
+        var part = 1.0;
 //#if COUPLED
-            part -= coupling[4u * k].w;
+        part -= coupling[4u * k].w;
 //#endif
+        if under_water {
             pressed = -part * rotate(pose.orientation, on_surface * wall.area.xyz);
             let area = rotate(pose.orientation, wall.area.xyz);
             force = -part * params.dynamic_viscosity * cross(pose.angular_velocity.xyz, area);
         }
+//#if MIXED
+        if is_known_row(excess[k]) {
+            pressed = -part * pressed_beside_surface(pose, wall, excess[k]);
+        }
+//#endif
 //#if REACTION
         force += reaction[k].xyz;
 //#endif

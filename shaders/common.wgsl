@@ -24,6 +24,22 @@ const INNER: u32 = 2u;
 // Excess of a wall's row whose pressure is no unknown; DRY in src/backend/gpu/layout.rs.
 const DRY: f32 = 3.0e38;
 
+// What stands in the place of its excess if it is a solid's beside the water's surface, with a pressure that is known: less that pressure, with
+// the last bit set, which an excess has not.
+fn known_row(known: f32) -> f32 {
+    // A normal number, which no device flushes to zero.
+    let kept = select(-known, 1.0e-30, abs(known) < 1.0e-30);
+    return bitcast<f32>(bitcast<u32>(kept) | 1u);
+}
+
+fn unknown_row(excess: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(excess) & 0xfffffffeu);
+}
+
+fn is_known_row(excess: f32) -> bool {
+    return (bitcast<u32>(excess) & 1u) == 1u;
+}
+
 // As crate::kernels::predict::DISPLACEMENT_MAX and crate::kernels::number_density::CLOSEST.
 const DISPLACEMENT_MAX: f32 = 0.5;
 const CLOSEST: f32 = 0.1;
@@ -498,6 +514,11 @@ fn surface_head(pose: Pose, wall: WallParticle) -> vec3f {
     }
     let back = vec4f(-pose.orientation.xyz, pose.orientation.w);
     return params.density * rotate(back, params.gravity) * wall.to_surface.xyz + params.surface_head;
+}
+
+// What a solid's particle is pressed with, outwards, that is no row but beside the water's surface: where a face lies above the water it is not.
+fn pressed_beside_surface(pose: Pose, wall: WallParticle, excess: f32) -> vec3f {
+    return rotate(pose.orientation, max(surface_head(pose, wall) - vec3f(excess), vec3f(0.0)) * wall.area.xyz);
 }
 
 // From the centre of mass to where pressures act: those on the faces of a box act along the ways to them.

@@ -93,9 +93,13 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         let arm = per_spacing * rotate(pose.orientation, wall.arm.xyz);
         var row = Wrench(vec3f(0.0), vec3f(0.0));
         var force = vec3f(0.0);
-        if excess[k] < DRY {
-            let slot = coupling[4u * k];
-            let face_arm = per_spacing * pressed_arm(pose, wall);
+        let slot = coupling[4u * k];
+        let face_arm = per_spacing * pressed_arm(pose, wall);
+        if is_known_row(excess[k]) {
+            let pressed = (slot.w - 1.0) * pressed_beside_surface(pose, wall, excess[k]);
+            known.force += pressed;
+            known.torque += cross(face_arm, pressed);
+        } else if excess[k] < DRY {
             row.force = (slot.w - 1.0) * rotate(pose.orientation, wall.area.xyz);
             row.torque = cross(face_arm, row.force);
             let at_zero = surface_head(pose, wall) - vec3f(excess[k]);

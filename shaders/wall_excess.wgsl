@@ -1,6 +1,7 @@
 // What the pressure of a wall's row is above that on the wall's surface, half way to the water before it, but for the weight of the
 // water between: its excess. `before_solve` makes that of moving walls from their equations and what the last step adds, for free
-// bodies; `after_solve` takes it from the pressures that are left.
+// bodies; `after_solve` takes it from the pressures that are left. Of a solid's particle that is no row but beside the water's surface they
+// keep the pressure that the surface has it have.
 // Twin: src/kernels/wall_excess.rs
 
 @group(0) @binding(2) var<storage, read> preconditioned: array<vec4f>; // positions, and what the solve has found
@@ -16,7 +17,56 @@
 @group(0) @binding(10) var<storage, read> surface_pressure: array<f32>;
 //#endif
 @group(0) @binding(11) var<storage, read> position: array<vec4f>;
+//#endif
+//#if SURFACE_PRESSURE
+@group(0) @binding(12) var<storage, read> state: array<u32>;
 
+//#if COUPLED
+fn place_of(j: u32) -> vec3f {
+    return position[j].xyz;
+}
+
+fn known_of(j: u32) -> f32 {
+    return surface_pressure[j];
+}
+//#else
+fn place_of(j: u32) -> vec3f {
+    return preconditioned[j].xyz;
+}
+
+// What the solve leaves of it.
+fn known_of(j: u32) -> f32 {
+    return pressure[j];
+}
+//#endif
+
+// The pressure of slot i at x beside the surface, from those of the surface's particles around it; DRY without any.
+fn beside_surface(i: u32, x: vec3f) -> f32 {
+    if state[i] != SURFACE {
+        return DRY;
+    }
+    let near = near_of(neighbour_count[i]);
+    var total = 0.0;
+    var sum = 0.0;
+    var height = 0.0;
+    for (var n = 0u; n < near; n++) {
+        let j = neighbour_list_at(n, i);
+        if j < params.fluid && state[j] == SURFACE {
+            let r = offset(x, place_of(j));
+            let w = weight(dot(r, r));
+            total += w;
+            sum += w * known_of(j);
+            height -= w * params.density * dot(params.gravity, r);
+        }
+    }
+    if total == 0.0 {
+        return DRY;
+    }
+    return known_row((sum + min(height, 0.0)) / total);
+}
+//#endif
+
+//#if COUPLED
 @compute @workgroup_size(WORKGROUP)
 fn before_solve(@builtin(global_invocation_id) id: vec3u) {
     let k = thread(id);
@@ -25,11 +75,15 @@ fn before_solve(@builtin(global_invocation_id) id: vec3u) {
     }
     let i = params.fluid + k;
     let equation = source_diagonal[i];
+    let x = position[i].xyz;
     if equation.y == 0.0 {
+//#if SURFACE_PRESSURE
+        excess[k] = beside_surface(i, x);
+//#else
         excess[k] = DRY;
+//#endif
         return;
     }
-    let x = position[i].xyz;
     let near = near_of(neighbour_count[i]);
     var links = 0.0;
     var sum = equation.x;
@@ -44,7 +98,7 @@ fn before_solve(@builtin(global_invocation_id) id: vec3u) {
 //#endif
         sum += w * over;
     }
-    excess[k] = inertia_head[k] + select(0.0, 0.5 * sum / links, links > 0.0);
+    excess[k] = unknown_row(inertia_head[k] + select(0.0, 0.5 * sum / links, links > 0.0));
 }
 
 //#endif
@@ -56,12 +110,20 @@ fn after_solve(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     if source_diagonal[i].y == 0.0 {
-        excess[wall] = DRY;
 //#if COUPLED
         if wall < params.moving_wall {
             inertia_head[wall] = 0.0;
+            return;
+        }
+//#else
+//#if SURFACE_PRESSURE
+        if wall < params.moving_wall {
+            excess[wall] = beside_surface(i, preconditioned[i].xyz);
+            return;
         }
 //#endif
+//#endif
+        excess[wall] = DRY;
         return;
     }
     let own = preconditioned[i];
@@ -101,12 +163,12 @@ fn after_solve(@builtin(global_invocation_id) id: vec3u) {
 //#else
         let cut = own_cut - own.w;
 //#endif
-        excess[wall] = answered + cut - felt * (cut - (left - solved));
+        excess[wall] = unknown_row(answered + cut - felt * (cut - (left - solved)));
         inertia_head[wall] = solved - (answered - inertia_head[wall]);
         return;
     }
 //#endif
-    excess[wall] = left;
+    excess[wall] = unknown_row(left);
 }
 
 //#if COUPLED

@@ -85,6 +85,50 @@ fn a_dam_let_into_the_ground_carries_the_water_above_it_alone() {
 }
 
 #[test]
+fn a_curved_dam_whose_toe_runs_out_under_the_ground_carries_the_water_above_it() {
+    // A quarter of a circle from where it touches the floor, 0.6 m from the tank's end, to a vertical face.
+    let (radius, depth, l0) = (0.4, 0.3, 0.015);
+    let arc = (0..=24).map(|k| {
+        let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_2 / 24.0).sin_cos();
+        format!("[{}, {}]", 0.6 + radius * cos, radius * (1.0 - sin))
+    });
+    let arc: Vec<String> = arc.collect();
+    let (told, scene) = mean(&case(&format!(
+        "[run]\nspacing = {l0}\ntime_step = 2e-3\nadaptive = true\nend = 1.0\ndimensions = 2\n\
+         [fluid]\nblock = []\n[[fluid.fill]]\nseed = [0.1, 0, 0.1]\nlevel = {depth}\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 0.5]\nopen = [\"z_max\"]\n\
+         [[obstacle]]\nname = \"dam\"\nshape = \"prism\"\nheight = 0.1\n\
+         section = [[0.6, -0.1], [1.1, -0.1], [1.1, 0.4], {}]\n\
+         [[gauge.force]]\nname = \"dam\"\non = \"dam\"\n",
+        arc.join(", ")
+    )));
+    let per_metre = WEIGHT / 9810.0 / l0;
+    let (across, down) = (told.force.x * per_metre, told.force.z * per_metre);
+    // The water above the arc, up to where the surface meets it.
+    let top = (radius * radius - (radius - depth).powi(2)).sqrt();
+    let under = radius * top - 0.5 * (top * (radius - depth) + radius * radius * (top / radius).asin());
+    let above = depth * top - under;
+    println!("{across:.5} of {:.5}, {down:.5} of {:.5}, {}", 0.5 * depth * depth, -above, scene.groups.fluid);
+    // 0.95 and 0.74 while what particles in the toe had was lost.
+    assert!((across / (0.5 * depth * depth) - 1.0).abs() < 0.03, "{across}");
+    assert!((down / above + 1.0).abs() < 0.03, "{down}");
+}
+
+/// Area of the box of the next test below the water, turned by `angle` degrees [m2].
+fn submerged(angle: f64) -> f64 {
+    let turn = glam::DVec2::from_angle(angle.to_radians());
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(x, z)| glam::DVec2::new(0.0, 0.02) + turn.rotate(0.05 * glam::DVec2::new(x, z)));
+    let mut below = vec![];
+    for (k, a) in corners.into_iter().enumerate() {
+        let b = corners[(k + 1) % 4];
+        below.extend((a.y <= 0.0).then_some(a));
+        below.extend((a.y * b.y < 0.0).then(|| a.lerp(b, a.y / (a.y - b.y))));
+    }
+    (0..below.len()).map(|k| 0.5 * below[k].perp_dot(below[(k + 1) % below.len()])).sum()
+}
+
+#[test]
 fn a_tilted_box_is_not_driven_across_still_water() {
     let of = |angle: f64| {
         mean(&case(&format!(
@@ -100,7 +144,8 @@ fn a_tilted_box_is_not_driven_across_still_water() {
         let told = of(angle);
         let (across, up) = (told.force.x / L0 / L0, told.force.z);
         println!("{angle} degrees: {across:.3} l0^2 across, {up:.5} m2 up");
-        // 0.9 at 20 degrees, now 0.51, with one pressure for both faces at an edge.
-        assert!(across.abs() < 0.6, "{angle}: {across}");
+        // 0.9 at 20 degrees with one pressure for both faces at an edge, 0.5 without what is no row but beside the surface, which had 4.5 % of the lift.
+        assert!(across.abs() < 0.2, "{angle}: {across}");
+        assert!((up / submerged(angle) - 1.0).abs() < 0.01, "{angle}: {up} of {}", submerged(angle));
     }
 }

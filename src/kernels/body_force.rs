@@ -45,6 +45,13 @@ pub fn surface_pressure(pressure: f64, excess: f64, to_surface: DVec3, params: &
     }
 }
 
+/// The same for a particle beside the water's surface, whose `pressure` is no unknown ([`super::surface_pressure::beside_surface`]): where the
+/// face lies above the water there is none.
+#[inline(always)]
+pub fn beside_surface(pressure: f64, to_surface: DVec3, params: &Params) -> f64 {
+    (pressure + head(to_surface, params)).max(0.0)
+}
+
 /// Force on what of the faces of row `k` of `solid`, of which `part` counts, and torque about its place [N, N m]. `pressure` tells that on the
 /// surface [Pa] by the way there from the particle [m], world axes.
 pub fn on_faces(solid: &Solid, k: usize, pose: &Pose, part: f64, pressure: impl Fn(DVec3) -> f64) -> Wrench {

@@ -21,11 +21,23 @@ pub fn surface_pressure(i: usize, carriers: Row, state: &[State], on: Particles,
         let pair = |(j, w)| (pressure[j] + pressure[i]) * pair_vector(i, j, w, on);
         return 0.5 * on.params.spacing * carriers.iter().map(pair).sum::<DVec3>().length();
     }
+    beside_surface(i, carriers, state, on, pressure).map_or(0.0, |p| p.max(0.0))
+}
+
+/// Pressure of a wall's slot `i` beside the surface, as that of the surface's particles around it has it [Pa]: less than 0 above the water; none
+/// where no such particle is near.
+pub fn beside_surface(
+    i: usize,
+    carriers: Row,
+    state: &[State],
+    on: Particles,
+    pressure: &[f64],
+) -> Option<f64> {
     let (mut weight, mut sum, mut height) = (0.0, 0.0, 0.0);
     for (j, w) in carriers.iter().filter(|&(j, _)| j < on.fluid && state[j] == State::Surface) {
         weight += w;
         sum += w * pressure[j];
         height += w * hydrostatic(on.offset(j, i), on.params);
     }
-    if weight > 0.0 { ((sum + height.min(0.0)) / weight).max(0.0) } else { 0.0 }
+    (weight > 0.0).then(|| (sum + height.min(0.0)) / weight)
 }

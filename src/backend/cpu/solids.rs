@@ -59,6 +59,9 @@ impl Cpu {
                         |way| body_force::surface_pressure(fields.pressure[i], excess, way, params);
                     total += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, pressure);
                     reaction += body_force::turning(pose.angular_velocity, area, params);
+                } else if let Some(pressure) = self.excess.beside_surface(i - fluid) {
+                    let pressure = |way| body_force::beside_surface(pressure, way, params);
+                    total += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, pressure);
                 }
                 total += Wrench { force: reaction, torque: arm.cross(reaction) };
             }

@@ -50,6 +50,10 @@ impl Cpu {
                 if !owns(share, i) || state[i] != State::Inner {
                     // Of the step's beginning, when it was this rank's.
                     sum += Wrench { force: reaction, torque: arm.cross(reaction) };
+                    if let Some(pressure) = excess.beside_surface(i - fluid) {
+                        let known = |way| body_force::beside_surface(pressure, way, params);
+                        sum += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, known);
+                    }
                     return Wrench::default();
                 }
                 let part = 1.0 - slot.taken;

@@ -5,10 +5,11 @@ use super::team::owns;
 use crate::fields::{Fields, State};
 use crate::kernels::Particles;
 use crate::kernels::pressure_source::laplacian_coefficient;
+use crate::kernels::surface_pressure::beside_surface;
 use crate::kernels::wall_excess::{cut_share, known_excess, wall_excess};
 use crate::neighbours::{CHUNK, Neighbours};
 use crate::params::Params;
-use crate::plan::{Arrays, Plan, Told};
+use crate::plan::{Arrays, Plan, Stage, Told};
 use crate::scene::{Scene, Solid};
 use crate::share::{OfWalls, Share};
 use rayon::prelude::*;
@@ -26,6 +27,8 @@ pub(super) struct WallExcess {
     cut_share: Vec<f64>,
     /// What the solve has found for the rows of free bodies.
     solved: Vec<Solved>,
+    /// Pressure of moving walls' slots beside the surface, which are no rows ([`beside_surface`]) [Pa].
+    beside: Vec<Option<f64>>,
 }
 
 /// A row of a free body between the solve and the cut [Pa].
@@ -47,8 +50,13 @@ pub(super) struct Rows<'a> {
 impl Rows<'_> {
     /// Slot of the wall, if it is this rank's and has an equation.
     fn row(&self, wall: usize, state: &[State]) -> Option<usize> {
+        self.own(wall, state, State::Inner)
+    }
+
+    /// Slot of the wall, if it is this rank's and its part in the equation is `as_what`.
+    fn own(&self, wall: usize, state: &[State], as_what: State) -> Option<usize> {
         let i = self.fluid + wall;
-        (owns(self.share, i) && state[i] == State::Inner).then_some(i)
+        (owns(self.share, i) && state[i] == as_what).then_some(i)
     }
 
     /// [`wall_excess`] of slot `i` with the pressures that are.
@@ -71,6 +79,7 @@ impl WallExcess {
             of_still: plan.excess == Told::All,
             solved: vec![Solved::default(); cut_share.len()],
             cut_share,
+            beside: vec![None; if plan.has(Stage::SurfacePressure) { groups.moving_wall } else { 0 }],
         }
     }
 
@@ -87,6 +96,11 @@ impl WallExcess {
         self.of.get(wall).copied().unwrap_or_default()
     }
 
+    /// Of the wall that moves [Pa], if it is no row but beside the water's surface.
+    pub fn beside_surface(&self, wall: usize) -> Option<f64> {
+        self.beside.get(wall).copied().flatten()
+    }
+
     /// What free bodies answer within the solve: what their equations say, and what the last step has left to add.
     pub fn before_solve(&mut self, rows: Rows, fields: &Fields) {
         let Fields { position, velocity, state, source, surface_pressure, inertia_head, .. } = fields;
@@ -101,6 +115,11 @@ impl WallExcess {
                 }
                 _ => 0.0,
             };
+        });
+        self.beside.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(wall, beside)| {
+            let slot = rows.own(wall, state, State::Surface);
+            *beside = slot
+                .and_then(|i| beside_surface(i, rows.neighbours.pressure(i), state, on, surface_pressure));
         });
     }
 

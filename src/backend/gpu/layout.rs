@@ -17,11 +17,17 @@ use glam::{DVec3, Vec3};
 /// Fluid slots whose ghosts share a key of the counting sort; `GHOST_BLOCK` in shaders/common.wgsl.
 pub const GHOST_BLOCK: u64 = 64;
 /// Excess of a wall's row whose pressure is no unknown [Pa]; `DRY` in shaders/common.wgsl.
-pub(crate) const DRY: f32 = 3.0e38;
+const DRY: f32 = 3.0e38;
 /// Fluid particles at most: so many numbers have a word.
 pub(crate) const FLUID_MAX: usize = 1 << 30;
 /// The word of number 0, 1.0; `FIRST_WORD` in shaders/common.wgsl.
 pub const FIRST_WORD: u32 = 0x3f80_0000;
+
+/// Excess of a wall's row as the device has it [Pa]; 0 where the pressure is no unknown, which is told by `DRY` or, beside the surface, by the last bit.
+pub(crate) fn excess(kept: f32) -> f64 {
+    let unknown = kept < DRY && kept.to_bits() & 1 == 0;
+    if unknown { kept.into() } else { 0.0 }
+}
 
 /// A number below [`FLUID_MAX`] as the fourth component of a vector: the bits of a normal f32, which no device flushes to zero.
 pub(crate) fn word_of(number: u32) -> f32 {

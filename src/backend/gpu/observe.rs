@@ -129,7 +129,7 @@ impl Gpu {
         let (excess, reaction) = rest.split_at(if over { stretches.len() } else { 0 });
         let told = |&slot: &usize| {
             let at = stretches.place(slot);
-            let excess = if over && excess[at] < layout::DRY { excess[at].into() } else { 0.0 };
+            let excess = if over { layout::excess(excess[at]) } else { 0.0 };
             let reaction = reaction.get(4 * at..4 * at + 3).map_or(Vec3::ZERO, Vec3::from_slice).as_dvec3();
             RowPressure { pressure: pressure[at].into(), excess, reaction }
         };
