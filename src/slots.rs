@@ -52,6 +52,8 @@ use std::sync::Arc;
 const FACING: (f64, f64) = (1.9, 2.1);
 /// Another solid's particle is faced by a row if it lies this near its outward direction (cosine of the angle).
 const AHEAD: f64 = 0.5;
+/// The same of a face of a row at an edge: half-way to the next face.
+const BEFORE_FACE: f64 = 0.7;
 /// Edge of the cells that points lie in, over l0: twice the reach, so that two an axis are looked into.
 const CELL: f64 = 4.2;
 /// Keeps the slope at bay along directions in which the rim has no extent.
@@ -78,6 +80,29 @@ struct Faced {
     share: f64,
     /// What it faces nearest.
     opposite: Option<Opposite>,
+    /// The same of each of its faces, along the axes of its solid's frame, of a row at an edge of a box.
+    by_face: Option<[Option<Opposite>; 3]>,
+}
+
+impl Faced {
+    /// All that it faces.
+    fn all(&self) -> impl Iterator<Item = Opposite> {
+        self.opposite.into_iter().chain(self.by_face.into_iter().flatten().flatten())
+    }
+
+    /// What its `area` looks onto, of a solid at `pose`, and with which part of it (world axes [m2]).
+    fn onto(&self, area: DVec3, pose: &Pose) -> Vec<(Opposite, DVec3)> {
+        let Some(by_face) = self.by_face else {
+            return self.opposite.map(|of| (of, area)).into_iter().collect();
+        };
+        let own = pose.orientation.inverse() * area;
+        let part = |axis: usize| {
+            let part = pose.orientation * (own[axis] * DVec3::AXES[axis]);
+            let looks = part.length_squared() > 1e-12 * area.length_squared();
+            by_face[axis].or(self.opposite).filter(|_| looks).map(|of| (of, part))
+        };
+        (0..3).filter_map(part).collect()
+    }
 }
 
 /// A slot as it is found.
@@ -240,13 +265,12 @@ impl Slots {
     fn faced(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<Faced> {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
         let reach = FACING.1 * l0;
-        let share = |(&offset, &area): (&DVec3, &DVec3)| {
-            let outward = pose.orientation * area.normalize_or_zero();
-            let x = pose.position + pose.orientation * offset;
+        // Of those within `ahead` of `outward` (cosine) around `x`, the nearest, and how far it is.
+        let nearest = |x: DVec3, outward: DVec3, ahead: f64| {
             let (mut nearest, mut opposite) = (reach, None);
             let mut see = |r: DVec3, of: Opposite| {
                 let distance = r.length();
-                if r.dot(outward) > AHEAD * distance && distance < nearest {
+                if r.dot(outward) > ahead * distance && distance < nearest {
                     (nearest, opposite) = (distance, Some(of));
                 }
             };
@@ -260,8 +284,21 @@ impl Slots {
                 let way = |n: u32| pose.orientation * (layer.grid.point(n) - local);
                 layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other, n as usize)));
             }
-            let share = ((FACING.1 - nearest / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-            Faced { share, opposite }
+            (nearest, opposite)
+        };
+        let share = |(&offset, &area): (&DVec3, &DVec3)| {
+            let x = pose.position + pose.orientation * offset;
+            let (distance, opposite) = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD);
+            let share = ((FACING.1 - distance / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
+            let faces = area.to_array().iter().filter(|a| **a != 0.0).count();
+            let by_face = (layer.is_box && faces > 1 && share > 0.0).then(|| {
+                let before = |axis: usize| {
+                    let outward = pose.orientation * (area[axis].signum() * DVec3::AXES[axis]);
+                    (area[axis] != 0.0).then(|| nearest(x, outward, BEFORE_FACE).1).flatten()
+                };
+                [0, 1, 2].map(before)
+            });
+            Faced { share, opposite, by_face }
         };
         (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
     }

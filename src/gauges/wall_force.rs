@@ -10,7 +10,7 @@ use crate::params::Params;
 use crate::scene::Scene;
 use crate::slots::{Opposite, Push, face_before};
 use glam::{DMat3, DVec3, IVec3};
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 /// A face of a row, of the size of a particle.
 #[derive(Clone, Debug)]
@@ -152,6 +152,8 @@ impl FixedWall {
         params: &Params,
     ) -> Wrench {
         let mut sum = Wrench::default();
+        // Of each row and face the direction, and what of it is pressed on [m2].
+        let mut pressed: BTreeMap<(usize, [i32; 3]), (DVec3, f64)> = BTreeMap::new();
         for push in pushes {
             let Opposite::Wall(wall) = push.on else { continue };
             if scene.static_wall_shape[wall] as usize != self.shape {
@@ -159,13 +161,23 @@ impl FixedWall {
             }
             let normal = scene.static_wall_normal[wall];
             let normal = if self.on_lattice { face_before(normal, push.area) } else { normal };
-            let mut force = push.pressure * push.area_on(normal);
+            let area = push.area_on(normal);
             let places = self.tiles.quarters(push.at, normal);
-            let each = 1.0 / places.len() as f64;
+            let each = area.length() / places.len() as f64;
             for row in places.iter().filter_map(|x| self.row_at(scene.periodic.wrap(*x), normal)) {
-                force -= each * push.told_by(normal, &told[row], self.to_surface[row], areas[row], params);
+                let face = (1e3 * normal).round().as_ivec3().to_array();
+                pressed.entry((row, face)).or_insert((normal, 0.0)).1 += each;
             }
-            let arm = scene.periodic.nearest(push.at - self.about);
+            let (force, arm) = (push.pressure * area, scene.periodic.nearest(push.at - self.about));
+            sum += Wrench { force, torque: arm.cross(force) };
+        }
+        // What is pressed on and counts as bare at once counts once: beside a body half of a face may be the one, half the other.
+        let whole = params.spacing * params.spacing;
+        for ((row, _), (normal, pressed)) in pressed {
+            let bare = areas[row].dot(normal).clamp(0.0, whole);
+            let twice = (bare + pressed - whole).clamp(0.0, bare.min(pressed));
+            let force = twice * told[row].in_force(self.to_surface[row], params) * normal;
+            let arm = scene.periodic.nearest(self.position[row] + self.to_surface[row] - self.about);
             sum += Wrench { force, torque: arm.cross(force) };
         }
         sum

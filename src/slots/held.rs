@@ -96,10 +96,8 @@ impl Slots {
     pub fn reads(&self, held: &Held, poses: &[Pose]) -> u64 {
         let pressed = held.pressed();
         let on_held = |of: &Opposite| matches!(*of, Opposite::Solid(k, row) if !self.layers[k].free && !pressed.contains(&(k, row)));
-        let presses = |f: &Found| {
-            let before = |row: &(usize, f64)| f.faced[row.0].opposite;
-            f.slot.inside.iter().filter_map(before).any(|of| on_held(&of))
-        };
+        let presses =
+            |f: &Found| f.slot.inside.iter().flat_map(|row| f.faced[row.0].all()).any(|of| on_held(&of));
         let any = self.find(poses).iter().chain(&held.found).any(presses);
         u64::from(!held.found.is_empty()) + u64::from(any)
     }
@@ -145,7 +143,7 @@ impl Slots {
                 // What has slots of its own there has its part from them.
                 let is_pressed =
                     |of| matches!(of, Opposite::Solid(other, row) if pressed.contains(&(other, row)));
-                if let Some(on) = f.faced[n].opposite.filter(|&of| !is_pressed(of)) {
+                for (on, into) in f.faced[n].onto(into, pose).into_iter().filter(|&(of, _)| !is_pressed(of)) {
                     let at = self.on_face(k, pose, n, into);
                     out.pushes.push(Push { on, at, pressure: slot, area: share * into });
                 }

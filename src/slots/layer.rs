@@ -14,6 +14,7 @@ pub(super) struct Layer {
     /// Whether no force moves it and its slots are told.
     pub holds: bool,
     pub still: bool,
+    pub is_box: bool,
     /// Slot of its first row.
     pub first: usize,
     pub offset: Vec<DVec3>,
@@ -44,6 +45,7 @@ impl Layer {
             free,
             holds,
             still: solid.is_still(),
+            is_box: solid.shape.as_cuboid().is_some(),
             bends: if holds { bending(&offset, &solid.wall_area, l0) } else { Vec::new() },
             faced: OnceLock::new(),
             first: solid.wall_slots.start,
@@ -98,22 +100,29 @@ impl Layer {
     }
 
     /// Of each row in `slot`, the part of its `area` (solid's frame) that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
-    /// is what looks as its neighbours deep in there do.
+    /// is what looks as its neighbours deep in there do; at a corner, where it has none, as theirs at the mouth.
     pub fn areas(&self, area: &[DVec3], slot: &Slot, pose: &Pose) -> Vec<DVec3> {
         let area = |n: usize| pose.orientation * area[n];
         let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
-        let is_deep = |n: &usize| slot.inside.binary_search_by_key(n, |row| row.0).is_ok() && !at_mouth(*n);
+        let place = |n: usize| slot.inside.binary_search_by_key(&n, |row| row.0).ok();
+        let beside =
+            |n: usize| self.adjacent[n].iter().filter_map(move |&m| Some((m as usize, place(m as usize)?)));
         let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
-        let inwards = |n: usize| {
+        let deep = |&(n, _): &(usize, f64)| {
+            let near = beside(n).filter(|&(m, _)| !at_mouth(m)).map(|(m, _)| area(m));
+            if at_mouth(n) { near.sum::<DVec3>().normalize_or_zero() } else { DVec3::ZERO }
+        };
+        let ways: Vec<DVec3> = slot.inside.iter().map(deep).collect();
+        let inwards = |(&(n, _), &deep): (&(usize, f64), &DVec3)| {
             if !at_mouth(n) {
                 return area(n);
             }
-            let near = self.adjacent[n].iter().map(|&m| m as usize).filter(is_deep);
-            let near: DVec3 = near.map(area).sum();
-            let way = if near == DVec3::ZERO { all } else { near }.normalize_or_zero();
+            let near = || beside(n).map(|(_, at)| ways[at]).sum::<DVec3>();
+            let way = [deep, near(), all].into_iter().find(|way| *way != DVec3::ZERO);
+            let way = way.unwrap_or_default().normalize_or_zero();
             area(n).dot(way).max(0.0) * way
         };
-        slot.inside.iter().map(|row| inwards(row.0)).collect()
+        slot.inside.iter().zip(&ways).map(inwards).collect()
     }
 
     pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {

@@ -113,17 +113,17 @@ impl Slots {
     fn pushes_of(&self, found: &Found, field: &Field, pose: &Pose) -> Vec<Push> {
         let Found { slot, faced, .. } = found;
         let push = |n: usize, area: DVec3| {
-            let (p, _) = self.on_row(field, slot.solid, pose, n);
-            let on = faced[n].opposite?;
-            Some(Push {
+            let (pressure, _) = self.on_row(field, slot.solid, pose, n);
+            let onto = faced[n].onto(area, pose).into_iter();
+            onto.map(move |(on, area)| Push {
                 on,
                 at: self.on_face(slot.solid, pose, n, area),
-                pressure: p,
+                pressure,
                 area: faced[n].share * area,
             })
         };
         let layer = &self.layers[slot.solid];
         let areas = layer.areas(&layer.area, slot, pose);
-        slot.inside.iter().zip(areas).filter_map(|(row, area)| push(row.0, area)).collect()
+        slot.inside.iter().zip(areas).flat_map(|(row, area)| push(row.0, area)).collect()
     }
 }
