@@ -443,10 +443,12 @@ fn press(n: u32, t: u32, width: u32) {
     let spring = smooth_pair[n].spring;
     let beyond = max(depth - smooth_pair[n].stop_depth, 0.0);
     let secant = spring + (smooth_pair[n].stop - spring) * beyond / depth;
-    let damping = smooth_pair[n].damping / sqrt(shares);
+    // As `grown` in src/contact/smooth/constants.rs, over the depth.
+    let past = beyond / depth;
+    let more = smooth_pair[n].stop / spring - 1.0;
+    let grown = (1.0 + more * past) / sqrt(1.0 + more * past * past);
+    let damping = smooth_pair[n].damping * grown / sqrt(shares);
     let step = smooth_pair[n].step;
-    // The second spring's dashpot.
-    let stopping = select(0.0, sqrt(smooth_pair[n].stop / spring) - 1.0, beyond > 0.0);
     for (var m = t; m < total; m += width) {
         let place = state + 3u * m;
         let own = contact_state[place].w;
@@ -455,8 +457,7 @@ fn press(n: u32, t: u32, width: u32) {
         if own > 0.0 {
             let x = own / deepest;
             let share = contact_state[place + 2u].x * x * x * x * x * x * x * to_mean;
-            let part = felt(own, speed, step) + stopping * felt(beyond, speed, step);
-            f = max(share * (secant * own - part * damping * speed), 0.0);
+            f = max(share * (secant * own - felt(own, speed, step) * damping * speed), 0.0);
         }
         contact_state[place + 2u].z = f;
     }

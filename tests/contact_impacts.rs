@@ -60,6 +60,28 @@ fn what_lands_on_an_edge_or_a_corner_bounces_as_asked() {
     }
 }
 
+/// Twice as deep as where the stop begins as well as above it: neither the depth nor the spring shows in what comes back.
+#[test]
+fn what_is_pressed_into_the_stop_bounces_as_asked() {
+    for asked in [0.2, 0.5, 0.8] {
+        let mut deepest = Vec::new();
+        for spring in [3e4_f64, 2e5, 7e5, 1.4e6, 2e6, 5e6, 1e7] {
+            let mut dry = Dry::new(&format!(
+                "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1\ngravity = [0, 0, 0]\n\
+                 [[plane]]\nname = \"plane\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [2, 2]\n\
+                 [[body]]\nname = \"box\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0, 0, 0.101]\ndensity = 2660\nvelocity = [0, 0, -3.2]\n\
+                 [contact]\nspring = {spring:e}\nrestitution = {asked}\n"
+            ));
+            let measured = parting(&mut dry, DVec3::NEG_Z * 0.1);
+            println!("K {spring:e}: {measured:.4} for {asked}");
+            assert!((measured - asked).abs() < 0.01, "K {spring:e}: {measured} for {asked}");
+            deepest.push(3.2 * (2660.0 * 0.008 / spring).sqrt() / 0.025);
+        }
+        // From the hard spring alone to far into the stop.
+        assert!(deepest[0] > 3.0 && deepest[6] < 0.25);
+    }
+}
+
 #[test]
 fn a_ball_that_strikes_a_bar_at_its_end_leaves_it_as_asked() {
     for off in [0.0, 0.1, 0.18] {

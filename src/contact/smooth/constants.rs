@@ -28,6 +28,17 @@ impl Constants {
         (self.spring + more * beyond / depth, energy)
     }
 
+    /// What the dashpot is at the effective depth `depth` [m], over that of the first spring [-].
+    ///
+    /// With y = sqrt(2 E / K) of the energy E that is stored, m v dv/dy = -K y - C v wherever the dashpot is C dy/dx: the
+    /// line of the linear oscillator, so that both springs part with the restitution of the first at any depth. It
+    /// grows from 1 to sqrt(stop / spring) without a step and is never beyond.
+    pub fn grown(&self, depth: f64) -> f64 {
+        let beyond = (depth - self.stop_depth).max(0.0);
+        let more = self.stop / self.spring - 1.0;
+        (depth + more * beyond) / (depth * depth + more * beyond * beyond).sqrt()
+    }
+
     /// Constants that make sub-steps of `h` [s] follow the damped oscillator of mass `mass` [kg].
     ///
     /// The explicit dashpot takes C h / m of the speed where the exact one takes 1 - exp(-C h / m); it is

@@ -272,8 +272,7 @@ impl Pair {
     ///
     /// The dashpot shares like the spring and is scaled so that the damping *ratio* does not depend on
     /// how much of a face is in contact: C sqrt(K_contact / K), K_contact = K sum s_i, nor on where that is: see
-    /// [`Mode`]. The second spring brings a dashpot of the same ratio, or a heavy body on a soft spring would bounce
-    /// on it for ever.
+    /// [`Mode`]. With the second spring it grows: see [`Constants::grown`].
     fn press(&mut self, bodies: &[Body]) {
         let deepest = self.contacts.iter().fold(0.0_f64, |m, c| m.max(c.depth));
         let eighth = |x: f64| ((x * x) * (x * x)) * ((x * x) * (x * x));
@@ -299,14 +298,11 @@ impl Pair {
         let k = self.constants;
         let (secant, energy) = k.stored(depth);
         self.energy = energy;
-        let beyond = (depth - k.stop_depth).max(0.0);
-        let stop = (k.stop / k.spring).sqrt() - 1.0;
+        let damping = k.damping * k.grown(depth) / shares.sqrt();
         for c in &mut self.contacts {
             let share = c.share(depth);
-            let since = |depth: f64| if c.speed < 0.0 { felt(depth / -c.speed / k.step) } else { 1.0 };
-            let stopping = if beyond > 0.0 { stop * since(beyond) } else { 0.0 };
-            let damping = k.damping / shares.sqrt() * (since(c.depth) + stopping);
-            c.force = (share * (secant * c.depth - damping * c.speed)).max(0.0);
+            let part = if c.speed < 0.0 { felt(c.depth / -c.speed / k.step) } else { 1.0 };
+            c.force = (share * (secant * c.depth - part * damping * c.speed)).max(0.0);
         }
     }
 
