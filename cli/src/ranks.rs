@@ -1,5 +1,8 @@
 //! `seixo run` as one of many processes that `mpirun` or `srun` started.
 
+#[cfg(feature = "mpi")]
+mod mpi;
+
 use seixo::Processor;
 use seixo::error::{Error, Result};
 use seixo::on_ranks::tell_case;
@@ -39,7 +42,7 @@ pub fn team() -> Result<Option<Arc<dyn Team>>> {
 /// [`Error::Usage`] if MPI does not start.
 #[cfg(feature = "mpi")]
 pub fn team() -> Result<Option<Arc<dyn Team>>> {
-    use seixo::ranks::mpi::{Processes, abort};
+    use self::mpi::{Processes, abort};
     if processes() < 2 {
         return Ok(None);
     }
@@ -131,7 +134,7 @@ pub fn end_all(_: &Error) {}
 #[cfg(feature = "mpi")]
 pub fn end_all(error: &Error) {
     seixo::console::remark(&format!("error: {error}"));
-    seixo::ranks::mpi::abort(error.exit_code());
+    mpi::abort(error.exit_code());
 }
 
 /// The part of a rank that is not the first.
@@ -147,7 +150,7 @@ pub fn serve(team: &Arc<dyn Team>, threads: u16, processor: &Processor) -> super
     };
     if let Err(error) = seixo::on_ranks::serve_on(team, processor, set_up) {
         seixo::console::remark(&format!("rank {}: {error}", team.rank()));
-        seixo::ranks::mpi::abort(5);
+        mpi::abort(5);
     }
     Ok(0)
 }

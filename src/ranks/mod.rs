@@ -8,10 +8,8 @@
 //! The first rank leads ([`crate::backend::lead`], [`crate::on_ranks`]): it alone moves solids and has clock, tables and files, and tells the others
 //! what to do, stage by stage. Sums are made in the order of the ranks, so that a run repeats to the last bit on the same number of ranks.
 //!
-//! What ranks say to each other goes through [`Team`]: threads of one process ([`threads`]), or MPI (feature `mpi`).
+//! What ranks say to each other goes through [`Team`]: threads of one process ([`threads`]), or MPI, which the program has (`cli/src/ranks/mpi.rs`).
 
-#[cfg(feature = "mpi")]
-pub mod mpi;
 pub mod threads;
 
 use crate::machine;
@@ -30,7 +28,7 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> T {
 }
 
 /// The ranks before and after `rank` of `ranks`, in a `ring` or in a row.
-pub(crate) fn beside(rank: usize, ranks: usize, ring: bool) -> [Option<usize>; 2] {
+pub fn beside(rank: usize, ranks: usize, ring: bool) -> [Option<usize>; 2] {
     let around = |other: usize| Some(other).filter(|_| ring && ranks > 1);
     [
         rank.checked_sub(1).or_else(|| around(ranks - 1)),

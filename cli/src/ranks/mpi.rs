@@ -1,11 +1,11 @@
 //! Ranks that are processes under MPI.
 
-use super::{Team, beside};
 use mpi::Count;
 use mpi::datatype::PartitionMut;
 use mpi::environment::Universe;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
+use seixo::ranks::{Team, beside};
 
 /// This process among those that `mpirun` or `srun` started; MPI ends when it is dropped.
 pub struct Processes {
