@@ -1,12 +1,13 @@
 //! The command line as a user meets it: messages, exit codes, files.
 
+use crate::common::ONE_THREAD;
 use assert_cmd::Command;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 pub(crate) fn seixo() -> Command {
     let mut command = Command::cargo_bin("seixo").unwrap();
-    command.current_dir(crate::common::ROOT);
+    command.current_dir(crate::common::ROOT).env(ONE_THREAD.0, ONE_THREAD.1);
     command
 }
 

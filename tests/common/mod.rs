@@ -13,17 +13,22 @@ use std::sync::Arc;
 /// The repository.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
+/// What has the program compute on one thread where it is not told `--threads`, as [`alone`] does a test.
+pub const ONE_THREAD: (&str, &str) = ("RAYON_NUM_THREADS", "1");
+
 /// The program, which heeds every signal: whoever runs the tests may ignore some (`nohup` does), and a child inherits
 /// that.
 pub fn program() -> std::process::Command {
     let program = env!("CARGO_BIN_EXE_seixo");
-    if cfg!(target_os = "linux") {
+    let mut command = if cfg!(target_os = "linux") {
         let mut command = std::process::Command::new("env");
         command.args(["--default-signal=HUP,INT,TERM,USR1,XCPU", program]);
         command
     } else {
         std::process::Command::new(program)
-    }
+    };
+    command.env(ONE_THREAD.0, ONE_THREAD.1);
+    command
 }
 
 thread_local! {
