@@ -243,9 +243,9 @@ fn random_drops_of_the_dam_break_cube_end_flat_and_still() {
         return;
     }
     // Those of the host drop forty.
-    let row = drops_together(12, 1.0, |s, c| Ok(Some(compute(s, c)))).expect("it runs");
+    let row = drops_together(6, 1.0, |s, c| Ok(Some(compute(s, c)))).expect("it runs");
     println!("{row:?}");
-    assert_eq!((row.flat, row.at_rest, row.kept), (12, 12, 12), "{row:?}");
+    assert_eq!((row.flat, row.at_rest, row.kept), (6, 6, 6), "{row:?}");
     assert!(row.rise < 0.0 && row.energy_gain < 0.0 && row.penetration < 0.1, "{row:?}");
 }
 

@@ -129,7 +129,7 @@ fn a_closed_tank_that_is_full_rests_with_no_pressure_below_zero() {
     all.extend(device().map(|processor| ("device", processor)));
     for (name, processor) in all {
         // On the lattice the solve's tolerance is what is left; a start shaken by a tenth of a spacing is still coming to rest.
-        for (fluid, steps, most) in [("", 50, [3e-3, 1e-3]), ("jitter = 0.1", 200, [0.025, 0.04])] {
+        for (fluid, steps, most) in [("", 20, [3e-3, 1e-3]), ("jitter = 0.1", 200, [0.025, 0.04])] {
             let (pressure, speed) = at_rest(&full_tank(fluid, ""), steps, &processor);
             println!("{name}: pressure within {pressure:.1e} of rho g H, {speed:.1e} m/s");
             assert!(pressure < most[0] && speed < most[1], "{name}: {pressure}, {speed}");
@@ -138,8 +138,8 @@ fn a_closed_tank_that_is_full_rests_with_no_pressure_below_zero() {
 }
 
 /// Acceleration of a cube of density ratio `s` let go in a full closed tank over g (s - 1) / (s + C) with C = 0.67 of an endless fluid, from
-/// its speed after 20 ms.
-fn cube(s: f64, processor: &Processor) -> f64 {
+/// its speed after 10 ms, and after 20 ms where it is asked `to_the_end`.
+fn cube(s: f64, processor: &Processor, to_the_end: bool) -> Vec<f64> {
     let case = case(&format!(
         "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -10]\n\
          [fluid]\nsound_speed = 5\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.5]\n\
@@ -151,20 +151,26 @@ fn cube(s: f64, processor: &Processor) -> f64 {
     let scene = Scene::build(&case).expect("it builds");
     let mut sim = Simulation::on(&case, scene, processor).expect("it starts");
     assert!(sim.params.filled);
-    while sim.time < 0.02 - 1e-9 {
-        sim.step().expect("a step");
-    }
-    sim.solids.poses()[0].velocity.z / sim.time / (10.0 * (1.0 - s) / (s + 0.67))
+    let times = if to_the_end { vec![0.01, 0.02] } else { vec![0.01] };
+    let mut over = |time: f64| {
+        while sim.time < time - 1e-9 {
+            sim.step().expect("a step");
+        }
+        sim.solids.poses()[0].velocity.z / sim.time / (10.0 * (1.0 - s) / (s + 0.67))
+    };
+    times.into_iter().map(&mut over).collect()
 }
 
 #[test]
 fn a_light_and_a_heavy_cube_move_in_a_full_tank_as_added_mass_says() {
-    let [light, heavy] = [0.3, 3.0].map(|s| cube(s, &Processor::Cpu));
-    println!("light {light:.3}, heavy {heavy:.3} of the acceleration in an endless fluid");
+    let [lights, heavies] = [0.3, 3.0].map(|s| cube(s, &Processor::Cpu, true));
+    println!("light {lights:.3?}, heavy {heavies:.3?} of the acceleration in an endless fluid");
+    let (light, heavy) = (lights[1], heavies[1]);
     assert!((light - 1.0).abs() < 0.12 && (heavy - 1.0).abs() < 0.12, "{light} {heavy}");
     if let Some(processor) = device() {
-        let there = cube(0.3, &processor);
-        assert!((there - light).abs() < 2e-3, "{there}, {light}");
+        let there = cube(0.3, &processor, false)[0];
+        println!("the light one on the device {there:.5}, on the CPU {:.5}", lights[0]);
+        assert!((there - lights[0]).abs() < 1e-3, "{there}, {}", lights[0]);
     }
 }
 

@@ -198,9 +198,9 @@ fn a_floating_cube_is_carried_by_its_displacement() {
     case.fluid.as_mut().expect("water").block[0].max[2] = 0.2;
     let mut sim = simulation(&case);
     let (mut force, mut height, mut level, mut count) = (0.0, 0.0, 0.0, 0.0);
-    while sim.time < 0.9 {
+    while sim.time < 0.75 {
         sim.step().expect("the cube floats");
-        if sim.time > 0.45 {
+        if sim.time > 0.4 {
             force += sim.fluid_force[0].force.z;
             height += sim.solids.poses()[0].position.z;
             let m = sim.backend.monitor().expect("water");

@@ -187,13 +187,14 @@ fn collapse(at: f64, steps: usize, processor: &Processor, preconditioner: &str) 
 #[test]
 fn a_collapse_over_the_seam_is_the_one_in_the_middle() {
     for preconditioner in ["jacobi", "multigrid"] {
-        let (middle, p) = collapse(0.5, 100, &Processor::Cpu, preconditioner);
-        let (seam, q) = collapse(0.0, 100, &Processor::Cpu, preconditioner);
+        // It began with 0.18 J.
+        let (middle, p) = collapse(0.5, 70, &Processor::Cpu, preconditioner);
+        let (seam, q) = collapse(0.0, 70, &Processor::Cpu, preconditioner);
         println!("{preconditioner}: {middle} J, over the seam {:+.1e}", seam / middle - 1.0);
-        assert!(middle > 1.0 && (seam / middle - 1.0).abs() < 1e-4, "{middle} {seam}");
+        assert!(middle > 0.5 && (seam / middle - 1.0).abs() < 1e-4, "{middle} {seam}");
         assert!((p[0] - q[0]).abs() < 1e-4 * p[0].abs() && p[0].abs() > 0.1, "{p:?} {q:?}");
         if !gpu::adapters().is_empty() {
-            let (device, _) = collapse(0.0, 100, &Processor::Gpu { adapter: None }, preconditioner);
+            let (device, _) = collapse(0.0, 70, &Processor::Gpu { adapter: None }, preconditioner);
             println!("on the device {:+.1e}", device / middle - 1.0);
             assert!((device / middle - 1.0).abs() < 1e-2, "{middle} {device}");
         }
@@ -445,12 +446,16 @@ fn the_levels_of_the_device_go_round() {
         // negative pressures are cut.
         let one = Settings { max_iterations: 1, ..TIGHT };
         let whole = Settings { tolerance: 1e-4, ..TIGHT };
+        let made = |settings| {
+            let device = gpu::Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
+            (device, Cpu::new(&scene, &params, &plan, settings).expect("the CPU can"))
+        };
+        let [mut first, mut last] = [one, whole].map(made);
         for (sign, settings) in [(1.0, one), (-1.0, one), (1.0, whole)] {
             let mut fields = fields.clone();
             fields.source.iter_mut().for_each(|b| *b *= 1e-4 * sign);
-            let mut device = gpu::Gpu::new(&scene, &params, &plan, settings, None).expect("the device can");
-            let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
-            let both: [&mut dyn Backend; 2] = [&mut device, &mut cpu];
+            let (device, cpu) = if settings == one { &mut first } else { &mut last };
+            let both: [&mut dyn Backend; 2] = [&mut *device, &mut *cpu];
             let mut iterations = Vec::new();
             for backend in both {
                 backend.write(&fields).expect("writable");
@@ -478,7 +483,7 @@ fn the_levels_of_the_device_go_round() {
             let (a, b) = (device.level_sums().expect("readable"), {
                 let mut twin = Multigrid::default();
                 twin.build(
-                    &system(&cpu, &params),
+                    &system(cpu, &params),
                     &Grid::new(&params).expect("valid"),
                     &cpu.fields().position,
                 );

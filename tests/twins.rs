@@ -691,16 +691,16 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
     for spacing in [0.03, 0.02] {
         case.run.spacing = spacing;
         let scene = Arc::new(Scene::build(&case).expect("a valid scene"));
-        let mut iterations = |preconditioner, on_device: bool| {
+        let mut iterations = |preconditioner, on_device: bool, steps: usize| {
             case.fluid.as_mut().expect("it has fluid").solver.preconditioner = preconditioner;
             let processor = if on_device { Processor::Gpu { adapter: None } } else { Processor::Cpu };
             let mut simulation =
                 Simulation::on(&case, scene.clone(), &processor).expect("the simulation starts");
-            (0..4).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
+            (0..steps).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
         };
-        let gpu = iterations(seixo::case::Preconditioner::Multigrid, true);
-        let cpu = iterations(seixo::case::Preconditioner::Multigrid, false);
-        let diagonal = iterations(seixo::case::Preconditioner::Jacobi, true);
+        let gpu = iterations(seixo::case::Preconditioner::Multigrid, true, 4);
+        let cpu = iterations(seixo::case::Preconditioner::Multigrid, false, 4);
+        let diagonal = iterations(seixo::case::Preconditioner::Jacobi, true, 1);
         println!(
             "l0 = {spacing}: at most {gpu} on the device, {cpu} on the CPU, {diagonal} with the diagonal"
         );
@@ -1286,9 +1286,7 @@ fn two_runs_give_the_same_bytes() {
         let scheme = "preset = \"accurate\"";
         for preconditioner in [Preconditioner::Jacobi, Preconditioner::Multigrid] {
             let first = bytes(scheme, preconditioner);
-            for _ in 0..2 {
-                assert!(first == bytes(scheme, preconditioner), "two runs differ ({preconditioner:?})");
-            }
+            assert!(first == bytes(scheme, preconditioner), "two runs differ ({preconditioner:?})");
         }
     }
 }
