@@ -7,7 +7,7 @@ use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall, coarse};
 use crate::error::Problem;
-use crate::shape::{Particles, PointCells, bending};
+use crate::shape::{ADJACENT, Particles, PointCells, bending, bends};
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
@@ -16,8 +16,8 @@ use std::collections::HashSet;
 pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
 /// Nearer to a particle of a solid than this, over the spacing, other walls may face pieces of the surface that are its.
 const MEETING: f64 = 3.0;
-/// Area of a particle with what it is handed on, over its own, from which it is handed on something [-].
-const HANDED: f64 = 1.05;
+/// Nearer to a wall than this, over the spacing, a flat face lies on it.
+const FLUSH: f64 = 1e-3;
 
 /// A wall without particles, where it stands; `moved` if it moves.
 fn wall(
@@ -142,12 +142,9 @@ impl Builder<'_> {
         let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
         let flat = |k: &usize| !bends[*k];
         match self.freed(solid, &kept) {
-            Some(freed) => {
-                // Where it bends what faces walls counts, too; but what particles that are left out have had is handed on.
-                let handed = |k: usize, area: DVec3| area.dot(areas[k]) > HANDED * areas[k].length_squared();
-                let rows = (0..kept.len()).filter(|&k| kept[k]).zip(0..);
-                let rows = rows.filter(|&(k, row)| flat(&k) || handed(k, freed.area[row]));
-                for (k, row) in rows.collect::<Vec<_>>() {
+            Some([unfaced, outside]) => {
+                for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..) {
+                    let freed = if flat(&k) { &unfaced } else { &outside };
                     areas[k] = freed.area[row];
                     solid.wall_to_surface[k] = freed.to_surface[row];
                 }
@@ -192,27 +189,48 @@ impl Builder<'_> {
         area
     }
 
-    /// Those particles of a solid that are `kept`, with what of its surface faces no other wall: of one whose particles have no face each of their own, where others
-    /// come near it.
-    fn freed(&self, solid: &Solid, kept: &[bool]) -> Option<Particles> {
+    /// Those particles of a solid that are `kept`, with what of its surface faces no other wall, and with what of it lies in none and flat on none:
+    /// where it bends away from a wall the gap is open. Of one whose particles have no face each of their own, where others come near it.
+    fn freed(&self, solid: &Solid, kept: &[bool]) -> Option<[Particles; 2]> {
         let l0 = self.lattice.spacing;
         let at = |x: DVec3| solid.position + solid.orientation * x;
-        let mut met = PointCells::new(MEETING * l0);
+        let (mut met, mut layer) = (PointCells::new(MEETING * l0), PointCells::new(MEETING * l0));
         for (&offset, kept) in solid.wall_offset.iter().zip(kept) {
+            layer.add(at(offset));
             let ways = DVec3::AXES.into_iter().flat_map(|e| [e, -e]);
             let mut around = ways.flat_map(|e| [1.0, 2.0].map(|d| at(offset) + d * l0 * e));
             if !kept || around.any(|x| self.buried(x, false)) {
                 met.add(at(offset));
             }
         }
-        let free = |x: DVec3, normal: DVec3| {
+        if met.is_empty() {
+            return None;
+        }
+        // Where a solid ends in a wedge its surface goes on beyond the last of its particles.
+        let alone = |x: DVec3| met.numbers(x).is_empty() && !layer.numbers(x).is_empty();
+        // Directions of the surface, each once in half a spacing.
+        let (mut around, mut ways, mut seen) = (PointCells::new(ADJACENT * l0), vec![], HashSet::new());
+        for (x, area) in solid.shape.pieces(l0)? {
+            let (x, way) = (at(x), solid.orientation * area.normalize_or_zero());
+            let key = ((2.0 / l0 * x).floor().as_ivec3(), (1e3 * way).round().as_ivec3());
+            if !alone(x) && seen.insert(key) {
+                around.add(x);
+                ways.push(way);
+            }
+        }
+        let covered = |x: DVec3, normal: DVec3, d: f64| self.buried(x + d * l0 * normal, false);
+        let faces_none = |x: DVec3, normal: DVec3| {
             let (x, normal) = (at(x), solid.orientation * normal);
-            met.nearest(x, MEETING * l0).is_none()
-                || COVERED.iter().all(|d| !self.buried(x + *d * l0 * normal, false))
+            alone(x) || COVERED.iter().all(|d| !covered(x, normal, *d))
+        };
+        let lies_in_none = |x: DVec3, normal: DVec3| {
+            let (x, normal) = (at(x), solid.orientation * normal);
+            let bent = || around.numbers(x).into_iter().any(|k| bends(normal, ways[k]));
+            alone(x) || !covered(x, normal, -FLUSH) && (!covered(x, normal, FLUSH) || bent())
         };
         let wall: Vec<DVec3> =
             solid.wall_offset.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect();
-        if met.is_empty() { None } else { solid.shape.freed(&wall, l0, &free) }
+        Some([solid.shape.freed(&wall, l0, &faces_none)?, solid.shape.freed(&wall, l0, &lies_in_none)?])
     }
 
     /// From where to where a solid reaches that goes beyond the tank's sides along an axis, for a note: that a prism stands from its `position`

@@ -35,7 +35,7 @@ pub(super) fn share(
     pieces: impl Iterator<Item = Piece>,
     nearest: impl Fn(DVec3) -> DVec3,
 ) {
-    give(particles, spacing, pieces, nearest);
+    give(particles, spacing, pieces, &nearest);
     close(particles, volume);
 }
 
@@ -48,16 +48,25 @@ pub(super) fn of_some(
 ) -> Particles {
     let mut out = Particles::default();
     wall.iter().for_each(|&x| out.add(0, x, DVec3::ZERO, nearest(x) - x));
-    give(&mut out, spacing, pieces, nearest);
+    let middles = give(&mut out, spacing, pieces, &nearest);
+    // One whose own side is left out stands for what it has of others.
+    for (k, (sum, weight)) in middles.into_iter().enumerate().filter(|(_, m)| m.1 > 0.0) {
+        let outward = out.area[k].normalize_or_zero();
+        if outward.dot(out.to_surface[k]) <= 0.0 {
+            let way = (sum / weight - out.wall[k]).clamp_length_max(FAR * spacing);
+            out.to_surface[k] = nearest(out.wall[k] + way + 0.5 * spacing * outward) - out.wall[k];
+        }
+    }
     out
 }
 
+/// Gives `pieces` to particles; returns the middle of what each has [m], times its weight, and that.
 fn give(
     particles: &mut Particles,
     spacing: f64,
     mut pieces: impl Iterator<Item = Piece>,
     nearest: impl Fn(DVec3) -> DVec3,
-) {
+) -> Vec<(DVec3, f64)> {
     let seen = |at: DVec3, normal: DVec3| {
         let turned = TURN * spacing * normal;
         [at.x, at.y, at.z, turned.x, turned.y, turned.z]
@@ -65,6 +74,7 @@ fn give(
     let normals: Vec<DVec3> = particles.to_surface.iter().map(|s| s.normalize_or_zero()).collect();
     let tree = Nearest::new(particles.wall.iter().zip(&normals).map(|(x, n)| seen(*x, *n)).collect());
     let mut middles = vec![(DVec3::ZERO, 0.0); particles.wall.len()];
+    let mut all = middles.clone();
     loop {
         let some: Vec<Piece> = pieces.by_ref().take(TOGETHER).collect();
         if some.is_empty() {
@@ -76,6 +86,8 @@ fn give(
         });
         for (at, area, k) in shared {
             particles.area[k] += area;
+            all[k].0 += area.length() * at;
+            all[k].1 += area.length();
             if area.dot(normals[k]) > ALIKE * area.length() {
                 middles[k].0 += area.length() * at;
                 middles[k].1 += area.length();
@@ -88,6 +100,7 @@ fn give(
         let along = off - off.dot(normals[k]) * normals[k];
         particles.to_surface[k] = nearest(above + along.clamp_length_max(FAR * spacing)) - particles.wall[k];
     }
+    all
 }
 
 /// Corrects areas that are even only nearly, by as little as it takes: an even pressure may not push, and one that grows along x_k must push with the

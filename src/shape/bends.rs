@@ -8,18 +8,21 @@ pub(crate) const ADJACENT: f64 = 1.2;
 /// Angles between the directions of rows beside each other at which a surface bends [rad]: below them it is flat, beyond them it has an edge.
 const BENDING: (f64, f64) = (1e-3, 0.6);
 
+/// Whether a surface that goes on from the direction `a` to `b` beside it bends there.
+pub(crate) fn bends(a: DVec3, b: DVec3) -> bool {
+    (BENDING.0..BENDING.1).contains(&a.cross(b).length().atan2(a.dot(b)))
+}
+
 /// Of rows at `offset` with outward `area`, which lie where the surface bends on from one to the next, so that it touches others along a line or
 /// in a point.
 pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], spacing: f64) -> Vec<bool> {
     let mut cells = PointCells::new(ADJACENT * spacing);
     offset.iter().for_each(|&x| cells.add(x));
     let way: Vec<DVec3> = area.iter().map(|a| a.normalize_or_zero()).collect();
-    let bends = |(k, &x): (usize, &DVec3)| {
-        let angle = |n: usize| way[k].cross(way[n]).length().atan2(way[k].dot(way[n]));
-        let is_bent = |n: usize| (BENDING.0..BENDING.1).contains(&angle(n));
-        way[k] != DVec3::ZERO && cells.numbers(x).into_iter().any(|n| n != k && is_bent(n))
+    let is_bent = |(k, &x): (usize, &DVec3)| {
+        way[k] != DVec3::ZERO && cells.numbers(x).into_iter().any(|n| n != k && bends(way[k], way[n]))
     };
-    offset.iter().enumerate().map(bends).collect()
+    offset.iter().enumerate().map(is_bent).collect()
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ mod surface;
 mod thickness;
 mod thin;
 
-pub(crate) use bends::{ADJACENT, bending};
+pub(crate) use bends::{ADJACENT, bending, bends};
 pub(crate) use cells::PointCells;
 pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;
@@ -246,6 +246,12 @@ pub trait Geometry: std::fmt::Debug + Sync {
 
     /// Particles about `spacing` [m] apart: the wall layer and what lies below it, hollow beyond `layers`.
     fn particles(&self, spacing: f64, dimensions: u32, layers: i32) -> Particles;
+
+    /// Its surface in pieces shorter than `spacing` [m]: their middles in its frame [m] and outward areas [m2]. `None` of shapes of which each
+    /// particle has a face of its own.
+    fn pieces(&self, _spacing: f64) -> Option<Box<dyn Iterator<Item = (DVec3, DVec3)> + '_>> {
+        None
+    }
 
     /// The particles `wall` of its wall layer with the areas of those pieces of its surface alone that are `free`: asked for places in its frame [m]
     /// and the normals there. `None` of shapes of which each particle has a face of its own.

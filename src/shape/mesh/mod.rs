@@ -429,6 +429,10 @@ impl Geometry for Mesh {
         particles::fill(self, spacing, layers)
     }
 
+    fn pieces(&self, spacing: f64) -> Option<Box<dyn Iterator<Item = (DVec3, DVec3)> + '_>> {
+        Some(Box::new(particles::pieces(self, spacing)))
+    }
+
     fn freed(&self, wall: &[DVec3], spacing: f64, free: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Particles> {
         Some(particles::freed(self, wall, spacing, free))
     }

@@ -84,7 +84,7 @@ fn nearest_of(sides: impl Iterator<Item = [DVec2; 2]>, q: DVec2) -> (DVec2, DVec
 
 impl Polygon {
     /// Its sides in pieces of `length` [m] at most.
-    fn pieces(&self, length: f64) -> impl Iterator<Item = Piece> + '_ {
+    fn sides_in(&self, length: f64) -> impl Iterator<Item = Piece> + '_ {
         self.sides().flat_map(move |[a, b]| {
             let count = (a.distance(b) / length).ceil().max(1.0);
             let area = -space((b - a).perp()) * self.width / count;
@@ -308,13 +308,17 @@ impl Geometry for Polygon {
             let places = stretches.iter().flat_map(|s| s.divided(PIECE * spacing)).map(space);
             thin.fill(above, places, &taken, &mut out);
         }
-        let pieces = self.pieces(PIECE * spacing);
+        let pieces = self.sides_in(PIECE * spacing);
         areas::share(&mut out, spacing, self.volume(), pieces, |x| space(self.nearest(plane(x)).0));
         out
     }
 
+    fn pieces(&self, spacing: f64) -> Option<Box<dyn Iterator<Item = Piece> + '_>> {
+        Some(Box::new(self.sides_in(CUT * spacing)))
+    }
+
     fn freed(&self, wall: &[DVec3], spacing: f64, free: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Particles> {
-        let pieces = self.pieces(CUT * spacing).filter(|(at, area)| free(*at, area.normalize_or_zero()));
+        let pieces = self.sides_in(CUT * spacing).filter(|(at, area)| free(*at, area.normalize_or_zero()));
         Some(areas::of_some(wall, spacing, pieces, |x| space(self.nearest(plane(x)).0)))
     }
 
