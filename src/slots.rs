@@ -326,19 +326,22 @@ impl Slots {
         let layer = &self.layers[slot.solid];
         // Relative to the centre of mass, world axes.
         let place = self.places(slot, pose, told);
-        let on_surface = |n: usize| pose.orientation * (layer.offset[n] + layer.to_surface[n]);
         let passing = self.passing(told.to_vec(), |n| pose.orientation * layer.offset[n]);
         let count = passing.len() as f64;
         let field = self.field(pose, &passing, &place);
         let Field { middle, inverse, any_wet, .. } = field;
         let xi = |n: usize| field.xi(place(n), self.spacing);
-        let under_water = |n: usize| !any_wet || self.in_slot(&field, place(n), on_surface(n)) > 0.0;
+        let under_water = |n: usize, at: DVec3| !any_wet || self.in_slot(&field, place(n), at) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
         let areas = layer.areas(&layer.area, slot, pose);
-        for (&(n, share), &area) in slot.inside.iter().zip(&areas).filter(|(row, _)| under_water(row.0)) {
-            let row = row(area, on_surface(n));
-            let head = self.weight.dot(on_surface(n) - middle);
+        let faces = |(&(n, share), &area): (&(usize, f64), &DVec3)| {
+            layer.faces(n, area, pose).map(move |(area, at)| (n, share, area, at))
+        };
+        let faces = slot.inside.iter().zip(&areas).flat_map(faces);
+        for (n, share, area, at) in faces.filter(|&(n, .., at)| under_water(n, at)) {
+            let row = row(area, at);
+            let head = self.weight.dot(at - middle);
             let along = xi(n).to_array();
             for (factor, (mean, slope)) in [1.0, head].into_iter().zip(mean.iter_mut().zip(&mut slope)) {
                 mean.add(share * factor, &row);
@@ -378,9 +381,11 @@ impl Slots {
         let inside = |(&(n, share), &area): (&(usize, f64), &DVec3)| {
             let mut out = SlotRow { solid, row: n as u32, taken: share, ..SlotRow::default() };
             if slot.mouth.binary_search(&n).is_ok() {
-                let outwards = pose.orientation * layer.area[n] - area;
-                out.per_pascal.add(share, &row(outwards, on_surface(n)));
-                out.head.add(self.weight.dot(on_surface(n) - place(n)), &out.per_pascal);
+                for (outwards, at) in layer.faces(n, pose.orientation * layer.area[n] - area, pose) {
+                    let row = row(outwards, at);
+                    out.per_pascal.add(share, &row);
+                    out.head.add(share * self.weight.dot(at - place(n)), &row);
+                }
             }
             out
         };

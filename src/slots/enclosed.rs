@@ -119,8 +119,9 @@ impl Slots {
             let field = self.lent(&found, &pressure, f, poses)?;
             let mut load = Wrench::default();
             for &(n, share) in &f.slot.inside {
-                let (p, at) = self.on_row(&field, k, pose, n);
-                load.add(share * p, &row(pose.orientation * self.layers[k].area[n], at));
+                for (area, at) in self.layers[k].faces(n, pose.orientation * self.layers[k].area[n], pose) {
+                    load.add(share * self.before(&field, k, pose, n, at), &row(area, at));
+                }
             }
             Some((k, load))
         };
@@ -135,12 +136,9 @@ impl Slots {
         f.slot.inside.iter().map(inside).collect()
     }
 
-    /// Pressure of the `field` of a slot of solid `k` on the surface before row `n` [Pa], and where that is, from the
-    /// centre of mass [m].
-    pub(super) fn on_row(&self, field: &Field, k: usize, pose: &Pose, n: usize) -> (f64, DVec3) {
-        let place = pose.orientation * self.layers[k].offset[n];
-        let at = place + pose.orientation * self.layers[k].to_surface[n];
-        (self.in_slot(field, place, at).max(0.0), at)
+    /// Pressure of the `field` of a slot of solid `k` on the surface `at` a place before row `n`, from the centre of mass [m] [Pa].
+    pub(super) fn before(&self, field: &Field, k: usize, pose: &Pose, n: usize, at: DVec3) -> f64 {
+        self.in_slot(field, pose.orientation * self.layers[k].offset[n], at).max(0.0)
     }
 
     /// The pressure in the slot `f` without a rim, by the rims of those that lend it theirs; `None` where they are dry.

@@ -2,7 +2,7 @@
 //! what stands in the gap, and the bed's would, too. What flat faces stand on has no water between (a pillar, a gate that is
 //! closed); where a surface bends away from what it touches the gap is open.
 
-use super::{Faced, Field, Found, Layer, Opposite, Push, Slots, enclosed};
+use super::{Faced, Found, Layer, Opposite, Push, Slots, enclosed};
 use crate::body::{Pose, Wrench};
 use crate::cover::driven::Covered;
 use crate::error::Result;
@@ -132,31 +132,29 @@ impl Slots {
             let (k, pose) = (f.slot.solid, &poses[f.slot.solid]);
             let field = self.field_of(found, &at_rims, (f, rim), poses);
             let mut load = Wrench::default();
-            let areas = self.layers[k].areas(&area[&k], &f.slot, pose);
-            for ((&(n, share), into), row) in f.slot.inside.iter().zip(areas).zip(&mut told) {
-                let (slot, arm) = self.in_held(field.as_ref(), k, pose, n);
-                let alone = row.in_force(pose.orientation * self.layers[k].to_surface[n], params);
-                let counted = if self.layers[k].bends[n] { self.layers[k].area[n] } else { area[&k][n] };
-                let rest = pose.orientation * (area[&k][n] - counted);
-                let force = -share * ((slot - alone) * into + alone * rest);
-                load += Wrench { force, torque: arm.cross(force) };
-                // What has slots of its own there has its part from them.
-                let is_pressed =
-                    |of| matches!(of, Opposite::Solid(other, row) if pressed.contains(&(other, row)));
-                for (on, into) in f.faced[n].onto(into, pose).into_iter().filter(|&(of, _)| !is_pressed(of)) {
-                    let at = self.on_face(k, pose, n, into);
-                    out.pushes.push(Push { on, at, pressure: slot, area: share * into });
+            let layer = &self.layers[k];
+            let areas = layer.areas(&area[&k], &f.slot, pose);
+            for ((&(n, share), into), row) in f.slot.inside.iter().zip(&areas).zip(&mut told) {
+                let place = pose.orientation * layer.offset[n];
+                let mut press = |pressure: f64, area: DVec3, at: DVec3| {
+                    let force = -share * pressure * area;
+                    load += Wrench { force, torque: at.cross(force) };
+                };
+                for (into, at) in layer.faces(n, *into, pose) {
+                    let slot = field.as_ref().map_or(0.0, |field| self.before(field, k, pose, n, at));
+                    press(slot - row.in_force(at - place, params), into, at);
+                }
+                if layer.bends[n] {
+                    let way = pose.orientation * layer.to_surface[n];
+                    let rest = pose.orientation * (area[&k][n] - layer.area[n]);
+                    press(row.in_force(way, params), rest, place + way);
                 }
             }
+            // What has slots of its own there has its part from them.
+            let is_free = |of| !matches!(of, Opposite::Solid(other, row) if pressed.contains(&(other, row)));
+            out.pushes.extend(self.pushes_of(f, &areas, field.as_ref(), pose, is_free));
             out.loads.push((k, load));
         }
         Ok(out)
-    }
-
-    /// Pressure in a slot on the surface before row `n` of solid `k` [Pa], none where it is dry, and where that is, from the solid's place [m].
-    fn in_held(&self, field: Option<&Field>, k: usize, pose: &Pose, n: usize) -> (f64, DVec3) {
-        let layer = &self.layers[k];
-        let dry = || (0.0, pose.orientation * (layer.offset[n] + layer.to_surface[n]));
-        field.map_or_else(dry, |field| self.on_row(field, k, pose, n))
     }
 }

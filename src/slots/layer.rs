@@ -125,6 +125,19 @@ impl Layer {
         slot.inside.iter().zip(&ways).map(inwards).collect()
     }
 
+    /// The faces of row `n` that its `area` sums up, and their middles from the place of the solid, which is at `pose`, world axes [m2], [m]: at an edge
+    /// of a box each has its own.
+    pub fn faces(&self, n: usize, area: DVec3, pose: &Pose) -> impl Iterator<Item = (DVec3, DVec3)> {
+        let (turn, offset, to_surface) = (pose.orientation, self.offset[n], self.to_surface[n]);
+        let own = turn.inverse() * area;
+        let is_one = move |of: &DVec3| of.length_squared() > 1e-12 * own.length_squared();
+        let of_box = DVec3::AXES.map(|e| (own * e, to_surface * e));
+        let of_box = of_box.into_iter().filter(move |(of, _)| is_one(of));
+        let is_box = self.is_box;
+        let faces = of_box.filter(move |_| is_box).chain((!is_box).then_some((own, to_surface)));
+        faces.map(move |(area, way)| (turn * area, turn * (offset + way)))
+    }
+
     pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {
         let reach = DVec3::splat(self.radius + margin);
         (pose.position - reach, pose.position + reach)

@@ -80,8 +80,10 @@ impl Slots {
         let found = self.find(poses);
         let pressure = self.at_rims(&found, read)?;
         let of = |(f, told): (&Found, &Vec<(usize, f64)>)| {
-            let field = self.field_of(&found, &pressure, (f, told), poses);
-            field.map_or_else(Vec::new, |field| self.pushes_of(f, &field, &poses[f.slot.solid]))
+            let Some(field) = self.field_of(&found, &pressure, (f, told), poses) else { return vec![] };
+            let (layer, pose) = (&self.layers[f.slot.solid], &poses[f.slot.solid]);
+            let areas = layer.areas(&layer.area, &f.slot, pose);
+            self.pushes_of(f, &areas, Some(&field), pose, |_| true)
         };
         Ok(found.iter().zip(&pressure).flat_map(of).collect())
     }
@@ -103,27 +105,26 @@ impl Slots {
         Some(self.field(pose, &passing, self.places(slot, pose, told))).filter(|field| field.any_wet)
     }
 
-    /// The middle of that face of row `n` of solid `k` which looks along `area` [m].
-    pub(super) fn on_face(&self, k: usize, pose: &Pose, n: usize, area: DVec3) -> DVec3 {
-        let (layer, way) = (&self.layers[k], area.normalize_or_zero());
-        let to_surface = pose.orientation * layer.to_surface[n];
-        pose.position + pose.orientation * layer.offset[n] + to_surface.dot(way) * way
-    }
-
-    fn pushes_of(&self, found: &Found, field: &Field, pose: &Pose) -> Vec<Push> {
+    /// What the water of the `field` in the slot `found` presses with the `areas` of its rows on that of what they look onto which `is_pressed`.
+    pub(super) fn pushes_of(
+        &self,
+        found: &Found,
+        areas: &[DVec3],
+        field: Option<&Field>,
+        pose: &Pose,
+        is_pressed: impl Fn(Opposite) -> bool,
+    ) -> Vec<Push> {
         let Found { slot, faced, .. } = found;
-        let push = |n: usize, area: DVec3| {
-            let (pressure, _) = self.on_row(field, slot.solid, pose, n);
-            let onto = faced[n].onto(area, pose).into_iter();
-            onto.map(move |(on, area)| Push {
-                on,
-                at: self.on_face(slot.solid, pose, n, area),
-                pressure,
-                area: faced[n].share * area,
-            })
-        };
         let layer = &self.layers[slot.solid];
-        let areas = layer.areas(&layer.area, slot, pose);
-        slot.inside.iter().zip(areas).flat_map(|(row, area)| push(row.0, area)).collect()
+        let mut out = vec![];
+        for (&(n, share), &area) in slot.inside.iter().zip(areas) {
+            for (on, area) in faced[n].onto(area, pose).into_iter().filter(|of| is_pressed(of.0)) {
+                out.extend(layer.faces(n, area, pose).map(|(area, at)| {
+                    let pressure = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
+                    Push { on, at: pose.position + at, pressure, area: share * area }
+                }));
+            }
+        }
+        out
     }
 }
