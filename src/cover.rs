@@ -12,7 +12,7 @@ use glam::{DMat3, DQuat, DVec3};
 /// row's face at its ends.
 const WITHIN: f64 = -0.15;
 /// A point that lies on a solid's surface up to this much, over l0, is half in it, or round-off would tell where it is.
-const SLACK: f64 = 1e-6;
+pub(crate) const SLACK: f64 = 1e-2;
 /// Edge of the cells that faces are found in, over l0.
 pub(crate) const CELL: f64 = 4.0;
 /// Points along an edge of a face, in the plane and in space.
@@ -147,12 +147,13 @@ impl Tiles {
         if self.plane { across } else { across.min(area.sqrt()) }
     }
 
-    /// The middles of the parts of a face about `center` that looks along `normal`: two halves in the plane, quarters in space.
-    pub fn quarters(&self, center: DVec3, normal: DVec3) -> Vec<DVec3> {
-        let (along, across) = self.tangents(normal.normalize_or_zero());
-        let ends = [-0.25, 0.25].map(|k| center + k * self.spacing * along);
-        let both = |x: DVec3| [-0.25, 0.25].map(|k| x + k * self.spacing * across);
-        if self.plane { ends.to_vec() } else { ends.into_iter().flat_map(both).collect() }
+    /// Points of the face around `center` with an `edge` [m] that looks along `normal`, evenly.
+    pub fn points(&self, (center, edge): (DVec3, f64), normal: DVec3) -> impl Iterator<Item = DVec3> {
+        let (along, across) = self.tangents(normal);
+        let n = POINTS[usize::from(!self.plane)];
+        let place = move |k: u32| edge * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
+        let rows = if self.plane { 1 } else { n };
+        (0..rows).flat_map(move |j| (0..n).map(move |i| center + place(i) * along + place(j) * across))
     }
 
     fn tangents(&self, normal: DVec3) -> (DVec3, DVec3) {
@@ -197,17 +198,10 @@ impl Tiles {
         if near.is_empty() {
             return 0.0;
         }
-        let (along, across) = self.tangents(normal);
-        let n = POINTS[usize::from(!self.plane)];
-        let place = |k: u32| edge * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
-        let mut sum = 0.0;
-        let rows = if self.plane { 1 } else { n };
-        for j in 0..rows {
-            for i in 0..n {
-                sum += of(center + place(i) * along + place(j) * across, &near);
-            }
-        }
-        sum / f64::from(rows * n)
+        let (sum, count) = self
+            .points((center, edge), normal)
+            .fold((0.0, 0.0), |(sum, count), x| (sum + of(x, &near), count + 1.0));
+        sum / count
     }
 }
 

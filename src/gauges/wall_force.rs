@@ -4,7 +4,7 @@
 
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::PointGrid;
-use crate::cover::{self, CELL, Standing, Tiles};
+use crate::cover::{self, CELL, SLACK, Standing, Tiles};
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
@@ -162,11 +162,15 @@ impl FixedWall {
             let normal = scene.static_wall_normal[wall];
             let normal = if self.on_lattice { face_before(normal, push.area) } else { normal };
             let area = push.area_on(normal);
-            let places = self.tiles.quarters(push.at, normal);
+            // As what stands before faces is told, so that what is pressed and what is bare fit together.
+            let edge = self.tiles.edge(area.length());
+            let places: Vec<DVec3> = self.tiles.points((push.at, edge), normal).collect();
             let each = area.length() / places.len() as f64;
-            for row in places.iter().filter_map(|x| self.row_at(scene.periodic.wrap(*x), normal)) {
-                let face = (1e3 * normal).round().as_ivec3().to_array();
-                pressed.entry((row, face)).or_insert((normal, 0.0)).1 += each;
+            let face = (1e3 * normal).round().as_ivec3().to_array();
+            for x in places {
+                let rows = self.rows_at(scene.periodic.wrap(x), normal);
+                let part = each / rows.len() as f64;
+                rows.iter().for_each(|&row| pressed.entry((row, face)).or_insert((normal, 0.0)).1 += part);
             }
             let (force, arm) = (push.pressure * area, scene.periodic.nearest(push.at - self.about));
             sum += Wrench { force, torque: arm.cross(force) };
@@ -183,16 +187,17 @@ impl FixedWall {
         sum
     }
 
-    /// The row before whose face along `normal` `x` [m] is; none where solids stand before all of it.
-    fn row_at(&self, x: DVec3, normal: DVec3) -> Option<usize> {
+    /// The rows before whose faces along `normal` `x` [m] is, of which two share what lies on the line between them; none where solids stand before
+    /// all of one.
+    fn rows_at(&self, x: DVec3, normal: DVec3) -> Vec<usize> {
         let l0 = self.tiles.spacing;
-        let mut found = None;
+        let mut found = vec![];
         self.centers.near(x, 1.5 * l0, |k| {
             let face = &self.faces[k as usize];
             let way = x - face.center;
             let along = way - way.dot(normal) * normal;
-            if face.normal.dot(normal) > 0.9 && along.abs().max_element() <= 0.5 * l0 * (1.0 + 1e-9) {
-                found = found.or(Some(face.row));
+            if face.normal.dot(normal) > 0.9 && along.abs().max_element() <= (0.5 + SLACK) * l0 {
+                found.push(face.row);
             }
         });
         found
