@@ -32,12 +32,25 @@ impl Cut {
         exchanged.sort_unstable();
         let side = IVec3::Z * i32::from(x.z > shape.center.z + 1e-6 * l0);
         let place = [even(exchanged.into()), even(mirrored), even(mirrored * IVec3::new(1, 1, 2) + side)];
-        (off < 0.5 - 1e-6).then(|| Self {
-            off: (100.0 * off).round() as i64,
-            place,
-            share: (0.5 - off).min(1.0),
-        })
+        let share = share(shape, (x, off), lattice);
+        (share > 1e-6).then(|| Self { off: (100.0 * off).round() as i64, place, share })
     }
+}
+
+/// The part of the cell about `x`, whose signed distance over l0 is `off`, that lies in the `shape` [-]. Each of its halves along each axis is cut as if by a plane:
+/// one that a corner or an edge reaches into would count as cut in half by a plane through its middle.
+fn share(shape: &Placed, (x, off): (DVec3, f64), lattice: &Lattice) -> f64 {
+    let half = 0.5 * lattice.spacing;
+    let ends = if lattice.plane { [DVec3::X, DVec3::Z].as_slice() } else { DVec3::AXES.as_slice() };
+    if off.abs() >= 0.5 * (ends.len() as f64).sqrt() {
+        return f64::from(u8::from(off < 0.0));
+    }
+    let mut parts = vec![x];
+    for e in ends {
+        parts = parts.into_iter().flat_map(|x| [x - 0.5 * half * e, x + 0.5 * half * e]).collect();
+    }
+    let of = |x: &DVec3| (0.5 - shape.distance(*x) / half).clamp(0.0, 1.0);
+    parts.iter().map(of).sum::<f64>() / parts.len() as f64
 }
 
 /// The deepest of what is cut, as many as its parts come to, but for what would be part of a set of mirrored cells.
