@@ -11,7 +11,7 @@ use glam::{DMat3, DQuat, DVec3};
 /// Distance before a face, over l0, at which a point in a solid tells that the face is within it: a surface that bends lies as much behind the plane of a
 /// row's face at its ends.
 const WITHIN: f64 = -0.15;
-/// A point that lies on a solid's surface up to this much, over l0, is half in it, or round-off would tell where it is.
+/// A point that lies on a solid's surface up to this much, over l0, is half in it: round-off, or how deep bodies press into each other, would tell where it is.
 pub(crate) const SLACK: f64 = 1e-2;
 /// Edge of the cells that faces are found in, over l0.
 pub(crate) const CELL: f64 = 4.0;

@@ -60,12 +60,12 @@ fn what_lands_on_an_edge_or_a_corner_bounces_as_asked() {
     }
 }
 
-/// Twice as deep as where the stop begins as well as above it: neither the depth nor the spring shows in what comes back.
+/// The stop begins a quarter of a spacing deep. The first spring alone would let the cube in by 3.4 spacings at 3e4 N/m and by 0.19 at 1e7 N/m: neither shows in
+/// what comes back.
 #[test]
 fn what_is_pressed_into_the_stop_bounces_as_asked() {
     for asked in [0.2, 0.5, 0.8] {
-        let mut deepest = Vec::new();
-        for spring in [3e4_f64, 2e5, 7e5, 1.4e6, 2e6, 5e6, 1e7] {
+        for spring in [3e4, 2e5, 7e5, 1.4e6, 2e6, 5e6, 1e7] {
             let mut dry = Dry::new(&format!(
                 "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1\ngravity = [0, 0, 0]\n\
                  [[plane]]\nname = \"plane\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [2, 2]\n\
@@ -75,10 +75,7 @@ fn what_is_pressed_into_the_stop_bounces_as_asked() {
             let measured = parting(&mut dry, DVec3::NEG_Z * 0.1);
             println!("K {spring:e}: {measured:.4} for {asked}");
             assert!((measured - asked).abs() < 0.01, "K {spring:e}: {measured} for {asked}");
-            deepest.push(3.2 * (2660.0 * 0.008 / spring).sqrt() / 0.025);
         }
-        // From the hard spring alone to far into the stop.
-        assert!(deepest[0] > 3.0 && deepest[6] < 0.25);
     }
 }
 

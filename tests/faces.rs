@@ -174,8 +174,7 @@ fn dams_that_run_out_flush_with_the_floor_carry_the_water_above_them() {
         let loads = |depth: f64| {
             let (mut area, mut across, mut down) = (0.6 * depth, 0.0, 0.0);
             for side in face.windows(2) {
-                let [(x, z), (dx, dz)] =
-                    [(side[0][0], side[0][1]), (side[1][0] - side[0][0], side[1][1] - side[0][1])];
+                let (z, dx, dz) = (side[0][1], side[1][0] - side[0][0], side[1][1] - side[0][1]);
                 for k in 0..200 {
                     let head = (depth - z - dz * (f64::from(k) + 0.5) / 200.0).max(0.0);
                     area += head * dx / 200.0;

@@ -162,15 +162,9 @@ impl FixedWall {
             let normal = scene.static_wall_normal[wall];
             let normal = if self.on_lattice { face_before(normal, push.area) } else { normal };
             let area = push.area_on(normal);
-            // As what stands before faces is told, so that what is pressed and what is bare fit together.
-            let edge = self.tiles.edge(area.length());
-            let places: Vec<DVec3> = self.tiles.points((push.at, edge), normal).collect();
-            let each = area.length() / places.len() as f64;
             let face = (1e3 * normal).round().as_ivec3().to_array();
-            for x in places {
-                let rows = self.rows_at(scene.periodic.wrap(x), normal);
-                let part = each / rows.len() as f64;
-                rows.iter().for_each(|&row| pressed.entry((row, face)).or_insert((normal, 0.0)).1 += part);
+            for (row, share) in self.shares(push.at, self.tiles.edge(area.length()), normal, scene) {
+                pressed.entry((row, face)).or_insert((normal, 0.0)).1 += share * area.length();
             }
             let (force, arm) = (push.pressure * area, scene.periodic.nearest(push.at - self.about));
             sum += Wrench { force, torque: arm.cross(force) };
@@ -187,19 +181,31 @@ impl FixedWall {
         sum
     }
 
-    /// The rows before whose faces along `normal` `x` [m] is, of which two share what lies on the line between them; none where solids stand before
-    /// all of one.
-    fn rows_at(&self, x: DVec3, normal: DVec3) -> Vec<usize> {
+    /// Rows before whose faces along `normal` a face of `edge` [m] around `center` lies, and how much of it [-], by the points by which what stands
+    /// before faces is told; those on a line between faces have a part of each. Nothing where solids stand before all of a face.
+    fn shares(&self, center: DVec3, edge: f64, normal: DVec3, scene: &Scene) -> Vec<(usize, f64)> {
         let l0 = self.tiles.spacing;
-        let mut found = vec![];
-        self.centers.near(x, 1.5 * l0, |k| {
-            let face = &self.faces[k as usize];
-            let way = x - face.center;
-            let along = way - way.dot(normal) * normal;
-            if face.normal.dot(normal) > 0.9 && along.abs().max_element() <= (0.5 + SLACK) * l0 {
-                found.push(face.row);
-            }
-        });
-        found
+        let reach = edge + 1.5 * l0;
+        // Faces, and the way from their middles.
+        let mut near: Vec<(&Face, DVec3)> = vec![];
+        for image in scene.periodic.images(scene.periodic.wrap(center), reach) {
+            self.centers.near(image, reach, |k| {
+                let face = &self.faces[k as usize];
+                near.extend((face.normal.dot(normal) > 0.9).then_some((face, image - face.center)));
+            });
+        }
+        let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), normal).collect();
+        let mut shares = vec![];
+        for x in &points {
+            let before = |(face, way): &(&Face, DVec3)| {
+                let way = *way + *x;
+                let along = way - way.dot(normal) * normal;
+                (along.abs().max_element() <= (0.5 + SLACK) * l0).then_some(face.row)
+            };
+            let rows: Vec<usize> = near.iter().filter_map(before).collect();
+            let share = 1.0 / (rows.len() * points.len()) as f64;
+            shares.extend(rows.into_iter().map(|row| (row, share)));
+        }
+        shares
     }
 }

@@ -16,7 +16,7 @@ use std::collections::HashSet;
 pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
 /// Nearer to a particle of a solid than this, over the spacing, other walls may face pieces of the surface that are its.
 const MEETING: f64 = 3.0;
-/// Nearer to a wall than this, over the spacing, a flat face lies on it.
+/// What lies deeper in a wall than this, over the spacing, has no gap before it.
 const FLUSH: f64 = 1e-3;
 
 /// A wall without particles, where it stands; `moved` if it moves.
@@ -139,20 +139,15 @@ impl Builder<'_> {
             solid.dummy_offset.iter().filter(|o| !self.buried(at(o), true)).copied().collect();
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
         let mut areas = self.cut(solid, &kept);
-        let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
-        let flat = |k: &usize| !bends[*k];
-        match self.freed(solid, &kept) {
-            Some([unfaced, outside]) => {
-                for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..) {
-                    let freed = if flat(&k) { &unfaced } else { &outside };
-                    areas[k] = freed.area[row];
-                    solid.wall_to_surface[k] = freed.to_surface[row];
-                }
+        if let Some(freed) = self.freed(solid, &kept) {
+            for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..) {
+                areas[k] = freed.area[row];
+                solid.wall_to_surface[k] = freed.to_surface[row];
             }
-            None => {
-                let flat = (0..kept.len()).filter(flat);
-                flat.for_each(|k| areas[k] = self.unfaced(solid, areas[k], at(&solid.wall_offset[k])));
-            }
+        } else {
+            let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
+            let flat = (0..kept.len()).filter(|&k| !bends[k]);
+            flat.for_each(|k| areas[k] = self.unfaced(solid, areas[k], at(&solid.wall_offset[k])));
         }
         fn left<T: Copy>(all: &[T], kept: &[bool]) -> Vec<T> {
             all.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()
@@ -189,12 +184,12 @@ impl Builder<'_> {
         area
     }
 
-    /// Those particles of a solid that are `kept`, with what of its surface faces no other wall, and with what of it lies in none and flat on none:
-    /// where it bends away from a wall the gap is open. Of one whose particles have no face each of their own, where others come near it.
-    fn freed(&self, solid: &Solid, kept: &[bool]) -> Option<[Particles; 2]> {
-        let l0 = self.lattice.spacing;
+    /// Those particles of a solid that are `kept`, with what of its surface faces no other wall, or bends away from one, so that there is a gap: of one whose
+    /// particles have no face each of their own, where others come near it.
+    fn freed(&self, solid: &Solid, kept: &[bool]) -> Option<Particles> {
+        let (l0, near) = (self.lattice.spacing, MEETING * self.lattice.spacing);
         let at = |x: DVec3| solid.position + solid.orientation * x;
-        let (mut met, mut layer) = (PointCells::new(MEETING * l0), PointCells::new(MEETING * l0));
+        let (mut met, mut layer) = (PointCells::new(near), PointCells::new(near));
         for (&offset, kept) in solid.wall_offset.iter().zip(kept) {
             layer.add(at(offset));
             let ways = DVec3::AXES.into_iter().flat_map(|e| [e, -e]);
@@ -207,7 +202,7 @@ impl Builder<'_> {
             return None;
         }
         // Where a solid ends in a wedge its surface goes on beyond the last of its particles.
-        let alone = |x: DVec3| met.numbers(x).is_empty() && !layer.numbers(x).is_empty();
+        let alone = |x: DVec3| !met.is_near(x, near) && layer.is_near(x, near);
         // Directions of the surface, each once in half a spacing.
         let (mut around, mut ways, mut seen) = (PointCells::new(ADJACENT * l0), vec![], HashSet::new());
         for (x, area) in solid.shape.pieces(l0)? {
@@ -218,19 +213,15 @@ impl Builder<'_> {
                 ways.push(way);
             }
         }
-        let covered = |x: DVec3, normal: DVec3, d: f64| self.buried(x + d * l0 * normal, false);
-        let faces_none = |x: DVec3, normal: DVec3| {
+        let bent = |x: DVec3, way: DVec3| around.within(x, ADJACENT * l0).any(|(k, _)| bends(way, ways[k]));
+        let free = |x: DVec3, normal: DVec3| {
             let (x, normal) = (at(x), solid.orientation * normal);
-            alone(x) || COVERED.iter().all(|d| !covered(x, normal, *d))
-        };
-        let lies_in_none = |x: DVec3, normal: DVec3| {
-            let (x, normal) = (at(x), solid.orientation * normal);
-            let bent = || around.numbers(x).into_iter().any(|k| bends(normal, ways[k]));
-            alone(x) || !covered(x, normal, -FLUSH) && (!covered(x, normal, FLUSH) || bent())
+            let covered = |d: f64| self.buried(x + d * l0 * normal, false);
+            alone(x) || !COVERED.into_iter().any(covered) || !covered(-FLUSH) && bent(x, normal)
         };
         let wall: Vec<DVec3> =
             solid.wall_offset.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect();
-        Some([solid.shape.freed(&wall, l0, &faces_none)?, solid.shape.freed(&wall, l0, &lies_in_none)?])
+        solid.shape.freed(&wall, l0, &free)
     }
 
     /// From where to where a solid reaches that goes beyond the tank's sides along an axis, for a note: that a prism stands from its `position`

@@ -44,6 +44,11 @@ impl PointCells {
         self.within(x, self.edge).map(|(k, _)| k).collect()
     }
 
+    /// Whether a point lies within `reach` [m] of `x`.
+    pub fn is_near(&self, x: DVec3, reach: f64) -> bool {
+        self.within(x, reach).next().is_some()
+    }
+
     /// The nearest point within `reach` [m] of `x`.
     pub fn nearest(&self, x: DVec3, reach: f64) -> Option<usize> {
         let near = self.within(x, reach);
