@@ -165,7 +165,7 @@ fn dams_that_run_out_flush_with_the_floor_carry_the_water_above_them() {
     for (dimensions, l0, section, end, bounds) in [
         (2, 0.02, beach.clone(), 2.0, [0.03, 0.03]),
         (2, 0.02, arc, 1.0, [0.12, 0.03]),
-        (3, 0.025, beach, 2.0, [0.06, 0.06]),
+        (3, 0.025, beach, 2.0, [0.09, 0.09]),
     ] {
         let width = if dimensions == 2 { l0 } else { 0.1 };
         let (told, scene) = mean(&case(&format!(

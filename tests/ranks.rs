@@ -208,7 +208,7 @@ fn many_ranks_compute_what_one_computes() {
         ("plane", shipped("dam_break_2d", &["fluid.solver.tolerance=1e-9"]), 20, &[4], 1e-11),
         ("flume", flume(""), 45, &[2, 4], 1e-11),
         ("flume, multigrid", flume("solver = { preconditioner = \"multigrid\" }"), 45, &[3], 1e-7),
-        ("full", full(""), 20, &[3], 1e-9),
+        ("full", full("solver = { tolerance = 1e-9 }"), 20, &[3], 1e-9),
     ]);
 }
 
