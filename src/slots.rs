@@ -30,7 +30,6 @@ mod pushes;
 
 pub use enclosed::Pressed;
 pub use held::{Held, HeldForces};
-pub(crate) use pushes::face_before;
 pub use pushes::{Opposite, Push};
 
 use crate::body::slots::{Seep, SlotRow};

@@ -8,7 +8,8 @@ use crate::cover::{self, CELL, SLACK, Standing, Tiles};
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::slots::{Opposite, Push, face_before};
+use crate::shape::face_before;
+use crate::slots::{Opposite, Push};
 use glam::{DMat3, DVec3, IVec3};
 use std::collections::{BTreeMap, HashSet};
 

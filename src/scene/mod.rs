@@ -46,7 +46,7 @@ pub(crate) use placement::{CONTACT_DISTANCE, point};
 pub(crate) use shaped::COVERED;
 
 use crate::periodic::Periodic;
-use crate::shape::{Surface, WallLayer};
+use crate::shape::{Surface, WallLayer, row_faces};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -269,13 +269,9 @@ impl Solid {
         }
     }
 
-    /// The faces of row `k`: outward area [m2], and the way to the middle [m], in its frame. A particle at an edge of a box has a part of each
-    /// face there, with middles that lie in different depths; any other has one.
+    /// The faces of row `k`: outward area [m2], and the way to the middle [m], in its frame ([`row_faces`]).
     pub(crate) fn faces(&self, k: usize) -> impl Iterator<Item = (DVec3, DVec3)> {
-        let (area, to_surface) = (self.wall_area[k], self.wall_to_surface[k]);
-        let of_box = DVec3::AXES.map(|e| (area * e, to_surface * e));
-        let is_box = self.shape.as_cuboid().is_some();
-        of_box.into_iter().filter(move |_| is_box).chain((!is_box).then_some((area, to_surface)))
+        row_faces(self.shape.as_cuboid().is_some(), self.wall_area[k], self.wall_to_surface[k])
     }
 
     /// Turn from the shape as its keys describe it to where `orientation`, that of a pose, has it: what users are told. At the start

@@ -18,6 +18,7 @@ mod nodes;
 mod open;
 mod polygon;
 mod rings;
+mod row;
 mod sphere;
 mod surface;
 mod thickness;
@@ -37,6 +38,7 @@ pub use nodes::Node;
 use nodes::nodes_between;
 pub use polygon::Polygon;
 pub(crate) use polygon::signed_area;
+pub(crate) use row::{face_before, row_faces};
 pub use sphere::Sphere;
 pub use surface::{Line, Ring, Side, Surface};
 

@@ -12,7 +12,8 @@ use crate::ledger::Entry;
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, Stage};
 use crate::scene::Scene;
-use crate::slots::{Opposite, Pressed, Push, face_before};
+use crate::shape::face_before;
+use crate::slots::{Opposite, Pressed, Push};
 use glam::DVec3;
 use std::collections::HashMap;
 

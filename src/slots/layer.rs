@@ -4,7 +4,7 @@ use super::{CELL, Faced, Slot};
 use crate::body::Pose;
 use crate::contact::broad::{Bounds, PointGrid};
 use crate::scene::Solid;
-use crate::shape::{ADJACENT, bending};
+use crate::shape::{ADJACENT, bending, row_faces};
 use glam::DVec3;
 use std::sync::{Arc, OnceLock};
 
@@ -125,16 +125,10 @@ impl Layer {
         slot.inside.iter().zip(&ways).map(inwards).collect()
     }
 
-    /// The faces of row `n` that its `area` sums up, and their middles from the place of the solid, which is at `pose`, world axes [m2], [m]: at an edge
-    /// of a box each has its own.
+    /// The faces of row `n` that its `area` sums up, and their middles from the place of the solid, which is at `pose`, world axes [m2], [m] ([`row_faces`]).
     pub fn faces(&self, n: usize, area: DVec3, pose: &Pose) -> impl Iterator<Item = (DVec3, DVec3)> {
-        let (turn, offset, to_surface) = (pose.orientation, self.offset[n], self.to_surface[n]);
-        let own = turn.inverse() * area;
-        let is_one = move |of: &DVec3| of.length_squared() > 1e-12 * own.length_squared();
-        let of_box = DVec3::AXES.map(|e| (own * e, to_surface * e));
-        let of_box = of_box.into_iter().filter(move |(of, _)| is_one(of));
-        let is_box = self.is_box;
-        let faces = of_box.filter(move |_| is_box).chain((!is_box).then_some((own, to_surface)));
+        let (turn, offset) = (pose.orientation, self.offset[n]);
+        let faces = row_faces(self.is_box, turn.inverse() * area, self.to_surface[n]);
         faces.map(move |(area, way)| (turn * area, turn * (offset + way)))
     }
 
