@@ -1,7 +1,7 @@
 //! Maps of stability over dimensionless numbers, with the limits of theory drawn in.
 //!
 //! Each point is classed: stable, degraded (a measure is out of its limit) or failed (a guard stopped it). The
-//! theory is derived in docs/numerics.md.
+//! theory is derived in docs/numerics.md and docs/numerics-contact.md.
 
 use super::definition::Setup;
 use super::report::{Report, short};
