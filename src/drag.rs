@@ -5,7 +5,7 @@
 //! The rate is the largest eigenvalue of M^-1 D, M the body's mass and inertia and D u the force and torque with which water at
 //! rest resists the motion u, six numbers, of a body that is wholly under water:
 //!
-//! D = sum k J^T J over the wall layer, J u the velocity there, k the force over it [kg/s].
+//! D = sum k J^T J over the wall layer, J u the velocity of the surface before it, k the force over it [kg/s].
 //!
 //! In steps of 1 / rate, and no longer than what a particle of water allows, nothing grows: sum k (v - J u)^2 is at most twice
 //! sum k v^2 + sum k (J u)^2, so that no eigenvalue of body and water together is more than twice the larger of theirs. The water
@@ -68,10 +68,9 @@ fn of(solid: &Solid, params: &Params) -> Drag {
                 rubbed -= number_density::pair_weight(r2, params);
             }
         });
-        let (at, to_surface) = (solid.orientation * x, solid.orientation * solid.wall_to_surface[k]);
-        let arm = at + to_surface;
-        viscous.add(params.particle_mass() * shear * sheared.max(0.0), at, arm);
-        friction.add(params.particle_mass() * params.wall_friction * rubbed.max(0.0), at, arm);
+        let arm = solid.orientation * (x + solid.wall_to_surface[k]);
+        viscous.add(params.particle_mass() * shear * sheared.max(0.0), arm);
+        friction.add(params.particle_mass() * params.wall_friction * rubbed.max(0.0), arm);
         let area = solid.orientation * solid.wall_area[k];
         viscous.turn(params.density * params.viscosity, arm, area);
     }
@@ -98,11 +97,11 @@ impl Default for Resistance {
 }
 
 impl Resistance {
-    /// A particle of the wall layer with `k` [kg/s]: its velocity is that `at` its centre, and the force acts on the surface, at `arm` [m].
-    fn add(&mut self, k: f64, at: DVec3, arm: DVec3) {
+    /// A particle of the wall layer with `k` [kg/s]: on the surface, at `arm` [m].
+    fn add(&mut self, k: f64, arm: DVec3) {
         self.sum += k;
-        self.first += k * 0.5 * (at + arm);
-        self.turn(k, arm, at);
+        self.first += k * arm;
+        self.turn(k, arm, arm);
     }
 
     /// The torque -k arm x (omega x b), symmetric: of a force, or of [`crate::kernels::body_force::turning`].

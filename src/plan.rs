@@ -110,6 +110,8 @@ pub enum Arrays {
     Fluid,
     /// Of solids that move in the fluid.
     Solids,
+    /// Of solids that turn, whose surfaces viscosity and friction act on.
+    Turning,
     /// Of walls that never move.
     FixedWalls,
     /// How unevenly neighbours lie, for the shift.
@@ -259,6 +261,8 @@ pub struct Plan {
     pub ledger: bool,
     /// Whether walls that never move line the fluid.
     pub fixed_walls: bool,
+    /// Whether solids turn in water that viscosity or friction takes along with their surface. In the paper's scheme walls are as water.
+    pub turning: bool,
 }
 
 impl Plan {
@@ -341,6 +345,8 @@ impl Plan {
         let of_solid = |on: &str| scene.solids.iter().any(|s| s.name == on);
         let gauges_fixed = case.gauge.force.iter().any(|g| !of_solid(&g.on));
         let has = |stage| runs(&reasons, stage);
+        let along = has(Stage::Viscosity) || has(Stage::WallFriction);
+        let turning = along && params.source == Source::Mixed && scene.solids.iter().any(Solid::turns);
         let reaction = match REACTING.into_iter().any(has) {
             true if fixed_walls && gauges_fixed => Told::All,
             true if has(Stage::BodyForce) => Told::Moving,
@@ -357,6 +363,7 @@ impl Plan {
             filled,
             ledger,
             fixed_walls,
+            turning,
         }
     }
 
@@ -372,6 +379,7 @@ impl Plan {
             reaction: Told::Moving,
             contact: ContactPlan::default(),
             fixed_walls: true,
+            turning: true,
             filled: false,
             ledger: false,
         }
@@ -388,6 +396,7 @@ impl Plan {
             excess: Told::None,
             reaction: Told::None,
             fixed_walls: false,
+            turning: false,
             ..Self::every_stage()
         }
     }
@@ -407,6 +416,7 @@ impl Plan {
         match arrays {
             Arrays::Fluid => self.wet(),
             Arrays::Solids => self.has(Stage::MoveSolids),
+            Arrays::Turning => self.turning,
             Arrays::FixedWalls => self.fixed_walls,
             Arrays::Imbalance => self.has(Stage::Shift),
             Arrays::SurfacePressure => self.has(Stage::SurfacePressure),

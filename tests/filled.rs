@@ -179,7 +179,7 @@ fn weightless(size: [f64; 2], spacing: f64, dt: f64, fluid: &str, body: &str) ->
     let [x, z] = size;
     case(&format!(
         "[run]\nspacing = {spacing}\ntime_step = {dt}\nadaptive = true\nend = 10.0\ngravity = [0, 0, 0]\ndimensions = 2\n\
-         [fluid]\nwall_friction = 0\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{x}, 0, {z}]\n\
+         [fluid]\n{fluid}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{x}, 0, {z}]\n\
          [tank]\nmin = [0, 0, 0]\nmax = [{x}, 0, {z}]\nopen = []\n\
          [contact]\nspring = 1e5\n[[body]]\nname = \"body\"\ndensity = 1000\ndisplaces_fluid = true\n{body}"
     ))
@@ -195,7 +195,7 @@ fn a_disc_in_creeping_flow_between_walls_is_held_back_as_faxen_says() {
         0.5 * gap,
         20.0 * speed
     );
-    let case = weightless([0.8, gap], l0, 1e-2, &format!("viscosity = {nu}"), &body);
+    let case = weightless([0.8, gap], l0, 1e-2, &format!("viscosity = {nu}\nwall_friction = 0"), &body);
     let k = 2.0 * radius / gap;
     let series = [-0.9157, 1.7244, -1.7302, 2.4056, -4.5913];
     let series: f64 = series.iter().zip([0, 2, 4, 6, 8]).map(|(c, n)| c * k.powi(n)).sum();
@@ -216,11 +216,77 @@ fn a_disc_in_creeping_flow_between_walls_is_held_back_as_faxen_says() {
 }
 
 #[test]
+fn the_friction_of_walls_holds_a_disc_that_turns_back_as_fast_as_its_surface_goes() {
+    // tau = rho C_f v^2 with the velocity of the surface, half a spacing outside of the particles that it acts on.
+    let (l0, rate, friction): (f64, f64, f64) = (0.01, 2.0, 0.01);
+    for (radius, bound) in [(0.05_f64, 0.03), (0.1, 0.02)] {
+        let body = format!(
+            "shape = \"cylinder\"\nradius = {radius}\nheight = 0.1\naxis = [0, 1, 0]\ncenter = [0.2, 0, 0.2]\n\
+             rotation = [[0, 0, 0, 0], [20, 0, {}, 0]]",
+            (20.0 * rate).to_degrees()
+        );
+        let fluid = format!("viscosity = 0\nwall_friction = {friction}");
+        let case = weightless([0.4, 0.4], l0, 5e-4, &fluid, &body);
+        let mut sim = simulation(&case);
+        (0..2).for_each(|_| drop(sim.step().expect("a step")));
+        let exact = -2.0 * PI * 1000.0 * friction * rate.powi(2) * radius.powi(4) * l0;
+        let ratio = sim.fluid_force[0].torque.y / exact;
+        println!("{} spacings: torque over that of the surface's velocity {ratio:.3}", radius / l0);
+        assert!((ratio - 1.0).abs() < bound, "{ratio}");
+    }
+}
+
+#[test]
+fn water_turns_with_its_drum_and_no_faster() {
+    // Two halves of a ring that turns as the water within it does.
+    let (radius, rate): (f64, f64) = (0.15, 6.0);
+    let half = |from: f64| {
+        let arc = (0..=48).map(|k| from + PI * f64::from(k) / 48.0);
+        let at = |r: f64, a: f64| format!("[{:.9}, {:.9}]", r * a.cos(), r * a.sin());
+        let outer = arc.clone().map(|a| at(radius + 0.05, a));
+        let points: Vec<String> = outer.chain(arc.rev().map(|a| at(radius, a))).collect();
+        format!(
+            "[[moving_wall]]\nname = \"{from}\"\nshape = \"prism\"\nsection = [{}]\npivot = [0, 0, 0]\n\
+             rotation = [[0, 0, 0, 0], [20, 0, {}, 0]]\n",
+            points.join(", "),
+            (20.0 * rate).to_degrees()
+        )
+    };
+    let case = case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-3\nadaptive = true\nend = 1.0\ngravity = [0, 0, 0]\ndimensions = 2\n\
+         domain = [[-0.25, -0.25, -0.25], [0.25, 0.25, 0.25]]\n\
+         [fluid]\nviscosity = 0.01\n[[fluid.shape]]\nshape = \"cylinder\"\nradius = {radius}\naxis = [0, 1, 0]\n\
+         center = [0, 0, 0]\nvelocity_gradient = [[0, 0, {rate}], [0, 0, 0], [{}, 0, 0]]\n{}{}",
+        -rate,
+        half(0.0),
+        half(PI)
+    ));
+    let mut sim = simulation(&case);
+    while sim.time < 0.3 {
+        sim.step().expect("a step");
+    }
+    let fields = sim.backend.read().expect("the fields");
+    let water = fields.position.iter().zip(&fields.velocity).take(sim.groups.fluid);
+    let (mut momentum, mut inertia) = (0.0, 0.0);
+    for (x, v) in water {
+        (momentum, inertia) = (momentum + x.cross(*v).y, inertia + x.length_squared());
+    }
+    let turned = momentum / inertia / rate;
+    println!("the water turns at {turned:.4} of its drum's rate");
+    assert!((turned - 1.0).abs() < 0.006, "{turned}");
+    // A shape of the very size of its vessel has all of the cells whose middles lie in it: the wall takes none.
+    let place = |k: i32| 0.01 * (f64::from(k) + 0.5);
+    let within = |i: i32| (-16..16).filter(|&k| place(i).hypot(place(k)) < radius).count();
+    let cells: usize = (-16..16).map(within).sum();
+    assert!(sim.groups.fluid.abs_diff(cells) <= 3, "{} of {cells}", sim.groups.fluid);
+}
+
+#[test]
 fn a_body_that_is_set_off_in_weightless_water_takes_it_along() {
     // Momentum of body and dragged water is that of the body before: v = v0 / (1 + C), C some 1.25 for a square between walls so near.
     let body = "size = [0.2, 1, 0.2]\ncenter = [0.5, 0, 0.5]\nvelocity = [0.2, 0, 0]";
     for processor in [Some(Processor::Cpu), device()].into_iter().flatten() {
-        let case = weightless([1.0, 1.0], 0.02, 1e-3, "viscosity = 0", body);
+        let case = weightless([1.0, 1.0], 0.02, 1e-3, "viscosity = 0\nwall_friction = 0", body);
         let scene = Scene::build(&case).expect("it builds");
         let mut sim = Simulation::on(&case, scene, &processor).expect("it starts");
         let mut speeds = Vec::new();

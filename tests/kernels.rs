@@ -12,11 +12,11 @@ use seixo::fields::State;
 use seixo::kernels::cell_list::{CellList, Scratch};
 use seixo::kernels::neighbour_list::{Candidates, Outward, neighbour_list};
 use seixo::kernels::{
-    Particles, correct, number_density, predict, pressure_gradient, pressure_source, shift, viscosity,
-    wall_friction,
+    Particles, correct, move_solids, number_density, predict, pressure_gradient, pressure_source, shift,
+    viscosity, wall_friction,
 };
 use seixo::params::{Params, Step};
-use seixo::plan::{ParticleStage, Plan};
+use seixo::plan::{Arrays, ParticleStage, Plan};
 use seixo::pressure::Settings;
 use seixo::scene::{Groups, Scene};
 use seixo::scheme::{Gradient, Source};
@@ -29,6 +29,8 @@ struct Water {
     params: Params,
     scene: Scene,
     step: Step,
+    /// Velocities, of the walls that turn those of their surface where the plan has viscosity act on it.
+    on_surface: Vec<DVec3>,
 }
 
 impl Water {
@@ -50,7 +52,14 @@ impl Water {
         let step = params.step(0.0, 1e-3, 2.0);
         cpu.run(ParticleStage::CellList, &step).expect("runs");
         cpu.run(ParticleStage::NeighbourList, &step).expect("runs");
-        Self { cpu, params, scene, step }
+        let mut on_surface = cpu.fields().velocity.clone();
+        for (solid, pose) in scene.solids.iter().zip(&poses).filter(|_| plan.needs(Arrays::Turning)) {
+            let rows = solid.wall_offset.iter().zip(&solid.wall_to_surface);
+            for (i, (&offset, &way)) in solid.wall_slots.clone().zip(rows) {
+                on_surface[i] = move_solids::on_surface(pose, offset, way);
+            }
+        }
+        Self { cpu, params, scene, step, on_surface }
     }
 
     fn run(&mut self, stage: ParticleStage) {
@@ -169,8 +178,11 @@ fn the_fast_search_finds_the_plain_rows() {
 #[test]
 fn the_fast_viscosity_is_the_plain_one() {
     each(|s| {
+        // The search has sorted the water, not the walls.
+        s.on_surface[..s.scene.groups.fluid]
+            .copy_from_slice(&s.cpu.fields().velocity[..s.scene.groups.fluid]);
         s.run(ParticleStage::Viscosity);
-        let on = s.particles();
+        let on = Particles { velocity: &s.on_surface, ..s.particles() };
         let row = |i: usize| s.cpu.neighbours().pressure(i).neighbour;
         let g = s.groups();
         let plain: Vec<DVec3> = (0..g.fluid).map(|i| viscosity::viscosity(i, row(i), on)).collect();

@@ -76,6 +76,8 @@ pub struct Gpu {
     /// Solid of each chunk of wall-layer particles.
     chunk_solid: Vec<usize>,
     solids: usize,
+    /// Whether the device has the poses of the solids.
+    posed: bool,
     /// First of the moving-wall slots and number of each solid's wall layer.
     wall_layers: Vec<(usize, usize)>,
     /// Rows at slots between solids that the device has.
@@ -170,6 +172,12 @@ impl Backend for Gpu {
         let none = || Error::gpu(format!("{}: it has no kernel over particles", Stage::from(stage).name()));
         let (kernel, over) = kernels::of(stage).ok_or_else(none)?;
         let s = self.sizes;
+        let along = matches!(stage, ParticleStage::Viscosity | ParticleStage::WallFriction);
+        let turns = along && self.posed && self.plan.needs(Arrays::Turning);
+        let moving_wall = groups(s.moving_wall);
+        if turns {
+            self.context.pass([(kernels::move_solids::on_surface, moving_wall)])?;
+        }
         let threads = match over {
             Over::Fluid => s.fluid,
             Over::FluidAndReaction => s.fluid + s.reacting,
@@ -178,6 +186,9 @@ impl Backend for Gpu {
         self.context.pass([(kernel, groups(threads))])?;
         if stage == ParticleStage::WallFriction && s.reacting > 0 {
             self.context.pass([(kernels::wall_friction::react, groups(s.reacting))])?;
+        }
+        if turns {
+            self.context.pass([(kernels::move_solids::at_centre, moving_wall)])?;
         }
         if matches!(stage, ParticleStage::WallFriction | ParticleStage::Collision) {
             self.book_kick(stage)?;

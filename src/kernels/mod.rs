@@ -94,7 +94,7 @@ pub mod device {
         ledger[super::WORKGROUP] Arrays(Ledger), Own:
             absorber_work predict_work lost_work friction_work collision_work pressure_work shift_work as_solved as_clipped;
         monitor[super::MONITOR_WIDTH] Arrays(Fluid), Own: monitor;
-        move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids;
+        move_solids[super::WORKGROUP] Stage(MoveSolids), Own: move_solids on_surface at_centre;
         multigrid[super::WORKGROUP] Arrays(Multigrid), Own:
             gather down_first down_second down_third down_fourth up_first up_second up_third up_fourth back_first small spread;
         multigrid_levels[super::WORKGROUP] Arrays(Multigrid), Own:

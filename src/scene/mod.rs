@@ -255,6 +255,14 @@ impl Solid {
         matches!(&self.drive, Drive::Free(free) if free.gives_way())
     }
 
+    /// Whether it may turn.
+    pub(crate) fn turns(&self) -> bool {
+        match &self.drive {
+            Drive::Free(free) => free.locked_rotation != [true; 3],
+            Drive::Prescribed(motion) => motion.turns(),
+        }
+    }
+
     /// Whether it turns where it is: on a hinge, or with all of its translations locked.
     pub(crate) fn is_hinged(&self) -> bool {
         matches!(&self.drive, Drive::Free(free) if free.locked_translation == [true; 3])

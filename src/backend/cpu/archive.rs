@@ -43,6 +43,7 @@ impl Cpu {
             share: _,
             // Made anew in every step before it is used.
             poses: _,
+            surface_velocity: _,
             free_bodies: _,
             slots: _,
             fluid_start: _,

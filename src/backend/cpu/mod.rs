@@ -58,6 +58,8 @@ pub struct Cpu {
     free_bodies: Vec<FreeBody>,
     /// Rows at slots, in the order of solids and rows.
     slots: Vec<SlotRow>,
+    /// Velocities of the surface before the wall-layer slots of moving solids, where viscosity and friction ask [m/s].
+    surface_velocity: Vec<DVec3>,
     /// [`Scene::facing`], in the accurate scheme.
     facing: Vec<DVec3>,
     /// The same where the solids are now, world axes.
@@ -116,6 +118,10 @@ impl Cpu {
             poses: Vec::new(),
             free_bodies: Vec::new(),
             slots: Vec::new(),
+            surface_velocity: vec![
+                DVec3::ZERO;
+                if plan.needs(Arrays::Turning) { groups.moving_wall } else { 0 }
+            ],
             facing: match params.source {
                 Source::NumberDensity => Vec::new(),
                 Source::Mixed => scene.facing(),
@@ -201,12 +207,12 @@ impl Backend for Cpu {
             ParticleStage::Absorber => self.absorber(step.dt),
             ParticleStage::Viscosity => {
                 self.show_motion();
-                self.viscosity();
+                self.on_surfaces(Self::viscosity);
             }
             ParticleStage::Predict => self.predict(step),
             ParticleStage::CellList => self.cell_list(),
             ParticleStage::NeighbourList => self.neighbour_list(),
-            ParticleStage::WallFriction => self.wall_friction(step),
+            ParticleStage::WallFriction => self.on_surfaces(|cpu| cpu.wall_friction(step)),
             ParticleStage::Collision => self.collision(step),
             ParticleStage::NumberDensity => self.number_density(),
             ParticleStage::SurfacePressure => self.surface_pressure(),

@@ -26,6 +26,14 @@ impl Cpu {
             .zip(poses)
             .flat_map(|(s, pose)| s.wall_slots.clone().map(|_| pose.orientation));
         self.outward.extend(self.facing.iter().zip(turned).map(|(&facing, turn)| turn * facing));
+        if !self.surface_velocity.is_empty() {
+            self.surface_velocity.clear();
+            for (solid, pose) in self.solids.iter().zip(poses) {
+                let rows = solid.wall_offset.iter().zip(&solid.wall_to_surface);
+                let velocity = rows.map(|(&offset, &way)| move_solids::on_surface(pose, offset, way));
+                self.surface_velocity.extend(velocity);
+            }
+        }
         for (solid, pose) in self.solids.iter().zip(poses) {
             for (slots, offsets) in
                 [(&solid.wall_slots, &solid.wall_offset), (&solid.dummy_slots, &solid.dummy_offset)]
@@ -35,6 +43,21 @@ impl Cpu {
                         move_solids::move_solids(pose, offset);
                 }
             }
+        }
+    }
+
+    /// Plays `stage` with wall layers of moving solids that move as the surface before them, if that makes a difference.
+    pub(super) fn on_surfaces(&mut self, stage: impl FnOnce(&mut Self)) {
+        self.swap_surfaces();
+        stage(self);
+        self.swap_surfaces();
+    }
+
+    fn swap_surfaces(&mut self) {
+        let Self { fields, surface_velocity, groups, poses, .. } = self;
+        if !poses.is_empty() {
+            let walls = groups.fluid..groups.fluid + surface_velocity.len();
+            fields.velocity[walls].swap_with_slice(surface_velocity);
         }
     }
 

@@ -32,7 +32,7 @@ const SAVED: [&str; 10] = [
 /// Buffers that are filled anew before they are read: in every step, or once from the case; and the counters, which
 /// are taken in on the host.
 #[cfg(test)]
-const MADE_ANEW: [&str; 48] = [
+const MADE_ANEW: [&str; 49] = [
     "unclipped",
     "clipped",
     "surface_pressure",
@@ -71,6 +71,7 @@ const MADE_ANEW: [&str; 48] = [
     "counters",
     "solid_offset",
     "facing",
+    "to_surface",
     "poses",
     "wall_layer",
     "force_chunk",

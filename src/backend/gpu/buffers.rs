@@ -135,6 +135,8 @@ table! {
         solid_offset: [f32; 4], Writes, Solids, |s, _| s.moving;
         /// Where the wall layer faces, in the solid's frame.
         facing: f32, Writes, Solids, |s, _| s.moving_wall;
+        /// From particles of the wall layer, in the solid's frame.
+        to_surface: [f32; 4], Writes, Turning, |s, _| s.moving_wall;
         poses: Pose, Writes, Solids, |s, _| s.solids;
         wall_layer: WallParticle, Writes, Force, |s, _| s.moving_wall;
         force_chunk: [u32; 4], Writes, Force, |s, _| s.force_chunks();

@@ -150,6 +150,7 @@ impl Gpu {
             middle: layout::middle(params),
             chunk_solid: Vec::new(),
             solids: scene.solids.len(),
+            posed: false,
             wall_layers: wall_layers.collect(),
             slot_rows: solids::SlotRows::new(),
             coupled: Vec::new(),
@@ -198,6 +199,11 @@ impl Gpu {
             self.context.upload(buffers::solid_offset, &offset)?;
             let facing: Vec<f32> = scene.facing().into_iter().map(layout::direction_word).collect();
             self.context.upload(buffers::facing, &facing)?;
+        }
+        if self.plan.needs(Arrays::Turning) {
+            let ways = scene.solids.iter().flat_map(|solid| &solid.wall_to_surface);
+            let ways: Vec<[f32; 4]> = ways.map(|&way| four(way, 0.0)).collect();
+            self.context.upload(buffers::to_surface, &ways)?;
         }
         if self.plan.needs(Arrays::Force) {
             let mut layer = vec![WallParticle::default(); g.moving_wall];

@@ -34,6 +34,7 @@ pub const SWITCHES: &[Switch] = &[
     ("STATIC", |_, plan| plan.needs(Arrays::FixedWalls)),
     ("SURFACE_PRESSURE", |_, plan| plan.needs(Arrays::SurfacePressure)),
     ("THRESHOLD_OFFSET", |params, _| params.free_surface == FreeSurface::ThresholdOffset),
+    ("TURNING", |_, plan| plan.needs(Arrays::Turning)),
     ("TWO_DIMENSIONS", |params, _| params.dimensions == 2),
     ("VISCOSITY", |_, plan| plan.has(Stage::Viscosity)),
 ];

@@ -110,6 +110,7 @@ impl Gpu {
             angular_velocity: four(p.angular_velocity),
         };
         let poses: Vec<_> = poses.iter().map(device).collect();
+        self.posed = true;
         self.context.begin(Some(Stage::MoveSolids));
         self.context.upload(buffers::poses, &poses)?;
         self.context.pass([(kernels::move_solids::move_solids, groups(self.sizes.moving))])
