@@ -178,7 +178,7 @@ impl<'a> Builder<'a> {
             }
             let taken = self.fixed.obstacle(obstacle, corners, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
-            self.taken(&label, taken);
+            self.taken(&label, taken, false);
             let gauged = case.gauge.force.iter().any(|gauge| stands_for(&gauge.on, &obstacle.name));
             let size = (DVec3::from(corners.1) - DVec3::from(corners.0)).abs();
             if gauged && self.is_thin(size) {
@@ -194,7 +194,7 @@ impl<'a> Builder<'a> {
             }
             let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
-            self.taken(&label, taken);
+            self.taken(&label, taken, true);
             if self.is_thin(2.0 * solid.shape.extent(DMat3::IDENTITY)) {
                 self.notes
                     .push(format!("{label}: one particle thick, so that its two sides share one pressure"));
@@ -202,7 +202,11 @@ impl<'a> Builder<'a> {
             self.moving_walls.push(solid);
         }
         for plane in &case.plane {
+            let before = self.fixed.wall.len();
             let left_out = self.fixed.plane(plane, &lattice, &mut self.grid, layers);
+            let rows = self.fixed.wall[before..].iter().zip(&self.fixed.normal[before..]);
+            let rows: Vec<(DVec3, DVec3)> = rows.map(|(x, n)| (*x, *n)).collect();
+            self.fixed.make_room(&rows, lattice.spacing);
             let frame = PlaneFrame::new(plane, &lattice);
             self.off_lattice.push(frame.displaced(layers));
             let n = frame.n.map(|n| f64::from(n) * lattice.spacing);
@@ -236,7 +240,7 @@ impl<'a> Builder<'a> {
                 continue;
             }
             self.water.fill(block, &self.lattice, &mut self.grid);
-            if self.beside_walls() == 0 {
+            if self.beside_walls(None) == 0 {
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
                 self.problems.push(Problem::new(key, message, remedy));
@@ -254,7 +258,7 @@ impl<'a> Builder<'a> {
             };
             let flow = Flow::new(water.velocity, water.velocity_gradient, placed.center, &self.lattice);
             self.water.shape(&placed, &flow, &self.lattice, &mut self.grid);
-            if self.beside_walls() == 0 {
+            if self.beside_walls(Some(&placed)) == 0 {
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
                 self.problems.push(Problem::new(key, message, remedy));
@@ -264,7 +268,7 @@ impl<'a> Builder<'a> {
             let from = self.water.clear;
             match self.water.flood(fill, &self.lattice, &mut self.grid, self.tank) {
                 Ok(()) => {
-                    let count = self.beside_walls();
+                    let count = self.beside_walls(None);
                     let reach = self.reach_of_water(from);
                     self.notes.push(format!("fluid.fill.{k}: {count} particles of water{reach}"));
                 }
@@ -296,11 +300,12 @@ impl<'a> Builder<'a> {
         format!(", {} m", reach.collect::<Vec<_>>().join(", "))
     }
 
-    /// Takes away what of the water laid last stands where walls do that are no boxes of the lattice; returns how many particles it has then.
-    fn beside_walls(&mut self) -> usize {
+    /// Takes away what of the water laid last, perhaps `within` a shape, stands where walls do that are no boxes of the lattice; returns how many particles it
+    /// has then.
+    fn beside_walls(&mut self, within: Option<&Placed>) -> usize {
         let from = self.water.clear;
         for shape in &self.off_lattice {
-            self.water.remove(shape, from, &self.lattice, &mut self.grid);
+            self.water.remove(shape, (from, within), &self.lattice, &mut self.grid);
         }
         self.water.laid.push(from);
         self.drain_walls();

@@ -20,8 +20,8 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// What of the cell `c` the `shape` displaces. `None` if that is nothing.
-    pub fn of(shape: &Placed, c: IVec3, lattice: &Lattice) -> Option<Self> {
+    /// What of the cell `c` the `shape` displaces, of water that lies `within` another if it is told. `None` if that is nothing.
+    pub fn of(shape: &Placed, within: Option<&Placed>, c: IVec3, lattice: &Lattice) -> Option<Self> {
         let l0 = lattice.spacing;
         let x = lattice.center(c);
         let off = shape.distance(x) / l0;
@@ -32,24 +32,29 @@ impl Cut {
         exchanged.sort_unstable();
         let side = IVec3::Z * i32::from(x.z > shape.center.z + 1e-6 * l0);
         let place = [even(exchanged.into()), even(mirrored), even(mirrored * IVec3::new(1, 1, 2) + side)];
-        let share = share(shape, (x, off), lattice);
+        let share = share(shape, within, (x, off), lattice);
         (share > 1e-6).then(|| Self { off: (100.0 * off).round() as i64, place, share })
     }
 }
 
 /// The part of the cell about `x`, whose signed distance over l0 is `off`, that lies in the `shape` [-]. Each of its halves along each axis is cut as if by a plane:
-/// one that a corner or an edge reaches into would count as cut in half by a plane through its middle.
-fn share(shape: &Placed, (x, off): (DVec3, f64), lattice: &Lattice) -> f64 {
+/// one that a corner or an edge reaches into would count as cut in half by a plane through its middle. Of water `within` a shape only what lies in that shape,
+/// too: a vessel of the very size of its water takes nothing.
+fn share(shape: &Placed, within: Option<&Placed>, (x, off): (DVec3, f64), lattice: &Lattice) -> f64 {
     let half = 0.5 * lattice.spacing;
     let ends = if lattice.plane { [DVec3::X, DVec3::Z].as_slice() } else { DVec3::AXES.as_slice() };
-    if off.abs() >= 0.5 * (ends.len() as f64).sqrt() {
+    let reach = 0.5 * (ends.len() as f64).sqrt();
+    let whole = within.is_none_or(|within| within.distance(x) / lattice.spacing <= -reach);
+    if off >= reach || off <= -reach && whole {
         return f64::from(u8::from(off < 0.0));
     }
     let mut parts = vec![x];
     for e in ends {
         parts = parts.into_iter().flat_map(|x| [x - 0.5 * half * e, x + 0.5 * half * e]).collect();
     }
-    let of = |x: &DVec3| (0.5 - shape.distance(*x) / half).clamp(0.0, 1.0);
+    let inside = |shape: &Placed, x: DVec3| (0.5 - shape.distance(x) / half).clamp(0.0, 1.0);
+    // The surfaces of the two look at each other where one ends at the other.
+    let of = |&x: &DVec3| (inside(shape, x) + within.map_or(1.0, |within| inside(within, x)) - 1.0).max(0.0);
     parts.iter().map(of).sum::<f64>() / parts.len() as f64
 }
 

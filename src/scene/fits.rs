@@ -76,9 +76,13 @@ impl Builder<'_> {
         }
     }
 
-    pub(super) fn taken(&mut self, label: &str, cells: usize) {
+    /// Notes that a box has no particles in `cells` in which walls stand; one that `moves` takes the holes along.
+    pub(super) fn taken(&mut self, label: &str, cells: usize, moves: bool) {
+        let holes = ": it has holes there, which go along as it moves; let it begin clear of them";
         if cells > 0 {
-            self.notes.push(format!("{label}: {cells} cells left to the walls that already stand there"));
+            let holes = if moves { holes } else { "" };
+            self.notes
+                .push(format!("{label}: {cells} cells left to the walls that already stand there{holes}"));
         }
     }
 }

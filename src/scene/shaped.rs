@@ -16,6 +16,8 @@ use std::collections::HashSet;
 pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
 /// Nearer to a particle of a solid than this, over the spacing, other walls may face pieces of the surface that are its.
 const MEETING: f64 = 3.0;
+/// As far as this around, over the spacing, what is flat in the face of another wall lies in it.
+const FLAT: f64 = 3.0;
 /// What lies deeper in a wall than this, over the spacing, has no gap before it.
 const FLUSH: f64 = 1e-3;
 
@@ -120,6 +122,7 @@ impl Builder<'_> {
             self.seams(&key, solid.what(), &solid.name, &solid.placed(), fixed);
             if fixed {
                 self.bury(&key, &mut solid);
+                self.stand_before(&solid);
             }
             if !solid.wall_offset.is_empty() {
                 self.grid.put(&solid.placed(), &self.lattice);
@@ -172,13 +175,25 @@ impl Builder<'_> {
         }
     }
 
-    /// What of the `area` of a solid's particle `at` a place faces no other wall along the axes.
+    /// Makes room for the layers of a solid that stays in other walls right behind it.
+    fn stand_before(&mut self, solid: &Solid) {
+        let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
+        let outward = |way: &DVec3| solid.orientation * way.normalize_or_zero();
+        let rows = solid.wall_offset.iter().zip(&solid.wall_to_surface);
+        let rows: Vec<(DVec3, DVec3)> = rows.map(|(offset, way)| (at(offset), outward(way))).collect();
+        let gone = self.fixed.make_room(&rows, self.lattice.spacing);
+        if gone > 0 {
+            let why = "of other walls that stand less than a spacing behind its own are moved down";
+            self.notes.push(format!("obstacle `{}`: {gone} particles {why}", solid.name));
+        }
+    }
+
+    /// What of the `area` of a solid's particle `at` a place faces no other wall along the axes of the solid.
     fn unfaced(&self, solid: &Solid, mut area: DVec3, at: DVec3) -> DVec3 {
         for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
-            let own = solid.orientation.inverse() * e;
-            let faces = area.dot(own);
-            if faces > 0.0 && self.buried(at + self.lattice.spacing * e, false) {
-                area -= faces * own;
+            let faces = area.dot(e);
+            if faces > 0.0 && self.buried(at + self.lattice.spacing * (solid.orientation * e), false) {
+                area -= faces * e;
             }
         }
         area
@@ -214,10 +229,19 @@ impl Builder<'_> {
             }
         }
         let bent = |x: DVec3, way: DVec3| around.within(x, ADJACENT * l0).any(|(k, _)| bends(way, ways[k]));
+        // What lies flat in the face of another wall is that wall's, which is not covered there.
+        let lies_on = |x: DVec3, normal: DVec3| {
+            let (one, other) = normal.any_orthonormal_pair();
+            let (one, other) =
+                if self.lattice.plane { (DVec3::Y.cross(normal), DVec3::ZERO) } else { (one, other) };
+            let around = [DVec3::ZERO, one, -one, other, -other];
+            around.into_iter().all(|way| self.buried(x + l0 * (FLAT * way - COVERED[0] * normal), false))
+        };
         let free = |x: DVec3, normal: DVec3| {
             let (x, normal) = (at(x), solid.orientation * normal);
             let covered = |d: f64| self.buried(x + d * l0 * normal, false);
-            alone(x) || !COVERED.into_iter().any(covered) || !covered(-FLUSH) && bent(x, normal)
+            let bare = !COVERED.into_iter().any(covered) && !lies_on(x, normal);
+            alone(x) || bare || !covered(-FLUSH) && bent(x, normal)
         };
         let wall: Vec<DVec3> =
             solid.wall_offset.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect();
@@ -241,11 +265,14 @@ impl Builder<'_> {
         let l0 = self.lattice.spacing;
         let Some((low, high)) = self.closed_sides() else { return solid.wall_area.clone() };
         let at = |k: usize| solid.position + solid.orientation * solid.wall_offset[k];
-        let inside = |x: DVec3| {
+        // A face has no length across it.
+        let inside = |k: usize| {
+            let (x, outward) = (at(k), solid.orientation * solid.wall_area[k].normalize_or_zero());
             let reach = (x + 0.5 * l0).min(high) - (x - 0.5 * l0).max(low);
-            (reach / l0).clamp(DVec3::ZERO, DVec3::ONE).element_product()
+            let across = outward.abs().cmpgt(DVec3::splat(0.7)) & x.cmpge(low) & x.cmple(high);
+            DVec3::select(across, DVec3::ONE, (reach / l0).clamp(DVec3::ZERO, DVec3::ONE)).element_product()
         };
-        let shares: Vec<f64> = (0..kept.len()).map(|k| inside(at(k))).collect();
+        let shares: Vec<f64> = (0..kept.len()).map(inside).collect();
         let mut areas: Vec<DVec3> =
             solid.wall_area.iter().zip(&shares).map(|(a, share)| *a * *share).collect();
         let stays: Vec<usize> = (0..kept.len()).filter(|&k| kept[k]).collect();

@@ -176,7 +176,7 @@ impl Water {
     /// it alone.
     pub fn displace(body: &Placed, lattice: &Lattice, grid: &mut Grid) -> usize {
         let near: Vec<IVec3> = around(body, lattice, grid).iter().filter(|&c| grid.get(c) == FLUID).collect();
-        let cut = near.into_par_iter().filter_map(|c| Cut::of(body, c, lattice).map(|cut| (cut, c)));
+        let cut = near.into_par_iter().filter_map(|c| Cut::of(body, None, c, lattice).map(|cut| (cut, c)));
         let cut = deepest_on_each_side(body, cut, |&c| lattice.center(c));
         cut.iter().for_each(|&c| grid.set(c, FREE));
         cut.len()
@@ -197,11 +197,17 @@ impl Water {
     }
 
     /// Removes as much water as a wall displaces, what lies deepest inside of it first: of the particles from the
-    /// `from`-th on. Nothing enters their cells.
-    pub fn remove(&mut self, wall: &Placed, from: usize, lattice: &Lattice, grid: &mut Grid) {
+    /// `from`-th on, which lie `within` a shape if it is told. Nothing enters their cells.
+    pub fn remove(
+        &mut self,
+        wall: &Placed,
+        (from, within): (usize, Option<&Placed>),
+        lattice: &Lattice,
+        grid: &mut Grid,
+    ) {
         let near = around(wall, lattice, grid);
         let depth = |(k, &c): (usize, &IVec3)| {
-            let cut = near.contains(c).then(|| Cut::of(wall, c, lattice))?;
+            let cut = near.contains(c).then(|| Cut::of(wall, within, c, lattice))?;
             cut.map(|cut| (cut, k))
         };
         let found = self.cell.par_iter().enumerate().skip(from).filter_map(depth);
