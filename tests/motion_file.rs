@@ -88,6 +88,7 @@ fn what_is_wrong_with_a_file_is_told_with_its_line() {
         (b"--,--,--,--\n0,0,0,0\n", "gate.csv:1: expected time"),
         (b"time[ms],x[m],y[m],z[m]\n0,0,0,0\n", "gate.csv:1: `time` is in [ms]: write time [s]"),
         (b"t,x [mm],y,z\n0,0,0,0\n", "gate.csv:1: `x` is in [mm]"),
+        (b"t,z,y,x\n0,0,0,0\n", "gate.csv:1: `z` stands where another axis is read: write time [s]"),
         (b"0,0,0,0\n1,0,0,nan\n", "gate.csv:2: expected time"),
         (b"0,0,0,0\n1,0,0,1\n1,0,0,2\n", "gate.csv:3: time 1 does not come after 1"),
         (b"# nothing\n", "gate.csv: it holds no rows"),

@@ -50,6 +50,7 @@ at = [0.5, 0.25]
 /// Overrides of it, and what is told of each.
 const SLIPS: &[(&[&str], &str)] = &[
     (&["run.gravity=[0,0,9.81]"], "run.gravity: the water falls upwards"),
+    (&["run.gravity=[9.81,0,0]", "absorber=[]"], "gauge.level.0: levels are read along z"),
     (&["run.gravity=[0,0,-9810]", "body=[]"], "run.gravity: 9.810e3 m/s2 is 1000 times that of the Earth"),
     (&["fluid.density=1", "body=[]"], "fluid.density: 1 kg/m3 is the density of no liquid"),
     (&["fluid.density=1e6", "body=[]"], "is the density of no liquid"),
@@ -73,7 +74,7 @@ const SLIPS: &[(&[&str], &str)] = &[
         "run.effective_radius: with 3.1 the pressure below a free surface is too small",
     ),
     (&["absorber.0.towards=z_max"], "absorber.0.towards: waves come in along x or y"),
-    (&["run.gravity=[9.81,0,0]"], "absorber.0.towards: waves come in along y or z"),
+    (&["run.gravity=[9.81,0,0]", "gauge.level=[]"], "absorber.0.towards: waves come in along y or z"),
     (
         &["run.gravity=[-9.81,0,0]", "absorber.0.towards=z_max"],
         "absorber.0.min: it begins 0.5000 m above the water",

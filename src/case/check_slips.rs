@@ -36,6 +36,11 @@ impl Checker<'_> {
             let message = format!("{g:.3e} m/s2 is {:.0} times that of the Earth", g / 9.806_65);
             self.warn(key, message, "write it in m/s2, e.g. [0, 0, -9.80665]");
         }
+        // Along z at least half of it, as on a slope.
+        if !case.gauge.level.is_empty() && gravity[2].abs() < 0.5 * g {
+            let message = format!("levels are read along z, and gravity, {gravity:?}, pulls across");
+            self.warn("gauge.level.0", message, "turn the scene so that z is up, or leave the levels out");
+        }
         let (Some(tank), Some(fluid), Some(l0)) = (&case.tank, &case.fluid, self.spacing()) else { return };
         let low = fluid.block.iter().any(|b| b.min[2] - tank.min[2] < l0) || !fluid.fill.is_empty();
         if gravity[2] > 0.0 && (tank.open.contains(&Face::ZMax) || low) {

@@ -104,6 +104,14 @@ fn other_unit<'a>(line: &'a str, key: &str, (form, flat): (&Form, bool)) -> Opti
     found.next()
 }
 
+/// The first of a line of names that stands in the place of another axis.
+fn other_axis(line: &str) -> Option<&str> {
+    let mut names = line.split(',').map(|column| column.split(['[', '(']).next().unwrap_or_default().trim());
+    names.by_ref().next();
+    let axis = |name: &str| ["x", "y", "z"].iter().position(|axis| name.eq_ignore_ascii_case(axis));
+    names.enumerate().find(|&(k, name)| axis(name).is_some_and(|n| n != k)).map(|(_, name)| name)
+}
+
 /// The rows of `file`, a name relative to the case at `path`, where `key` of the table at `place` names it.
 fn rows(path: &Path, file: &str, (place, key): (&str, &str), (form, flat): (&Form, bool)) -> Result<Array> {
     let file = path.with_file_name("").join(file);
@@ -135,6 +143,10 @@ fn rows(path: &Path, file: &str, (place, key): (&str, &str), (form, flat): (&For
                     _ => "",
                 };
                 let why = format!("`{name}` is in [{unit}]: write {}{own}, and its name so", form.what);
+                return Err(wrong(n, why));
+            }
+            if let Some(name) = other_axis(line).filter(|_| key == "motion") {
+                let why = format!("`{name}` stands where another axis is read: write {}", form.what);
                 return Err(wrong(n, why));
             }
             headed = true;
