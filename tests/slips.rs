@@ -106,7 +106,7 @@ fn slips_of_unit_sign_and_place_are_warned_of() {
         &["body.0.inertia=[0.1,0.1,0.1]"][..],
         &["body.0.density=50"],
         &["output.kinds=[\"fluid\",\"body\",\"wall\"]", "body=[]", "moving_wall=[]"],
-        &["run.gravity=[9.81,0,0]", "absorber.0.towards=z_max"],
+        &["run.gravity=[9.81,0,0]", "absorber.0.towards=z_max", "gauge.level=[]"],
         &["fluid.block.0.velocity=[20,0,0]"],
     ] {
         assert_eq!(read(sets), Ok(vec![]), "{sets:?}");
