@@ -3,6 +3,7 @@
 //! Order of placement, first come first served: tank, obstacles and moving walls that are boxes of the lattice, planes,
 //! obstacles and moving walls of any other shape, water, bodies.
 
+use super::behind::Row;
 use super::bodies;
 use super::lattice::{Cells, Grid, Lattice};
 use super::near::Near;
@@ -205,7 +206,7 @@ impl<'a> Builder<'a> {
             let before = self.fixed.wall.len();
             let left_out = self.fixed.plane(plane, &lattice, &mut self.grid, layers);
             let rows = self.fixed.wall[before..].iter().zip(&self.fixed.normal[before..]);
-            let rows: Vec<(DVec3, DVec3)> = rows.map(|(x, n)| (*x, *n)).collect();
+            let rows: Vec<Row> = rows.map(|(x, n)| Row(*x, *n)).collect();
             self.fixed.make_room(&rows, lattice.spacing);
             let frame = PlaneFrame::new(plane, &lattice);
             self.off_lattice.push(frame.displaced(layers));

@@ -11,6 +11,7 @@
 //! | static dummy | [`Kind::Dummy`] | no | no |
 //! | moving dummy | [`Kind::Dummy`], [`Kind::BodyDummy`] of a moving solid | with its solid | no |
 
+mod behind;
 mod bodies;
 mod boxes;
 mod build;

@@ -1,5 +1,6 @@
 //! Obstacles and moving walls of any shape: solids that stand still or follow a table, with water around them.
 
+use super::behind::Row;
 use super::build::{AXES, Builder};
 use super::oriented::Placed;
 use super::placement::point;
@@ -180,7 +181,7 @@ impl Builder<'_> {
         let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
         let outward = |way: &DVec3| solid.orientation * way.normalize_or_zero();
         let rows = solid.wall_offset.iter().zip(&solid.wall_to_surface);
-        let rows: Vec<(DVec3, DVec3)> = rows.map(|(offset, way)| (at(offset), outward(way))).collect();
+        let rows: Vec<Row> = rows.map(|(offset, way)| Row(at(offset), outward(way))).collect();
         let gone = self.fixed.make_room(&rows, self.lattice.spacing);
         if gone > 0 {
             let why = "of other walls that stand less than a spacing behind its own are moved down";

@@ -4,12 +4,8 @@ use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
 use super::oriented::Placed;
 use super::{Curve, Drive, Motion, Shape, Solid, WallShape};
 use crate::case::{self, Face, TANK_FACES};
-use crate::shape::PointCells;
 use crate::waves::Wave;
 use glam::{DMat3, DQuat, DVec3, IVec3};
-
-/// Depths behind a row of another wall, over the spacing, at which one particle too many stands for the next layer, which is 1 behind.
-const CLOSE: std::ops::Range<f64> = 0.4..0.95;
 
 /// Particles of the walls that never move.
 #[derive(Default, Debug)]
@@ -165,57 +161,6 @@ impl Fixed {
         }
         grid.put(&frame.displaced(layers), lattice);
         left_out
-    }
-
-    /// Moves what of wall layers stands right behind `rows` of another wall, places and the directions outwards, nearer than that wall's next layer
-    /// would, to where that layer belongs, as dummies, and what lies behind it by as much: water and rows that have both layers in their density are
-    /// pushed off. Returns how many wall particles.
-    pub fn make_room(&mut self, rows: &[(DVec3, DVec3)], l0: f64) -> usize {
-        // How deep behind a row a place is, over the spacing, if it lies in line with it.
-        let behind = |p: DVec3, (row, outward): (DVec3, DVec3)| {
-            let depth = (row - p).dot(outward) / l0;
-            ((row - p - depth * l0 * outward).length() < 0.55 * l0).then_some(depth)
-        };
-        let mut near = PointCells::new(l0);
-        rows.iter().for_each(|row| near.add(row.0));
-        let hidden = |k: usize| {
-            let p = self.wall[k];
-            let faces = |n: &usize| self.normal[k].dot(rows[*n].1) > 0.7;
-            let found = near.within(p, 1.2 * l0).map(|(n, _)| n).filter(faces);
-            let mut found =
-                found.filter_map(|n| Some((n, behind(p, rows[n]).filter(|d| CLOSE.contains(d))?)));
-            found.next()
-        };
-        let hidden: Vec<Option<(usize, f64)>> = (0..self.wall.len()).map(hidden).collect();
-        // The rows before them, and how deep they lie.
-        let columns: Vec<(DVec3, DVec3, f64)> =
-            hidden.iter().flatten().map(|&(n, depth)| (rows[n].0, rows[n].1, depth)).collect();
-        if columns.is_empty() {
-            return 0;
-        }
-        let mut near = PointCells::new(2.5 * l0);
-        columns.iter().for_each(|column| near.add(column.0));
-        for q in &mut self.dummy {
-            let in_line = |n: usize| {
-                let (row, outward, first) = columns[n];
-                behind(*q, (row, outward)).is_some_and(|d| d > first + 0.5 && d < 2.2).then_some(n)
-            };
-            if let Some(n) = near.within(*q, 2.5 * l0).find_map(|(n, _)| in_line(n)) {
-                *q -= (1.0 - columns[n].2) * l0 * columns[n].1;
-            }
-        }
-        let moved = |(&p, of): (&DVec3, &Option<(usize, f64)>)| {
-            of.map(|(n, depth)| p - (1.0 - depth) * l0 * rows[n].1)
-        };
-        self.dummy.extend(self.wall.iter().zip(&hidden).filter_map(moved));
-        fn keep<T>(of: &mut Vec<T>, hidden: &[Option<(usize, f64)>]) {
-            let mut hidden = hidden.iter();
-            of.retain(|_| hidden.next().is_none_or(Option::is_none));
-        }
-        keep(&mut self.wall, &hidden);
-        keep(&mut self.normal, &hidden);
-        keep(&mut self.shape_of, &hidden);
-        columns.len()
     }
 
     fn add_shape(&mut self, name: &str, lattice: &Lattice, cells: Cells) -> u32 {
