@@ -76,7 +76,7 @@ const SLIPS: &[(&[&str], &str)] = &[
     (&["absorber.0.towards=z_max"], "absorber.0.towards: waves come in along x or y"),
     (&["run.gravity=[9.81,0,0]", "gauge.level=[]"], "absorber.0.towards: waves come in along y or z"),
     (
-        &["run.gravity=[-9.81,0,0]", "absorber.0.towards=z_max"],
+        &["run.gravity=[-9.81,0,0]", "absorber.0.towards=z_max", "gauge.level=[]"],
         "absorber.0.min: it begins 0.5000 m above the water",
     ),
     (&["absorber.0.min=[1.5,0,0.7]"], "absorber.0.min: it begins 0.2000 m above the water"),
