@@ -5,7 +5,8 @@
 //! The rate is the largest eigenvalue of M^-1 D, M the body's mass and inertia and D u the force and torque with which water at
 //! rest resists the motion u, six numbers, of a body that is wholly under water:
 //!
-//! D = sum k J^T J over the wall layer, J u the velocity of the surface before it, k the force over it [kg/s].
+//! D = sum k J^T J over the wall layer, J u the velocity of the surface before it, k the force over it [kg/s]. In the paper's scheme it is the velocity
+//! of the layer itself, half a spacing below: for turns D is a little too large there, of a free vessel for what it holds a little too small.
 //!
 //! In steps of 1 / rate, and no longer than what a particle of water allows, nothing grows: sum k (v - J u)^2 is at most twice
 //! sum k v^2 + sum k (J u)^2, so that no eigenvalue of body and water together is more than twice the larger of theirs. The water

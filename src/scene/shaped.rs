@@ -178,10 +178,9 @@ impl Builder<'_> {
 
     /// Makes room for the layers of a solid that stays in other walls right behind it.
     fn stand_before(&mut self, solid: &Solid) {
-        let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
         let outward = |way: &DVec3| solid.orientation * way.normalize_or_zero();
-        let rows = solid.wall_offset.iter().zip(&solid.wall_to_surface);
-        let rows: Vec<Row> = rows.map(|(offset, way)| Row(at(offset), outward(way))).collect();
+        let rows = solid.wall_positions().zip(&solid.wall_to_surface);
+        let rows: Vec<Row> = rows.map(|(at, way)| Row(at, outward(way))).collect();
         let gone = self.fixed.make_room(&rows, self.lattice.spacing);
         if gone > 0 {
             let why = "of other walls that stand less than a spacing behind its own are moved down";

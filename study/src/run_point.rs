@@ -172,8 +172,10 @@ fn play(point: &Point, context: &Context, course: &mut Course, state: Option<Arc
     } else {
         course.seconds = 0.0;
         // What was rounded to the lattice differs from spacing to spacing, and would pass for an error of the scheme.
-        let rounded = scene.notes.iter().filter(|note| sampler.is_some() && note.contains(" becomes "));
-        rounded.for_each(|note| remark(&format!("note: {note}")));
+        if sampler.is_some() {
+            let rounded = scene.notes.iter().filter(|note| note.contains(" becomes "));
+            rounded.for_each(|note| remark(&format!("note: {note}")));
+        }
         sampler.iter_mut().try_for_each(|s| s.sample(&mut simulation, 0, 0.0))?;
         if sampler.is_some() {
             // Slots for what is to come in hold no particles yet.
