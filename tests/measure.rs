@@ -109,6 +109,8 @@ fn pressures_along_a_line_are_those_of_water_at_rest() {
     assert!(table.starts_with("time [s],x [m],y [m],z [m],velocity_x [m/s],"), "{table}");
     let rows = rows(&table);
     assert_eq!(rows.len(), 8);
+    let (_, parts, _) = measured(folder.path(), &["--line", "0,0,0.2,0.3,0,0.2", "--count", "7"]);
+    assert!(parts.contains(",0.05,0,0.2,") && parts.contains(",0.15,0,0.2,"), "{parts}");
     for row in rows {
         let z = row[3].unwrap();
         assert!((row[0].unwrap() - 0.02).abs() < 1e-9);

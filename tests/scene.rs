@@ -253,6 +253,13 @@ fn problems_at_the_start_name_who_and_what_to_do() {
         ),
         (pool("[\"z_max\"]", &body("[0.1, 0.5, 0.8]", "")), &["body `b` overlaps wall `tank.x_min` by 0.05"]),
         (
+            pool("[\"z_max\"]", &body("[0.1, 0.12, 0.8]", "")),
+            &[
+                "overlaps wall `tank.x_min` by 0.050000 m and wall `tank.y_min` by 0.030000 m",
+                "its center by (0.050001, 0.030001, 0) m",
+            ],
+        ),
+        (
             pool("[\"z_max\"]", &two),
             &["body `c` overlaps body `b` by 0.05", "standing = true", "raise its center by 0.05"],
         ),

@@ -126,8 +126,7 @@ pub fn measure(args: &MeasureArgs) -> Exit {
 fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
     let mut points = args.points.clone();
     for [a, b] in &args.lines {
-        // What both ends share stays as it was typed.
-        points.extend((0..args.count).map(|k| *a + f64::from(k) / f64::from(args.count - 1) * (*b - *a)));
+        points.extend((0..args.count).map(|k| along(*a, *b, f64::from(k) / f64::from(args.count - 1))));
     }
     if let Some(path) = &args.file {
         let listed = listed(path)?;
@@ -143,6 +142,15 @@ fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
         return Err(Error::usage("--line", "say where: --point X,Y,Z, --line X,Y,Z,X,Y,Z or --file FILE"));
     }
     Ok(points)
+}
+
+/// A `part` of the way from `a` to `b`. What both ends share stays as it was typed; the rest has the digits that are not rounding.
+fn along(a: DVec3, b: DVec3, part: f64) -> DVec3 {
+    let told = |a: f64, b: f64| {
+        let x = a + part * (b - a);
+        if a == b { a } else { format!("{x:.12e}").parse().unwrap_or(x) }
+    };
+    DVec3::new(told(a.x, b.x), told(a.y, b.y), told(a.z, b.z))
 }
 
 /// The points of a file; one line of names may stand before them.

@@ -29,6 +29,9 @@ const MOST_STEPS: f64 = 2000.0;
 /// What a remedy asks for more than what just does, over the spacing [-].
 const MARGIN: f64 = 1e-6;
 
+/// Shortest ways out of what it overlaps that are taken one after the other, at most.
+const WAYS_OUT: usize = 8;
+
 /// What a body may meet at t = 0: fixed walls, and the solids placed before it.
 pub(super) struct Surroundings<'a> {
     pub fixed: &'a Fixed,
@@ -41,7 +44,7 @@ pub(super) struct Surroundings<'a> {
     pub up: Option<DVec3>,
 }
 
-/// The deepest contact of a body at t = 0.
+/// A contact of a body at t = 0.
 struct Contact {
     with: String,
     overlap: f64,
@@ -55,18 +58,38 @@ impl Surroundings<'_> {
     /// # Errors
     /// What is wrong, with the body, what it overlaps and by how much; and what to do.
     pub fn place(&self, body: &mut Solid, standing: bool) -> Result<Option<String>, (String, String)> {
-        let Some(Contact { with, overlap, out }) = self.deepest(body) else { return Ok(None) };
+        let overlaps = self.overlaps(body);
+        if overlaps.is_empty() {
+            return Ok(None);
+        }
         // A lift over the rim of a wall is not what anyone means by standing.
         let lift = self
             .up
             .map(|up| (self.lift(body, up), up))
             .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
-        let says = format!("body `{}` overlaps {with} by {} m at t = 0", body.name, metres(overlap));
+        let all: Vec<String> =
+            overlaps.iter().take(3).map(|c| format!("{} by {} m", c.with, metres(c.overlap))).collect();
+        let says = format!("body `{}` overlaps {} at t = 0", body.name, all.join(" and "));
         let margin = MARGIN * self.spacing;
         let Some((lift, up)) = lift else {
-            let away = out.map_or("move it away".into(), |n| {
-                format!("move it away, its center by {} m along {}", at_least(overlap + margin), point(n))
-            });
+            let away = match (&overlaps[..], self.away(body)) {
+                ([Contact { overlap, out: Some(n), .. }], _) => {
+                    format!(
+                        "move it away, its center by {} m along {}",
+                        at_least(overlap + margin),
+                        point(*n)
+                    )
+                }
+                (_, Some(by)) => {
+                    let [x, y, z] = by.to_array().map(|x| match x {
+                        0.0 => "0".into(),
+                        x if x < 0.0 => format!("-{}", at_least(-x)),
+                        x => at_least(x),
+                    });
+                    format!("move it away, its center by ({x}, {y}, {z}) m")
+                }
+                _ => "move it away".into(),
+            };
             let why =
                 if self.up.is_some() { ", lifting it would take more than half its height" } else { "" };
             return Err((says, away + why));
@@ -88,6 +111,16 @@ impl Surroundings<'_> {
             point(from),
             point(body.shape_center())
         )))
+    }
+
+    /// Where a body is free of contact, from where it is [m], by the shortest ways out one after the other; `None` where they lead nowhere.
+    fn away(&self, body: &Solid) -> Option<DVec3> {
+        let mut moved = body.clone();
+        for _ in 0..WAYS_OUT {
+            let Some(contact) = self.deepest(&moved) else { return Some(moved.position - body.position) };
+            moved.position += (contact.overlap + MARGIN * self.spacing) * contact.out?;
+        }
+        None
     }
 
     /// Says so where a standing body has nothing under it, once all that was asked for is placed.
@@ -165,21 +198,26 @@ impl Surroundings<'_> {
     }
 
     fn deepest(&self, body: &Solid) -> Option<Contact> {
+        self.overlaps(body).into_iter().next()
+    }
+
+    /// What a body overlaps, the deepest first; of pairs of particles the deepest alone.
+    fn overlaps(&self, body: &Solid) -> Vec<Contact> {
         let own = body.placed();
         // Lattices need not be in register, so that "paper" lets true surfaces overlap a little. Otherwise what touches is written with as many
         // digits as anyone writes: K gives no body more than sqrt(K / m) times this.
         let tolerance = if self.law == Law::Paper { 0.5 } else { TOUCHING } * self.spacing;
-        let solid = self
-            .obstructions(body, DVec3::ZERO, 0.0)
-            .into_iter()
-            .map(|b| {
-                let (overlap, out) = b.way_out(&own, body, tolerance);
-                Contact { with: b.name, overlap, out: Some(out) }
-            })
-            .filter(|c| c.overlap > tolerance)
-            .max_by(|a, b| a.overlap.total_cmp(&b.overlap));
-        if solid.is_some() || self.law != Law::Paper {
-            return solid;
+        let overlap = |b: Obstruction<'_>| {
+            let (overlap, out) = b.way_out(&own, body, tolerance);
+            (overlap > tolerance).then_some(Contact { with: b.name, overlap, out: Some(out) })
+        };
+        let mut all: Vec<Contact> =
+            self.obstructions(body, DVec3::ZERO, 0.0).into_iter().filter_map(overlap).collect();
+        // Of those as deep the last.
+        all.reverse();
+        all.sort_by(|a, b| b.overlap.total_cmp(&a.overlap));
+        if !all.is_empty() || self.law != Law::Paper {
+            return all;
         }
         let d_c = CONTACT_DISTANCE * self.spacing;
         let up = self.up.unwrap_or(DVec3::Z);
@@ -193,6 +231,8 @@ impl Surroundings<'_> {
                 overlap,
                 out: None,
             })
+            .into_iter()
+            .collect()
     }
 
     /// Least distance >= 0 along `up` that ends all contact [m].

@@ -142,6 +142,9 @@ impl Builder<'_> {
         let dummies: Vec<DVec3> =
             solid.dummy_offset.iter().filter(|o| !self.buried(at(o), true)).copied().collect();
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
+        let mut surface = solid.wall_offset.iter().zip(&solid.wall_to_surface);
+        let bare = !kept.contains(&true)
+            && surface.any(|(x, way)| !self.buried(at(&(*x + (1.0 + FLUSH) * *way)), false));
         let mut areas = self.cut(solid, &kept);
         if let Some(freed) = self.freed(solid, &kept) {
             for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..) {
@@ -165,7 +168,12 @@ impl Builder<'_> {
         if solid.wall_offset.is_empty() {
             let message =
                 format!("{label}: nothing of it stands free, its middle is at {}", point(solid.position));
-            let remedy = "it lies beyond the tank's walls or inside others: move it, or check `scale`";
+            let remedy = match bare {
+                true => {
+                    "its surface is less than half a spacing before other walls, which have no room for its particles: move it a spacing away from them, or leave it out"
+                }
+                false => "it lies beyond the tank's walls or inside others: move it, or check `scale`",
+            };
             self.problems.push(Problem::new(key, message, remedy));
             self.lacks_walls = true;
         } else if gone > 0 {
@@ -266,19 +274,18 @@ impl Builder<'_> {
         let Some((low, high)) = self.closed_sides() else { return solid.wall_area.clone() };
         let at = |k: usize| solid.position + solid.orientation * solid.wall_offset[k];
         // A face has no length across it.
-        let inside = |k: usize| {
-            let (x, outward) = (at(k), solid.orientation * solid.wall_area[k].normalize_or_zero());
+        let inside = |x: DVec3, area: DVec3| {
+            let outward = solid.orientation * area.normalize_or_zero();
             let reach = (x + 0.5 * l0).min(high) - (x - 0.5 * l0).max(low);
             let across = outward.abs().cmpgt(DVec3::splat(0.7)) & x.cmpge(low) & x.cmple(high);
             DVec3::select(across, DVec3::ONE, (reach / l0).clamp(DVec3::ZERO, DVec3::ONE)).element_product()
         };
-        let shares: Vec<f64> = (0..kept.len()).map(inside).collect();
-        let mut areas: Vec<DVec3> =
-            solid.wall_area.iter().zip(&shares).map(|(a, share)| *a * *share).collect();
+        let part = |k: usize| solid.faces(k).map(|(area, _)| inside(at(k), area) * area).sum();
+        let mut areas: Vec<DVec3> = (0..kept.len()).map(part).collect();
         let stays: Vec<usize> = (0..kept.len()).filter(|&k| kept[k]).collect();
         let mut near = PointCells::new(l0);
         stays.iter().for_each(|&k| near.add(at(k)));
-        for k in (0..kept.len()).filter(|&k| !kept[k] && shares[k] > 0.0) {
+        for k in (0..kept.len()).filter(|&k| !kept[k]) {
             let taker = near.nearest(at(k), 1.5 * l0).map(|j| stays[j]);
             if let Some(taker) = taker.filter(|&j| solid.wall_area[j].dot(areas[k]) > 0.0) {
                 let area = areas[k];
