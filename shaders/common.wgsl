@@ -168,16 +168,31 @@ fn number_of(word: f32) -> u32 {
     return max(bitcast<u32>(word), FIRST_WORD) - FIRST_WORD;
 }
 
-// A direction as such a word, to a thousandth; and back, where 0.0 stands for none.
+// A direction as such a word, to 1e-4, by its place on an octahedron whose lower half is folded out into a square (Cigolle et al., JCGT 3(2), 2014); and
+// back, where 0.0 stands for none.
+fn folded(p: vec2f) -> vec2f {
+    return (1.0 - abs(p.yx)) * select(vec2f(1.0), vec2f(-1.0), p < vec2f(0.0));
+}
+
 fn direction_word(n: vec3f) -> f32 {
-    let parts = vec3u(round((n + 1.0) * 511.0));
-    return word_of(parts.x | (parts.y << 10u) | (parts.z << 20u));
+    let sum = dot(abs(n), vec3f(1.0));
+    if sum == 0.0 {
+        return 0.0;
+    }
+    let p = n.xy / sum;
+    let parts = vec2u(round((select(p, folded(p), n.z < 0.0) + 1.0) * 16383.0));
+    return word_of(1u + parts.x + (parts.y << 15u));
 }
 
 fn direction_of(word: f32) -> vec3f {
-    let parts = number_of(word);
-    let n = vec3f(vec3u(parts, parts >> 10u, parts >> 20u) & vec3u(1023u)) / 511.0 - 1.0;
-    return select(n, vec3f(0.0), parts == 0u);
+    let number = number_of(word);
+    if number == 0u {
+        return vec3f(0.0);
+    }
+    let parts = vec2i(vec2u(number - 1u, (number - 1u) >> 15u) & vec2u(32767u));
+    let p = vec2f(parts - 16383) * (1.0 / 16383.0);
+    let z = 1.0 - abs(p.x) - abs(p.y);
+    return normalize(vec3f(select(p, folded(p), z < 0.0), z));
 }
 
 // Numbers of a thread and of a workgroup, and how many workgroups there are. Where a dispatch has more than a device starts along

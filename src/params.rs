@@ -21,8 +21,10 @@ pub enum Relaxation {
 
 /// Derived c_s over the speed of the flow. A slow one leaves calm water calm, a fast one keeps violent water from crowding.
 const SOUND_OVER_FLOW: f64 = 2.5;
-/// Least part of the derived c_s that a calm flow has.
+/// Least part of the derived c_s that a calm flow has, and up to which nu / (l0 sqrt(g l0)): creeping flow is slower than what the density errors of water as thin as
+/// water would move, which so thick a one does not need.
 const CALM: f64 = 0.5;
+const THICK: f64 = 0.03;
 
 /// c_s^2 of creeping flow over nu v / l0, at least: in steps as long as viscosity allows, 0.16 l0^2 / nu, a density error is undone at half of
 /// v / l0 then, about as fast as the flow makes one. c_s of the flow alone would leave next to nothing of it in such short steps.
@@ -347,7 +349,8 @@ impl Params {
                 let most = if self.gravity == DVec3::ZERO { f64::INFINITY } else { c };
                 let c = if self.follows_flow {
                     let creeping = (CREEPING * self.viscosity * flow.max(driven) / self.spacing).sqrt();
-                    let c = (SOUND_OVER_FLOW * flow).clamp(CALM * c, most).max(SOUND_OVER_FLOW * driven);
+                    let calm = CALM * c * (THICK / self.thickness()).min(1.0);
+                    let c = (SOUND_OVER_FLOW * flow).clamp(calm, most).max(SOUND_OVER_FLOW * driven);
                     c.max(creeping)
                 } else {
                     c
@@ -355,6 +358,12 @@ impl Params {
                 (c * dt / self.spacing).powi(2).min(RELAXATION_MAX)
             }
         }
+    }
+
+    /// Viscosity over what a spacing's fall under gravity makes of a spacing, nu / (l0 sqrt(g l0)) [-]; 0 without gravity.
+    fn thickness(&self) -> f64 {
+        let fall = self.spacing * (self.gravity.length() * self.spacing).sqrt();
+        if fall > 0.0 { self.viscosity / fall } else { 0.0 }
     }
 
     /// Largest extent of the domain [m].

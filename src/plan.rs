@@ -1,7 +1,7 @@
 //! Which stages and arrays a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{self, Case, ContactDevice, stands_for};
+use crate::case::{self, Case, ContactDevice, Law, stands_for};
 use crate::compute::Program;
 use crate::contact;
 use crate::error::{Error, Result};
@@ -197,11 +197,23 @@ impl ContactPlan {
             ContactDevice::Auto if points < most => {
                 host(&format!("{points} surface points, below {most} a round trip to a device costs more"))
             }
+            ContactDevice::Auto
+                if case.contact.as_ref().is_some_and(|c| c.law == Law::Paper) && on_fixed(case, scene) =>
+            {
+                host(
+                    "a force gauge is on a fixed wall, and a device does not tell what presses on which by law \"paper\"",
+                )
+            }
             ContactDevice::Auto => {
                 Self { program, reason: format!("{points} surface points, {most} or more") }
             }
         }
     }
+}
+
+/// Whether a force gauge is on a fixed wall.
+fn on_fixed(case: &Case, scene: &Scene) -> bool {
+    case.gauge.force.iter().any(|gauge| scene.walls.iter().any(|wall| stands_for(&gauge.on, &wall.name)))
 }
 
 /// Walls of which something is told beside the pressure of their rows.

@@ -165,7 +165,8 @@ fn result_json_has_the_agreed_keys_whatever_happened() {
         ("particles", "total fluid wall dummy body"),
         (
             "pressure",
-            "preconditioner solves unknowns_mean iterations_mean iterations_max relative_residual_max failures",
+            "preconditioner solves unknowns_mean iterations_mean iterations_max relative_residual_max failures \
+             clamps negative",
         ),
         (
             "monitors",

@@ -54,6 +54,48 @@ fn one_step_agrees_stage_by_stage() {
     }
 }
 
+/// Water behind a thin plate stands among the dummies; calm water hardly collides; slanted surfaces tell by their directions which rows look at each other; a
+/// site's coordinates are no reason to see less.
+#[test]
+fn solids_in_calm_water_agree_stage_by_stage() {
+    if !device() {
+        return;
+    }
+    let tank = |far: f64, body: &str| {
+        crate::common::case(&format!(
+            "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 0.3\n\
+             [tank]\nmin = [{far}, 0, 0]\nmax = [{:.1}, 0.4, 0.4]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [{far}, 0, 0]\nmax = [{:.1}, 0.4, 0.2]\n\
+             [[body]]\nname = \"a\"\ndensity = 900\ndisplaces_fluid = true\n{body}\n[contact]\nspring = 2e4\n",
+            far + 0.4,
+            far + 0.4
+        ))
+    };
+    let prism = "shape = \"prism\"\nheight = 0.2\nsection = [[0.1, 0], [0.2, 0.05], [0.1, 0.1], [0, 0.05]]\n\
+                 orientation = { axis = [0, 1, 0], angle_deg = 12 }\ncenter = [0.2, 0.2, 0.12]";
+    let plate = "size = [0.2, 0.2, 0.05]\ncenter = [0.2, 0.2, 0.125]";
+    let heavy = "size = [0.15, 0.15, 0.1]\ncenter = [0.2, 0.2, 0.0501]\nvelocity = [0, 0, 0]";
+    let far = "size = [0.2, 0.2, 0.1]\ncenter = [1000.2, 0.2, 0.125]";
+    for (name, case, warmup) in [
+        ("plate", tank(0.0, plate), 0),
+        ("on the floor", tank(0.0, heavy), 10),
+        ("prism", tank(0.0, prism), 10),
+        ("far", tank(1000.0, far), 10),
+    ] {
+        let scene = std::sync::Arc::new(Scene::build(&case).expect("the scene builds"));
+        let errors = compare::compare_stages(&case, &scene, None, warmup).expect("both run");
+        assert!(errors.iter().any(|e| e.max_relative > 0.0), "{name}");
+        for e in &errors {
+            println!("{name:14} {:20} {:16} l2 {:.1e} of {:.1e}", e.stage, e.field, e.l2_relative, e.bound);
+            assert!(e.is_explained(), "{name}: {e:?}");
+        }
+        // A bound that nothing fails is none.
+        let bound = |field: &str| errors.iter().find(|e| e.field == field).map(|e| e.bound);
+        assert!(bound("number_density").is_some_and(|bound| bound < 1e-4), "{name}");
+        assert!(bound("diagonal").is_some_and(|bound| bound < 1e-4), "{name}");
+    }
+}
+
 #[test]
 fn runs_stay_together() {
     if !device() {

@@ -220,6 +220,14 @@ fn pressures_that_are_cut_are_judged() {
         assert_eq!(verdict.grade, grade, "{clamps}: {verdict}");
         assert_eq!(clamps == 400, verdict.to_string().contains("were cut at their upper bound"), "{verdict}");
     }
+    summary.pressure.clamps = 0;
+    for (negative, grade) in [(140_000, Grade::Fine), (190_000, Grade::Degraded)] {
+        summary.pressure.negative = negative;
+        let verdict = judge(&summary, scale, false);
+        assert_eq!(verdict.grade, grade, "{negative}: {verdict}");
+        assert_eq!(negative == 190_000, verdict.to_string().contains("water does not pull"), "{verdict}");
+    }
+    summary.pressure.negative = 0;
     // What a run does already is no remedy.
     summary.monitors.solid_courant_max = 1.5;
     for adaptive in [false, true] {

@@ -3,6 +3,7 @@
 use super::setup::Setup;
 use super::{CaseArgs, Exit};
 use seixo::console::{say_json, tell};
+use seixo::plan::ContactPlan;
 use seixo_study::device_compare::{Drift, StageError, compare_stages, drift};
 
 #[derive(Debug, clap::Args)]
@@ -28,6 +29,9 @@ struct Report {
     case: String,
     warmup: u64,
     stages: Vec<StageError>,
+    /// Why contact is where it is.
+    #[serde(skip)]
+    contact: String,
     drift: Option<Drift>,
 }
 
@@ -39,6 +43,7 @@ pub fn compare(args: &CompareArgs) -> Exit {
         case: setup.name.clone(),
         warmup: args.warmup,
         stages: compare_stages(case, scene, adapter, args.warmup)?,
+        contact: ContactPlan::on_device(case, scene).reason,
         drift: if args.steps > 0 { Some(drift(case, scene, adapter, args.steps)?) } else { None },
     };
     if args.json {
@@ -68,7 +73,10 @@ fn words(report: &Report) -> String {
     let mut lines =
         vec![format!("one step of {} after {} steps, GPU against CPU", report.case, report.warmup)];
     if report.stages.is_empty() {
-        lines.push("  a dry scene has no stages on the GPU".to_string());
+        lines.push(format!(
+            "  a dry scene has no stages on the GPU but contact, and that is the host's: {}",
+            report.contact
+        ));
     } else {
         lines.push(format!(
             "  {:<20}{:<16}{:>10}{:>10}{:>12}",

@@ -18,6 +18,7 @@ use seixo::machine;
 use seixo::output::digits::{of_moment, of_place, of_time};
 use seixo::output::folder::case_name;
 use seixo::output::result::{Grade, Status, Summary};
+use seixo::pressure::SINGLE;
 use seixo::ranks::Team;
 use seixo::run::resume::{Standing, standing};
 use seixo::run::{Options, Start, run as run_simulation};
@@ -225,7 +226,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
         inputs: asked.inputs,
     };
     if !args.quiet {
-        announce(&setup, &simulation);
+        announce(&setup, &mut simulation);
     }
     let mut display = Display::new(args.quiet, simulation.plan.wet(), of_time(&simulation.case));
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
@@ -293,7 +294,7 @@ fn begin(args: &RunArgs, asked: &Asked, case: &Case) -> Result<Option<Start>> {
 }
 
 /// What is computed, and on what.
-fn announce(setup: &Setup, simulation: &Simulation) {
+fn announce(setup: &Setup, simulation: &mut Simulation) {
     // Those of the scene were shown when it was built.
     let more = &simulation.scene.notes[setup.scene.notes.len()..];
     more.iter().for_each(|note| remark(&format!("note: {note}")));
@@ -305,6 +306,13 @@ fn announce(setup: &Setup, simulation: &Simulation) {
         groups.total() - setup.scene.reserve,
         setup.scene.water()
     ));
+    let tolerance = simulation.settings().tolerance;
+    if simulation.plan.wet() && tolerance < SINGLE && simulation.backend.compute().is_some() {
+        remark(&format!(
+            "note: fluid.solver.tolerance = {tolerance:e} is finer than a device holds in single precision, about {SINGLE:e}: residuals stay \
+             above it; --backend cpu meets it"
+        ));
+    }
     let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);
     words.iter().for_each(|line| remark(line));
     let step = shortest(&simulation.case, &setup.scene, &simulation.params);

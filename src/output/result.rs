@@ -92,6 +92,8 @@ pub struct Pressure {
     pub failures: u64,
     /// Pressures that were cut at the upper bound, over all steps.
     pub clamps: u64,
+    /// Negative pressures that were set to zero, of water and walls, over all steps.
+    pub negative: u64,
 }
 
 /// Extremes over the run.

@@ -73,6 +73,7 @@ impl Totals {
             failures,
             // Counted by the backend.
             clamps: _,
+            negative: _,
         } = pressure;
         archive.small("totals.iterations_max", iterations_max)?;
         archive.number("totals.relative_residual_max", relative_residual_max)?;
@@ -143,6 +144,7 @@ impl Totals {
     pub fn see(&mut self, fluid: &FluidMonitor, counters: &Counters) {
         self.water = (fluid.particles, counters.swallowed.clone());
         self.pressure.clamps = counters.pressure_clamps;
+        self.pressure.negative = counters.negative_pressures;
     }
 
     /// Count in a look at the water and the guards after so many `steps`; the last one was `dt` [s] long, with l0 [m].

@@ -10,6 +10,8 @@ const FAILURES: (f64, f64) = (0.01, 0.5);
 const LOST: (f64, f64) = (1e-3, 0.1);
 /// Part of all pressures of all steps that are cut at the upper bound [-]: a slam cuts some.
 const CLAMPED: (f64, f64) = (1e-4, f64::INFINITY);
+/// Part of them that are negative and set to zero [-]: of water that flies two thirds, of water that something would have to hold together all.
+const PULLED: (f64, f64) = (0.9, f64::INFINITY);
 /// Mean of n / n0 - 1 [-]: the water is compressed by that much.
 const COMPRESSION: (f64, f64) = (0.05, 0.3);
 /// Largest speed over that of a fall through the domain.
@@ -78,6 +80,14 @@ pub fn judge(summary: &Summary, scale: Scale, adaptive: bool) -> Verdict {
                 "{} pressures, {:.1e} of all, were cut at their upper bound; use a larger fluid.sound_speed or a shorter run.time_step, \
                  or give the water room",
                 p.clamps, cut
+            )
+        });
+        let pulled = p.negative as f64 / (p.unknowns_mean * solves).max(1.0);
+        judge.bound(pulled, PULLED, || {
+            format!(
+                "{} pressures, {pulled:.2} of all, were negative and set to zero: water does not pull here, so that what only tension would \
+                 hold together flies apart",
+                p.negative
             )
         });
         judge.bound(m.lost_particles as f64 / fluid, LOST, || {

@@ -215,7 +215,7 @@ impl Surroundings<'_> {
             self.obstructions(body, DVec3::ZERO, 0.0).into_iter().filter_map(overlap).collect();
         // Of those as deep the last.
         all.reverse();
-        all.sort_by(|a, b| b.overlap.total_cmp(&a.overlap));
+        all.sort_unstable_by(|a, b| b.overlap.total_cmp(&a.overlap));
         if !all.is_empty() || self.law != Law::Paper {
             return all;
         }

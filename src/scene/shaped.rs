@@ -273,19 +273,20 @@ impl Builder<'_> {
         let l0 = self.lattice.spacing;
         let Some((low, high)) = self.closed_sides() else { return solid.wall_area.clone() };
         let at = |k: usize| solid.position + solid.orientation * solid.wall_offset[k];
-        // A face has no length across it.
-        let inside = |x: DVec3, area: DVec3| {
-            let outward = solid.orientation * area.normalize_or_zero();
+        // A face has no length across it; of an edge, which has two or three, [`crate::cover`] takes what lies beyond a side.
+        let inside = |k: usize| {
+            let (x, outward) = (at(k), solid.orientation * solid.wall_area[k].normalize_or_zero());
             let reach = (x + 0.5 * l0).min(high) - (x - 0.5 * l0).max(low);
             let across = outward.abs().cmpgt(DVec3::splat(0.7)) & x.cmpge(low) & x.cmple(high);
             DVec3::select(across, DVec3::ONE, (reach / l0).clamp(DVec3::ZERO, DVec3::ONE)).element_product()
         };
-        let part = |k: usize| solid.faces(k).map(|(area, _)| inside(at(k), area) * area).sum();
-        let mut areas: Vec<DVec3> = (0..kept.len()).map(part).collect();
+        let shares: Vec<f64> = (0..kept.len()).map(inside).collect();
+        let mut areas: Vec<DVec3> =
+            solid.wall_area.iter().zip(&shares).map(|(a, share)| *a * *share).collect();
         let stays: Vec<usize> = (0..kept.len()).filter(|&k| kept[k]).collect();
         let mut near = PointCells::new(l0);
         stays.iter().for_each(|&k| near.add(at(k)));
-        for k in (0..kept.len()).filter(|&k| !kept[k]) {
+        for k in (0..kept.len()).filter(|&k| !kept[k] && shares[k] > 0.0) {
             let taker = near.nearest(at(k), 1.5 * l0).map(|j| stays[j]);
             if let Some(taker) = taker.filter(|&j| solid.wall_area[j].dot(areas[k]) > 0.0) {
                 let area = areas[k];

@@ -39,10 +39,17 @@ pub(crate) fn number_of(word: f32) -> u32 {
     word.to_bits().max(FIRST_WORD) - FIRST_WORD
 }
 
-/// A direction of length 1 as such a word, to a thousandth, or that of no length; `direction_word` in shaders/common.wgsl.
+/// A direction of length 1 as such a word, to 1e-4, or that of no length; `direction_word` in shaders/common.wgsl, where the map is told.
 pub(crate) fn direction_word(n: DVec3) -> f32 {
-    let part = |c: f64| ((c + 1.0) * 511.0).round() as u32;
-    word_of(part(n.x) | (part(n.y) << 10) | (part(n.z) << 20))
+    let sum = n.abs().element_sum();
+    if sum == 0.0 {
+        return word_of(0);
+    }
+    let [x, y] = [n.x / sum, n.y / sum];
+    let sign = |c: f64| if c < 0.0 { -1.0 } else { 1.0 };
+    let [x, y] = if n.z < 0.0 { [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)] } else { [x, y] };
+    let part = |c: f64| ((c + 1.0) * 16383.0).round() as u32;
+    word_of(1 + part(x) + (part(y) << 15))
 }
 
 /// Places in the buffer of counters.
@@ -405,6 +412,39 @@ mod tests {
         }
         assert_eq!(word_of(last), f32::MAX);
         assert_eq!(number_of(0.0), 0);
+    }
+
+    #[test]
+    fn directions_travel_as_words_to_a_ten_thousandth_and_those_of_axes_exactly() {
+        // As `direction_of` in shaders/common.wgsl.
+        let back = |word: f32| {
+            let number = number_of(word);
+            if number == 0 {
+                return DVec3::ZERO;
+            }
+            let part = |n: u32| (f64::from(n & 32767) - 16383.0) / 16383.0;
+            let (x, y) = (part(number - 1), part((number - 1) >> 15));
+            let z = 1.0 - x.abs() - y.abs();
+            let sign = |c: f64| if c < 0.0 { -1.0 } else { 1.0 };
+            let fold = z < 0.0;
+            let (x, y) = if fold { ((1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)) } else { (x, y) };
+            DVec3::new(x, y, z).normalize()
+        };
+        for axis in DVec3::AXES.into_iter().flat_map(|e| [e, -e]).chain([DVec3::ZERO]) {
+            assert_eq!(back(direction_word(axis)), axis);
+        }
+        let mut off = 0.0_f64;
+        for k in 0..10_000 {
+            let (z, turn) = (f64::from(k).mul_add(2e-4, 1e-4) - 1.0, 2.4 * f64::from(k));
+            let n = DVec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z);
+            let word = direction_word(n);
+            assert!(word.is_normal());
+            off = off.max((back(word) - n).length());
+            // In the plane it stays there.
+            let flat = DVec3::new(turn.cos(), 0.0, turn.sin());
+            assert_eq!(back(direction_word(flat)).y, 0.0);
+        }
+        assert!(off < 1e-4, "{off:e}");
     }
 
     #[test]

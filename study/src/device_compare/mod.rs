@@ -202,12 +202,13 @@ pub fn neighbour_differences(
     out
 }
 
-/// Rows in the order of the particles' numbers, with numbers in place of fluid slots.
+/// Rows in the order of the particles' numbers, with numbers in place of fluid slots: water behind a thin solid stands among the dummies.
 fn rows_by_number(rows: Vec<Neighbourhood>, id: &[u32]) -> Vec<Neighbourhood> {
     let mut out = vec![Neighbourhood::default(); rows.len()];
     let number = |j: u32| id.get(j as usize).copied().unwrap_or(j);
     for (i, (near, dummies)) in rows.into_iter().enumerate() {
-        out[number(i as u32) as usize] = (near.into_iter().map(number).collect(), dummies);
+        let numbers = |row: Vec<u32>| row.into_iter().map(number).collect();
+        out[number(i as u32) as usize] = (numbers(near), numbers(dummies));
     }
     out
 }
@@ -263,6 +264,7 @@ pub fn compare_stages(
     adapter: Option<&str>,
     warmup: u64,
 ) -> Result<Vec<StageError>> {
+    ContactPlan::on_device(case, scene).refuse(case, scene)?;
     let mut simulation = Simulation::on(&for_cpu(case), scene.clone(), &Processor::Cpu)?;
     for _ in 0..warmup {
         simulation.step()?;
