@@ -25,6 +25,8 @@ const SOUND_OVER_FLOW: f64 = 2.5;
 /// water would move, which so thick a one does not need.
 const CALM: f64 = 0.5;
 const THICK: f64 = 0.03;
+/// Least part of that part which thick water has: with less it sinks while it stands still.
+const CREEP: f64 = 0.2;
 
 /// c_s^2 of creeping flow over nu v / l0, at least: in steps as long as viscosity allows, 0.16 l0^2 / nu, a density error is undone at half of
 /// v / l0 then, about as fast as the flow makes one. c_s of the flow alone would leave next to nothing of it in such short steps.
@@ -349,7 +351,7 @@ impl Params {
                 let most = if self.gravity == DVec3::ZERO { f64::INFINITY } else { c };
                 let c = if self.follows_flow {
                     let creeping = (CREEPING * self.viscosity * flow.max(driven) / self.spacing).sqrt();
-                    let calm = CALM * c * (THICK / self.thickness()).min(1.0);
+                    let calm = CALM * c * (THICK / self.thickness()).clamp(CREEP, 1.0);
                     let c = (SOUND_OVER_FLOW * flow).clamp(calm, most).max(SOUND_OVER_FLOW * driven);
                     c.max(creeping)
                 } else {

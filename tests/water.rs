@@ -6,10 +6,31 @@ use crate::meshes::{ball, file, stl};
 use glam::DVec3;
 use seixo::backend::{Processor, gpu};
 use seixo::case::Case;
+use seixo::params::Params;
 use seixo::scene::{Kind, Scene};
 use seixo::simulation::Simulation;
 
 const L0: f64 = 0.02;
+
+/// Density errors of thick water under gravity are corrected more slowly, those of water as ever.
+#[test]
+fn thick_water_that_stands_still_is_corrected_slowly() {
+    let gamma = |viscosity: f64, flow: f64| {
+        let block = "[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0.4, 0.2]";
+        let case = case(&tank(&format!("viscosity = {viscosity}\n{block}"), ""));
+        let scene = Scene::build(&case).expect("the scene builds");
+        let params = Params::new(&case, &scene).expect("valid");
+        params.relaxation(1e-5, flow, 0.0)
+    };
+    let water = gamma(1e-6, 0.0);
+    assert_eq!(gamma(2e-4, 0.0), water, "nu / (l0 sqrt(g l0)) = 0.023");
+    for (viscosity, part) in [(5e-4, 0.03 / 0.056_437), (0.05, 0.2)] {
+        let thick = (gamma(viscosity, 0.0) / water).sqrt();
+        assert!((thick / part - 1.0).abs() < 1e-3, "{viscosity}: c_s {thick} of that of water, {part}");
+    }
+    // Water that flows as fast as ever is corrected as fast as ever.
+    assert_eq!(gamma(5e-4, 2.0), gamma(1e-6, 2.0));
+}
 
 /// A tank of 0.8 x 0.4 x 0.4 m with `water` and `solids`.
 fn tank(water: &str, solids: &str) -> String {
