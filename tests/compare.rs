@@ -102,7 +102,7 @@ fn runs_stay_together() {
         return;
     }
     let (case, scene) = transport(&[]);
-    let drift = compare::drift(&case, &scene, None, 20).expect("both run");
+    let drift = compare::drift(&case, &scene, None, 12).expect("both run");
     println!("{:?} {:?} s", drift.backends, drift.seconds);
     for q in &drift.quantities {
         println!("{:24} {:12.6} {:12.6} {:.1e}", q.name, q.cpu, q.gpu, q.relative);

@@ -180,7 +180,7 @@ fn water_in_a_huge_domain_is_the_same_water() {
         let domain = format!("domain = [[-0.21, -0.21, -0.21], {to:?}]");
         let Some(mut sim) = on_device(&column(&domain)) else { return };
         let mut iterations = 0;
-        for _ in 0..4 {
+        for _ in 0..2 {
             iterations += sim.step().expect("still water is no trouble").pressure.iterations;
         }
         let fields = sim.backend.read().expect("the device is there");
@@ -206,7 +206,7 @@ fn water_in_a_huge_domain_is_the_same_water() {
 fn slow_water_in_a_long_domain_is_not_held() {
     let case = common::case(
         "[run]\nspacing = 0.025\ntime_step = 5e-4\nend = 1.0\nadaptive = false\n\
-         domain = [[-0.2, -0.2, -0.2], [400.0, 0.5, 1.0]]\ngravity = [0, 0, 0]\n\
+         domain = [[0.3, 0, 0], [400.4, 0.3, 0.3]]\ngravity = [0, 0, 0]\n\
          [fluid]\n[[fluid.block]]\nmin = [0.5, 0.1, 0.1]\nmax = [0.7, 0.2, 0.2]\nvelocity = [2e-3, -1e-3, 0]\n",
     );
     let Some(mut sim) = on_device(&case) else { return };

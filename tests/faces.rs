@@ -50,6 +50,27 @@ fn mean(case: &Case) -> (Wrench, Arc<Scene>) {
     (sum / count, scene)
 }
 
+/// The rim of an end has a part of the side's area and a part of the end's; the latter stands on the floor.
+#[test]
+fn a_round_pier_on_the_floor_is_not_lifted() {
+    for radius in [0.04, 0.05] {
+        let case = case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n[tank]\nmin = [0, 0, 0]\nmax = [0.24, 0.24, 0.3]\n\
+             open = [\"z_max\"]\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.24, 0.24, 0.16]\n\
+             [[obstacle]]\nname = \"pier\"\nshape = \"cylinder\"\nradius = {radius}\nheight = 0.3\n\
+             center = [0.12, 0.12, 0.15]\n[[gauge.force]]\nname = \"pier\"\non = \"pier\"\n"
+        ));
+        let scene = Scene::build(&case).expect("the scene builds");
+        let mut sim = Simulation::on(&case, scene, &Processor::Cpu).expect("the simulation starts");
+        while sim.time < 0.03 {
+            sim.step().expect("still water stands");
+        }
+        let lift = sim.fluid_force[0].force.z / (9810.0 * 0.16 * std::f64::consts::PI * radius * radius);
+        println!("{radius} m: {lift:.4} of the load on its foot");
+        assert!(lift.abs() < 0.01, "{radius}: {lift}");
+    }
+}
+
 #[test]
 fn a_dam_let_into_the_ground_carries_the_water_above_it_alone() {
     for (slope, below, bed) in [

@@ -114,8 +114,8 @@ fn a_device_reads_the_same_gauges() {
     // Walls' rows undo much of it.
     thrown.fluid.as_mut().expect("water").block[0].velocity = [-0.5, 0.0, 0.0];
     for case in [still(""), thrown] {
-        let cpu = means(&case, &Processor::Cpu, 0.02, 0.04);
-        let gpu = means(&case, &Processor::Gpu { adapter: None }, 0.02, 0.04);
+        let cpu = means(&case, &Processor::Cpu, 0.01, 0.02);
+        let gpu = means(&case, &Processor::Gpu { adapter: None }, 0.01, 0.02);
         for (name, size) in [("floor_force_z [N]", 100.0), ("side_force_x [N]", 50.0), ("half [Pa]", 1000.0)]
         {
             println!("{name}: {} and {}", cpu[name], gpu[name]);
@@ -750,8 +750,7 @@ fn a_pipe_on_the_bed_has_its_lift_and_the_bed_its_load_whatever_the_gap() {
             if on_device && *gap > 0.0 {
                 continue;
             }
-            let (from, to) = if on_device { (0.08, 0.14) } else { (0.15, 0.25) };
-            let mean = means(case, &processor, from, to);
+            let mean = means(case, &processor, 0.04, 0.08);
             let lift = mean["pipe_force_z [N]"] / slice / (0.01 * std::f64::consts::PI);
             let load = mean["floor_force_z [N]"] / slice / (-0.8 * 0.3);
             println!("{kind}, gap {gap}: lift {lift:.4}, load {load:.4} of statics");
@@ -812,7 +811,7 @@ fn the_floor_under_rocks_bears_what_lifts_them() {
              [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
             rocks.concat()
         ));
-        let mean = means(&case, &Processor::Cpu, 0.35, 0.5);
+        let mean = means(&case, &Processor::Cpu, 0.15, 0.25);
         let water =
             9810.0 * Scene::build(&case).expect("the scene builds").groups.fluid as f64 * 0.02_f64.powi(3);
         let of_rocks = |name: &str| {

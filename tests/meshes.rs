@@ -386,8 +386,8 @@ fn a_hull_from_a_file_floats_at_its_draft() {
     let options = Options { processor: Processor::Cpu, ..Options::default() };
     let mut sim = Simulation::open(&case, &options).expect("opens");
     let (mut height, mut tilt, mut count) = (0.0, 0.0_f64, 0.0);
-    sim.run_until(1.3, |sim, _| {
-        if sim.time > 0.8 {
+    sim.run_until(0.65, |sim, _| {
+        if sim.time > 0.35 {
             let pose = sim.solids().next().expect("the hull").pose;
             height += pose.position.z;
             tilt = tilt.max((pose.orientation * DVec3::Z).angle_between(DVec3::Z));

@@ -59,7 +59,7 @@ fn the_device_links_pockets_as_the_cpu_does() {
     let scene = Scene::build(&case).expect("the scene builds");
     let mut runs = [Processor::Cpu, Processor::Gpu { adapter: None }]
         .map(|processor| Simulation::on(&case, scene.clone(), &processor).expect("it starts"));
-    let lifts = runs.each_mut().map(|simulation| lift(simulation, 0, 0.36 * 0.08, 0.6));
+    let lifts = runs.each_mut().map(|simulation| lift(simulation, 0, 0.36 * 0.08, 0.3));
     println!("{lifts:?}");
     assert!((lifts[0] - lifts[1]).abs() < 0.05, "{lifts:?}");
 }

@@ -92,9 +92,9 @@ fn a_section_held_under_water_is_lifted_by_what_it_displaces_on_both_processors(
             let mut sim =
                 Simulation::on(&case, Scene::build(&case).expect("builds"), processor).expect("starts");
             let mut forces = vec![];
-            for step in 0..250 {
+            for step in 0..150 {
                 sim.step().expect("still water is no trouble");
-                if step >= 100 {
+                if step >= 60 {
                     forces.push(sim.fluid_force[0].force.z);
                 }
             }

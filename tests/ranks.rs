@@ -215,12 +215,14 @@ fn many_ranks_compute_what_one_computes() {
 #[test]
 fn many_ranks_round_a_tank_compute_what_one_computes() {
     let multigrid = "jitter = 0.1\nsolver = { preconditioner = \"multigrid\" }";
+    let fast =
+        |bodies: &str| bodies.replace("[-2, 0, -0.5]", "[-4, 0, -1]").replace("[2, 0, 0]", "[4, 0, 0]");
     // The first and the last rank are neighbours: two on both sides, more with a column each at least.
     compare(&[
-        ("ring", ring(1.5, "jitter = 0.1", DRIVEN), 45, &[2, 5], 1e-11),
-        ("ring, multigrid", ring(1.5, multigrid, DRIVEN), 45, &[4], 1e-7),
-        ("ring of bodies", ring(1.5, "jitter = 0.1", FREE), 60, &[2], 1e-11),
-        ("bodies over the seam of a ring", ring(1.5, "jitter = 0.1", &over()), 60, &[3], 1e-11),
+        ("ring", ring(3.0, "jitter = 0.1", DRIVEN), 25, &[2, 5], 1e-11),
+        ("ring, multigrid", ring(3.0, multigrid, DRIVEN), 25, &[4], 1e-7),
+        ("ring of bodies", ring(3.0, "jitter = 0.1", &fast(FREE)), 30, &[2], 1e-11),
+        ("bodies over the seam of a ring", ring(3.0, "jitter = 0.1", &fast(&over())), 30, &[3], 1e-11),
         ("ring, narrow", narrow(), 30, &[4], 1e-11),
     ]);
 }

@@ -61,18 +61,18 @@ type Tried<'a> = (&'a str, Case, u64, usize, f64);
 
 #[test]
 fn many_devices_compute_what_one_device_computes() {
-    compare([("plane", shipped("dam_break_2d", &[]), 8, 3, 5e-7), ("flume", flume(""), 6, 2, 5e-7)]);
+    compare([("plane", shipped("dam_break_2d", &[]), 5, 3, 5e-7), ("flume", flume(""), 4, 2, 5e-7)]);
 }
 
 #[test]
 fn many_devices_compute_what_one_device_computes_round_a_tank_and_in_a_full_one() {
     let multigrid = "jitter = 0.1\nsolver = { preconditioner = \"multigrid\", tolerance = 1e-5 }";
     // Fast, so that they cross the side between the last and the first rank in few steps.
-    let bodies = over().replace("[-2, 0, -0.5]", "[-5, 0, -0.5]").replace("[2, 0, 0]", "[5, 0, 0]");
+    let bodies = over().replace("[-2, 0, -0.5]", "[-10, 0, -0.5]").replace("[2, 0, 0]", "[10, 0, 0]");
     compare([
-        ("ring of bodies, multigrid", ring(3.0, multigrid, &bodies), 10, 2, 2e-6),
-        ("full", full(""), 3, 2, 5e-7),
-        ("full, multigrid", full("solver = { preconditioner = \"multigrid\" }"), 3, 3, 5e-7),
+        ("ring of bodies, multigrid", ring(6.0, multigrid, &bodies), 5, 2, 2e-6),
+        ("full", full(""), 2, 2, 5e-7),
+        ("full, multigrid", full("solver = { preconditioner = \"multigrid\" }"), 2, 3, 5e-7),
     ]);
 }
 
@@ -145,7 +145,7 @@ fn multigrid_of_many_devices_takes_the_iterations_of_one() {
     let case = dam_break();
     // Mean iterations, the largest true residual, and the water after some steps.
     let of = |s: &mut Simulation| {
-        let solves: Vec<_> = (0..4).map(|_| s.step().expect("a step").pressure).collect();
+        let solves: Vec<_> = (0..3).map(|_| s.step().expect("a step").pressure).collect();
         let mean = solves.iter().map(|solve| f64::from(solve.iterations)).sum::<f64>() / solves.len() as f64;
         (mean, solves.iter().map(|solve| solve.residual).fold(0.0, f64::max), s.fields().expect("the fields"))
     };
@@ -348,8 +348,18 @@ fn water_comes_in_and_goes_out_over_devices() {
     if !device() {
         return;
     }
-    let case = shipped("channel", &["run.spacing=0.05", "fluid.solver.preconditioner=\"multigrid\""]);
-    let steps = 60;
+    // Three times as fast as it is shipped: a layer of particles comes in sooner.
+    let case = shipped(
+        "channel",
+        &[
+            "run.spacing=0.05",
+            "fluid.solver.preconditioner=\"multigrid\"",
+            "fluid.block.0.velocity=[1.5,0,0]",
+            "inflow.0.discharge=0.12",
+            "outflow.0.velocity=1.5",
+        ],
+    );
+    let steps = 25;
     let (one, _) = Seen::after(&mut on_device(&case), steps);
     let ((many, fields), ranks) = on_devices(&case, 2, |s| Seen::after(s, steps));
     let scene = Scene::build(&case).expect("it builds");

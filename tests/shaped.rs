@@ -152,9 +152,9 @@ fn a_ball_from_a_file_that_is_held_under_water_is_lifted_by_the_water_it_displac
         let scene = Scene::build(&case).expect("builds");
         let mut sim = Simulation::on(&case, scene, &processor).expect("starts");
         let (mut lift, mut count) = (0.0, 0.0);
-        for step in 0..50 {
+        for step in 0..30 {
             sim.step().expect("still water is no trouble");
-            if step >= 25 {
+            if step >= 15 {
                 lift += sim.fluid_force[0].force.z;
                 count += 1.0;
             }

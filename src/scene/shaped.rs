@@ -153,8 +153,12 @@ impl Builder<'_> {
             }
         } else {
             let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
-            let flat = (0..kept.len()).filter(|&k| !bends[k]);
-            flat.for_each(|k| areas[k] = self.unfaced(solid, areas[k], at(&solid.wall_offset[k])));
+            // Of what is round the ends alone are flat, and the rim has a part of them.
+            let ends = if solid.shape.pieces(l0).is_none() { solid.shape.axes() } else { vec![] };
+            for k in 0..kept.len() {
+                let flat = if bends[k] { &ends[..] } else { &DVec3::AXES };
+                areas[k] = self.unfaced(solid, flat, areas[k], at(&solid.wall_offset[k]));
+            }
         }
         fn left<T: Copy>(all: &[T], kept: &[bool]) -> Vec<T> {
             all.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()
@@ -196,9 +200,9 @@ impl Builder<'_> {
         }
     }
 
-    /// What of the `area` of a solid's particle `at` a place faces no other wall along the axes of the solid.
-    fn unfaced(&self, solid: &Solid, mut area: DVec3, at: DVec3) -> DVec3 {
-        for e in DVec3::AXES.into_iter().flat_map(|e| [e, -e]) {
+    /// What of the `area` of a solid's particle `at` a place faces no other wall along `axes` of the solid.
+    fn unfaced(&self, solid: &Solid, axes: &[DVec3], mut area: DVec3, at: DVec3) -> DVec3 {
+        for e in axes.iter().flat_map(|&e| [e, -e]) {
             let faces = area.dot(e);
             if faces > 0.0 && self.buried(at + self.lattice.spacing * (solid.orientation * e), false) {
                 area -= faces * e;
