@@ -279,7 +279,7 @@ fn restitution_is_what_the_case_asks_for() {
 
 #[test]
 fn a_stack_of_ten_cubes_stands() {
-    let row = stack(10, 4.0).unwrap();
+    let row = stack(10, 10.0).unwrap();
     assert!(row.drift < 1e-4 && row.speed < 1e-9, "{row:?}");
 }
 

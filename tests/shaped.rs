@@ -281,7 +281,7 @@ fn what_is_wrong_with_a_wall_of_any_shape_is_said_with_its_key() {
         (format!("shape = \"mesh\"\nfile = \"{huge}\""), "obstacle.0.scale", &["100 m long", "millimetres", "scale = 0.001"]),
         (format!("shape = \"mesh\"\nfile = \"{plate}\""), "obstacle.0.file", &["1.00e-2 m thin at (0.", "run.spacing"]),
         (format!("shape = \"mesh\"\nfile = \"{open}\""), "obstacle.0.file", &["open", "terrain"]),
-        (format!("shape = \"mesh\"\nfile = \"{closed}\"\nposition = [3, 0, 0]"), "obstacle.0", &["nothing of it stands free"]),
+        (format!("shape = \"mesh\"\nfile = \"{closed}\"\nposition = [3, 0, 0]"), "obstacle.0", &["nothing of it stands free", "it lies beyond"]),
         (format!("shape = \"mesh\"\nfile = \"{closed}\"\ncenter = [0.2, 0.1, 0.1]"), "obstacle.0.center", &["use `position`"]),
         (format!("shape = \"terrain\"\nfile = \"{closed}\""), "obstacle.0.file", &["closed", "mesh"]),
         (format!("shape = \"terrain\"\nfile = \"{folded}\""), "obstacle.0.file", &["triangle", "overhangs"]),

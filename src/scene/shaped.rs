@@ -144,7 +144,7 @@ impl Builder<'_> {
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
         let mut surface = solid.wall_offset.iter().zip(&solid.wall_to_surface);
         let bare = !kept.contains(&true)
-            && surface.any(|(x, way)| !self.buried(at(&(*x + (1.0 + FLUSH) * *way)), false));
+            && surface.any(|(x, way)| !self.buried(at(&(*x + (1.0 - FLUSH) * *way)), false));
         let mut areas = self.cut(solid, &kept);
         if let Some(freed) = self.freed(solid, &kept) {
             for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..) {
