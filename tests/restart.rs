@@ -616,7 +616,7 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     }
 }
 
-/// Spacings at one of which the step of that case takes seconds, however fast the machine is.
+/// Spacings at one of which the steps of that case take seconds, however fast the machine is.
 #[cfg(unix)]
 const LONG: [&str; 3] = ["0.002", "0.0014", "0.001"];
 
@@ -645,7 +645,7 @@ fn a_long_step_is_given_up_and_nothing_is_lost() {
     // Nothing damps the pressure, the diagonal alone preconditions, and only the last digits end a solve.
     let sets = [
         "run.time_step=1e-4",
-        "run.end=1e-4",
+        "run.end=2e-4",
         "fluid.relaxation=1e-9",
         "fluid.solver={tolerance=1e-13,max_iterations=1000000,preconditioner=\"jacobi\"}",
         "fluid.block.0.max=[0.6,0,0.6]",
@@ -656,8 +656,8 @@ fn a_long_step_is_given_up_and_nothing_is_lost() {
         assert_eq!(case.run(spacing, &["--spacing", spacing]).code, 0);
         (spacing, clock.elapsed())
     };
-    let long = LONG.into_iter().map(timed).find(|(_, took)| *took > Duration::from_secs(2));
-    let (spacing, step) = long.expect("its step is long at one of the spacings");
+    let long = LONG.into_iter().map(timed).find(|(_, took)| *took > Duration::from_secs(4));
+    let (spacing, two_steps) = long.expect("its steps are long at one of the spacings");
     let fine = ["--spacing", spacing];
     for (signal, code) in [("-INT", 130), ("-USR1", 75)] {
         let root = case.root(signal).display().to_string();
@@ -665,7 +665,10 @@ fn a_long_step_is_given_up_and_nothing_is_lost() {
         let begun = || case.root(signal).join("small.pvd").exists();
         let (ended, err, took) = interrupted(&case.args(&root, &fine), signal, begun);
         assert_eq!(ended, Some(code), "{err}");
-        assert!(took < step && took < Duration::from_secs(3), "{took:?} for a step of {step:?}");
+        assert!(
+            took < two_steps / 2 && took < Duration::from_secs(3),
+            "{took:?} for a step of {two_steps:?} / 2"
+        );
         let result = json(&std::fs::read_to_string(case.root(signal).join("result.json")).unwrap());
         assert_eq!((result["status"].as_str(), result["steps"].as_u64()), (Some("interrupted"), Some(0)));
     }
@@ -687,7 +690,7 @@ fn a_long_step_on_the_device_is_given_up_and_nothing_is_lost() {
     }
     let sets = [
         "run.time_step=1e-4",
-        "run.end=1e-4",
+        "run.end=2e-4",
         "output.every=1e-4",
         "fluid.relaxation=1e-9",
         "fluid.solver={tolerance=1e-6,max_iterations=100000,preconditioner=\"jacobi\"}",
@@ -697,12 +700,12 @@ fn a_long_step_on_the_device_is_given_up_and_nothing_is_lost() {
     let fine = ["--spacing", "0.006"];
     let clock = Instant::now();
     assert_eq!(case.run("whole", &fine).code, 0);
-    let step = clock.elapsed();
+    let two_steps = clock.elapsed();
     let root = case.root("parts").display().to_string();
     let begun = || case.root("parts").join("small.pvd").exists();
     let (ended, err, took) = interrupted(&case.args(&root, &fine), "-TERM", begun);
     assert_eq!(ended, Some(143), "{err}");
-    assert!(took < Duration::from_secs(4), "{took:?} for a step of {step:?}");
+    assert!(took < Duration::from_secs(4), "{took:?} for steps of {two_steps:?} / 2");
     let ended = case.run("parts", &[&fine[..], &["--resume"]].concat());
     assert_eq!(ended.code, 0, "{}", ended.err);
     assert_same(&case.root("whole"), &case.root("parts"), "a step that was given up on the device");

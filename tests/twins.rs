@@ -700,8 +700,8 @@ fn multigrid_needs_few_iterations_at_any_spacing() {
                 Simulation::on(&case, scene.clone(), &processor).expect("the simulation starts");
             (0..steps).map(|_| simulation.step().expect("a step").pressure.iterations).max().unwrap_or(0)
         };
-        let gpu = iterations(seixo::case::Preconditioner::Multigrid, true, 2);
-        let cpu = iterations(seixo::case::Preconditioner::Multigrid, false, 2);
+        let gpu = iterations(seixo::case::Preconditioner::Multigrid, true, 4);
+        let cpu = iterations(seixo::case::Preconditioner::Multigrid, false, 4);
         let diagonal = iterations(seixo::case::Preconditioner::Jacobi, true, 1);
         println!(
             "l0 = {spacing}: at most {gpu} on the device, {cpu} on the CPU, {diagonal} with the diagonal"
