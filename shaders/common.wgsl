@@ -168,7 +168,7 @@ fn number_of(word: f32) -> u32 {
     return max(bitcast<u32>(word), FIRST_WORD) - FIRST_WORD;
 }
 
-// A direction as such a word, to 1e-4, by its place on an octahedron whose lower half is folded out into a square (Cigolle et al., JCGT 3(2), 2014); and
+// A direction as such a word, to 1.3e-4, by its place on an octahedron whose lower half is folded out into a square (Cigolle et al., JCGT 3(2), 2014); and
 // back, where 0.0 stands for none.
 fn folded(p: vec2f) -> vec2f {
     return (1.0 - abs(p.yx)) * select(vec2f(1.0), vec2f(-1.0), p < vec2f(0.0));

@@ -86,7 +86,10 @@ fn see_cells(i: u32, me: vec3f, first: u32, last: u32) {
     let moving_end = cell_start_at(moving + last) - params.fluid;
     for (var k = cell_start_at(moving + first) - params.fluid; k < moving_end; k++) {
         let other = moving_slot[k];
-        let facing = select(vec3f(0.0), -direction_of(bitcast<f32>(other.y)), i < params.fluid);
+        var facing = vec3f(0.0);
+        if i < params.fluid {
+            facing = -direction_of(bitcast<f32>(other.y));
+        }
         see(i, other.x, offset(me, position[other.x].xyz), facing);
     }
 //#endif

@@ -21,11 +21,11 @@ pub enum Relaxation {
 
 /// Derived c_s over the speed of the flow. A slow one leaves calm water calm, a fast one keeps violent water from crowding.
 const SOUND_OVER_FLOW: f64 = 2.5;
-/// Least part of the derived c_s that a calm flow has, and up to which nu / (l0 sqrt(g l0)): creeping flow is slower than what the density errors of water as thin as
-/// water would move, which so thick a one does not need.
+/// Least part of the derived c_s that a calm flow has.
 const CALM: f64 = 0.5;
+/// nu / (l0 sqrt(g l0)) from which on that part falls, as its inverse: what the correction moves would drown creeping flow.
 const THICK: f64 = 0.03;
-/// Least part of that part which thick water has: with less it sinks while it stands still.
+/// Where its fall ends, over `CALM`: with less thick water sinks while it stands still.
 const CREEP: f64 = 0.2;
 
 /// c_s^2 of creeping flow over nu v / l0, at least: in steps as long as viscosity allows, 0.16 l0^2 / nu, a density error is undone at half of

@@ -309,8 +309,8 @@ fn announce(setup: &Setup, simulation: &mut Simulation) {
     let tolerance = simulation.settings().tolerance;
     if simulation.plan.wet() && tolerance < SINGLE && simulation.backend.compute().is_some() {
         remark(&format!(
-            "note: fluid.solver.tolerance = {tolerance:e} is finer than a device holds in single precision, about {SINGLE:e}: residuals stay \
-             above it; --backend cpu meets it"
+            "note: fluid.solver.tolerance = {tolerance:e} is finer than what a device holds in single precision, 3e-6 to {SINGLE:e} by the number of unknowns: \
+             residuals may stay above it; --backend cpu meets it"
         ));
     }
     let words = step_warnings(&simulation.case, &setup.scene, &simulation.params);

@@ -121,8 +121,8 @@ impl Counters {
         archive.count("counters.displacement_clamps", displacement_clamps)?;
         if !archive.is_of_another() {
             archive.count("counters.pressure_clamps", pressure_clamps)?;
+            archive.count("counters.negative_pressures", negative_pressures)?;
         }
-        archive.count("counters.negative_pressures", negative_pressures)?;
         archive.small("counters.neighbours_max", neighbours_max)?;
         let mut none = non_finite.unwrap_or(u32::MAX);
         archive.small("counters.non_finite", &mut none)?;

@@ -60,7 +60,7 @@ pub struct Fluid {
     /// Relaxation gamma of Eq. (8) [-]. Give this or `sound_speed`.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 4)))]
     pub relaxation: Option<f64>,
-    /// Reference speed c_s [m/s], gamma = (c_s dt / l0)^2: how fast errors of the density are undone. If neither is given, 2.5 times the fastest water's speed, at most the larger of 10 sqrt(g l0) and 2.5 sqrt(g H), H the depth at the start, and at least half of that (the paper's source: always the most); in any case 2.5 times the speed of the fastest solid or opening. In a viscous fluid its square is at least 3 nu v / l0, so that creeping flow keeps its density.
+    /// Reference speed c_s [m/s], gamma = (c_s dt / l0)^2: how fast errors of the density are undone. If neither is given, 2.5 times the fastest water's speed, at most the larger of 10 sqrt(g l0) and 2.5 sqrt(g H), H the depth at the start, and at least half of that, less in a thick fluid (the paper's source: always the most); in any case 2.5 times the speed of the fastest solid or opening. In a viscous fluid its square is at least 3 nu v / l0, so that creeping flow keeps its density.
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub sound_speed: Option<f64>,
     /// Artificial compressibility alpha of Eq. (8) [1/Pa]. Derived if absent.

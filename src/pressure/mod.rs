@@ -36,9 +36,9 @@ pub struct PressureReport {
     pub outcome: Outcome,
 }
 
-/// The finest tolerance that single precision keeps, nearly: the recursion of a device goes on below it, the true residual does not (study
-/// `pressure-solve`: 3e-6 with 2,900 unknowns, 2.4e-5 with 19,400).
-pub const SINGLE: f64 = 1e-5;
+/// The finest tolerance that single precision keeps: the recursion of a device goes on below it, the true residual does not (study
+/// `pressure-solve`: it stays at 3e-6 with 2,900 unknowns, at 2.4e-5 with 19,400).
+pub const SINGLE: f64 = 3e-5;
 
 /// When to stop, and how.
 #[derive(Clone, Copy, PartialEq, Debug)]

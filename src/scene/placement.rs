@@ -67,28 +67,29 @@ impl Surroundings<'_> {
             .up
             .map(|up| (self.lift(body, up), up))
             .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
-        let all: Vec<String> =
+        let mut all: Vec<String> =
             overlaps.iter().take(3).map(|c| format!("{} by {} m", c.with, metres(c.overlap))).collect();
+        if overlaps.len() > all.len() {
+            all.push(format!("{} more", overlaps.len() - all.len()));
+        }
         let says = format!("body `{}` overlaps {} at t = 0", body.name, all.join(" and "));
         let margin = MARGIN * self.spacing;
         let Some((lift, up)) = lift else {
-            let away = match (&overlaps[..], self.away(body)) {
-                ([Contact { overlap, out: Some(n), .. }], _) => {
-                    format!(
-                        "move it away, its center by {} m along {}",
-                        at_least(overlap + margin),
-                        point(*n)
-                    )
+            let first = &overlaps[0];
+            let straight = first.out.map(|n| (first.overlap + margin) * n);
+            let away = match self.away(body).or(straight) {
+                None => "move it away".into(),
+                Some(by) if straight.is_some_and(|way| way.distance(by) < margin) => {
+                    let far = at_least(first.overlap + margin);
+                    format!("move it away, its center by {far} m along {}", point(by.normalize()))
                 }
-                (_, Some(by)) => {
-                    let [x, y, z] = by.to_array().map(|x| match x {
-                        0.0 => "0".into(),
-                        x if x < 0.0 => format!("-{}", at_least(-x)),
-                        x => at_least(x),
+                Some(by) => {
+                    let [x, y, z] = by.to_array().map(|x| match x.abs() {
+                        small if small < margin => "0".into(),
+                        far => format!("{}{}", if x < 0.0 { "-" } else { "" }, at_least(far)),
                     });
                     format!("move it away, its center by ({x}, {y}, {z}) m")
                 }
-                _ => "move it away".into(),
             };
             let why =
                 if self.up.is_some() { ", lifting it would take more than half its height" } else { "" };
@@ -213,8 +214,6 @@ impl Surroundings<'_> {
         };
         let mut all: Vec<Contact> =
             self.obstructions(body, DVec3::ZERO, 0.0).into_iter().filter_map(overlap).collect();
-        // Of those as deep the last.
-        all.reverse();
         all.sort_unstable_by(|a, b| b.overlap.total_cmp(&a.overlap));
         if !all.is_empty() || self.law != Law::Paper {
             return all;

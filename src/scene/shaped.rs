@@ -314,7 +314,6 @@ impl Builder<'_> {
 
     /// Whether a place lies inside a wall or beyond the tank's; `near`: or closer to a particle of the lattice's walls
     /// than half a spacing.
-    #[inline(never)]
     fn buried(&self, at: DVec3, near: bool) -> bool {
         let (lattice, slack) = (&self.lattice, 1e-6 * self.lattice.spacing);
         let beyond = self
