@@ -25,7 +25,7 @@ const LATTICE_CELL: f64 = 1.0;
 /// The program itself, and with MPI.
 const PROGRAM: f64 = 16e6;
 const PROGRAM_OF_RANK: f64 = 30e6;
-/// Of one process, while a frame is made: for each particle in it. (Peaks with states and frames, 8,000 to 210,000 of water in space: 0.94 to 1.09 times what is told.)
+/// Of one process, while a frame is made: for each particle in it. (Peaks with states and frames, 8,000 to 210,000 of water in space: 0.93 to 1.08 times what is told.)
 const FRAME: f64 = 500.0;
 /// Bytes of a particle in a frame with all fields, by encoding.
 const FRAME_BASE64: f64 = 45.0;

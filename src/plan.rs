@@ -1,7 +1,7 @@
 //! Which stages and arrays a scene needs. The only place where that is judged: what is not planned is not compiled,
 //! not allocated and not run.
 
-use crate::case::{self, Case, ContactDevice, Law, stands_for};
+use crate::case::{self, Case, ContactDevice, stands_for};
 use crate::compute::Program;
 use crate::contact;
 use crate::error::{Error, Result};
@@ -182,12 +182,12 @@ impl ContactPlan {
         let host = |reason: &str| Self { program: None, reason: reason.into() };
         let free = |s: &&Solid| s.gives_way();
         let points: usize = scene.solids.iter().filter(free).map(|s| s.wall_offset.len()).sum();
-        let program = match case.contact.as_ref().map(|c| c.law) {
-            None => return host("no contact"),
-            Some(law) => match (contact::kind(law).program)(scene) {
-                Ok(program) => Some(program),
-                Err(why) => return host(why),
-            },
+        let Some(kind) = case.contact.as_ref().map(|c| contact::kind(c.law)) else {
+            return host("no contact");
+        };
+        let program = match (kind.program)(scene) {
+            Ok(program) => Some(program),
+            Err(why) => return host(why),
         };
         let most = DEVICE_CONTACT_POINTS;
         match asked {
@@ -197,13 +197,9 @@ impl ContactPlan {
             ContactDevice::Auto if points < most => {
                 host(&format!("{points} surface points, below {most} a round trip to a device costs more"))
             }
-            ContactDevice::Auto
-                if case.contact.as_ref().is_some_and(|c| c.law == Law::Paper) && on_fixed(case, scene) =>
-            {
-                host(
-                    "a force gauge is on a fixed wall, and a device does not tell what presses on which by law \"paper\"",
-                )
-            }
+            ContactDevice::Auto if !kind.device_tells_walls_apart && on_fixed(case, scene) => host(
+                "a force gauge is on a fixed wall, and by this law a device does not tell what presses on which",
+            ),
             ContactDevice::Auto => {
                 Self { program, reason: format!("{points} surface points, {most} or more") }
             }

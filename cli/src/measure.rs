@@ -147,13 +147,13 @@ fn points(args: &MeasureArgs) -> Result<Vec<DVec3>> {
 /// A `part` of the way from `a` to `b`. What both ends share stays as it was typed; the rest has the digits that are not rounding.
 fn along(a: DVec3, b: DVec3, part: f64) -> DVec3 {
     let told = |a: f64, b: f64| {
-        if a == b || part == 0.0 {
-            return a;
+        if a == b || part == 0.0 || part == 1.0 {
+            return if part == 1.0 { b } else { a };
         }
         let x = a + part * (b - a);
         let digits = (12.0 - a.abs().max(b.abs()).log10().floor()).clamp(0.0, 300.0) as usize;
         // No zero has a sign.
-        if part == 1.0 { b } else { format!("{x:.digits$}").parse().unwrap_or(x) + 0.0 }
+        format!("{x:.digits$}").parse().unwrap_or(x) + 0.0
     };
     DVec3::new(told(a.x, b.x), told(a.y, b.y), told(a.z, b.z))
 }

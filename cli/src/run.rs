@@ -226,7 +226,7 @@ fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Optio
         inputs: asked.inputs,
     };
     if !args.quiet {
-        announce(&setup, &mut simulation);
+        announce(&setup, &simulation);
     }
     let mut display = Display::new(args.quiet, simulation.plan.wet(), of_time(&simulation.case));
     let mut observe = |progress: &seixo::run::Progress| display.step(progress);
@@ -294,7 +294,7 @@ fn begin(args: &RunArgs, asked: &Asked, case: &Case) -> Result<Option<Start>> {
 }
 
 /// What is computed, and on what.
-fn announce(setup: &Setup, simulation: &mut Simulation) {
+fn announce(setup: &Setup, simulation: &Simulation) {
     // Those of the scene were shown when it was built.
     let more = &simulation.scene.notes[setup.scene.notes.len()..];
     more.iter().for_each(|note| remark(&format!("note: {note}")));
@@ -307,7 +307,7 @@ fn announce(setup: &Setup, simulation: &mut Simulation) {
         setup.scene.water()
     ));
     let tolerance = simulation.settings().tolerance;
-    if simulation.plan.wet() && tolerance < SINGLE && simulation.backend.compute().is_some() {
+    if simulation.plan.wet() && tolerance < SINGLE && simulation.backend.precision() == "f32" {
         remark(&format!(
             "note: fluid.solver.tolerance = {tolerance:e} is finer than what a device holds in single precision, 3e-6 to {SINGLE:e} by the number of unknowns: \
              residuals may stay above it; --backend cpu meets it"

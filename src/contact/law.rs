@@ -136,4 +136,6 @@ pub(crate) struct Kind {
     pub gap: fn(f64) -> f64,
     /// What a device runs for the solids of a scene, or why it runs nothing.
     pub program: fn(&Scene) -> std::result::Result<&'static Program, &'static str>,
+    /// Whether it is known of what a device evaluates which fixed wall each force is on ([`Law::tells_walls_apart`]).
+    pub device_tells_walls_apart: bool,
 }

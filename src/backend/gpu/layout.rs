@@ -12,7 +12,7 @@ use crate::params::{Params, Step, Zone};
 use crate::pressure::Settings;
 use crate::scene::Groups;
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Fluid slots whose ghosts share a key of the counting sort; `GHOST_BLOCK` in shaders/common.wgsl.
 pub const GHOST_BLOCK: u64 = 64;
@@ -45,11 +45,16 @@ pub(crate) fn direction_word(n: DVec3) -> f32 {
     if sum == 0.0 {
         return word_of(0);
     }
-    let [x, y] = [n.x / sum, n.y / sum];
-    let sign = |c: f64| if c < 0.0 { -1.0 } else { 1.0 };
-    let [x, y] = if n.z < 0.0 { [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)] } else { [x, y] };
+    let p = n.truncate() / sum;
+    let p = if n.z < 0.0 { folded(p) } else { p };
     let part = |c: f64| ((c + 1.0) * 16383.0).round() as u32;
-    word_of(1 + part(x) + (part(y) << 15))
+    word_of(1 + part(p.x) + (part(p.y) << 15))
+}
+
+/// A place on the lower half of the octahedron out in the square, or back; `folded` in shaders/common.wgsl.
+fn folded(p: DVec2) -> DVec2 {
+    let sign = |c: f64| if c < 0.0 { -1.0 } else { 1.0 };
+    DVec2::new((1.0 - p.y.abs()) * sign(p.x), (1.0 - p.x.abs()) * sign(p.y))
 }
 
 /// Places in the buffer of counters.
@@ -423,12 +428,9 @@ mod tests {
                 return DVec3::ZERO;
             }
             let part = |n: u32| (f64::from(n & 32767) - 16383.0) / 16383.0;
-            let (x, y) = (part(number - 1), part((number - 1) >> 15));
-            let z = 1.0 - x.abs() - y.abs();
-            let sign = |c: f64| if c < 0.0 { -1.0 } else { 1.0 };
-            let fold = z < 0.0;
-            let (x, y) = if fold { ((1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)) } else { (x, y) };
-            DVec3::new(x, y, z).normalize()
+            let p = DVec2::new(part(number - 1), part((number - 1) >> 15));
+            let z = 1.0 - p.abs().element_sum();
+            (if z < 0.0 { folded(p) } else { p }).extend(z).normalize()
         };
         for axis in DVec3::AXES.into_iter().flat_map(|e| [e, -e]).chain([DVec3::ZERO]) {
             assert_eq!(back(direction_word(axis)), axis);

@@ -41,6 +41,7 @@ pub(super) const KIND: Kind = Kind {
     make: |contact, scene, bodies, limits| Ok(Box::new(Paper::new(contact, scene, bodies, limits)?)),
     gap: |spacing| (CONTACT_DISTANCE - 1.0) * spacing,
     program: |_| Ok(&device::PROGRAM),
+    device_tells_walls_apart: false,
 };
 
 /// K over Eq. (16) at which the law returns a falling body from every entry phase: measured 5.6 to 5.8, theory

@@ -24,6 +24,7 @@ pub(super) const KIND: Kind = Kind {
     make: |_, scene, _, _| Ok(Box::new(Pressure::new(scene))),
     gap: |_| 0.0,
     program: |_| Err("the impulses of law \"pressure\" follow one another, on the host"),
+    device_tells_walls_apart: true,
 };
 
 /// Restitution b of Eq. (18) [-].

@@ -71,6 +71,7 @@ pub(super) const KIND: Kind = Kind {
         }
         Ok(&device::PROGRAM)
     },
+    device_tells_walls_apart: true,
 };
 
 /// Exponent p of the effective depth.
