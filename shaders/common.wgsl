@@ -98,6 +98,7 @@ struct Constants {
     wall_room: f32,        // sum W of a particle of a flat wall's layer with the water above it
     wall_depth: f32,       // of the wall's middle below a particle of a flat wall's layer, over l0
     reacting: u32,         // wall-layer slots that keep a reaction; they follow the fluid
+    shear_scale: f32,      // d / sum w r^2 with the weight of viscosity.wgsl, 1/m2
 }
 
 // The PPE is kept divided by c = 2 d / (lambda n0): its right side is then in Pa and its squares stay far from the
@@ -399,11 +400,16 @@ fn shift_way(imbalance: vec3f, v: vec3f) -> vec3f {
     return shortened(-SHIFT * now.dt * speed * params.spacing * imbalance, SHIFT_MAX * params.spacing);
 }
 
-// Inverse of M = d / n0 times the sum, or 1 where a lower bound of its smallest eigenvalue is too small. M is symmetric:
-// its inverse is the matrix of cofactors over the determinant. See src/neighbourhood.rs.
+// Inverse of M = d / n0 times the sum, or 1 where it is not known well enough.
 fn inverse_moment(sum: Moment) -> mat3x3f {
-    var diagonal = params.gradient_scale * sum.diagonal;
-    let mixed = params.gradient_scale * sum.mixed;
+    return inverse_above(EIGENVALUE_MIN, sum, params.gradient_scale, 1.0);
+}
+
+// Inverse of M = scale times the sum, or `otherwise` times 1 where a lower bound of its smallest eigenvalue is below `least`. M is
+// symmetric: its inverse is the matrix of cofactors over the determinant. See src/neighbourhood.rs.
+fn inverse_above(least: f32, sum: Moment, scale: f32, otherwise: f32) -> mat3x3f {
+    var diagonal = scale * sum.diagonal;
+    let mixed = scale * sum.mixed;
 //#if TWO_DIMENSIONS
     // The plane y = 0 has no moment across it.
     diagonal.y = 1.0;
@@ -412,13 +418,13 @@ fn inverse_moment(sum: Moment) -> mat3x3f {
     let across = mixed.yxx * mixed.zzy - diagonal * mixed;
     let determinant = diagonal.x * cofactor.x + mixed.z * across.z + mixed.y * across.y;
 //#if TWO_DIMENSIONS
-    let known = determinant > EIGENVALUE_MIN * (diagonal.x + diagonal.z);
+    let known = determinant > least * (diagonal.x + diagonal.z);
 //#else
     let trace = diagonal.x + diagonal.y + diagonal.z;
-    let known = 4.0 * determinant > EIGENVALUE_MIN * trace * trace;
+    let known = 4.0 * determinant > least * trace * trace;
 //#endif
     if !known {
-        return mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+        return otherwise * mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
     }
     return (1.0 / determinant) * mat3x3f(
         vec3f(cofactor.x, across.z, across.y),

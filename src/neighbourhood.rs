@@ -63,17 +63,23 @@ pub fn moment(i: usize, all: Row, on: Particles) -> DMat3 {
     m
 }
 
-/// Inverse of the moment matrix `m`, if its smallest eigenvalue is known to exceed [`EIGENVALUE_MIN`]. With
-/// eigenvalues a <= b <= c, det = a b c <= a ((b + c) / 2)^2 < a tr^2 / 4; in the plane det = a b < a tr.
+/// Inverse of the moment matrix `m`, if its smallest eigenvalue is known to exceed [`EIGENVALUE_MIN`].
 #[inline(always)]
 pub fn inverse(m: DMat3, dimensions: u32) -> Option<DMat3> {
+    inverse_above(EIGENVALUE_MIN, m, dimensions)
+}
+
+/// Inverse of the moment matrix `m`, if its smallest eigenvalue is known to exceed `least`. With
+/// eigenvalues a <= b <= c, det = a b c <= a ((b + c) / 2)^2 < a tr^2 / 4; in the plane det = a b < a tr.
+#[inline(always)]
+pub fn inverse_above(least: f64, m: DMat3, dimensions: u32) -> Option<DMat3> {
     let in_plane = m.x_axis.x + m.z_axis.z;
     let bound = if dimensions == 2 {
         m.determinant() / in_plane
     } else {
         4.0 * m.determinant() / (in_plane + m.y_axis.y).powi(2)
     };
-    (bound > EIGENVALUE_MIN).then(|| m.inverse())
+    (bound > least).then(|| m.inverse())
 }
 
 #[cfg(test)]

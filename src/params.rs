@@ -28,6 +28,9 @@ const THICK: f64 = 0.03;
 /// Where its fall ends, over `CALM`: with less thick water sinks while it stands still.
 const CREEP: f64 = 0.2;
 
+/// nu / (l0 sqrt(g l0)) from which on the whole viscous stress acts on a free surface: in water it is lost in what else damps.
+const STRESSED: f64 = 0.01;
+
 /// c_s^2 of creeping flow over nu v / l0, at least: in steps as long as viscosity allows, 0.16 l0^2 / nu, a density error is undone at half of
 /// v / l0 then, about as fast as the flow makes one. c_s of the flow alone would leave next to nothing of it in such short steps.
 const CREEPING: f64 = 3.0;
@@ -366,6 +369,12 @@ impl Params {
     fn thickness(&self) -> f64 {
         let fall = self.spacing * (self.gravity.length() * self.spacing).sqrt();
         if fall > 0.0 { self.viscosity / fall } else { 0.0 }
+    }
+
+    /// Whether viscosity is more than the Laplacian: where there is a free surface that feels it, in the accurate scheme.
+    pub fn surface_stress(&self) -> bool {
+        let felt = self.gravity == DVec3::ZERO || self.thickness() > STRESSED;
+        self.viscosity > 0.0 && felt && !self.filled && self.source == Source::Mixed
     }
 
     /// Largest extent of the domain [m].

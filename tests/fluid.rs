@@ -652,7 +652,8 @@ fn a_plate_that_moves_along_drags_water_to_the_line_between_the_surfaces() {
          [[fluid.block]]\nmin = [0, 0, 0]\nmax = [{h}, 0.1, 0.4]\n"
     ));
     let mut sim = simulation(&case);
-    while sim.time < 0.6 {
+    // By then what has begun at the ends, which the whole stress pulls at and no pressure holds, has not come to the middle.
+    while sim.time < 0.5 {
         sim.step().expect("a step");
     }
     let fields = sim.backend.read().expect("the fields");

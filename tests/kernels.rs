@@ -3,7 +3,7 @@
 
 use crate::common::moving as common;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::body::Pose;
@@ -185,12 +185,80 @@ fn the_fast_viscosity_is_the_plain_one() {
         let on = Particles { velocity: &s.on_surface, ..s.particles() };
         let row = |i: usize| s.cpu.neighbours().pressure(i).neighbour;
         let g = s.groups();
-        let plain: Vec<DVec3> = (0..g.fluid).map(|i| viscosity::viscosity(i, row(i), on)).collect();
+        let stress = s.params.surface_stress();
+        assert_eq!(stress, s.params.source == Source::Mixed);
+        let of = |i: usize| {
+            let laplacian = viscosity::viscosity(i, row(i), on);
+            if stress {
+                laplacian + viscosity::surface_stress(i, s.cpu.neighbours().all(i), on)
+            } else {
+                laplacian
+            }
+        };
+        let plain: Vec<DVec3> = (0..g.fluid).map(of).collect();
         assert!(close(&s.cpu.fields().acceleration, &plain) > 1e-2);
         let walls = g.moving_wall_range();
         let plain: Vec<DVec3> = walls.map(|i| viscosity::reaction(i, row(i), on)).collect();
         assert!(close(&s.cpu.fields().reaction, &plain) > 1e-6);
     });
+}
+
+/// Places and viscous accelerations of a block of water, `across` spacings a side and its places shaken by `jitter` of one, with the
+/// velocity gradient `gradient` and nothing around it.
+fn viscous(dimensions: u32, across: i32, jitter: f64, gradient: DMat3) -> (Params, Vec<(DVec3, DVec3)>) {
+    let side = 0.02 * f64::from(across);
+    let case: seixo::case::Case = toml::from_str(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = {dimensions}\ngravity = [0, 0, 0]\n\
+         domain = [[-0.2, -0.2, -0.2], [0.6, 0.6, 0.6]]\n\
+         [fluid]\nviscosity = 0.05\njitter = {jitter}\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [{side}, {side}, {side}]\n"
+    ))
+    .expect("a case");
+    let mut scene = Scene::build(&case).expect("a scene");
+    for i in 0..scene.groups.fluid {
+        scene.velocity[i] = gradient * scene.position[i];
+    }
+    let params = Params::new(&case, &scene).expect("valid");
+    let plan = Plan::new(&case, &scene, &params);
+    let settings = Settings { tolerance: 1e-4, max_iterations: 1000, warm_start: true };
+    let mut cpu = Cpu::new(&scene, &params, &plan, settings).expect("the CPU can");
+    let step = params.step(0.0, 1e-3, 2.0);
+    for stage in [ParticleStage::CellList, ParticleStage::NeighbourList, ParticleStage::Viscosity] {
+        cpu.run(stage, &step).expect("runs");
+    }
+    let f = cpu.fields();
+    (params.clone(), f.position.iter().copied().zip(f.acceleration.iter().copied()).collect())
+}
+
+/// The sum over neighbours alone holds back what turns beside a free surface, at 0.98 nu omega / l0.
+#[test]
+fn viscosity_does_nothing_to_water_that_turns_as_a_whole() {
+    let turn = DMat3::from_cols(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::new(3.0, 0.0, 0.0));
+    // In a corner there may be too few to tell how the water moves.
+    for (dimensions, across, jitter, corners) in [(2, 12, 0.0, 0), (2, 12, 0.1, 4), (3, 7, 0.0, 8)] {
+        let (params, water) = viscous(dimensions, across, jitter, turn);
+        let scale = params.viscosity * 3.0 / params.spacing;
+        let held = water.iter().filter(|(_, a)| a.length() > 1e-9 * scale).count();
+        assert!(held <= corners, "{dimensions}D: {held} of {} are held back", water.len());
+    }
+}
+
+/// On a face of normal n that nothing presses on the viscous stress 2 nu E n is missing: what holds there is its opposite.
+#[test]
+fn water_that_is_strained_feels_the_whole_stress_on_its_surface() {
+    let strain = DMat3::from_diagonal(DVec3::new(2.0, 0.0, -2.0));
+    for (dimensions, across) in [(2, 12), (3, 9)] {
+        let (params, water) = viscous(dimensions, across, 0.0, strain);
+        let l0 = params.spacing;
+        let middle = l0 * (0.5 + f64::from(across / 2));
+        let in_column = |x: &DVec3| {
+            (x.x - middle).abs() < 0.1 * l0
+                && (dimensions == 2 || (x.y - middle).abs() < 0.1 * l0)
+                && x.z > middle
+        };
+        let sum: DVec3 = water.iter().filter(|(x, _)| in_column(x)).map(|(_, a)| l0 * *a).sum();
+        let whole = DVec3::new(0.0, 0.0, 2.0 * params.viscosity * 2.0);
+        assert!((sum - whole).length() < 1e-9 * whole.z, "{dimensions}D: {sum} for {whole}");
+    }
 }
 
 /// Sum of the friction of water on its lattice that slides at `speed` over a floor, over rho C_f A speed^2, and the same with

@@ -76,5 +76,6 @@ mod study_measures;
 mod surface;
 mod tables;
 mod twins;
+mod viscous;
 mod wall_layers;
 mod water;

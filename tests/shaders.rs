@@ -299,6 +299,7 @@ fn structs_lie_the_same_on_both_sides() {
             wall_room,
             wall_depth,
             reacting,
+            shear_scale,
         }
     );
     same_layout!(
@@ -477,6 +478,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(common("DISPLACEMENT_MAX"), DISPLACEMENT_MAX);
     assert_eq!(common("CLOSEST"), CLOSEST);
     assert_eq!(common("EIGENVALUE_MIN"), EIGENVALUE_MIN);
+    assert_eq!(constant(text("viscosity"), "FIT_MIN"), seixo::kernels::viscosity::FIT_MIN);
     for (name, place) in [
         ("LOST", counter::LOST),
         ("DISPLACEMENT_CLAMPS", counter::DISPLACEMENT_CLAMPS),

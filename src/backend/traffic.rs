@@ -85,6 +85,8 @@ pub struct Sizes {
     pub pairs: u64,
     /// Those of them that carry pressure.
     pub pressure_pairs: u64,
+    /// Pairs that viscosity goes through.
+    pub viscous_pairs: u64,
     /// Slots that carry pressure: the length of the solver's vectors.
     pub pressure: u64,
     /// Bytes of a number.
@@ -101,10 +103,10 @@ pub struct Sizes {
 impl Sizes {
     /// What a step moves.
     pub fn traffic(&self) -> Traffic {
-        let Self { fluid, rows, cells, pairs, number, vector, weight, pressure, pressure_pairs, .. } = *self;
+        let Self { fluid, rows, cells, pairs, number, vector, weight, pressure, viscous_pairs, .. } = *self;
         let update = fluid * 5 * vector; // position and velocity in and out, acceleration in
         let bytes = |stage| match stage {
-            Stage::Viscosity => pressure_pairs * 4 + rows * 2 * vector + fluid * vector,
+            Stage::Viscosity => viscous_pairs * 4 + rows * 2 * vector + fluid * vector,
             Stage::Absorber => fluid * 3 * vector,
             Stage::Openings => fluid * vector,
             Stage::Predict => update,

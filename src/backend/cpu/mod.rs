@@ -323,6 +323,9 @@ impl Backend for Cpu {
             cells: self.grid.total() as u64,
             pairs: self.neighbours.pairs() as u64,
             pressure_pairs: pressure_pairs as u64,
+            viscous_pairs: (pressure_pairs
+                + if self.params.surface_stress() { self.neighbours.pairs() } else { 0 })
+                as u64,
             pressure: self.groups.pressure() as u64,
             number: 8,
             vector: 24,

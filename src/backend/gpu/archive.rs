@@ -10,8 +10,9 @@ use crate::plan::Arrays;
 use bytemuck::Pod;
 use glam::DVec3;
 
-/// What holds the neighbour lists of a state.
+/// What holds the neighbour lists of a state, and the dummies of them.
 const LISTED: &str = "neighbour_count";
+const DUMMIES: &str = "neighbour_dummies";
 /// Bytes of neighbour lists that are on the host at a time, unless a plane takes more.
 const PLANES_BYTES: usize = 64 << 20;
 
@@ -106,7 +107,8 @@ impl Gpu {
             let heads = if self.plan.needs(Arrays::Coupling) && held { g.moving_wall } else { 0 };
             self.buffer(archive, buffers::inertia_head, heads)?;
             // The lists of the last step serve viscosity, at the start of the next one. A state of many ranks has none.
-            let listed = archive.is_saving() || archive.sections.contains_key(LISTED);
+            let holds = |name: &str| archive.is_saving() || archive.sections.contains_key(name);
+            let listed = holds(LISTED) && (!self.params.surface_stress() || holds(DUMMIES));
             if self.params.viscosity > 0.0 && listed {
                 self.lists(archive)?;
             }
@@ -152,47 +154,72 @@ impl Gpu {
         self.context.upload(buffer, &read(archive, buffer, count)?)
     }
 
-    /// The neighbours that carry pressure, row by row without gaps. The dummies, at the other end of the rows, are
-    /// listed anew before they are read. The lists travel some planes at a time: together they are many times what the
-    /// rows hold.
+    /// The neighbours that carry pressure, and where viscosity reads them the dummies.
     fn lists(&mut self, archive: &mut Archive) -> Result<()> {
         let (rows, capacity) = (self.groups.pressure(), self.sizes.capacity as usize);
         self.buffer(archive, buffers::neighbour_count, rows)?;
         let count = self.context.download(buffers::neighbour_count, rows)?;
-        let near = |i: usize| (count[i] & 0xfff) as usize;
-        let held = |i: usize| near(i).min(capacity);
-        let total: usize = (0..rows).map(held).sum();
-        let most = (0..rows).map(held).max().unwrap_or(0);
-        let planes = (PLANES_BYTES / (size_of::<u32>() * rows.max(1))).max(1);
-        // Of each batch of planes the row's neighbours in it, with their places in `packed`.
+        let near: Vec<usize> = count.iter().map(|word| (word & 0xfff) as usize).collect();
+        let dummies: Vec<usize> = count.iter().map(|word| (word >> 12 & 0xfff) as usize).collect();
+        if !archive.is_saving() && near.iter().zip(&dummies).any(|(a, b)| a + b > capacity) {
+            return Err(Error::damaged("the checkpoint's neighbour lists are damaged"));
+        }
+        self.planes(archive, "neighbour_list", &near, |k| k)?;
+        if self.params.surface_stress() {
+            // From the other end of the rows.
+            self.planes(archive, DUMMIES, &dummies, |k| capacity - 1 - k)?;
+        }
+        Ok(())
+    }
+
+    /// As many neighbours of each row as it has `held`, row by row without gaps; number k of a row stands in plane `plane(k)`. They travel some
+    /// planes at a time: together these are many times what the rows hold.
+    fn planes(
+        &mut self,
+        archive: &mut Archive,
+        name: &'static str,
+        held: &[usize],
+        plane: impl Fn(usize) -> usize,
+    ) -> Result<()> {
+        let (rows, capacity) = (held.len(), self.sizes.capacity as usize);
+        // Of a state that ends a run by too many neighbours the rows hold no more than fits.
+        let held: Vec<usize> = held.iter().map(|&n| n.min(capacity)).collect();
+        let total: usize = held.iter().sum();
+        let most = held.iter().copied().max().unwrap_or(0);
+        let batch = (PLANES_BYTES / (size_of::<u32>() * rows.max(1))).max(1);
+        let batches = || (0..most).step_by(batch).map(|first| (first, most.min(first + batch)));
+        // The planes of a batch lie side by side, from the lowest on.
+        let lowest = |first: usize, end: usize| plane(first).min(plane(end - 1));
+        // Of each batch the row's neighbours in it, with their places in `packed`.
         let each = |first: usize, end: usize, take: &mut dyn FnMut(usize, usize)| {
             let mut start = 0;
-            for i in 0..rows {
-                (first..held(i).min(end)).for_each(|k| take((k - first) * rows + i, start + k));
-                start += held(i);
+            for (i, &n) in held.iter().enumerate() {
+                let low = lowest(first, end);
+                (first..n.min(end)).for_each(|k| take((plane(k) - low) * rows + i, start + k));
+                start += n;
             }
         };
-        let batches = || (0..most).step_by(planes).map(|first| (first, most.min(first + planes)));
         let mut packed = vec![0_u32; if archive.is_saving() { total } else { 0 }];
         if archive.is_saving() {
             for (first, end) in batches() {
-                let part = [(first * rows, (end - first) * rows)];
+                let part = [(lowest(first, end) * rows, (end - first) * rows)];
                 let list = self.context.download_parts(buffers::neighbour_list, &part)?;
                 each(first, end, &mut |at, place| packed[place] = list[at]);
             }
         }
-        archive.array("neighbour_list", &mut packed, false)?;
+        archive.array(name, &mut packed, false)?;
         if archive.is_saving() {
             return Ok(());
         }
-        let fits = packed.len() == total && (0..rows).all(|i| near(i) <= capacity);
-        if !fits || packed.iter().any(|&j| j as usize >= self.groups.total()) {
+        if packed.len() != total || packed.iter().any(|&j| j as usize >= self.groups.total()) {
             return Err(Error::damaged("the checkpoint's neighbour lists are damaged"));
         }
         for (first, end) in batches() {
-            let mut list = vec![0_u32; (end - first) * rows];
+            // What else stands in these planes is kept: near ones and dummies of other rows may share them.
+            let part = [(lowest(first, end) * rows, (end - first) * rows)];
+            let mut list = self.context.download_parts(buffers::neighbour_list, &part)?;
             each(first, end, &mut |at, place| list[at] = packed[place]);
-            let place = (size_of::<u32>() * first * rows) as u64;
+            let place = (size_of::<u32>() * part[0].0) as u64;
             self.context.upload_to(buffers::neighbour_list.id(), place, bytemuck::cast_slice(&list))?;
         }
         Ok(())

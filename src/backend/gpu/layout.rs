@@ -129,8 +129,7 @@ pub struct Constants {
     pub wall_room: f32,
     pub wall_depth: f32,
     pub reacting: u32,
-    /// To a multiple of 16 bytes.
-    pub pad: u32,
+    pub shear_scale: f32,
 }
 
 /// Coefficients of a step; see `Coefficients` in shaders/common.wgsl.
@@ -379,7 +378,7 @@ impl Constants {
             wall_room: params.wall_room as f32,
             wall_depth: params.wall_depth as f32,
             reacting: sizes.reacting as u32,
-            pad: 0,
+            shear_scale: crate::kernels::viscosity::scale(params) as f32,
         }
     }
 }

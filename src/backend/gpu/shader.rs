@@ -32,6 +32,7 @@ pub const SWITCHES: &[Switch] = &[
     ("REACTION", |_, plan| plan.needs(Arrays::Reaction)),
     ("SHARED_COLLISIONS", |params, _| params.collision == Collision::Shared),
     ("STATIC", |_, plan| plan.needs(Arrays::FixedWalls)),
+    ("STRESS", |params, _| params.surface_stress()),
     ("SURFACE_PRESSURE", |_, plan| plan.needs(Arrays::SurfacePressure)),
     ("THRESHOLD_OFFSET", |params, _| params.free_surface == FreeSurface::ThresholdOffset),
     ("TURNING", |_, plan| plan.needs(Arrays::Turning)),

@@ -42,7 +42,7 @@ impl Gpu {
         let update = f * 6 * v;
         // Position in, acceleration and perhaps the imbalance out.
         let gradient = if self.plan.has(Stage::Shift) { 3 * v } else { 2 * v };
-        let viscous = self.plan.has(Stage::Viscosity);
+        let (viscous, stress) = (self.plan.has(Stage::Viscosity), self.params.surface_stress());
         // The walls of which the fluid is near, and as many layers of dummies behind them.
         let walls = 3 * v * rows.used.saturating_sub(f);
         let lists = k * pairs;
@@ -50,7 +50,10 @@ impl Gpu {
         // What slots between solids bring a wall-layer particle.
         let slots = if self.plan.needs(Arrays::Coupling) { 4 * buffers::coupling.size() } else { 0 };
         let bytes = |stage| match stage {
-            Stage::Viscosity => f * (3 * v + k) + followed * (4 * v + k) + k * rows.fluid_near,
+            Stage::Viscosity => {
+                let stress = if stress { lists * f / rows.used.max(1) } else { 0 };
+                f * (3 * v + k) + followed * (4 * v + k) + k * rows.fluid_near + stress
+            }
             Stage::Absorber => f * 3 * v,
             Stage::Openings => f * v,
             Stage::Predict => {
