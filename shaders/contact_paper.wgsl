@@ -56,7 +56,8 @@ struct PaperLaw {
     pad: f32,
 }
 
-// Of a particle: high part, low part, normal; in its solid's frame.
+// Of a particle: high part, low part, and how it faces: a normal and 0, or the vector part of a box's turn and the faces of it that
+// it is of, a bit for each; in its solid's frame.
 @group(0) @binding(2) var<storage, read> contact_layer: array<vec4f>;
 @group(0) @binding(3) var<storage, read> contact_wall: array<vec4f>;
 @group(0) @binding(4) var<storage, read> paper_pair: array<PaperPair>;
@@ -78,12 +79,44 @@ fn as_rounded(n: u32, x: vec3f) -> vec3f {
     return bitcast<vec3f>(bitcast<vec3u>(x) ^ vec3u(bitcast<u32>(paper_pose[n].spin_b.w)));
 }
 
-fn of_b(n: u32, j: u32, word: u32) -> vec3f {
+fn of_b(n: u32, j: u32, word: u32) -> vec4f {
     let first = paper_pair[n].first.y;
     if (first & ON_WALL) != 0u {
-        return contact_wall[3u * ((first & ~ON_WALL) + j) + word].xyz;
+        return contact_wall[3u * ((first & ~ON_WALL) + j) + word];
     }
-    return contact_layer[3u * (first + j) + word].xyz;
+    return contact_layer[3u * (first + j) + word];
+}
+
+// v turned by the unit quaternion of vector part q and scalar w.
+fn turned(q: vec3f, w: f32, v: vec3f) -> vec3f {
+    let t = 2.0 * cross(q, v);
+    return v + w * t + cross(q, t);
+}
+
+// How far towards another particle a face of a later axis has to look more than one of an earlier axis.
+const MORE: f32 = 0.001;
+
+// N of particle j of B towards a particle that lies along the unit vector `away` of it: the one of its faces that looks most there.
+fn normal_of(n: u32, j: u32, away: vec3f) -> vec3f {
+    let facing = of_b(n, j, 2u);
+    let faces = u32(facing.w);
+    if faces == 0u {
+        return facing.xyz;
+    }
+    let w = sqrt(max(1.0 - dot(facing.xyz, facing.xyz), 0.0));
+    let own = turned(-facing.xyz, w, away);
+    var best = -2.0;
+    var chosen = vec3f(0.0);
+    for (var k = 0u; k < 6u; k++) {
+        let axis = k / 2u;
+        let side = select(-1.0, 1.0, (k & 1u) == 1u);
+        if ((faces >> k) & 1u) == 1u && side * own[axis] > best + MORE {
+            best = side * own[axis];
+            chosen = vec3f(0.0);
+            chosen[axis] = side;
+        }
+    }
+    return turned(facing.xyz, w, chosen);
 }
 
 struct Split {
@@ -94,8 +127,8 @@ struct Split {
 // r_j - r_i in A's frame.
 fn apart(n: u32, i: u32, j: u32) -> Split {
     let a = 3u * (paper_pair[n].first.x + i);
-    let high = of_b(n, j, 0u);
-    let low = of_b(n, j, 1u);
+    let high = of_b(n, j, 0u).xyz;
+    let low = of_b(n, j, 1u).xyz;
     let th = mat3x3f(paper_pose[n].high_x.xyz, paper_pose[n].high_y.xyz, paper_pose[n].high_z.xyz);
     let tl = mat3x3f(paper_pose[n].low_x.xyz, paper_pose[n].low_y.xyz, paper_pose[n].low_z.xyz);
     let sh = vec3f(paper_pose[n].high_x.w, paper_pose[n].high_y.w, paper_pose[n].high_z.w);
@@ -226,7 +259,7 @@ fn force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) t
         let e = whole / d;
         let a = 3u * (paper_pair[n].first.x + at.x);
         let arm = contact_layer[a].xyz + contact_layer[a + 1u].xyz;
-        let normal = turn * of_b(n, at.y, 2u);
+        let normal = turn * normal_of(n, at.y, -(transpose(turn) * e));
         let v = cross(paper_pose[n].spin_b.xyz, whole) - paper_pose[n].velocity.xyz - cross(paper_pose[n].spin.xyz, arm);
         let along = dot(law.damping * v - law.spring * depth * e, normal);
         let f = along * normal + law.viscous_friction * (v - dot(v, e) * e);

@@ -216,3 +216,44 @@ fn torque_on_a_plane_counts_about_its_centre_at_any_spacing() {
         );
     }
 }
+
+/// Particles on an edge of a box, or of a plate one particle thick, are of several faces: the one that looks towards the other particle presses.
+#[test]
+fn by_the_papers_law_each_face_presses_along_its_own_normal() {
+    let dry = |text: &str| {
+        Dry::new(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 2e-4\nend = 2\ndimensions = 2\ngravity = [0, 0, -{G}]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [2, 0, 1.2]\nopen = [\"z_max\"]\n\
+             [contact]\nlaw = \"paper\"\nspring = 1e5\ndamping_ratio = 0.5\n{text}"
+        ))
+    };
+    let block = |center: &str, more: &str| {
+        format!(
+            "[[body]]\nname = \"block\"\nsize = [0.2, 0.2, 0.1]\ncenter = {center}\ndensity = 1000\nstanding = true\n{more}"
+        )
+    };
+    let wall = |kind: &str, name: &str, min: &str, max: &str, more: &str| {
+        format!("[[{kind}]]\nname = \"{name}\"\nmin = {min}\nmax = {max}\n{more}")
+    };
+    // A shelf and a gate of one particle.
+    for (kind, more) in [("obstacle", ""), ("moving_wall", "motion = [[0, 0, 0, 0], [9, 0, 0, 0]]\n")] {
+        let plate = wall(kind, "plate", "[0.6, 0, 0.3]", "[1.4, 0, 0.32]", more);
+        let mut dry = dry(&(plate + &block("[1.0, 0, 0.45]", "").replace("standing = true\n", "")));
+        dry.run(0.6);
+        let z = dry.solids.poses()[0].position.z;
+        assert!((z - 0.37).abs() < 0.01, "{kind}: {z}");
+    }
+    // Over the joint of two boxes.
+    let two = wall("obstacle", "first", "[0, 0, 0]", "[1, 0, 0.2]", "")
+        + &wall("obstacle", "second", "[1, 0, 0]", "[2, 0, 0.2]", "");
+    let mut over = dry(&(two + &block("[0.8, 0, 0.2549]", "velocity = [0.5, 0, 0]\n")));
+    over.run(0.8);
+    let pose = over.solids.poses()[0];
+    assert!((pose.velocity.x - 0.5).abs() < 5e-3 && pose.position.x > 1.15, "{pose:?}");
+    // Across an edge, with its centre of mass on the ledge.
+    let ledge = wall("obstacle", "ledge", "[0, 0, 0]", "[1, 0, 0.2]", "");
+    let mut across = dry(&(ledge + &block("[0.95, 0, 0.2549]", "")));
+    across.run(0.6);
+    let x = across.solids.poses()[0].position.x;
+    assert!((x - 0.95).abs() < 1e-3, "{x}");
+}

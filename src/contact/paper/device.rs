@@ -101,7 +101,7 @@ impl Pairs {
         for (layer, size) in layers.iter().zip(&size) {
             first.push(place(all.len())?);
             let both = layer.offsets.iter().zip(&layer.normals);
-            all.extend(both.map(|(o, n)| words(*o, *n, size / PARTS)));
+            all.extend(both.map(|(o, n)| words(*o, n, size / PARTS)));
         }
         link.write(buffer::contact_layer, all.as_flattened())?;
         link.write(buffer::paper_law, &[PaperLaw::new(law)])?;
@@ -203,7 +203,7 @@ impl Pairs {
                 None => {
                     let step = self.size[e.a] / PARTS;
                     let wall = |&j: &u32| {
-                        words(model.walls.grid.point(j) - e.origin, model.walls.normals[j as usize], step)
+                        words(model.walls.grid.point(j) - e.origin, &model.walls.normals[j as usize], step)
                     };
                     first |= ON_WALL | place(fixed.len())?;
                     fixed.extend(theirs.iter().map(wall));

@@ -1,5 +1,6 @@
 //! Which particles of two wall layers may come close.
 
+use super::facing::Facing;
 use super::pair::{Layer, Pair, Walls};
 use crate::body::Body;
 use crate::contact::broad::{PointGrid, fixed_walls, images_of};
@@ -18,16 +19,16 @@ pub(crate) struct Lists {
 
 impl Lists {
     pub fn new(scene: &Scene) -> Self {
-        let layers = scene.solids.iter().map(|s| Layer {
-            offsets: s.wall_offset.clone(),
-            normals: s.wall_area.iter().map(|a| a.normalize_or_zero()).collect(),
-        });
+        let layers = scene
+            .solids
+            .iter()
+            .map(|s| Layer { offsets: s.wall_offset.clone(), normals: Facing::of_solid(s, scene) });
         let (mut positions, of) = fixed_walls(scene);
-        let mut normals: Vec<DVec3> = of.iter().map(|&k| scene.static_wall_normal[k]).collect();
+        let mut normals: Vec<Facing> = of.iter().map(|&k| Facing::of_fixed(k, scene)).collect();
         let mut of: Vec<u32> = of.iter().map(|&k| scene.static_wall_shape[k]).collect();
         for (x, inward, wall) in lids(scene) {
             positions.push(x);
-            normals.push(inward);
+            normals.push(Facing::one(inward));
             of.push(wall);
         }
         let walls = Walls { grid: PointGrid::new(positions, 2.0 * scene.spacing), normals, of };

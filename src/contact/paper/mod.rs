@@ -14,6 +14,7 @@
 //! anything but reproducing the paper.
 
 pub mod device;
+mod facing;
 mod lists;
 mod near;
 mod pair;

@@ -1,5 +1,6 @@
 //! Eqs. (10) to (14) for a pair of solids.
 
+use super::facing::Facing;
 use crate::body::{Body, Wrench};
 use crate::contact::broad::PointGrid;
 use crate::contact::candidates::image;
@@ -20,18 +21,18 @@ pub(crate) struct Constants {
     pub torque: bool,
 }
 
-/// The wall layer of a solid: offsets from its centre and unit normals, solid's frame.
+/// The wall layer of a solid: offsets from its centre, and the ways that its particles face, solid's frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Layer {
     pub offsets: Vec<DVec3>,
-    pub normals: Vec<DVec3>,
+    pub normals: Vec<Facing>,
 }
 
 /// The fixed wall particles.
 #[derive(Clone, Debug)]
 pub(crate) struct Walls {
     pub grid: PointGrid,
-    pub normals: Vec<DVec3>,
+    pub normals: Vec<Facing>,
     /// Number in [`Scene::walls`](crate::scene::Scene::walls) of the one that each is of.
     pub of: Vec<u32>,
 }
@@ -136,14 +137,15 @@ impl Pair {
             if squared >= law.distance * law.distance || squared == 0.0 {
                 continue;
             }
-            let (v_j, normal) = match &b {
-                None => (DVec3::ZERO, walls.normals[j as usize]),
-                Some((pose, rotation, layer)) => {
-                    (pose.velocity_at(x_j), *rotation * layer.normals[j as usize])
-                }
-            };
             let d = squared.sqrt();
             let e = r / d;
+            let (v_j, normal) = match &b {
+                None => (DVec3::ZERO, walls.normals[j as usize].towards(-e)),
+                Some((pose, rotation, layer)) => {
+                    let normal = layer.normals[j as usize].towards(-(rotation.transpose() * e));
+                    (pose.velocity_at(x_j), *rotation * normal)
+                }
+            };
             let v = v_j - v_i;
             let along = (-law.spring * (law.distance - d) * e + law.damping * v).dot(normal);
             let force = along * normal + law.viscous_friction * (v - v.dot(e) * e);

@@ -1,5 +1,6 @@
 //! What crosses over to shaders/contact_paper.wgsl and back: particles in two parts, blocks, sums.
 
+use super::facing::Facing;
 use super::{Constants, Pair};
 use crate::body::{Body, Wrench};
 use crate::compute::shader_structs;
@@ -96,9 +97,10 @@ pub(super) fn split(x: DVec3, step: f64) -> [DVec3; 2] {
 }
 
 /// Words of a particle.
-pub(super) fn words(offset: DVec3, normal: DVec3, step: f64) -> [[f32; 4]; 3] {
+pub(super) fn words(offset: DVec3, facing: &Facing, step: f64) -> [[f32; 4]; 3] {
     let [high, low] = split(offset, step);
-    [four(high, 0.0), four(low, 0.0), four(normal, 0.0)]
+    let (way, faces) = facing.numbers();
+    [four(high, 0.0), four(low, 0.0), four(way, faces)]
 }
 
 /// Sums over a pair in A's frame; see `contact_sum` in the shader.
