@@ -794,3 +794,42 @@ fn a_table_that_was_edited_is_not_gone_on_with() {
         assert_same(&case.root("whole"), &case.root(name), name);
     }
 }
+
+/// What lies on the floor under water is held by it in the first step, too: without, the water would hold its weight.
+#[test]
+fn a_body_that_touches_goes_on_touching_in_another_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rest.toml");
+    let case = "[run]\nspacing = 0.02\ntime_step = 1e-3\nadaptive = true\nend = 0.15\ndimensions = 2\n\
+                [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.4]\nopen = [\"z_max\"]\n\
+                [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0.1, 0.2]\n\
+                [[body]]\nname = \"box\"\ncenter = [0.3, 0.05, 0.05]\nsize = [0.1, 0.1, 0.1]\ndensity = 3000\n\
+                displaces_fluid = true\n[contact]\nspring = 20000\n[output]\nevery = 0\n";
+    std::fs::write(&file, case).unwrap();
+    let file = file.display().to_string();
+    let out = |name: &str| folder.path().join(name).display().to_string();
+    let from = format!("run.from=\"{}\"", out("first"));
+    for more in [
+        vec!["-o", &out("whole")],
+        vec!["-o", &out("first"), "--until", "0.1"],
+        vec!["-o", &out("second"), "--set", &from],
+    ] {
+        let done = ran(&[&["run", &file, "--backend", "cpu", "--threads", "1", "-q"], &more[..]].concat());
+        assert_eq!(done.code, 0, "{}", done.err);
+    }
+    let force = |name: &str| -> Vec<(f64, f64)> {
+        let text = std::fs::read_to_string(folder.path().join(name).join("bodies.csv")).unwrap();
+        let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let place = |column: &str| head.iter().position(|c| *c == column).expect(column);
+        let [t, f] = ["time [s]", "fluid_force_z [N]"].map(place);
+        let cells = text.lines().skip(1).map(|l| l.split(',').collect::<Vec<_>>());
+        cells.filter_map(|c| Some((c[t].parse().ok()?, c[f].parse().ok()?))).collect()
+    };
+    let whole = force("whole");
+    let second = force("second");
+    let steady = whole.last().expect("rows").1;
+    assert!(second.len() > 20 && steady > 0.5, "{second:?}");
+    for (t, f) in second {
+        assert!((f / steady - 1.0).abs() < 0.01, "{f} for {steady} N at {t}");
+    }
+}

@@ -15,6 +15,7 @@ const POSE: usize = 13;
 const POSES: &str = "solids.pose";
 const MOMENTA: &str = "solids.momentum";
 const TURNS: &str = "solids.turns";
+const CONTACT: &str = "solids.contact";
 
 fn numbers(pose: &Pose) -> [f64; POSE] {
     let Pose { position, orientation, velocity, angular_velocity } = *pose;
@@ -33,6 +34,14 @@ fn pose(n: &[f64]) -> Pose {
         velocity: vector(1),
         angular_velocity: vector(2),
     }
+}
+
+fn vectors(wrenches: &[Wrench]) -> Vec<[DVec3; 2]> {
+    wrenches.iter().map(|w| [w.force, w.torque]).collect()
+}
+
+fn wrench([force, torque]: [DVec3; 2]) -> Wrench {
+    Wrench { force, torque }
 }
 
 impl Solids {
@@ -95,10 +104,10 @@ impl Solids {
         archive.number("solids.whole_substep", whole)?;
         let mut now: Vec<[f64; POSE]> = bodies.iter().map(|b| numbers(&b.pose)).collect();
         let mut momenta: Vec<DVec3> = bodies.iter().map(|b| b.momentum).collect();
-        let mut wrenches: Vec<[DVec3; 2]> = contact.iter().map(|w| [w.force, w.torque]).collect();
+        let mut wrenches = vectors(contact);
         archive.array(POSES, &mut now, true)?;
         archive.array(MOMENTA, &mut momenta, true)?;
-        archive.array("solids.contact", &mut wrenches, true)?;
+        archive.array(CONTACT, &mut wrenches, true)?;
         fixed.exchange(archive)?;
         if periodic.is_any() {
             archive.array(TURNS, turns, true)?;
@@ -128,17 +137,20 @@ impl Solids {
         for (k, body) in self.bodies.iter_mut().enumerate() {
             body.restore(pose(&now[k]), momenta[k]);
             self.poses[k] = body.pose;
-            self.contact[k] = Wrench { force: wrenches[k][0], torque: wrenches[k][1] };
+            self.contact[k] = wrench(wrenches[k]);
         }
         Ok(())
     }
 
-    /// Takes the poses over from another run, in which the solids may have had other masses, freedoms, motions and laws.
+    /// Takes poses and the forces of contact over from another run, in which the solids may have had other masses, freedoms, motions and laws.
     fn take_over(&mut self, archive: &mut Archive) -> Result<()> {
         let mut now: Vec<[f64; POSE]> = self.bodies.iter().map(|b| numbers(&b.pose)).collect();
         let mut momenta: Vec<DVec3> = self.bodies.iter().map(|b| b.momentum).collect();
         archive.array(POSES, &mut now, true)?;
         archive.array(MOMENTA, &mut momenta, true)?;
+        // What bodies lie on holds them: without it the water of the first step would.
+        let mut wrenches = vectors(&self.contact);
+        archive.array(CONTACT, &mut wrenches, true)?;
         // Momenta are those in the middle of the last sub-step, so that the next kick spans half of it, too.
         archive.number("solids.substep", &mut self.substep)?;
         archive.number("solids.whole_substep", &mut self.whole)?;
@@ -153,6 +165,9 @@ impl Solids {
         for (k, body) in self.bodies.iter_mut().enumerate() {
             body.take_over(pose(&now[k]), momenta[k]);
             self.poses[k] = body.pose;
+            if self.law.is_some() {
+                self.contact[k] = wrench(wrenches[k]);
+            }
         }
         Ok(())
     }
