@@ -4,6 +4,12 @@ use crate::case::Case;
 use crate::periodic::Periodic;
 use glam::{DMat3, DVec3};
 
+/// Distance from a wall of the tank, over l0, below which a place is on it.
+const ON_WALL: f64 = 0.25;
+/// Square of the distance of a place from the middle of the particles about it, over the square of their spread and the dimensions, up to
+/// which their slopes count in full; 3 on a wall of water on its lattice.
+const BEYOND: f64 = 4.0;
+
 /// What the water does at a place.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Value {
@@ -24,6 +30,8 @@ pub struct Probe {
     pub flat: bool,
     /// Sides across which the water goes on.
     pub periodic: Periodic,
+    /// Lower and upper inner corner of the tank [m], if there is one: there is no water beyond, which is no sign of its end.
+    pub room: Option<[DVec3; 2]>,
     /// What the pressure of the particles lacks at the water's surface [Pa] ([`crate::kernels::body_force::missing_head`]).
     pub surface_head: f64,
 }
@@ -46,15 +54,34 @@ impl Probe {
             radius: run.effective_radius * run.spacing,
             flat,
             periodic,
+            room: Self::room(case),
             surface_head: head * gravity.length(),
         }
+    }
+
+    /// Corners of the tank of `case` [m].
+    pub fn room(case: &Case) -> Option<[DVec3; 2]> {
+        case.tank.as_ref().map(|t| [t.min.into(), t.max.into()])
+    }
+
+    /// How far the nearest particle of water may be from `x` [m]: half the diagonal of a cell of the lattice, and a tenth. On the tank's walls,
+    /// where no water is on the other side, a particle that slides by is further away.
+    fn reach(&self, x: DVec3) -> f64 {
+        let on_wall = self.room.map_or([false; 3], |[low, high]| {
+            let near = (x - low).abs().min((x - high).abs()).cmplt(DVec3::splat(ON_WALL * self.spacing));
+            let [x, y, z] = self.periodic.length().to_array().map(|l| l == 0.0);
+            [near.x && x, near.y && y && !self.flat, near.z && z]
+        });
+        let squares = (0..3)
+            .filter(|&k| k != 1 || !self.flat)
+            .map(|k| if on_wall[k] { 0.8 * 0.8 } else { 0.55 * 0.55 });
+        self.spacing * squares.sum::<f64>().sqrt()
     }
 
     /// Velocity and pressure at `x` [m] of the water whose particles have `values`, position first: those of the linear function that comes
     /// nearest to the particles within the effective radius, by least squares with the weight (1 - r^2 / re^2)^2; where they do not span
     /// space, their mean. Exact for linear fields, on walls and at the surface, too. The pressure is that of gauges: with what it lacks at the
-    /// surface, but for water without any, such as drops in the air. Nothing where no particle is nearer than the middle of a
-    /// cube of eight may be, and a tenth.
+    /// surface, but for water without any, such as drops in the air. Nothing where no particle is near (`reach`).
     pub fn at(&self, values: impl Iterator<Item = (DVec3, Value)>, x: DVec3) -> Option<Value> {
         let mut near: Vec<(f64, DVec3, Value)> = Vec::new();
         let mut nearest = f64::INFINITY;
@@ -70,8 +97,7 @@ impl Probe {
             }
         }
         let dimensions: f64 = if self.flat { 2.0 } else { 3.0 };
-        let reach = 1.1 * 0.5 * dimensions.sqrt() * self.spacing;
-        if nearest.sqrt() * self.radius > reach {
+        if nearest.sqrt() * self.radius > self.reach(x) {
             return None;
         }
         let total: f64 = near.iter().map(|n| n.0).sum();
@@ -102,7 +128,10 @@ impl Probe {
             return Some(Value { pressure: mean.pressure + head, ..mean });
         }
         let inverse = moment.inverse();
-        let [vx, vy, vz, p] = with.map(|sum| (inverse * sum).dot(-middle));
+        // Where the second row of particles is just within reach, a line through the scatter of the first would be drawn out.
+        let beyond = total * middle.dot(inverse * middle) / (BEYOND * dimensions);
+        let part = if beyond > 1.0 { 1.0 / (beyond * beyond) } else { 1.0 };
+        let [vx, vy, vz, p] = with.map(|sum| part * (inverse * sum).dot(-middle));
         Some(Value { velocity: mean.velocity + DVec3::new(vx, vy, vz), pressure: mean.pressure + p + head })
     }
 }
@@ -112,7 +141,14 @@ mod tests {
     use super::*;
 
     fn probe(flat: bool) -> Probe {
-        Probe { spacing: 0.02, radius: 0.042, flat, periodic: Periodic::default(), surface_head: 0.0 }
+        Probe {
+            spacing: 0.02,
+            radius: 0.042,
+            flat,
+            periodic: Periodic::default(),
+            room: Some([DVec3::ZERO, DVec3::splat(0.3)]),
+            surface_head: 0.0,
+        }
     }
 
     /// Water below z = 0.3 on a lattice that is shaken, with linear fields.
@@ -164,5 +200,34 @@ mod tests {
         let beyond = place + DVec3::new(0.99, 0.0, 0.0);
         assert!(across.at([(place, value)].into_iter(), beyond).is_some());
         assert!(probe(false).at([(place, value)].into_iter(), beyond).is_none());
+    }
+
+    /// A row of particles half a spacing off a wall, the second one only just within reach of it: the scatter of the first makes no slope.
+    #[test]
+    fn a_single_row_at_a_wall_is_not_drawn_out() {
+        let at = |k: i32| {
+            let off = if k % 2 == 0 { 0.009 } else { 0.011 };
+            DVec3::new(off, 0.0, 0.02 * f64::from(k))
+        };
+        let value =
+            |k: i32| Value { pressure: if k % 2 == 0 { 1500.0 } else { 1400.0 }, velocity: DVec3::ZERO };
+        let first = (0..9).map(|k| (at(k), value(k)));
+        let second = (0..9).map(|k| (at(k) + DVec3::new(0.0315, 0.0, 0.0), value(k)));
+        let water: Vec<_> = first.chain(second).collect();
+        let found = probe(true).at(water.into_iter(), DVec3::new(0.0, 0.0, 0.08)).expect("water");
+        assert!((1390.0..1510.0).contains(&found.pressure), "{found:?}");
+    }
+
+    #[test]
+    fn deep_water_is_seen_from_the_corner_of_its_tank() {
+        let probe = probe(true);
+        // Its lowest particle has slid along the floor.
+        let mut water = water(true);
+        water[0].0 = DVec3::new(0.0145, 0.0, 0.0095);
+        let corner = DVec3::new(0.0, 0.0, 0.0);
+        assert!(probe.at(water.iter().copied(), corner).is_some());
+        // Above its surface it ends as early as it did.
+        assert!(probe.at(water.iter().copied(), DVec3::new(0.15, 0.0, 0.311)).is_none());
+        assert!(Probe { room: None, ..probe }.at(water.iter().copied(), corner).is_none());
     }
 }

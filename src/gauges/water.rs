@@ -15,8 +15,8 @@ use glam::DVec3;
 pub(super) enum InWater {
     /// Height of the surface on a vertical line through x and y [m].
     Level(String, [f64; 2]),
-    /// Velocity at a point [m].
-    Velocity(String, DVec3),
+    /// Velocity at a point [m], and the corners of the tank.
+    Velocity(String, DVec3, Option<[DVec3; 2]>),
     /// Volume in a box between two corners [m].
     Volume(String, [DVec3; 2]),
 }
@@ -26,7 +26,8 @@ impl InWater {
     pub fn all(case: &Case) -> Vec<Self> {
         let Gauges { every: _, mean: _, pressure: _, force: _, level, velocity, volume } = &case.gauge;
         let levels = level.iter().map(|g| Self::Level(g.name.clone(), g.at));
-        let velocities = velocity.iter().map(|g| Self::Velocity(g.name.clone(), g.point.into()));
+        let velocities =
+            velocity.iter().map(|g| Self::Velocity(g.name.clone(), g.point.into(), Probe::room(case)));
         let volumes = volume.iter().map(|g| Self::Volume(g.name.clone(), [g.min.into(), g.max.into()]));
         levels.chain(velocities).chain(volumes).collect()
     }
@@ -35,7 +36,7 @@ impl InWater {
     pub fn columns(&self) -> Vec<String> {
         match self {
             Self::Level(name, _) => vec![format!("{name} [m]")],
-            Self::Velocity(name, _) => {
+            Self::Velocity(name, ..) => {
                 vector_columns(&format!("{name}_velocity"), "m/s").into_iter().collect()
             }
             Self::Volume(name, _) => vec![format!("{name} [m3]")],
@@ -52,12 +53,13 @@ impl InWater {
                 let level = level(fields, groups, line, params.dimensions, reach, l0, &params.periodic);
                 vec![Cell::from(level.unwrap_or(f64::NAN))]
             }
-            Self::Velocity(_, point) => {
+            Self::Velocity(_, point, room) => {
                 let probe = Probe {
                     spacing: params.spacing,
                     radius: params.effective_radius,
                     flat,
                     periodic: params.periodic,
+                    room,
                     surface_head: missing_head(params),
                 };
                 let values = water().map(|i| {
