@@ -131,6 +131,7 @@ fn pairs_that_mean_nothing_are_refused_with_what_there_is() {
     for (a, b) in [("post", "tank"), ("box", "box"), ("tank*", "post")] {
         let apart = built(&pair(a, b)).unwrap_err();
         assert!(apart.contains("cannot touch"), "{a} {b}: {apart}");
+        assert_eq!(apart.contains("they are one solid"), a == b, "{apart}");
     }
     for (pairs, said) in [
         ("[[contact.pair]]\nbetween = [\"box\", \"post\"]\n", "without numbers"),

@@ -94,6 +94,13 @@ fn a_seed_fills_its_basin_up_to_the_level_and_no_other() {
     assert!((low.depth - 0.14).abs() < 1e-9);
     let note = "particles of water, x 0.0000..0.4000, y 0.0000..0.4000, z 0.0000..0.1400 m";
     assert!(low.notes.iter().any(|n| n.ends_with(note)), "{:?}", low.notes);
+    // A shape is told as it comes out, too: half a cell of its height is none.
+    let shape = "[[fluid.shape]]\nshape = \"prism\"\nsection = [[0, 0], [0.4, 0], [0.4, 0.13], [0, 0.13]]\nheight = 0.4\n";
+    let shaped = scene(&tank(shape, WEIR));
+    let told = shaped.notes.iter().find(|n| n.starts_with("fluid.shape.0: ")).expect("a note");
+    let top =
+        shaped.position[..shaped.groups.fluid].iter().map(|x| x.z).fold(0.0, f64::max) + 0.5 * shaped.spacing;
+    assert!(told.ends_with(&format!("z 0.0000..{top:.4} m")), "{told}");
     // Over the weir both basins fill.
     let high = scene(&tank(&fill(0.3), WEIR));
     assert!((volume(&high) / (0.8 * 0.4 * 0.3 - 0.04 * 0.4 * 0.2) - 1.0).abs() < 1e-9, "{}", volume(&high));

@@ -71,9 +71,12 @@ impl Betweens {
             let [first, second] = &pair.between;
             let ends = [named(scene, first, &key)?, named(scene, second, &key)?];
             if !can_touch(scene, &ends) {
-                let message = format!(
-                    "{key}: `{first}` and `{second}` cannot touch: no body that forces move is one of them"
-                );
+                let why = if first == second {
+                    "they are one solid"
+                } else {
+                    "no body that forces move is one of them"
+                };
+                let message = format!("{key}: `{first}` and `{second}` cannot touch: {why}");
                 return Err(Error::key(
                     key,
                     message,

@@ -258,11 +258,17 @@ impl<'a> Builder<'a> {
                 }
             };
             let flow = Flow::new(water.velocity, water.velocity_gradient, placed.center, &self.lattice);
+            let from = self.water.clear;
             self.water.shape(&placed, &flow, &self.lattice, &mut self.grid);
-            if self.beside_walls(Some(&placed)) == 0 {
+            let count = self.beside_walls(Some(&placed));
+            if count == 0 {
                 let message = format!("{key}: no free cell in it at spacing {}", self.lattice.spacing);
                 let remedy = "it lies inside walls or other water, move it or use a smaller run.spacing";
                 self.problems.push(Problem::new(key, message, remedy));
+            } else {
+                // A level is that of whole cells.
+                let reach = self.reach_of_water(from);
+                self.notes.push(format!("{key}: {count} particles of water{reach}"));
             }
         }
         for (k, fill) in fluid.fill.iter().enumerate() {
@@ -335,6 +341,7 @@ impl<'a> Builder<'a> {
                 near: &near,
                 law,
                 spacing: case.run.spacing,
+                plane: self.lattice.plane,
                 up,
             };
             match surroundings.place(&mut solid, body.standing) {

@@ -24,7 +24,7 @@ impl Builder<'_> {
         let driven: Vec<(&Solid, &Motion)> = driven.collect();
         let (end, tolerance) = (self.case.run.end, MEETING * self.lattice.spacing);
         let times: Vec<f64> = (0..=MOMENTS).map(|k| end * f64::from(k) / f64::from(MOMENTS)).collect();
-        let (mut near, mut notes) = (Near::default(), Vec::new());
+        let (mut near, mut notes, plane) = (Near::default(), Vec::new(), self.lattice.plane);
         for &(solid, motion) in &driven {
             let ends = times.iter().map(|&t| {
                 let placed = solid.placed_at(motion, t);
@@ -38,7 +38,7 @@ impl Builder<'_> {
                 }
                 let meets = |t: &&f64| {
                     let (own, beside) = (solid.placed_at(motion, **t), other.placed_at(others, **t));
-                    own.apart(&beside).0 <= 0.0 && own.way_out(&beside).0 > tolerance
+                    own.apart(&beside).0 <= 0.0 && own.way_out(&beside, plane).0 > tolerance
                 };
                 if let Some(t) = times.iter().find(meets).filter(|t| **t > 0.0) {
                     notes.push(format!(

@@ -71,10 +71,10 @@ impl Placed {
     /// How far the shapes overlap along the direction in which they overlap least [m]; 0 or less: apart.
     #[cfg(test)]
     pub fn overlap(&self, other: &Self) -> f64 {
-        self.way_out(other).0
+        self.way_out(other, false).0
     }
-    /// The same, with that direction, in which this shape would have to move.
-    pub(crate) fn way_out(&self, other: &Self) -> (f64, DVec3) {
+    /// The same, with that direction, in which this shape would have to move; in the `plane` not out of it.
+    pub(crate) fn way_out(&self, other: &Self, plane: bool) -> (f64, DVec3) {
         let of_ball = match (self.shape, other.shape) {
             (Shape::Sphere(ball), _) => other.way_out_of(self.center, ball.radius),
             (_, Shape::Sphere(ball)) => self.way_out_of(other.center, ball.radius).map(|(o, n)| (o, -n)),
@@ -85,7 +85,12 @@ impl Placed {
         }
         let d = self.center - other.center;
         // a shape need not reach as far one way as the other
-        let (overlap, n) = self.least(other, |n| self.between(other, n * d.dot(n).signum()) - d.dot(n).abs());
+        let (overlap, n) = self.least(other, |n| {
+            if plane && n.y.abs() > 1e-6 {
+                return f64::INFINITY;
+            }
+            self.between(other, n * d.dot(n).signum()) - d.dot(n).abs()
+        });
         (overlap, n * d.dot(n).signum())
     }
     /// How deep the ball of `radius` [m] about a `center` outside reaches into it [m], and the ball's way out.
@@ -204,6 +209,15 @@ mod tests {
         cube.center += up * expected * 1.000001;
         assert!(cube.overlap(&floor) < 0.0);
         assert_eq!(cube.lift(&floor, up), 0.0);
+    }
+
+    #[test]
+    fn what_lies_in_the_plane_does_not_leave_it() {
+        let slice =
+            |x: f64| Placed::cuboid(DVec3::new(x, 0.0, 0.0), DVec3::new(0.1, 0.01, 0.05), DMat3::IDENTITY);
+        assert_eq!(slice(0.15).way_out(&slice(0.0), false).1, DVec3::Y);
+        let (overlap, out) = slice(0.15).way_out(&slice(0.0), true);
+        assert!((overlap - 0.05).abs() < 1e-12 && out == DVec3::X, "{overlap} along {out}");
     }
 
     #[test]

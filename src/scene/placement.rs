@@ -40,6 +40,8 @@ pub(super) struct Surroundings<'a> {
     pub near: &'a Near,
     pub law: Law,
     pub spacing: f64,
+    /// Whether everything lies in the plane y = 0.
+    pub plane: bool,
     /// Against gravity; `None` without gravity.
     pub up: Option<DVec3>,
 }
@@ -209,7 +211,7 @@ impl Surroundings<'_> {
         // digits as anyone writes: K gives no body more than sqrt(K / m) times this.
         let tolerance = if self.law == Law::Paper { 0.5 } else { TOUCHING } * self.spacing;
         let overlap = |b: Obstruction<'_>| {
-            let (overlap, out) = b.way_out(&own, body, tolerance);
+            let (overlap, out) = b.way_out(&own, body, tolerance, self.plane);
             (overlap > tolerance).then_some(Contact { with: b.name, overlap, out: Some(out) })
         };
         let mut all: Vec<Contact> =
@@ -247,7 +249,7 @@ impl Surroundings<'_> {
         // Each round clears at least one shape for good, if they are convex: `up` never leads back into one.
         for _ in 0..MOST_LIFTS.max(all.len() + 1) {
             let own = Placed { center: start.center + total * up, ..start };
-            let lifts = all.iter().map(|b| b.lift(&own, body, up, self.spacing));
+            let lifts = all.iter().map(|b| b.lift(&own, body, up, self));
             let lift = lifts.fold(0.0, f64::max);
             if lift == 0.0 || total > most {
                 break;
@@ -352,13 +354,13 @@ struct Obstruction<'a> {
 
 impl Obstruction<'_> {
     /// How deep `body`, placed as `own`, reaches into it [m], and the way out; what is convex is told apart by planes.
-    fn way_out(&self, own: &Placed, body: &Solid, tolerance: f64) -> (f64, DVec3) {
+    fn way_out(&self, own: &Placed, body: &Solid, tolerance: f64, plane: bool) -> (f64, DVec3) {
         // most of a heap
         let (gap, axis) = own.apart(&self.placed);
         if gap > 0.0 {
             return (-gap, axis);
         }
-        let (overlap, out) = own.way_out(&self.placed);
+        let (overlap, out) = own.way_out(&self.placed, plane);
         if overlap <= tolerance || own.is_convex() && self.placed.is_convex() {
             return (overlap, out);
         }
@@ -377,8 +379,9 @@ impl Obstruction<'_> {
     }
 
     /// Way along `up` that `body`, placed as `own`, has to go to leave it, or a part of that way [m].
-    fn lift(&self, own: &Placed, body: &Solid, up: DVec3, spacing: f64) -> f64 {
-        let (overlap, _) = self.way_out(own, body, 1e-9 * spacing);
+    fn lift(&self, own: &Placed, body: &Solid, up: DVec3, around: &Surroundings) -> f64 {
+        let spacing = around.spacing;
+        let (overlap, _) = self.way_out(own, body, 1e-9 * spacing, around.plane);
         if overlap <= 1e-9 * spacing {
             return 0.0;
         }

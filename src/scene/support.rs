@@ -19,6 +19,7 @@ impl Builder<'_> {
             near,
             law,
             spacing: self.case.run.spacing,
+            plane: self.lattice.plane,
             up,
         };
         let standing: HashSet<&str> =
