@@ -150,6 +150,28 @@ fn what_cannot_be_made_is_told_with_line_and_remedy() {
 }
 
 #[test]
+fn absorbers_that_spoil_the_waves_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flume.toml");
+    for (absorber, words) in [
+        ("min = [-0.5, 0, 0]\nmax = [0.6, 1, 1]\ntowards = \"x_min\"", "waves are damped where they are made"),
+        ("min = [2, 0, 0]\nmax = [4, 1, 1]\ntowards = \"x_min\"", "they are thrown back"),
+        ("min = [3.6, 0, 0]\nmax = [4, 1, 1]\ntowards = \"x_max\"", "a good part of it comes back"),
+        // As long as the wave, and behind the piston.
+        ("min = [1.9, 0, 0]\nmax = [4, 1, 1]\ntowards = \"x_max\"", ""),
+        ("min = [-0.5, 0, 0]\nmax = [-0.1, 1, 1]\ntowards = \"x_min\"", ""),
+    ] {
+        let wave = "wave = { kind = \"regular\", height = 0.04, period = 1.5 }";
+        std::fs::write(&path, flume(wave, &format!("[[absorber]]\n{absorber}"))).unwrap();
+        let plan = ran(&["plan", &path.display().to_string()]);
+        assert_eq!(plan.code, 0, "{absorber}: {}", plan.err);
+        let said = ["waves are damped", "thrown back", "comes back"].iter().filter(|w| plan.err.contains(**w));
+        assert_eq!(said.count(), usize::from(!words.is_empty()), "{absorber}: {}", plan.err);
+        assert!(plan.err.contains(words), "{absorber}: {}", plan.err);
+    }
+}
+
+#[test]
 fn the_rate_of_an_absorber_grows_as_the_square_of_the_way_into_it() {
     let text = flume(
         "sine = { axis = [1, 0, 0], amplitude = 0.05, period = 1.6 }",

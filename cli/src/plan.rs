@@ -6,7 +6,7 @@ mod words;
 use super::setup::{self, Setup};
 use super::{CaseArgs, Exit};
 use afloat::Buoyancy;
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::forecast::{Forecast, Group, groups};
@@ -29,6 +29,7 @@ use seixo::pressure::Settings;
 use seixo::run::from::{holds, named};
 use seixo::run::summary::particles;
 use seixo::scene::{Drive, Scene, Solid};
+use seixo::scheme::Source;
 use seixo::share::Outlook;
 use seixo::time_step::{Bounds, expected_speed, time_step};
 use seixo::waves::WaveKind;
@@ -260,6 +261,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     let dt = shortest(case, scene, &params);
     let mut advice = if plan.wet() { step_advice(&params, case, speed).0 } else { vec![] };
     advice.extend(many_steps(case, dt));
+    advice.extend(pressed_down(scene, &params));
     let called = |still: bool| -> Vec<String> {
         let of_opening = |k: usize| scene.openings.iter().any(|opening| opening.solid == Some(k));
         let solids =
@@ -381,12 +383,39 @@ fn scheme(seen: &Seen, params: &Params, plan: &Plan, dt: f64) -> Result<Scheme> 
     })
 }
 
-/// What `run` says of the time step: nothing, unless there is something to change.
+/// What `run` says of the time step and of the scheme: nothing, unless there is something to change.
 pub fn step_warnings(case: &Case, scene: &Scene, params: &Params) -> Vec<String> {
     let wet = scene.groups.fluid > 0;
     let (words, matters) = step_advice(params, case, fastest(case, scene, params));
     let words = if wet && matters { words } else { Vec::new() };
-    words.into_iter().chain(many_steps(case, shortest(case, scene, params))).collect()
+    let words = words.into_iter().chain(many_steps(case, shortest(case, scene, params)));
+    words.chain(pressed_down(scene, params)).collect()
+}
+
+/// Says so of bodies that stand on fixed walls where no water presses under them: with the paper's source.
+fn pressed_down(scene: &Scene, params: &Params) -> Option<String> {
+    let down = scene.gravity.normalize_or_zero();
+    if params.source != Source::NumberDensity || scene.groups.fluid == 0 || down == DVec3::ZERO {
+        return None;
+    }
+    let walls = &scene.position[scene.groups.static_wall_range()];
+    let stands = |solid: &&Solid| {
+        let (low, high) = solid.shape.bounds(DMat3::from_quat(solid.orientation));
+        let (center, half) = (solid.shape_center() + 0.5 * (low + high), 0.5 * (high - low));
+        let reach = half.dot(down.abs());
+        let under = |x: &DVec3| {
+            let way = *x - center;
+            let (depth, aside) = (way.dot(down) - reach, way - way.dot(down) * down);
+            (-0.1..1.1).contains(&(depth / scene.spacing)) && aside.abs().cmple(half).all()
+        };
+        solid.is_free() && walls.iter().any(under)
+    };
+    let solid = scene.solids.iter().find(stands)?;
+    Some(format!(
+        "body `{}` stands on a wall: with the source `number_density`, as the preset `paper` has it, no water presses under it, and it is held \
+         down by the water above; the source `mixed` has water in the slot",
+        solid.name
+    ))
 }
 
 /// The step that is to be reckoned with at any time of the run [s].

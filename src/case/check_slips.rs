@@ -18,6 +18,9 @@ const MOST_FRICTION: f64 = 5.0;
 /// Effective radius up to which the pressure of the free surface carries its weight within 0.1 % of 0.2 m of water at l0 = 10 mm [-].
 const MOST_RADIUS: f64 = 2.6;
 
+/// Length of an absorber over that of the wave below which much of it comes back; 0.3 of its height with a twelfth.
+const SHORT: f64 = 0.5;
+
 impl Checker<'_> {
     pub(super) fn slips(&mut self) {
         self.slips_of_gravity();
@@ -187,6 +190,7 @@ impl Checker<'_> {
         let case = self.case;
         let Some(l0) = self.spacing() else { return };
         self.slips_of_absorbers();
+        self.slips_of_damped_waves();
         let Some(tank) = &case.tank else { return };
         for (k, plane) in case.plane.iter().enumerate() {
             let (Some(normal), Some(along)) =
@@ -250,6 +254,58 @@ impl Checker<'_> {
             if !other && begins >= level {
                 let message = format!("it begins {:.4} m above the water", begins - level);
                 self.warn(&format!("absorber.{k}.min"), message, "let it reach down to the floor");
+            }
+        }
+    }
+
+    /// Absorbers that take the waves of a piston where they are made, from the wrong side, or not on their way through.
+    fn slips_of_damped_waves(&mut self) {
+        let case = self.case;
+        for piston in &case.moving_wall {
+            let (Some(keys), Some((low, high))) = (&piston.wave, piston.straight_box()) else { continue };
+            let push = keys.direction();
+            let Some(axis) = (0..3).find(|&k| push[k].abs() > 0.99 * DVec3::from(push).length()) else {
+                continue;
+            };
+            let ahead = push[axis] > 0.0;
+            // Along the way of the waves, from the piston's face.
+            let way = |x: f64| if ahead { x - high[axis] } else { low[axis] - x };
+            for (k, absorber) in case.absorber.iter().enumerate().filter(|(_, a)| a.way().0 == axis) {
+                let (a, b) = (way(absorber.min[axis]), way(absorber.max[axis]));
+                let (from, to) = (a.min(b), a.max(b));
+                let (name, l0) = (&piston.name, case.run.spacing);
+                if to < l0 {
+                    continue;
+                }
+                if from < l0 {
+                    let message =
+                        format!("it lies at the piston `{name}`: waves are damped where they are made");
+                    self.warn(
+                        &format!("absorber.{k}.min"),
+                        message,
+                        "let it begin where they have been used",
+                    );
+                    continue;
+                }
+                if absorber.way().1 != ahead {
+                    let message = format!(
+                        "the waves of `{name}` come in where the damping is full: they are thrown back"
+                    );
+                    self.warn(
+                        &format!("absorber.{k}.towards"),
+                        message,
+                        "name the side that they should not come back from",
+                    );
+                    continue;
+                }
+                let length = piston.wave(case).map_or(0.0, |wave| wave.length);
+                if to - from < SHORT * length {
+                    let message = format!(
+                        "it is {:.2} of the wave of `{name}` long, {length:.3} m: a good part of it comes back",
+                        (to - from) / length
+                    );
+                    self.warn(&format!("absorber.{k}"), message, "make it a wave length long");
+                }
             }
         }
     }

@@ -71,16 +71,23 @@ impl Scale {
         let (low, high) = scene.domain;
         let height = (high - low).abs().dot(params.gravity.normalize_or_zero().abs());
         let height = if height.is_finite() { height } else { 0.0 };
+        let up = -params.gravity.normalize_or_zero();
+        let floor = (low * up).min(high * up).element_sum();
         let start = scene.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         let Driven { speed: driven, risen, tilted, swept, stirred } =
             Driven::of(scene, params, simulation.openings.fastest(0.0, end), end);
-        let (mut bodies, mut turning) = (0.0, 0.0);
+        let (mut bodies, mut own) = (0.0, 0.0);
         for solid in &scene.solids {
             if let Drive::Free(body) = &solid.drive {
                 bodies += body.mass;
-                turning += (body.inertia * body.angular_velocity * body.angular_velocity).element_sum();
+                own += body.mass * body.velocity.length_squared();
+                own += (body.inertia * body.angular_velocity * body.angular_velocity).element_sum();
+                // As far as it may fall.
+                let above = solid.position.dot(up) - floor;
+                own += body.mass * g * if above.is_finite() { above.max(0.0) } else { 0.0 };
             }
         }
+        let flows = scene.velocity[..scene.water()].iter().map(|v| v.length_squared()).sum::<f64>();
         let water = scene.water() as f64 * params.particle_mass();
         let moved = start.max(driven);
         let speed = moved + drawn;
@@ -98,7 +105,6 @@ impl Scale {
             _ => 0.0,
         };
         // Water that comes in stands as high as all of it in the end, what goes out falls from the opening.
-        let up = -params.gravity.normalize_or_zero();
         let faces = scene.openings.iter().map(|o| o.face.dot(up) * g);
         let at_start = scene.position[..scene.water()].iter().map(|x| x.dot(up) * g);
         let lowest = faces.clone().chain(at_start).fold(f64::INFINITY, f64::min);
@@ -114,9 +120,10 @@ impl Scale {
                 .max(collapse_speed(params))
                 .max(noise)
                 .max(thrown),
-            energy: g * (water * params.depth + bodies * height + (water + bodies) * (risen + tilted))
-                + (water + bodies) * speed * speed
-                + turning
+            energy: g * (water * params.depth + (water + bodies) * (risen + tilted))
+                + own
+                + params.particle_mass() * flows
+                + (water + bodies) * ((driven + drawn) * (driven + drawn) + 2.0 * start * drawn)
                 + water * noise * noise,
             given: [
                 0.5 * (water + bodies) * (speed * speed - moved * moved),

@@ -82,7 +82,7 @@ impl Buoyancy {
             (Some(true), None) => ": it floats".into(),
             // No more than is told.
             (Some(true), Some(lower)) if 2.0 * lower.abs() < 0.1_f64.powi(places as i32) => {
-                ": it floats as it stands".into()
+                ": it floats as deep as it stands, turned as it is".into()
             }
             (Some(true), Some(lower)) => {
                 let side = if lower < 0.0 { "higher" } else { "lower" };
@@ -105,5 +105,7 @@ fn level(scene: &Scene, (low, high): (DVec3, DVec3), up: DVec3, held: impl Fn(DV
         (out - out.dot(up.abs()) * up.abs()).length() < 2.0 * scene.spacing
     };
     let top = water(scene).filter(|x| beside(*x) && !held(*x)).map(|x| x.dot(up)).reduce(f64::max)?;
-    Some(top + 0.5 * scene.spacing)
+    // Of a surface that leans the lattice has steps, whose highest particles lie in it.
+    let level = up.abs().max_element() > 1.0 - 1e-6;
+    Some(if level { top + 0.5 * scene.spacing } else { top })
 }

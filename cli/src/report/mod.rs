@@ -11,6 +11,7 @@ use super::render::{LookArgs, Show};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use chart::{Chart, Curve, bars};
+use glam::{DQuat, DVec3};
 use page::{MARK, charts, escape, html, section, table};
 use rayon::prelude::*;
 use seixo::case::file::load;
@@ -258,20 +259,55 @@ fn chart(title: impl Into<String>, table: &Table, columns: &[(&str, &str)]) -> C
 /// Bodies whose way is drawn; more would be no page.
 const MOST_BODIES: usize = 12;
 
+/// How a body is turned over time [degrees]: about y in the plane, in space by how much what was up leans; nothing of one that does not turn.
+fn turned(name: &str, table: &Table, run: &Run) -> Option<Chart> {
+    let [w, x, y, z] = ["qw [-]", "qx [-]", "qy [-]", "qz [-]"].map(|column| table.curve(column));
+    let (w, x, y, z) = (w?, x?, y?, z?);
+    let turns = (0..w.len()).map(|k| (w[k][0], DQuat::from_xyzw(x[k][1], y[k][1], z[k][1], w[k][1])));
+    let turns: Vec<(f64, DQuat)> = turns.filter(|(_, q)| q.is_finite()).collect();
+    let start = turns.first()?.1;
+    let up = -DVec3::from(run.case.run.gravity).normalize_or(DVec3::NEG_Z);
+    let flat = run.case.run.dimensions == 2;
+    let mut last = 0.0;
+    let angle = |&(t, q): &(f64, DQuat)| {
+        if flat {
+            // On from turn to turn.
+            let about_y = (2.0 * q.y.atan2(q.w)).to_degrees();
+            last = about_y + 360.0 * ((last - about_y) / 360.0_f64).round();
+        } else {
+            last = ((q * start.conjugate()) * up).angle_between(up).to_degrees();
+        }
+        [t, last]
+    };
+    let points: Vec<[f64; 2]> = turns.iter().map(angle).collect();
+    let first = points[0][1];
+    if points.iter().all(|p| (p[1] - first).abs() < 1e-3) {
+        return None;
+    }
+    let (what, curve) = if flat { ("turn about y", "turn") } else { ("lean from how it stood", "lean") };
+    let curves = vec![Curve { name: curve.to_owned(), points }];
+    Some(Chart { title: format!("{name}: {what} [degrees]"), curves, dashed: false })
+}
+
 fn bodies(run: &Run) -> String {
+    let flat = run.case.run.dimensions == 2;
     let of = |(name, table): &(String, Table)| {
         let three = |what: &str, unit: &str| {
             let columns = ["x", "y", "z"].map(|axis| format!("{what}{axis} [{unit}]"));
             let [x, y, z] = &columns;
+            let all = [(x.as_str(), "x"), (y.as_str(), "y"), (z.as_str(), "z")];
+            let drawn: Vec<(&str, &str)> =
+                all.into_iter().filter(|(_, axis)| !flat || *axis != "y").collect();
             chart(
                 format!("{name}: {} [{unit}]", if what.is_empty() { "place" } else { "force of the water" }),
                 table,
-                &[(x, "x"), (y, "y"), (z, "z")],
+                &drawn,
             )
         };
         // Obstacles of any shape have rows there, too, but no way.
         let stands = run.case.obstacle.iter().any(|o| o.name == *name);
         let mut seen = if stands { vec![] } else { vec![three("", "m")] };
+        seen.extend(turned(name, table, run));
         if run.case.fluid.is_some() {
             seen.push(three("fluid_force_", "N"));
         }
