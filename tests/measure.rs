@@ -171,3 +171,19 @@ fn with_either_preset_points_tell_the_pressure_that_gauges_do() {
         assert!(code == 0 && (point - gauge).abs() < 30.0, "{preset}: {point} for {gauge}\n{out}{err}");
     }
 }
+
+#[test]
+fn points_whose_water_is_not_written_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let region = "region = { min = [0.3, 0, 0], max = [1, 0, 0.7] }\n";
+    std::fs::write(folder.path().join("still.toml"), format!("{STILL}{region}")).unwrap();
+    let run = ["run", "still.toml", "-o", "out", "--backend", "cpu", "-q"];
+    seixo().current_dir(folder.path()).args(run).assert().success();
+    // Outside, on its edge, within; the tank's own end is none of the region's.
+    let points =
+        ["--point", "0.1,0,0.2", "--point", "0.3,0,0.2", "--point", "0.6,0,0.2", "--point", "1,0,0.2"];
+    let (code, _, told) = measured(folder.path(), &points);
+    assert!(code == 0 && told.contains("2 of 4 points lie outside of the region that is written"), "{told}");
+    let (code, _, told) = measured(folder.path(), &points[4..]);
+    assert!(code == 0 && !told.contains("region"), "{told}");
+}

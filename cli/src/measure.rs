@@ -5,8 +5,8 @@ use super::render::numbers;
 use super::{Exit, counted, finite};
 use glam::DVec3;
 use rayon::prelude::*;
-use seixo::case::OutputField;
 use seixo::case::file::read_text;
+use seixo::case::{Case, OutputField};
 use seixo::console::{remark, say};
 use seixo::error::{Error, Result};
 use seixo::output::particles::Particles;
@@ -109,7 +109,14 @@ pub fn measure(args: &MeasureArgs) -> Exit {
     for (what, _) in [("velocity", known[0]), ("pressure", known[1])].iter().filter(|(_, known)| !known) {
         remark(&format!("note: no {what}: output.fields of the case leaves it out"));
     }
-    if dry == rows {
+    let cut = beyond(&points, &case, &probe);
+    if cut > 0 {
+        let many = points.len();
+        remark(&format!(
+            "note: {cut} of {many} points lie outside of the region that is written, or less than an effective radius within it: \
+             what is not written is not read"
+        ));
+    } else if dry == rows {
         remark("note: no point lies in the water at any of these times");
     }
     match &args.out {
@@ -186,4 +193,19 @@ fn values(water: &Particles) -> impl Iterator<Item = (DVec3, Value)> {
         let pressure = water.pressure.get(k).map_or(0.0, |&p| f64::from(p));
         (DVec3::from(*x), Value { velocity, pressure })
     })
+}
+/// How many of the `points` have water around them that is not in the frames.
+fn beyond(points: &[DVec3], case: &Case, probe: &Probe) -> usize {
+    let Some(region) = &case.output.region else { return 0 };
+    let (low, high) = (DVec3::from(region.min) + probe.radius, DVec3::from(region.max) - probe.radius);
+    // Beyond the tank there is nothing to miss.
+    let [start, end] = probe.room.unwrap_or([DVec3::NEG_INFINITY, DVec3::INFINITY]);
+    let outside = |x: &&DVec3| {
+        (0..3).filter(|&k| k != 1 || !probe.flat).any(|k| {
+            let from = low[k] < x[k] || region.min[k] <= start[k];
+            let to = x[k] < high[k] || region.max[k] >= end[k];
+            !from || !to
+        })
+    };
+    points.iter().filter(outside).count()
 }
