@@ -132,6 +132,31 @@ fn a_wanted_error_is_answered_in_words() {
     assert!(text.contains("For a pressure error [-] of at most 0.5 take"), "{text}");
 }
 
+/// Points whose result means nothing, as `seixo run` says of them, are recommended to nobody.
+#[test]
+fn a_point_whose_result_means_nothing_fails_and_a_study_of_such_points_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let study = |iterations: &str| {
+        let text = STUDY
+            .replace("key = \"fluid.solver.tolerance\"\nvalues = [1e-3, 7.0]", iterations)
+            .replace("[\"paper\", \"accurate\"]", "[\"accurate\"]")
+            .replace("[0.02, 0.01, 0.005]", "[0.02]")
+            .replace("[[error]]\ncurve = \"front\"\nagainst = \"finest\"\n", "");
+        std::fs::write(folder.join("small.toml"), text).expect("a file");
+        let (code, text) = run(folder, &["small.toml", "-o", "out", "--error", "9", "-q"]);
+        (code, text, table(&folder.join("out")))
+    };
+    let key = "key = \"fluid.solver.max_iterations\"\nvalues = ";
+    let (code, text, rows) = study(&format!("{key}[1, 1000]"));
+    let class = rows[0].iter().position(|name| name == "class").expect("a column");
+    assert_eq!((code, rows[1][class].as_str(), rows[2][class].as_str()), (0, "failed", "ok"), "{text}");
+    assert_eq!(text.matches("missed fluid.solver.tolerance").count(), 1, "{text}");
+    assert!(text.contains("of at most 9 take accurate, spacing = 0.02, tolerance = 1000"), "{text}");
+    let (code, text, _) = study(&format!("{key}[1]"));
+    assert!(code == 4 && text.contains("the only point has no result"), "{code}: {text}");
+}
+
 #[test]
 fn mistakes_are_told_before_anything_runs() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -477,9 +502,9 @@ fn a_study_without_a_reference_tells_results() {
         assert!((-force / weight - 1.0).abs() < 0.05, "{force} for {weight}");
     }
     std::fs::write(&path, head.clone() + &rest("flor_force_z [N]", "mean")).unwrap();
-    let (_, said) = run(folder.path(), &["floor.toml", "-o", "wrong", "--quiet"]);
-    let report = std::fs::read_to_string(folder.path().join("wrong/report.md")).unwrap_or(said);
-    assert!(report.contains("there is no curve `flor_force_z [N]`"), "{report}");
+    let (code, said) = run(folder.path(), &["floor.toml", "-o", "wrong", "--quiet"]);
+    assert!(code == 2 && said.contains("there is no curve `flor_force_z [N]`"), "{code}: {said}");
+    assert_eq!(std::fs::read_dir(folder.path().join("wrong/points")).unwrap().count(), 0, "before any point");
     std::fs::write(&path, head + &rest("floor_force_z [N/m]", "lag")).unwrap();
     let (code, said) = run(folder.path(), &["floor.toml", "-o", "lag", "--quiet"]);
     assert!(code != 0 && said.contains("asks for a second curve"), "{code}: {said}");

@@ -34,7 +34,8 @@ const EXIT_CODES: &str = "Exit codes:
   1    compare: GPU and CPU differ by more than single precision explains
   2    the case or the command line is wrong
   3    no suitable GPU, or the device was lost
-  4    the computation diverged (its last state is kept), or its result means nothing
+  4    the computation diverged (its last state is kept), or its result means nothing;
+       of a study: no point has a result
   5    a file could not be read or written, or a result not be printed
   75   stopped by --max-wall, SIGUSR1 or SIGXCPU with the state saved: go on with --resume
   129, 130, 143  interrupted by SIGHUP, SIGINT (Ctrl-C), SIGTERM; the state is saved";

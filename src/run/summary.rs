@@ -39,7 +39,7 @@ impl Totals {
     ///
     /// # Errors
     /// [`crate::error::Error::Checkpoint`] if the state has none.
-    pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         let Self {
             solves,
             unknowns,

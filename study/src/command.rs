@@ -3,7 +3,7 @@
 use super::builtin::ENTRIES;
 use super::computers::ComputerArgs;
 use super::definition::Setup;
-use super::engine::{Context, Make, Options, Shard};
+use super::engine::{Context, Make, Options, Shard, ended};
 use super::kept::gather;
 use super::manifest::{Listed, Manifest};
 use seixo::console::say;
@@ -57,7 +57,8 @@ fn bound(text: &str) -> std::result::Result<f64, String> {
 /// Run `args` until `stop` asks to end. Findings go to stdout, progress to stderr.
 ///
 /// # Errors
-/// [`Error::Case`] for a study that cannot be set up, [`Error::Folder`] for a folder in use, [`Error::Io`], [`Error::Interrupted`]. Points that fail are results.
+/// [`Error::Case`] for a study that cannot be set up, [`Error::Folder`] for a folder in use, [`Error::Io`], [`Error::Interrupted`], and
+/// those of [`ended`]: points that fail beside others are results.
 pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
     let computers = args.computers.start()?;
     let make: &Make = &|processor, scene, params, plan, settings| {
@@ -112,5 +113,6 @@ pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
         say(&format!("{missing} of {} points are still to be computed.", points.len()));
     }
     say(&format!("Results: {}", out.join("report.md").display()));
-    Ok(())
+    // A part says nothing of the whole, which is that of `collect`.
+    if args.shard.is_none() { ended(&rows) } else { Ok(()) }
 }

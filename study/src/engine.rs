@@ -5,7 +5,7 @@
 //! joined later, and a changed case computes only what changed.
 
 use super::kept::{VERSION, gather, json, point, read, told_of_kept};
-use super::row::{FORMAT, Measured, Row, hash, told};
+use super::row::{Class, FORMAT, Measured, Row, hash, told};
 use seixo::backend::Backend;
 use seixo::backend::cpu::Cpu;
 use seixo::console::remark;
@@ -82,6 +82,9 @@ pub const SAVE_EVERY: Duration = Duration::from_secs(60);
 /// What a point does.
 pub type Task = Box<dyn Fn(&Context) -> Result<Measured> + Send + Sync>;
 
+/// What a study itself has wrong, as a point shows before it is computed; nothing where it is right, or the point's own case is wrong.
+pub type Fault = Box<dyn Fn() -> Option<Error> + Send + Sync>;
+
 /// A point that is to be computed.
 pub struct Job {
     /// Line of the plot that it belongs to.
@@ -92,6 +95,8 @@ pub struct Job {
     pub identity: String,
     /// Expected cost against that of other points, for the remaining time.
     pub weight: f64,
+    /// What the study has wrong.
+    pub fault: Fault,
     /// The computation.
     pub task: Task,
 }
@@ -107,7 +112,8 @@ impl Job {
         let parameters: Vec<(String, String)> =
             parameters.iter().map(|(k, v)| ((*k).to_string(), v.clone())).collect();
         let identity = format!("{parameters:?}");
-        Self { method: method.into(), parameters, identity, weight, task: Box::new(task) }
+        let fault = Box::new(|| None);
+        Self { method: method.into(), parameters, identity, weight, fault, task: Box::new(task) }
     }
 
     /// Hash of everything that the result depends on.
@@ -177,7 +183,7 @@ impl Options {
 /// Rows of the points that are there at the end, in the order of `jobs`.
 ///
 /// # Errors
-/// [`Error::Io`]. A point that fails is a row. With `options.collect` nothing is computed, and [`Error::Usage`] if no point is there.
+/// [`Error::Io`], and what every open point shows to be wrong with the study. A point that fails is a row. With `options.collect` nothing is computed, and [`Error::Usage`] if no point is there.
 pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) -> Result<Vec<Row>> {
     let hashes: Vec<String> = jobs.iter().map(|job| job.hash(study)).collect();
     if let Some(others) = &options.collect {
@@ -193,6 +199,13 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
     };
     let mut rows: Vec<Option<Row>> = hashes.iter().enumerate().map(kept).collect();
     let open: Vec<usize> = (0..jobs.len()).filter(mine).filter(|&k| rows[k].is_none()).collect();
+    // What all points would fail for is told before the first one.
+    let mut faults = open.iter().map(|&k| (jobs[k].fault)());
+    if let Some(first) = faults.next().flatten()
+        && faults.all(|fault| fault.is_some())
+    {
+        return Err(first);
+    }
     let total: f64 = open.iter().map(|&k| jobs[k].weight).sum();
     if !options.quiet {
         told_of_kept(study, jobs.len(), &rows.iter().flatten().collect::<Vec<_>>(), context.repetitions);
@@ -240,7 +253,63 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
         // What is shown is what is in the file, to the last digit.
         rows[k] = serde_json::from_str(&text).ok().or(Some(row));
     }
-    Ok(rows.into_iter().flatten().collect())
+    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    // Where no point of a whole sweep came to anything, its error says why.
+    if options.quiet && (options.shard.is_some() || ended(&rows).is_ok()) {
+        told_of_failed(study, &rows).iter().for_each(|line| remark(line));
+    }
+    Ok(rows)
+}
+
+/// Reasons of failed points that are told where no progress is: more of them are findings of the report.
+const REASONS: usize = 3;
+
+/// Why those of `rows` failed that did, in words, each reason once.
+fn told_of_failed(study: &str, rows: &[Row]) -> Vec<String> {
+    let mut failed: Vec<&Row> = rows.iter().filter(|row| !row.measured.has_result()).collect();
+    let (all, mut lines) = (rows.len(), Vec::new());
+    while let Some(&first) = failed.first() {
+        if lines.len() == REASONS {
+            lines.push(format!(
+                "{study}: {} of {all} points failed for other reasons, see report.md",
+                failed.len()
+            ));
+            break;
+        }
+        let before = failed.len();
+        failed.retain(|row| row.measured.reason != first.measured.reason);
+        let (class, reason) = (first.measured.class.name(), first_line(&first.measured.reason));
+        let which = told(&first.method, &first.setting());
+        lines.push(match before - failed.len() {
+            1 => format!("{study}: {which}: {class}: {reason}"),
+            same => format!("{study}: {which} and {} more of {all} points: {class}: {reason}", same - 1),
+        });
+    }
+    lines
+}
+
+/// Whether any of `rows`, the points of a whole sweep, has a result.
+///
+/// # Errors
+/// If there are points and none has one, why the first has none: [`Error::Gpu`] if all were skipped, [`Error::Usage`] if all were refused, else
+/// [`Error::Senseless`].
+pub fn ended(rows: &[Row]) -> Result<()> {
+    let Some(first) = rows.first().filter(|_| !rows.iter().any(|row| row.measured.has_result())) else {
+        return Ok(());
+    };
+    let which = told(&first.method, &first.setting());
+    let (class, reason) = (first.measured.class.name(), &first.measured.reason);
+    let text = match rows.len() {
+        1 => format!("the only point has no result, {which}: {class}: {reason}"),
+        all => format!("none of {all} points has a result; the first, {which}: {class}: {reason}"),
+    };
+    Err(if rows.iter().all(|row| row.measured.class == Class::Skipped) {
+        GpuError::NoAdapter(text).into()
+    } else if rows.iter().all(|row| row.measured.refused) {
+        Error::usage("study", text)
+    } else {
+        Error::Senseless(text)
+    })
 }
 
 /// First line of `text`.
@@ -261,7 +330,7 @@ fn attempt(job: &Job, context: &Context) -> Result<Measured> {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
             Measured {
-                class: super::row::Class::Failed,
+                class: Class::Failed,
                 reason: format!("panic, which is a fault of this program: {text}"),
                 ..Measured::default()
             }
@@ -285,7 +354,6 @@ fn forget(states: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::Class;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -337,6 +405,43 @@ mod tests {
         std::fs::write(&file, "{\"format\": 1, \"stu").unwrap();
         assert_eq!(run(folder.path(), None, None, &calls), first);
         assert_eq!(calls.load(Relaxed), 6);
+    }
+
+    #[test]
+    fn reasons_are_told_once_and_a_sweep_without_a_result_is_an_error() {
+        let row = |class, reason: &str, refused| {
+            let measured = Measured { class, reason: reason.into(), refused, ..Measured::default() };
+            Row { method: "m".into(), measured, ..Row::default() }
+        };
+        let failed = |reason: &str| row(Class::Failed, reason, false);
+        let some = [failed("a\nb"), row(Class::Degraded, "c", false), failed("a\nb"), failed("d")];
+        assert_eq!(told_of_failed("s", &some), ["s: m and 1 more of 4 points: failed: a", "s: m: failed: d"]);
+        let many: Vec<Row> = (0..9).map(|k| failed(&k.to_string())).collect();
+        let told = told_of_failed("s", &many);
+        assert!(told.len() == REASONS + 1 && told[REASONS].contains("6 of 9 points failed"), "{told:?}");
+        assert!(ended(&some).is_ok() && ended(&[]).is_ok());
+        let code = |rows: &[Row]| ended(rows).unwrap_err().exit_code();
+        let (refused, skipped) = (row(Class::Failed, "no file", true), row(Class::Skipped, "no GPU", false));
+        let alone = |row: &Row| code(std::slice::from_ref(row));
+        assert_eq!([code(&many), alone(&refused), alone(&skipped)], [4, 2, 3]);
+        assert_eq!(code(&[refused, skipped]), 4);
+    }
+
+    #[test]
+    fn what_every_point_shows_to_be_wrong_is_told_before_any_is_computed() {
+        let (folder, calls) = (tempfile::tempdir().unwrap(), Arc::default());
+        let options = Options { out: folder.path().into(), quiet: true, ..Options::default() };
+        let sweep = |wrong: [bool; 2]| {
+            let mut jobs = jobs(2, &calls);
+            for (job, wrong) in jobs.iter_mut().zip(wrong) {
+                job.fault = Box::new(move || wrong.then(|| Error::key("result", "no such curve", "")));
+            }
+            super::sweep("test", &jobs, &options, &Context::new(&cpu_only))
+        };
+        assert!(sweep([true; 2]).unwrap_err().to_string().contains("no such curve"));
+        assert_eq!(calls.load(Relaxed), 0);
+        // One point may have what another has not.
+        assert_eq!((sweep([true, false]).unwrap().len(), calls.load(Relaxed)), (2, 2));
     }
 
     #[test]

@@ -35,6 +35,7 @@ pub mod engine;
 pub mod gallery;
 pub mod gallery_scenes;
 pub mod incline;
+mod judged;
 mod kept;
 mod manifest;
 pub mod measure;

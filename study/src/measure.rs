@@ -5,6 +5,7 @@ use super::record::{Profile, Recorder};
 use super::row::Measured;
 use super::time_mean::{TimeMean, deviation, mean};
 use glam::DVec3;
+use seixo::case::Case;
 use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
 use seixo::fields::{Fields, State};
@@ -55,10 +56,23 @@ pub struct Spec {
     pub of: Vec<Measure>,
     /// Start of the window of means [s].
     pub from: f64,
-    /// Interval between samples [s]; every step if 0.
+    /// Interval between samples [s], of gauges as well. If 0 every step, and gauges as the case says (`gauge.every`).
     pub every: f64,
     /// Profiles of the water, means over the window.
     pub profile: Vec<Profile>,
+}
+
+impl Spec {
+    /// What it says of gauges in place of `case`, in words.
+    pub fn overrules(&self, case: &Case) -> Option<String> {
+        let (own, every) = (self.every, case.gauge.every?);
+        let other = self.of.contains(&Measure::Gauges) && own > 0.0 && own != every;
+        other.then(|| {
+            format!(
+                "the study reads gauges every {own} s (measure.every), not every {every} s as the case says (gauge.every)"
+            )
+        })
+    }
 }
 
 /// Places among the means over the window: of the kinetic energy [J],
@@ -330,6 +344,7 @@ impl Sampler {
         if self.has(Measure::BodyHeight) {
             out.curves.insert("height".into(), std::mem::take(&mut self.height));
         }
+        self.recorder.end(simulation)?;
         self.recorder.finish(&mut out);
         if simulation.params.dimensions == 2 {
             out.of_slice(simulation.params.spacing);

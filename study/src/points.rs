@@ -2,9 +2,12 @@
 
 use super::definition::{Axis, Definition, Files, Grid};
 use super::engine::{Job, Processor};
+use super::measure::Spec;
+use super::record::curves;
+use super::result_number::ResultNumber;
 use super::row::Measured;
 use super::run_point::{Point, run};
-use seixo::case::file::load_text;
+use seixo::case::file::{load_text, parse};
 use seixo::error::{Error, Result};
 use seixo::run::{from, named_by_content};
 use std::path::{Path, PathBuf};
@@ -192,27 +195,43 @@ impl Definition {
         };
         let (spec, limits, repetitions) = (self.measure.clone(), self.limit.clone(), self.repetitions);
         let results = self.result.clone();
+        let text = effective.as_ref().ok().map(|(_, text)| text.clone());
+        let (measure, asked) = (self.measure.clone(), self.result.clone());
+        let fault = move || lacks(text.as_deref()?, &measure, &asked);
         let job = Job {
             method,
             parameters,
             identity,
             weight,
+            fault: Box::new(fault),
             task: Box::new(move |context| {
                 let text = match &effective {
                     Ok((_, text)) => text.clone(),
                     Err(error) => return Err(Error::file("case", "", error)),
                 };
-                let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
-                // A mistake of the study and not of the case: the run need not be repeated before the study is another.
-                if let Err(error) = results.iter().try_for_each(|result| result.put(&mut out)) {
+                // A mistake of the study and not of the case: the point need not be tried again before the study is another.
+                if let Some(error) = lacks(&text, &spec, &results) {
                     return Ok(Measured::failed(&error));
                 }
+                let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
+                results.iter().for_each(|result| result.put(&mut out));
                 limits.iter().for_each(|(name, most)| out.limit(name, *most));
                 Ok(out)
             }),
         };
         (job, refused)
     }
+}
+
+/// What is wrong with the first of `results` that asks for a curve which the case in `text`, measured by `spec`, has not; nothing of a case that is
+/// refused, which says more.
+fn lacks(text: &str, spec: &Spec, results: &[ResultNumber]) -> Option<Error> {
+    if results.is_empty() {
+        return None;
+    }
+    let (case, _, _) = parse("case", text.to_owned(), &[]).ok()?;
+    let curves = curves(spec, &case).ok()?;
+    results.iter().find_map(|result| result.lacks(&curves))
 }
 
 #[cfg(test)]

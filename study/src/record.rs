@@ -8,6 +8,8 @@
 //! | `spread` | `fluid spread x [m]`: standard deviation of the water's places; half a semi-axis of an ellipse |
 //! | `measure.profile` | the profile's name: mean over the window against a coordinate |
 //!
+//! Gauges have the rows of gauges.csv, unless `measure.every` says when samples are taken.
+//!
 //! In two dimensions forces, torques, energies, momenta and volumes are those of each metre across, and are called so:
 //! `NAME_force_x [N/m]`.
 
@@ -15,15 +17,18 @@ use super::measure::{Measure, Spec};
 use super::row::Measured;
 use super::time_mean::TimeMean;
 use glam::DVec3;
+use seixo::case::Case;
 use seixo::checkpoint::Archive;
 use seixo::error::{Error, Result};
 use seixo::fields::Fields;
 use seixo::gauges::Gauges;
+use seixo::output::slice::per_metre;
 use seixo::output::table::Cell;
+use seixo::run::Due;
 use seixo::scene::{Kind, Scene};
 use seixo::simulation::Simulation;
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -135,16 +140,60 @@ fn of_solid(name: &str) -> [String; 7] {
         .map(|what| format!("{name} {what}"))
 }
 
+/// The curves that `spec` takes of `scene`, with water if it is `wet`: their names as the tables have them, and whose they are.
+fn named(spec: &Spec, gauges: Option<&Gauges>, scene: &Scene, wet: bool) -> Vec<(String, String)> {
+    let has = |m| spec.of.contains(&m);
+    let mut all: Vec<(String, String)> = Vec::new();
+    let mut put = |whose: &str, names: &mut dyn Iterator<Item = String>| {
+        all.extend(names.map(|name| (name, whose.to_owned())));
+    };
+    let owned = |names: &'static [&str]| names.iter().map(|name| (*name).to_owned());
+    put("a gauge", &mut gauges.iter().flat_map(|gauges| gauges.header().into_iter().skip(1)));
+    for solid in scene.solids.iter().take(scene.followed()).filter(|_| has(Measure::Bodies)) {
+        put(&format!("the solid `{}`", solid.name), &mut of_solid(&solid.name).into_iter());
+    }
+    put("the water", &mut owned(&WATER).filter(|_| has(Measure::Fluid) && wet));
+    put("the water", &mut owned(&SPREAD).filter(|_| has(Measure::Spread) && wet));
+    put("a profile", &mut spec.profile.iter().map(|profile| profile.name.clone()));
+    for (measure, whose, names) in [
+        (Measure::Front, "the front", &["front", "front scaled"][..]),
+        (Measure::Energy, "the energy", &["energy"]),
+        (Measure::BodyHeight, "the first body", &["height"]),
+    ] {
+        put(whose, &mut owned(names).filter(|_| has(measure)));
+    }
+    all
+}
+
+/// Names of the curves that a point with `case` measures by `spec`.
+///
+/// # Errors
+/// What is wrong with the scene or its gauges.
+pub fn curves(spec: &Spec, case: &Case) -> Result<BTreeSet<String>> {
+    let scene = Scene::build(case)?;
+    let gauges = if spec.of.contains(&Measure::Gauges) { Some(Gauges::new(case, &scene)?) } else { None };
+    let names = named(spec, gauges.as_ref(), &scene, case.fluid.is_some()).into_iter().map(|(name, _)| name);
+    let called = |name: String| {
+        let slice = scene.dimensions == 2 && spec.profile.iter().all(|profile| profile.name != name);
+        per_metre(&name).filter(|_| slice).unwrap_or(name)
+    };
+    Ok(names.map(called).collect())
+}
+
 /// Keeps the curves of a run.
 #[derive(Debug)]
 pub struct Recorder {
     gauges: Option<Gauges>,
+    /// When gauges are read that the case says: they have rows as `seixo run` writes them. With all the rest if absent.
+    rows: Option<Due>,
+    /// When gauges were read [s].
+    gauged: Vec<f64>,
     bodies: bool,
     fluid: bool,
     spread: bool,
     profiles: Vec<Sums>,
     curves: BTreeMap<String, Vec<[f64; 2]>>,
-    /// When they were sampled [s].
+    /// When those of all but gauges were sampled [s].
     times: Vec<f64>,
 }
 
@@ -171,6 +220,8 @@ impl Recorder {
         let sums = |p: &Profile| Sums { profile: p.clone(), flat, bins: TimeMean::default() };
         let recorder = Self {
             gauges: if has(Measure::Gauges) { Some(Gauges::new(&simulation.case, scene)?) } else { None },
+            rows: if spec.every > 0.0 { None } else { Some(Due::new(simulation.case.gauge.every)) },
+            gauged: Vec::new(),
             bodies: has(Measure::Bodies),
             fluid: has(Measure::Fluid) && simulation.plan.wet(),
             spread: has(Measure::Spread) && simulation.plan.wet(),
@@ -184,26 +235,7 @@ impl Recorder {
 
     /// Refuses two curves of one name, of which a study would take one for the other.
     fn tells_apart(&self, spec: &Spec, simulation: &Simulation) -> Result<()> {
-        let mut all: Vec<(String, String)> = Vec::new();
-        let mut put = |whose: &str, names: &mut dyn Iterator<Item = String>| {
-            all.extend(names.map(|name| (name, whose.to_owned())));
-        };
-        let owned = |names: &'static [&str]| names.iter().map(|name| (*name).to_owned());
-        put("a gauge", &mut self.gauges.iter().flat_map(|gauges| gauges.header().into_iter().skip(1)));
-        for k in (0..simulation.scene.followed()).filter(|_| self.bodies) {
-            let name = simulation.solids.name(k);
-            put(&format!("the solid `{name}`"), &mut of_solid(name).into_iter());
-        }
-        put("the water", &mut owned(&WATER).filter(|_| self.fluid));
-        put("the water", &mut owned(&SPREAD).filter(|_| self.spread));
-        put("a profile", &mut self.profiles.iter().map(|sums| sums.profile.name.clone()));
-        for (measure, whose, names) in [
-            (Measure::Front, "the front", &["front", "front scaled"][..]),
-            (Measure::Energy, "the energy", &["energy"]),
-            (Measure::BodyHeight, "the first body", &["height"]),
-        ] {
-            put(whose, &mut owned(names).filter(|_| spec.of.contains(&measure)));
-        }
+        let mut all = named(spec, self.gauges.as_ref(), &simulation.scene, simulation.plan.wet());
         all.sort();
         let Some(twice) = all.windows(2).find(|pair| pair[0].0 == pair[1].0) else { return Ok(()) };
         let [(name, one), (_, other)] = [&twice[0], &twice[1]];
@@ -217,8 +249,10 @@ impl Recorder {
     /// [`Error::Checkpoint`] if the state holds none of them.
     pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         // What is recorded follows from study and case.
-        let Self { gauges, bodies: _, fluid: _, spread: _, profiles, curves, times } = self;
+        let Self { gauges, rows, gauged, bodies: _, fluid: _, spread: _, profiles, curves, times } = self;
         gauges.iter_mut().try_for_each(|gauges| gauges.exchange(archive))?;
+        rows.iter_mut().try_for_each(|rows| rows.exchange("curves.gauges", archive))?;
+        archive.array("curves.gauged", gauged, false)?;
         for Sums { profile, flat: _, bins } in profiles {
             bins.exchange(&format!("profile.{}", profile.name), archive)?;
         }
@@ -247,20 +281,11 @@ impl Recorder {
     pub fn sample(&mut self, simulation: &mut Simulation, in_window: bool) -> Result<()> {
         let t = simulation.time;
         self.times.push(t);
-        let mut put = |name: String, value: f64| {
-            // A gauge that sees no water, or no pressure before the first step, leaves a gap.
-            if value.is_finite() {
-                self.curves.entry(name).or_default().push([t, value]);
-            }
-        };
-        if let Some(gauges) = &mut self.gauges {
-            for (name, cell) in gauges.header().into_iter().zip(gauges.row(simulation)?).skip(1) {
-                if let Cell::Number(value) = cell {
-                    put(name, value);
-                }
-            }
-            gauges.begin();
+        let due = self.rows.as_mut().is_none_or(|rows| rows.reached(t));
+        if due || self.gauged.is_empty() {
+            self.read_gauges(simulation)?;
         }
+        let mut put = |name, value| put(&mut self.curves, name, [t, value]);
         if self.bodies {
             let followed = simulation.scene.followed();
             for (k, pose) in simulation.solids.poses().iter().take(followed).enumerate() {
@@ -295,14 +320,40 @@ impl Recorder {
         Ok(())
     }
 
+    /// A row of the gauges now.
+    fn read_gauges(&mut self, simulation: &mut Simulation) -> Result<()> {
+        let Some(gauges) = &mut self.gauges else { return Ok(()) };
+        let t = simulation.time;
+        self.gauged.push(t);
+        for (name, cell) in gauges.header().into_iter().zip(gauges.row(simulation)?).skip(1) {
+            if let Cell::Number(value) = cell {
+                put(&mut self.curves, name, [t, value]);
+            }
+        }
+        gauges.begin();
+        Ok(())
+    }
+
+    /// At the end of the run: gauges that have rows as the case says have one there.
+    ///
+    /// # Errors
+    /// What the backend says when it is read.
+    pub fn end(&mut self, simulation: &mut Simulation) -> Result<()> {
+        let late = self.rows.is_some() && self.gauged.last() != Some(&simulation.time);
+        if late { self.read_gauges(simulation) } else { Ok(()) }
+    }
+
     /// The curves of the whole run.
     pub fn finish(self, out: &mut Measured) {
-        // Points that follow each other among the times have nothing left out between them. Before the first step there is no pressure.
-        let place = |t: f64| self.times.partition_point(|at| *at < t);
-        let late = |c: &Vec<[f64; 2]>| c.first().is_some_and(|p| place(p[0]) > 1);
-        let broken = |c: &Vec<[f64; 2]>| late(c) || c.windows(2).any(|w| place(w[1][0]) - place(w[0][0]) > 1);
-        if self.curves.values().any(broken) {
-            out.sampled.clone_from(&self.times);
+        let of_gauges: BTreeSet<String> = self.gauges.iter().flat_map(Gauges::header).collect();
+        for (name, curve) in &self.curves {
+            let times = if of_gauges.contains(name) { &self.gauged } else { &self.times };
+            // Points that follow each other among the times have nothing left out between them. Before the first step there is no pressure.
+            let place = |t: f64| times.partition_point(|at| *at < t);
+            let late = curve.first().is_some_and(|p| place(p[0]) > 1);
+            if late || curve.windows(2).any(|w| place(w[1][0]) - place(w[0][0]) > 1) {
+                out.sampled.insert(name.clone(), times.clone());
+            }
         }
         out.curves.extend(self.curves);
         for sums in &self.profiles {
@@ -315,6 +366,13 @@ impl Recorder {
             out.curves.insert(name.clone(), curve);
             out.profiles.insert(name.clone());
         }
+    }
+}
+
+/// Adds a point to the curve `name`. A gauge that sees no water, or no pressure before the first step, leaves a gap.
+fn put(curves: &mut BTreeMap<String, Vec<[f64; 2]>>, name: String, point: [f64; 2]) {
+    if point[1].is_finite() {
+        curves.entry(name).or_default().push(point);
     }
 }
 
@@ -363,6 +421,8 @@ mod tests {
         // In space no water is there, and that is told.
         let mut recorder = Recorder {
             gauges: None,
+            rows: None,
+            gauged: Vec::new(),
             bodies: false,
             fluid: false,
             spread: false,

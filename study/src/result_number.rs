@@ -10,8 +10,9 @@
 
 use super::row::{Class, Measured};
 use super::validation::reduce::{Curve, Take, cut, prepared, reduce, reduce_bins};
-use seixo::error::{Error, Problem, Result};
+use seixo::error::{Error, Problem};
 use serde::Deserialize;
+use std::collections::BTreeSet;
 
 /// What is told.
 #[derive(Clone, Debug, Deserialize)]
@@ -47,36 +48,49 @@ impl ResultNumber {
         self.take.fault([self.level, self.to], self.window, self.smooth)
     }
 
-    /// Puts the number among what a run `measured`. A curve that is not there is a mistake of the study; what does not come to pass in
-    /// a run, such as a passage, leaves its cell empty.
-    ///
-    /// # Errors
-    /// [`Error::Case`] with the curves that there are.
-    pub fn put(&self, measured: &mut Measured) -> Result<()> {
-        if measured.class > Class::Degraded {
-            return Ok(());
+    /// What is wrong where `curves` are all that a point has, if its own is none of them: a mistake of the study.
+    pub fn lacks(&self, curves: &BTreeSet<String>) -> Option<Error> {
+        if curves.contains(&self.curve) {
+            return None;
         }
-        let Some(curve) = measured.curve(&self.curve) else {
-            let known: Vec<&str> = measured.curves.keys().map(String::as_str).collect();
-            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-            let text =
-                format!("result `{}`: there is no curve `{}`; there are: {known}", self.name, self.curve);
-            return Err(Error::key("result", text, "name a curve that [measure] takes"));
+        let known: Vec<&str> = curves.iter().map(String::as_str).collect();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        let text = format!("result `{}`: there is no curve `{}`; there are: {known}", self.name, self.curve);
+        Some(Error::key("result", text, "name a curve that [measure] takes"))
+    }
+
+    /// Puts the number among what a run `measured`. What does not come to pass in a run, such as a passage, leaves its cell empty.
+    pub fn put(&self, measured: &mut Measured) {
+        // A gauge that has never had a value has no curve.
+        let Some(curve) = measured.curve(&self.curve).filter(|_| measured.class <= Class::Degraded) else {
+            return;
         };
-        let curve = prepared(curve, self.since_moved, self.smooth);
+        let curve = prepared(self.take, curve, self.since_moved, self.smooth);
         let reduced = if measured.profiles.contains(&self.curve) { reduce_bins } else { reduce };
         let levels = [self.level, self.to].map(Option::unwrap_or_default);
         let number = |(curve, _): (Curve, f64)| reduced(self.take, &cut(&curve, self.window), levels);
         if let Some(value) = curve.and_then(number) {
             measured.put(&self.name, value);
         }
-        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_curve_that_no_point_can_have_is_told_with_those_that_there_are() {
+        let number: ResultNumber = toml::from_str("name = \"n\"\ncurve = \"c\"\ntake = \"mean\"").unwrap();
+        let curves = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        assert!(number.lacks(&curves(&["b", "c"])).is_none());
+        let told = number.lacks(&curves(&["b", "d"])).unwrap().to_string();
+        assert!(told.contains("there is no curve `c`; there are: b, d"), "{told}");
+        // A gauge that was dry all the time has none either, which is no mistake.
+        let mut measured = Measured::default();
+        number.put(&mut measured);
+        assert_eq!(measured, Measured::default());
+    }
 
     #[test]
     fn what_a_number_asks_for_has_to_be_there() {

@@ -1,6 +1,7 @@
 //! A point of a study: what was asked, how it ended, what was measured.
 
 use seixo::error::Error;
+use seixo::output::result::{Grade, Verdict};
 use seixo::output::slice::per_metre;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
@@ -8,18 +9,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Version of the files of finished points. A change of meaning of any measure raises it, so that older points
 /// are computed again.
-pub const FORMAT: u32 = 4;
+pub const FORMAT: u32 = 5;
 
 /// How a point ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Class {
-    /// It reached its end and no measure is out of its limit.
+    /// It reached its end, its verdict is fine and no measure is out of its limit.
     #[default]
     Ok,
-    /// It reached its end, with a measure beyond its limit: the reason names it.
+    /// It reached its end, with a verdict of degraded or a measure beyond its limit: the reason names it.
     Degraded,
-    /// A guard stopped it: the reason is the guard's.
+    /// A guard stopped it, or what it computed means nothing: the reason is that of the guard or of the verdict.
     Failed,
     /// It could not be tried here, e.g. without a GPU.
     Skipped,
@@ -94,9 +95,9 @@ pub struct Measured {
     /// Names of the curves that are profiles: their rows are bins, of which each weighs alike in a mean.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub profiles: BTreeSet<String>,
-    /// Times at which curves over time were sampled [s], if one of them has gaps or begins late.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sampled: Vec<f64>,
+    /// Times at which the curves over time were sampled that have gaps or begin late [s].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub sampled: BTreeMap<String, Vec<f64>>,
     /// Wall-clock time.
     pub timing: Option<Timing>,
     /// Work.
@@ -110,6 +111,11 @@ impl Measured {
     pub fn failed(error: &Error) -> Self {
         let class = if matches!(error, Error::Gpu(_)) { Class::Skipped } else { Class::Failed };
         Self { class, reason: error.to_string(), ..Self::default() }
+    }
+
+    /// Whether it came to its end with something that can be looked at.
+    pub fn has_result(&self) -> bool {
+        self.class <= Class::Degraded
     }
 
     /// Keep `value` as `name`; what is not finite is not kept, and makes a point that was fine degraded.
@@ -132,6 +138,19 @@ impl Measured {
         }
     }
 
+    /// Takes over the verdict on the run that it is of. What was measured of a failed one stays to be looked at, and counts for nothing.
+    pub fn judge(&mut self, verdict: &Verdict) {
+        let why = verdict.reasons.join("; ");
+        match verdict.grade {
+            Grade::Fine => {}
+            Grade::Degraded => self.degrade(&why),
+            Grade::Failed => {
+                self.class = Class::Failed;
+                self.reason = format!("what was computed means nothing: {why}");
+            }
+        }
+    }
+
     /// Degraded if `name` was measured above `most`; told once, however often it is asked.
     pub fn limit(&mut self, name: &str, most: f64) {
         // What is no number is within no limit.
@@ -147,7 +166,7 @@ impl Measured {
 
     /// What was measured of a slice in two dimensions, `spacing` [m] wide, for each metre across: points of other spacings share that.
     pub fn of_slice(&mut self, spacing: f64) {
-        let Self { values, curves, profiles, .. } = self;
+        let Self { values, curves, profiles, sampled, .. } = self;
         let names: Vec<String> = values.keys().chain(curves.keys()).cloned().collect();
         // A profile is called as the study says and is of no slice.
         for name in names.into_iter().filter(|name| !profiles.contains(name)) {
@@ -157,6 +176,9 @@ impl Measured {
             }
             if let Some(mut curve) = curves.remove(&name) {
                 curve.iter_mut().for_each(|p| p[1] /= spacing);
+                if let Some(times) = sampled.remove(&name) {
+                    sampled.insert(new.clone(), times);
+                }
                 curves.insert(new, curve);
             }
         }
@@ -165,16 +187,16 @@ impl Measured {
     /// A curve, with a row that has no number wherever it was sampled up to its last point and had no value. The first sample counts
     /// only with a value: before the first step there is no pressure.
     pub fn curve(&self, name: &str) -> Option<Vec<[f64; 2]>> {
-        let (curve, mut places) = (self.curves.get(name)?, self.sampled.iter());
+        let curve = self.curves.get(name)?;
+        let Some(times) = self.sampled.get(name) else { return Some(curve.clone()) };
+        let mut places = times.iter();
         let mut marked = Vec::with_capacity(curve.len());
         for point in curve {
             let missed = places.by_ref().take_while(|t| **t != point[0]);
-            marked.extend(missed.filter(|t| **t != self.sampled[0]).map(|t| [*t, f64::NAN]));
+            marked.extend(missed.filter(|t| **t != times[0]).map(|t| [*t, f64::NAN]));
             marked.push(*point);
         }
-        // One over places, or over other times, has none of these.
-        let over_time = curve.iter().all(|p| self.sampled.binary_search_by(|t| t.total_cmp(&p[0])).is_ok());
-        Some(if over_time { marked } else { curve.clone() })
+        Some(marked)
     }
 
     /// A value.
@@ -246,6 +268,7 @@ pub fn hash(parts: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Class, Measured, Row, Timing, hash};
+    use seixo::output::result::{Grade, Verdict};
 
     #[test]
     fn median_and_spread() {
@@ -267,8 +290,27 @@ mod tests {
     }
 
     #[test]
+    fn a_verdict_is_the_class_of_a_point_and_comes_on_top_of_its_limits() {
+        let judged = |grade| {
+            let mut measured = Measured::default();
+            measured.put("a [-]", 2.0);
+            let reasons = if grade == Grade::Fine { vec![] } else { vec!["b".into(), "c".into()] };
+            measured.judge(&Verdict { grade, reasons, left_out: Vec::new() });
+            measured.limit("a [-]", 1.0);
+            (measured.class, measured.reason)
+        };
+        let limit = "a [-] = 2.000e0 > 1.000e0";
+        assert_eq!(judged(Grade::Fine), (Class::Degraded, limit.into()));
+        assert_eq!(judged(Grade::Degraded), (Class::Degraded, format!("b; c; {limit}")));
+        assert_eq!(judged(Grade::Failed), (Class::Failed, "what was computed means nothing: b; c".into()));
+    }
+
+    #[test]
     fn a_curve_has_gaps_where_it_was_sampled_without_a_value() {
-        let mut measured = Measured { sampled: vec![0.0, 0.1, 0.2, 0.3], ..Measured::default() };
+        let mut measured = Measured::default();
+        for name in ["level", "late"] {
+            measured.sampled.insert(name.into(), vec![0.0, 0.1, 0.2, 0.3]);
+        }
         measured.curves.insert("level".into(), vec![[0.1, 1.0], [0.3, 2.0]]);
         measured.curves.insert("profile".into(), vec![[0.1, 1.0], [0.25, 2.0]]);
         let level = measured.curve("level").unwrap();

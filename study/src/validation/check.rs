@@ -13,7 +13,7 @@
 //! peers = [{ name = "MPS of the paper's group, l0 = 15 mm", value = 18505 }]
 //! ```
 
-use super::reduce::{Curve, Take, cut, distance, lag, prepared, reduce, reduce_bins, smooth};
+use super::reduce::{Curve, Take, cut, distance, lag, prepared, reduce, reduce_bins, smooth, smooth_for};
 use crate::compare::within;
 use crate::definition::Files;
 use crate::engine::first_line;
@@ -249,7 +249,7 @@ impl Check {
     pub fn prepared(&self, measured: &Measured) -> Option<(Curve, f64)> {
         let curve = measured.curve(self.curve.as_ref()?)?;
         let curve: Curve = curve.iter().map(|p| [p[0], (p[1] + self.plus) * self.times]).collect();
-        prepared(curve, self.since_moved, self.smooth)
+        prepared(self.take, curve, self.since_moved, self.smooth)
     }
 
     fn levels(&self) -> [f64; 2] {
@@ -258,9 +258,9 @@ impl Check {
 
     /// The number of a curve that is prepared, against that of the reference.
     fn of_curve(&self, curve: &[[f64; 2]], is_profile: bool, reference: &Reference) -> Option<Verdict> {
-        let expected = reference.curve.as_ref().map(|c| cut(c, self.window));
         if self.take == Take::Distance {
-            let reached = within(self.curve.as_deref().unwrap_or_default(), &expected?, curve);
+            let expected = cut(reference.curve.as_ref()?, self.window);
+            let reached = within(self.curve.as_deref().unwrap_or_default(), &expected, curve);
             let (rms, _) = distance(curve, &reached)?;
             let size = reached.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
             return Some(Verdict {
@@ -272,11 +272,14 @@ impl Check {
         }
         let reduced = if is_profile { reduce_bins } else { reduce };
         let result = reduced(self.take, &cut(curve, self.window), self.levels())?;
-        let expected = match expected {
-            Some(curve) => reduce(self.take, &smooth(&curve, self.smooth), self.levels())?,
-            None => self.reference?,
-        };
-        self.of_numbers(result, expected)
+        self.of_numbers(result, self.expected(reference)?)
+    }
+
+    /// What the number should be.
+    fn expected(&self, reference: &Reference) -> Option<f64> {
+        let Some(curve) = &reference.curve else { return self.reference };
+        let smoothed = smooth_for(self.take, curve, self.smooth);
+        reduce(self.take, &cut(&smoothed, self.window), self.levels())
     }
 
     fn of_numbers(&self, result: f64, reference: f64) -> Option<Verdict> {
@@ -307,11 +310,7 @@ impl Check {
         if let Some(curve) = reference.peers.get(k)? {
             return self.of_curve(curve, false, reference);
         }
-        let expected = match &reference.curve {
-            Some(curve) => reduce(self.take, &smooth(&cut(curve, self.window), self.smooth), self.levels())?,
-            None => self.reference?,
-        };
-        self.of_numbers(self.peers[k].value?, expected)
+        self.of_numbers(self.peers[k].value?, self.expected(reference)?)
     }
 }
 

@@ -5,7 +5,7 @@ use super::page;
 use crate::cases;
 use crate::computers::ComputerArgs;
 use crate::definition::{Definition, Setup};
-use crate::engine::{Context, Make, Options, Shard};
+use crate::engine::{Context, Make, Options, Shard, ended};
 use crate::report::write_table;
 use seixo::console::say;
 use seixo::error::{Error, Result};
@@ -54,7 +54,7 @@ pub struct ValidateArgs {
 ///
 /// # Errors
 /// [`seixo::error::Error::Case`] for a validation that cannot be set up, [`seixo::error::Error::Folder`] for a folder in
-/// use, [`seixo::error::Error::Io`]. Points that fail, and checks that do, are results.
+/// use, [`seixo::error::Error::Io`], and those of [`ended`]: points that fail beside others, and checks that do, are results.
 pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
     if args.names == ["list"] {
         for name in cases::names("validation") {
@@ -106,5 +106,5 @@ pub fn command(args: &ValidateArgs, stop: &Stop) -> Result<()> {
         say(&format!("{missing} of {} points are still to be computed.", suite.len()));
     }
     say(&format!("Page: {}", path.display()));
-    Ok(())
+    if args.shard.is_none() { ended(&rows) } else { Ok(()) }
 }

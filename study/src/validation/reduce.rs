@@ -45,7 +45,7 @@ pub enum Take {
     /// Time by which it lags `behind` another curve: the shift at which the two go together best.
     Lag,
     /// Last amplitude over the first, to the power of one over the periods between: what a period leaves of the
-    /// amplitude.
+    /// amplitude. Each is half of the way from one turning point to the next, wherever the middle of the oscillation lies.
     Decay,
 }
 
@@ -119,6 +119,24 @@ pub fn smooth(curve: &[[f64; 2]], width: f64) -> Curve {
     smoothed
 }
 
+/// [`smooth`] as `take` looks at it: the largest and the smallest are of the values whose mean is over the whole `width`, which at the ends of
+/// a stretch would be over as little as half of it.
+pub fn smooth_for(take: Take, curve: &[[f64; 2]], width: f64) -> Curve {
+    let mut smoothed = smooth(curve, width);
+    if width > 0.0 && matches!(take, Take::Largest | Take::Smallest | Take::Range) {
+        let stretches = curve.chunk_by(|a, b| a[1].is_finite() && b[1].is_finite());
+        let mut whole = stretches.flat_map(|stretch| {
+            let ends = [stretch[0][0], stretch[stretch.len() - 1][0]];
+            let slack = 1e-9 * (1.0 + ends[1].abs());
+            stretch
+                .iter()
+                .map(move |p| p[0] - ends[0] >= 0.5 * width - slack && ends[1] - p[0] >= 0.5 * width - slack)
+        });
+        smoothed.retain(|_| whole.next() == Some(true));
+    }
+    smoothed
+}
+
 /// Integral of a curve from its first point to each of them.
 fn integral(curve: &[[f64; 2]]) -> Vec<f64> {
     let mut sum = 0.0;
@@ -131,13 +149,13 @@ fn integral(curve: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// The curve as numbers are taken from it: its time counted from when it has moved by `since`, if that is asked for, and a moving mean
-/// over `width`; with the moment from which time counts. `None` if it never moves so far.
-pub fn prepared(curve: Curve, since: Option<f64>, width: f64) -> Option<(Curve, f64)> {
+/// over `width` [`smooth_for`] `take`; with the moment from which time counts. `None` if it never moves so far.
+pub fn prepared(take: Take, curve: Curve, since: Option<f64>, width: f64) -> Option<(Curve, f64)> {
     let (curve, origin) = match since {
         Some(by) => since_moved(&curve, by)?,
         None => (curve, 0.0),
     };
-    Some((smooth(&curve, width), origin))
+    Some((smooth_for(take, &curve, width), origin))
 }
 
 /// The curve with its time counted from when it has moved by `distance` from its start, and that moment; `None` if
@@ -227,32 +245,48 @@ fn fit<const N: usize>(curve: &[[f64; 2]]) -> Option<[f64; N]> {
     out.iter().all(|c| c.is_finite()).then_some(out)
 }
 
-/// Times at which the oscillation about the mean passes it upwards, and the largest excursion of each half swing
-/// between passages of either direction. Passages closer than a tenth of the range are noise.
+/// Part of the range that a curve has to move by before it counts as having done so [-]: less is noise.
+const NOISE: f64 = 0.1;
+
+/// Times at which the oscillation about the mean passes it upwards, and the values at which it turns, one of each half swing between passages of
+/// either direction. Passages closer than [`NOISE`] are none.
 fn oscillation(curve: &[[f64; 2]]) -> (Vec<f64>, Vec<f64>) {
     let middle = mean(curve);
-    let range = range(curve);
-    let (mut upward, mut swings) = (Vec::new(), Vec::new());
-    let (mut side, mut excursion, mut crossing) = (0.0_f64, 0.0_f64, None);
-    for pair in curve.windows(2) {
-        let (a, b) = (pair[0][1] - middle, pair[1][1] - middle);
+    let noise = NOISE * range(curve);
+    let (mut upward, mut turns) = (Vec::new(), Vec::new());
+    let (mut side, mut start, mut crossing) = (0.0_f64, 0, None);
+    let most = |half: &[[f64; 2]], side: f64| {
+        half.iter().map(|p| p[1] * side).fold(f64::NEG_INFINITY, f64::max) * side
+    };
+    for k in 1..curve.len() {
+        let (a, b) = (curve[k - 1][1] - middle, curve[k][1] - middle);
         if a * b <= 0.0 && a != b {
-            crossing = Some(pair[0][0] + (pair[1][0] - pair[0][0]) * a / (a - b));
+            crossing = Some(curve[k - 1][0] + (curve[k][0] - curve[k - 1][0]) * a / (a - b));
         }
         // A side counts once the curve is well on it.
-        if b.abs() > 0.1 * range && b.signum() != side {
+        if b.abs() > noise && b.signum() != side {
             if side != 0.0 {
-                swings.push(excursion);
+                turns.push(most(&curve[start..k], side));
             }
             if let Some(x) = crossing.filter(|_| side != 0.0 && b > 0.0) {
                 upward.push(x);
             }
-            (side, excursion) = (b.signum(), 0.0);
+            (side, start) = (b.signum(), if side == 0.0 { 0 } else { k });
         }
-        excursion = excursion.max(b * side);
     }
-    // The first half swing may be cut by the window.
-    (upward, swings.into_iter().skip(1).collect())
+    // The window may cut the first and the last half swing before they turn.
+    if let (Some(first), Some(turn)) = (curve.first(), turns.first())
+        && (turn - first[1]).abs() <= noise
+    {
+        turns.remove(0);
+    }
+    if let Some(last) = curve.last().filter(|_| side != 0.0) {
+        let turn = most(&curve[start..], side);
+        if (turn - last[1]).abs() > noise {
+            turns.push(turn);
+        }
+    }
+    (upward, turns)
 }
 
 fn range(curve: &[[f64; 2]]) -> f64 {
@@ -293,7 +327,8 @@ pub fn reduce(take: Take, curve: &[[f64; 2]], levels: [f64; 2]) -> Option<f64> {
             Some((upward[periods] - upward[0]) / periods as f64)
         }
         Take::Decay => {
-            let (_, swings) = oscillation(curve);
+            let (_, turns) = oscillation(curve);
+            let swings: Vec<f64> = turns.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
             let halves = swings.len().checked_sub(1).filter(|n| *n > 0)?;
             Some((swings[halves] / swings[0]).powf(2.0 / halves as f64))
         }
@@ -386,6 +421,25 @@ mod tests {
     }
 
     #[test]
+    fn a_sine_keeps_its_amplitude_in_any_window() {
+        for phase in [0.0, 0.7, 1.6, 3.0, 4.4] {
+            let wave = |decay: f64, periods: f64| -> Curve {
+                let t = (0..=(400.0 * periods) as u32).map(|k| f64::from(k) / 400.0);
+                t.map(|t| [t, 3.0 + decay.powf(t) * (std::f64::consts::TAU * t + phase).sin()]).collect()
+            };
+            for periods in [2.1, 2.5, 2.75, 3.0, 3.3, 3.75, 6.1] {
+                for decay in [1.0, 0.9, 0.7] {
+                    let found = reduce(Take::Decay, &wave(decay, periods), [0.0; 2]).unwrap();
+                    let near = if decay == 1.0 { 1e-4 } else { 1e-3 };
+                    assert!((found - decay).abs() < near, "{phase} {periods} {decay}: {found}");
+                }
+            }
+            // Two turning points are one way, with nothing to compare it with.
+            assert_eq!(reduce(Take::Decay, &wave(1.0, 0.9), [0.0; 2]), None);
+        }
+    }
+
+    #[test]
     fn a_curve_lags_behind_another_by_the_time_that_a_wave_takes() {
         let sine = |late: f64| -> Curve {
             (0..600).map(|k| f64::from(k) / 100.0).map(|t| [t, (4.0 * (t - late)).sin() + 0.3]).collect()
@@ -437,6 +491,21 @@ mod tests {
         let noise: Curve = (0..100).map(|k| [f64::from(k), if k % 2 == 0 { 1.0 } else { -1.0 }]).collect();
         assert!(smooth(&noise, 9.0)[10..90].iter().all(|p| p[1].abs() < 0.2));
         assert_eq!(smooth(&noise, 0.0), noise);
+    }
+
+    #[test]
+    fn the_largest_of_a_moving_mean_is_over_its_whole_width() {
+        // A line that falls is largest where the mean would be over half of the width.
+        let line: Curve = (0..=10).map(|k| [f64::from(k), -f64::from(k)]).collect();
+        let take = |take, curve: &[[f64; 2]]| reduce(take, &smooth_for(take, curve, 4.0), [0.0; 2]);
+        let of = |what| take(what, &line).unwrap();
+        for (what, expected) in [(Take::Largest, -2.0), (Take::Smallest, -8.0), (Take::Range, 6.0)] {
+            assert!((of(what) - expected).abs() < 1e-9, "{what:?}: {}", of(what));
+        }
+        assert!((of(Take::Mean) + 5.0).abs() < 1e-9, "the ends count in what is not of single values");
+        assert_eq!(take(Take::Largest, &line[..4]), None);
+        let gap: Curve = line.iter().map(|p| if p[0] == 5.0 { [5.0, f64::NAN] } else { *p }).collect();
+        assert!((take(Take::Largest, &gap).unwrap() + 2.0).abs() < 1e-9);
     }
 
     #[test]
