@@ -21,7 +21,7 @@ use glam::{DMat3, DVec3};
 
 /// Bound of the smallest eigenvalue of the moments of a particle's water ([`inverse_above`]), over the lattice's, from which on its
 /// velocities are fitted: on the lattice 0.50 inside, 0.31 on a flat surface and 0.20 on an edge in the plane (0.44, 0.30 and 0.20 in
-/// space). With less, sprays of few particles feed on their motion.
+/// space). With fewer neighbours a fit says little of how the water moves.
 pub const FIT_MIN: f64 = 0.17;
 
 /// 2 d nu / sum w r^2 over the lattice [1/s], Eq. (6).
