@@ -6,9 +6,9 @@ use glam::{DMat3, DVec3};
 
 /// Distance from a wall of the tank, over l0, below which a place is on it.
 const ON_WALL: f64 = 0.25;
-/// Square of the distance of a place from the middle of the particles about it, over the square of their spread and the dimensions, up to
-/// which their slopes count in full; 3 on a wall of water on its lattice.
-const BEYOND: f64 = 4.0;
+/// Square of the distance of a place from the middle of the particles about it along an axis, over the square of their spread along it, up
+/// to which their slopes count in full: 3 on walls and in corners of water on its lattice, 12 where the second row is two spacings off the wall.
+const BEYOND: f64 = 6.0;
 
 /// What the water does at a place.
 #[derive(Clone, Copy, Debug, Default)]
@@ -80,7 +80,7 @@ impl Probe {
 
     /// Velocity and pressure at `x` [m] of the water whose particles have `values`, position first: those of the linear function that comes
     /// nearest to the particles within the effective radius, by least squares with the weight (1 - r^2 / re^2)^2; where they do not span
-    /// space, their mean. Exact for linear fields, on walls and at the surface, too. The pressure is that of gauges: with what it lacks at the
+    /// space, their mean. Exact for linear fields, on walls, in corners and at the surface, too, unless all water near is a single row. The pressure is that of gauges: with what it lacks at the
     /// surface, but for water without any, such as drops in the air. Nothing where no particle is near (`reach`).
     pub fn at(&self, values: impl Iterator<Item = (DVec3, Value)>, x: DVec3) -> Option<Value> {
         let mut near: Vec<(f64, DVec3, Value)> = Vec::new();
@@ -96,7 +96,6 @@ impl Probe {
                 nearest = nearest.min(away);
             }
         }
-        let dimensions: f64 = if self.flat { 2.0 } else { 3.0 };
         if nearest.sqrt() * self.radius > self.reach(x) {
             return None;
         }
@@ -129,7 +128,8 @@ impl Probe {
         }
         let inverse = moment.inverse();
         // Where the second row of particles is just within reach, a line through the scatter of the first would be drawn out.
-        let beyond = total * middle.dot(inverse * middle) / (BEYOND * dimensions);
+        let spread = DVec3::new(moment.x_axis.x, moment.y_axis.y, moment.z_axis.z);
+        let beyond = (total * middle * middle / spread).max_element() / BEYOND;
         let part = if beyond > 1.0 { 1.0 / (beyond * beyond) } else { 1.0 };
         let [vx, vy, vz, p] = with.map(|sum| part * (inverse * sum).dot(-middle));
         Some(Value { velocity: mean.velocity + DVec3::new(vx, vy, vz), pressure: mean.pressure + p + head })
@@ -153,8 +153,12 @@ mod tests {
 
     /// Water below z = 0.3 on a lattice that is shaken, with linear fields.
     fn water(flat: bool) -> Vec<(DVec3, Value)> {
+        shaken_water(flat, 7)
+    }
+
+    fn shaken_water(flat: bool, seed: u32) -> Vec<(DVec3, Value)> {
         let mut out = Vec::new();
-        let (l0, mut seed) = (0.02, 7_u32);
+        let (l0, mut seed) = (0.02, seed);
         let mut shaken = || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             0.2 * l0 * (f64::from(seed >> 8) / f64::from(1 << 24) - 0.5)
@@ -183,6 +187,11 @@ mod tests {
                 let velocity = DVec3::new(1.0 + 2.0 * x, 0.5, 3.0 * z);
                 assert!((found.velocity - velocity).abs().max_element() < 1e-5, "{x}, {z}: {found:?}");
                 assert!((found.pressure - 9810.0 * (0.3 - z)).abs() < 0.02, "{x}, {z}: {found:?}");
+            }
+            // In the very corner.
+            for seed in 1..9 {
+                let found = probe.at(shaken_water(flat, seed).into_iter(), DVec3::ZERO).expect("water");
+                assert!((found.pressure - 9810.0 * 0.3).abs() < 0.02, "{seed}: {found:?}");
             }
             for [x, z] in [[0.15, 0.33], [-0.03, 0.1], [5.0, 5.0]] {
                 assert!(probe.at(water.iter().copied(), DVec3::new(x, y, z)).is_none(), "{x}, {z}");

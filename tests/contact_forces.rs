@@ -243,6 +243,14 @@ fn by_the_papers_law_each_face_presses_along_its_own_normal() {
         let z = dry.solids.poses()[0].position.z;
         assert!((z - 0.37).abs() < 0.01, "{kind}: {z}");
     }
+    // A body of one particle, which counts from its centre of mass.
+    let held = "mass_offset = [0, 0, -0.006]\nlocked = [\"x\", \"z\", \"rotation_y\"]\n";
+    let plate = "[[body]]\nname = \"plate\"\nsize = [0.8, 0.2, 0.02]\ncenter = [1, 0, 0.31]\ndensity = 1000\n"
+        .to_owned() + held;
+    let mut on_body = dry(&(block("[1.0, 0, 0.45]", "").replace("standing = true\n", "") + &plate));
+    on_body.run(0.6);
+    let z = on_body.solids.poses()[0].position.z;
+    assert!((z - 0.37).abs() < 0.01, "{z}");
     // Over the joint of two boxes.
     let two = wall("obstacle", "first", "[0, 0, 0]", "[1, 0, 0.2]", "")
         + &wall("obstacle", "second", "[1, 0, 0]", "[2, 0, 0.2]", "");

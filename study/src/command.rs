@@ -113,6 +113,6 @@ pub fn command(args: &StudyArgs, stop: &Stop) -> Result<()> {
         say(&format!("{missing} of {} points are still to be computed.", points.len()));
     }
     say(&format!("Results: {}", out.join("report.md").display()));
-    // A part says nothing of the whole, which is that of `collect`.
-    if args.shard.is_none() { ended(&rows) } else { Ok(()) }
+    // A part says nothing of the whole, which is that of `collect` once all of them are there.
+    if args.shard.is_none() && missing == 0 { ended(&rows) } else { Ok(()) }
 }

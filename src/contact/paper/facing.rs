@@ -56,7 +56,9 @@ impl Facing {
             None => normals.map(Self::one).collect(),
             Some(cuboid) => normals
                 .zip(&solid.wall_offset)
-                .map(|(normal, &x)| Self::of_box(normal, x, cuboid.half, DMat3::IDENTITY, scene))
+                .map(|(normal, &x)| {
+                    Self::of_box(normal, x - solid.shape_offset, cuboid.half, DMat3::IDENTITY, scene)
+                })
                 .collect(),
         }
     }
