@@ -7,8 +7,9 @@ use glam::{DMat3, DVec3};
 /// Distance from a wall of the tank, over l0, below which a place is on it.
 const ON_WALL: f64 = 0.25;
 /// Square of the distance of a place from the middle of the particles about it along an axis, over the square of their spread along it, up
-/// to which their slopes count in full: 3 on walls and in corners of water on its lattice, 12 where the second row is two spacings off the wall.
-const BEYOND: f64 = 6.0;
+/// to which their slopes count in full: 3 to 6 on walls and in corners of water that is shaken by a tenth of a spacing, 20 where the second row is two
+/// spacings off the wall.
+const BEYOND: f64 = 8.0;
 
 /// What the water does at a place.
 #[derive(Clone, Copy, Debug, Default)]
@@ -122,8 +123,8 @@ impl Probe {
         if self.flat {
             moment.y_axis = DVec3::Y * total;
         }
-        // In a full neighbourhood the determinant is total^3 times 0.1 or so.
-        if moment.determinant() < 1e-3 * total.powi(3) {
+        // In a full neighbourhood the determinant is total^3 times 0.1 or so, in a corner in space 0.001.
+        if moment.determinant() < 2e-4 * total.powi(3) {
             return Some(Value { pressure: mean.pressure + head, ..mean });
         }
         let inverse = moment.inverse();
