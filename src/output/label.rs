@@ -44,30 +44,39 @@ impl Picture {
         }
     }
 
-    fn letters(&self) -> RasterHeight {
+    /// Letters, and pixels of the picture for each of theirs: another size of them would be a hundredth of the program.
+    fn letters(&self) -> (RasterHeight, usize) {
         match self.height() {
-            0..600 => RasterHeight::Size16,
-            600..1200 => RasterHeight::Size24,
-            _ => RasterHeight::Size32,
+            0..600 => (RasterHeight::Size16, 1),
+            600..1800 => (RasterHeight::Size24, 1),
+            _ => (RasterHeight::Size24, 2),
         }
+    }
+
+    /// Height of a line and width of a letter [pixels].
+    fn letter(&self) -> [usize; 2] {
+        let (size, scale) = self.letters();
+        [size.val(), get_raster_width(FontWeight::Regular, size)].map(|n| scale * n)
     }
 
     /// Write `text` with its upper left corner at `x`, `y`.
     fn write(&mut self, x: usize, y: usize, text: &str) {
-        let size = self.letters();
-        let each = get_raster_width(FontWeight::Regular, size);
+        let (size, scale) = self.letters();
+        let [_, each] = self.letter();
         for (k, c) in text.chars().enumerate() {
             let Some(raster) = get_raster(c, FontWeight::Regular, size) else { continue };
             for (dy, row) in raster.raster().iter().enumerate() {
                 for (dx, &part) in row.iter().enumerate() {
-                    self.mix(x + k * each + dx, y + dy, INK, part);
+                    for (own_y, own_x) in (0..scale).flat_map(|i| (0..scale).map(move |j| (i, j))) {
+                        self.mix(x + k * each + scale * dx + own_x, y + scale * dy + own_y, INK, part);
+                    }
                 }
             }
         }
     }
 
     fn length(&self, text: &str) -> usize {
-        text.chars().count() * get_raster_width(FontWeight::Regular, self.letters())
+        text.chars().count() * self.letter()[1]
     }
 
     /// Lighten a rectangle, so that words on it are read whatever lies behind.
@@ -79,7 +88,7 @@ impl Picture {
 
     /// The time, as it is `told`, in the upper left corner.
     pub fn time(&mut self, told: &str) {
-        let letter = self.letters().val();
+        let [letter, _] = self.letter();
         let edge = letter / 2;
         self.plate(edge / 2, edge / 2, self.length(told) + edge, letter + edge);
         self.write(edge, edge, told);
@@ -88,7 +97,7 @@ impl Picture {
     /// A bar of the colours in the upper right corner, from `range[0]` to `range[1]`, called `name`; none in a picture that
     /// it would cover, or in which it would meet the time, as it is `told`.
     pub fn bar(&mut self, name: &str, range: [f64; 2], told: &str) {
-        let letter = self.letters().val();
+        let [letter, _] = self.letter();
         let (width, edge) = ((self.width / 4).max(8 * letter).min(self.width), letter / 2);
         let (left, high) = (self.width.saturating_sub(width + 2 * edge), letter / 2);
         let bottom = edge + letter + letter / 8;
