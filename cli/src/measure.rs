@@ -194,6 +194,7 @@ fn values(water: &Particles) -> impl Iterator<Item = (DVec3, Value)> {
         (DVec3::from(*x), Value { velocity, pressure })
     })
 }
+
 /// How many of the `points` have water around them that is not in the frames.
 fn beyond(points: &[DVec3], case: &Case, probe: &Probe) -> usize {
     let Some(region) = &case.output.region else { return 0 };
@@ -202,9 +203,9 @@ fn beyond(points: &[DVec3], case: &Case, probe: &Probe) -> usize {
     let [start, end] = probe.room.unwrap_or([DVec3::NEG_INFINITY, DVec3::INFINITY]);
     let outside = |x: &&DVec3| {
         (0..3).filter(|&k| k != 1 || !probe.flat).any(|k| {
-            let from = low[k] < x[k] || region.min[k] <= start[k];
-            let to = x[k] < high[k] || region.max[k] >= end[k];
-            !from || !to
+            let before = x[k] <= low[k] && region.min[k] > start[k];
+            let behind = x[k] >= high[k] && region.max[k] < end[k];
+            before || behind
         })
     };
     points.iter().filter(outside).count()
