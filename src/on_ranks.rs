@@ -57,7 +57,7 @@ impl Simulation {
     ) -> Result<Self> {
         let (mut dealt, k) = (false, team.on_machine());
         let set_up = Self::with_shared(case, scene, |scene, params, plan, settings| {
-            let start = deal(&**team, scene, params, processor.has_every_wall());
+            let start = deal(&**team, scene, plan, params, processor.has_every_wall());
             dealt = true;
             let own = start.and_then(|start| processor.of_team((team, k), &start, plan, settings));
             let together = agree(&**team, &own);
@@ -76,9 +76,15 @@ impl Simulation {
 }
 
 /// Deals the particles of `scene` to the ranks; returns what the first one begins with. If they cannot share it the others get nothing.
-fn deal(team: &dyn Team, scene: &Arc<Scene>, params: &Params, every_wall: bool) -> Result<Start> {
+fn deal(
+    team: &dyn Team,
+    scene: &Arc<Scene>,
+    plan: &Plan,
+    params: &Params,
+    every_wall: bool,
+) -> Result<Start> {
     let grid = Grid::over(params);
-    check(team.ranks(), params, &grid).inspect_err(|_| drop(team.deal(&mut |_| Vec::new())))?;
+    check(team.ranks(), plan, params, &grid).inspect_err(|_| drop(team.deal(&mut |_| Vec::new())))?;
     let particles = (&scene.position[..], &scene.kind[..]);
     let division = Division::new(team.ranks(), scene.groups, &grid, params, particles);
     let start = |rank: usize| Start::new(rank, scene, params, &division, every_wall);

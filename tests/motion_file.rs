@@ -71,6 +71,28 @@ fn a_file_is_named_in_a_table_on_one_line_and_by_an_override_of_it() {
 }
 
 #[test]
+fn a_wall_turns_as_its_file_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = "t [s],x [degrees],y [degrees],z [degrees]\n0,0,0,0\n0.01,0,2,0\n0.02,0,2,0\n";
+    std::fs::write(folder.path().join("turn.csv"), written).unwrap();
+    let run = |name: &str, rotation: &str| {
+        let path = case(folder.path(), &format!("rotation = {rotation}"));
+        let out = folder.path().join(name);
+        let run = ran(&["run", &path, "--backend", "cpu", "-q", "-o", out.to_str().unwrap()]);
+        assert_eq!(run.code, 0, "{}", run.err);
+        std::fs::read_to_string(out.join("bodies.csv")).unwrap()
+    };
+    assert_eq!(run("file", "\"turn.csv\""), run("rows", "[[0, 0, 0, 0], [0.01, 0, 2, 0], [0.02, 0, 2, 0]]"));
+    std::fs::write(folder.path().join("turn.csv"), written.replace("y [degrees]", "y [rad]")).unwrap();
+    let plan = ran(&["plan", &case(folder.path(), "rotation = \"turn.csv\"")]);
+    assert!(
+        plan.code == 2 && plan.err.contains("turn.csv:1: `y` is in [rad]: write time [s] and angles"),
+        "{}",
+        plan.err
+    );
+}
+
+#[test]
 fn what_is_wrong_with_a_file_is_told_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = case(folder.path(), "motion = \"gate.csv\"");

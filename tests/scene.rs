@@ -512,3 +512,62 @@ fn what_a_body_half_a_spacing_off_the_lattice_displaces_has_its_symmetries() {
         assert!(dimensions == 2 || mean.y.abs() < 1e-12, "{mean}");
     }
 }
+
+#[test]
+fn water_does_not_run_into_an_open_face_without_a_word() {
+    let scene = |min: &str, max: &str, more: &str| {
+        build(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [1, 0.2, 0.6]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.5, 0.2, 0.3]\n\
+             [[obstacle]]\nname = \"bar\"\nmin = {min}\nmax = {max}\n{more}"
+        ))
+    };
+    let told = |min: &str, max: &str, more: &str| scene(min, max, more).expect("it builds").notes.join("; ");
+    let below = "open = [\"z_min\"]";
+    // In the water, on the floor, and in the air.
+    let why = scene("[0.2, 0, 0.1]", "[0.4, 0.2, 0.2]", below).expect_err("water stands below it");
+    assert!(why.contains("obstacle `bar`: water stands before 100 cells of its open face z_min"), "{why}");
+    assert!(!told("[0.2, 0, 0]", "[0.4, 0.2, 0.1]", below).contains("open face"));
+    let note = told("[0.6, 0, 0.1]", "[0.8, 0.2, 0.2]", below);
+    assert!(note.contains("obstacle `bar`: nothing covers its open face z_min"), "{note}");
+    // Its sides lie against the tank's.
+    assert!(!told("[0.2, 0, 0]", "[0.4, 0.2, 0.1]", "open = [\"y_min\", \"y_max\"]").contains("open face"));
+    // One box on the other covers it.
+    let on = "open = [\"z_max\"]\n[[obstacle]]\nname = \"top\"\nmin = [0.2, 0, 0.1]\nmax = [0.4, 0.2, 0.2]\n";
+    assert!(!told("[0.2, 0, 0]", "[0.4, 0.2, 0.1]", on).contains("open face"));
+    let wall = "[[moving_wall]]\nname = \"gate\"\nmin = [0.5, 0, 0]\nmax = [0.54, 0.2, 0.4]\nopen = [\"x_min\"]\n\
+                motion = [[0, 0, 0, 0], [1, 0, 0, 0.3]]\n";
+    let why = scene("[0.8, 0, 0]", "[0.9, 0.2, 0.1]", wall).expect_err("water stands beside it");
+    assert!(
+        why.contains("moving wall `gate`: water stands before 150 cells of its open face x_min"),
+        "{why}"
+    );
+}
+
+#[test]
+fn tables_that_begin_or_stop_with_a_jump_are_told_of() {
+    let told = |rows: &str, more: &str| {
+        let scene = build(&format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 3.0\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [2, 0.5, 0.6]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0.5, 0, 0]\nmax = [2, 0.5, 0.3]\n\
+             [[moving_wall]]\nname = \"paddle\"\nmin = [0.4, 0, 0]\nmax = [0.5, 0.5, 0.5]\nmotion = [{rows}]\n{more}"
+        ));
+        scene.expect("it builds").notes.into_iter().filter(|n| n.contains("its table")).collect::<Vec<_>>()
+    };
+    let stops = told("[0,0,0,0],[0.5,0.02,0,0],[1,0.08,0,0],[1.5,0.2,0,0]", "");
+    assert_eq!(stops.len(), 1, "{stops:?}");
+    assert!(stops[0].starts_with("moving wall `paddle`: its table stops from 0.3"), "{stops:?}");
+    assert!(stops[0].contains("at t = 1.5 s within a step (it goes at up to 0.3"), "{stops:?}");
+    // Two rows are a constant velocity, as they say; two of one place at either end are rest.
+    assert!(told("[0,0,0,0],[1,0.1,0,0]", "").is_empty());
+    assert!(told("[0,0,0,0],[0.5,0,0,0],[1,0.05,0,0],[1.5,0.1,0,0],[2,0.1,0,0]", "").is_empty());
+    // What happens after the end does not happen.
+    assert!(told("[0,0,0,0],[1,0,0,0],[2,0.1,0,0],[3,0.2,0,0],[4,0.3,0,0]", "").is_empty());
+    let turns = told("[0,0,0,0],[9,0,0,0]", "rotation = [[0,0,0,0],[0.5,0,0,0],[1,0,1,0],[1.5,0,2,0]]\n");
+    assert!(
+        turns.len() == 1 && turns[0].contains("stops from 2.") && turns[0].contains("degrees/s"),
+        "{turns:?}"
+    );
+}

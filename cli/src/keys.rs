@@ -55,12 +55,38 @@ pub fn keys(args: &KeysArgs) -> Exit {
     let word = Some(names.collect::<Vec<_>>().join(".")).filter(|word| !word.is_empty()).unwrap_or(asked);
     let text = text(&tables, &word);
     if text.is_empty() {
-        let words = format!("no key has `{word}` in its path or description: `seixo keys` lists all");
+        let asked = word.to_lowercase();
+        let instead = INSTEAD.iter().find(|(names, _)| names.iter().any(|name| asked.contains(name)));
+        let instead = instead.map_or(String::new(), |(_, words)| format!("; {words}"));
+        let words =
+            format!("no key has `{word}` in its path or description: `seixo keys` lists all{instead}");
         return Err(Error::usage("WORD", words));
     }
     tell(text.trim_end());
     Ok(0)
 }
+
+/// What people look for that is not there, by parts of its names, and what there is instead.
+const INSTEAD: [(&[&str], &str); 6] = [
+    (
+        &["mooring", "tether", "cable", "anchor", "chain"],
+        "there are no lines and springs between solids: `body.locked` holds a body along axes, `body.hinge` about a line",
+    ),
+    (
+        &["porous", "porosity", "permeab", "rubble", "darcy"],
+        "solids are impermeable: a mound of many bodies or obstacles lets water through the gaps that run.spacing resolves",
+    ),
+    (
+        &["turbulen", "eddy", "smagorinsky", "epsilon"],
+        "there is no model of turbulence: `fluid.viscosity` may be that of a turbulent flow, `fluid.wall_friction` is that of its walls",
+    ),
+    (&["tension", "capillar", "wetting"], "there is no surface tension"),
+    (&["air", "gas", "phase"], "there is water alone: air has no pressure, and is not caught by water"),
+    (
+        &["elastic", "flexib", "deform", "young"],
+        "solids are rigid; `contact.spring` is the stiffness with which they touch",
+    ),
+];
 
 /// Examples of keys that no case that comes along has.
 const RARE: &str = include_str!("rare.toml");

@@ -279,14 +279,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
     } else if plan.has(Stage::Contact) {
         advice.push("contact: not judged, the particles of the solids were not built".into());
     }
-    let ranks = match ranks {
-        Some(n) if plan.wet() => Some(Outlook::new(usize::from(n), scene, &params, &plan)?),
-        Some(_) => {
-            advice.push("ranks: not told, of a scene without water".into());
-            None
-        }
-        None => None,
-    };
+    let ranks = ranks.map(|n| Outlook::new(usize::from(n), scene, &params, &plan)).transpose()?;
     if let Some(found) = named(case)? {
         if built {
             holds(&found, scene)?;

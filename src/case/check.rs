@@ -77,7 +77,8 @@ impl Checker<'_> {
         self.range(path, value, value > 0.0, &format!("more than 0 {unit}"));
     }
     pub(super) fn not_negative(&mut self, path: &str, value: f64, unit: &str) {
-        self.range(path, value, value >= 0.0, &format!("0 {unit} or more"));
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        self.range(path, value, value >= 0.0, &format!("0{unit} or more"));
     }
     /// At most one of some optional keys; returns how many are given.
     pub(super) fn one_of(&mut self, table: &str, given: &[(&str, bool)]) -> usize {

@@ -18,11 +18,17 @@ const MOST_FRICTION: f64 = 5.0;
 /// Effective radius up to which the pressure of the free surface carries its weight within 0.1 % of 0.2 m of water at l0 = 10 mm [-].
 const MOST_RADIUS: f64 = 2.6;
 
+/// Threshold of the free surface below which water on the surface is taken for inner water [-].
+const LEAST_THRESHOLD: f64 = 0.8;
+/// Arm of a hinge over the body's size beyond which it is a place mistaken for a way [-].
+const LONGEST_ARM: f64 = 10.0;
+
 /// Length of an absorber over that of the wave below which much of it comes back; 0.3 of its height with a twelfth.
 const SHORT: f64 = 0.5;
 
 impl Checker<'_> {
     pub(super) fn slips(&mut self) {
+        self.slips_of_nothing();
         self.slips_of_gravity();
         self.slips_of_water();
         self.slips_of_bodies();
@@ -52,9 +58,33 @@ impl Checker<'_> {
         }
     }
 
+    /// A case in which nothing ever moves.
+    fn slips_of_nothing(&mut self) {
+        let case = self.case;
+        let water = case
+            .fluid
+            .as_ref()
+            .is_some_and(|f| !(f.block.is_empty() && f.shape.is_empty() && f.fill.is_empty()));
+        if !water && case.inflow.is_empty() && case.body.is_empty() && case.moving_wall.is_empty() {
+            let message = "there is no water, no body and no moving wall: nothing happens".to_owned();
+            self.warn("run", message, "add a [[fluid.block]], [[inflow]], [[body]] or [[moving_wall]]");
+        }
+    }
+
     fn slips_of_water(&mut self) {
         let case = self.case;
         let Some(fluid) = &case.fluid else { return };
+        let beta = fluid.free_surface_threshold;
+        if (0.0..LEAST_THRESHOLD).contains(&beta) {
+            let message = format!(
+                "with {beta} particles of the surface are taken for inner ones, and pressed as these are"
+            );
+            self.warn(
+                "fluid.free_surface_threshold",
+                message,
+                "0.9 to 0.97 in most work; leave it out for 0.97",
+            );
+        }
         let radius = case.run.effective_radius;
         // The paper's gradient has no pressure of the surface.
         if fluid.gradient() == Gradient::Consistent && radius > MOST_RADIUS && radius.is_finite() {
@@ -87,6 +117,9 @@ impl Checker<'_> {
         for (k, fill) in fluid.fill.iter().enumerate() {
             self.speed(&format!("fluid.fill.{k}.velocity"), length(&fill.velocity), most);
         }
+        for (path, speed) in self.speeds_of_openings() {
+            self.speed(&path, speed, most);
+        }
     }
 
     /// Warns of a speed at the start above `most`, refuses one that nothing has [m/s].
@@ -94,11 +127,11 @@ impl Checker<'_> {
         if speed > IMPOSSIBLE_SPEED {
             self.add(
                 path,
-                format!("more than {IMPOSSIBLE_SPEED:.0e} m/s at t = 0: nothing is so fast"),
+                format!("more than {IMPOSSIBLE_SPEED:.0e} m/s: nothing is so fast"),
                 "write it in m/s",
             );
         } else if speed > most {
-            let message = format!("{speed:.4} m/s at t = 0, more than {most:.1} m/s, is hardly meant");
+            let message = format!("{speed:.4} m/s, more than {most:.1} m/s, is hardly meant");
             self.warn(path, message, "check the unit: lengths are metres, times seconds");
         }
     }
@@ -113,6 +146,20 @@ impl Checker<'_> {
             let Ok((shape, share)) = body.form().shape(l0, flat) else { continue };
             let radius = shape.radius();
             self.speed(&path("angular_velocity"), radius * length(&body.angular_velocity), MOST_SPEED);
+            let arm = body.hinge.as_ref().map_or(0.0, |hinge| {
+                let mut arm = DVec3::from(hinge.at) - DVec3::from(body.center);
+                arm[hinge.axis as usize] = 0.0;
+                arm.length()
+            });
+            if arm.is_finite() && arm > LONGEST_ARM * radius {
+                let message =
+                    format!("it turns about a place {arm:.4} m away, {:.0} times its size", arm / radius);
+                self.warn(
+                    &path("hinge.at"),
+                    message,
+                    "give the place of the hinge [m], in the tank's coordinates",
+                );
+            }
             let volume = shape.volume();
             let mass = body.mass.map(|m| m * share).or(body.density.map(|d| d * volume)).unwrap_or(0.0);
             if !(mass > 0.0 && volume > 0.0) {
@@ -192,6 +239,18 @@ impl Checker<'_> {
         self.slips_of_absorbers();
         self.slips_of_damped_waves();
         let Some(tank) = &case.tank else { return };
+        for (k, obstacle) in case.obstacle.iter().enumerate() {
+            let Some((low, high)) = obstacle.corners() else { continue };
+            let reach = case.run.effective_radius * l0;
+            let apart = |&k: &usize| high[k] < tank.min[k] - reach || low[k] > tank.max[k] + reach;
+            if let Some(axis) = self.axes().find(apart) {
+                let message = format!(
+                    "obstacle `{}` lies outside of the tank along {}, where nothing comes",
+                    obstacle.name, AXES[axis]
+                );
+                self.warn(&format!("obstacle.{k}"), message, "move it into the tank, or enlarge [tank]");
+            }
+        }
         for (k, plane) in case.plane.iter().enumerate() {
             let (Some(normal), Some(along)) =
                 (DVec3::from(plane.normal).try_normalize(), DVec3::from(plane.along).try_normalize())

@@ -1,4 +1,4 @@
-//! Tables over time from files: `motion = "file.csv"` is the rows of that file, `discharge = "file.csv"` too.
+//! Tables over time from files: `motion = "file.csv"` is the rows of that file, `rotation`, `discharge` and `velocity` too.
 
 use super::file::read_text;
 use crate::error::{Error, Result};
@@ -6,9 +6,11 @@ use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 /// Tables of a case, those of their keys that may be the name of a file, and its rows.
-const TABLES: [(&str, &[&str], &Form); 4] = [
+const TABLES: [(&str, &[&str], &Form); 6] = [
     ("moving_wall", &["motion"], &MOTION),
+    ("moving_wall", &["rotation"], &ROTATION),
     ("body", &["motion"], &MOTION),
+    ("body", &["rotation"], &ROTATION),
     ("inflow", &["velocity", "discharge"], &RATE),
     ("outflow", &["velocity", "discharge"], &RATE),
 ];
@@ -22,6 +24,11 @@ struct Form {
 
 const MOTION: Form =
     Form { columns: 4, what: "time [s] and displacement x, y, z [m], four numbers", short: "time, x, y, z" };
+const ROTATION: Form = Form {
+    columns: 4,
+    what: "time [s] and angles about x, y, z [degrees], four numbers",
+    short: "time, x, y, z",
+};
 const RATE: Form = Form { columns: 2, what: "time [s] and value, two numbers", short: "time, value" };
 
 /// The text of the case at `path` with the rows of each file that a key names in the file's place. Text that cannot be
@@ -63,7 +70,9 @@ pub(super) fn allow_files(schema: &mut serde_json::Value) {
     use serde_json::Value::{Array, String};
     let of = [
         ("Body", "motion"),
+        ("Body", "rotation"),
         ("MovingWall", "motion"),
+        ("MovingWall", "rotation"),
         ("Inflow", "velocity"),
         ("Inflow", "discharge"),
         ("Outflow", "velocity"),
@@ -91,6 +100,7 @@ fn other_unit<'a>(line: &'a str, key: &str, (form, flat): (&Form, bool)) -> Opti
     };
     let own = match key {
         "motion" => &["m", "metres", "meters"][..],
+        "rotation" => &["degrees", "degree", "deg", "\u{b0}"],
         "velocity" => &["m/s", "m s-1"],
         _ if flat => &["m2/s", "m\u{b2}/s", "m^2/s", "m2 s-1"],
         _ => &["m3/s", "m\u{b3}/s", "m^3/s", "m3 s-1"],
@@ -145,7 +155,7 @@ fn rows(path: &Path, file: &str, (place, key): (&str, &str), (form, flat): (&For
                 let why = format!("`{name}` is in [{unit}]: write {}{own}, and its name so", form.what);
                 return Err(wrong(n, why));
             }
-            if let Some(name) = other_axis(line).filter(|_| key == "motion") {
+            if let Some(name) = other_axis(line).filter(|_| form.columns == 4) {
                 let why = format!("`{name}` stands where another axis is read: write {}", form.what);
                 return Err(wrong(n, why));
             }

@@ -49,7 +49,8 @@ pub struct MovingWall {
     /// Turn about `center` or `position`.
     pub orientation: Option<Turn>,
     /// Rows of time [s] and displacement x, y, z [m]. Two rows: a constant velocity; more: a smooth curve through them
-    /// with a continuous velocity. At rest before the first and after the last. May be left out if something else moves it.
+    /// with a continuous velocity. At rest before the first and after the last: two rows of one place there let it begin and end so.
+    /// May be left out if something else moves it.
     #[serde(default)]
     pub motion: Vec<[f64; 4]>,
     /// A sine along an axis, instead of `motion`.

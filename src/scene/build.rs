@@ -33,6 +33,7 @@ impl Scene {
         builder.notes = notes;
         builder.walls();
         builder.water();
+        builder.open_faces();
         builder.bodies();
         builder.meetings();
         builder.room();
@@ -139,6 +140,11 @@ impl<'a> Builder<'a> {
             notes: Vec::new(),
             problems: Vec::new(),
         })
+    }
+
+    /// Corners of the tank as the lattice has it [m].
+    pub(super) fn sides(&self) -> Option<(DVec3, DVec3)> {
+        self.tank.map(|tank| (self.lattice.corner(tank.lo), self.lattice.corner(tank.hi)))
     }
 
     /// Gravity [m/s2], in the plane in two dimensions.
@@ -342,6 +348,7 @@ impl<'a> Builder<'a> {
                 law,
                 spacing: case.run.spacing,
                 plane: self.lattice.plane,
+                tank: self.sides(),
                 up,
             };
             match surroundings.place(&mut solid, body.standing) {

@@ -109,6 +109,12 @@ impl Curve {
         met.map(most).fold(0.0, f64::max)
     }
 
+    /// Derivatives at the first and the last row, before and after which it is at rest; `None` of a straight line or a place.
+    pub fn ends(&self) -> Option<[DVec3; 2]> {
+        let [first, _, .., last] = &self.slope[..] else { return None };
+        (self.time.len() > 2).then_some([*first, *last])
+    }
+
     /// Whether the derivative changes between `t` and `t + dt` [s].
     pub fn bends(&self, t: f64, dt: f64) -> bool {
         let inside = |x: f64| x > t && x < t + dt;

@@ -31,6 +31,9 @@ impl Builder<'_> {
             let (lo, hi) = shape.ends();
             bounds.add(&label, lo, hi);
             if let Drive::Prescribed(motion) = &solid.drive {
+                notes.extend(
+                    motion.abrupt(self.case.run.end).into_iter().map(|what| format!("{label}: {what}")),
+                );
                 let (mut low, mut high) = (lo, hi);
                 for (way, turn) in motion.poses() {
                     let center = shape.center + way;

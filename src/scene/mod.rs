@@ -28,6 +28,7 @@ mod layout;
 mod meetings;
 mod motion;
 mod near;
+mod open_faces;
 mod opening;
 mod oriented;
 mod part;

@@ -44,6 +44,8 @@ enum Turning {
 const SAMPLE: f64 = 0.05;
 /// Fewest of them an interval.
 const SAMPLES: f64 = 8.0;
+/// Share of a table's largest speed that a jump at its ends may have without a word.
+const JUMP: f64 = 0.1;
 
 impl Motion {
     /// A motion without a turn: displacement from the start [m] over time.
@@ -119,6 +121,19 @@ impl Motion {
         self.displacement.fastest(from, to) + self.rotation.as_ref().map_or(0.0, turning)
     }
 
+    /// What a reader of the tables' rows may not expect before `end` [s]: jumps of the velocity at the first and the last row.
+    pub(super) fn abrupt(&self, end: f64) -> Vec<String> {
+        let way = if let Way::Table(curve) = &self.displacement { Some((curve, 1.0, "m/s")) } else { None };
+        let turn = match self.rotation.as_ref().map(|r| &r.turning) {
+            Some(Turning::Table(curve)) => Some((curve, 180.0 / std::f64::consts::PI, "degrees/s")),
+            _ => None,
+        };
+        way.into_iter()
+            .chain(turn)
+            .filter_map(|(curve, scale, unit)| abrupt(curve, end, scale, unit))
+            .collect()
+    }
+
     /// Whether the velocity changes between `t` and `t + dt` [s].
     pub(crate) fn bends(&self, t: f64, dt: f64) -> bool {
         self.turns() || self.displacement.bends(t, dt)
@@ -177,6 +192,31 @@ fn swings(axis: DVec3, angle: &Formula) -> Vec<DQuat> {
     let count = ((high - low) / SAMPLE).ceil().clamp(1.0, 1e4);
     let at = |k: u32| DQuat::from_axis_angle(axis, low + (high - low) * f64::from(k) / count);
     (0..=count as u32).map(at).collect()
+}
+
+/// What [`Motion::abrupt`] says of a table, whose values are told times `scale` in `unit`.
+fn abrupt(curve: &Curve, end: f64, scale: f64, unit: &str) -> Option<String> {
+    let slopes = curve.ends()?;
+    let (times, fastest) = (curve.times(), curve.fastest(f64::MIN, f64::MAX));
+    let (first, last) = (times.first()?, times.last()?);
+    let mut told = Vec::new();
+    let jumps = |slope: DVec3| slope.length() > JUMP * fastest;
+    if jumps(slopes[0]) && *first < end {
+        told.push(format!("begins with {:.3} {unit} at t = {first} s", scale * slopes[0].length()));
+    }
+    if jumps(slopes[1]) && *last < end {
+        told.push(format!(
+            "stops from {:.3} {unit} at t = {last} s within a step",
+            scale * slopes[1].length()
+        ));
+    }
+    (!told.is_empty()).then(|| {
+        format!(
+            "its table {} (it goes at up to {:.3} {unit}); two rows of one place at an end are rest",
+            told.join(", "),
+            scale * fastest
+        )
+    })
 }
 
 impl Way {

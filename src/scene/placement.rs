@@ -42,6 +42,8 @@ pub(super) struct Surroundings<'a> {
     pub spacing: f64,
     /// Whether everything lies in the plane y = 0.
     pub plane: bool,
+    /// Corners of the tank [m].
+    pub tank: Option<(DVec3, DVec3)>,
     /// Against gravity; `None` without gravity.
     pub up: Option<DVec3>,
 }
@@ -79,8 +81,17 @@ impl Surroundings<'_> {
         let Some((lift, up)) = lift else {
             let first = &overlaps[0];
             let straight = first.out.map(|n| (first.overlap + margin) * n);
-            let away = match self.away(body).or(straight) {
-                None => "move it away".into(),
+            // Out of the tank is no way to anywhere.
+            let center = body.shape_center();
+            let inside = |by: &DVec3| {
+                self.tank.is_none_or(|(low, high)| {
+                    let at = center + *by;
+                    (0..3).all(|k| self.plane && k == 1 || at[k] >= low[k] && at[k] <= high[k])
+                })
+            };
+            let way = self.away(body).filter(inside).or(straight.filter(inside));
+            let away = match way {
+                None => "there is no room for it beside that: make it smaller, or move it away".into(),
                 Some(by) if straight.is_some_and(|way| way.distance(by) < margin) => {
                     let far = at_least(first.overlap + margin);
                     format!("move it away, its center by {far} m along {}", point(by.normalize()))
@@ -93,8 +104,12 @@ impl Surroundings<'_> {
                     format!("move it away, its center by ({x}, {y}, {z}) m")
                 }
             };
-            let why =
-                if self.up.is_some() { ", lifting it would take more than half its height" } else { "" };
+            let lifts = way.zip(self.up).is_some_and(|(way, up)| way.dot(up) > 0.9 * way.length());
+            let why = if self.up.is_some() && !lifts {
+                ", lifting it would take more than half its height"
+            } else {
+                ""
+            };
             return Err((says, away + why));
         };
         if !standing {

@@ -20,6 +20,7 @@ impl Builder<'_> {
             law,
             spacing: self.case.run.spacing,
             plane: self.lattice.plane,
+            tank: self.sides(),
             up,
         };
         let standing: HashSet<&str> =

@@ -36,7 +36,7 @@ pub(super) fn share(
     nearest: impl Fn(DVec3) -> DVec3,
 ) {
     give(particles, spacing, pieces, &nearest);
-    close(particles, volume);
+    close(particles, volume, |_, change| change);
 }
 
 /// Those `pieces` alone of the surface on the particles `wall` of its layer: one that faces none of them has no area.
@@ -104,8 +104,9 @@ fn give(
 }
 
 /// Corrects areas that are even only nearly, by as little as it takes: an even pressure may not push, and one that grows along x_k must push with the
-/// weight of `volume` [m3] and not turn, so sum A = 0, sum x A^T = volume and sum x_k (x cross A) = 0 about the centre of mass.
-pub(super) fn close(particles: &mut Particles, volume: f64) {
+/// weight of `volume` [m3] and not turn, so sum A = 0, sum x A^T = volume and sum x_k (x cross A) = 0 about the centre of mass. `part` is what of a
+/// change of the area at a place may be made there.
+pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3, DVec3) -> DVec3 + Sync) {
     let at: Vec<DVec3> = particles.wall.iter().zip(&particles.to_surface).map(|(x, s)| *x + *s).collect();
     let size = at.iter().map(|x| x.length()).fold(0.0, f64::max);
     let weights: Vec<f64> = particles.area.iter().map(|a| a.length()).collect();
@@ -113,7 +114,8 @@ pub(super) fn close(particles: &mut Particles, volume: f64) {
     if !(size > 0.0 && total > 0.0) {
         return;
     }
-    let conditions: Vec<[DVec3; CONDITIONS]> = at.par_iter().map(|x| conditions(*x / size)).collect();
+    let conditions: Vec<[DVec3; CONDITIONS]> =
+        at.par_iter().map(|x| conditions(*x / size).map(|c| part(*x, c))).collect();
     let mut matrix = [[0.0; CONDITIONS]; CONDITIONS];
     for (of, weight) in conditions.iter().zip(&weights) {
         for i in 0..CONDITIONS {
@@ -155,6 +157,9 @@ fn conditions(x: DVec3) -> [DVec3; CONDITIONS] {
 /// pivots).
 fn solved<const N: usize>(mut matrix: [[f64; N]; N], right: [f64; N]) -> [f64; N] {
     let scale: [f64; N] = std::array::from_fn(|i| matrix[i][i].max(0.0).sqrt());
+    // A condition that no change can serve is round-off.
+    let least = OWN * scale.iter().copied().fold(0.0, f64::max);
+    let scale = scale.map(|s| if s > least { s } else { 0.0 });
     for i in 0..N {
         for j in 0..=i {
             let both = scale[i] * scale[j];

@@ -75,7 +75,8 @@ impl Geometry for Sphere {
                 out.add(depth, r * outward, area * outward, 0.5 * step * outward);
             }
         }
-        areas::close(&mut out, self.volume());
+        // No pressure turns a sphere.
+        areas::close(&mut out, self.volume(), |at, change| change.project_onto(at));
         out
     }
 
@@ -93,4 +94,37 @@ fn fibonacci(n: usize) -> impl Iterator<Item = DVec3> {
         let r = (1.0 - z * z).sqrt();
         DVec3::new(r * cos, r * sin, z)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn areas_push_through_the_middle_and_carry_the_volume() {
+        for tenths in [10, 15, 20, 30, 33, 60] {
+            let sphere = Sphere { radius: 0.1 * f64::from(tenths) };
+            let particles = sphere.particles(1.0, 3, 2);
+            let (mut sum, mut volume) = (DVec3::ZERO, 0.0);
+            let mut moments = [DVec3::ZERO; 3];
+            for ((x, way), area) in particles.wall.iter().zip(&particles.to_surface).zip(&particles.area) {
+                let at = *x + *way;
+                assert!(
+                    (at.length() - sphere.radius).abs() < 1e-12 && at.cross(*area).length() < 1e-12,
+                    "{area}"
+                );
+                assert!(area.dot(at) > 0.0, "{area} at {at}");
+                (sum, volume) = (sum + *area, volume + at.dot(*area) / 3.0);
+                (0..3).for_each(|k| moments[k] += at[k] * *area);
+            }
+            assert!(sum.length() < 1e-9, "{sum}");
+            assert!((volume / sphere.volume() - 1.0).abs() < 1e-9, "{volume} for {}", sphere.volume());
+            if particles.wall.len() > 8 {
+                for (k, moment) in moments.into_iter().enumerate() {
+                    let off = moment / sphere.volume() - DVec3::AXES[k];
+                    assert!(off.length() < 1e-9, "{}: {off}", sphere.radius);
+                }
+            }
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use crate::cells::Grid;
 use crate::error::{Error, Result};
 use crate::params::Params;
+use crate::plan::Plan;
 
 /// Whether the first and the last of so many ranks are neighbours: in a tank that is periodic along x.
 pub(super) fn is_ring(ranks: usize, params: &Params) -> bool {
@@ -73,8 +74,11 @@ fn shares(load: &[u64], ranks: usize, least: usize) -> Vec<u32> {
 /// Refuses ranks that cannot share a tank.
 ///
 /// # Errors
-/// [`Error::Usage`] if there are more of them than columns of cells.
-pub fn check(ranks: usize, params: &Params, grid: &Grid) -> Result<()> {
+/// [`Error::Usage`] if there is no water, or there are more of them than columns of cells.
+pub fn check(ranks: usize, plan: &Plan, params: &Params, grid: &Grid) -> Result<()> {
+    if !plan.wet() {
+        return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
+    }
     let columns = grid.count[0] as usize;
     if ranks > 1 && 2.0 * params.collision_distance > params.effective_radius {
         let text = "ranks: fluid.collision_distance is more than half of run.effective_radius, and who collides beyond a cut is not \

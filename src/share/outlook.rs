@@ -74,7 +74,7 @@ impl Outlook {
     /// As [`super::Share::new`].
     pub fn new(ranks: usize, scene: &Scene, params: &Params, plan: &Plan) -> Result<Self> {
         let grid = Grid::over(params);
-        check(ranks, params, &grid)?;
+        check(ranks, plan, params, &grid)?;
         let loads = Loads::new(scene, &grid, params);
         let (groups, columns) = (loads.groups(), grid.count[0] as usize);
         let (water, walls) = (&loads.water[..], &loads.walls[..]);

@@ -89,7 +89,9 @@ impl Team for Processes {
         [before, after]
     }
 
-    fn gather(&self, own: Vec<u8>) -> Vec<Vec<u8>> {
+    fn gather(&self, mut own: Vec<u8>) -> Vec<Vec<u8>> {
+        // A byte more than there is to say: an empty buffer's address may be that of MPI_IN_PLACE (Open MPI: 1), which is refused, or taken at its word.
+        own.push(0);
         let mut counts = vec![0 as Count; self.ranks()];
         self.world.all_gather_into(&count(own.len()), &mut counts[..]);
         let starts: Vec<Count> = counts
@@ -103,7 +105,8 @@ impl Team for Processes {
         let mut all = vec![0_u8; counts.iter().map(|&n| n as usize).sum()];
         let mut parts = PartitionMut::new(&mut all[..], &counts[..], &starts[..]);
         self.world.all_gather_varcount_into(&own[..], &mut parts);
-        let part = |(&start, &n): (&Count, &Count)| all[start as usize..start as usize + n as usize].to_vec();
+        let part =
+            |(&start, &n): (&Count, &Count)| all[start as usize..start as usize + n as usize - 1].to_vec();
         starts.iter().zip(&counts).map(part).collect()
     }
 
@@ -116,6 +119,9 @@ impl Team for Processes {
     }
 
     fn gather_numbers(&self, own: &[f64]) -> Vec<f64> {
+        if own.is_empty() {
+            return Vec::new();
+        }
         let mut all = vec![0.0; own.len() * self.ranks()];
         self.world.all_gather_into(own, &mut all[..]);
         all

@@ -317,21 +317,43 @@ fn bodies(run: &Run) -> String {
     charts(&drawn) + &page::rest(run.bodies.len(), MOST_BODIES, "bodies.csv")
 }
 
-/// Gauges that are drawn.
+/// Charts of gauges that are drawn.
 const MOST_GAUGES: usize = 36;
 
+/// A chart of each number, and one of the components of a vector that are not zero all the time.
 fn gauges(run: &Run) -> String {
-    let flat = run.case.run.dimensions == 2;
-    // In two dimensions nothing acts along y, or turns about another axis.
-    let still = |c: &&String| {
-        let name = c.split(" [").next().unwrap_or_default();
-        let across = ["_y", "torque_x", "torque_z"].iter().any(|end| name.ends_with(end));
-        let points = run.gauges.curve(c).unwrap_or_default();
-        flat && across && points.iter().all(|p| p[1] == 0.0 || !p[1].is_finite())
+    let component = |c: &str| {
+        let (name, unit) = c.split_once(" [").unwrap_or((c, ""));
+        let stem = name.strip_suffix("_x").or(name.strip_suffix("_y")).or(name.strip_suffix("_z"))?;
+        Some((format!("{stem} [{unit}"), name[stem.len() + 1..].to_owned()))
     };
-    let all: Vec<&String> = run.gauges.columns().iter().skip(1).filter(|c| !still(c)).collect();
-    let drawn = all.iter().take(MOST_GAUGES).map(|&c| chart(c.clone(), &run.gauges, &[(c, c)]));
-    charts(&drawn.collect::<Vec<_>>()) + &page::rest(all.len(), MOST_GAUGES, "gauges.csv")
+    let mut all: Vec<(String, Vec<(&str, String)>)> = Vec::new();
+    for c in run.gauges.columns().iter().skip(1) {
+        let (title, label) = component(c).unwrap_or_else(|| (c.clone(), c.clone()));
+        match all.last_mut() {
+            Some((last, of)) if *last == title => of.push((c, label)),
+            _ => all.push((title, vec![(c, label)])),
+        }
+    }
+    let still = |c: &str| {
+        let points = run.gauges.curve(c).unwrap_or_default();
+        points.iter().all(|p| p[1] == 0.0 || !p[1].is_finite())
+    };
+    for (title, of) in all.iter_mut().filter(|(_, of)| of.len() > 1) {
+        let moves: Vec<_> = of.iter().filter(|(c, _)| !still(c)).cloned().collect();
+        match &moves[..] {
+            [] => continue,
+            [(one, _)] => *title = (*one).to_owned(),
+            _ => {}
+        }
+        *of = moves;
+    }
+    let draw = |(title, of): &(String, Vec<(&str, String)>)| {
+        let columns: Vec<(&str, &str)> = of.iter().map(|(c, label)| (*c, label.as_str())).collect();
+        chart(title.clone(), &run.gauges, &columns)
+    };
+    let drawn: Vec<Chart> = all.iter().take(MOST_GAUGES).map(draw).collect();
+    charts(&drawn) + &page::rest(all.len(), MOST_GAUGES, "gauges.csv")
 }
 
 /// What came in and went out, of a case with openings: sums, then curves.

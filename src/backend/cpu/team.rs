@@ -5,7 +5,7 @@ use super::archive::Saved;
 use crate::backend::{Backend, Counters, Ranked};
 use crate::cells::Grid;
 use crate::checkpoint::Archive;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::fields::{Fields, insert};
 use crate::kernels::openings::Emission;
 use crate::ledger::Ledger;
@@ -29,11 +29,8 @@ impl Cpu {
     /// The part of a rank of `team`, which begins with `start`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for what ranks do not compute.
+    /// [`crate::error::Error::Usage`] for a slab whose cells are more than can be numbered.
     pub fn of_team(team: Arc<dyn Team>, start: &Start, plan: &Plan, settings: Settings) -> Result<Self> {
-        if !plan.wet() {
-            return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
-        }
         let grid = Grid::over(&start.params);
         let mut share = Share::new(team, start, &grid);
         let mut cpu = Self::on_grid(

@@ -74,20 +74,12 @@ pub struct GpuRank {
     rows: Rows,
 }
 
-/// Refuses what devices of many ranks do not compute.
-fn check(plan: &Plan) -> Result<()> {
-    if !plan.wet() {
-        return Err(Error::usage("ranks", "there is no water, which is what ranks share: run it on one"));
-    }
-    Ok(())
-}
-
 impl GpuRank {
     /// The part of a rank of `team`, which begins with `start`, the `k`-th on its machine: on the device of that number among those that are `asked` for,
     /// see [`super::adapters`].
     ///
     /// # Errors
-    /// [`Error::Usage`] for what ranks do not compute; [`Error::Gpu`] if there is no such adapter, or the part does not fit it.
+    /// [`Error::Gpu`] if there is no such adapter, or the part does not fit it.
     pub fn of_team(
         (team, k): (Arc<dyn Team>, usize),
         start: &Start,
@@ -95,7 +87,6 @@ impl GpuRank {
         settings: Settings,
         asked: Option<&str>,
     ) -> Result<Self> {
-        check(plan)?;
         let (part, params, own) = (&start.scene, &start.params, start.ids.len());
         let grid = Grid::new(params)?;
         let mut share = Share::new(team, start, &grid);
