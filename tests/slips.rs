@@ -77,10 +77,6 @@ const SLIPS: &[(&[&str], &str)] = &[
         &["obstacle=[{name=\"far\",min=[5,0,0],max=[6,0.5,0.2]}]"],
         "obstacle.0: obstacle `far` lies outside of the tank along x",
     ),
-    (
-        &["fluid.block=[]", "body=[]", "moving_wall=[]", "absorber=[]"],
-        "run: there is no water, no body and no moving wall",
-    ),
     (&["contact.friction=30"], "contact.friction: a coefficient of friction of 30"),
     (&["moving_wall.0.sine.ramp=20"], "moving_wall.0.sine.ramp: 20 s is longer than the run of 1 s"),
     (
@@ -118,6 +114,9 @@ fn read(sets: &[&str]) -> Result<Vec<String>, String> {
 #[test]
 fn slips_of_unit_sign_and_place_are_warned_of() {
     assert_eq!(read(&[]), Ok(vec![]));
+    let nothing = "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\n".to_owned();
+    let told = parse("nothing.toml", nothing, &[]).expect("it reads").2;
+    assert!(told.len() == 1 && told[0].contains("no water, no body and no moving wall"), "{told:?}");
     for (sets, words) in SLIPS {
         let told = read(sets).unwrap_or_else(|e| panic!("{sets:?}: {e}"));
         assert!(told.len() == 1 && told[0].contains(words), "{sets:?}: `{words}` is not all of {told:?}");

@@ -61,13 +61,9 @@ impl Checker<'_> {
     /// A case in which nothing ever moves.
     fn slips_of_nothing(&mut self) {
         let case = self.case;
-        let water = case
-            .fluid
-            .as_ref()
-            .is_some_and(|f| !(f.block.is_empty() && f.shape.is_empty() && f.fill.is_empty()));
-        if !water && case.inflow.is_empty() && case.body.is_empty() && case.moving_wall.is_empty() {
+        if case.fluid.is_none() && case.body.is_empty() && case.moving_wall.is_empty() {
             let message = "there is no water, no body and no moving wall: nothing happens".to_owned();
-            self.warn("run", message, "add a [[fluid.block]], [[inflow]], [[body]] or [[moving_wall]]");
+            self.warn("run", message, "add [fluid] with a block, a [[body]] or a [[moving_wall]]");
         }
     }
 
