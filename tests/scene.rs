@@ -568,3 +568,29 @@ fn tables_that_begin_or_stop_with_a_jump_are_told_of() {
     let turns = told("[0,0,0,0],[9,0,0,0]", "rotation = [[0,0,0,0],[0.5,0,0,0],[1,0,1,0],[1.5,0,2,0]]\n");
     assert!(turns.len() == 1 && turns[0].contains("stops from 1.333 degrees/s"), "{turns:?}");
 }
+
+#[test]
+fn a_velocity_gauge_inside_a_solid_is_told_of() {
+    let told = |at: &str| {
+        let scene = build(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [1, 0.2, 0.6]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0.2, 0.3]\n\
+             [[obstacle]]\nname = \"bar\"\nmin = [0.4, 0, 0.1]\nmax = [0.6, 0.2, 0.2]\n\
+             [[obstacle]]\nname = \"pipe\"\nshape = \"cylinder\"\nradius = 0.06\nheight = 0.2\ncenter = [0.8, 0.1, 0.15]\n\
+             [[gauge.velocity]]\nname = \"v\"\npoint = {at}\n"
+        ));
+        scene
+            .expect("it builds")
+            .notes
+            .into_iter()
+            .filter(|n| n.contains("gauge.velocity"))
+            .collect::<Vec<_>>()
+    };
+    let inside = told("[0.5, 0.1, 0.15]");
+    assert!(inside.len() == 1 && inside[0].contains("`v`: it lies inside `bar`"), "{inside:?}");
+    assert!(told("[0.8, 0.1, 0.15]").iter().any(|n| n.contains("inside `pipe`")));
+    for at in ["[0.5, 0.1, 0.25]", "[0.5, 0.1, 0.2]", "[0.2, 0.1, 0.0]", "[0.2, 0.1, 0.5]"] {
+        assert!(told(at).is_empty(), "{at}: {:?}", told(at));
+    }
+}

@@ -39,7 +39,7 @@ pub(crate) use coarse::coarse;
 pub use contact::{Contact, ContactDevice, ContactPair, Law};
 pub use copies::{Array, Written};
 pub use fluid::{Block, Fluid, Preconditioner, Preset, Solver};
-pub use gauge::{ForceGauge, Gauges, LevelGauge, PressureGauge};
+pub use gauge::{ForceGauge, Gauges, LevelGauge, PressureGauge, VelocityGauge};
 pub(crate) use names::{is_pattern, stands_for};
 pub(crate) use opening::{HURRY, OpeningKeys, room_behind};
 pub use opening::{Inflow, OUTFLOWS_MAX, Outflow, Rate};

@@ -13,9 +13,9 @@ use super::placement::{Surroundings, point};
 use super::shaped;
 use super::walls::{self, Fixed, PlaneFrame};
 use super::water::{Flow, Water};
-use super::{Scene, Solid, wall_at};
+use super::{Scene, Solid};
 pub(super) use crate::case::AXES;
-use crate::case::{Case, Law, PressureGauge, stands_for};
+use crate::case::{Case, Law, stands_for};
 use crate::error::{CaseError, Problem, Result};
 use crate::periodic::Periodic;
 use glam::{DMat3, DVec3, IVec3};
@@ -429,40 +429,5 @@ impl<'a> Builder<'a> {
     /// Whether a box of the lattice of this `size` [m] is one particle thick.
     fn is_thin(&self, size: DVec3) -> bool {
         (0..3).any(|k| size[k] < 1.5 * self.lattice.spacing && !(self.lattice.plane && k == 1))
-    }
-
-    /// A pressure gauge averages over the wall particles near its point: there must be some.
-    fn gauges(&mut self) {
-        let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
-        // Of the solids in openings no gauge tells anything.
-        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = self.solids_of_case().partition(|s| s.stays());
-        let still = still.into_iter().flat_map(Solid::wall_positions);
-        let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
-        let wrong = |(k, gauge): (usize, &PressureGauge)| {
-            let mut at: DVec3 = gauge.point.into();
-            if self.lattice.plane {
-                at.y = 0.0;
-            }
-            let (key, name) = (format!("gauge.pressure.{k}.point"), &gauge.name);
-            let nearest = wall_at(&walls, at, reach, self.lattice.spacing).err()?;
-            let is_on = |s: &&&Solid| {
-                wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
-            };
-            if let Some(solid) = moving.iter().find(is_on) {
-                let (what, on) = (solid.what(), &solid.name);
-                let message = format!("gauge.pressure `{name}`: it lies on {what} `{on}`, which may move");
-                let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
-                return Some(Problem::new(key, message, remedy));
-            }
-            let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
-                format!("the nearest stands at {}", point(nearest))
-            });
-            let message = format!("gauge.pressure `{name}` at {}: no fixed wall there, {hint}", point(at));
-            let remedy = "move the point onto a wall; where water comes in or goes out there is none";
-            Some(Problem::new(key, message, remedy))
-        };
-        let gauges = self.case.gauge.pressure.iter().enumerate().filter(|_| !self.lacks_walls);
-        let problems: Vec<Problem> = gauges.filter_map(wrong).collect();
-        self.problems.extend(problems);
     }
 }

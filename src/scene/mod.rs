@@ -21,6 +21,7 @@ mod curve;
 mod displaced;
 mod domain;
 mod fits;
+mod gauged;
 mod inflow_depth;
 mod jitter;
 mod lattice;

@@ -1,0 +1,66 @@
+//! What gauges of the case have at their places.
+
+use super::build::Builder;
+use super::oriented::Placed;
+use super::{Solid, point, wall_at};
+use crate::case::{PressureGauge, VelocityGauge};
+use crate::error::Problem;
+use glam::DVec3;
+
+impl Builder<'_> {
+    /// A pressure gauge averages over the wall particles near its point: there must be some.
+    pub(super) fn gauges(&mut self) {
+        let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
+        // Of the solids in openings no gauge tells anything.
+        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = self.solids_of_case().partition(|s| s.stays());
+        let still = still.into_iter().flat_map(Solid::wall_positions);
+        let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
+        let wrong = |(k, gauge): (usize, &PressureGauge)| {
+            let mut at: DVec3 = gauge.point.into();
+            if self.lattice.plane {
+                at.y = 0.0;
+            }
+            let (key, name) = (format!("gauge.pressure.{k}.point"), &gauge.name);
+            let nearest = wall_at(&walls, at, reach, self.lattice.spacing).err()?;
+            let is_on = |s: &&&Solid| {
+                wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
+            };
+            if let Some(solid) = moving.iter().find(is_on) {
+                let (what, on) = (solid.what(), &solid.name);
+                let message = format!("gauge.pressure `{name}`: it lies on {what} `{on}`, which may move");
+                let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
+                return Some(Problem::new(key, message, remedy));
+            }
+            let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
+                format!("the nearest stands at {}", point(nearest))
+            });
+            let message = format!("gauge.pressure `{name}` at {}: no fixed wall there, {hint}", point(at));
+            let remedy = "move the point onto a wall; where water comes in or goes out there is none";
+            Some(Problem::new(key, message, remedy))
+        };
+        let gauges = self.case.gauge.pressure.iter().enumerate().filter(|_| !self.lacks_walls);
+        let problems: Vec<Problem> = gauges.filter_map(wrong).collect();
+        self.problems.extend(problems);
+        let notes: Vec<String> =
+            self.case.gauge.velocity.iter().filter_map(|gauge| self.covered(gauge)).collect();
+        self.notes.extend(notes);
+    }
+
+    /// What there is to say of a velocity gauge inside a solid that stays: no water ever comes there.
+    fn covered(&self, gauge: &VelocityGauge) -> Option<String> {
+        let mut at: DVec3 = gauge.point.into();
+        if self.lattice.plane {
+            at.y = 0.0;
+        }
+        let inside = |shape: &Placed| shape.distance(at) < -0.5 * self.lattice.spacing;
+        let wall =
+            self.fixed.shapes.iter().find(|wall| inside(&Placed::from(*wall))).map(|wall| wall.name.clone());
+        let still =
+            || self.solids_of_case().find(|s| s.stays() && inside(&s.placed())).map(|s| s.name.clone());
+        let name = wall.or_else(still)?;
+        Some(format!(
+            "gauge.velocity `{}`: it lies inside `{name}`, where no water comes: its cells stay empty",
+            gauge.name
+        ))
+    }
+}
