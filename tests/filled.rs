@@ -79,6 +79,20 @@ fn water_that_fills_all_its_room_has_no_free_surface() {
     let gate = "[[moving_wall]]\nname = \"gate\"\nmin = [0.2, 0, 0]\nmax = [0.25, 0.4, 0.5]\n\
                 motion = [[0, 0, 0, 0], [1, 0, 0, 0.1]]\n";
     assert!(!filled(&full_tank("", gate)));
+    // A bar that turns covers now more and now fewer centres of cells and takes the same room; a piston takes more and more.
+    let bar = |motion: &str| {
+        filled(&full_tank(
+            "",
+            &format!(
+                "[[body]]\nname = \"bar\"\nsize = [0.24, 0.2, 0.06]\ncenter = [0.2, 0.2, 0.25]\ndisplaces_fluid = true\n{motion}\n"
+            ),
+        ))
+    };
+    assert!(bar("swing = { axis = [0, 1, 0], amplitude_deg = 25, period = 0.4 }"));
+    assert!(bar("rotation = [[0, 0, 0, 0], [1, 40, 300, 0]]"));
+    let piston = "[[moving_wall]]\nname = \"piston\"\nmin = [-0.2, 0, 0]\nmax = [0, 0.4, 0.5]\n\
+                  motion = [[0, 0, 0, 0], [1, 0.05, 0, 0]]\n";
+    assert!(!filled(&full_tank("", piston)));
     // To the letter the paper's: a surface wherever n is low.
     let paper = full_tank("preset = \"paper\"", "");
     let scene = Scene::build(&paper).expect("it builds");

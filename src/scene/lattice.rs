@@ -209,14 +209,12 @@ impl Grid {
         }
         None
     }
-    /// How many open cells there are to which steps of `ways` lead from the open ones of some `seeds`; more than `most` are not
-    /// counted on.
+    /// How many open cells there are to which steps of `ways` lead from the open ones of some `seeds`.
     pub fn reach(
         &self,
         seeds: &[IVec3],
         ways: impl Iterator<Item = IVec3> + Clone,
         open: impl Fn(IVec3) -> bool,
-        most: usize,
     ) -> usize {
         let mut seen = vec![false; self.state.len()];
         let mut queue = Vec::with_capacity(seeds.len());
@@ -227,7 +225,7 @@ impl Grid {
         };
         seeds.iter().for_each(|&c| look(c, &mut queue));
         let mut next = 0;
-        while next < queue.len() && queue.len() <= most {
+        while next < queue.len() {
             ways.clone().for_each(|way| look(self.wrap(queue[next] + way), &mut queue));
             next += 1;
         }

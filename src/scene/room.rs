@@ -72,25 +72,46 @@ impl Builder<'_> {
         }
         let fixed = self.fixed.shapes.iter().map(Placed::from).chain(still.iter().map(|s| s.placed()));
         let fixed: Vec<Barrier> = fixed.flat_map(images).collect();
-        let room = |t: f64, most: usize| {
-            let now = at(t);
-            let within = |all: &[Barrier], p: DVec3| all.iter().any(|b| b.holds(p));
-            let open = |c: IVec3| {
-                let p = self.lattice.center(c);
-                let left = match self.grid.get(c) {
-                    FREE | FLUID => true,
-                    FACE => !within(&fixed, p),
-                    _ => within(&start, p) && !within(&fixed, p),
-                };
-                left && !within(&now, p)
-            };
-            self.grid.reach(&self.water.cell, self.lattice.ways(), open, most)
+        let within = |all: &[Barrier], p: DVec3| all.iter().any(|b| b.holds(p));
+        let left = |c: IVec3| {
+            let p = self.lattice.center(c);
+            match self.grid.get(c) {
+                FREE | FLUID => true,
+                FACE => !within(&fixed, p),
+                _ => within(&start, p) && !within(&fixed, p),
+            }
         };
-        let whole = room(0.0, usize::MAX);
-        let slack = (SAME_ROOM * whole as f64) as usize;
+        let room = |t: f64| {
+            let now = at(t);
+            let open = |c: IVec3| left(c) && !within(&now, self.lattice.center(c));
+            let cells = self.grid.reach(&self.water.cell, self.lattice.ways(), open);
+            // A solid that turns covers now more and now fewer centres of cells: what it takes of them counts.
+            cells as f64 + self.rounded_up(&now, left)
+        };
+        let whole = room(0.0);
+        let slack = SAME_ROOM * whole;
         // Instants that keep step with no period.
         let times = (1..=LOOKS).map(|k| self.case.run.end * (f64::from(k) * 0.618_033_988_75).fract());
         let times: Vec<f64> = times.chain([self.case.run.end]).collect();
-        times.into_par_iter().all(|t| whole.abs_diff(room(t, whole + slack + 1)) <= slack)
+        times.into_par_iter().all(|t| (whole - room(t)).abs() <= slack)
+    }
+
+    /// By how much the cells whose centres `barriers` cover are more than the volume that they take of the cells that are `left`.
+    fn rounded_up(&self, barriers: &[Barrier], left: impl Fn(IVec3) -> bool) -> f64 {
+        let l0 = self.lattice.spacing;
+        let mut more = 0.0;
+        for (k, barrier) in barriers.iter().enumerate() {
+            for c in self.lattice.cells(barrier.low - l0, barrier.high + l0).iter() {
+                let p = self.lattice.center(c);
+                let off = barrier.shape.distance(p) / l0;
+                // Of a cell that several reach it is the first one's.
+                if off.abs() < 0.5 && !barriers[..k].iter().any(|b| b.shape.distance(p) < 0.5 * l0) && left(c)
+                {
+                    let taken = 0.5 - off;
+                    more += if off < 0.0 { 1.0 - taken } else { -taken };
+                }
+            }
+        }
+        more
     }
 }

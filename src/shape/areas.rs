@@ -19,13 +19,28 @@ const FAR: f64 = 2.0;
 pub(super) const AS_NEAR: f64 = 1e-6;
 /// Pieces that are looked up together.
 const TOGETHER: usize = 1 << 16;
-/// Conditions of still water on the areas.
+/// Conditions of still water on the areas: no push by an even pressure, the weight of the volume by one that grows, no turn by that.
 const CONDITIONS: usize = 21;
+/// How many of them are asked for, where more would change areas by too much.
+const KEPT: [usize; 3] = [CONDITIONS, 12, 3];
+/// Largest change of an area over the mean of all.
+const MOST_CHANGE: f64 = 0.5;
 /// What of a condition the others leave, below which it is none of its own.
 const OWN: f64 = 1e-7;
 
 /// A piece of the surface: its middle [m] and its outward area [m2].
 pub(super) type Piece = (DVec3, DVec3);
+
+/// The middle of places [m], of which those no farther apart than `slack` [m] count once.
+pub(super) fn middle(places: impl Iterator<Item = DVec3>, slack: f64) -> Option<DVec3> {
+    let mut found: Vec<DVec3> = Vec::new();
+    for at in places {
+        if found.iter().all(|other| other.distance(at) > slack) {
+            found.push(at);
+        }
+    }
+    (!found.is_empty()).then(|| found.iter().sum::<DVec3>() / found.len() as f64)
+}
 
 /// Gives all `pieces` of the surface to the wall layer of `particles`; `nearest` is the point of the surface nearest to another one.
 pub(super) fn share(
@@ -116,28 +131,39 @@ pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3,
     }
     let conditions: Vec<[DVec3; CONDITIONS]> =
         at.par_iter().map(|x| conditions(*x / size).map(|c| part(*x, c))).collect();
-    let mut matrix = [[0.0; CONDITIONS]; CONDITIONS];
-    for (of, weight) in conditions.iter().zip(&weights) {
-        for i in 0..CONDITIONS {
-            for j in 0..=i {
-                matrix[i][j] += weight / total * of[i].dot(of[j]);
+    let closed = |kept: usize| {
+        let mut matrix = [[0.0; CONDITIONS]; CONDITIONS];
+        for (of, weight) in conditions.iter().zip(&weights) {
+            for i in 0..kept {
+                for j in 0..=i {
+                    matrix[i][j] += weight / total * of[i].dot(of[j]);
+                }
             }
         }
-    }
-    // Once more for what was rounded off.
-    for _ in 0..2 {
-        let mut missing = [0.0; CONDITIONS];
-        for k in 0..3 {
-            missing[3 + 4 * k] = volume / (size * total);
+        let mut areas = particles.area.clone();
+        // Once more for what was rounded off.
+        for _ in 0..2 {
+            let mut missing = [0.0; CONDITIONS];
+            if kept > 3 {
+                (0..3).for_each(|k| missing[3 + 4 * k] = volume / (size * total));
+            }
+            for (of, area) in conditions.iter().zip(&areas) {
+                missing.iter_mut().zip(of).take(kept).for_each(|(m, c)| *m -= c.dot(*area) / total);
+            }
+            let factors = solved(matrix, missing);
+            for ((of, weight), area) in conditions.iter().zip(&weights).zip(&mut areas) {
+                *area += *weight * of.iter().zip(factors).map(|(c, factor)| factor * *c).sum::<DVec3>();
+            }
         }
-        for (of, area) in conditions.iter().zip(&particles.area) {
-            missing.iter_mut().zip(of).for_each(|(m, c)| *m -= c.dot(*area) / total);
-        }
-        let factors = solved(matrix, missing);
-        for ((of, weight), area) in conditions.iter().zip(&weights).zip(&mut particles.area) {
-            *area += *weight * of.iter().zip(factors).map(|(c, factor)| factor * *c).sum::<DVec3>();
-        }
-    }
+        areas
+    };
+    let mean = total / weights.len() as f64;
+    let is_small = |areas: &[DVec3]| {
+        areas.iter().zip(&particles.area).all(|(new, old)| new.distance(*old) <= MOST_CHANGE * mean)
+    };
+    // A handful of particles cannot meet all conditions but by areas that are none.
+    let found = KEPT.iter().map(|&kept| closed(kept)).find(|areas| is_small(areas));
+    particles.area = found.unwrap_or_else(|| closed(KEPT[KEPT.len() - 1]));
 }
 
 /// What the area at `x` is multiplied by in each condition: 1 along each axis, x_k along each, x_k times the arm about each.

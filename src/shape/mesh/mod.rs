@@ -18,10 +18,12 @@ mod shells;
 mod skin;
 mod thickness;
 
+use super::areas::middle;
 use super::surface::Surface;
 use super::{Faces, Geometry, Inside, Node, Particles, Shape, WallLayer, face, nodes_between};
 use glam::{DQuat, DVec3};
 use mass::Mass;
+use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 use planes::Planes;
@@ -269,6 +271,17 @@ impl Mesh {
     fn nearest(&self, q: DVec3) -> (DVec3, bool) {
         let found = self.triangles.project_local_point(q, false);
         (found.point, found.is_inside)
+    }
+
+    /// The middle of the points of the surface that are nearest to `q`, of which a place before the bisector of an edge or a corner has several;
+    /// those that are farther by less than `slack` [m] count.
+    fn nearest_evenly(&self, q: DVec3, slack: f64) -> DVec3 {
+        let nearest = self.nearest(q).0;
+        let most = nearest.distance(q) + slack;
+        let around = Aabb::from_half_extents(q, DVec3::splat(most));
+        let of = |k: u32| self.triangles.triangle(k).project_local_point(q, false).point;
+        let found = self.triangles.bvh().intersect_aabb(&around).map(of).filter(|at| at.distance(q) <= most);
+        middle(found, slack).unwrap_or(nearest)
     }
 
     /// Places along the line where it goes through the surface, in order.

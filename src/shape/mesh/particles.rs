@@ -98,6 +98,7 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
     let mut out = Particles::default();
     let mut taken = PointCells::new(spacing);
     let thin = Thin::new(|x| mesh.distance(x), spacing, false);
+    let nearest = |x| mesh.nearest_evenly(x, areas::AS_NEAR * spacing);
     for layer in 0..layers {
         let (above, depth) = (f64::from(layer) * border, (f64::from(layer) + 0.5) * spacing);
         let mut here: Vec<_> = found.iter().filter(|f| f.1 > above && f.1 <= above + border).collect();
@@ -124,7 +125,8 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
         for Place { at, inside: (depth, outward), .. } in places {
             if taken.nearest(at, APART * spacing).is_none() {
                 taken.add(at);
-                out.add(layer, at, DVec3::ZERO, depth * outward);
+                let way = if layer == 0 { nearest(at) - at } else { depth * outward };
+                out.add(layer, at, DVec3::ZERO, way);
             }
         }
     }
@@ -135,7 +137,6 @@ pub(super) fn fill(mesh: &Mesh, spacing: f64, layers: i32) -> Particles {
         let cells: Vec<_> = here.copied().collect();
         thin.fill(above, thin.beside(&cells).into_iter(), &taken, &mut out);
     }
-    let nearest = |x| mesh.nearest(x).0;
     areas::share(&mut out, spacing, mesh.volume(), pieces(mesh, spacing), nearest);
     out
 }
@@ -148,7 +149,7 @@ pub(super) fn freed(
     free: &dyn Fn(DVec3, DVec3) -> bool,
 ) -> Particles {
     let pieces = pieces(mesh, spacing).filter(|(at, area)| free(*at, area.normalize_or_zero()));
-    areas::of_some(wall, spacing, pieces, |x| mesh.nearest(x).0)
+    areas::of_some(wall, spacing, pieces, |x| mesh.nearest_evenly(x, areas::AS_NEAR * spacing))
 }
 
 /// The places of a layer at `depth` [m], pushed apart along it until they lie evenly.

@@ -108,4 +108,26 @@ mod tests {
         assert!((wedge.volume() - 0.036).abs() < 1e-12, "{}", wedge.volume());
         assert!((wedge.origin() - DVec3::new(0.4, 0.2, 0.1)).length() < 1e-12, "{}", wedge.origin());
     }
+
+    #[test]
+    fn small_ones_close() {
+        for tenths in 13..=30 {
+            let r = 0.1 * f64::from(tenths);
+            for mesh in [Mesh::cone(r, 2.0 * r), Mesh::wedge(DVec3::new(2.0 * r, 1.7 * r, 2.0 * r))] {
+                let mesh = mesh.expect("a solid");
+                let out = mesh.particles(1.0, 3, 2);
+                let sum: DVec3 = out.area.iter().sum();
+                let all: f64 = out.area.iter().map(|a| a.length()).sum();
+                let most = out.area.iter().map(|a| a.length()).fold(0.0, f64::max);
+                let mean = all / out.area.len().max(1) as f64;
+                println!(
+                    "{r:.1}: {} particles, {all:.2} m2, largest over the mean {:.2}",
+                    out.wall.len(),
+                    most / mean
+                );
+                assert!(sum.length() < 1e-9 * all, "{r}: {sum}");
+                assert!(most < 3.0 * mean, "{r}: {most} of {mean}");
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@
 
 mod layer;
 
-use super::areas::{self, Piece};
+use super::areas::{self, Piece, middle};
 use super::cells::PointCells;
 use super::open;
 use super::surface::Surface;
@@ -161,6 +161,14 @@ impl Polygon {
         nearest_of(self.sides(), q)
     }
 
+    /// The middle of the points of the outline that are nearest to `q`: before the bisector of a corner there are two, and either would be a
+    /// bias; those that are farther by less than `slack` [m] count.
+    fn nearest_evenly(&self, q: DVec2, slack: f64) -> DVec2 {
+        let most = self.nearest(q).0.distance(q) + slack;
+        let found = self.sides().map(|side| nearest_of(std::iter::once(side), q).0);
+        middle(found.filter(|at| at.distance(q) <= most).map(space), slack).map_or(q, plane)
+    }
+
     fn holds(&self, q: DVec2) -> bool {
         let crossed = |[a, b]: [DVec2; 2]| {
             (a.y > q.y) != (b.y > q.y) && q.x < a.x + (q.y - a.y) / (b.y - a.y) * (b.x - a.x)
@@ -280,6 +288,7 @@ impl Geometry for Polygon {
         let mut out = Particles::default();
         let mut taken = PointCells::new(spacing);
         let thin = Thin::new(|x| self.distance(x), spacing, true);
+        let evenly = |x| space(self.nearest_evenly(plane(x), areas::AS_NEAR * spacing));
         for layer in 0..layers {
             let depth = (f64::from(layer) + 0.5) * spacing;
             let mut stretches = self.layer(depth, spacing);
@@ -295,7 +304,7 @@ impl Geometry for Polygon {
                 }
                 if taken.nearest(at, APART * spacing).is_none() {
                     taken.add(at);
-                    out.add(layer, at, DVec3::ZERO, -distance * outward);
+                    out.add(layer, at, DVec3::ZERO, evenly(at) - at);
                 }
             }
         }
@@ -309,7 +318,7 @@ impl Geometry for Polygon {
             thin.fill(above, places, &taken, &mut out);
         }
         let pieces = self.sides_in(PIECE * spacing);
-        areas::share(&mut out, spacing, self.volume(), pieces, |x| space(self.nearest(plane(x)).0));
+        areas::share(&mut out, spacing, self.volume(), pieces, evenly);
         out
     }
 
@@ -319,7 +328,8 @@ impl Geometry for Polygon {
 
     fn freed(&self, wall: &[DVec3], spacing: f64, free: &dyn Fn(DVec3, DVec3) -> bool) -> Option<Particles> {
         let pieces = self.sides_in(CUT * spacing).filter(|(at, area)| free(*at, area.normalize_or_zero()));
-        Some(areas::of_some(wall, spacing, pieces, |x| space(self.nearest(plane(x)).0)))
+        let evenly = |x| space(self.nearest_evenly(plane(x), areas::AS_NEAR * spacing));
+        Some(areas::of_some(wall, spacing, pieces, evenly))
     }
 
     /// Points alone, all of one weight, which sum to 1 over the side that has most of them.
@@ -339,5 +349,31 @@ impl Geometry for Polygon {
             }
         }
         Surface::even(points, faces, PLANE_FACES)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_take_no_side_wherever_the_section_begins() {
+        let keel = [[-6.0, 3.0], [0.0, -3.0], [6.0, 3.0]];
+        let square = [[-1.25, -1.25], [1.25, -1.25], [1.25, 1.25], [-1.25, 1.25]];
+        for corners in [&keel[..], &square] {
+            for begin in 0..corners.len() {
+                let mut corners = corners.to_vec();
+                corners.rotate_left(begin);
+                let out = Polygon::new(&corners, 1.0).particles(1.0, 2, 2);
+                for (k, x) in out.wall.iter().enumerate() {
+                    let mirror = |v: DVec3| DVec3::new(-v.x, v.y, v.z);
+                    let other =
+                        out.wall.iter().position(|y| y.distance(mirror(*x)) < 1e-9).expect("a mirrored one");
+                    let (area, way) = (out.area[k], out.to_surface[k]);
+                    assert!(out.area[other].distance(mirror(area)) < 1e-9, "{x}: {area} {}", out.area[other]);
+                    assert!(out.to_surface[other].distance(mirror(way)) < 1e-9, "{x}: {way}");
+                }
+            }
+        }
     }
 }
