@@ -7,6 +7,9 @@ use crate::case::{PressureGauge, VelocityGauge};
 use crate::error::Problem;
 use glam::DVec3;
 
+/// Depth below the surface of a solid at which a place is inside it, over the spacing: in two dimensions solids are half a spacing deep at most.
+const INSIDE: f64 = 0.4;
+
 impl Builder<'_> {
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     pub(super) fn gauges(&mut self) {
@@ -52,7 +55,7 @@ impl Builder<'_> {
         if self.lattice.plane {
             at.y = 0.0;
         }
-        let inside = |shape: &Placed| shape.distance(at) < -0.5 * self.lattice.spacing;
+        let inside = |shape: &Placed| shape.distance(at) < -INSIDE * self.lattice.spacing;
         let wall =
             self.fixed.shapes.iter().find(|wall| inside(&Placed::from(*wall))).map(|wall| wall.name.clone());
         let still =

@@ -21,8 +21,9 @@ pub(super) const AS_NEAR: f64 = 1e-6;
 const TOGETHER: usize = 1 << 16;
 /// Conditions of still water on the areas: no push by an even pressure, the weight of the volume by one that grows, no turn by that.
 const CONDITIONS: usize = 21;
-/// How many of them are asked for, where more would change areas by too much.
+/// How many of them are asked of fewer particles than [`FEW`], where more would change areas by more than [`MOST_CHANGE`].
 const KEPT: [usize; 3] = [CONDITIONS, 12, 3];
+const FEW: usize = 24;
 /// Largest change of an area over the mean of all.
 const MOST_CHANGE: f64 = 0.5;
 /// What of a condition the others leave, below which it is none of its own.
@@ -159,7 +160,8 @@ pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3,
     };
     let mean = total / weights.len() as f64;
     let is_small = |areas: &[DVec3]| {
-        areas.iter().zip(&particles.area).all(|(new, old)| new.distance(*old) <= MOST_CHANGE * mean)
+        weights.len() >= FEW
+            || areas.iter().zip(&particles.area).all(|(new, old)| new.distance(*old) <= MOST_CHANGE * mean)
     };
     // A handful of particles cannot meet all conditions but by areas that are none.
     let found = KEPT.iter().map(|&kept| closed(kept)).find(|areas| is_small(areas));

@@ -87,8 +87,8 @@ impl Geometry for Sphere {
     }
 }
 
-/// About `n` directions spread evenly: a golden spiral, of a handful the corners of a tetrahedron or an octahedron, which alone carry an
-/// even pressure and one that grows.
+/// About `n` directions spread evenly: a golden spiral, of a handful the corners of a tetrahedron, an octahedron or a cube, which carry an even
+/// pressure and one that grows by themselves.
 fn directions(n: usize) -> Vec<DVec3> {
     match n {
         0..=4 => [
@@ -100,6 +100,11 @@ fn directions(n: usize) -> Vec<DVec3> {
         .map(DVec3::normalize)
         .to_vec(),
         5 | 6 => DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).collect(),
+        7..=9 => (0..8)
+            .map(|k| {
+                DVec3::from_array([1, 2, 4].map(|bit| if k & bit == 0 { -1.0 } else { 1.0 })).normalize()
+            })
+            .collect(),
         _ => fibonacci(n).collect(),
     }
 }
