@@ -30,7 +30,7 @@ fn a_report_holds_everything_and_fetches_nothing() {
         "prefers-color-scheme: dark",
         "<strong>Fine</strong>",
         "p floor [Pa]",
-        "on gate_force",
+        "on gate_force [N]",
         "a &lt;b&gt; &amp; c: place [m]",
         "gate: place [m]",
         "of motion",

@@ -385,7 +385,7 @@ pub(super) fn length(v: &Vector) -> f64 {
 }
 
 /// Name of a face as it is written.
-pub(super) fn face(face: Face) -> &'static str {
+pub(crate) fn face(face: Face) -> &'static str {
     match face {
         Face::XMin => "x_min",
         Face::XMax => "x_max",

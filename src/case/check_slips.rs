@@ -94,11 +94,7 @@ impl Checker<'_> {
             let message = format!("{} kg/m3 is the density of no liquid", fluid.density);
             self.warn("fluid.density", message, "write it in kg/m3: fresh water has 1000");
         }
-        let tall = |lo: &Vector, hi: &Vector| (hi[2] - lo[2]).max(0.0);
-        let tank = case.tank.iter().map(|t| tall(&t.min, &t.max));
-        let height = tank.chain(fluid.block.iter().map(|b| tall(&b.min, &b.max))).fold(0.0, f64::max);
-        let falls = MOST_FROUDE * (length(&case.run.gravity) * height).sqrt();
-        let most = if falls > 0.0 { falls.min(MOST_SPEED) } else { MOST_SPEED };
+        let most = self.most_speed();
         for (k, block) in fluid.block.iter().enumerate() {
             self.speed(&format!("fluid.block.{k}.velocity"), length(&block.velocity), most);
             let half = DVec3::from(block.max) - DVec3::from(block.min);
@@ -113,13 +109,21 @@ impl Checker<'_> {
         for (k, fill) in fluid.fill.iter().enumerate() {
             self.speed(&format!("fluid.fill.{k}.velocity"), length(&fill.velocity), most);
         }
-        for (path, speed) in self.speeds_of_openings() {
-            self.speed(&path, speed, most);
-        }
     }
 
-    /// Warns of a speed at the start above `most`, refuses one that nothing has [m/s].
-    fn speed(&mut self, path: &str, speed: f64, most: f64) {
+    /// Speed of water beyond which a number is a slip [m/s].
+    pub(super) fn most_speed(&self) -> f64 {
+        let case = self.case;
+        let tall = |lo: &Vector, hi: &Vector| (hi[2] - lo[2]).max(0.0);
+        let tank = case.tank.iter().map(|t| tall(&t.min, &t.max));
+        let blocks = case.fluid.iter().flat_map(|f| &f.block).map(|b| tall(&b.min, &b.max));
+        let height = tank.chain(blocks).fold(0.0, f64::max);
+        let falls = MOST_FROUDE * (length(&case.run.gravity) * height).sqrt();
+        if falls > 0.0 { falls.min(MOST_SPEED) } else { MOST_SPEED }
+    }
+
+    /// Warns of a speed above `most`, refuses one that nothing has [m/s].
+    pub(super) fn speed(&mut self, path: &str, speed: f64, most: f64) {
         if speed > IMPOSSIBLE_SPEED {
             self.add(
                 path,
@@ -235,11 +239,14 @@ impl Checker<'_> {
         self.slips_of_absorbers();
         self.slips_of_damped_waves();
         let Some(tank) = &case.tank else { return };
+        let axes: Vec<usize> = self.axes().collect();
+        // The axis along which a box lies beyond the tank by more than `reach` [m].
+        let beyond = |low: Vector, high: Vector, reach: f64| {
+            axes.iter().copied().find(|&k| high[k] < tank.min[k] - reach || low[k] > tank.max[k] + reach)
+        };
         for (k, obstacle) in case.obstacle.iter().enumerate() {
             let Some((low, high)) = obstacle.corners() else { continue };
-            let reach = case.run.effective_radius * l0;
-            let apart = |&k: &usize| high[k] < tank.min[k] - reach || low[k] > tank.max[k] + reach;
-            if let Some(axis) = self.axes().find(apart) {
+            if let Some(axis) = beyond(low, high, case.run.effective_radius * l0) {
                 let message = format!(
                     "obstacle `{}` lies outside of the tank along {}, where nothing comes",
                     obstacle.name, AXES[axis]
@@ -258,9 +265,7 @@ impl Checker<'_> {
             let half =
                 DMat3::from_cols(edges[0].abs(), edges[1].abs(), DVec3::ZERO) * DVec3::new(0.5, 0.5, 0.0);
             let center = DVec3::from(plane.center);
-            let (low, high) = (center - half, center + half);
-            let apart = |&k: &usize| high[k] < tank.min[k] - l0 || low[k] > tank.max[k] + l0;
-            if let Some(axis) = self.axes().find(apart) {
+            if let Some(axis) = beyond((center - half).into(), (center + half).into(), l0) {
                 let message = format!(
                     "plane `{}` lies outside of the tank along {}: it holds no water",
                     plane.name, AXES[axis]

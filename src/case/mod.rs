@@ -35,6 +35,7 @@ mod water;
 mod wave;
 
 pub use absorber::Absorber;
+pub(crate) use check::face;
 pub(crate) use coarse::coarse;
 pub use contact::{Contact, ContactDevice, ContactPair, Law};
 pub use copies::{Array, Written};

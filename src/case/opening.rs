@@ -261,23 +261,11 @@ impl Checker<'_> {
             // A wall that swallows hurries where it is not all under water.
             let hurry = if key == "discharge" && !opening.is_inflow() { HURRY } else { 1.0 };
             self.crosses(&path, full, hurry);
+            // One without area is told of already.
+            if full.is_finite() {
+                self.speed(&path, full, self.most_speed());
+            }
         }
-    }
-
-    /// Keys of what openings let pass, and its fastest speed [m/s].
-    pub(super) fn speeds_of_openings(&self) -> Vec<(String, f64)> {
-        let Some(tank) = &self.case.tank else { return vec![] };
-        let most = |rate: &Rate| rate.rows().iter().map(|r| r[1]).fold(0.0, f64::max);
-        let of = |opening: OpeningKeys<'_>| {
-            let area = opening.area(tank, self.flat());
-            [("velocity", opening.velocity, 1.0), ("discharge", opening.discharge, area)]
-                .into_iter()
-                .filter_map(|(key, rate, over)| {
-                    Some((format!("{}.{key}", opening.path()), most(rate?) / over))
-                })
-                .collect::<Vec<_>>()
-        };
-        self.case.openings().flat_map(of).filter(|(_, speed)| speed.is_finite()).collect()
     }
 
     /// The corners of an opening: both or none, and a box that meets the face.

@@ -112,7 +112,7 @@ impl Curve {
     /// Derivatives at the first and the last row, before and after which it is at rest; `None` of a straight line or a place.
     pub fn ends(&self) -> Option<[DVec3; 2]> {
         let [first, _, .., last] = &self.slope[..] else { return None };
-        (self.time.len() > 2).then_some([*first, *last])
+        Some([*first, *last])
     }
 
     /// Whether the derivative changes between `t` and `t + dt` [s].

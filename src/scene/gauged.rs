@@ -3,7 +3,7 @@
 use super::build::Builder;
 use super::oriented::Placed;
 use super::{Solid, point, wall_at};
-use crate::case::{PressureGauge, VelocityGauge};
+use crate::case::{PressureGauge, Vector, VelocityGauge};
 use crate::error::Problem;
 use glam::DVec3;
 
@@ -19,10 +19,7 @@ impl Builder<'_> {
         let still = still.into_iter().flat_map(Solid::wall_positions);
         let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
         let wrong = |(k, gauge): (usize, &PressureGauge)| {
-            let mut at: DVec3 = gauge.point.into();
-            if self.lattice.plane {
-                at.y = 0.0;
-            }
+            let at = self.place(gauge.point);
             let (key, name) = (format!("gauge.pressure.{k}.point"), &gauge.name);
             let nearest = wall_at(&walls, at, reach, self.lattice.spacing).err()?;
             let is_on = |s: &&&Solid| {
@@ -49,12 +46,15 @@ impl Builder<'_> {
         self.notes.extend(notes);
     }
 
+    /// A point of the case [m], in the plane in two dimensions.
+    fn place(&self, point: Vector) -> DVec3 {
+        let at = DVec3::from(point);
+        if self.lattice.plane { at.with_y(0.0) } else { at }
+    }
+
     /// What there is to say of a velocity gauge inside a solid that stays: no water ever comes there.
     fn covered(&self, gauge: &VelocityGauge) -> Option<String> {
-        let mut at: DVec3 = gauge.point.into();
-        if self.lattice.plane {
-            at.y = 0.0;
-        }
+        let at = self.place(gauge.point);
         let inside = |shape: &Placed| shape.distance(at) < -INSIDE * self.lattice.spacing;
         let wall =
             self.fixed.shapes.iter().find(|wall| inside(&Placed::from(*wall))).map(|wall| wall.name.clone());

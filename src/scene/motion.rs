@@ -125,7 +125,7 @@ impl Motion {
     pub(super) fn abrupt(&self, end: f64) -> Vec<String> {
         let way = if let Way::Table(curve) = &self.displacement { Some((curve, 1.0, "m/s")) } else { None };
         let turn = match self.rotation.as_ref().map(|r| &r.turning) {
-            Some(Turning::Table(curve)) => Some((curve, 180.0 / std::f64::consts::PI, "degrees/s")),
+            Some(Turning::Table(curve)) => Some((curve, 1_f64.to_degrees(), "degrees/s")),
             _ => None,
         };
         way.into_iter()

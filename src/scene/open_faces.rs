@@ -2,7 +2,7 @@
 
 use super::build::Builder;
 use super::lattice::{Cells, FLUID, FREE, REACHED};
-use crate::case::TANK_FACES;
+use crate::case::{TANK_FACES, face};
 use crate::error::Problem;
 
 impl Builder<'_> {
@@ -22,11 +22,11 @@ impl Builder<'_> {
         for (key, label, corners, open) in obstacles.chain(walls) {
             let Some((min, max)) = corners else { continue };
             let cells = self.lattice.cells(min.into(), max.into());
-            for (k, (face, name)) in TANK_FACES.iter().enumerate() {
-                if !open.contains(face) || (self.lattice.plane && k / 2 == 1) {
+            for (k, &(side, _)) in TANK_FACES.iter().enumerate() {
+                if !open.contains(&side) || (self.lattice.plane && k / 2 == 1) {
                     continue;
                 }
-                let name = name.trim_start_matches("tank.");
+                let name = face(side);
                 let (wet, bare) = self.before(cells, k);
                 if wet > 0 {
                     let message = format!(

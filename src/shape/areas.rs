@@ -163,9 +163,14 @@ pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3,
         weights.len() >= FEW
             || areas.iter().zip(&particles.area).all(|(new, old)| new.distance(*old) <= MOST_CHANGE * mean)
     };
-    // A handful of particles cannot meet all conditions but by areas that are none.
-    let found = KEPT.iter().map(|&kept| closed(kept)).find(|areas| is_small(areas));
-    particles.area = found.unwrap_or_else(|| closed(KEPT[KEPT.len() - 1]));
+    // A handful of particles cannot meet all conditions but by areas that are none; what is left of them in the end always holds.
+    for kept in KEPT {
+        let areas = closed(kept);
+        if kept == KEPT[KEPT.len() - 1] || is_small(&areas) {
+            particles.area = areas;
+            return;
+        }
+    }
 }
 
 /// What the area at `x` is multiplied by in each condition: 1 along each axis, x_k along each, x_k times the arm about each.

@@ -76,9 +76,8 @@ impl Geometry for Sphere {
                 out.add(depth, r * outward, area * outward, 0.5 * step * outward);
             }
         }
-        // No pressure turns a sphere; what a handful of particles cannot do without is left to the second pass.
+        // No pressure turns a sphere.
         areas::close(&mut out, self.volume(), |at, change| change.project_onto(at));
-        areas::close(&mut out, self.volume(), |_, change| change);
         out
     }
 
@@ -126,7 +125,7 @@ mod tests {
 
     #[test]
     fn areas_push_through_the_middle_and_carry_the_volume() {
-        for tenths in [5, 10, 11, 12, 13, 15, 20, 30, 33, 60] {
+        for tenths in (5..60).chain([100]) {
             let sphere = Sphere { radius: 0.1 * f64::from(tenths) };
             let particles = sphere.particles(1.0, 3, 2);
             let (mut sum, mut volume) = (DVec3::ZERO, 0.0);

@@ -339,14 +339,14 @@ fn gauges(run: &Run) -> String {
         let points = run.gauges.curve(c).unwrap_or_default();
         points.iter().all(|p| p[1] == 0.0 || !p[1].is_finite())
     };
-    for (title, of) in all.iter_mut().filter(|(_, of)| of.len() > 1) {
-        let moves: Vec<_> = of.iter().filter(|(c, _)| !still(c)).cloned().collect();
-        match &moves[..] {
-            [] => continue,
-            [(one, _)] => *title = (*one).to_owned(),
-            _ => {}
+    for (title, of) in &mut all {
+        if of.iter().any(|(c, _)| !still(c)) {
+            of.retain(|(c, _)| !still(c));
         }
-        *of = moves;
+        // One alone has its whole name.
+        if let [(one, _)] = &of[..] {
+            *title = (*one).to_owned();
+        }
     }
     let draw = |(title, of): &(String, Vec<(&str, String)>)| {
         let columns: Vec<(&str, &str)> = of.iter().map(|(c, label)| (*c, label.as_str())).collect();
