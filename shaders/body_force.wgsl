@@ -37,34 +37,35 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let pose = poses[chunk.z];
         let wall = wall_layer[k];
         let p = pressure[params.fluid + k];
-        var on_surface = p + surface_head(pose, wall);
 //#if MIXED
         let under_water = excess[k] < DRY && !is_known_row(excess[k]);
-        on_surface -= vec3f(excess[k]);
+        let on_surface = p - excess[k];
+        let least = -LARGEST;
 //#else
         let under_water = state[params.fluid + k] == INNER;
-        on_surface = max(on_surface, vec3f(0.0));
+        let on_surface = p;
+        let least = 0.0;
 //#endif
-        var pressed = vec3f(0.0);
+        var pressed = Wrench(vec3f(0.0), vec3f(0.0));
         var part = 1.0;
 //#if COUPLED
         part -= coupling[4u * k].w;
 //#endif
         if under_water {
-            pressed = -part * rotate(pose.orientation, on_surface * wall.area.xyz);
+            pressed = pressed_on_faces(pose, wall, part, on_surface, least);
             let area = rotate(pose.orientation, wall.area.xyz);
             force = -part * params.dynamic_viscosity * cross(pose.angular_velocity.xyz, area);
         }
 //#if MIXED
         if is_known_row(excess[k]) {
-            pressed = -part * pressed_beside_surface(pose, wall, excess[k]);
+            pressed = pressed_on_faces(pose, wall, part, -excess[k], 0.0);
         }
 //#endif
 //#if REACTION
         force += reaction[k].xyz;
 //#endif
-        torque = cross(rotate(pose.orientation, wall.arm.xyz), force) + cross(pressed_arm(pose, wall), pressed);
-        force += pressed;
+        torque = cross(rotate(pose.orientation, wall.arm.xyz), force) + pressed.torque;
+        force += pressed.force;
 //#if COUPLED
         if under_water {
             force += p * coupling[4u * k].xyz + coupling[4u * k + 2u].xyz;

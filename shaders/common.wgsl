@@ -23,6 +23,7 @@ const SURFACE: u32 = 1u;
 const INNER: u32 = 2u;
 // Excess of a wall's row whose pressure is no unknown; DRY in src/backend/gpu/layout.rs.
 const DRY: f32 = 3.0e38;
+const LARGEST: f32 = 3.4e38;
 
 // What stands in the place of its excess if it is a solid's beside the water's surface, with a pressure that is known: less that pressure, with
 // the last bit set, which an excess has not.
@@ -122,12 +123,24 @@ struct Pose {
     angular_velocity: vec4f,
 }
 
+// A face of a wall-layer particle: outward area, and from the particle to its middle.
+struct WallFace {
+    area: vec4f,
+    way: vec4f,
+}
+
 // A wall-layer particle of a moving solid, in the solid's frame: outward area, from the centre of mass to the surface, from
-// the particle to the surface.
+// the particle to the surface, and its faces, which sum up to the area. Those that it lacks have none.
 struct WallParticle {
     area: vec4f, // and its lightness in collisions
-    arm: vec4f, // and 1 of a box, whose particles at edges have a part of each face there
+    arm: vec4f,
     to_surface: vec4f, // and cut_share of src/kernels/wall_excess.rs
+    faces: array<WallFace, 3>,
+}
+
+struct Wrench {
+    force: vec3f,
+    torque: vec3f,
 }
 
 // A box in which the water comes to rest. Corners relative to the middle of the domain; s = ramp.xyz . (r - start.xyz).
@@ -527,22 +540,30 @@ fn coupled_row(k: u32) -> u32 {
     return 4u * params.moving_wall + 2u * k;
 }
 
-// Pressures of still water on the true surface of a moving solid over that of a wall-layer particle, half a spacing inside: on its face along
-// each axis of the solid's frame of a box, else thrice the same. See head and on_faces in src/kernels/body_force.rs.
-fn surface_head(pose: Pose, wall: WallParticle) -> vec3f {
-    if wall.arm.w == 0.0 {
-        return vec3f(params.density * dot(params.gravity, rotate(pose.orientation, wall.to_surface.xyz)) + params.surface_head);
+// What a pressure of `p` at a wall-layer particle of a moving solid, where it stands for `part` of its area, does to the solid: on each of
+// its faces with the weight of the water on the way there; `least` is the lowest pressure on them. See on_faces and head in
+// src/kernels/body_force.rs.
+fn pressed_on_faces(pose: Pose, wall: WallParticle, part: f32, p: f32, least: f32) -> Wrench {
+    var faces = wall.faces;
+    let place = wall.arm.xyz - wall.to_surface.xyz;
+    var sum = Wrench(vec3f(0.0), vec3f(0.0));
+    for (var f = 0u; f < 3u; f++) {
+        let way = faces[f].way.xyz;
+        let head = params.density * dot(params.gravity, rotate(pose.orientation, way)) + params.surface_head;
+        let force = rotate(pose.orientation, -part * max(p + head, least) * faces[f].area.xyz);
+        sum.force += force;
+        sum.torque += cross(rotate(pose.orientation, place + way), force);
     }
-    let back = vec4f(-pose.orientation.xyz, pose.orientation.w);
-    return params.density * rotate(back, params.gravity) * wall.to_surface.xyz + params.surface_head;
+    return sum;
 }
 
-// What a solid's particle is pressed with, outwards, that is no row but beside the water's surface: where a face lies above the water it is not.
-fn pressed_beside_surface(pose: Pose, wall: WallParticle, excess: f32) -> vec3f {
-    return rotate(pose.orientation, max(surface_head(pose, wall) - vec3f(excess), vec3f(0.0)) * wall.area.xyz);
-}
-
-// From the centre of mass to where pressures act: those on the faces of a box act along the ways to them.
-fn pressed_arm(pose: Pose, wall: WallParticle) -> vec3f {
-    return rotate(pose.orientation, wall.arm.xyz - wall.arm.w * wall.to_surface.xyz);
+// The same for each pascal that acts on all of them.
+fn pressed_evenly(pose: Pose, wall: WallParticle, part: f32) -> Wrench {
+    var faces = wall.faces;
+    let place = wall.arm.xyz - wall.to_surface.xyz;
+    var torque = vec3f(0.0);
+    for (var f = 0u; f < 3u; f++) {
+        torque -= part * cross(place + faces[f].way.xyz, faces[f].area.xyz);
+    }
+    return Wrench(rotate(pose.orientation, -part * wall.area.xyz), rotate(pose.orientation, torque));
 }

@@ -34,11 +34,6 @@ struct FreeBody {
     bodies: u32, // how many there are
 }
 
-struct Wrench {
-    force: vec3f,
-    torque: vec3f,
-}
-
 var<workgroup> force_of: array<vec3f, 256>;
 var<workgroup> torque_of: array<vec3f, 256>;
 var<workgroup> force_row: array<vec3f, 16>;
@@ -94,18 +89,17 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         var row = Wrench(vec3f(0.0), vec3f(0.0));
         var force = vec3f(0.0);
         let slot = coupling[4u * k];
-        let face_arm = per_spacing * pressed_arm(pose, wall);
+        let part = 1.0 - slot.w;
         if is_known_row(excess[k]) {
-            let pressed = (slot.w - 1.0) * pressed_beside_surface(pose, wall, excess[k]);
-            known.force += pressed;
-            known.torque += cross(face_arm, pressed);
+            let pressed = pressed_on_faces(pose, wall, part, -excess[k], 0.0);
+            known.force += pressed.force;
+            known.torque += per_spacing * pressed.torque;
         } else if excess[k] < DRY {
-            row.force = (slot.w - 1.0) * rotate(pose.orientation, wall.area.xyz);
-            row.torque = cross(face_arm, row.force);
-            let at_zero = surface_head(pose, wall) - vec3f(excess[k]);
-            let pressed = (slot.w - 1.0) * rotate(pose.orientation, at_zero * wall.area.xyz);
-            known.force += pressed;
-            known.torque += cross(face_arm, pressed);
+            row = pressed_evenly(pose, wall, part);
+            row.torque *= per_spacing;
+            let at_zero = pressed_on_faces(pose, wall, part, -excess[k], -LARGEST);
+            known.force += at_zero.force;
+            known.torque += per_spacing * at_zero.torque;
             force = params.dynamic_viscosity * cross(pose.angular_velocity.xyz, row.force);
             let of_torque = coupling[4u * k + 1u];
             let head = coupling[4u * k + 2u];

@@ -319,7 +319,7 @@ fn structs_lie_the_same_on_both_sides() {
     same_layout!("multigrid", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("halo", Hierarchy { level, operation, levels, capacity, cells, operations });
     same_layout!("move_solids", Pose { position, orientation, velocity, angular_velocity });
-    same_layout!("body_force", WallParticle { area, arm, to_surface });
+    same_layout!("body_force", WallParticle { area, arm, to_surface, faces });
     same_layout!("openings", Emission { wall, count, to, pad, shift, velocity });
     same_layout!("openings", Outlet { low, high, room_low, room_high });
     same_layout!("absorber", AbsorberZone { low, high, start, ramp });

@@ -3,7 +3,7 @@
 use crate::common::{case, cpu_simulation};
 use glam::{DVec2, DVec3};
 use seixo::scene::Scene;
-use seixo::shape::{Geometry, Mesh, Particles, Polygon, Shape};
+use seixo::shape::{Face, Geometry, Mesh, Particles, Polygon, Shape};
 use std::f64::consts::{PI, TAU};
 use std::time::{Duration, Instant};
 
@@ -46,16 +46,21 @@ fn layers_of_many_sided_sections_lie_as_even_as_those_of_a_disc() {
     }
 }
 
+/// The faces of all particles, with the numbers of these.
+fn faces(particles: &Particles) -> impl Iterator<Item = (usize, Face)> + '_ {
+    (0..particles.wall.len()).flat_map(|k| particles.faces(k).map(move |face| (k, face)))
+}
+
 /// Sum A, sum x A^T and sum x_k (x cross A) against what they are of the surface, over its area and size.
 fn off(particles: &Particles, volume: f64, plane: bool) -> f64 {
-    let at: Vec<DVec3> = particles.wall.iter().zip(&particles.to_surface).map(|(x, s)| *x + *s).collect();
-    let rows = || at.iter().zip(&particles.area);
-    let area: f64 = particles.area.iter().map(|a| a.length()).sum();
-    let size = at.iter().map(|x| x.length()).fold(0.0, f64::max);
-    let mut most = rows().map(|(_, a)| *a).sum::<DVec3>().length() / area;
+    let faces: Vec<(DVec3, DVec3)> =
+        faces(particles).map(|(k, face)| (particles.wall[k] + face.way, face.area)).collect();
+    let area: f64 = faces.iter().map(|face| face.1.length()).sum();
+    let size = faces.iter().map(|face| face.0.length()).fold(0.0, f64::max);
+    let mut most = faces.iter().map(|face| face.1).sum::<DVec3>().length() / area;
     for (k, e) in DVec3::AXES.into_iter().enumerate().filter(|(k, _)| !(plane && *k == 1)) {
-        let push: DVec3 = rows().map(|(x, a)| x[k] * *a).sum();
-        let turn: DVec3 = rows().map(|(x, a)| x[k] * x.cross(*a)).sum();
+        let push: DVec3 = faces.iter().map(|(x, a)| x[k] * *a).sum();
+        let turn: DVec3 = faces.iter().map(|(x, a)| x[k] * x.cross(*a)).sum();
         most =
             most.max((push - volume * e).length() / (area * size)).max(turn.length() / (area * size * size));
     }
@@ -79,8 +84,9 @@ fn the_pressure_of_still_water_lifts_a_solid_and_does_not_turn_it() {
             let off = off(&particles, shape.volume(), dimensions == 2);
             assert!(off < 1e-12, "{}, {dimensions}D, {l0}: {off:.1e}", shape.name());
             // Where the pressure acts is on the surface; before the bisector of a corner it is on that: a hair aside another face is the nearest.
-            for (x, s) in particles.wall.iter().zip(&particles.to_surface) {
-                let (name, at) = (shape.name(), *x + *s);
+            for (k, face) in faces(&particles) {
+                let x = particles.wall[k];
+                let (name, at) = (shape.name(), x + face.way);
                 let (distance, outward) = shape.distance(at);
                 let aside = || shape.distance(at - 1e-4 * l0 * outward).1.dot(outward) < 1.0 - 1e-6;
                 assert!(

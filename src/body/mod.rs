@@ -347,6 +347,7 @@ mod tests {
             dummy_offset: vec![],
             wall_area: vec![],
             wall_to_surface: vec![],
+            wall_edges: Default::default(),
         };
         Body::new(&solid, 3)
     }

@@ -8,6 +8,7 @@ use super::{CELL, Standing, Tiles, moving, still};
 use crate::body::Pose;
 use crate::contact::broad::PointGrid;
 use crate::scene::{Scene, Solid};
+use crate::shape;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -102,11 +103,11 @@ impl DrivenFaces {
 /// The faces of a solid's rows that have an area.
 fn faces(solid: &Solid) -> Vec<Face> {
     let of = |row: usize| {
-        let face = move |(area, to_surface)| Face {
+        let face = move |face: shape::Face| Face {
             row,
-            to_surface,
-            center: solid.wall_offset[row] + to_surface,
-            area,
+            to_surface: face.way,
+            center: solid.wall_offset[row] + face.way,
+            area: face.area,
         };
         solid.faces(row).map(face)
     };

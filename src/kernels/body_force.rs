@@ -57,9 +57,9 @@ pub fn beside_surface(pressure: f64, to_surface: DVec3, params: &Params) -> f64 
 pub fn on_faces(solid: &Solid, k: usize, pose: &Pose, part: f64, pressure: impl Fn(DVec3) -> f64) -> Wrench {
     let turn = pose.orientation;
     let mut sum = Wrench::default();
-    for (area, way) in solid.faces(k) {
-        let way = turn * way;
-        let force = -part * pressure(way) * (turn * area);
+    for face in solid.faces(k) {
+        let way = turn * face.way;
+        let force = -part * pressure(way) * (turn * face.area);
         sum += Wrench { force, torque: (turn * solid.wall_offset[k] + way).cross(force) };
     }
     sum

@@ -23,13 +23,14 @@ use crate::scene::{Drive, FreeBody, Solid};
 pub const SURFACE: f64 = 0.5;
 
 /// Part that `solid` feels in the same step of what the cut changes, which no equation knew: 1, but M / m of a body lighter than m, and 0 of a solid that is not
-/// free, or held. M is its mass, m that of the water between its wall layer and its surface, rho / d . sum A . to_surface.
+/// free, or held. M is its mass, m that of the water between its wall layer and its surface, rho / d . sum A . way over its faces.
 pub fn cut_share(solid: &Solid, params: &Params) -> f64 {
     let Drive::Free(FreeBody { mass, .. }) = &solid.drive else { return 0.0 };
     if !solid.gives_way() {
         return 0.0;
     }
-    let layer: f64 = solid.wall_area.iter().zip(&solid.wall_to_surface).map(|(a, way)| a.dot(*way)).sum();
+    let faces = (0..solid.wall_area.len()).flat_map(|k| solid.faces(k));
+    let layer: f64 = faces.map(|face| face.area.dot(face.way)).sum();
     (mass * f64::from(params.dimensions) / (params.density * layer)).min(1.0)
 }
 

@@ -51,6 +51,7 @@ pub(super) fn body(
         dummy_offset: from_there(particles.dummy),
         wall_area: particles.area,
         wall_to_surface: particles.to_surface,
+        wall_edges: particles.edges,
     })
 }
 

@@ -40,7 +40,7 @@ mod support;
 mod walls;
 mod water;
 
-pub use crate::shape::Shape;
+pub use crate::shape::{Edges, Face, Shape};
 pub use curve::Curve;
 pub use motion::Motion;
 pub use opening::{Course, Opening, Passes};
@@ -49,7 +49,7 @@ pub(crate) use placement::{CONTACT_DISTANCE, point};
 pub(crate) use shaped::COVERED;
 
 use crate::periodic::Periodic;
-use crate::shape::{Surface, WallLayer, row_faces};
+use crate::shape::{Surface, WallLayer};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -235,6 +235,8 @@ pub struct Solid {
     /// For each wall-layer particle, the vector from its centre to the true surface (to the edge or
     /// corner where it belongs to two or three faces), solid's frame [m].
     pub wall_to_surface: Vec<DVec3>,
+    /// Those wall-layer particles that have several faces.
+    pub wall_edges: Edges,
 }
 
 impl Solid {
@@ -280,9 +282,9 @@ impl Solid {
         }
     }
 
-    /// The faces of row `k`: outward area [m2], and the way to the middle [m], in its frame ([`row_faces`]).
-    pub(crate) fn faces(&self, k: usize) -> impl Iterator<Item = (DVec3, DVec3)> {
-        row_faces(self.shape.as_cuboid().is_some(), self.wall_area[k], self.wall_to_surface[k])
+    /// The faces of row `k`, in its frame.
+    pub(crate) fn faces(&self, k: usize) -> impl Iterator<Item = Face> + use<> {
+        self.wall_edges.faces(k, self.wall_area[k], self.wall_to_surface[k])
     }
 
     /// Turn from the shape as its keys describe it to where `orientation`, that of a pose, has it: what users are told. At the start

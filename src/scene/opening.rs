@@ -310,6 +310,7 @@ impl Builder<'_> {
                 dummy_offset: (1..deep).flat_map(offset).collect(),
                 wall_area: vec![-opening.outward * l0 * l0; count],
                 wall_to_surface: vec![-opening.outward * 0.5 * l0; count],
+                wall_edges: Default::default(),
             });
         }
     }

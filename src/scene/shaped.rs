@@ -55,6 +55,7 @@ fn wall(
         dummy_offset: vec![],
         wall_area: vec![],
         wall_to_surface: vec![],
+        wall_edges: Default::default(),
     })
 }
 
@@ -119,6 +120,7 @@ impl Builder<'_> {
             solid.dummy_offset = particles.dummy;
             solid.wall_area = particles.area;
             solid.wall_to_surface = particles.to_surface;
+            solid.wall_edges = particles.edges;
             self.thin(&key, &solid);
             self.seams(&key, solid.what(), &solid.name, &solid.placed(), fixed);
             if fixed {
@@ -151,14 +153,16 @@ impl Builder<'_> {
                 areas[k] = freed.area[row];
                 solid.wall_to_surface[k] = freed.to_surface[row];
             }
+            solid.wall_edges = freed.edges;
         } else {
-            let bends = bending(&solid.wall_offset, &solid.wall_area, l0);
+            let bends = bending(&solid.wall_offset, &solid.wall_area, &solid.wall_edges, l0);
             // Of what is round the ends alone are flat, and the rim has a part of them.
             let ends = if solid.shape.pieces(l0).is_none() { solid.shape.axes() } else { vec![] };
             for k in 0..kept.len() {
                 let flat = if bends[k] { &ends[..] } else { &DVec3::AXES };
                 areas[k] = self.unfaced(solid, flat, areas[k], at(&solid.wall_offset[k]));
             }
+            solid.wall_edges = solid.wall_edges.kept(&kept);
         }
         fn left<T: Copy>(all: &[T], kept: &[bool]) -> Vec<T> {
             all.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()

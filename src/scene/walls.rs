@@ -4,6 +4,7 @@ use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
 use super::oriented::Placed;
 use super::{Curve, Drive, Motion, Shape, Solid, WallShape};
 use crate::case::{self, Face, TANK_FACES};
+use crate::shape::Edges;
 use crate::waves::Wave;
 use glam::{DMat3, DQuat, DVec3, IVec3};
 
@@ -246,6 +247,7 @@ pub(super) fn moving_wall(
         dummy_offset: Vec::new(),
         wall_area: Vec::new(),
         wall_to_surface: Vec::new(),
+        wall_edges: Default::default(),
     };
     let closed = grid.closed(cells, closed(&wall.open, lattice.plane));
     let (shell, taken) = shell(cells, closed, grid, layers);
@@ -259,6 +261,7 @@ pub(super) fn moving_wall(
             solid.wall_to_surface.push(cell.outward * 0.5 * l0);
         }
     }
+    solid.wall_edges = Edges::of_box(&solid.wall_area, &solid.wall_to_surface);
     (solid, taken)
 }
 

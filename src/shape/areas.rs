@@ -1,16 +1,26 @@
 //! The surface of a solid as its wall layer feels it: the area of each particle, and the way to where the pressure acts on it.
 //!
-//! A particle stands for a part of one face. Where it had parts of two at an edge, the one pressure that it knows would act on both at one place: in
-//! still water an arm wrong by 0.3 of the spacing. So each piece of the surface goes to the nearest particle that looks its way, and the pressure of a particle
-//! acts in the middle of its pieces. What then is left of a push, or of a turn, by the pressure of still water is taken out of all areas.
+//! Each piece of the surface goes to the nearest particle. Where the surface has an edge, a particle has pieces on both sides of it: its faces, each of which is
+//! pressed on in the middle of its own pieces. With one middle for both, an arm would be wrong by 0.3 of the spacing in still water; given to the particles beside
+//! it that look the way of a face, the pieces at the edges of what falls into water would be pressed by what presses farther inside. What then is left of a push, or
+//! of a turn, by the pressure of still water is taken out of all areas.
 
-use super::Particles;
 use super::nearest::Nearest;
+use super::{Face, MOST_FACES, Particles};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Distance that counts as much as a normal that is off by 1, over the spacing: at an edge of 90 degrees a face's own particle is taken up to 2 spacings farther away.
-const TURN: f64 = 1.5;
+/// Distance that counts as much as a normal that is off by 1, over the spacing: pieces of a thin solid go to the particles on their side.
+const TURN: f64 = 0.5;
+/// The same of a solid that others cut. Particles at its edges stand close to those of the others, and the pressure of the next ones, which look the way of a face, is
+/// nearer to that of still water: the pieces at an edge of 90 degrees go to these.
+const TURN_OF_CUT: f64 = 1.5;
+/// Cosine between the normals of pieces of one face: what turns by more is an edge.
+const FACE: f64 = 0.77;
+/// Pieces whose normals differ by less are put together at once.
+const FLAT: f64 = 0.999;
+/// What of a particle's area is no face of its own.
+const STRIP: f64 = 0.01;
 /// Cosine between the normals of a particle and of pieces in whose middle its pressure acts.
 const ALIKE: f64 = 0.5;
 /// That middle is no farther than this from the nearest point of the surface, over the spacing.
@@ -48,23 +58,23 @@ pub(super) fn share(
     particles: &mut Particles,
     spacing: f64,
     volume: f64,
-    pieces: impl Iterator<Item = Piece>,
+    mut pieces: impl Iterator<Item = Piece>,
     nearest: impl Fn(DVec3) -> DVec3,
 ) {
-    give(particles, spacing, pieces, &nearest);
-    close(particles, volume, |_, change| change);
+    give(particles, (spacing, TURN), &mut pieces, &nearest);
+    close(particles, volume, &|_, change| change);
 }
 
 /// Those `pieces` alone of the surface on the particles `wall` of its layer: one that faces none of them has no area.
 pub(super) fn of_some(
     wall: &[DVec3],
     spacing: f64,
-    pieces: impl Iterator<Item = Piece>,
+    mut pieces: impl Iterator<Item = Piece>,
     nearest: impl Fn(DVec3) -> DVec3,
 ) -> Particles {
     let mut out = Particles::default();
     wall.iter().for_each(|&x| out.add(0, x, DVec3::ZERO, nearest(x) - x));
-    let middles = give(&mut out, spacing, pieces, &nearest);
+    let middles = give(&mut out, (spacing, TURN_OF_CUT), &mut pieces, &nearest);
     // One whose own side is left out stands for what it has of others.
     for (k, (sum, weight)) in middles.into_iter().enumerate().filter(|(_, m)| m.1 > 0.0) {
         let outward = out.area[k].normalize_or_zero();
@@ -76,56 +86,130 @@ pub(super) fn of_some(
     out
 }
 
-/// Gives `pieces` to particles; returns the middle of what each has [m], times its weight, and that.
+/// Gives `pieces` to particles, `turn` as [`TURN`]; returns the middle of what each has [m], times its weight, and that.
 fn give(
     particles: &mut Particles,
-    spacing: f64,
-    mut pieces: impl Iterator<Item = Piece>,
-    nearest: impl Fn(DVec3) -> DVec3,
+    (spacing, turn): (f64, f64),
+    pieces: &mut dyn Iterator<Item = Piece>,
+    nearest: &dyn Fn(DVec3) -> DVec3,
 ) -> Vec<(DVec3, f64)> {
     let seen = |at: DVec3, normal: DVec3| {
-        let turned = TURN * spacing * normal;
+        let turned = turn * spacing * normal;
         [at.x, at.y, at.z, turned.x, turned.y, turned.z]
     };
     let normals: Vec<DVec3> = particles.to_surface.iter().map(|s| s.normalize_or_zero()).collect();
     let tree = Nearest::new(particles.wall.iter().zip(&normals).map(|(x, n)| seen(*x, *n)).collect());
-    let mut middles = vec![(DVec3::ZERO, 0.0); particles.wall.len()];
-    let mut all = middles.clone();
+    let mut parts: Vec<Vec<Part>> = vec![vec![]; particles.wall.len()];
     loop {
-        let some: Vec<Piece> = pieces.by_ref().take(TOGETHER).collect();
+        let some: Vec<Piece> = (&mut *pieces).take(TOGETHER).collect();
         if some.is_empty() {
             break;
         }
         let found = tree.to_each(&some, |(at, area)| seen(*at, area.normalize_or_zero()), AS_NEAR * spacing);
-        let shared = some.into_iter().zip(&found).flat_map(|((at, area), nearest)| {
-            nearest.iter().map(move |&k| (at, area / nearest.len() as f64, k))
-        });
-        for (at, area, k) in shared {
-            particles.area[k] += area;
-            all[k].0 += area.length() * at;
-            all[k].1 += area.length();
-            if area.dot(normals[k]) > ALIKE * area.length() {
-                middles[k].0 += area.length() * at;
-                middles[k].1 += area.length();
+        for ((at, area), nearest) in some.into_iter().zip(&found) {
+            let area = area / nearest.len() as f64;
+            let piece = Part { area, moment: area.length() * at, weight: area.length() };
+            for &k in nearest {
+                match parts[k].iter_mut().find(|part| part.looks_like(&piece, FLAT)) {
+                    Some(part) => part.add(&piece),
+                    None => parts[k].push(piece),
+                }
             }
         }
     }
-    for (k, (sum, weight)) in middles.into_iter().enumerate().filter(|(_, m)| m.1 > 0.0) {
-        let above = particles.wall[k] + particles.to_surface[k];
-        let off = sum / weight - above;
-        let along = off - off.dot(normals[k]) * normals[k];
-        particles.to_surface[k] = nearest(above + along.clamp_length_max(FAR * spacing)) - particles.wall[k];
+    let mut all = vec![(DVec3::ZERO, 0.0); particles.wall.len()];
+    for (k, parts) in parts.into_iter().enumerate() {
+        let x = particles.wall[k];
+        let mut whole = Part::default();
+        parts.iter().for_each(|part| whole.add(part));
+        particles.area[k] = whole.area;
+        all[k] = (whole.moment, whole.weight);
+        let faces = together(&parts);
+        if (2..=MOST_FACES).contains(&faces.len()) {
+            let face = |part: &Part| {
+                let way = (part.moment / part.weight - x).clamp_length_max(FAR * spacing);
+                Face { area: part.area, way: nearest(x + way) - x }
+            };
+            particles.edges.add(k, faces.iter().map(face).collect());
+            continue;
+        }
+        let mut alike = Part::default();
+        let towards = |part: &&Part| part.area.dot(normals[k]) > ALIKE * part.area.length();
+        parts.iter().filter(towards).for_each(|part| alike.add(part));
+        if alike.weight > 0.0 {
+            let above = x + particles.to_surface[k];
+            let off = alike.moment / alike.weight - above;
+            let along = off - off.dot(normals[k]) * normals[k];
+            particles.to_surface[k] = nearest(above + along.clamp_length_max(FAR * spacing)) - x;
+        }
     }
     all
+}
+
+/// Pieces of the surface that belong together.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    area: DVec3,
+    /// Sum of their middles, each times its area [m3].
+    moment: DVec3,
+    weight: f64,
+}
+
+impl Part {
+    fn add(&mut self, other: &Self) {
+        self.area += other.area;
+        self.moment += other.moment;
+        self.weight += other.weight;
+    }
+
+    /// Whether the cosine between the ways they look is more than `least`.
+    fn looks_like(&self, other: &Self, least: f64) -> bool {
+        self.area.dot(other.area) > least * self.area.length() * other.area.length()
+    }
+}
+
+/// The faces of a particle that has these `parts` of the surface: those that look nearly the same way, one after the other, are one.
+fn together(parts: &[Part]) -> Vec<Part> {
+    let mut left = parts.to_vec();
+    let mut out = vec![];
+    while let Some(first) = left.pop() {
+        let (mut members, mut at) = (vec![first], 0);
+        while at < members.len() {
+            let of = members[at];
+            let (near, far) = left.into_iter().partition(|part| part.looks_like(&of, FACE));
+            members.extend::<Vec<Part>>(near);
+            left = far;
+            at += 1;
+        }
+        let mut face = Part::default();
+        members.iter().for_each(|part| face.add(part));
+        out.push(face);
+    }
+    // A strip of a face that others hold goes with the largest.
+    let all: f64 = out.iter().map(|face| face.weight).sum();
+    let (strips, mut out): (Vec<Part>, Vec<Part>) =
+        out.into_iter().partition(|face| face.weight < STRIP * all);
+    if let Some(largest) = out.iter_mut().max_by(|a, b| a.weight.total_cmp(&b.weight)) {
+        strips.iter().for_each(|strip| largest.add(strip));
+    }
+    out
 }
 
 /// Corrects areas that are even only nearly, by as little as it takes: an even pressure may not push, and one that grows along x_k must push with the
 /// weight of `volume` [m3] and not turn, so sum A = 0, sum x A^T = volume and sum x_k (x cross A) = 0 about the centre of mass. `part` is what of a
 /// change of the area at a place may be made there.
-pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3, DVec3) -> DVec3 + Sync) {
-    let at: Vec<DVec3> = particles.wall.iter().zip(&particles.to_surface).map(|(x, s)| *x + *s).collect();
+pub(super) fn close(particles: &mut Particles, volume: f64, part: &(dyn Fn(DVec3, DVec3) -> DVec3 + Sync)) {
+    let (mut at, mut given, mut counts): (Vec<DVec3>, Vec<DVec3>, Vec<usize>) = Default::default();
+    for (k, x) in particles.wall.iter().enumerate() {
+        let before = at.len();
+        for face in particles.faces(k) {
+            at.push(*x + face.way);
+            given.push(face.area);
+        }
+        counts.push(at.len() - before);
+    }
     let size = at.iter().map(|x| x.length()).fold(0.0, f64::max);
-    let weights: Vec<f64> = particles.area.iter().map(|a| a.length()).collect();
+    let weights: Vec<f64> = given.iter().map(|a| a.length()).collect();
     let total: f64 = weights.iter().sum();
     if !(size > 0.0 && total > 0.0) {
         return;
@@ -141,7 +225,7 @@ pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3,
                 }
             }
         }
-        let mut areas = particles.area.clone();
+        let mut areas = given.clone();
         // Once more for what was rounded off.
         for _ in 0..2 {
             let mut missing = [0.0; CONDITIONS];
@@ -160,14 +244,19 @@ pub(super) fn close(particles: &mut Particles, volume: f64, part: impl Fn(DVec3,
     };
     let mean = total / weights.len() as f64;
     let is_small = |areas: &[DVec3]| {
-        weights.len() >= FEW
-            || areas.iter().zip(&particles.area).all(|(new, old)| new.distance(*old) <= MOST_CHANGE * mean)
+        counts.len() >= FEW
+            || areas.iter().zip(&given).all(|(new, old)| new.distance(*old) <= MOST_CHANGE * mean)
     };
     // A handful of particles cannot meet all conditions but by areas that are none; what is left of them in the end always holds.
     for kept in KEPT {
         let areas = closed(kept);
         if kept == KEPT[KEPT.len() - 1] || is_small(&areas) {
-            particles.area = areas;
+            let mut areas = areas.into_iter();
+            for (k, &count) in counts.iter().enumerate() {
+                let of: Vec<DVec3> = areas.by_ref().take(count).collect();
+                particles.area[k] = of.iter().sum();
+                particles.edges.set(k, &of);
+            }
             return;
         }
     }

@@ -1,6 +1,6 @@
 //! Where the surface of a solid bends.
 
-use super::PointCells;
+use super::{Edges, PointCells};
 use glam::DVec3;
 
 /// Rows of a layer this near each other, over l0, are neighbours in it.
@@ -14,11 +14,15 @@ pub(crate) fn bends(a: DVec3, b: DVec3) -> bool {
 }
 
 /// Of rows at `offset` with outward `area`, which lie where the surface bends on from one to the next, so that it touches others along a line or
-/// in a point.
-pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], spacing: f64) -> Vec<bool> {
+/// in a point. It does not at its `edges`.
+pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], edges: &Edges, spacing: f64) -> Vec<bool> {
     let mut cells = PointCells::new(ADJACENT * spacing);
     offset.iter().for_each(|&x| cells.add(x));
-    let way: Vec<DVec3> = area.iter().map(|a| a.normalize_or_zero()).collect();
+    let way = |(k, area): (usize, &DVec3)| match edges.of(k) {
+        [] => area.normalize_or_zero(),
+        _ => DVec3::ZERO,
+    };
+    let way: Vec<DVec3> = area.iter().enumerate().map(way).collect();
     let is_bent = |(k, &x): (usize, &DVec3)| {
         way[k] != DVec3::ZERO && cells.numbers(x).into_iter().any(|n| n != k && bends(way[k], way[n]))
     };
@@ -35,7 +39,7 @@ mod tests {
         let l0 = 0.01;
         let of = |shape: Shape| {
             let layer = shape.particles(l0, 3, 1);
-            let bends = bending(&layer.wall, &layer.area, l0);
+            let bends = bending(&layer.wall, &layer.area, &layer.edges, l0);
             (bends.iter().filter(|b| **b).count(), bends.len())
         };
         let (bent, _) = of(Shape::cuboid(DVec3::new(0.1, 0.13, 0.08)));

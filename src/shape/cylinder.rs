@@ -2,7 +2,7 @@
 
 use super::rings::{Ring, rings};
 use super::surface::{Ring as Circle, Side, Surface};
-use super::{ALL_FACES, Faces, Geometry, Inside, Particles, WallLayer};
+use super::{ALL_FACES, Face, Faces, Geometry, Inside, Particles, WallLayer};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -128,10 +128,18 @@ impl Geometry for Cylinder {
                 for k in 0..n {
                     let (sin, cos) = (TAU * (k as f64 + 0.5 * f64::from((i + j) % 2)) / n as f64).sin_cos();
                     let away = DVec3::new(cos, sin, 0.0);
-                    let area = rim * TAU * self.radius * step_z / n as f64 * away
-                        + end * annulus / n as f64 * DVec3::Z;
-                    let to_surface = 0.5 * (rim * step_r * away + end * step_z * DVec3::Z);
-                    out.add(depth, r * away + z * DVec3::Z, area, to_surface);
+                    let side = Face {
+                        area: rim * TAU * self.radius * step_z / n as f64 * away,
+                        way: 0.5 * rim * step_r * away,
+                    };
+                    let end = Face {
+                        area: end * annulus / n as f64 * DVec3::Z,
+                        way: 0.5 * end * step_z * DVec3::Z,
+                    };
+                    if rim != 0.0 && end.area != DVec3::ZERO {
+                        out.edges.add(out.wall.len(), vec![side, end]);
+                    }
+                    out.add(depth, r * away + z * DVec3::Z, side.area + end.area, side.way + end.way);
                 }
             }
         }

@@ -38,7 +38,8 @@ pub use nodes::Node;
 use nodes::nodes_between;
 pub use polygon::Polygon;
 pub(crate) use polygon::signed_area;
-pub(crate) use row::{face_before, row_faces};
+pub use row::{Edges, Face};
+pub(crate) use row::{MOST_FACES, face_before};
 pub use sphere::Sphere;
 pub use surface::{Line, Ring, Side, Surface};
 
@@ -281,6 +282,8 @@ pub struct Particles {
     pub area: Vec<DVec3>,
     /// From each particle of the wall layer to where its pressure acts on the true surface [m].
     pub to_surface: Vec<DVec3>,
+    /// Those of the wall layer that have several faces.
+    pub edges: Edges,
 }
 
 impl Particles {
@@ -293,6 +296,11 @@ impl Particles {
         self.wall.push(at);
         self.area.push(area);
         self.to_surface.push(to_surface);
+    }
+
+    /// The faces of particle `k` of the wall layer.
+    pub fn faces(&self, k: usize) -> impl Iterator<Item = Face> + use<> {
+        self.edges.faces(k, self.area[k], self.to_surface[k])
     }
 }
 

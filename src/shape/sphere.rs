@@ -77,7 +77,7 @@ impl Geometry for Sphere {
             }
         }
         // No pressure turns a sphere.
-        areas::close(&mut out, self.volume(), |at, change| change.project_onto(at));
+        areas::close(&mut out, self.volume(), &|at, change| change.project_onto(at));
         out
     }
 

@@ -4,7 +4,7 @@ use super::{CELL, Faced, Slot};
 use crate::body::Pose;
 use crate::contact::broad::{Bounds, PointGrid};
 use crate::scene::Solid;
-use crate::shape::{ADJACENT, bending, row_faces};
+use crate::shape::{ADJACENT, Edges, bending};
 use glam::DVec3;
 use std::sync::{Arc, OnceLock};
 
@@ -20,6 +20,7 @@ pub(super) struct Layer {
     pub offset: Vec<DVec3>,
     pub area: Vec<DVec3>,
     pub to_surface: Vec<DVec3>,
+    pub edges: Edges,
     pub radius: f64,
     pub grid: PointGrid,
     pub adjacent: Vec<Vec<u32>>,
@@ -46,12 +47,13 @@ impl Layer {
             holds,
             still: solid.is_still(),
             is_box: solid.shape.as_cuboid().is_some(),
-            bends: if holds { bending(&offset, &solid.wall_area, l0) } else { Vec::new() },
+            bends: if holds { bending(&offset, &solid.wall_area, &solid.wall_edges, l0) } else { Vec::new() },
             faced: OnceLock::new(),
             first: solid.wall_slots.start,
             radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
             area: solid.wall_area.clone(),
             to_surface: solid.wall_to_surface.clone(),
+            edges: solid.wall_edges.clone(),
             offset,
             grid,
             adjacent,
@@ -125,11 +127,11 @@ impl Layer {
         slot.inside.iter().zip(&ways).map(inwards).collect()
     }
 
-    /// The faces of row `n` that its `area` sums up, and their middles from the place of the solid, which is at `pose`, world axes [m2], [m] ([`row_faces`]).
-    pub fn faces(&self, n: usize, area: DVec3, pose: &Pose) -> impl Iterator<Item = (DVec3, DVec3)> {
+    /// The faces of row `n` that its `area` sums up, and their middles from the place of the solid, which is at `pose`, world axes [m2], [m].
+    pub fn faces(&self, n: usize, area: DVec3, pose: &Pose) -> impl Iterator<Item = (DVec3, DVec3)> + use<> {
         let (turn, offset) = (pose.orientation, self.offset[n]);
-        let faces = row_faces(self.is_box, turn.inverse() * area, self.to_surface[n]);
-        faces.map(move |(area, way)| (turn * area, turn * (offset + way)))
+        let faces = self.edges.faces(n, turn.inverse() * area, self.to_surface[n]);
+        faces.map(move |face| (turn * face.area, turn * (offset + face.way)))
     }
 
     pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {

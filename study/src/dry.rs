@@ -1,7 +1,7 @@
 //! Dry scenes built by hand: boxes on the lattice, floors and walls, no fluid and no case file.
 
 use glam::{DMat3, DQuat, DVec3};
-use seixo::scene::{Drive, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid, WallShape};
+use seixo::scene::{Drive, Edges, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid, WallShape};
 
 /// Standard gravity [m/s2]; Table 1 of the paper follows from it.
 pub const GRAVITY: f64 = 9.80665;
@@ -210,6 +210,7 @@ fn lattice_box(
         shape_offset: DVec3::ZERO,
         wall_offset: offsets,
         dummy_offset: vec![],
+        wall_edges: Edges::of_box(&areas, &to_surface),
         wall_area: areas,
         wall_to_surface: to_surface,
     }

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 use seixo::body::Pose;
 use seixo::case::Case;
 use seixo::plan::Stage;
-use seixo::scene::{Curve, Drive, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid};
+use seixo::scene::{Curve, Drive, Edges, FreeBody, Groups, Kind, Motion, Scene, Shape, Solid};
 
 /// Spacing of the scene [m].
 pub const SPACING: f64 = 0.02;
@@ -141,6 +141,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
             dummy_slots: start.1..moving_dummy.len(),
             wall_offset,
             dummy_offset,
+            wall_edges: Edges::of_box(&wall_area, &wall_to_surface),
             wall_area,
             wall_to_surface,
         });

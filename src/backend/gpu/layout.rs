@@ -11,6 +11,7 @@ use crate::neighbourhood::scale;
 use crate::params::{Params, Step, Zone};
 use crate::pressure::Settings;
 use crate::scene::Groups;
+use crate::shape::MOST_FACES;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, Vec3};
 
@@ -182,6 +183,7 @@ pub struct WallParticle {
     pub area: [f32; 4],
     pub arm: [f32; 4],
     pub to_surface: [f32; 4],
+    pub faces: [[[f32; 4]; 2]; MOST_FACES],
 }
 
 /// A wall layer that becomes water; see `Emission` in shaders/common.wgsl.

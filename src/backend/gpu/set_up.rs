@@ -211,14 +211,18 @@ impl Gpu {
             for (k, solid) in scene.solids.iter().enumerate() {
                 let first = solid.wall_slots.start - g.fluid;
                 let felt = cut_share(solid, &self.params);
-                let in_faces = if solid.shape.as_cuboid().is_some() { 1.0 } else { 0.0 };
                 let lightness = collision::lightness(solid, &self.params);
                 for p in 0..solid.wall_slots.len() {
                     let to_surface = solid.wall_to_surface[p];
+                    let mut faces = WallParticle::default().faces;
+                    for (of, face) in faces.iter_mut().zip(solid.faces(p)) {
+                        *of = [four(face.area, 0.0), four(face.way, 0.0)];
+                    }
                     layer[first + p] = WallParticle {
                         area: four(solid.wall_area[p], lightness as f32),
-                        arm: four(solid.wall_offset[p] + to_surface, in_faces),
+                        arm: four(solid.wall_offset[p] + to_surface, 0.0),
                         to_surface: four(to_surface, felt as f32),
+                        faces,
                     };
                 }
                 for p in (0..solid.wall_slots.len()).step_by(WORKGROUP as usize) {

@@ -7,7 +7,7 @@ mod surface;
 pub(crate) use depth::{ALL_FACES, face_normal};
 
 use super::surface::Surface;
-use super::{Faces, Geometry, Inside, Node, Particles, WallLayer};
+use super::{Edges, Faces, Geometry, Inside, Node, Particles, WallLayer};
 use glam::{DMat3, DVec3, IVec3};
 
 /// A box.
@@ -144,6 +144,7 @@ impl Geometry for Cuboid {
                 }
             }
         }
+        out.edges = Edges::of_box(&out.area, &out.to_surface);
         out
     }
 
