@@ -333,3 +333,24 @@ fn bodies_from_files_turn_by_their_moments_however_small_they_are() {
         }
     }
 }
+
+/// The ground goes down to the floor, also where it ends inside the tank.
+#[test]
+fn no_water_stands_in_ground_that_ends_inside_the_tank() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (length, height) in [(0.2, 0.2), (0.39, 0.14)] {
+        let land = file(&folder, &format!("land{length}.stl"), &stl(&ground(length, |_| height)));
+        let text = still(&format!("[[obstacle]]\nname = \"it\"\nshape = \"terrain\"\nfile = \"{land}\"\n"));
+        let text = text.replace(
+            "[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0.3, 0.24]",
+            "[[fluid.fill]]\nseed = [0.395, 0.15, 0.22]\nlevel = 0.24",
+        );
+        let scene = Scene::build(&case(&text)).unwrap_or_else(|e| panic!("{e}"));
+        let water = &scene.position[..scene.water()];
+        let within = water.iter().filter(|x| x.x < length - 0.5 * L0 && x.z < height - 0.5 * L0).count();
+        let volume = water.len() as f64 * L0.powi(3) / (0.3 * (0.4 * 0.24 - length * height));
+        println!("{length} x {height} m: {within} within, {volume:.3} of the volume");
+        assert_eq!(within, 0, "{length} x {height}");
+        assert!((volume - 1.0).abs() < 0.03, "{length} x {height}: {volume}");
+    }
+}

@@ -96,6 +96,8 @@ pub(crate) struct Form<'a> {
     pub orientation: Option<&'a Turn>,
     /// Length of what comes from a file without a `scale` from which it is asked about [m].
     pub(super) large: f64,
+    /// Level below which the ground under a terrain ends, over the origin of its file [m].
+    pub(super) floor: f64,
 }
 
 /// Where a wall of any shape stands.
@@ -136,6 +138,7 @@ macro_rules! form {
             axis: $keys.axis,
             orientation: $keys.orientation.as_ref(),
             large: $large,
+            floor: f64::INFINITY,
         }
     };
 }
@@ -154,9 +157,16 @@ pub(super) fn place(shape: BodyShape, center: Option<Vector>, position: Option<V
 macro_rules! wall {
     ($kind:ty) => {
         impl $kind {
-            /// The keys that make its shape; `tank` tells what is large.
+            /// The keys that make its shape; `tank` tells what is large, and how deep ground goes.
             pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
-                form!(self, large(tank))
+                let at = DVec3::from(self.position.unwrap_or_default());
+                let below = |t: &Tank| {
+                    // However it is turned.
+                    let far = (at - DVec3::from(t.min)).length()
+                        + (DVec3::from(t.max) - DVec3::from(t.min)).length();
+                    if self.orientation.is_some() { -far } else { t.min[2] - at.z }
+                };
+                Form { floor: tank.map_or(f64::INFINITY, below), ..form!(self, large(tank)) }
             }
 
             /// What it is: a box of the lattice, if it has corners.
@@ -353,7 +363,7 @@ impl Form<'_> {
                 let height = self.height.unwrap_or_default();
                 return Ok(Shape::Mesh(Mesh::prism(section, height).map_err(unfit("section"))?));
             }
-            BodyShape::Terrain => Mesh::terrain(path, scale, spacing),
+            BodyShape::Terrain => Mesh::terrain(path, scale, spacing, self.floor),
             _ => Mesh::open(path, scale),
         };
         let mesh =

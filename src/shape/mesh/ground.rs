@@ -4,13 +4,13 @@ use super::Unfit;
 use super::read::{Soup, directed};
 use glam::DVec3;
 
-/// Depth of the ground below the lowest place of its surface, over the spacing: more than the layers of a wall.
+/// Depth of the ground below the lowest place of its surface and below the floor, over the spacing: more than the layers of a wall.
 pub(super) const BASE: f64 = 6.0;
 /// Slope of a triangle that overhangs by more than round-off: the z part of its unit normal.
 pub(super) const OVERHANG: f64 = -1e-6;
 
 /// The closed surface of what lies between `vertices` and `triangles`, z upwards, and the level `base` [m] below the lowest
-/// vertex.
+/// vertex and the `floor` [m].
 ///
 /// # Errors
 /// A surface without a border, one turned both ways, or one that overhangs.
@@ -18,6 +18,7 @@ pub(super) fn below(
     path: &str,
     mut vertices: Vec<DVec3>,
     mut triangles: Vec<[u32; 3]>,
+    floor: f64,
     base: f64,
 ) -> Result<Soup, Unfit> {
     let edges = directed(path, &vertices, &triangles)?;
@@ -52,7 +53,7 @@ pub(super) fn below(
         ));
     }
     border.sort_unstable();
-    let level = vertices.iter().map(|v| v.z).fold(f64::INFINITY, f64::min) - base;
+    let level = vertices.iter().map(|v| v.z).fold(floor, f64::min) - base;
     let under = vertices.len() as u32;
     let feet: Vec<DVec3> = vertices.iter().map(|v| DVec3 { z: level, ..*v }).collect();
     vertices.extend(feet);

@@ -94,7 +94,7 @@ const SHARP: f64 = 0.5;
 static MADE: Mutex<Vec<(Key, &'static Mesh)>> = Mutex::new(Vec::new());
 
 /// What a mesh is made from: a name, the file's checksum, and the lengths that it is made with.
-type Key = (String, u32, [u64; 3]);
+type Key = (String, u32, [u64; 4]);
 
 impl std::fmt::Debug for Mesh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -114,16 +114,16 @@ impl Mesh {
     /// # Errors
     /// A file that cannot be read, or a surface that encloses nothing: open, turned both ways, flat.
     pub fn open(path: &str, scale: f64) -> Result<&'static Self, Unfit> {
-        Self::from_file(path, scale, 0.0, Ok)
+        Self::from_file(path, scale, [0.0; 2], Ok)
     }
 
-    /// The ground below the open surface in the file `path`, down to a few of `spacing` [m] below its lowest place.
+    /// The ground below the open surface in the file `path`, down to a few of `spacing` [m] below its lowest place and the level `floor` [m].
     ///
     /// # Errors
     /// A file that cannot be read, or a surface that is closed, overhangs or is turned both ways.
-    pub fn terrain(path: &str, scale: f64, spacing: f64) -> Result<&'static Self, Unfit> {
-        Self::from_file(path, scale, spacing, |(vertices, triangles)| {
-            ground::below(path, vertices, triangles, ground::BASE * spacing)
+    pub fn terrain(path: &str, scale: f64, spacing: f64, floor: f64) -> Result<&'static Self, Unfit> {
+        Self::from_file(path, scale, [spacing, floor], |(vertices, triangles)| {
+            ground::below(path, vertices, triangles, floor, ground::BASE * spacing)
         })
     }
 
@@ -135,7 +135,7 @@ impl Mesh {
     fn from_file(
         path: &str,
         scale: f64,
-        base: f64,
+        [base, floor]: [f64; 2],
         close: impl FnOnce(read::Soup) -> Result<read::Soup, Unfit>,
     ) -> Result<&'static Self, Unfit> {
         let bytes = read::bytes(path).map_err(|e| {
@@ -143,7 +143,7 @@ impl Mesh {
         })?;
         let single = f64::from(u8::from(read::is_single(path, &bytes)));
         Self::made(
-            (path.to_owned(), crc32fast::hash(&bytes), [scale, base, single].map(f64::to_bits)),
+            (path.to_owned(), crc32fast::hash(&bytes), [scale, base, single, floor].map(f64::to_bits)),
             || {
                 let (vertices, triangles) = read::soup(path, &bytes)?;
                 let vertices = vertices.into_iter().map(|v| scale * v).collect();

@@ -15,7 +15,7 @@ impl Mesh {
     /// # Errors
     /// A cone without a volume.
     pub fn cone(radius: f64, height: f64) -> Result<&'static Self, Unfit> {
-        let key = ("cone".to_owned(), 0, [radius, height, 0.0].map(f64::to_bits));
+        let key = ("cone".to_owned(), 0, [radius, height, 0.0, 0.0].map(f64::to_bits));
         Self::made(key, || Ok(cone(radius, height)))
     }
 
@@ -24,7 +24,7 @@ impl Mesh {
     /// # Errors
     /// A wedge without a volume.
     pub fn wedge(size: DVec3) -> Result<&'static Self, Unfit> {
-        let key = ("wedge".to_owned(), 0, size.to_array().map(f64::to_bits));
+        let key = ("wedge".to_owned(), 0, size.extend(0.0).to_array().map(f64::to_bits));
         Self::made(key, || Ok(wedge(size)))
     }
 
@@ -33,7 +33,7 @@ impl Mesh {
     /// # Errors
     /// A prism without a volume.
     pub fn prism(section: &[[f64; 2]], height: f64) -> Result<&'static Self, Unfit> {
-        let key = (format!("prism {section:?}"), 0, [height, 0.0, 0.0].map(f64::to_bits));
+        let key = (format!("prism {section:?}"), 0, [height, 0.0, 0.0, 0.0].map(f64::to_bits));
         Self::made(key, || Ok(prism(section, height)))
     }
 }
