@@ -137,7 +137,7 @@ pub struct Plane {
     pub name: String,
     /// Centre of the surface [m].
     pub center: Vector,
-    /// Normal, into the free space (any length).
+    /// Normal, into the free space (any length); gauges tell nothing of water behind it.
     pub normal: Vector,
     /// Edge lengths [m]: along `along`, and across it.
     #[cfg_attr(test, schemars(transform = super::bounds::each_positive))]

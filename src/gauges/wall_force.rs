@@ -8,10 +8,10 @@ use crate::cover::{self, CELL, SLACK, Standing, Tiles};
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::shape::face_before;
+use crate::shape::{PointCells, face_before};
 use crate::slots::{Opposite, Push};
-use glam::{DMat3, DVec3, IVec3};
-use std::collections::{BTreeMap, HashSet};
+use glam::{DMat3, DVec3};
+use std::collections::BTreeMap;
 
 /// A face of a row, of the size of a particle.
 #[derive(Clone, Debug)]
@@ -26,6 +26,9 @@ struct Face {
     /// Part before which nothing stands that never moves [-].
     bare: f64,
 }
+
+/// A wall's particle no farther from the place one spacing before a face than this, over l0, stands before it.
+const AHEAD: f64 = 0.45;
 
 /// The wall layer of a fixed wall.
 #[derive(Clone, Debug, Default)]
@@ -59,10 +62,8 @@ impl FixedWall {
         let (about, still) = (scene.walls[shape].middle, cover::still(scene, Some(shape)));
         let mut out = Self { shape, on_lattice, about, still, tiles, ..Self::default() };
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
-        let origin = scene.position.get(scene.groups.static_wall_range().start).copied().unwrap_or_default();
-        let cell = |x: DVec3| ((scene.periodic.wrap(x) - origin) / l0).round().as_ivec3();
-        let solid: HashSet<IVec3> =
-            scene.position[scene.groups.static_range()].iter().map(|x| cell(*x)).collect();
+        let mut solid = PointCells::new(l0);
+        scene.position[scene.groups.static_range()].iter().for_each(|x| solid.add(scene.periodic.wrap(*x)));
         let mut rows: Vec<(usize, DVec3, Vec<DVec3>)> = vec![];
         for (k, slot) in scene.groups.static_wall_range().enumerate() {
             let (normal, x) = (scene.static_wall_normal[k], scene.position[slot]);
@@ -72,7 +73,8 @@ impl FixedWall {
             // Particles on an edge of a box belong to all of its faces there, whole.
             let open = |axis: usize| {
                 let face = DVec3::AXES[axis] * normal[axis].signum();
-                (normal[axis].abs() > 1e-6 && !solid.contains(&cell(x + l0 * face))).then_some(face)
+                let ahead = || solid.is_near(scene.periodic.wrap(x + l0 * face), AHEAD * l0);
+                (normal[axis].abs() > 1e-6 && !ahead()).then_some(face)
             };
             let normals: Vec<DVec3> =
                 if on_lattice { (0..3).filter_map(open).collect() } else { vec![normal] };

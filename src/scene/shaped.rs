@@ -327,7 +327,7 @@ impl Builder<'_> {
         beyond
             || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
             || earlier().any(|b| b.holds(at, slack))
-            || near && near_solid(lattice, &self.grid, at)
+            || near && near_solid(lattice, &self.grid, at, 0.5)
     }
 
     /// Tells of files in single precision whose coordinates are so large that the steps between them bend what they describe.

@@ -8,6 +8,9 @@ use crate::shape::Edges;
 use crate::waves::Wave;
 use glam::{DMat3, DQuat, DVec3, IVec3};
 
+/// A wall's particle nearer than this below a plane, over the spacing, is its next layer.
+const BELOW: f64 = 0.35;
+
 /// Particles of the walls that never move.
 #[derive(Default, Debug)]
 pub(super) struct Fixed {
@@ -148,9 +151,11 @@ impl Fixed {
                     if lattice.plane {
                         p.y = 0.0;
                     }
-                    // Rows behind the face of another wall would make it denser, and what they bear is no part of the plane.
-                    let in_wall = earlier.iter().any(|b| b.holds(p, 1e-6 * l0));
-                    if in_wall || grid.is_beyond(lattice.cell(p)) || near_solid(lattice, grid, p) {
+                    // Rows behind the face of another wall would make it denser, and what they bear is no part of the plane. Below
+                    // them what stands nearer than the next layer fills its place; left out at more, the plane would be hollow.
+                    let (within, near) = if depth > 0 { (0.5 - BELOW, BELOW) } else { (1e-6, 0.5) };
+                    let in_wall = earlier.iter().any(|b| b.holds(p, within * l0));
+                    if in_wall || grid.is_beyond(lattice.cell(p)) || near_solid(lattice, grid, p, near) {
                         left_out += 1;
                     } else if depth > 0 {
                         self.dummy.push(p);
@@ -350,10 +355,10 @@ impl PlaneFrame {
     }
 }
 
-/// Whether a lattice particle of a wall stands closer than l0/2.
-pub(super) fn near_solid(lattice: &Lattice, grid: &Grid, p: DVec3) -> bool {
+/// Whether a lattice particle of a wall stands closer than `reach`, at most half, over the spacing.
+pub(super) fn near_solid(lattice: &Lattice, grid: &Grid, p: DVec3, reach: f64) -> bool {
     let at = lattice.cell(p);
     let near = Cells { lo: at, hi: at + 1 }.grown(lattice.step(1));
     near.iter()
-        .any(|c| grid.get(grid.wrap(c)) == SOLID && lattice.center(c).distance(p) < 0.5 * lattice.spacing)
+        .any(|c| grid.get(grid.wrap(c)) == SOLID && lattice.center(c).distance(p) < reach * lattice.spacing)
 }
