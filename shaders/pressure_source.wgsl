@@ -170,8 +170,8 @@ fn pressure_source(@builtin(global_invocation_id) id: vec3u) {
     let at_body = is_body(i) || sums.boundary.bodies;
     let share = links / params.wall_contact;
     let room = room_of(sums.solids, is_fluid);
-    let row = select(saturate(share), min(saturate(2.0 * share - 1.0), room), at_body);
-    let wet = select(row, room, is_fluid);
+    let row = select(saturate(share), saturate(2.0 * share - 1.0), at_body);
+    let wet = select(min(row, room), room, is_fluid);
     var b = wet * now.source_density * (sums.density - params.smooth_density) / params.smooth_density
         - wet * now.source_divergence * divergence(i, sums)
         - params.density * dot(params.gravity, first_moment);

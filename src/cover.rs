@@ -13,6 +13,8 @@ use glam::{DMat3, DQuat, DVec3};
 const WITHIN: f64 = -0.15;
 /// A point that lies on a solid's surface up to this much, over l0, is half in it: round-off, or how deep bodies press into each other, would tell where it is.
 pub(crate) const SLACK: f64 = 1e-2;
+/// Distance behind a face, over l0, at which a point in a wall tells that the face lies flat in the wall's or deeper: more than [`SLACK`].
+const FLAT_IN: f64 = -0.02;
 /// Edge of the cells that faces are found in, over l0.
 pub(crate) const CELL: f64 = 4.0;
 /// Points along an edge of a face, in the plane and in space.
@@ -161,14 +163,26 @@ impl Tiles {
     }
 
     /// Part of the face around `center` with an `edge` [m] that looks along `normal` before which water may stand [-].
-    pub fn bare(&self, (center, edge): (DVec3, f64), normal: DVec3, solids: &[&Standing]) -> f64 {
-        1.0 - self.mean((center, edge), normal, solids, |x, near| {
+    pub fn bare(&self, face: (DVec3, f64), normal: DVec3, solids: &[&Standing]) -> f64 {
+        self.bare_of(face, normal, solids, |_| false)
+    }
+
+    /// The same of a face of a solid that may have moved into those that `take` what lies flat in their faces: the water there presses on these.
+    pub fn bare_of(
+        &self,
+        face: (DVec3, f64),
+        normal: DVec3,
+        solids: &[&Standing],
+        take: impl Fn(&Standing) -> bool,
+    ) -> f64 {
+        1.0 - self.mean(face, normal, solids, |x, near| {
             let at = |d: f64, s: &Standing| self.holds(x + d * self.spacing * normal, s);
+            let covers = |s: &&Standing| {
+                let flat = if take(s) { at(FLAT_IN, s) } else { 0.0 };
+                COVERED.map(|d| at(d, s)).into_iter().fold(flat, f64::max)
+            };
             // Of two that meet at the point each has a half.
-            near.iter()
-                .map(|s| COVERED.map(|d| at(d, s)).into_iter().fold(0.0, f64::max))
-                .sum::<f64>()
-                .min(1.0)
+            near.iter().map(covers).sum::<f64>().min(1.0)
         })
     }
 

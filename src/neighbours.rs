@@ -10,12 +10,17 @@ pub(crate) const CHUNK: usize = 512;
 
 /// Neighbours that a row holds at most, `lattice` those of a full lattice: twice as many, 64 for the usual 32. Healthy
 /// runs stay below 1.6 times; more means that the fluid has collapsed onto itself, and ends the run on every backend.
-pub fn capacity(lattice: u32) -> usize {
-    (2 * lattice as usize).next_multiple_of(8).max(24)
+/// Where solids are driven they may move into each other: rows of two lattices in one place, and some water.
+pub fn capacity(lattice: u32, driven: bool) -> usize {
+    let overlaid = if driven { OVERLAID } else { 0 };
+    (2 * lattice as usize + overlaid).next_multiple_of(8).max(24)
 }
 
+/// Neighbours that a row of two lattices in one place has beyond twice those of one: its twin, and water before it.
+const OVERLAID: usize = 5;
+
 /// The largest [`capacity`]: of the largest effective radius that a case may ask for, 4.1 spacings.
-pub(crate) const CAPACITY: usize = 512;
+pub(crate) const CAPACITY: usize = 520;
 
 /// Rows of `CHUNK` particles.
 #[derive(Clone, Default, Debug)]

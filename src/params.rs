@@ -3,6 +3,7 @@
 use crate::case::{self, Case, Fluid, Preset};
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, Shear};
+use crate::neighbours::capacity;
 use crate::periodic::Periodic;
 use crate::scene::Scene;
 use crate::scheme::{Collision, FreeSurface, Gradient, Source};
@@ -123,6 +124,8 @@ pub struct Params {
     pub smooth_density: f64,
     /// Neighbours of a particle on the full lattice.
     pub neighbours: u32,
+    /// Neighbours that a row holds at most, [`capacity`].
+    pub row_capacity: usize,
     /// Gravity, without what of it lies along periodic axes [m/s2]: what a pressure at rest balances.
     pub gravity: DVec3,
     /// What of gravity lies along periodic axes [m/s2]: no pressure balances it, it drives the flow.
@@ -261,6 +264,10 @@ impl Params {
             laplacian: lattice.laplacian * l0 * l0,
             smooth_density: lattice.smooth_density,
             neighbours: lattice.neighbours,
+            row_capacity: capacity(
+                lattice.neighbours,
+                scene.solids.iter().any(|s| !s.is_free() && !s.is_still()),
+            ),
             gravity,
             drive: scene.gravity - gravity,
             density: fluid.map_or(1000.0, |f| f.density),

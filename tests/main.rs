@@ -30,6 +30,7 @@ mod faults;
 mod filled;
 mod first_minute;
 mod fluid;
+mod flush;
 mod frames;
 mod fuzz;
 mod gauges;

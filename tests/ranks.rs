@@ -175,6 +175,11 @@ impl Seen {
         assert_eq!(self.iterations.len(), other.iterations.len());
         let differ = self.iterations.iter().zip(&other.iterations).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(differ <= Some(1), "{what}: {:?} {:?}", self.iterations, other.iterations);
+        let first = self.iterations.iter().zip(&other.iterations).position(|(a, b)| a != b);
+        println!(
+            "{what}: a solve takes another number of iterations in step {first:?} of {}",
+            self.iterations.len()
+        );
         assert_eq!(self.ledger.is_some(), other.ledger.is_some());
         if let (Some(a), Some(b)) = (&self.ledger, &other.ledger) {
             let size = Entry::ALL.iter().map(|&e| a.get(e).abs()).fold(0.0, f64::max);

@@ -76,7 +76,7 @@ impl DrivenFaces {
         let moving = moving(scene, poses);
         let all: Vec<&Standing> = self.still.iter().chain(&moving).collect();
         let of = |driven: &Driven| {
-            let pose = &poses[driven.solid];
+            let (pose, is_still) = (&poses[driven.solid], scene.solids[driven.solid].is_still());
             let faces = (&driven.centers, driven.faces.len());
             let reached = self.tiles.reached(faces, Some((pose, driven.radius)), all.iter().copied());
             let of = |(face, reached): (&Face, Vec<usize>)| {
@@ -85,7 +85,8 @@ impl DrivenFaces {
                     (pose.position + pose.orientation * face.center, pose.orientation * face.area);
                 let (normal, others) = (area.normalize_or_zero(), others.collect::<Vec<_>>());
                 let center = (center, self.tiles.edge(area.length()));
-                let bare = self.tiles.bare(center, normal, &others);
+                let takes = |s: &Standing| !is_still && s.solid.is_none_or(|k| scene.solids[k].is_still());
+                let bare = self.tiles.bare_of(center, normal, &others, takes);
                 (bare < 1.0).then(|| Covered {
                     solid: driven.solid,
                     row: face.row,

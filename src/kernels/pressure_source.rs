@@ -77,7 +77,8 @@ pub fn pressure_source(
 /// weights with neighbours that carry pressure sum to `links`, and solids, itself among them, to `solids` = 1 + sum W;
 /// `bodies` are among them or not.
 /// A row in a slot between solids meets hardly any water, of which a little that is left to be undone, as of solids
-/// that touch, would ask a large pressure. At a body a row undoes nothing below half of a flat wall's water, as at the
+/// that touch, would ask a large pressure; and where a wall has moved into another one their rows stand in one place, whose
+/// density would push all water off. At a body a row undoes nothing below half of a flat wall's water, as at the
 /// edge that a body stands on: the rest would press a tenth too much into the slot under it. Solids that come to touch
 /// catch particles of water between them, which have no room and no way out: to undo that would take pressures without
 /// bound in a pocket of a few rows.
@@ -88,10 +89,8 @@ pub fn wet_share(i: usize, links: f64, solids: f64, bodies: bool, on: Particles)
         return room;
     }
     let share = (links / on.params.wall_contact).min(1.0);
-    if share.min(room) >= 1.0 {
-        return 1.0;
-    }
-    if bodies || is_body(i, on) { (2.0 * share - 1.0).max(0.0).min(room) } else { share }
+    let share = if bodies || is_body(i, on) { (2.0 * share - 1.0).max(0.0) } else { share };
+    share.min(room)
 }
 
 /// gamma rho / dt^2 (n - n0) / n0 [Pa/m2], Eq. (8).

@@ -201,6 +201,14 @@ impl<'a> Builder<'a> {
             }
             let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
+            if solid.wall_offset.is_empty() && solid.dummy_offset.is_empty() {
+                let message =
+                    format!("{label}: nothing is left of it: walls stand in all of its {taken} cells");
+                let remedy = "let it begin clear of them, inside the tank";
+                self.problems.push(Problem::new(format!("moving_wall.{k}"), message, remedy));
+                self.lacks_walls = true;
+                continue;
+            }
             self.taken(&label, taken, true);
             if self.is_thin(2.0 * solid.shape.extent(DMat3::IDENTITY)) {
                 self.notes

@@ -16,7 +16,7 @@ use crate::kernels::{
     wall_friction,
 };
 use crate::ledger::Entry;
-use crate::neighbours::{CHUNK, capacity};
+use crate::neighbours::CHUNK;
 use crate::params::Step;
 use crate::plan::Stage;
 use crate::scene::Kind;
@@ -160,7 +160,7 @@ impl Cpu {
             })
             .reduce(|| (0, 0), |a, b| a.max(b));
         self.counters.neighbours_max = self.counters.neighbours_max.max(largest as u32);
-        let most = capacity(params.neighbours);
+        let most = params.row_capacity;
         if largest > most && self.counters.overflow.is_none() {
             // The first slot with too many, as a device names it.
             let too_many = |i: &usize| self.neighbours.all(*i).neighbour.len() > most;

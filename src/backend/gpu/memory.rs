@@ -6,7 +6,6 @@ use super::layout::{GHOST_BLOCK, MONITOR_WIDTH, WORKGROUP};
 use super::parts::{Grain, Split};
 use crate::cells::Grid;
 use crate::compute::{Host, Id, Program, Spec};
-use crate::neighbours::capacity;
 use crate::params::Params;
 use crate::plan::{Arrays, Plan};
 use crate::scene::Scene;
@@ -72,7 +71,7 @@ impl Sizes {
             solids: scene.solids.len() as u64,
             absorbers: params.absorbers.len() as u64,
             openings: scene.openings.len() as u64,
-            capacity: capacity(params.neighbours) as u64,
+            capacity: params.row_capacity as u64,
             rows_per_thread: 1,
         }
     }
