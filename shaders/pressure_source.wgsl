@@ -100,7 +100,7 @@ fn divergence(i: u32, sums: Sums) -> f32 {
     return sum - slide(i, sums.boundary, inverse);
 }
 
-// Room before a row at a body, over that of a flat wall, between which it comes to undo all.
+// Room before a row, over that of a flat wall, between which it comes to undo all.
 const SLOT = vec2f(0.35, 0.68);
 // Link of a caught particle to P = 0, over n0.
 const LEAK: f32 = 0.1;

@@ -39,7 +39,7 @@ use crate::error::Result;
 use crate::kernels::coupling::row;
 use crate::params::Params;
 use crate::periodic::Periodic;
-use crate::scene::{Scene, Solid};
+use crate::scene::{Face, Scene, Solid};
 use glam::{DMat3, DVec3};
 use layer::Layer;
 use rayon::prelude::*;
@@ -73,34 +73,26 @@ struct Slot {
 }
 
 /// How a row lies before what is near it.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Faced {
     /// How much of it lies in a slot [-].
     share: f64,
     /// What it faces nearest.
     opposite: Option<Opposite>,
-    /// The same of each of its faces, along the axes of its solid's frame, of a row at an edge of a box.
-    by_face: Option<[Option<Opposite>; 3]>,
+    /// Outward directions of the faces of a row that has several, in its solid's frame, and what each faces.
+    by_face: Vec<(DVec3, Option<Opposite>)>,
 }
 
 impl Faced {
     /// All that it faces.
     fn all(&self) -> impl Iterator<Item = Opposite> {
-        self.opposite.into_iter().chain(self.by_face.into_iter().flatten().flatten())
+        self.opposite.into_iter().chain(self.by_face.iter().filter_map(|face| face.1))
     }
 
-    /// What its `area` looks onto, of a solid at `pose`, and with which part of it (world axes [m2]).
-    fn onto(&self, area: DVec3, pose: &Pose) -> Vec<(Opposite, DVec3)> {
-        let Some(by_face) = self.by_face else {
-            return self.opposite.map(|of| (of, area)).into_iter().collect();
-        };
-        let own = pose.orientation.inverse() * area;
-        let part = |axis: usize| {
-            let part = pose.orientation * (own[axis] * DVec3::AXES[axis]);
-            let looks = part.length_squared() > 1e-12 * area.length_squared();
-            by_face[axis].or(self.opposite).filter(|_| looks).map(|of| (of, part))
-        };
-        (0..3).filter_map(part).collect()
+    /// What that of its faces looks onto that looks as `area` does, in the solid's frame.
+    fn before(&self, area: DVec3) -> Option<Opposite> {
+        let alike = self.by_face.iter().max_by(|a, b| a.0.dot(area).total_cmp(&b.0.dot(area)));
+        alike.and_then(|face| face.1).or(self.opposite)
     }
 }
 
@@ -285,21 +277,19 @@ impl Slots {
             }
             (nearest, opposite)
         };
-        let share = |(&offset, &area): (&DVec3, &DVec3)| {
+        let share = |(n, (&offset, &area)): (usize, (&DVec3, &DVec3))| {
             let x = pose.position + pose.orientation * offset;
             let (distance, opposite) = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD);
             let share = ((FACING.1 - distance / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-            let faces = area.to_array().iter().filter(|a| **a != 0.0).count();
-            let by_face = (layer.is_box && faces > 1 && share > 0.0).then(|| {
-                let before = |axis: usize| {
-                    let outward = pose.orientation * (area[axis].signum() * DVec3::AXES[axis]);
-                    (area[axis] != 0.0).then(|| nearest(x, outward, BEFORE_FACE).1).flatten()
-                };
-                [0, 1, 2].map(before)
-            });
+            let face = |face: &Face| {
+                let way = face.area.normalize_or_zero();
+                (way, nearest(x, pose.orientation * way, BEFORE_FACE).1)
+            };
+            let faces = if share > 0.0 { layer.edges.of(n) } else { &[] };
+            let by_face = faces.iter().map(face).collect();
             Faced { share, opposite, by_face }
         };
-        (&layer.offset, &layer.area).into_par_iter().with_min_len(256).map(share).collect()
+        (&layer.offset, &layer.area).into_par_iter().enumerate().with_min_len(256).map(share).collect()
     }
 
     /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`.

@@ -159,14 +159,15 @@ macro_rules! wall {
         impl $kind {
             /// The keys that make its shape; `tank` tells what is large, and how deep ground goes.
             pub(crate) fn form(&self, tank: Option<&Tank>) -> Form<'_> {
+                let form = form!(self, large(tank));
                 let at = DVec3::from(self.position.unwrap_or_default());
+                let is_upright = (form.orientation() * DVec3::Z).z > 1.0 - 1e-9;
                 let below = |t: &Tank| {
-                    // However it is turned.
-                    let far = (at - DVec3::from(t.min)).length()
-                        + (DVec3::from(t.max) - DVec3::from(t.min)).length();
-                    if self.orientation.is_some() { -far } else { t.min[2] - at.z }
+                    let (low, high) = (DVec3::from(t.min), DVec3::from(t.max));
+                    // However it leans.
+                    if is_upright { low.z - at.z } else { -at.distance(low) - low.distance(high) }
                 };
-                Form { floor: tank.map_or(f64::INFINITY, below), ..form!(self, large(tank)) }
+                Form { floor: tank.map_or(f64::INFINITY, below), ..form }
             }
 
             /// What it is: a box of the lattice, if it has corners.

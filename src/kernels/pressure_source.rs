@@ -103,7 +103,7 @@ pub fn number_density_source(n: f64, params: &Params, step: &Step) -> f64 {
 /// Solids about a particle of water, over W0, from which on it is caught between them, and at which it wholly is, as in
 /// a hole of one particle: gaps of 0.85 and 0.6 spacings in the plane, of 0.6 and 0.4 in space.
 pub const CAUGHT: (f64, f64) = (0.85, 1.0);
-/// Room before a row at a body, over that of a flat wall, at which it undoes nothing, and from which on as much as it
+/// Room before a row, over that of a flat wall, at which it undoes nothing, and from which on as much as it
 /// meets water: gaps of some 0.14 and 0.31 spacings. A corner has 0.73 and more.
 pub const SLOT: (f64, f64) = (0.35, 0.68);
 /// Link of a caught particle to P = 0, over n0 [-]: small beside links to water that is not caught.

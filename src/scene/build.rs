@@ -201,7 +201,7 @@ impl<'a> Builder<'a> {
             }
             let (solid, taken) = walls::moving_wall(wall, corners, case, &lattice, &mut self.grid, layers);
             self.rounded(&label, corners.0.into(), corners.1.into());
-            if solid.wall_offset.is_empty() && solid.dummy_offset.is_empty() {
+            if taken > 0 && solid.wall_offset.is_empty() && solid.dummy_offset.is_empty() {
                 let message =
                     format!("{label}: nothing is left of it: walls stand in all of its {taken} cells");
                 let remedy = "let it begin clear of them, inside the tank";

@@ -13,7 +13,6 @@
 
 mod behind;
 mod bodies;
-mod boxes;
 mod build;
 mod cavities;
 mod covered;
@@ -208,8 +207,8 @@ pub struct Solid {
     pub name: String,
     /// `true` for a `[[body]]`, `false` for a `[[moving_wall]]`.
     pub is_body: bool,
-    /// Shape, in the solid's frame. A rank of many is told whether it is a box and no more: it has the particles, and contact is on the first one.
-    #[serde(with = "boxes")]
+    /// Shape, in the solid's frame. A rank of many is not told: it has the particles, and contact is on the first one.
+    #[serde(skip, default = "unknown")]
     pub shape: Shape,
     /// Initial position of what it moves and turns about [m]: of a free body the centre of mass or a place on its hinge.
     pub position: DVec3,
@@ -232,11 +231,16 @@ pub struct Solid {
     /// Outward area vector of each wall-layer particle, solid's frame [m2]: the sum over the faces it
     /// belongs to of outward normal times face area per particle.
     pub wall_area: Vec<DVec3>,
-    /// For each wall-layer particle, the vector from its centre to the true surface (to the edge or
-    /// corner where it belongs to two or three faces), solid's frame [m].
+    /// For each wall-layer particle, the vector from its centre to the true surface, solid's frame [m]: where it belongs to two or three
+    /// faces to the edge or corner, of sections and meshes to the middle of the nearest places on them.
     pub wall_to_surface: Vec<DVec3>,
     /// Those wall-layer particles that have several faces.
     pub wall_edges: Edges,
+}
+
+/// A shape without size, where it is not told.
+fn unknown() -> Shape {
+    Shape::cuboid(DVec3::ZERO)
 }
 
 impl Solid {

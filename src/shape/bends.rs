@@ -14,17 +14,15 @@ pub(crate) fn bends(a: DVec3, b: DVec3) -> bool {
 }
 
 /// Of rows at `offset` with outward `area`, which lie where the surface bends on from one to the next, so that it touches others along a line or
-/// in a point. It does not at its `edges`.
+/// in a point. At its `edges` each face goes on by itself.
 pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], edges: &Edges, spacing: f64) -> Vec<bool> {
     let mut cells = PointCells::new(ADJACENT * spacing);
     offset.iter().for_each(|&x| cells.add(x));
-    let way = |(k, area): (usize, &DVec3)| match edges.of(k) {
-        [] => area.normalize_or_zero(),
-        _ => DVec3::ZERO,
-    };
-    let way: Vec<DVec3> = area.iter().enumerate().map(way).collect();
+    let ways = |k: usize| edges.faces(k, area[k], DVec3::ZERO).map(|face| face.area.normalize_or_zero());
     let is_bent = |(k, &x): (usize, &DVec3)| {
-        way[k] != DVec3::ZERO && cells.numbers(x).into_iter().any(|n| n != k && bends(way[k], way[n]))
+        let beside = cells.numbers(x);
+        let next = || beside.iter().filter(|n| **n != k).flat_map(|&n| ways(n));
+        ways(k).any(|way| next().any(|other| bends(way, other)))
     };
     offset.iter().enumerate().map(is_bent).collect()
 }
@@ -32,7 +30,7 @@ pub(crate) fn bending(offset: &[DVec3], area: &[DVec3], edges: &Edges, spacing: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Shape, Sphere};
+    use crate::shape::{Cylinder, Shape, Sphere};
 
     #[test]
     fn round_surfaces_bend_and_faces_do_not() {
@@ -47,6 +45,13 @@ mod tests {
         for radius in [0.025, 0.05, 0.2] {
             let (bent, all) = of(Shape::Sphere(Sphere { radius }));
             assert_eq!(bent, all, "{radius}");
+        }
+        // The rim of an end as the side does, the end does not.
+        let layer = Shape::Cylinder(Cylinder { radius: 0.05, half_height: 0.04 }).particles(l0, 3, 1);
+        let bends = bending(&layer.wall, &layer.area, &layer.edges, l0);
+        assert!(bends.contains(&false));
+        for (bends, area) in bends.into_iter().zip(layer.area) {
+            assert_eq!(bends, area.truncate().length() > 1e-9 * area.length(), "{area}");
         }
     }
 }

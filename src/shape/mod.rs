@@ -280,7 +280,7 @@ pub struct Particles {
     pub dummy: Vec<DVec3>,
     /// Outward area of each particle of the wall layer [m2]; they sum to zero.
     pub area: Vec<DVec3>,
-    /// From each particle of the wall layer to where its pressure acts on the true surface [m].
+    /// From each particle of the wall layer to where its pressure acts on the true surface [m]; of one with several faces these tell.
     pub to_surface: Vec<DVec3>,
     /// Those of the wall layer that have several faces.
     pub edges: Edges,

@@ -49,16 +49,11 @@ impl Edges {
 
     /// Those of the rows that are `kept`, numbered anew.
     pub(crate) fn kept(&self, kept: &[bool]) -> Self {
-        let mut number = 0;
-        let numbers: Vec<usize> = kept
-            .iter()
-            .map(|&kept| {
-                number += usize::from(kept);
-                number
-            })
-            .collect();
+        let count =
+            |before: &mut usize, &kept: &bool| Some(std::mem::replace(before, *before + usize::from(kept)));
+        let numbers: Vec<usize> = kept.iter().scan(0, count).collect();
         let left = self.0.iter().filter(|edge| kept[edge.0]);
-        Self(left.map(|(row, faces)| (numbers[*row] - 1, faces.clone())).collect())
+        Self(left.map(|(row, faces)| (numbers[*row], faces.clone())).collect())
     }
 
     /// The several faces of `row`, or none.

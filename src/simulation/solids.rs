@@ -12,13 +12,10 @@ use crate::ledger::Entry;
 use crate::params::{Params, Step};
 use crate::plan::{Arrays, Stage};
 use crate::scene::Scene;
-use crate::shape::face_before;
+use crate::shape::Face;
 use crate::slots::{Opposite, Pressed, Push};
 use glam::DVec3;
 use std::collections::HashMap;
-
-/// A row that lies farther from the true surface than this, over l0, is at an edge and belongs to several faces.
-const OF_ONE_FACE: f64 = 0.6;
 
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
@@ -48,15 +45,13 @@ fn on_driven(
     let force = |((push, k, row), told): ((Push, usize, usize), RowPressure)| {
         let (solid, turn) = (&scene.solids[k], poses[k].orientation);
         let bare = turn * solid.wall_area[row] - taken.get(&(k, row)).copied().unwrap_or_default();
-        let own = solid.wall_to_surface[row];
-        let normal = match own.length() < OF_ONE_FACE * params.spacing {
-            true => own.normalize_or_zero(),
-            false => face_before(own, turn.inverse() * push.area),
-        };
-        let is_box = solid.shape.as_cuboid().is_some();
-        let to_surface = turn * if is_box { own * normal.abs() } else { own };
-        let told = push.told_by(turn * normal, &told, to_surface, bare, params);
-        let force = push.pressure * push.area_on(turn * normal) - told;
+        let own = turn.inverse() * push.area;
+        let against = |face: &Face| face.area.normalize_or_zero().dot(own);
+        // That of its faces that looks into the push most.
+        let face = solid.faces(row).min_by(|a, b| against(a).total_cmp(&against(b))).unwrap_or_default();
+        let normal = turn * face.area.try_normalize().unwrap_or_else(|| face.way.normalize_or_zero());
+        let told = push.told_by(normal, &told, turn * face.way, bare, params);
+        let force = push.pressure * push.area_on(normal) - told;
         let arm = params.periodic.nearest(push.at - poses[k].position);
         (k, Wrench { force, torque: arm.cross(force) })
     };

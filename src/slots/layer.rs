@@ -14,7 +14,6 @@ pub(super) struct Layer {
     /// Whether no force moves it and its slots are told.
     pub holds: bool,
     pub still: bool,
-    pub is_box: bool,
     /// Slot of its first row.
     pub first: usize,
     pub offset: Vec<DVec3>,
@@ -46,7 +45,6 @@ impl Layer {
             free,
             holds,
             still: solid.is_still(),
-            is_box: solid.shape.as_cuboid().is_some(),
             bends: if holds { bending(&offset, &solid.wall_area, &solid.wall_edges, l0) } else { Vec::new() },
             faced: OnceLock::new(),
             first: solid.wall_slots.start,

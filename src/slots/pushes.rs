@@ -110,11 +110,12 @@ impl Slots {
         let layer = &self.layers[slot.solid];
         let mut out = vec![];
         for (&(n, share), &area) in slot.inside.iter().zip(areas) {
-            for (on, area) in faced[n].onto(area, pose).into_iter().filter(|of| is_pressed(of.0)) {
-                out.extend(layer.faces(n, area, pose).map(|(area, at)| {
+            for (area, at) in layer.faces(n, area, pose) {
+                let on = faced[n].before(pose.orientation.inverse() * area);
+                if let Some(on) = on.filter(|&on| is_pressed(on)) {
                     let pressure = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
-                    Push { on, at: pose.position + at, pressure, area: share * area }
-                }));
+                    out.push(Push { on, at: pose.position + at, pressure, area: share * area });
+                }
             }
         }
         out
