@@ -95,6 +95,8 @@ impl Gauges {
             if scene.dimensions == 2 {
                 point.y = 0.0;
             }
+            // The image of each that is nearest.
+            let wall: Vec<DVec3> = wall.iter().map(|x| point + scene.periodic.nearest(*x - point)).collect();
             let found = wall_at(&wall, point, reach, scene.spacing).map_err(|nearest| {
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |at| {
                     format!("the nearest wall particle is {:.4} m away at {at:.4}", at.distance(point))

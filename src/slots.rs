@@ -39,7 +39,7 @@ use crate::error::Result;
 use crate::kernels::coupling::row;
 use crate::params::Params;
 use crate::periodic::Periodic;
-use crate::scene::{Face, Scene, Solid};
+use crate::scene::{Scene, Solid};
 use glam::{DMat3, DVec3};
 use layer::Layer;
 use rayon::prelude::*;
@@ -53,6 +53,8 @@ const FACING: (f64, f64) = (1.9, 2.1);
 const AHEAD: f64 = 0.5;
 /// The same of a face of a row at an edge: half-way to the next face.
 const BEFORE_FACE: f64 = 0.7;
+/// What a face of such a row looks onto looks back at it, the cosine of their directions being no larger: beside the foot of a block on the floor the floor does not.
+const BACK: f64 = -0.3;
 /// Edge of the cells that points lie in, over l0: twice the reach, so that two an axis are looked into.
 const CELL: f64 = 4.2;
 /// Keeps the slope at bay along directions in which the rim has no extent.
@@ -89,10 +91,20 @@ impl Faced {
         self.opposite.into_iter().chain(self.by_face.iter().filter_map(|face| face.1))
     }
 
-    /// What that of its faces looks onto that looks as `area` does, in the solid's frame.
-    fn before(&self, area: DVec3) -> Option<Opposite> {
+    /// Whether it has several faces.
+    fn has_faces(&self) -> bool {
+        !self.by_face.is_empty()
+    }
+
+    /// What that of its several faces looks onto that looks as `area` does, in the solid's frame.
+    fn of_face(&self, area: DVec3) -> Option<Opposite> {
         let alike = self.by_face.iter().max_by(|a, b| a.0.dot(area).total_cmp(&b.0.dot(area)));
-        alike.and_then(|face| face.1).or(self.opposite)
+        alike.and_then(|face| face.1)
+    }
+
+    /// The same of any row.
+    fn before(&self, area: DVec3) -> Option<Opposite> {
+        self.of_face(area).or(self.opposite)
     }
 }
 
@@ -142,8 +154,9 @@ pub struct Slots {
     /// Lowest and highest corner of the domain [m].
     domain: Bounds,
     fixed: PointGrid,
-    /// Which of the walls' particles each point of theirs is.
+    /// Which of the walls' particles each point of theirs is, and where each of those looks.
     fixed_of: Vec<usize>,
+    fixed_normal: Vec<DVec3>,
     layers: Vec<Layer>,
     periodic: Periodic,
 }
@@ -166,6 +179,7 @@ impl Slots {
             domain: scene.domain,
             fixed: PointGrid::new(fixed, CELL * l0),
             fixed_of,
+            fixed_normal: scene.static_wall_normal.clone(),
             layers: scene.solids.iter().enumerate().map(layer).collect(),
         }
     }
@@ -256,40 +270,56 @@ impl Slots {
     fn faced(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<Faced> {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
         let reach = FACING.1 * l0;
-        // Of those within `ahead` of `outward` (cosine) around `x`, the nearest, and how far it is.
-        let nearest = |x: DVec3, outward: DVec3, ahead: f64| {
+        // Of those within `ahead` of `outward` (cosine) around `x`, the nearest which looks `back` so far at least, and how far it is.
+        let nearest = |x: DVec3, outward: DVec3, ahead: f64, back: f64| {
             let (mut nearest, mut opposite) = (reach, None);
-            let mut see = |r: DVec3, of: Opposite| {
+            let mut see = |r: DVec3, of: Opposite, looks: &dyn Fn() -> f64| {
                 let distance = r.length();
-                if r.dot(outward) > ahead * distance && distance < nearest {
+                if r.dot(outward) > ahead * distance && distance < nearest && looks() <= back {
                     (nearest, opposite) = (distance, Some(of));
                 }
             };
             if at_walls {
-                let of = |n: u32| Opposite::Wall(self.fixed_of[n as usize]);
-                self.fixed.near(x, reach, |n| see(self.fixed.point(n) - x, of(n)));
+                let of = |n: u32| {
+                    let wall = self.fixed_of[n as usize];
+                    let looks = || self.fixed_normal[wall].dot(outward);
+                    see(self.fixed.point(n) - x, Opposite::Wall(wall), &looks);
+                };
+                self.fixed.near(x, reach, of);
             }
             for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
-                let local = pose.orientation.inverse() * (x - way - pose.position);
-                let way = |n: u32| pose.orientation * (layer.grid.point(n) - local);
-                layer.grid.near(local, reach, |n| see(way(n), Opposite::Solid(other, n as usize)));
+                let to_frame = pose.orientation.inverse();
+                let (local, outward) = (to_frame * (x - way - pose.position), to_frame * outward);
+                let of = |n: u32| {
+                    let way = pose.orientation * (layer.grid.point(n) - local);
+                    let looks = || layer.looks(n as usize, outward);
+                    see(way, Opposite::Solid(other, n as usize), &looks);
+                };
+                layer.grid.near(local, reach, of);
             }
             (nearest, opposite)
         };
-        let share = |(n, (&offset, &area)): (usize, (&DVec3, &DVec3))| {
+        let share = |distance: f64| ((FACING.1 - distance / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
+        let faced = |(n, (&offset, &area)): (usize, (&DVec3, &DVec3))| {
             let x = pose.position + pose.orientation * offset;
-            let (distance, opposite) = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD);
-            let share = ((FACING.1 - distance / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-            let face = |face: &Face| {
+            // What a thin edge looks along as a whole is neither of its faces.
+            let mut first = (reach, None);
+            let mut by_face = vec![];
+            for face in layer.edges.of(n) {
                 let way = face.area.normalize_or_zero();
-                (way, nearest(x, pose.orientation * way, BEFORE_FACE).1)
-            };
-            let faces = if share > 0.0 { layer.edges.of(n) } else { &[] };
-            let by_face = faces.iter().map(face).collect();
-            Faced { share, opposite, by_face }
+                let (distance, opposite) = nearest(x, pose.orientation * way, BEFORE_FACE, BACK);
+                if distance < first.0 {
+                    first = (distance, opposite);
+                }
+                by_face.push((way, opposite));
+            }
+            if by_face.is_empty() {
+                first = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD, 1.0 + AHEAD);
+            }
+            Faced { share: share(first.0), opposite: first.1, by_face }
         };
-        (&layer.offset, &layer.area).into_par_iter().enumerate().with_min_len(256).map(share).collect()
+        (&layer.offset, &layer.area).into_par_iter().enumerate().with_min_len(256).map(faced).collect()
     }
 
     /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`.
@@ -309,9 +339,10 @@ impl Slots {
         Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0), axes, ends }
     }
 
-    /// The rows that lie in `slot`, and those at its rim with what they pass on; `told` are the rim and its
+    /// The rows that lie in the slot, and those at its rim with what they pass on; `told` are the rim and its
     /// pressures in the last step, `seeps` what comes through the slot to rows of the rim.
-    fn passed_on(&self, slot: &Slot, pose: &Pose, told: &[(usize, f64)], seeps: &[Seep]) -> Vec<SlotRow> {
+    fn passed_on(&self, found: &Found, pose: &Pose, told: &[(usize, f64)], seeps: &[Seep]) -> Vec<SlotRow> {
+        let slot = &found.slot;
         let layer = &self.layers[slot.solid];
         // Relative to the centre of mass, world axes.
         let place = self.places(slot, pose, told);
@@ -323,7 +354,7 @@ impl Slots {
         let under_water = |n: usize, at: DVec3| !any_wet || self.in_slot(&field, place(n), at) > 0.0;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
-        let areas = layer.areas(&layer.area, slot, pose);
+        let areas = layer.areas(&layer.area, found, pose);
         let faces = |(&(n, share), &area): (&(usize, f64), &DVec3)| {
             layer.faces(n, area, pose).map(move |(area, at)| (n, share, area, at))
         };
@@ -366,15 +397,13 @@ impl Slots {
                 slot.rim.binary_search(&n).ok().and_then(|at| seeps.get(at)).copied().unwrap_or_default();
             SlotRow { solid, row: n as u32, taken: 0.0, per_pascal, head, seep }
         };
-        // A row at the mouth keeps what of it looks out: its own pressure there.
+        // A row keeps what of it looks out: its own pressure there.
         let inside = |(&(n, share), &area): (&(usize, f64), &DVec3)| {
             let mut out = SlotRow { solid, row: n as u32, taken: share, ..SlotRow::default() };
-            if slot.mouth.binary_search(&n).is_ok() {
-                for (outwards, at) in layer.faces(n, pose.orientation * layer.area[n] - area, pose) {
-                    let row = row(outwards, at);
-                    out.per_pascal.add(share, &row);
-                    out.head.add(share * self.weight.dot(at - place(n)), &row);
-                }
+            for (outwards, at) in layer.faces(n, pose.orientation * layer.area[n] - area, pose) {
+                let row = row(outwards, at);
+                out.per_pascal.add(share, &row);
+                out.head.add(share * self.weight.dot(at - place(n)), &row);
             }
             out
         };

@@ -676,3 +676,21 @@ fn boxes_over_the_seam_hold_what_comes_in_at_the_other_side() {
     let over = water.position.iter().filter(|x| x[0] > 0.3 || x[0] < 0.1).count();
     assert_eq!((water.within(&region).len(), over), (over, 4 * 8 * 6));
 }
+
+#[test]
+fn a_pressure_gauge_at_the_seam_looks_over_it() {
+    let case = case(
+        "[run]\nspacing = 0.02\ntime_step = 4e-3\nadaptive = true\nend = 1.0\ndimensions = 2\n[fluid]\n\
+         [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0, 0.4]\n[[fluid.block]]\nmin = [0.2, 0, 0]\nmax = [0.8, 0, 0.2]\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.6]\nopen = [\"z_max\"]\nperiodic = [\"x\"]\n[gauge]\nevery = 0.01\n\
+         [[gauge.pressure]]\nname = \"low\"\npoint = [0, 0, 0]\n[[gauge.pressure]]\nname = \"high\"\npoint = [0.8, 0, 0]\n",
+    );
+    // One place, between the water that stands higher and the other.
+    let mut simulation = simulation(&case);
+    for _ in 0..20 {
+        simulation.step().expect("a step");
+        let read = simulation.gauges().expect("both");
+        let [low, high] = [read[0].1, read[1].1];
+        assert!(low > 500.0 && (low - high).abs() < 1e-9 * low, "{low} and {high} Pa");
+    }
+}

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 const MERGED: f64 = 0.3;
 /// Part of a layer for which there is room in the middle, from which on it gets one.
 const ROOM: f64 = 0.32;
-/// Cosine between the normals of two sides that look away from each other: a plate, not the tip of a wedge.
-const AWAY: f64 = -0.9;
+/// Cosine between the normals of two sides that look away from each other: a plate or a wedge of up to 23 degrees, not the tip of a blunter one, whose middle has room.
+const AWAY: f64 = -0.92;
 /// Part of the spacing to which the middle is found.
 const EXACT: f64 = 1e-6;
 

@@ -22,7 +22,7 @@ pub struct Pressed {
 }
 
 /// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a mouth alone
-/// that lends nothing.
+/// that lends nothing, unless it has rows of which a face looks into it and another out.
 pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
     if found.iter().any(|f| f.slot.rim.is_empty()) {
         let beside = beside(&found);
@@ -35,7 +35,10 @@ pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
     let lending: BTreeSet<usize> = found.iter().flat_map(|f| f.lenders.iter().copied()).collect();
     let is_slot = |(k, f): &(usize, &Found)| match f.slot.rim.is_empty() {
         true => !f.lenders.is_empty(),
-        false => f.slot.inside.len() > f.slot.mouth.len() || lending.contains(k),
+        false => {
+            let mut rows = f.slot.inside.iter().map(|row| &f.faced[row.0]);
+            f.slot.inside.len() > f.slot.mouth.len() || lending.contains(k) || rows.any(Faced::has_faces)
+        }
     };
     let kept: Vec<usize> = found.iter().enumerate().filter(is_slot).map(|(k, _)| k).collect();
     let place = |k: usize| kept.partition_point(|&other| other < k);
@@ -98,7 +101,7 @@ impl Slots {
             if slot.rim.is_empty() {
                 return Self::without_rim(f);
             }
-            self.passed_on(slot, &poses[slot.solid], told, &solids.seeps(slot, told))
+            self.passed_on(f, &poses[slot.solid], told, &solids.seeps(slot, told))
         };
         let mut rows: Vec<SlotRow> = found.par_iter().zip(&pressure).flat_map_iter(of_slot).collect();
         rows.sort_by_key(|slot| (slot.solid, slot.row));

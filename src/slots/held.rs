@@ -133,7 +133,7 @@ impl Slots {
             let field = self.field_of(found, &at_rims, (f, rim), poses);
             let mut load = Wrench::default();
             let layer = &self.layers[k];
-            let areas = layer.areas(&area[&k], &f.slot, pose);
+            let areas = layer.areas(&area[&k], f, pose);
             for ((&(n, share), into), row) in f.slot.inside.iter().zip(&areas).zip(&mut told) {
                 let place = pose.orientation * layer.offset[n];
                 let mut press = |pressure: f64, area: DVec3, at: DVec3| {

@@ -1,6 +1,6 @@
 //! The wall layer of a solid: which of its rows hang together, and what of them looks into a slot.
 
-use super::{CELL, Faced, Slot};
+use super::{CELL, Faced, Found, Slot};
 use crate::body::Pose;
 use crate::contact::broad::{Bounds, PointGrid};
 use crate::scene::Solid;
@@ -99,30 +99,17 @@ impl Layer {
         sum / count
     }
 
-    /// Of each row in `slot`, the part of its `area` (solid's frame) that looks into it, world axes [m2]. A row at the mouth looks out as well: what of it looks into the slot
-    /// is what looks as its neighbours deep in there do; at a corner, where it has none, as theirs at the mouth.
-    pub fn areas(&self, area: &[DVec3], slot: &Slot, pose: &Pose) -> Vec<DVec3> {
-        let area = |n: usize| pose.orientation * area[n];
-        let at_mouth = |n: usize| slot.mouth.binary_search(&n).is_ok();
-        let place = |n: usize| slot.inside.binary_search_by_key(&n, |row| row.0).ok();
-        let beside =
-            |n: usize| self.adjacent[n].iter().filter_map(move |&m| Some((m as usize, place(m as usize)?)));
-        let all: DVec3 = slot.inside.iter().map(|row| area(row.0)).sum();
-        let deep = |&(n, _): &(usize, f64)| {
-            let near = beside(n).filter(|&(m, _)| !at_mouth(m)).map(|(m, _)| area(m));
-            if at_mouth(n) { near.sum::<DVec3>().normalize_or_zero() } else { DVec3::ZERO }
-        };
-        let ways: Vec<DVec3> = slot.inside.iter().map(deep).collect();
-        let inwards = |(&(n, _), &deep): (&(usize, f64), &DVec3)| {
-            if !at_mouth(n) {
-                return area(n);
+    /// Of each row in the slot, the part of its `area` (solid's frame) that looks into it, world axes [m2]: all of it, or of a row with several faces those that something lies
+    /// before.
+    pub fn areas(&self, area: &[DVec3], Found { slot, faced, .. }: &Found, pose: &Pose) -> Vec<DVec3> {
+        let inwards = |&(n, _): &(usize, f64)| {
+            if self.edges.of(n).is_empty() {
+                return area[n];
             }
-            let near = || beside(n).map(|(_, at)| ways[at]).sum::<DVec3>();
-            let way = [deep, near(), all].into_iter().find(|way| *way != DVec3::ZERO);
-            let way = way.unwrap_or_default().normalize_or_zero();
-            area(n).dot(way).max(0.0) * way
+            let faces = self.edges.faces(n, area[n], self.to_surface[n]).map(|face| face.area);
+            faces.filter(|&face| faced[n].of_face(face).is_some()).sum()
         };
-        slot.inside.iter().zip(&ways).map(inwards).collect()
+        slot.inside.iter().map(inwards).map(|area| pose.orientation * area).collect()
     }
 
     /// The faces of row `n` that its `area` sums up, and their middles from the place of the solid, which is at `pose`, world axes [m2], [m].
@@ -130,6 +117,12 @@ impl Layer {
         let (turn, offset) = (pose.orientation, self.offset[n]);
         let faces = self.edges.faces(n, turn.inverse() * area, self.to_surface[n]);
         faces.map(move |face| (turn * face.area, turn * (offset + face.way)))
+    }
+
+    /// How far a face of row `n` looks along `way` at least, of length 1 (cosine); both in the solid's frame.
+    pub fn looks(&self, n: usize, way: DVec3) -> f64 {
+        let faces = self.edges.of(n).iter().map(|face| face.area.normalize_or_zero().dot(way));
+        faces.reduce(f64::min).unwrap_or_else(|| self.area[n].normalize_or_zero().dot(way))
     }
 
     pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {

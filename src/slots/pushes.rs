@@ -74,7 +74,7 @@ impl Slots {
         let of = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             let Some(field) = self.field_of(&found, &pressure, (f, told), poses) else { return vec![] };
             let (layer, pose) = (&self.layers[f.slot.solid], &poses[f.slot.solid]);
-            let areas = layer.areas(&layer.area, &f.slot, pose);
+            let areas = layer.areas(&layer.area, f, pose);
             self.pushes_of(f, &areas, Some(&field), pose, |_| true)
         };
         Ok(found.iter().zip(&pressure).flat_map(of).collect())
