@@ -3,6 +3,7 @@
 //! Particles stand in layers half a spacing, one and a half and so on below its sides. A layer is the outline moved inwards: sides
 //! shrink to where they meet inside a corner, and an arc closes them round a notch. What of it goes on smoothly is divided evenly.
 
+mod holes;
 mod layer;
 
 use super::areas::{self, Piece, middle};
@@ -317,6 +318,10 @@ impl Geometry for Polygon {
             let places = stretches.iter().flat_map(|s| s.divided(PIECE * spacing)).map(space);
             thin.fill(above, places, &taken, &mut out);
         }
+        let depths = (0..).map(|k| 1.0 + 0.125 * f64::from(k)).take_while(|d| *d < f64::from(layers) - 0.5);
+        let stretches = depths.flat_map(|depth| self.layer(depth * spacing, spacing));
+        let places = stretches.flat_map(|s| s.divided(PIECE * spacing)).map(space);
+        holes::fill(places, spacing, &mut out);
         let pieces = self.sides_in(PIECE * spacing);
         areas::share(&mut out, spacing, self.volume(), pieces, evenly);
         out
