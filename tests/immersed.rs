@@ -422,8 +422,8 @@ fn a_raft_of_two_spacings_bears_a_block() {
 
 #[test]
 fn what_lands_on_the_floor_presses_no_water_through_it() {
-    // Particles without room between cube and floor carry no pressure. They fell past the wall's: 4 of 720, and 2 to 9 of other heaps. Now one to
-    // three are pressed into the floor's first layer, in 13 of 16 heaps, and stay there: none lay deeper than 0.031 m, between the first layer and
+    // Particles without room between cube and floor carry no pressure. They fell past the wall's: 4 of 720, and 2 to 9 of other heaps. Now one or
+    // two are pressed into the floor's first layer, in 12 of 16 heaps, and stay there: none lay deeper than 0.0311 m, between the first layer and
     // the second, whose particles lie at -0.045 m.
     let case = case(
         "[run]\nspacing = 0.03\ntime_step = 2e-3\nadaptive = true\nend = 2\ngravity = [0, 0, -9.81]\n\
