@@ -315,7 +315,7 @@ impl Slots {
                 by_face.push((way, opposite));
             }
             if by_face.is_empty() {
-                first = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD, 1.0 + AHEAD);
+                first = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD, f64::INFINITY);
             }
             Faced { share: share(first.0), opposite: first.1, by_face }
         };
