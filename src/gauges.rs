@@ -95,9 +95,8 @@ impl Gauges {
             if scene.dimensions == 2 {
                 point.y = 0.0;
             }
-            // The image of each that is nearest.
-            let wall: Vec<DVec3> = wall.iter().map(|x| point + scene.periodic.nearest(*x - point)).collect();
-            let found = wall_at(&wall, point, reach, scene.spacing).map_err(|nearest| {
+            let near = (reach, scene.spacing);
+            let found = wall_at(&wall, point, near, &scene.periodic).map_err(|nearest| {
                 let hint = nearest.map_or("there are no fixed walls".to_string(), |at| {
                     format!("the nearest wall particle is {:.4} m away at {at:.4}", at.distance(point))
                 });
@@ -106,8 +105,8 @@ impl Gauges {
             })?;
             out.pressure.push(WallPressure {
                 name: gauge.name.clone(),
-                slots: found.iter().map(|&k| slots[k]).collect(),
-                to_point: found.iter().map(|&k| point - wall[k]).collect(),
+                slots: found.iter().map(|(k, _)| slots[*k]).collect(),
+                to_point: found.iter().map(|(_, way)| *way).collect(),
             });
         }
         out.water = InWater::all(case);

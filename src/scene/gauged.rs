@@ -13,7 +13,8 @@ const INSIDE: f64 = 0.4;
 impl Builder<'_> {
     /// A pressure gauge averages over the wall particles near its point: there must be some.
     pub(super) fn gauges(&mut self) {
-        let reach = 0.5 * self.case.run.effective_radius * self.lattice.spacing;
+        let l0 = self.lattice.spacing;
+        let near = (0.5 * self.case.run.effective_radius * l0, l0);
         // Of the solids in openings no gauge tells anything.
         let (still, moving): (Vec<&Solid>, Vec<&Solid>) = self.solids_of_case().partition(|s| s.stays());
         let still = still.into_iter().flat_map(Solid::wall_positions);
@@ -21,9 +22,9 @@ impl Builder<'_> {
         let wrong = |(k, gauge): (usize, &PressureGauge)| {
             let at = self.place(gauge.point);
             let (key, name) = (format!("gauge.pressure.{k}.point"), &gauge.name);
-            let nearest = wall_at(&walls, at, reach, self.lattice.spacing).err()?;
+            let nearest = wall_at(&walls, at, near, &self.periodic).err()?;
             let is_on = |s: &&&Solid| {
-                wall_at(&s.wall_positions().collect::<Vec<_>>(), at, reach, self.lattice.spacing).is_ok()
+                wall_at(&s.wall_positions().collect::<Vec<_>>(), at, near, &self.periodic).is_ok()
             };
             if let Some(solid) = moving.iter().find(is_on) {
                 let (what, on) = (solid.what(), &solid.name);

@@ -53,25 +53,26 @@ use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Wall particles that stand for `point`: those within half an effective radius `reach` of it, or, where the lattice
-/// has moved the wall away, of the nearest one. `Err` holds the nearest if the point is on no wall, and nothing if
-/// there are no walls.
+/// Particles of `wall` that stand for `point`, and the way from each, or the image of it that is nearest, to the point [m]: those within half an effective
+/// radius `reach` of it, or, where the lattice has moved the wall away, of the nearest one. `Err` holds the nearest if the point is on no wall, and
+/// nothing if there are no walls.
 ///
 /// # Errors
 /// See above.
 pub(crate) fn wall_at(
     wall: &[DVec3],
     point: DVec3,
-    reach: f64,
-    spacing: f64,
-) -> Result<Vec<usize>, Option<DVec3>> {
+    (reach, spacing): (f64, f64),
+    periodic: &Periodic,
+) -> Result<Vec<(usize, DVec3)>, Option<DVec3>> {
     // A face moves by up to half a spacing to fit the lattice, its particles stand half a spacing behind it; along
     // the face it may end half a spacing short, and half a spacing from the last particle.
     let farthest = 3_f64.sqrt() * (1.0 + 1e-6) * spacing;
-    let nearest = wall.iter().copied().min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)));
-    let nearest = nearest.filter(|n| n.distance(point) <= farthest).ok_or(nearest)?;
-    let from = if nearest.distance(point) <= reach { point } else { nearest };
-    Ok((0..wall.len()).filter(|&k| wall[k].distance(from) <= reach).collect())
+    let ways = || wall.iter().map(|x| periodic.nearest(point - *x));
+    let nearest = ways().min_by(|a, b| a.length().total_cmp(&b.length()));
+    let nearest = nearest.filter(|way| way.length() <= farthest).ok_or(nearest.map(|way| point - way))?;
+    let from = if nearest.length() <= reach { DVec3::ZERO } else { nearest };
+    Ok(ways().enumerate().filter(|(_, way)| way.distance(from) <= reach).collect())
 }
 
 /// What a particle is.

@@ -22,7 +22,7 @@ pub struct Pressed {
 }
 
 /// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a mouth alone
-/// that lends nothing, unless it has rows of which a face looks into it and another out.
+/// that lends nothing, unless it has rows of several faces: what of these looks out is told.
 pub(super) fn lend(mut found: Vec<Found>) -> Vec<Found> {
     if found.iter().any(|f| f.slot.rim.is_empty()) {
         let beside = beside(&found);
