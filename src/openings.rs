@@ -29,8 +29,11 @@ struct Gate {
     travel: f64,
     /// Speed of the wall [m/s].
     speed: f64,
-    /// Layers that have become water.
+    /// Layers that have become water, and the particles of these that a solid held back.
     layers: u64,
+    held: u64,
+    /// Where the particles of an inflow's layer become water [m].
+    places: Vec<DVec3>,
     /// Discharge over this area is the speed of a wall that follows a discharge [m2].
     area: f64,
     /// Particles that it had swallowed when they were last counted.
@@ -68,6 +71,8 @@ impl Openings {
             travel: 0.0,
             speed: 0.0,
             layers: 0,
+            held: 0,
+            places: opening.places(scene),
             area: opening.area * (opening.wet.max(1) as f64 / opening.layer as f64).max(0.25),
             taken: 0,
             asked: 0.0,
@@ -86,8 +91,9 @@ impl Openings {
         self.gates.iter().map(|g| g.opening.fastest(from, to)).fold(0.0, f64::max)
     }
 
-    /// Moves the walls on until `to` [s]; water that comes in takes the last of `slots` fluid slots.
-    pub fn advance(&mut self, to: f64, slots: usize) -> Passage {
+    /// Moves the walls on until `to` [s]; water that comes in takes the last of `slots` fluid slots. None comes in where one of
+    /// the solids of `scene` stands, in their `poses`.
+    pub fn advance(&mut self, to: f64, slots: usize, scene: &Scene, poses: &[Pose]) -> Passage {
         let (l0, from) = (self.spacing, self.reached);
         self.reached = to;
         let mut out = Passage::default();
@@ -115,12 +121,17 @@ impl Openings {
             if gate.opening.is_inflow() {
                 if crosses {
                     gate.layers += 1;
-                    out.emissions.push(Emission {
-                        wall: gate.wall.clone(),
-                        to: 0,
-                        shift: -outward * way,
-                        velocity: -outward * gate.speed,
-                    });
+                    let first = gate.wall.start;
+                    gate.held += gate.wall.len() as u64;
+                    for part in free(&gate.places, |x| scene.stands_before(poses, x, -outward)) {
+                        gate.held -= part.len() as u64;
+                        out.emissions.push(Emission {
+                            wall: first + part.start..first + part.end,
+                            to: 0,
+                            shift: -outward * way,
+                            velocity: -outward * gate.speed,
+                        });
+                    }
                 }
                 continue;
             }
@@ -200,7 +211,7 @@ impl Openings {
     /// Particles that have come in, one an inflow.
     pub fn emitted(&self) -> impl Iterator<Item = (&str, u64)> {
         let inflows = self.gates.iter().filter(|g| g.opening.is_inflow());
-        inflows.map(|g| (g.opening.name.as_str(), g.layers * g.wall.len() as u64))
+        inflows.map(|g| (g.opening.name.as_str(), g.layers * g.wall.len() as u64 - g.held))
     }
 
     /// All particles that have come in.
@@ -213,18 +224,37 @@ impl Openings {
         self.gates.iter().filter(|g| !g.opening.is_inflow()).map(|g| g.opening.name.as_str())
     }
 
+    /// Volume that each inflow was to let in and did not, as a solid stood there [m3].
+    pub(crate) fn held_back(&self) -> impl Iterator<Item = f64> {
+        let inflows = self.gates.iter().filter(|g| g.opening.is_inflow());
+        inflows.map(|g| g.held as f64 * self.spacing.powi(3))
+    }
+
+    /// Volume that each outflow is behind its discharge [m3], of those that follow one, having `swallowed` so many particles.
+    pub(crate) fn behind(&self, swallowed: &[u64]) -> impl Iterator<Item = Option<f64>> {
+        let outflows = self.gates.iter().filter(|g| !g.opening.is_inflow());
+        outflows.zip(swallowed).map(|(gate, &total)| {
+            let follows = matches!(gate.opening.passes, Passes::Drawn(_));
+            // What its wall has drawn back for since it last swallowed is not missed yet.
+            let due = gate.asked - gate.travel * gate.area;
+            follows.then(|| (due - total as f64 * self.spacing.powi(3)).max(0.0))
+        })
+    }
+
     /// Save where the walls are, or take it over.
     ///
     /// # Errors
     /// [`crate::error::Error::Checkpoint`] if the state has none.
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         for (k, gate) in self.gates.iter_mut().enumerate() {
-            let Gate { opening: _, wall: _, travel, speed, layers, area, taken, asked } = gate;
+            let Gate { opening: _, wall: _, places: _, travel, speed, layers, held, area, taken, asked } =
+                gate;
             archive.number(&format!("openings.{k}.travel"), travel)?;
             archive.number(&format!("openings.{k}.speed"), speed)?;
             archive.number(&format!("openings.{k}.area"), area)?;
             archive.number(&format!("openings.{k}.asked"), asked)?;
             archive.count(&format!("openings.{k}.layers"), layers)?;
+            archive.count_of_late(&format!("openings.{k}.held"), held)?;
             archive.count(&format!("openings.{k}.taken"), taken)?;
         }
         if !self.gates.is_empty() {
@@ -234,7 +264,30 @@ impl Openings {
     }
 }
 
+/// Runs of the `places` where nothing `stands`.
+fn free(places: &[DVec3], stands: impl Fn(DVec3) -> bool) -> impl Iterator<Item = Range<usize>> {
+    let mut from = 0;
+    std::iter::from_fn(move || {
+        let next = |from: usize, want: bool| (from..places.len()).find(|&k| stands(places[k]) == want);
+        let start = next(from, false)?;
+        from = next(start, true).unwrap_or(places.len());
+        Some(start..from)
+    })
+}
+
 impl Opening {
+    /// Where the particles of its wall layer become water, if it is an inflow [m].
+    fn places(&self, scene: &Scene) -> Vec<DVec3> {
+        let Some(solid) = self.solid.filter(|_| self.is_inflow()).map(|k| &scene.solids[k]) else {
+            return vec![];
+        };
+        solid
+            .wall_offset
+            .iter()
+            .map(|offset| solid.position + offset - scene.spacing * self.outward)
+            .collect()
+    }
+
     /// The box behind the wall in it, which has gone so far from the face [m], or behind a hole.
     fn outlet(&self, travel: f64) -> Outlet {
         let (low, high) = self.behind;

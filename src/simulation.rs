@@ -287,7 +287,7 @@ impl Simulation {
         self.timed(Stage::Openings, |s| {
             let there = s.scene.water() as u64 + s.openings.total_emitted();
             let slots = s.groups.fluid;
-            let passage = s.openings.advance(step.time + step.ahead, slots);
+            let passage = s.openings.advance(step.time + step.ahead, slots, &s.scene, s.solids.poses());
             let comes: usize = passage.emissions.iter().map(|e| e.wall.len()).sum();
             let fits = |gone: u64| there - gone + comes as u64 <= slots as u64;
             if comes > 0 && !fits(s.gone) {

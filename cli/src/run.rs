@@ -374,6 +374,7 @@ fn words(summary: &Summary, case: &Case, out: &Path) -> String {
         lines.push("verdict: fine".into());
     }
     lines.extend(summary.verdict.left_out.iter().map(|left_out| format!("not judged: {left_out}")));
+    lines.extend(summary.verdict.notes.iter().map(|note| format!("note: {note}")));
     lines.push(format!("results in {}", out.display()));
     lines.join("\n")
 }

@@ -210,7 +210,7 @@ impl Backend for Gpu {
                 shift: four(e.shift),
                 velocity: four(e.velocity),
             };
-            let mut layers = vec![layout::Emission::default(); self.sizes.openings as usize];
+            let mut layers = vec![layout::Emission::default(); self.sizes.emissions as usize];
             layers.iter_mut().zip(emissions).for_each(|(layer, e)| *layer = device(e));
             let count: u64 = emissions.iter().map(|e| e.wall.len() as u64).sum();
             self.context.upload(buffers::emission, &layers)?;

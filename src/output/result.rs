@@ -46,6 +46,9 @@ pub struct Verdict {
     /// What could not be judged, and what would let it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
+    /// What speaks against no result, but may not be what was wanted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 impl std::fmt::Display for Verdict {
@@ -166,6 +169,10 @@ pub struct Passed {
     pub particles: u64,
     /// Their volume [m3]; in two dimensions of a slice one spacing wide.
     pub volume_m3: f64,
+    /// Volume that it was to let through besides [m3]: of an inflow what solids before it held back, of an outflow what its `discharge`
+    /// asks for and has not had. None of outflows that follow no discharge.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missed_m3: Option<f64>,
 }
 
 /// Water of a scene with openings: what was there at the start and came in is what is there at the end, went out or was lost,

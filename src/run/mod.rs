@@ -298,7 +298,7 @@ impl Run {
         summary.case = options.name.clone();
         summary.status = status;
         summary.verdict = match error {
-            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()], left_out: vec![] },
+            Some(_) => Verdict { grade: Grade::Failed, reasons: vec![reason.clone()], ..Verdict::default() },
             None => verdict::judge(&summary, scale, simulation.case.run.adaptive),
         };
         summary.exit_reason = reason;

@@ -224,20 +224,22 @@ impl Totals {
     fn water(&self, simulation: &Simulation) -> Option<Water> {
         let openings = &simulation.openings;
         let volume = simulation.params.particle_volume();
-        let passed = |name: &str, particles: u64| Passed {
+        let passed = |name: &str, particles: u64, missed_m3: Option<f64>| Passed {
             name: name.to_owned(),
             particles,
             volume_m3: particles as f64 * volume,
+            missed_m3,
         };
-        let outflows = openings.outflows().zip(&self.water.1);
+        let inflows = openings.emitted().zip(openings.held_back());
+        let outflows = openings.outflows().zip(&self.water.1).zip(openings.behind(&self.water.1));
         (!openings.is_empty()).then(|| Water {
             particles_start: simulation.scene.water() as u64,
             particles_end: self.water.0,
             particles_lost: self.monitors.lost_particles,
             volume_start_m3: simulation.scene.water() as f64 * volume,
             volume_end_m3: self.water.0 as f64 * volume,
-            inflow: openings.emitted().map(|(name, n)| passed(name, n)).collect(),
-            outflow: outflows.map(|(name, &n)| passed(name, n)).collect(),
+            inflow: inflows.map(|((name, n), held)| passed(name, n, Some(held))).collect(),
+            outflow: outflows.map(|((name, &n), behind)| passed(name, n, behind)).collect(),
         })
     }
 }

@@ -25,6 +25,9 @@ const SOLID_COURANT: (f64, f64) = (1.0, 10.0);
 /// Depth to which solids sank into each other over l0 [-].
 const PENETRATION: (f64, f64) = (0.5, 3.0);
 
+/// Part of what an opening was to let through that may be missed and not be told [-].
+const MISSED: f64 = 0.02;
+
 /// Reasons, each with the grade that it leaves.
 struct Judge(Vec<(Grade, String)>);
 
@@ -144,5 +147,20 @@ pub fn judge(summary: &Summary, scale: Scale, adaptive: bool) -> Verdict {
         grade: judge.0.first().map_or(Grade::Fine, |(grade, _)| *grade),
         reasons: judge.0.into_iter().map(|(_, why)| why).collect(),
         left_out,
+        notes: summary.water.as_ref().map(missed).unwrap_or_default(),
     }
+}
+
+/// What openings were to let through and did not.
+fn missed(water: &Water) -> Vec<String> {
+    let much = |p: &&Passed| p.missed_m3.is_some_and(|missed| missed > MISSED * (missed + p.volume_m3));
+    let told = |p: &Passed, why: &str| {
+        let (missed, passed) = (p.missed_m3.unwrap_or_default(), p.volume_m3);
+        format!("`{}` let {passed:.3e} m3 through and missed {missed:.3e} m3: {why}", p.name)
+    };
+    let inflow =
+        water.inflow.iter().filter(much).map(|p| format!("inflow {}", told(p, "solids stood before it")));
+    let dry = "something lies on it, or too little of it was under water, for its discharge";
+    let outflow = water.outflow.iter().filter(much).map(|p| format!("outflow {}", told(p, dry)));
+    inflow.chain(outflow).collect()
 }

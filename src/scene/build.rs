@@ -36,6 +36,7 @@ impl Scene {
         builder.open_faces();
         builder.bodies();
         builder.meetings();
+        builder.stood_before();
         builder.room();
         builder.overfilled();
         builder.gauges();

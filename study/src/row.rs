@@ -295,7 +295,7 @@ mod tests {
             let mut measured = Measured::default();
             measured.put("a [-]", 2.0);
             let reasons = if grade == Grade::Fine { vec![] } else { vec!["b".into(), "c".into()] };
-            measured.judge(&Verdict { grade, reasons, left_out: Vec::new() });
+            measured.judge(&Verdict { grade, reasons, ..Verdict::default() });
             measured.limit("a [-]", 1.0);
             (measured.class, measured.reason)
         };

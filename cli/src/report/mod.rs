@@ -178,8 +178,11 @@ fn verdict(result: &Value) -> String {
     };
     let reasons = result["verdict"]["reasons"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let reasons: String = reasons.map(|r| format!("<li>{}</li>", escape(r))).collect();
-    let left_out = result["verdict"]["left_out"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    let left_out: String = left_out.map(|r| format!("<p>Not judged: {}</p>", escape(r))).collect();
+    let told = |key: &str, word: &str| -> String {
+        let all = result["verdict"][key].as_array().into_iter().flatten().filter_map(Value::as_str);
+        all.map(|r| format!("<p>{word}: {}</p>", escape(r))).collect()
+    };
+    let left_out = told("left_out", "Not judged") + &told("notes", "Note");
     let list = if reasons.is_empty() { reasons } else { format!("<ul>{reasons}</ul>") };
     let ended = result["exit_reason"]
         .as_str()

@@ -145,7 +145,7 @@ table! {
         /// What the moving-wall slots have of slots between solids, four numbers each; their rows; what each body answers.
         coupling: [f32; 4], Both, Coupling, |s, _| 6 * s.moving_wall + 2 * s.solids;
         absorber_zone: AbsorberZone, Writes, Absorber, |s, _| s.absorbers;
-        emission: Emission, Writes, Openings, |s, _| s.openings;
+        emission: Emission, Writes, Openings, |s, _| s.emissions;
         outlet: Outlet, Writes, Openings, |s, _| s.openings;
         monitor_sum: MonitorSum, Reads, Fluid, |s, _| s.monitor_groups();
         speed_bin: u32, Both, Fluid, |_, _| SPEED_BINS as u64;

@@ -173,6 +173,7 @@ mod tests {
             solids: 2,
             absorbers: 1,
             openings: 1,
+            emissions: 1,
             capacity: 64,
             rows_per_thread: 1,
         }

@@ -46,6 +46,8 @@ pub struct Sizes {
     pub absorbers: u64,
     /// Openings through which water comes in and goes out.
     pub openings: u64,
+    /// Most parts of layers that become water in a step.
+    pub emissions: u64,
     /// Neighbours of a row at most.
     pub capacity: u64,
     /// Rows of the PPE that a thread takes at least. One fills a GPU best; software pays for every workgroup and
@@ -71,6 +73,7 @@ impl Sizes {
             solids: scene.solids.len() as u64,
             absorbers: params.absorbers.len() as u64,
             openings: scene.openings.len() as u64,
+            emissions: scene.emissions() as u64,
             capacity: params.row_capacity as u64,
             rows_per_thread: 1,
         }
@@ -242,6 +245,7 @@ mod tests {
             solids: 2,
             absorbers: 1,
             openings: 1,
+            emissions: 1,
             capacity: 64,
             rows_per_thread: 1,
         };

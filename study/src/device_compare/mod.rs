@@ -316,7 +316,9 @@ fn stages(
         match stage {
             Stage::Contact => continue,
             Stage::Openings => {
-                let passage = simulation.openings.advance(step.time + step.ahead, simulation.groups.fluid);
+                let (slots, poses) = (simulation.groups.fluid, simulation.solids.poses());
+                let passage =
+                    simulation.openings.advance(step.time + step.ahead, slots, &simulation.scene, poses);
                 pair.cpu.pass_openings(&passage.emissions, &passage.outlets)?;
                 pair.gpu.pass_openings(&passage.emissions, &passage.outlets)?;
             }
