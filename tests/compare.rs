@@ -147,3 +147,36 @@ fn contact_of_a_dry_scene_is_compared_too() {
         }
     }
 }
+
+/// Of what stands out of the water beside a surface with a pressure of its own, under a source that knows no divergence.
+#[test]
+fn a_scheme_put_together_presses_alike_on_what_stands_out_of_the_water() {
+    let pressed = |processor: &seixo::Processor| {
+        let case = crate::common::case(
+            "[run]\nspacing = 0.025\ntime_step = 1.25e-3\nend = 2.0\ndimensions = 2\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.3]\nopen = [\"z_max\"]\n\
+             [fluid]\nsource = \"number_density\"\nsolver = { tolerance = 1e-5 }\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.175]\n\
+             [[moving_wall]]\nname = \"w\"\nmin = [0, 0, 0]\nmax = [0.075, 0, 0.25]\n\
+             motion = [[0, 0, 0, 0], [0.1, 0.0125, 0, 0]]\n\
+             [[gauge.force]]\nname = \"f\"\non = \"w\"\n",
+        );
+        let options = seixo::Options { processor: processor.clone(), ..seixo::Options::default() };
+        let mut simulation = seixo::Simulation::open(&case, &options).expect("it opens");
+        (0..12)
+            .map(|_| {
+                simulation.step().expect("a step");
+                simulation.gauges().expect("a force")[0].1
+            })
+            .collect::<Vec<f64>>()
+    };
+    if device() {
+        let (cpu, gpu) = (pressed(&seixo::Processor::Cpu), pressed(&seixo::Processor::Gpu { adapter: None }));
+        println!("{cpu:.4?} N on the CPU\n{gpu:.4?} N on the device");
+        let most = cpu.iter().map(|f| f.abs()).fold(0.0, f64::max);
+        assert!(
+            most > 5.0 && cpu.iter().zip(&gpu).all(|(c, g)| (c - g).abs() < 2e-3 * most),
+            "{cpu:?} {gpu:?}"
+        );
+    }
+}

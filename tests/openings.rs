@@ -203,6 +203,50 @@ fn an_empty_tank_may_be_filled_and_slots_are_used_again() {
 const LOW_HOLE: &str = "min = [0.8, 0, 0]\nmax = [0.8, 0.1, 0.02]";
 
 #[test]
+fn a_hole_may_be_as_wide_as_a_tank_that_goes_on_or_is_open_beside_it() {
+    let drained = |sides: &str, face: &str, axes: [usize; 3]| {
+        // The same tank with other names for its axes.
+        let turned = |x: [f64; 3]| {
+            let mut out = [0.0; 3];
+            (0..3).for_each(|k| out[axes[k]] = x[k]);
+            format!("{out:?}")
+        };
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.2\ngravity = {}\n\
+             [tank]\nmin = [0, 0, 0]\nmax = {}\n{sides}\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = {}\n\
+             [[outflow]]\nname = \"out\"\nface = \"{face}\"\nmin = [0, 0, 0]\nmax = {}\n",
+            turned([0.0, 0.0, -9.81]),
+            turned([0.14, 0.2, 0.2]),
+            turned([0.14, 0.2, 0.1]),
+            turned([0.14, 0.2, 0.08]),
+        );
+        let mut simulation = opened(&text, &Processor::Cpu);
+        until(&mut simulation, 0.15);
+        let (_, out, lost, _) = counted(&mut simulation);
+        assert_eq!(lost, 0, "{sides}, {face}");
+        out
+    };
+    // Periodic across the hole, with each axis the one across.
+    let across_x = drained("periodic = [\"x\"]\nopen = [\"z_max\"]", "y_max", [0, 1, 2]);
+    let across_y = drained("periodic = [\"y\"]\nopen = [\"z_max\"]", "x_max", [1, 0, 2]);
+    let across_z = drained("periodic = [\"z\"]\nopen = [\"x_max\"]", "y_max", [2, 1, 0]);
+    println!("{across_x}, {across_y}, {across_z} particles out");
+    assert!(
+        across_x > 30 && across_x == across_y && across_x == across_z,
+        "{across_x} {across_y} {across_z}"
+    );
+    // Beside a side that is open.
+    let hole = "[[outflow]]\nname = \"out\"\nface = \"z_min\"\n";
+    let text = tank(0.1, hole)
+        .replace("[\"z_max\"]", "[\"z_max\", \"x_max\"]")
+        .replace("[0.4, 0.1, 0.1]", "[0.2, 0.1, 0.1]");
+    let case: Case = text.parse().unwrap_or_else(|e| panic!("{e}"));
+    let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(scene.openings[0].layer, 40);
+}
+
+#[test]
 fn both_backends_do_the_same() {
     if !there_is_a_device("water that comes and goes on a device") {
         return;

@@ -694,3 +694,41 @@ fn a_pressure_gauge_at_the_seam_looks_over_it() {
         assert!(low > 500.0 && (low - high).abs() < 1e-9 * low, "{low} and {high} Pa");
     }
 }
+
+#[test]
+fn an_obstacle_that_ends_at_the_seam_has_its_end() {
+    let force = |shape: &str, y: f64| {
+        let case = case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n[fluid]\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.16]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.2]\nopen = [\"z_max\"]\nperiodic = [\"y\"]\n\
+             [[obstacle]]\nname = \"o\"\ncenter = [0.1, {y}, 0.08]\n{shape}\n\
+             [[gauge.force]]\nname = \"f\"\non = \"o\"\n"
+        ));
+        let mut simulation = simulation(&case);
+        for _ in 0..3 {
+            simulation.step().expect("a step");
+        }
+        DVec3::from_slice(&simulation.gauges().expect("a force").iter().map(|g| g.1).collect::<Vec<_>>())
+    };
+    let round = "radius = 0.04\nheight = 0.08\naxis = [0, 1, 0]";
+    let shapes = [
+        "size = [0.08, 0.08, 0.08]",
+        "shape = \"sphere\"\nradius = 0.04",
+        &format!("shape = \"cylinder\"\n{round}"),
+    ];
+    for shape in shapes {
+        let middle = force(shape, 0.1);
+        for y in [0.04, 0.16] {
+            let end = force(shape, y);
+            println!("{shape}: {middle} N in the middle, {end} N at {y} m");
+            assert!(middle.z > 2.0 && (end - middle).length() < 2e-3 * middle.z, "{shape}: {middle} {end}");
+        }
+    }
+    // One that spans the tank has no ends.
+    let spans = force("size = [0.08, 0.2, 0.08]", 0.1);
+    assert!(
+        spans.y.abs() < 1e-9 && (spans.z / (1000.0 * 9.81 * 0.08 * 0.08 * 0.2) - 1.0).abs() < 0.02,
+        "{spans}"
+    );
+}

@@ -140,13 +140,12 @@ impl Builder<'_> {
     fn bury(&mut self, key: &str, solid: &mut Solid) {
         let l0 = self.lattice.spacing;
         let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
-        let kept: Vec<bool> = solid.wall_offset.iter().map(|o| !self.buried(at(o), true)).collect();
-        let dummies: Vec<DVec3> =
-            solid.dummy_offset.iter().filter(|o| !self.buried(at(o), true)).copied().collect();
+        let kept: Vec<bool> = solid.wall_offset.iter().map(|o| !self.takes(at(o))).collect();
+        let dummies: Vec<DVec3> = solid.dummy_offset.iter().filter(|o| !self.takes(at(o))).copied().collect();
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
         let mut surface = solid.wall_offset.iter().zip(&solid.wall_to_surface);
         let bare = !kept.contains(&true)
-            && surface.any(|(x, way)| !self.buried(at(&(*x + (1.0 - FLUSH) * *way)), false));
+            && surface.any(|(x, way)| !self.is_covered(solid, at(&(*x + (1.0 - FLUSH) * *way))));
         let mut areas = self.cut(solid, &kept);
         if let Some(freed) = self.freed(solid, &kept) {
             for (k, row) in (0..kept.len()).filter(|&k| kept[k]).zip(0..) {
@@ -208,7 +207,7 @@ impl Builder<'_> {
     fn unfaced(&self, solid: &Solid, axes: &[DVec3], mut area: DVec3, at: DVec3) -> DVec3 {
         for e in axes.iter().flat_map(|&e| [e, -e]) {
             let faces = area.dot(e);
-            if faces > 0.0 && self.buried(at + self.lattice.spacing * (solid.orientation * e), false) {
+            if faces > 0.0 && self.is_covered(solid, at + self.lattice.spacing * (solid.orientation * e)) {
                 area -= faces * e;
             }
         }
@@ -225,7 +224,7 @@ impl Builder<'_> {
             layer.add(at(offset));
             let ways = DVec3::AXES.into_iter().flat_map(|e| [e, -e]);
             let mut around = ways.flat_map(|e| [1.0, 2.0].map(|d| at(offset) + d * l0 * e));
-            if !kept || around.any(|x| self.buried(x, false)) {
+            if !kept || around.any(|x| self.is_covered(solid, x)) {
                 met.add(at(offset));
             }
         }
@@ -251,11 +250,11 @@ impl Builder<'_> {
             let (one, other) =
                 if self.lattice.plane { (DVec3::Y.cross(normal), DVec3::ZERO) } else { (one, other) };
             let around = [DVec3::ZERO, one, -one, other, -other];
-            around.into_iter().all(|way| self.buried(x + l0 * (FLAT * way - COVERED[0] * normal), false))
+            around.into_iter().all(|way| self.is_covered(solid, x + l0 * (FLAT * way - COVERED[0] * normal)))
         };
         let free = |x: DVec3, normal: DVec3| {
             let (x, normal) = (at(x), solid.orientation * normal);
-            let covered = |d: f64| self.buried(x + d * l0 * normal, false);
+            let covered = |d: f64| self.is_covered(solid, x + d * l0 * normal);
             let bare = !COVERED.into_iter().any(covered) && !lies_on(x, normal);
             alone(x) || bare || !covered(-FLUSH) && bent(x, normal)
         };
@@ -316,10 +315,22 @@ impl Builder<'_> {
         Some((side(low, 0, f64::NEG_INFINITY), side(high, 1, f64::INFINITY)))
     }
 
-    /// Whether a place lies inside a wall or beyond the tank's; `near`: or closer to a particle of the lattice's walls
-    /// than half a spacing.
-    fn buried(&self, at: DVec3, near: bool) -> bool {
-        let (lattice, slack) = (&self.lattice, 1e-6 * self.lattice.spacing);
+    /// Whether a wall takes the place of a particle: it lies inside of one, beyond the tank's or a seam, or closer to a particle of the lattice's walls than half
+    /// a spacing.
+    fn takes(&self, at: DVec3) -> bool {
+        self.buried(at) || near_solid(&self.lattice, &self.grid, at, 0.5)
+    }
+
+    /// Whether a wall covers a place before the face of a solid. Across a seam that may be the solid itself.
+    fn is_covered(&self, solid: &Solid, at: DVec3) -> bool {
+        let image = self.periodic.wrap(at);
+        let itself = || solid.placed().holds(image, 1e-6 * self.lattice.spacing);
+        self.buried(image) || image.distance(at) > 0.5 * self.lattice.spacing && itself()
+    }
+
+    /// Whether a place lies inside a wall or beyond the tank's or a seam.
+    fn buried(&self, at: DVec3) -> bool {
+        let slack = 1e-6 * self.lattice.spacing;
         let beyond = self
             .closed_sides()
             .is_some_and(|(low, high)| at.cmplt(low - slack).any() || at.cmpgt(high + slack).any());
@@ -327,7 +338,6 @@ impl Builder<'_> {
         beyond
             || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
             || earlier().any(|b| b.holds(at, slack))
-            || near && near_solid(lattice, &self.grid, at, 0.5)
     }
 
     /// Tells of files in single precision whose coordinates are so large that the steps between them bend what they describe.

@@ -73,13 +73,14 @@ impl WallExcess {
         let rows = |s: &Solid| std::iter::repeat_n(cut_share(s, params), s.wall_slots.len());
         let cut_share: Vec<f64> =
             scene.solids.iter().filter(|_| plan.needs(Arrays::Coupling)).flat_map(rows).collect();
+        let beside = plan.needs(Arrays::Excess) && plan.has(Stage::SurfacePressure);
         Self {
             of: vec![0.0; plan.excess.rows(groups.pressure() - groups.fluid, groups.moving_wall)],
             moving: groups.moving_wall,
             of_still: plan.excess == Told::All,
             solved: vec![Solved::default(); cut_share.len()],
             cut_share,
-            beside: vec![None; if plan.has(Stage::SurfacePressure) { groups.moving_wall } else { 0 }],
+            beside: vec![None; if beside { groups.moving_wall } else { 0 }],
         }
     }
 
