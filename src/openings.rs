@@ -38,9 +38,11 @@ struct Gate {
     area: f64,
     /// Particles that it had swallowed when they were last counted.
     taken: u64,
-    /// Volume that its discharge has asked for so far [m3]: the discharge may have been another before `run.from`.
+    /// Volume that its discharge has asked for so far [m3], without what was missed: the discharge may have been another before `run.from`.
     /// 0 of walls that follow none.
     asked: f64,
+    /// Volume that its discharge has asked for where no water was, and that is not made up for [m3].
+    missed: f64,
 }
 
 /// The openings of a scene.
@@ -76,6 +78,7 @@ impl Openings {
             area: opening.area * (opening.wet.max(1) as f64 / opening.layer as f64).max(0.25),
             taken: 0,
             asked: 0.0,
+            missed: 0.0,
             opening: opening.clone(),
         };
         Self { gates: scene.openings.iter().map(gate).collect(), spacing: scene.spacing, reached: 0.0 }
@@ -162,6 +165,11 @@ impl Openings {
             let wet = (total - gate.taken) as f64 * l0 * l0;
             gate.taken = total;
             let behind = gate.asked - total as f64 * l0.powi(3);
+            // A pump that has run dry owes no more than a full layer.
+            let beyond = (behind - full * l0).max(0.0);
+            gate.missed += beyond;
+            gate.asked -= beyond;
+            let behind = behind - beyond;
             // A wall that has met no water goes on as if there were.
             let wet = if wet > 0.0 { wet } else { full };
             gate.area =
@@ -237,7 +245,7 @@ impl Openings {
             let follows = matches!(gate.opening.passes, Passes::Drawn(_));
             // What its wall has drawn back for since it last swallowed is not missed yet.
             let due = gate.asked - gate.travel * gate.area;
-            follows.then(|| (due - total as f64 * self.spacing.powi(3)).max(0.0))
+            follows.then(|| gate.missed + (due - total as f64 * self.spacing.powi(3)).max(0.0))
         })
     }
 
@@ -247,12 +255,24 @@ impl Openings {
     /// [`crate::error::Error::Checkpoint`] if the state has none.
     pub(crate) fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
         for (k, gate) in self.gates.iter_mut().enumerate() {
-            let Gate { opening: _, wall: _, places: _, travel, speed, layers, held, area, taken, asked } =
-                gate;
+            let Gate {
+                opening: _,
+                wall: _,
+                places: _,
+                travel,
+                speed,
+                layers,
+                held,
+                area,
+                taken,
+                asked,
+                missed,
+            } = gate;
             archive.number(&format!("openings.{k}.travel"), travel)?;
             archive.number(&format!("openings.{k}.speed"), speed)?;
             archive.number(&format!("openings.{k}.area"), area)?;
             archive.number(&format!("openings.{k}.asked"), asked)?;
+            archive.number_of_late(&format!("openings.{k}.missed"), missed)?;
             archive.count(&format!("openings.{k}.layers"), layers)?;
             archive.count_of_late(&format!("openings.{k}.held"), held)?;
             archive.count(&format!("openings.{k}.taken"), taken)?;

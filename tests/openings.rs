@@ -203,7 +203,7 @@ fn an_empty_tank_may_be_filled_and_slots_are_used_again() {
 const LOW_HOLE: &str = "min = [0.8, 0, 0]\nmax = [0.8, 0.1, 0.02]";
 
 #[test]
-fn a_hole_may_be_as_wide_as_a_tank_that_goes_on_or_is_open_beside_it() {
+fn a_hole_may_be_as_wide_as_a_tank_that_is_periodic_across_it() {
     let drained = |sides: &str, face: &str, axes: [usize; 3]| {
         // The same tank with other names for its axes.
         let turned = |x: [f64; 3]| {
@@ -236,14 +236,6 @@ fn a_hole_may_be_as_wide_as_a_tank_that_goes_on_or_is_open_beside_it() {
         across_x > 30 && across_x == across_y && across_x == across_z,
         "{across_x} {across_y} {across_z}"
     );
-    // Beside a side that is open.
-    let hole = "[[outflow]]\nname = \"out\"\nface = \"z_min\"\n";
-    let text = tank(0.1, hole)
-        .replace("[\"z_max\"]", "[\"z_max\", \"x_max\"]")
-        .replace("[0.4, 0.1, 0.1]", "[0.2, 0.1, 0.1]");
-    let case: Case = text.parse().unwrap_or_else(|e| panic!("{e}"));
-    let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(scene.openings[0].layer, 40);
 }
 
 #[test]

@@ -169,3 +169,30 @@ fn what_an_outflow_misses_of_its_discharge_is_told() {
     let (missed, said) = notes("covered", wall);
     assert!(missed > 5e-4 && said.starts_with("outflow `out` let "), "{missed} m3: {said}");
 }
+
+#[test]
+fn a_pump_that_ran_dry_draws_what_it_is_asked_for_when_water_comes_and_no_more() {
+    crate::common::alone();
+    // Nothing comes in for a second, then four times what the pump takes.
+    let case: Case = "[run]\nspacing = 0.02\ntime_step = 2e-3\nadaptive = true\nend = 3.0\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.6]\nopen = [\"z_max\"]\n[fluid]\n\
+         [[inflow]]\nname = \"up\"\nface = \"x_min\"\nmin = [0, 0, 0]\nmax = [0, 0, 0.1]\n\
+         discharge = [[0, 0], [1, 0], [1.2, 0.12]]\n\
+         [[outflow]]\nname = \"pump\"\nface = \"x_max\"\nmin = [0.6, 0, 0]\nmax = [0.6, 0, 0.1]\ndischarge = 0.03\n"
+        .parse()
+        .unwrap_or_else(|e| panic!("{e}"));
+    let options = Options { processor: Processor::Cpu, ..Options::default() };
+    let mut simulation = Simulation::open(&case, &options).unwrap_or_else(|e| panic!("{e}"));
+    let mut out_at = |time: f64| {
+        while simulation.time < time {
+            simulation.step().unwrap_or_else(|e| panic!("{:.3} s: {e}", simulation.time));
+        }
+        let out = simulation.observe().expect("it can be looked at").1.swallowed[0];
+        (simulation.time, out as f64 * SPACING * SPACING)
+    };
+    let (from, before) = out_at(2.0);
+    let (to, after) = out_at(3.0);
+    let discharge = (after - before) / (to - from);
+    println!("{before} m2 out by {from:.2} s, {discharge} m2/s from there on");
+    assert!((discharge / 0.03 - 1.0).abs() < 0.07, "{discharge} m2/s");
+}

@@ -104,6 +104,14 @@ impl Archive {
         if self.saving || self.numbers.contains_key(name) { self.count(name, value) } else { Ok(()) }
     }
 
+    /// A number that states of older versions lack: `value` stays as it is then.
+    ///
+    /// # Errors
+    /// None so far.
+    pub fn number_of_late(&mut self, name: &str, value: &mut f64) -> Result<()> {
+        if self.saving || self.numbers.contains_key(name) { self.number(name, value) } else { Ok(()) }
+    }
+
     /// A count of `what` that must be the same in the state and in the case.
     ///
     /// # Errors

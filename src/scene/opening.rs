@@ -165,7 +165,7 @@ impl Builder<'_> {
                 for c in planned.cells.iter().map(|c| c + depth * out) {
                     let rim = if hole { depth * sideways } else { IVec3::ZERO };
                     let cells = Cells { lo: c, hi: c + 1 }.grown(rim);
-                    // At a seam the rim goes on on the other side, at an open one it ends.
+                    // At a seam the rim goes on on the other side.
                     let cells =
                         cells.iter().map(|c| self.grid.wrap(c)).filter(|&c| self.grid.cells.contains(c));
                     cells.collect::<Vec<_>>().into_iter().for_each(|c| self.grid.set(c, state));
