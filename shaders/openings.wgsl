@@ -15,6 +15,9 @@ fn emit(@builtin(global_invocation_id) id: vec3u) {
     var k = thread(id);
     for (var e = 0u; e < arrayLength(&emission); e += 1u) {
         let layer = emission[e];
+        if layer.count == 0u {
+            return;
+        }
         if k < layer.count {
             let wall = layer.wall + k;
             let i = layer.to + k;

@@ -54,8 +54,24 @@ impl Standing {
         }
     }
 
+    /// Number `number` of the scene's solids where it is at t = 0.
+    pub(crate) fn at_start(number: usize, solid: &Solid) -> Self {
+        Self::new(number, solid, solid.position, solid.orientation)
+    }
+
+    /// The same in its `pose`.
+    pub(crate) fn of(number: usize, solid: &Solid, pose: &Pose) -> Self {
+        Self::new(number, solid, pose.position, pose.orientation)
+    }
+
+    /// Whether it may reach within `reach` of `x` [m].
+    pub(crate) fn may_reach(&self, x: DVec3, reach: f64, periodic: &Periodic) -> bool {
+        let way = x - self.position;
+        way.length().min(periodic.nearest(way).length()) < self.radius + reach
+    }
+
     /// How far its surface is from `x` [m], negative inside; infinite if no nearer than `reach` [m].
-    fn outside(&self, x: DVec3, reach: f64, periodic: &Periodic) -> f64 {
+    pub(crate) fn outside(&self, x: DVec3, reach: f64, periodic: &Periodic) -> f64 {
         let way = x - self.position;
         let most = self.radius + reach;
         let outside = |way: DVec3| {
@@ -88,7 +104,7 @@ pub(crate) fn still(scene: &Scene, wall: Option<usize>) -> Vec<Standing> {
     let walls = scene.walls.iter().enumerate().filter(|(k, other)| wall != Some(*k) && !is_told(other));
     let opened = scene.followed();
     let solids = scene.solids.iter().enumerate().filter(|(k, s)| s.is_still() || *k >= opened);
-    let solids = solids.map(|(k, s)| Standing::new(k, s, s.position, s.orientation));
+    let solids = solids.map(|(k, s)| Standing::at_start(k, s));
     walls.map(|(_, wall)| Standing::wall(wall)).chain(solids).collect()
 }
 
@@ -96,7 +112,7 @@ pub(crate) fn still(scene: &Scene, wall: Option<usize>) -> Vec<Standing> {
 pub(crate) fn moving(scene: &Scene, poses: &[Pose]) -> Vec<Standing> {
     let solids = scene.solids[..scene.followed()].iter().zip(poses).enumerate();
     let solids = solids.filter(|(_, (s, _))| !s.is_still());
-    solids.map(|(k, (s, pose))| Standing::new(k, s, pose.position, pose.orientation)).collect()
+    solids.map(|(k, (s, pose))| Standing::of(k, s, pose)).collect()
 }
 
 /// Faces of wall particles, each a square.

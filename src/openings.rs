@@ -57,7 +57,7 @@ pub struct Openings {
 /// What passes the openings in a step.
 #[derive(Clone, Debug, Default)]
 pub struct Passage {
-    /// Layers that become water.
+    /// Parts of layers that become water.
     pub emissions: Vec<Emission>,
     /// Where water is swallowed, one an outflow.
     pub outlets: Vec<Outlet>,
@@ -126,7 +126,7 @@ impl Openings {
                     gate.layers += 1;
                     let first = gate.wall.start;
                     gate.held += gate.wall.len() as u64;
-                    for part in free(&gate.places, |x| scene.stands_before(poses, x, -outward)) {
+                    for part in free(&scene.held_back(&gate.opening, &gate.places, poses)) {
                         gate.held -= part.len() as u64;
                         out.emissions.push(Emission {
                             wall: first + part.start..first + part.end,
@@ -238,15 +238,10 @@ impl Openings {
         inflows.map(|g| g.held as f64 * self.spacing.powi(3))
     }
 
-    /// Volume that each outflow is behind its discharge [m3], of those that follow one, having `swallowed` so many particles.
-    pub(crate) fn behind(&self, swallowed: &[u64]) -> impl Iterator<Item = Option<f64>> {
+    /// Volume that each outflow has missed of its discharge for good [m3], of those that follow one.
+    pub(crate) fn missed(&self) -> impl Iterator<Item = Option<f64>> {
         let outflows = self.gates.iter().filter(|g| !g.opening.is_inflow());
-        outflows.zip(swallowed).map(|(gate, &total)| {
-            let follows = matches!(gate.opening.passes, Passes::Drawn(_));
-            // What its wall has drawn back for since it last swallowed is not missed yet.
-            let due = gate.asked - gate.travel * gate.area;
-            follows.then(|| gate.missed + (due - total as f64 * self.spacing.powi(3)).max(0.0))
-        })
+        outflows.map(|g| matches!(g.opening.passes, Passes::Drawn(_)).then_some(g.missed))
     }
 
     /// Save where the walls are, or take it over.
@@ -284,15 +279,14 @@ impl Openings {
     }
 }
 
-/// Runs of the `places` where nothing `stands`.
-fn free(places: &[DVec3], stands: impl Fn(DVec3) -> bool) -> impl Iterator<Item = Range<usize>> {
-    let mut from = 0;
-    std::iter::from_fn(move || {
-        let next = |from: usize, want: bool| (from..places.len()).find(|&k| stands(places[k]) == want);
-        let start = next(from, false)?;
-        from = next(start, true).unwrap_or(places.len());
-        Some(start..from)
-    })
+/// Runs of the places that are not `held`.
+fn free(held: &[bool]) -> impl Iterator<Item = Range<usize>> {
+    let parts = held.chunk_by(|a, b| a == b).scan(0, |from, part| {
+        let first = *from;
+        *from += part.len();
+        Some((part[0], first..*from))
+    });
+    parts.filter(|(held, _)| !held).map(|(_, part)| part)
 }
 
 impl Opening {

@@ -217,6 +217,43 @@ fn water_slides_down_a_terrain_as_fast_as_its_weight_says() {
     assert!((along - 1.0).abs() < 0.06, "{along}");
 }
 
+#[test]
+fn a_mesh_is_cut_at_a_seam_that_it_reaches_over_and_has_its_end_at_one_where_it_ends() {
+    let folder = TempDir::new().unwrap();
+    // A box of 0.08 m, `wide` across, from y = `from` on, on the floor or in the middle of 0.16 m of water.
+    let force = |wide: f64, from: f64, z: f64| {
+        let triangles = cuboid(DVec3::new(0.08, wide, 0.08));
+        let path = file(&folder, &format!("{wide}.stl"), &stl(&triangles));
+        let mut simulation = crate::common::simulation(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\n[fluid]\n\
+             [[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.16]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.2, 0.2, 0.2]\nopen = [\"z_max\"]\nperiodic = [\"y\"]\n\
+             [[obstacle]]\nname = \"o\"\nshape = \"mesh\"\nfile = \"{path}\"\nposition = [0.06, {from}, {z}]\n\
+             [[gauge.force]]\nname = \"f\"\non = \"o\"\n"
+        )));
+        for _ in 0..3 {
+            simulation.step().expect("a step");
+        }
+        let read = simulation.gauges().expect("a force");
+        DVec3::new(read[0].1, read[1].1, read[2].1)
+    };
+    let load = 1000.0 * 9.81 * 0.08 * 0.08 * 0.2;
+    let fits = force(0.2, 0.0, 0.0);
+    println!("from side to side: {fits} N for {load} N");
+    assert!((fits.z / -load - 1.0).abs() < 0.04 && fits.y.abs() < 1e-6 * load, "{fits} for {load} N");
+    for over in [0.02, 0.1] {
+        let f = force(0.2 + 2.0 * over, -over, 0.0);
+        println!("{over} m over the seam: {f} N");
+        assert!((f - fits).length() < 0.01 * load, "{over} m: {f} for {fits} N");
+    }
+    let middle = force(0.08, 0.06, 0.04);
+    for from in [0.0, 0.12] {
+        let end = force(0.08, from, 0.04);
+        println!("from {from} m: {end} N, {middle} N in the middle");
+        assert!(middle.z > 2.0 && (end - middle).length() < 2e-3 * middle.z, "{from} m: {end} {middle}");
+    }
+}
+
 /// A vessel with this inside, open at the top, with walls and a floor of `thick` [m], turned by `turn` about the lower corner of its inside.
 fn vessel(inside: DVec3, thick: f64, turn: DQuat) -> Triangles {
     let (low, high) = (DVec3::new(-thick, -thick, -thick), inside + DVec3::new(thick, thick, 0.0));

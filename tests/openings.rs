@@ -689,4 +689,19 @@ fn a_tank_that_lets_nothing_out_says_when_it_is_full() {
     ] {
         assert_eq!(noted(&fine), None, "{fine}");
     }
+    // And so does the end of the run, also of one in which it is the water that has no room, not a wall.
+    let body = "[[body]]\nname = \"float\"\nsize = [0.1, 0.1, 0.06]\ncenter = [0.2, 0, 0.2]\ndensity = 500\n\
+                displaces_fluid = true\n[contact]\nspring = 2e4\n";
+    let mut simulation = opened(&format!("{shut}{body}").replace("end = 2.0", "end = 3.0"), &Processor::Cpu);
+    let why = loop {
+        match simulation.step() {
+            Ok(_) => assert!(simulation.time < 3.0, "it holds all of it"),
+            Err(e) => break e.to_string(),
+        }
+    };
+    println!("{why}");
+    assert!(why.contains("lets nothing out and is full at t = 1.5"), "{why}");
+    let hole = format!("{}[[gauge.force]]\nname = \"f\"\non = \"out\"\n", tank(0.2, outflow));
+    let why = hole.parse::<Case>().expect_err("refused").to_string();
+    assert!(why.contains("outflow `out` is a hole"), "{why}");
 }

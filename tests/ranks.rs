@@ -1,6 +1,7 @@
 //! Ranks: that many of them compute what one computes, to the last bit twice, whatever crosses the cuts between them.
 
 use crate::common;
+use crate::openings_covered::{lifted, pond};
 use common::*;
 use glam::DVec3;
 use seixo::Error;
@@ -237,6 +238,8 @@ fn many_ranks_with_openings_compute_what_one_computes() {
     compare(&[
         ("channel", shipped("channel", &["run.spacing=0.04"]), 90, &[3], 1e-8),
         ("holes", holes(), 100, &[3], 1e-8),
+        // Beams before the inflow hold back parts of its layers.
+        ("beams", case(&pond("velocity = 0.4", &lifted([0.0, 0.06]))), 100, &[2], 1e-6),
     ]);
 }
 

@@ -210,8 +210,10 @@ impl Backend for Gpu {
                 shift: four(e.shift),
                 velocity: four(e.velocity),
             };
-            let mut layers = vec![layout::Emission::default(); self.sizes.emissions as usize];
-            layers.iter_mut().zip(emissions).for_each(|(layer, e)| *layer = device(e));
+            // One without particles ends them.
+            let end = std::iter::once(layout::Emission::default());
+            let layers: Vec<layout::Emission> =
+                emissions.iter().map(device).chain(end).take(self.sizes.emissions as usize).collect();
             let count: u64 = emissions.iter().map(|e| e.wall.len() as u64).sum();
             self.context.upload(buffers::emission, &layers)?;
             self.context.pass([(kernels::openings::emit, groups(count))])?;

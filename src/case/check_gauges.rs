@@ -70,6 +70,15 @@ impl Checker<'_> {
                     "name another face, or take it out of tank.open or tank.periodic"
                 };
                 self.add(format!("gauge.force.{k}.on"), message, remedy);
+            } else if case.openings().any(|o| o.is_hole() && o.name == gauge.on)
+                && !solid.contains(&gauge.on.as_str())
+            {
+                let message = format!("outflow `{}` is a hole: nothing stands in it to measure on", gauge.on);
+                self.add(
+                    format!("gauge.force.{k}.on"),
+                    message,
+                    "name the face of the tank around it, or remove the gauge",
+                );
             } else if !solid.contains(&gauge.on.as_str()) {
                 let message = format!("nothing solid is called `{}`", gauge.on);
                 let remedy = match super::report::closest(&gauge.on, &solid) {

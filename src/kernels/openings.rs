@@ -8,7 +8,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// A wall layer that becomes water.
+/// A wall layer, or a part of one, that becomes water.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Emission {
     /// Its slots.

@@ -170,7 +170,7 @@ pub struct Passed {
     /// Their volume [m3]; in two dimensions of a slice one spacing wide.
     pub volume_m3: f64,
     /// Volume that it was to let through besides [m3]: of an inflow what solids before it held back, of an outflow what its `discharge`
-    /// asks for and has not had. None of outflows that follow no discharge.
+    /// has asked for where no water was. None of outflows that follow no discharge.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missed_m3: Option<f64>,
 }

@@ -231,7 +231,7 @@ impl Totals {
             missed_m3,
         };
         let inflows = openings.emitted().zip(openings.held_back());
-        let outflows = openings.outflows().zip(&self.water.1).zip(openings.behind(&self.water.1));
+        let outflows = openings.outflows().zip(&self.water.1).zip(openings.missed());
         (!openings.is_empty()).then(|| Water {
             particles_start: simulation.scene.water() as u64,
             particles_end: self.water.0,
@@ -239,7 +239,7 @@ impl Totals {
             volume_start_m3: simulation.scene.water() as f64 * volume,
             volume_end_m3: self.water.0 as f64 * volume,
             inflow: inflows.map(|((name, n), held)| passed(name, n, Some(held))).collect(),
-            outflow: outflows.map(|((name, &n), behind)| passed(name, n, behind)).collect(),
+            outflow: outflows.map(|((name, &n), missed)| passed(name, n, missed)).collect(),
         })
     }
 }

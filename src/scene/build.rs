@@ -85,6 +85,7 @@ pub(super) struct Builder<'a> {
     pub(super) water: Water,
     pub(super) depth: f64,
     pub(super) filled: bool,
+    pub(super) full: Option<f64>,
     /// Whether a wall of the case could not be built: of gauges nothing is said then, for they may be on it.
     pub(super) lacks_walls: bool,
     pub(super) notes: Vec<String>,
@@ -137,6 +138,7 @@ impl<'a> Builder<'a> {
             water: Water::default(),
             depth: 0.0,
             filled: false,
+            full: None,
             lacks_walls: false,
             notes: Vec::new(),
             problems: Vec::new(),

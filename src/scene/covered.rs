@@ -9,8 +9,10 @@ use super::walls::PlaneFrame;
 use super::{Opening, Scene, Solid};
 use crate::body::Pose;
 use crate::case::{Case, OpeningKeys};
+use crate::cover::{SLACK, Standing};
 use crate::error::Problem;
 use glam::{DVec3, IVec3};
+use std::collections::HashSet;
 
 /// Where nothing may stand in the way of what comes in, from where it becomes water on, over the spacing [-]: through a gap of a spacing between a face and what
 /// stands before it all water of an inflow would have to pass in a row of single particles, and is pressed together.
@@ -110,28 +112,38 @@ impl Builder<'_> {
         Some(left)
     }
 
-    /// Notes the openings before which something stands at t = 0 that may move or is held: see [`Scene::stands_before`].
+    /// Solids that may stand before openings in the course of a run, with their numbers: all but obstacles, whose cells openings do not have.
+    pub(super) fn passing(&self) -> impl Iterator<Item = (usize, &Solid)> {
+        let obstacles: HashSet<&str> = self.case.obstacle.iter().map(|o| o.name.as_str()).collect();
+        let numbered = self.bodies.iter().chain(&self.moving_walls).enumerate();
+        let of_case = numbered.take(self.solids_of_case().count());
+        of_case.filter(move |(_, solid)| solid.is_body || !obstacles.contains(solid.name.as_str()))
+    }
+
+    /// Notes the openings before which something stands at t = 0 that is no obstacle.
     pub(super) fn stood_before(&mut self) {
-        let solids: Vec<(&Solid, Placed)> = self.solids_of_case().map(|s| (s, s.placed())).collect();
         let mut notes = Vec::new();
         for planned in &self.openings {
             let (opening, all) = (&planned.opening, planned.cells.len());
             let out = opening.outward.as_ivec3();
-            let holds = |shape: &Placed, c: &IVec3| {
-                before(*c, out, opening.is_inflow(), &self.lattice).any(|x| shape.holds(x, 0.0))
-            };
-            for (solid, shape) in solids.iter().filter(|(solid, _)| !solid.is_still()) {
-                let covered = planned.cells.iter().filter(|c| holds(shape, c)).count();
+            for (number, solid) in self.passing() {
+                let standing = Standing::at_start(number, solid);
+                let inside =
+                    |x: DVec3| standing.outside(x, 0.0, &self.periodic) < -SLACK * self.lattice.spacing;
+                let covers = |c: &&IVec3| before(**c, out, opening.is_inflow(), &self.lattice).any(inside);
+                let covered = planned.cells.iter().filter(covers).count();
                 if covered == 0 {
                     continue;
                 }
-                let (key, way) = if opening.is_inflow() { ("inflow", "in") } else { ("outflow", "out") };
-                notes.push(format!(
-                    "{key} `{}`: {} `{}` stands before {covered} of its {all} cells at t = 0: no water comes {way} there as long as it does",
-                    opening.name,
-                    solid.what(),
-                    solid.name
-                ));
+                let (what, name) = (solid.what(), &solid.name);
+                notes.push(if opening.is_inflow() {
+                    format!(
+                        "inflow `{}`: {what} `{name}` stands before {covered} of its {all} cells at t = 0, where no water comes in as long as it does",
+                        opening.name
+                    )
+                } else {
+                    format!("outflow `{}`: {what} `{name}` lies on {covered} of its {all} cells at t = 0", opening.name)
+                });
             }
         }
         self.notes.extend(notes);
@@ -161,20 +173,19 @@ impl Scene {
     /// Most parts of the layers of inflows that may become water in a step: solids hold back what lies between.
     pub(crate) fn emissions(&self) -> usize {
         let inflows = self.openings.iter().filter(|o| o.is_inflow());
-        let parts = |o: &Opening| if self.followed() == 0 { 1 } else { o.layer.div_ceil(2) };
+        let parts = |o: &Opening| if o.passing.is_empty() { 1 } else { o.layer.div_ceil(2) };
         inflows.map(parts).sum::<usize>().max(1)
     }
 
-    /// Whether one of the solids in these `poses`, the walls in openings aside, lets no water come in at `x` [m] on its way `inward`, of length 1.
-    pub(crate) fn stands_before(&self, poses: &[Pose], x: DVec3, inward: DVec3) -> bool {
-        let places = [x, x + ROOM * self.spacing * inward];
-        (0..self.followed()).any(|k| {
-            let (solid, pose) = (&self.solids[k], &poses[k]);
-            places.iter().any(|place| {
-                let way = self.periodic.nearest(place - pose.position);
-                way.length() < solid.radius()
-                    && solid.shape.outside(pose.orientation.inverse() * way - solid.shape_offset) < 0.0
-            })
-        })
+    /// Which of the `places` [m] where the layer of an inflow becomes water solids in these `poses` hold back: they stand there or [`ROOM`] further.
+    pub(crate) fn held_back(&self, opening: &Opening, places: &[DVec3], poses: &[Pose]) -> Vec<bool> {
+        let further = -ROOM * self.spacing * opening.outward;
+        let ends = places.iter().map(|&x| (x, x)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let (low, high) = ends.unwrap_or_default();
+        let (middle, reach) = (0.5 * (low + high + further), 0.5 * (high - low + further.abs()).length());
+        let solids = opening.passing.iter().map(|&k| Standing::of(k, &self.solids[k], &poses[k]));
+        let near: Vec<Standing> = solids.filter(|s| s.may_reach(middle, reach, &self.periodic)).collect();
+        let holds = |x: DVec3| near.iter().any(|s| s.outside(x, 0.0, &self.periodic) < -SLACK * self.spacing);
+        places.iter().map(|&x| holds(x) || holds(x + further)).collect()
     }
 }

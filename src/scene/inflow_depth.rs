@@ -143,6 +143,7 @@ impl Builder<'_> {
             let middle = 0.5 * (before + full);
             *if comes(middle) > room { &mut full } else { &mut before } = middle;
         }
+        self.full = Some(full);
         self.notes.push(format!(
             "inflow: the tank is full at t = {full:.4} s, and nothing lets water out: add an [[outflow]], open a face (tank.open), or end \
              the inflow or the run before"

@@ -70,6 +70,7 @@ impl Builder<'_> {
             periodic: self.periodic,
             depth: self.depth,
             filled: self.filled,
+            full: self.full,
             uneven: false,
             notes: self.notes,
         }

@@ -413,6 +413,8 @@ pub struct Scene {
     /// Whether the water leaves no room free at the start, nor anything that lets in or out or is driven could: it has no free
     /// surface.
     pub filled: bool,
+    /// When what comes in has filled a tank that lets nothing out, at the latest: solids that move may take room as well [s].
+    pub full: Option<f64>,
     /// Whether water starts beside solids that do not stand on its lattice, where its density is not quite even.
     pub uneven: bool,
     /// What a user should know that is no error (rounded lengths, removed particles ...).

@@ -86,6 +86,8 @@ pub struct Opening {
     pub layer: usize,
     /// Of these, how many columns of the lattice in front of it hold water at t = 0.
     pub wet: usize,
+    /// Solids that may stand before it: all but obstacles, whose cells it does not have.
+    pub passing: Vec<usize>,
     /// Where particles of the tank's wall would stand in a hole [m]: bodies do not leave through it. None where a wall moves.
     pub lid: Vec<DVec3>,
 }
@@ -266,6 +268,7 @@ impl Builder<'_> {
             area,
             layer,
             wet: 0,
+            passing: vec![],
             lid: if is_hole { cells.iter().map(|&c| self.lattice.center(c)).collect() } else { vec![] },
         };
         let mut wall = None;
@@ -325,9 +328,11 @@ impl Builder<'_> {
         } else {
             self.water.cell.iter().copied().collect()
         };
+        let passing: Vec<usize> = self.passing().map(|(k, _)| k).collect();
         let of = |planned: &Planned| {
             let out = planned.opening.outward.as_ivec3();
             Opening {
+                passing: passing.clone(),
                 solid: planned.wall.map(|k| self.bodies.len() + k),
                 wet: planned.cells.iter().filter(|c| water.contains(&(*c - out))).count(),
                 ..planned.opening.clone()

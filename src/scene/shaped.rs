@@ -254,6 +254,10 @@ impl Builder<'_> {
         };
         let free = |x: DVec3, normal: DVec3| {
             let (x, normal) = (at(x), solid.orientation * normal);
+            // What reaches over a seam is cut there.
+            if self.is_beyond(x) && self.periodic.wrap(x) != x {
+                return false;
+            }
             let covered = |d: f64| self.is_covered(solid, x + d * l0 * normal);
             let bare = !COVERED.into_iter().any(covered) && !lies_on(x, normal);
             alone(x) || bare || !covered(-FLUSH) && bent(x, normal)
@@ -328,14 +332,18 @@ impl Builder<'_> {
         self.buried(image) || image.distance(at) > 0.5 * self.lattice.spacing && itself()
     }
 
+    /// Whether a place lies beyond the tank's walls or a seam.
+    fn is_beyond(&self, at: DVec3) -> bool {
+        let slack = 1e-6 * self.lattice.spacing;
+        let sides = self.closed_sides();
+        sides.is_some_and(|(low, high)| at.cmplt(low - slack).any() || at.cmpgt(high + slack).any())
+    }
+
     /// Whether a place lies inside a wall or beyond the tank's or a seam.
     fn buried(&self, at: DVec3) -> bool {
         let slack = 1e-6 * self.lattice.spacing;
-        let beyond = self
-            .closed_sides()
-            .is_some_and(|(low, high)| at.cmplt(low - slack).any() || at.cmpgt(high + slack).any());
         let earlier = || self.moving_walls.iter().filter(|s| s.is_still()).map(Solid::placed);
-        beyond
+        self.is_beyond(at)
             || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, slack))
             || earlier().any(|b| b.holds(at, slack))
     }

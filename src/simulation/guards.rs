@@ -18,6 +18,9 @@ const SHORTEST_STEP: f64 = 1e-6;
 /// A typed step of so many times the fall through a spacing is far beyond what any flow leaves of it.
 const LONGEST_STEP: f64 = 1e3;
 
+/// Part of the time in which a tank fills from which on it may have no room left: solids that move may take some of it [-].
+const FULL_FROM: f64 = 0.5;
+
 impl Simulation {
     /// An error if a step has become so short that the run would not end.
     pub(crate) fn check_length(&self, step: &Step) -> Result<()> {
@@ -57,6 +60,20 @@ impl Simulation {
              a way out",
             self.solids.name(k)
         )
+    }
+
+    /// Why water may have collapsed, and what would help.
+    fn collapse(&self, step: &Step) -> String {
+        match self.scene.full.filter(|full| step.time > FULL_FROM * full) {
+            Some(full) => format!(
+                "the tank lets nothing out and is full at t = {full:.3} s at the latest: add an [[outflow]], open a face \
+                 (tank.open), or end the inflow or the run before"
+            ),
+            None => {
+                "the fluid has collapsed onto itself; use a smaller time step or a larger fluid.sound_speed"
+                    .to_owned()
+            }
+        }
     }
 
     pub(super) fn check_bodies(&self, step: &Step) -> Result<()> {
@@ -120,8 +137,8 @@ impl Simulation {
                     )
                 }
                 None => format!(
-                    "particle slot {slot} has {neighbours} neighbours, {lists}: the fluid has collapsed onto itself; use a \
-                     smaller time step or a larger fluid.sound_speed"
+                    "particle slot {slot} has {neighbours} neighbours, {lists}: {}",
+                    self.collapse(step)
                 ),
             };
             return Err(self.diverged(step, Stage::NeighbourList, what));

@@ -65,6 +65,7 @@ impl DryScene {
             periodic: Default::default(),
             depth: 0.0,
             filled: false,
+            full: None,
             uneven: false,
             notes: vec![],
         };

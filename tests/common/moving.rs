@@ -197,6 +197,7 @@ pub fn scene(dimensions: u32, scale: i32) -> Scene {
         periodic: Default::default(),
         depth: f64::from(7 * scale) * SPACING,
         filled: false,
+        full: None,
         uneven: false,
         notes: Vec::new(),
     }
