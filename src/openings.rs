@@ -8,9 +8,10 @@
 
 use crate::body::Pose;
 use crate::checkpoint::Archive;
+use crate::cover::{SLACK, Standing};
 use crate::error::Result;
 use crate::kernels::openings::{Emission, Outlet};
-use crate::scene::{Opening, Passes, Scene};
+use crate::scene::{INFLOW_ROOM, Opening, Passes, Scene};
 use glam::DVec3;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -126,7 +127,7 @@ impl Openings {
                     gate.layers += 1;
                     let first = gate.wall.start;
                     gate.held += gate.wall.len() as u64;
-                    for part in free(&scene.held_back(&gate.opening, &gate.places, poses)) {
+                    for part in free(&held_back(scene, &gate.opening, &gate.places, poses)) {
                         gate.held -= part.len() as u64;
                         out.emissions.push(Emission {
                             wall: first + part.start..first + part.end,
@@ -277,6 +278,20 @@ impl Openings {
         }
         Ok(())
     }
+}
+
+/// Which of the `places` [m] where the layer of an inflow of `scene` becomes water solids in these `poses` hold back: they stand there or
+/// [`INFLOW_ROOM`] further.
+fn held_back(scene: &Scene, opening: &Opening, places: &[DVec3], poses: &[Pose]) -> Vec<bool> {
+    let (spacing, periodic) = (scene.spacing, &scene.periodic);
+    let further = -INFLOW_ROOM * spacing * opening.outward;
+    let ends = places.iter().map(|&x| (x, x)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = ends.unwrap_or_default();
+    let (middle, reach) = (0.5 * (low + high + further), 0.5 * (high - low + further.abs()).length());
+    let solids = opening.passing.iter().map(|&k| Standing::of(k, &scene.solids[k], &poses[k]));
+    let near: Vec<Standing> = solids.filter(|s| s.may_reach(middle, reach, periodic)).collect();
+    let holds = |x: DVec3| near.iter().any(|s| s.outside(x, 0.0, periodic) < -SLACK * spacing);
+    places.iter().map(|&x| holds(x) || holds(x + further)).collect()
 }
 
 /// Runs of the places that are not `held`.

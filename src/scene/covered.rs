@@ -7,16 +7,14 @@ use super::oriented::Placed;
 use super::shaped;
 use super::walls::PlaneFrame;
 use super::{Opening, Scene, Solid};
-use crate::body::Pose;
 use crate::case::{Case, OpeningKeys};
-use crate::cover::{SLACK, Standing};
 use crate::error::Problem;
 use glam::{DVec3, IVec3};
 use std::collections::HashSet;
 
 /// Where nothing may stand in the way of what comes in, from where it becomes water on, over the spacing [-]: through a gap of a spacing between a face and what
 /// stands before it all water of an inflow would have to pass in a row of single particles, and is pressed together.
-const ROOM: f64 = 0.55;
+pub(crate) const INFLOW_ROOM: f64 = 0.55;
 
 enum Body {
     /// A box of the lattice.
@@ -42,10 +40,10 @@ impl Cover {
 }
 
 /// The places before the cell `c` of an opening, the way `out` back, of which none may lie in a solid [m]: the middle of the cell before it,
-/// and of an inflow a place [`ROOM`] further.
+/// and of an inflow a place [`INFLOW_ROOM`] further.
 fn before(c: IVec3, out: IVec3, is_inflow: bool, lattice: &Lattice) -> impl Iterator<Item = DVec3> {
     let middle = lattice.center(c - out);
-    let further = middle - ROOM * lattice.spacing * out.as_dvec3();
+    let further = middle - INFLOW_ROOM * lattice.spacing * out.as_dvec3();
     [Some(middle), is_inflow.then_some(further)].into_iter().flatten()
 }
 
@@ -126,10 +124,10 @@ impl Builder<'_> {
         for planned in &self.openings {
             let (opening, all) = (&planned.opening, planned.cells.len());
             let out = opening.outward.as_ivec3();
-            for (number, solid) in self.passing() {
-                let standing = Standing::at_start(number, solid);
-                let inside =
-                    |x: DVec3| standing.outside(x, 0.0, &self.periodic) < -SLACK * self.lattice.spacing;
+            for (_, solid) in self.passing() {
+                let shape = solid.placed();
+                let image = |x: DVec3| shape.center + self.periodic.nearest(x - shape.center);
+                let inside = |x: DVec3| shape.holds(x, 0.0) || shape.holds(image(x), 0.0);
                 let covers = |c: &&IVec3| before(**c, out, opening.is_inflow(), &self.lattice).any(inside);
                 let covered = planned.cells.iter().filter(covers).count();
                 if covered == 0 {
@@ -175,17 +173,5 @@ impl Scene {
         let inflows = self.openings.iter().filter(|o| o.is_inflow());
         let parts = |o: &Opening| if o.passing.is_empty() { 1 } else { o.layer.div_ceil(2) };
         inflows.map(parts).sum::<usize>().max(1)
-    }
-
-    /// Which of the `places` [m] where the layer of an inflow becomes water solids in these `poses` hold back: they stand there or [`ROOM`] further.
-    pub(crate) fn held_back(&self, opening: &Opening, places: &[DVec3], poses: &[Pose]) -> Vec<bool> {
-        let further = -ROOM * self.spacing * opening.outward;
-        let ends = places.iter().map(|&x| (x, x)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let (low, high) = ends.unwrap_or_default();
-        let (middle, reach) = (0.5 * (low + high + further), 0.5 * (high - low + further.abs()).length());
-        let solids = opening.passing.iter().map(|&k| Standing::of(k, &self.solids[k], &poses[k]));
-        let near: Vec<Standing> = solids.filter(|s| s.may_reach(middle, reach, &self.periodic)).collect();
-        let holds = |x: DVec3| near.iter().any(|s| s.outside(x, 0.0, &self.periodic) < -SLACK * self.spacing);
-        places.iter().map(|&x| holds(x) || holds(x + further)).collect()
     }
 }

@@ -40,6 +40,7 @@ mod walls;
 mod water;
 
 pub use crate::shape::{Edges, Face, Shape};
+pub(crate) use covered::INFLOW_ROOM;
 pub use curve::Curve;
 pub use motion::Motion;
 pub use opening::{Course, Opening, Passes};
