@@ -150,3 +150,41 @@ fn a_pocket_at_a_seam_is_one_as_in_the_middle() {
     println!("a trench: {found:?}");
     assert!(found.0 > 16, "{found:?}");
 }
+
+#[test]
+fn what_is_flat_beside_what_is_round_has_the_water_between() {
+    // Less than half a spacing apart at the nearest, whichever stands first in the case.
+    let aside = |gap: f64, flat_first: bool, flat: &str| {
+        let disc = "[[obstacle]]\nname = \"disc\"\nshape = \"cylinder\"\nradius = 0.06\naxis = [0, 1, 0]\n\
+                    center = [0.22, 0, 0.1]\n";
+        let flat = format!(
+            "{flat}\nname = \"flat\"\nsize = [0.12, 0.02, 0.12]\ncenter = [{}, 0, 0.1]\n",
+            0.34 + gap
+        );
+        let solids = if flat_first { flat + disc } else { disc.to_owned() + &flat };
+        let mut simulation = simulation(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.2\ndimensions = 2\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.4]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.28]\n{solids}\
+             [[gauge.force]]\nname = \"f\"\non = \"flat\"\n"
+        )));
+        let (mut sum, mut count) = (0.0, 0.0);
+        while simulation.time < 0.06 {
+            simulation.step().unwrap_or_else(|e| panic!("{e}"));
+            if simulation.time > 0.03 {
+                sum += simulation.gauges().expect("a force")[0].1;
+                count += 1.0;
+            }
+        }
+        sum / count
+    };
+    // 4.24 N press on each of its sides.
+    let still = "[[moving_wall]]\nmotion = [[50, 0, 0, 0], [60, 0, 0, 0.1]]";
+    for (gap, kinds) in [(0.0, 1), (0.004, 1), (0.008, 2)] {
+        for flat in ["[[obstacle]]", still].into_iter().take(kinds) {
+            let [one, other] = [false, true].map(|first| aside(gap, first, flat));
+            println!("{gap} m, {flat}: {one} N aside, {other} N");
+            assert!(one.abs() < 0.15 && (one - other).abs() < 1e-6, "{gap} m, {flat}: {one} {other}");
+        }
+    }
+}

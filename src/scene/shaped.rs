@@ -206,8 +206,8 @@ impl Builder<'_> {
     /// What of the `area` of a solid's particle `at` a place faces no other wall along `axes` of the solid.
     fn unfaced(&self, solid: &Solid, axes: &[DVec3], mut area: DVec3, at: DVec3) -> DVec3 {
         for e in axes.iter().flat_map(|&e| [e, -e]) {
-            let faces = area.dot(e);
-            if faces > 0.0 && self.is_covered(solid, at + self.lattice.spacing * (solid.orientation * e)) {
+            let (faces, way) = (area.dot(e), self.lattice.spacing * (solid.orientation * e));
+            if faces > 0.0 && self.is_covered(solid, at + way) && !self.opens(at + 0.5 * way, at + way) {
                 area -= faces * e;
             }
         }
@@ -259,7 +259,8 @@ impl Builder<'_> {
                 return false;
             }
             let covered = |d: f64| self.is_covered(solid, x + d * l0 * normal);
-            let bare = !COVERED.into_iter().any(covered) && !lies_on(x, normal);
+            let open = |d: f64| !covered(d) || self.opens(x, x + d * l0 * normal);
+            let bare = COVERED.into_iter().all(open) && !lies_on(x, normal);
             alone(x) || bare || !covered(-FLUSH) && bent(x, normal)
         };
         let wall: Vec<DVec3> =
@@ -330,6 +331,23 @@ impl Builder<'_> {
         let image = self.periodic.wrap(at);
         let itself = || solid.placed().holds(image, 1e-6 * self.lattice.spacing);
         self.buried(image) || image.distance(at) > 0.5 * self.lattice.spacing && itself()
+    }
+
+    /// Whether all that covers a place before a `face` is round there, and does not hold the face itself: the gap opens to the sides, and
+    /// [`crate::cover`] tells what is covered.
+    fn opens(&self, face: DVec3, place: DVec3) -> bool {
+        let slack = 1e-6 * self.lattice.spacing;
+        let is_flat = |b: &Placed| {
+            let to_shape = b.axes.transpose();
+            let (_, normal) = b.shape.distance(to_shape * (place - b.center));
+            let round = matches!(b.shape, Shape::Sphere(_) | Shape::Cylinder(_) | Shape::Disc(_));
+            !round || b.shape.axes().iter().any(|e| e.dot(normal).abs() > 0.99)
+        };
+        let earlier = self.moving_walls.iter().filter(|s| s.is_still()).map(Solid::placed);
+        let covering: Vec<Placed> = earlier.filter(|b| b.holds(place, slack)).collect();
+        let by_others = self.is_beyond(place)
+            || self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(place, slack));
+        !by_others && !covering.is_empty() && !covering.iter().any(|b| is_flat(b) || b.holds(face, slack))
     }
 
     /// Whether a place lies beyond the tank's walls or a seam.

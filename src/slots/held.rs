@@ -2,7 +2,7 @@
 //! what stands in the gap, and the bed's would, too. What flat faces stand on has no water between (a pillar, a gate that is
 //! closed); where a surface bends away from what it touches the gap is open.
 
-use super::{Faced, Found, Layer, Opposite, Push, Slots, enclosed};
+use super::{Faced, Found, Opposite, Push, Slots, enclosed};
 use crate::body::{Pose, Wrench};
 use crate::cover::driven::Covered;
 use crate::error::Result;
@@ -17,6 +17,8 @@ pub struct Held {
     found: Vec<Found>,
     /// By solid, the areas of its rows that water may press on from a slot, in its frame [m2].
     area: HashMap<usize, Vec<DVec3>>,
+    /// By solid, whether a row's surface, or one that looks at it, bends away from the other, so that the gap is open.
+    bends: HashMap<usize, Vec<bool>>,
 }
 
 /// What they do beside the pressures of the rows in them.
@@ -35,10 +37,10 @@ impl Held {
     }
 
     /// How much of a row lies in a slot of a surface that bends, so that what [`Covered`] says of it does not hold [-].
-    fn open(&self, layers: &[Layer]) -> HashMap<(usize, usize), f64> {
+    fn open(&self) -> HashMap<(usize, usize), f64> {
         let of = |f: &Found| {
             let solid = f.slot.solid;
-            let bent = |row: &(usize, f64)| layers[solid].bends[row.0];
+            let bent = |row: &(usize, f64)| self.bends[&solid][row.0];
             f.slot
                 .inside
                 .iter()
@@ -55,7 +57,7 @@ impl Slots {
     /// The slots of solids that no force moves with the solids at `poses`, of which other solids cover what `covered` says.
     pub fn held(&self, poses: &[Pose], covered: &[Covered]) -> Held {
         let others = self.others(poses, |a, b| a.holds && b.holds);
-        let mut area = HashMap::new();
+        let (mut area, mut bends) = (HashMap::new(), HashMap::new());
         let mut found = vec![];
         for (k, layer) in self.layers.iter().enumerate().take(others.len()).filter(|(_, layer)| layer.holds) {
             let at_walls = self.at_walls(layer, &poses[k], super::FACING.1 * self.spacing);
@@ -65,12 +67,16 @@ impl Slots {
             let is_still = layer.still && others[k].iter().all(|(other, _)| self.layers[*other].still);
             let look = || Arc::<[Faced]>::from(self.faced(k, at_walls, &others[k], poses));
             let faced = if is_still { layer.faced.get_or_init(look).clone() } else { look() };
+            let bends_there = |other: usize, row: usize| self.layers[other].bends.get(row) == Some(&true);
+            let bent = |of: Opposite| matches!(of, Opposite::Solid(other, row) if bends_there(other, row));
+            let own = layer.bends.iter().zip(faced.iter());
+            let bent: Vec<bool> = own.map(|(own, row)| *own || row.all().any(bent)).collect();
             let mut open = layer.area.clone();
             let to_frame = poses[k].orientation.inverse();
             // They come in the order of solids.
             let own = covered.partition_point(|c| c.solid < k)..covered.partition_point(|c| c.solid <= k);
             for c in &covered[own] {
-                open[c.row] -= to_frame * if layer.bends[c.row] { c.within } else { c.area };
+                open[c.row] -= to_frame * if bent[c.row] { c.within } else { c.area };
             }
             // What is left of a face that stands on another by round-off is nothing.
             let is_open = |n: usize| open[n].length_squared() > 1e-4 * layer.area[n].length_squared();
@@ -79,13 +85,14 @@ impl Slots {
             let slots = layer.slots(k, &shares).into_iter();
             found.extend(slots.map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }));
             area.insert(k, open);
+            bends.insert(k, bent);
         }
-        Held { found: enclosed::lend(found), area }
+        Held { found: enclosed::lend(found), area, bends }
     }
 
     /// What of `covered` water in the slots `held` presses on is not covered.
     pub fn uncover(&self, held: &Held, covered: &mut [Covered]) {
-        let open = held.open(&self.layers);
+        let open = held.open();
         for c in covered {
             c.area *= 1.0 - open.get(&(c.solid, c.row)).copied().unwrap_or(0.0);
         }
@@ -113,7 +120,7 @@ impl Slots {
         params: &Params,
         read: impl FnOnce(&[usize]) -> Result<Vec<RowPressure>>,
     ) -> Result<HeldForces> {
-        let Held { found, area } = held;
+        let Held { found, area, bends } = held;
         let own = |f: &Found| {
             let first = self.layers[f.slot.solid].first;
             f.slot.inside.iter().map(move |row| first + row.0).collect::<Vec<_>>()
@@ -144,7 +151,7 @@ impl Slots {
                     let slot = field.as_ref().map_or(0.0, |field| self.before(field, k, pose, n, at));
                     press(slot - row.in_force(at - place, params), into, at);
                 }
-                if layer.bends[n] {
+                if bends[&k][n] {
                     let way = pose.orientation * layer.to_surface[n];
                     let rest = pose.orientation * (area[&k][n] - layer.area[n]);
                     press(row.in_force(way, params), rest, place + way);
