@@ -188,3 +188,38 @@ fn what_is_flat_beside_what_is_round_has_the_water_between() {
         }
     }
 }
+
+#[test]
+fn a_slab_half_a_spacing_above_the_floor_and_the_floor_bear_the_water_between() {
+    // 12 by 3 spacings in 24 by 12 of water.
+    let forces = |gap: f64| {
+        let mut simulation = simulation(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.3\ndimensions = 2\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.48, 0, 0.4]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.48, 0, 0.24]\n\
+             [[obstacle]]\nname = \"slab\"\nsize = [0.24, 0.02, 0.06]\ncenter = [0.24, 0, {}]\n\
+             [[gauge.force]]\nname = \"slab\"\non = \"slab\"\n\
+             [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
+            0.03 + gap * 0.02
+        )));
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        while simulation.time < 0.3 {
+            simulation.step().expect("a step");
+            if simulation.time > 0.1 {
+                let read = simulation.gauges().expect("forces");
+                let of =
+                    |name: &str| read.iter().find(|(column, _)| column.starts_with(name)).expect("there").1;
+                (sum[0], sum[1]) = (sum[0] + of("slab_force_z"), sum[1] + of("floor_force_z"));
+                count += 1.0;
+            }
+        }
+        (sum.map(|f| f / count), simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.81)
+    };
+    let lift = 1000.0 * 9.81 * 0.24 * 0.06 * 0.02;
+    for gap in [0.5, 0.505] {
+        let ([slab, floor], weight) = forces(gap);
+        println!("{gap}: {slab} N for {lift}, {floor} N on the floor, {weight} N of water");
+        assert!(((slab + floor) / -weight - 1.0).abs() < 0.03, "{gap}: {slab} and {floor} N for {weight}");
+        assert!((slab / lift - 1.0).abs() < 0.15, "{gap}: {slab} N for {lift}");
+    }
+}

@@ -13,8 +13,8 @@ use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
 /// Distances before a face, over l0, at which a point that lies in a solid tells that no water stands between: nearly at the face, where a solid ends
-/// in a wedge, and half a particle away, where it stands a little off the lattice.
-pub(crate) const COVERED: [f64; 2] = [0.1, 0.5];
+/// in a wedge, and half a particle away, where it stands a little off the lattice; less than just half, which is a gap that cases have.
+pub(crate) const COVERED: [f64; 2] = [0.1, 0.48];
 /// Nearer to a particle of a solid than this, over the spacing, other walls may face pieces of the surface that are its.
 const MEETING: f64 = 3.0;
 /// As far as this around, over the spacing, what is flat in the face of another wall lies in it.
@@ -207,7 +207,8 @@ impl Builder<'_> {
     fn unfaced(&self, solid: &Solid, axes: &[DVec3], mut area: DVec3, at: DVec3) -> DVec3 {
         for e in axes.iter().flat_map(|&e| [e, -e]) {
             let (faces, way) = (area.dot(e), self.lattice.spacing * (solid.orientation * e));
-            if faces > 0.0 && self.is_covered(solid, at + way) && !self.opens(at + 0.5 * way, at + way) {
+            let (face, before) = (at + 0.5 * way, at + (0.5 + COVERED[1]) * way);
+            if faces > 0.0 && self.is_covered(solid, before) && !self.opens(face, before) {
                 area -= faces * e;
             }
         }
