@@ -623,6 +623,27 @@ fn what_cannot_go_round_is_refused_by_key_with_what_would_do() {
     assert_eq!(refusal(&format!("{sound}{gauge}")).0, "gauge.force.0.on");
     let (key, _) = refusal(&format!("{sound}{}", body("[0.2, 0.38, 0.45]")));
     assert_eq!(key, "body.0");
+    let plane = |y: f64| {
+        format!(
+            "[[plane]]\nname = \"p\"\ncenter = [0.2, {y}, 0.1]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [0.4, 0.2]\n"
+        )
+    };
+    let (key, text) = refusal(&format!("{sound}{}", plane(0.35)));
+    assert!(
+        key == "plane.0" && text.contains("plane `p` reaches from y = 0.2500 to 0.4500 m"),
+        "{key}: {text}"
+    );
+    let ends = format!("{sound}{}", plane(0.3));
+    Scene::build(&ends.parse().expect("a case")).expect("it ends at the side");
+    let hole = "[[outflow]]\nname = \"out\"\nface = \"x_max\"\nmin = [0.4, 0.3, 0]\nmax = [0.4, 0.5, 0.1]\n";
+    let (key, text) = refusal(&format!("{sound}{hole}"));
+    assert!(
+        key == "outflow.0.min" && text.contains("outflow `out` reaches from y = 0.3000 to 0.5000 m"),
+        "{key}: {text}"
+    );
+    // What reaches over both sides is all of the axis.
+    let all = hole.replace("0.3, 0]", "-1, 0]").replace("0.5, 0.1]", "1, 0.1]");
+    Scene::build(&format!("{sound}{all}").parse().expect("a case")).expect("it builds");
 }
 
 /// A small cube that drifts along y.

@@ -38,7 +38,12 @@ impl Builder<'_> {
     /// Complains of a solid of any shape that reaches over a periodic side: half of it would be missing at the other
     /// one. A fixed one that spans the whole axis goes on there.
     pub(super) fn seams(&mut self, key: &str, what: &str, name: &str, shape: &Placed, fixed: bool) {
-        let ((start, end), slack) = (shape.ends(), 1e-6 * self.lattice.spacing);
+        self.crosses(key, &format!("{what} `{name}`"), shape.ends(), fixed);
+    }
+
+    /// The same of what reaches from one corner to another [m] and is called by its `label`; `true` if it does.
+    pub(super) fn crosses(&mut self, key: &str, label: &str, ends: (DVec3, DVec3), fixed: bool) -> bool {
+        let ((start, end), slack) = (ends, 1e-6 * self.lattice.spacing);
         for k in 0..3 {
             let Some((low, high)) = self.periodic.sides(k) else { continue };
             let (from, to) = (start[k], end[k]);
@@ -46,14 +51,15 @@ impl Builder<'_> {
             if over && !(fixed && from <= low + slack && to >= high - slack) {
                 let axis = AXES[k];
                 let message = format!(
-                    "{what} `{name}` reaches from {axis} = {from:.4} to {to:.4} m, over a periodic side \
+                    "{label} reaches from {axis} = {from:.4} to {to:.4} m, over a periodic side \
                      at {low} or {high} m"
                 );
                 let remedy = format!("keep it between them, or take \"{axis}\" out of tank.periodic");
                 self.problems.push(Problem::new(key, message, remedy));
-                return;
+                return true;
             }
         }
+        false
     }
 
     /// Axes along which a length changed by more than 1 % of the spacing.

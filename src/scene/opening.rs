@@ -136,6 +136,12 @@ impl Builder<'_> {
             (cells.lo[axis], cells.hi[axis]) =
                 if side == 0 { (-1, 0) } else { (tank.hi[axis], tank.hi[axis] + 1) };
             let path = keys.path();
+            if let [Some(min), Some(max)] = keys.corners {
+                let label = format!("{} `{}`", keys.key, keys.name);
+                if self.crosses(&format!("{path}.min"), &label, (min.into(), max.into()), true) {
+                    continue;
+                }
+            }
             if cells.lo.cmpge(cells.hi).any() {
                 let message = format!("{} `{}` holds no particle of the face", keys.key, keys.name);
                 let remedy = "make it larger, or use a smaller run.spacing";
