@@ -54,12 +54,7 @@ impl Standing {
         }
     }
 
-    /// Number `number` of the scene's solids where it is at t = 0.
-    pub(crate) fn at_start(number: usize, solid: &Solid) -> Self {
-        Self::new(number, solid, solid.position, solid.orientation)
-    }
-
-    /// The same in its `pose`.
+    /// Number `number` of the scene's solids in its `pose`.
     pub(crate) fn of(number: usize, solid: &Solid, pose: &Pose) -> Self {
         Self::new(number, solid, pose.position, pose.orientation)
     }
@@ -104,7 +99,7 @@ pub(crate) fn still(scene: &Scene, wall: Option<usize>) -> Vec<Standing> {
     let walls = scene.walls.iter().enumerate().filter(|(k, other)| wall != Some(*k) && !is_told(other));
     let opened = scene.followed();
     let solids = scene.solids.iter().enumerate().filter(|(k, s)| s.is_still() || *k >= opened);
-    let solids = solids.map(|(k, s)| Standing::at_start(k, s));
+    let solids = solids.map(|(k, s)| Standing::new(k, s, s.position, s.orientation));
     walls.map(|(_, wall)| Standing::wall(wall)).chain(solids).collect()
 }
 

@@ -70,18 +70,14 @@ impl Checker<'_> {
                     "name another face, or take it out of tank.open or tank.periodic"
                 };
                 self.add(format!("gauge.force.{k}.on"), message, remedy);
-            } else if case.openings().any(|o| o.is_hole() && o.name == gauge.on)
-                && !solid.contains(&gauge.on.as_str())
-            {
-                let message = format!("outflow `{}` is a hole: nothing stands in it to measure on", gauge.on);
-                self.add(
-                    format!("gauge.force.{k}.on"),
-                    message,
-                    "name the face of the tank around it, or remove the gauge",
-                );
             } else if !solid.contains(&gauge.on.as_str()) {
-                let message = format!("nothing solid is called `{}`", gauge.on);
+                let is_hole = case.openings().any(|o| o.is_hole() && o.name == gauge.on);
+                let message = match is_hole {
+                    true => format!("outflow `{}` is a hole: nothing stands in it to measure on", gauge.on),
+                    false => format!("nothing solid is called `{}`", gauge.on),
+                };
                 let remedy = match super::report::closest(&gauge.on, &solid) {
+                    _ if is_hole => "name the face of the tank around it, or remove the gauge".to_owned(),
                     Some(name) => format!("did you mean `{name}`?"),
                     None if solid.is_empty() => "remove the gauge".to_owned(),
                     None => format!("allowed: {}", solid.join(", ")),

@@ -174,9 +174,12 @@ impl Builder<'_> {
                     let rim = if hole { depth * sideways } else { IVec3::ZERO };
                     let cells = Cells { lo: c, hi: c + 1 }.grown(rim);
                     // At a seam the rim goes on on the other side.
-                    let cells =
-                        cells.iter().map(|c| self.grid.wrap(c)).filter(|&c| self.grid.cells.contains(c));
-                    cells.collect::<Vec<_>>().into_iter().for_each(|c| self.grid.set(c, state));
+                    for c in cells.iter() {
+                        let c = self.grid.wrap(c);
+                        if self.grid.cells.contains(c) {
+                            self.grid.set(c, state);
+                        }
+                    }
                 }
             }
         }

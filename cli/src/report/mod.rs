@@ -176,19 +176,18 @@ fn verdict(result: &Value) -> String {
             ("degraded", "Not finished", "There is no result.json: the run goes on still, or it was killed.")
         }
     };
-    let reasons = result["verdict"]["reasons"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    let reasons: String = reasons.map(|r| format!("<li>{}</li>", escape(r))).collect();
-    let told = |key: &str, word: &str| -> String {
-        let all = result["verdict"][key].as_array().into_iter().flatten().filter_map(Value::as_str);
-        all.map(|r| format!("<p>{word}: {}</p>", escape(r))).collect()
+    let all = |key: &str, [before, after]: [&str; 2]| -> String {
+        let told = result["verdict"][key].as_array().into_iter().flatten().filter_map(Value::as_str);
+        told.map(|r| format!("{before}{}{after}", escape(r))).collect()
     };
-    let left_out = told("left_out", "Not judged") + &told("notes", "Note");
+    let reasons = all("reasons", ["<li>", "</li>"]);
+    let besides = all("left_out", ["<p>Not judged: ", "</p>"]) + &all("notes", ["<p>Note: ", "</p>"]);
     let list = if reasons.is_empty() { reasons } else { format!("<ul>{reasons}</ul>") };
     let ended = result["exit_reason"]
         .as_str()
         .map_or(String::new(), |r| format!("<p class=\"faint\">{}</p>", escape(r)));
     format!(
-        "<div class=\"verdict {class}\"><strong>{word}</strong><p>{words}</p>{list}{left_out}{ended}</div>"
+        "<div class=\"verdict {class}\"><strong>{word}</strong><p>{words}</p>{list}{besides}{ended}</div>"
     )
 }
 
