@@ -13,6 +13,8 @@ use glam::{DMat3, DQuat, DVec3};
 const WITHIN: f64 = -0.15;
 /// A point that lies on a solid's surface up to this much, over l0, is half in it: round-off, or how deep bodies press into each other, would tell where it is.
 pub(crate) const SLACK: f64 = 1e-2;
+/// A gap that is wider than the bound by no more than this, over l0, is as wide: round-off.
+const TOUCHING: f64 = 1e-6;
 /// Distance behind a face, over l0, at which a point in a wall tells that the face lies flat in the wall's or deeper: more than [`SLACK`].
 const FLAT_IN: f64 = -0.02;
 /// Edge of the cells that faces are found in, over l0.
@@ -187,7 +189,7 @@ impl Tiles {
         take: impl Fn(&Standing) -> bool,
     ) -> f64 {
         1.0 - self.mean(face, normal, solids, |x, near| {
-            let at = |d: f64, s: &Standing| self.holds(x + d * self.spacing * normal, s);
+            let at = |d: f64, s: &Standing| self.holds_before(x + d * self.spacing * normal, normal, s);
             let covers = |s: &&Standing| {
                 let flat = if take(s) { at(FLAT_IN, s) } else { 0.0 };
                 COVERED.map(|d| at(d, s)).into_iter().fold(flat, f64::max)
@@ -203,6 +205,21 @@ impl Tiles {
         self.mean(face, normal, solids, |x, near| {
             near.iter().map(|s| self.holds(at(x), s)).sum::<f64>().min(1.0)
         })
+    }
+
+    /// The same as [`Self::holds`] at a place before a face that looks along `normal`; but where a surface faces that the gap tells, and not whether the place is near it:
+    /// as much counts on either side of the gap.
+    fn holds_before(&self, x: DVec3, normal: DVec3, solid: &Standing) -> f64 {
+        let slack = SLACK * self.spacing;
+        let outside = |x: DVec3| solid.outside(x, 4.0 * slack, &self.periodic);
+        let here = outside(x);
+        if here.abs() > slack {
+            f64::from(u8::from(here < 0.0))
+        } else if outside(x + 2.0 * slack * normal) < here - slack {
+            f64::from(u8::from(here <= TOUCHING * self.spacing))
+        } else {
+            0.5
+        }
     }
 
     fn holds(&self, x: DVec3, solid: &Standing) -> f64 {

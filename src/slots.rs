@@ -22,6 +22,7 @@
 //! A body that others enclose has slots without a rim (`slots/enclosed.rs`); water that solids and their slots enclose has the pressure
 //! that comes through them (`slots/pockets.rs`). Solids that no force moves have slots where their forces are told (`slots/held.rs`).
 
+mod driven;
 mod enclosed;
 mod held;
 mod layer;
@@ -35,6 +36,7 @@ pub use pushes::{Opposite, Push};
 use crate::body::slots::{Seep, SlotRow};
 use crate::body::{Pose, Wrench};
 use crate::contact::broad::{Bounds, PointGrid, fixed_walls, meeting_images};
+use crate::cover::Tiles;
 use crate::error::Result;
 use crate::kernels::coupling::row;
 use crate::params::Params;
@@ -158,6 +160,7 @@ pub struct Slots {
     fixed_of: Vec<usize>,
     fixed_normal: Vec<DVec3>,
     layers: Vec<Layer>,
+    tiles: Tiles,
     periodic: Periodic,
 }
 
@@ -172,6 +175,7 @@ impl Slots {
         };
         Self {
             periodic: scene.periodic,
+            tiles: Tiles::new(scene),
             spacing: l0,
             weight: params.density * params.gravity,
             closed: params.filled,
@@ -228,7 +232,7 @@ impl Slots {
             let faced: Arc<[Faced]> = self.faced(k, at_walls, &others[k], poses).into();
             let shares: Vec<f64> = faced.iter().map(|row| row.share).collect();
             let found = |slot| Found { slot, faced: faced.clone(), lenders: vec![] };
-            layer.slots(k, &shares).into_iter().map(found).collect()
+            layer.slots(k, &shares, |_| false).into_iter().map(found).collect()
         };
         let layers = self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free);
         enclosed::lend(layers.flat_map_iter(of).collect())

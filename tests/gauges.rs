@@ -365,8 +365,10 @@ fn what_a_slot_presses_on_a_floor_beyond_a_seam_acts_where_its_image_is() {
     let params = Params::new(&case, &scene).expect("valid");
     let (told, areas) =
         (vec![RowPressure::default(); floor.slots.len()], vec![DVec3::ZERO; floor.slots.len()]);
+    // The face of one particle.
+    let area = scene.spacing * scene.spacing;
     let torque = |x: f64| {
-        let push = Push { on, at: DVec3::new(x, 0.12, 0.0), pressure: 2.0, area: -DVec3::Z };
+        let push = Push { on, at: DVec3::new(x, 0.12, 0.0), pressure: 2.0 / area, area: -area * DVec3::Z };
         floor.slot_force(&[push], (&told, &areas), &scene, &params).torque
     };
     // By a body that lies over the side; the arm was longer by the tank.

@@ -487,3 +487,88 @@ fn a_held_body_feels_its_slot_once_whatever_stands_elsewhere() {
     println!("{lift:.3} of the water that it displaces");
     assert!((lift - 1.0).abs() < 0.05, "{lift}");
 }
+
+/// Still water over a slab of 0.2 m that stands on a plinth of `width` [m], 25 mm: what it presses on the slab, and on the plinth [N].
+fn on_plinth(slab: &str, plinth: &str, width: f64, end: f64) -> [f64; 2] {
+    let half = 0.5 * width;
+    let keys = match plinth {
+        "obstacle" => format!("min = [-{half}, -{half}, 0]\nmax = [{half}, {half}, 0.1]"),
+        _ => format!(
+            "size = [{width}, {width}, 0.1]\ncenter = [0, 0, 0.05]\nmotion = [[50, 0, 0, 0], [60, 0, 0, 0.1]]"
+        ),
+    };
+    let mut simulation = simulation(&case(&format!(
+        "[run]\nspacing = 0.025\ntime_step = 1e-3\nend = 5\ndimensions = 2\n\
+         [tank]\nmin = [-0.3, 0, 0]\nmax = [0.3, 0, 0.4]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [-0.3, 0, 0]\nmax = [0.3, 0, 0.25]\n\
+         [contact]\nspring = 2e4\nfriction = 0.3\n\
+         [[body]]\nname = \"slab\"\nsize = [0.2, 0.1, 0.05]\ncenter = [0, 0, 0.125]\ndisplaces_fluid = true\n{slab}\n\
+         [[{plinth}]]\nname = \"plinth\"\n{keys}\n\
+         [[gauge.force]]\nname = \"slab\"\non = \"slab\"\n[[gauge.force]]\nname = \"plinth\"\non = \"plinth\"\n"
+    )));
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
+    while simulation.time < end {
+        simulation.step().expect("it stands");
+        if simulation.time > 0.5 * end {
+            let read = simulation.gauges().expect("forces");
+            let of = |name: &str| read.iter().find(|gauge| gauge.0.starts_with(name)).expect("measured").1;
+            sums = [sums[0] + of("slab_force_z"), sums[1] + of("plinth_force_z")];
+            count += 1.0;
+        }
+    }
+    sums.map(|sum| sum / count)
+}
+
+#[test]
+fn a_slab_that_stands_out_over_its_plinth_has_its_lift_and_the_plinth_its_load() {
+    // Two spacings thin: rows of its upper side were taken for the rim, and the slot was none over 0.1 m. What of the slot's rows lies beside the
+    // plinth pressed on that, too.
+    let locked = "density = 1500\nlocked = [\"x\", \"z\", \"rotation_y\"]";
+    let weight = 9806.65 * 0.025;
+    for plinth in ["obstacle", "moving_wall"] {
+        // An obstacle's edges are rounded to the lattice.
+        let widths =
+            if plinth == "obstacle" { &[0.05, 0.1, 0.15, 0.2][..] } else { &[0.05, 0.1, 0.125, 0.15, 0.2] };
+        for &width in widths {
+            let [slab, load] = on_plinth(locked, plinth, width, 0.06);
+            let (lift, carried) = (weight * 0.2 * 0.05, -weight * 0.15 * width);
+            println!("{plinth} of {width} m: {slab:.3} N for {lift:.3}, {load:.3} for {carried:.3}");
+            assert!((slab / lift - 1.0).abs() < 0.06, "{plinth} {width}: {slab} N for {lift}");
+            assert!((load / carried - 1.0).abs() < 0.03, "{plinth} {width}: {load} N for {carried}");
+        }
+    }
+    // Let go it had a quarter of it, pressed the contact in, and stayed so.
+    let [slab, _] = on_plinth("density = 1500\nstanding = true", "obstacle", 0.15, 0.3);
+    println!("free: {slab:.3} N");
+    assert!((slab / (weight * 0.2 * 0.05) - 1.0).abs() < 0.05, "{slab} N");
+}
+
+#[test]
+fn a_body_larger_than_what_stands_beside_it_presses_on_that_alone() {
+    // 0.2 spacings between a box of 0.12 m and one of 0.1 m: twice the pressure beside the edges was a force of half a side.
+    for kind in ["obstacle", "moving_wall"] {
+        let motion = if kind == "obstacle" { "" } else { "motion = [[50, 0, 0, 0], [60, 0, 0, 0.1]]\n" };
+        for edge in [0.11, 0.12, 0.15, 0.2] {
+            let mut simulation = simulation(&case(&format!(
+                "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 5\ndimensions = 2\n\
+                 [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.5]\nopen = [\"z_max\"]\n\
+                 [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.4]\n\
+                 [[body]]\nname = \"body\"\nsize = [0.12, 0.1, {edge}]\ncenter = [0.2, 0, 0.18]\ndisplaces_fluid = true\n\
+                 locked = [\"x\", \"z\", \"rotation_y\"]\n\
+                 [[{kind}]]\nname = \"other\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.314, 0, 0.18]\n{motion}\
+                 [[gauge.force]]\nname = \"other\"\non = \"other\"\n"
+            )));
+            let (mut sum, mut count) = (0.0, 0.0);
+            while simulation.time < 0.06 {
+                simulation.step().expect("it stands");
+                if simulation.time > 0.03 {
+                    (sum, count) = (sum + simulation.fluid_force[1].force.x, count + 1.0);
+                }
+            }
+            let side = 9806.65 * 0.22 * 0.1 * 0.02;
+            let aside = sum / count / side;
+            println!("{kind} beside {edge} m: {aside:.3} of the force on its side");
+            assert!(aside.abs() < 0.06, "{kind} {edge}: {aside}");
+        }
+    }
+}

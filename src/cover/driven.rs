@@ -16,6 +16,7 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug)]
 struct Face {
     row: usize,
+    number: usize,
     to_surface: DVec3,
     center: DVec3,
     area: DVec3,
@@ -38,6 +39,8 @@ pub struct Covered {
     pub solid: usize,
     /// Index of the row in the solid's wall layer.
     pub row: usize,
+    /// Which of the row's faces.
+    pub face: usize,
     /// From the row's particle to the middle of the face, world axes [m].
     pub to_surface: DVec3,
     /// Outward area, world axes [m2].
@@ -90,6 +93,7 @@ impl DrivenFaces {
                 (bare < 1.0).then(|| Covered {
                     solid: driven.solid,
                     row: face.row,
+                    face: face.number,
                     to_surface: pose.orientation * face.to_surface,
                     area: (1.0 - bare) * area,
                     within: self.tiles.within(center, normal, &others) * area,
@@ -104,13 +108,14 @@ impl DrivenFaces {
 /// The faces of a solid's rows that have an area.
 fn faces(solid: &Solid) -> Vec<Face> {
     let of = |row: usize| {
-        let face = move |face: shape::Face| Face {
+        let face = move |(number, face): (usize, shape::Face)| Face {
             row,
+            number,
             to_surface: face.way,
             center: solid.wall_offset[row] + face.way,
             area: face.area,
         };
-        solid.faces(row).map(face)
+        solid.faces(row).enumerate().map(face)
     };
     (0..solid.wall_offset.len()).flat_map(of).filter(|face| face.area != DVec3::ZERO).collect()
 }

@@ -8,7 +8,7 @@ use crate::cover::{self, CELL, SLACK, Standing, Tiles};
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::shape::{PointCells, face_before};
+use crate::shape::PointCells;
 use crate::slots::{Opposite, Push};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -16,7 +16,8 @@ use std::collections::BTreeMap;
 /// A face of a row, of the size of a particle.
 #[derive(Clone, Debug)]
 struct Face {
-    row: usize,
+    /// None of one before which something stands that never moves: slots alone press there.
+    row: Option<usize>,
     /// Its middle [m].
     center: DVec3,
     /// Into the free space, of length 1.
@@ -30,13 +31,14 @@ struct Face {
 /// A wall's particle no farther from the place one spacing before a face than this, over l0, stands before it.
 const AHEAD: f64 = 0.45;
 
+/// A face that looks back at a push less than this is not pressed on (cosine of the angle).
+const BACK: f64 = 0.5;
+
 /// The wall layer of a fixed wall.
 #[derive(Clone, Debug, Default)]
 pub struct FixedWall {
     /// Index into [`Scene::walls`].
     shape: usize,
-    /// Whether it is a box of the lattice.
-    on_lattice: bool,
     /// Slots of its wall particles that face the fluid.
     pub slots: Vec<usize>,
     position: Vec<DVec3>,
@@ -60,7 +62,7 @@ impl FixedWall {
         let l0 = scene.spacing;
         let tiles = Tiles::new(scene);
         let (about, still) = (scene.walls[shape].middle, cover::still(scene, Some(shape)));
-        let mut out = Self { shape, on_lattice, about, still, tiles, ..Self::default() };
+        let mut out = Self { shape, about, still, tiles, ..Self::default() };
         // A face with another wall before it sees no water: under a pillar, where two faces of the tank meet.
         let mut solid = PointCells::new(l0);
         scene.position[scene.groups.static_range()].iter().for_each(|x| solid.add(scene.periodic.wrap(*x)));
@@ -91,13 +93,14 @@ impl FixedWall {
                 let center = x + 0.5 * l0 * normal;
                 let near: Vec<&Standing> = still.iter().map(|&k| &out.still[k]).collect();
                 let bare = tiles.bare((center, l0), normal, &near);
-                (bare > 0.0).then_some(Face { row: out.slots.len(), center, normal, still, bare })
+                Face { row: (bare > 0.0).then_some(out.slots.len()), center, normal, still, bare }
             };
-            let faces: Vec<Face> = normals.into_iter().zip(reached.by_ref()).filter_map(face).collect();
-            if faces.is_empty() {
+            let faces: Vec<Face> = normals.into_iter().zip(reached.by_ref()).map(face).collect();
+            let any_bare = faces.iter().any(|face| face.row.is_some());
+            out.faces.extend(faces);
+            if !any_bare {
                 continue;
             }
-            out.faces.extend(faces);
             out.slots.push(slot);
             out.position.push(x);
             out.to_surface.push(to_surface);
@@ -123,6 +126,7 @@ impl FixedWall {
         let mut areas = vec![DVec3::ZERO; self.slots.len()];
         let reached = self.tiles.reached((&self.centers, self.faces.len()), None, &moving);
         for (face, reached) in self.faces.iter().zip(reached) {
+            let Some(row) = face.row else { continue };
             let bare = if reached.is_empty() {
                 face.bare
             } else {
@@ -130,7 +134,7 @@ impl FixedWall {
                 let all: Vec<&Standing> = near.chain(face.still.iter().map(|&k| &self.still[k])).collect();
                 self.tiles.bare((face.center, l0), face.normal, &all)
             };
-            areas[face.row] += bare * l0 * l0 * face.normal;
+            areas[row] += bare * l0 * l0 * face.normal;
         }
         areas
     }
@@ -157,19 +161,17 @@ impl FixedWall {
         let mut sum = Wrench::default();
         // Of each row and face the direction, and what of it is pressed on [m2].
         let mut pressed: BTreeMap<(usize, [i32; 3]), (DVec3, f64)> = BTreeMap::new();
-        for push in pushes {
-            let Opposite::Wall(wall) = push.on else { continue };
-            if scene.static_wall_shape[wall] as usize != self.shape {
-                continue;
+        for push in pushes.iter().filter(|push| matches!(push.on, Opposite::Wall(_))) {
+            let mut on = DVec3::ZERO;
+            for (face, share) in self.shares(push, scene) {
+                let area = share * push.area_on(face.normal);
+                let way = (1e3 * face.normal).round().as_ivec3().to_array();
+                on += area;
+                if let Some(row) = face.row {
+                    pressed.entry((row, way)).or_insert((face.normal, 0.0)).1 += area.length();
+                }
             }
-            let normal = scene.static_wall_normal[wall];
-            let normal = if self.on_lattice { face_before(normal, push.area) } else { normal };
-            let area = push.area_on(normal);
-            let face = (1e3 * normal).round().as_ivec3().to_array();
-            for (row, share) in self.shares(push.at, self.tiles.edge(area.length()), normal, scene) {
-                pressed.entry((row, face)).or_insert((normal, 0.0)).1 += share * area.length();
-            }
-            let (force, arm) = (push.pressure * area, scene.periodic.nearest(push.at - self.about));
+            let (force, arm) = (push.pressure * on, scene.periodic.nearest(push.at - self.about));
             sum += Wrench { force, torque: arm.cross(force) };
         }
         // What is pressed on and counts as bare at once counts once: beside a body half of a face may be the one, half the other.
@@ -184,30 +186,35 @@ impl FixedWall {
         sum
     }
 
-    /// Rows before whose faces along `normal` a face of `edge` [m] around `center` lies, and how much of it [-], by the points by which what stands
-    /// before faces is told; those on a line between faces have a part of each. Nothing where solids stand before all of a face.
-    fn shares(&self, center: DVec3, edge: f64, normal: DVec3, scene: &Scene) -> Vec<(usize, f64)> {
+    /// Faces before which a `push` lies, and how much of it [-], by the points by which what stands before faces is told; those on a line between faces have a part
+    /// of each. What lies before none is not on this wall: beside its edge there is open water.
+    fn shares(&self, push: &Push, scene: &Scene) -> Vec<(&Face, f64)> {
         let l0 = self.tiles.spacing;
+        let (edge, way) = (self.tiles.edge(push.area.length()), push.area.normalize_or_zero());
         let reach = edge + 1.5 * l0;
         // Faces, and the way from their middles.
         let mut near: Vec<(&Face, DVec3)> = vec![];
-        for image in scene.periodic.images(scene.periodic.wrap(center), reach) {
+        for image in scene.periodic.images(scene.periodic.wrap(push.at), reach) {
             self.centers.near(image, reach, |k| {
                 let face = &self.faces[k as usize];
-                near.extend((face.normal.dot(normal) > 0.9).then_some((face, image - face.center)));
+                near.extend((face.normal.dot(way) < -BACK).then_some((face, image - face.center)));
             });
         }
-        let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), normal).collect();
+        // Of an edge that looks at it with two faces the one that does so more.
+        let most = near.iter().map(|(face, _)| -face.normal.dot(way)).fold(0.0, f64::max);
+        near.retain(|(face, _)| -face.normal.dot(way) > most - SLACK);
+        let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), way).collect();
+        let to_wall = scene.walls[self.shape].axes.transpose();
         let mut shares = vec![];
         for x in &points {
             let before = |(face, way): &(&Face, DVec3)| {
                 let way = *way + *x;
-                let along = way - way.dot(normal) * normal;
-                (along.abs().max_element() <= (0.5 + SLACK) * l0).then_some(face.row)
+                let along = to_wall * (way - way.dot(face.normal) * face.normal);
+                along.abs().max_element() <= (0.5 + SLACK) * l0
             };
-            let rows: Vec<usize> = near.iter().filter_map(before).collect();
-            let share = 1.0 / (rows.len() * points.len()) as f64;
-            shares.extend(rows.into_iter().map(|row| (row, share)));
+            let on: Vec<&Face> = near.iter().filter(|of| before(of)).map(|of| of.0).collect();
+            let share = 1.0 / (on.len() * points.len()) as f64;
+            shares.extend(on.into_iter().map(|face| (face, share)));
         }
         shares
     }

@@ -49,7 +49,7 @@ pub(crate) use placement::{CONTACT_DISTANCE, point};
 pub(crate) use shaped::COVERED;
 
 use crate::periodic::Periodic;
-use crate::shape::{Surface, WallLayer};
+use crate::shape::{Bending, Surface, WallLayer, bending};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -291,6 +291,11 @@ impl Solid {
     /// The faces of row `k`, in its frame.
     pub(crate) fn faces(&self, k: usize) -> impl Iterator<Item = Face> + use<> {
         self.wall_edges.faces(k, self.wall_area[k], self.wall_to_surface[k])
+    }
+
+    /// Which faces of its rows bend, `spacing` [m] apart.
+    pub(crate) fn bending(&self, spacing: f64) -> Bending {
+        bending(&self.shape, self.shape_offset, &self.wall_offset, |k| self.faces(k), spacing)
     }
 
     /// Turn from the shape as its keys describe it to where `orientation`, that of a pose, has it: what users are told. At the start

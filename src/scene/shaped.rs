@@ -8,7 +8,7 @@ use super::walls::{closed, near_solid, wall_motion};
 use super::{Drive, Motion, Shape, Solid};
 use crate::case::{Body, Case, Form, MovingWall, Place, Vector, Wall, coarse};
 use crate::error::Problem;
-use crate::shape::{ADJACENT, Particles, PointCells, bending, bends};
+use crate::shape::{ADJACENT, Particles, PointCells, bends};
 use glam::{DMat3, DVec3};
 use std::collections::HashSet;
 
@@ -154,11 +154,11 @@ impl Builder<'_> {
             }
             solid.wall_edges = freed.edges;
         } else {
-            let bends = bending(&solid.wall_offset, &solid.wall_area, &solid.wall_edges, l0);
+            let bends = solid.bending(l0);
             // Of what is round the ends alone are flat, and the rim has a part of them.
             let ends = if solid.shape.pieces(l0).is_none() { solid.shape.axes() } else { vec![] };
             for k in 0..kept.len() {
-                let flat = if bends[k] { &ends[..] } else { &DVec3::AXES };
+                let flat = if bends[k] != 0 { &ends[..] } else { &DVec3::AXES };
                 areas[k] = self.unfaced(solid, flat, areas[k], at(&solid.wall_offset[k]));
             }
             solid.wall_edges = solid.wall_edges.kept(&kept);

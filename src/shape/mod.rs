@@ -24,7 +24,7 @@ mod surface;
 mod thickness;
 mod thin;
 
-pub(crate) use bends::{ADJACENT, bending, bends};
+pub(crate) use bends::{ADJACENT, Bending, bending, bends};
 pub(crate) use cells::PointCells;
 pub(crate) use convex::{along, around, root};
 pub use cuboid::Cuboid;
@@ -38,8 +38,8 @@ pub use nodes::Node;
 use nodes::nodes_between;
 pub use polygon::Polygon;
 pub(crate) use polygon::signed_area;
+pub(crate) use row::MOST_FACES;
 pub use row::{Edges, Face};
-pub(crate) use row::{MOST_FACES, face_before};
 pub use sphere::Sphere;
 pub use surface::{Line, Ring, Side, Surface};
 

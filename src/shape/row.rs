@@ -133,14 +133,6 @@ fn least_parts(faces: &[Face], area: DVec3) -> [f64; MOST_FACES] {
     out
 }
 
-/// The direction of that face of a box's row, of those that its `normals` sum up, into which `area` looks most, both in its frame.
-pub(crate) fn face_before(normals: DVec3, area: DVec3) -> DVec3 {
-    let own = (0..3).filter(|&k| normals[k].abs() > 1e-6);
-    let most =
-        own.max_by(|&a, &b| (-area[a] * normals[a].signum()).total_cmp(&(-area[b] * normals[b].signum())));
-    most.map_or(DVec3::ZERO, |k| normals[k].signum() * DVec3::AXES[k])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

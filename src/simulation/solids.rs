@@ -7,55 +7,14 @@ use crate::body::{Pose, Wrench};
 use crate::contact::ContactReport;
 use crate::cover::driven::Covered;
 use crate::error::{Error, Result};
-use crate::kernels::body_force::RowPressure;
 use crate::ledger::Entry;
-use crate::params::{Params, Step};
+use crate::params::Step;
 use crate::plan::{Arrays, Stage};
-use crate::scene::Scene;
-use crate::shape::Face;
-use crate::slots::{Opposite, Pressed, Push};
-use glam::DVec3;
-use std::collections::HashMap;
+use crate::slots::{Pressed, Push};
 
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
     Ok(backend.wall_pressures(slots)?.iter().map(|row| row.pressure).collect())
-}
-
-/// What the `pushes` of slots do to solids of `scene` that no force moves, at their `poses` and `covered` in part, in place of what their rows tell there [N, N m].
-fn on_driven(
-    scene: &Scene,
-    params: &Params,
-    backend: &mut dyn Backend,
-    poses: &[Pose],
-    covered: &[Covered],
-    pushes: &[Push],
-) -> Result<Vec<(usize, Wrench)>> {
-    let on_driven = |push: &'_ Push| match push.on {
-        Opposite::Solid(k, row) if !scene.solids[k].is_free() => Some((*push, k, row)),
-        _ => None,
-    };
-    let pushes: Vec<(Push, usize, usize)> = pushes.iter().filter_map(on_driven).collect();
-    if pushes.is_empty() {
-        return Ok(vec![]);
-    }
-    let rows: Vec<usize> = pushes.iter().map(|&(_, k, row)| scene.solids[k].wall_slots.start + row).collect();
-    let mut taken: HashMap<(usize, usize), DVec3> = HashMap::new();
-    covered.iter().for_each(|c| *taken.entry((c.solid, c.row)).or_default() += c.area);
-    let force = |((push, k, row), told): ((Push, usize, usize), RowPressure)| {
-        let (solid, turn) = (&scene.solids[k], poses[k].orientation);
-        let bare = turn * solid.wall_area[row] - taken.get(&(k, row)).copied().unwrap_or_default();
-        let own = turn.inverse() * push.area;
-        let against = |face: &Face| face.area.normalize_or_zero().dot(own);
-        // That of its faces that looks into the push most.
-        let face = solid.faces(row).min_by(|a, b| against(a).total_cmp(&against(b))).unwrap_or_default();
-        let normal = turn * face.area.try_normalize().unwrap_or_else(|| face.way.normalize_or_zero());
-        let told = push.told_by(normal, &told, turn * face.way, bare, params);
-        let force = push.pressure * push.area_on(normal) - told;
-        let arm = params.periodic.nearest(push.at - poses[k].position);
-        (k, Wrench { force, torque: arm.cross(force) })
-    };
-    Ok(pushes.into_iter().zip(backend.wall_pressures(&rows)?).map(force).collect())
 }
 
 impl Simulation {
@@ -197,8 +156,11 @@ impl Simulation {
             forces.loads.into_iter().for_each(|(k, load)| sum[k] += load);
             pushes.extend(forces.pushes);
         }
-        let of_driven = on_driven(scene, &self.params, backend, poses, &covered, &pushes)?;
-        of_driven.into_iter().for_each(|(k, force)| sum[k] += force);
+        if let Some(slots) = &self.slots {
+            let of_driven = slots
+                .on_driven(poses, &covered, &pushes, &self.params, |rows| backend.wall_pressures(rows))?;
+            of_driven.into_iter().for_each(|(k, force)| sum[k] += force);
+        }
         Ok(sum)
     }
 

@@ -8,6 +8,7 @@ use crate::cover::driven::Covered;
 use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
+use crate::shape::Bending;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -17,8 +18,8 @@ pub struct Held {
     found: Vec<Found>,
     /// By solid, the areas of its rows that water may press on from a slot, in its frame [m2].
     area: HashMap<usize, Vec<DVec3>>,
-    /// By solid, whether a row's surface, or one that looks at it, bends away from the other, so that the gap is open.
-    bends: HashMap<usize, Vec<bool>>,
+    /// By solid, which faces of its rows, or those that look at them, bend away from the other, so that the gap is open.
+    bends: HashMap<usize, Bending>,
 }
 
 /// What they do beside the pressures of the rows in them.
@@ -36,18 +37,11 @@ impl Held {
         self.found.iter().flat_map(|f| f.slot.inside.iter().map(|row| (f.slot.solid, row.0))).collect()
     }
 
-    /// How much of a row lies in a slot of a surface that bends, so that what [`Covered`] says of it does not hold [-].
-    fn open(&self) -> HashMap<(usize, usize), f64> {
+    /// How much of each row lies in a slot [-].
+    fn shares(&self) -> HashMap<(usize, usize), f64> {
         let of = |f: &Found| {
             let solid = f.slot.solid;
-            let bent = |row: &(usize, f64)| self.bends[&solid][row.0];
-            f.slot
-                .inside
-                .iter()
-                .copied()
-                .filter(bent)
-                .map(|(n, share)| ((solid, n), share))
-                .collect::<Vec<_>>()
+            f.slot.inside.iter().map(|&(n, share)| ((solid, n), share)).collect::<Vec<_>>()
         };
         self.found.iter().flat_map(of).collect()
     }
@@ -57,6 +51,7 @@ impl Slots {
     /// The slots of solids that no force moves with the solids at `poses`, of which other solids cover what `covered` says.
     pub fn held(&self, poses: &[Pose], covered: &[Covered]) -> Held {
         let others = self.others(poses, |a, b| a.holds && b.holds);
+        let bodies = self.others(poses, |a, b| a.holds && b.free || a.free && b.holds);
         let (mut area, mut bends) = (HashMap::new(), HashMap::new());
         let mut found = vec![];
         for (k, layer) in self.layers.iter().enumerate().take(others.len()).filter(|(_, layer)| layer.holds) {
@@ -67,22 +62,25 @@ impl Slots {
             let is_still = layer.still && others[k].iter().all(|(other, _)| self.layers[*other].still);
             let look = || Arc::<[Faced]>::from(self.faced(k, at_walls, &others[k], poses));
             let faced = if is_still { layer.faced.get_or_init(look).clone() } else { look() };
-            let bends_there = |other: usize, row: usize| self.layers[other].bends.get(row) == Some(&true);
-            let bent = |of: Opposite| matches!(of, Opposite::Solid(other, row) if bends_there(other, row));
-            let own = layer.bends.iter().zip(faced.iter());
-            let bent: Vec<bool> = own.map(|(own, row)| *own || row.all().any(bent)).collect();
-            let mut open = layer.area.clone();
             let to_frame = poses[k].orientation.inverse();
+            let bent: Bending = (0..faced.len()).map(|n| self.bent(k, n, &faced[n], poses)).collect();
+            let mut open = layer.area.clone();
             // They come in the order of solids.
             let own = covered.partition_point(|c| c.solid < k)..covered.partition_point(|c| c.solid <= k);
             for c in &covered[own] {
-                open[c.row] -= to_frame * if bent[c.row] { c.within } else { c.area };
+                open[c.row] -= to_frame * if bent[c.row] & 1 << c.face != 0 { c.within } else { c.area };
             }
             // What is left of a face that stands on another by round-off is nothing.
             let is_open = |n: usize| open[n].length_squared() > 1e-4 * layer.area[n].length_squared();
             let shares: Vec<f64> =
                 faced.iter().enumerate().map(|(n, row)| if is_open(n) { row.share } else { 0.0 }).collect();
-            let slots = layer.slots(k, &shares).into_iter();
+            // What stands before a free body is in the slot of that.
+            let before: Vec<Faced> = match &bodies[k][..] {
+                [] => vec![],
+                bodies => self.faced(k, false, bodies, poses),
+            };
+            let shut = |n: usize| before.get(n).is_some_and(|row| row.share > 0.0);
+            let slots = layer.slots(k, &shares, shut).into_iter();
             found.extend(slots.map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }));
             area.insert(k, open);
             bends.insert(k, bent);
@@ -90,11 +88,31 @@ impl Slots {
         Held { found: enclosed::lend(found), area, bends }
     }
 
-    /// What of `covered` water in the slots `held` presses on is not covered.
+    /// Which faces of row `n` of layer `k`, which lies as `faced`, or of what looks at them bend.
+    fn bent(&self, k: usize, n: usize, faced: &Faced, poses: &[Pose]) -> u8 {
+        let layer = &self.layers[k];
+        let looked_at = |way: DVec3, of: Option<Opposite>| match of {
+            Some(Opposite::Solid(other, row)) => {
+                let way = poses[other].orientation.inverse() * (poses[k].orientation * way);
+                self.layers[other].bends_before(row, way)
+            }
+            _ => false,
+        };
+        let others = match &faced.by_face[..] {
+            [] => u8::from(looked_at(layer.area[n].normalize_or_zero(), faced.opposite)),
+            faces => faces.iter().zip(0..).map(|(&(way, of), k)| u8::from(looked_at(way, of)) << k).sum(),
+        };
+        layer.bends[n] | others
+    }
+
+    /// What of `covered` water in the slots `held` presses on is not covered: of faces that bend, or before which something does, all but what lies within others.
     pub fn uncover(&self, held: &Held, covered: &mut [Covered]) {
-        let open = held.open();
+        let shares = held.shares();
         for c in covered {
-            c.area *= 1.0 - open.get(&(c.solid, c.row)).copied().unwrap_or(0.0);
+            let bends = held.bends.get(&c.solid).is_some_and(|bends| bends[c.row] & 1 << c.face != 0);
+            if let Some(share) = shares.get(&(c.solid, c.row)).filter(|_| bends) {
+                c.area += *share * (c.within - c.area);
+            }
         }
     }
 
@@ -120,7 +138,7 @@ impl Slots {
         params: &Params,
         read: impl FnOnce(&[usize]) -> Result<Vec<RowPressure>>,
     ) -> Result<HeldForces> {
-        let Held { found, area, bends } = held;
+        let Held { found, area, .. } = held;
         let own = |f: &Found| {
             let first = self.layers[f.slot.solid].first;
             f.slot.inside.iter().map(move |row| first + row.0).collect::<Vec<_>>()
@@ -150,11 +168,6 @@ impl Slots {
                 for (into, at) in layer.faces(n, *into, pose) {
                     let slot = field.as_ref().map_or(0.0, |field| self.before(field, k, pose, n, at));
                     press(slot - row.in_force(at - place, params), into, at);
-                }
-                if bends[&k][n] {
-                    let way = pose.orientation * layer.to_surface[n];
-                    let rest = pose.orientation * (area[&k][n] - layer.area[n]);
-                    press(row.in_force(way, params), rest, place + way);
                 }
             }
             // What has slots of its own there has its part from them.

@@ -4,9 +4,12 @@ use super::{CELL, Faced, Found, Slot};
 use crate::body::Pose;
 use crate::contact::broad::{Bounds, PointGrid};
 use crate::scene::Solid;
-use crate::shape::{ADJACENT, Edges, bending};
+use crate::shape::{ADJACENT, Bending, Edges, Face};
 use glam::DVec3;
 use std::sync::{Arc, OnceLock};
+
+/// Rows of which no faces look alike more than this are of two sides of a plate, and do not go on from one to the other (cosine of the angle).
+const TURNED: f64 = -0.5;
 
 /// A solid's wall layer, in its frame.
 pub(super) struct Layer {
@@ -23,8 +26,8 @@ pub(super) struct Layer {
     pub radius: f64,
     pub grid: PointGrid,
     pub adjacent: Vec<Vec<u32>>,
-    /// Of one that holds, which rows lie where its surface bends.
-    pub bends: Vec<bool>,
+    /// Of one that no force moves, which faces of its rows lie where its surface bends.
+    pub bends: Bending,
     /// Of one that never moves, how its rows lie before what never moves either.
     pub faced: OnceLock<Arc<[Faced]>>,
 }
@@ -45,7 +48,7 @@ impl Layer {
             free,
             holds,
             still: solid.is_still(),
-            bends: if holds { bending(&offset, &solid.wall_area, &solid.wall_edges, l0) } else { Vec::new() },
+            bends: if free { Vec::new() } else { solid.bending(l0) },
             faced: OnceLock::new(),
             first: solid.wall_slots.start,
             radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
@@ -59,8 +62,8 @@ impl Layer {
     }
 
     /// Slots whose rows hang together, by how much of each row lies in one: what lies in them, and their rims, which may
-    /// be empty.
-    pub fn slots(&self, solid: usize, shares: &[f64]) -> Vec<Slot> {
+    /// be empty. A row that is `shut`, in another's slot, is no rim where others are.
+    pub fn slots(&self, solid: usize, shares: &[f64], shut: impl Fn(usize) -> bool) -> Vec<Slot> {
         let mut seen: Vec<bool> = shares.iter().map(|&share| share == 0.0).collect();
         let mut out = vec![];
         for first in 0..shares.len() {
@@ -81,13 +84,33 @@ impl Layer {
             let mut rim: Vec<usize> = beside.filter(|&m| shares[m] == 0.0).collect();
             rim.sort_unstable();
             rim.dedup();
-            let at_rim = |n: &usize| self.adjacent[*n].iter().any(|&m| shares[m as usize] == 0.0);
+            // Those on the other side of a plate, too, are none where others are.
+            let goes_on = |&m: &usize| {
+                let beside = self.adjacent[m].iter().map(|&n| n as usize);
+                beside.filter(|n| rows.binary_search(n).is_ok()).any(|n| self.go_on(n, m))
+            };
+            let is_open = |&m: &usize| !shut(m);
+            for is_rim in [&is_open as &dyn Fn(&usize) -> bool, &goes_on] {
+                if rim.iter().any(is_rim) {
+                    rim.retain(is_rim);
+                }
+            }
+            let at_rim =
+                |n: &usize| self.adjacent[*n].iter().any(|&m| rim.binary_search(&(m as usize)).is_ok());
             let mouth: Vec<usize> = rows.iter().copied().filter(at_rim).collect();
             let edge = rim.iter().map(|&m| self.edge(m, &mouth)).collect();
             let inside = rows.into_iter().map(|n| (n, shares[n])).collect();
             out.push(Slot { solid, rim, edge, mouth, inside });
         }
         out
+    }
+
+    /// Whether rows `a` and `b`, which are near each other, lie beside each other on the surface.
+    fn go_on(&self, a: usize, b: usize) -> bool {
+        let ways = |k: usize| {
+            self.edges.faces(k, self.area[k], self.to_surface[k]).map(|face| face.area.normalize_or_zero())
+        };
+        ways(a).any(|a| ways(b).any(|b| a.dot(b) > TURNED))
     }
 
     /// Where the slot ends before row `m` of its rim, on the surface of the rows at its `mouth`.
@@ -123,6 +146,14 @@ impl Layer {
     pub fn looks(&self, n: usize, way: DVec3) -> f64 {
         let faces = self.edges.of(n).iter().map(|face| face.area.normalize_or_zero().dot(way));
         faces.reduce(f64::min).unwrap_or_else(|| self.area[n].normalize_or_zero().dot(way))
+    }
+
+    /// Whether of row `n` that face bends which looks back most at what looks along `way`, in the solid's frame.
+    pub fn bends_before(&self, n: usize, way: DVec3) -> bool {
+        let looks = |face: &Face| face.area.normalize_or_zero().dot(way);
+        let faces = self.edges.of(n).iter().enumerate();
+        let back = faces.min_by(|a, b| looks(a.1).total_cmp(&looks(b.1))).map_or(0, |face| face.0);
+        self.bends.get(n).is_some_and(|faces| faces & 1 << back != 0)
     }
 
     pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {

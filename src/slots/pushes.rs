@@ -4,8 +4,6 @@ use super::{Field, Found, Slots};
 use crate::body::Pose;
 use crate::contact::broad::meeting_images;
 use crate::error::Result;
-use crate::kernels::body_force::RowPressure;
-use crate::params::Params;
 use glam::DVec3;
 
 /// What a body's slot lies before.
@@ -34,20 +32,6 @@ impl Push {
     /// Its area as a face that looks along `normal` counts it [m2].
     pub fn area_on(&self, normal: DVec3) -> DVec3 {
         self.area.dot(normal) * normal
-    }
-
-    /// What the `row` of that face tells of the same area, of which as much is counted as is `bare`, world axes [m2], with the surface
-    /// `to_surface` from it: force to be replaced [N].
-    pub fn told_by(
-        &self,
-        normal: DVec3,
-        row: &RowPressure,
-        to_surface: DVec3,
-        bare: DVec3,
-        params: &Params,
-    ) -> DVec3 {
-        let counted = (bare.dot(normal) / (params.spacing * params.spacing)).clamp(0.0, 1.0);
-        counted * row.in_force(to_surface, params) * self.area_on(normal)
     }
 }
 
