@@ -508,8 +508,15 @@ fn plan_tells_where_free_bodies_stand_and_what_they_weigh() {
     for (key, corner) in corners {
         assert!((0..3).all(|k| near(&bodies[0][key][k], corner[k])), "{bodies}");
     }
+    // m (b^2 / 12 + h^2 / 18) about x and its like about z; about y m (l^2 + h^2) / 18.
+    let mut moments = [0, 1, 2].map(|k| bodies[0]["inertia_kg_m2"][k].as_f64().unwrap());
+    moments.sort_by(f64::total_cmp);
+    assert!((moments.iter().sum::<f64>() - 4.5 * (0.04 / 6.0 + 0.18 / 9.0)).abs() < 1e-9, "{moments:?}");
     let words = ran(&["plan", &case]).out;
-    assert!(words.contains("`ramp`: 4.5000e0 kg, 9.0000e-3 m3; x 1.2000 to 1.5000"), "{words}");
+    assert!(
+        words.contains("`ramp`: 4.5000e0 kg, ") && words.contains(" kg m2, 9.0000e-3 m3; x 1.2000 to 1.5000"),
+        "{words}"
+    );
     // No water is around it: nine kilograms are what it displaces in all.
     assert!(words.contains("displaces 9.000e0 kg of water when all under: it floats"), "{words}");
     let aloft = std::fs::read_to_string(&case).unwrap();

@@ -77,3 +77,39 @@ fn a_slice_of_two_dimensions_is_seen_with_its_ends() {
         }
     }
 }
+
+/// Where nothing falls what starts or is driven tells how fast the water may be: one colour was all of it.
+#[test]
+fn colours_reach_as_far_as_what_moves_where_nothing_falls() {
+    for (moves, range) in [
+        ("[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, 0.5]\nvelocity = [2, 0, 0]\n", 2.0),
+        (
+            "[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, 0.5]\n[[body]]\nname = \"disc\"\nshape = \"cylinder\"\nradius = 0.1\n\
+             axis = [0, 1, 0]\ncenter = [0.5, 0, 0.7]\ndensity = 500\nvelocity = [0, 0, -1.5]\n[contact]\nspring = 1e4\n",
+            1.5,
+        ),
+        (
+            "[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, 0.5]\n[[moving_wall]]\nname = \"wall\"\nmin = [0.4, 0, 0.6]\n\
+             max = [0.6, 0, 0.8]\nmotion = [[0, 0, 0, 0], [1, 0, 0, 0.5]]\n",
+            0.5,
+        ),
+    ] {
+        let case: Case = toml::from_str(&format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1.0\ndimensions = 2\ngravity = [0, 0, 0]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 1]\nopen = [\"z_max\"]\n[fluid]\n{moves}"
+        ))
+        .unwrap();
+        let scene = Scene::build(&case).unwrap();
+        let params = Params::new(&case, &scene).unwrap();
+        let poses: Vec<_> = scene.solids.iter().map(|s| Some((s.position, s.orientation))).collect();
+        let water = Fields::new(&scene);
+        let painted = |range: Option<[f64; 2]>| {
+            let style = Style { range, ..Style::of(2) };
+            Painter::new(&scene, &style, &params)
+                .paint(&scene, 0.0, &poses, drops(&scene, Some(&water)))
+                .bytes
+        };
+        assert!(painted(None) == painted(Some([0.0, range])), "{moves}");
+        assert!(painted(None) != painted(Some([0.0, 2.0 * range])), "{moves}");
+    }
+}

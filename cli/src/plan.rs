@@ -105,6 +105,8 @@ struct BodyLine {
     name: String,
     /// In two dimensions of the slice one spacing wide; 0 of one that is held and has none.
     mass_kg: f64,
+    /// Principal moments of inertia about the centre of mass, or three times the one about a hinge, in the frame of the shape; of the slice, too.
+    inertia_kg_m2: [f64; 3],
     volume_m3: f64,
     /// Lower and upper corner of the box around it at t = 0.
     min_m: [f64; 3],
@@ -120,6 +122,7 @@ impl BodyLine {
         Some(Self {
             name: solid.name.clone(),
             mass_kg: free.mass,
+            inertia_kg_m2: free.inertia.to_array(),
             volume_m3: solid.shape.volume(),
             min_m: (solid.shape_center() + lo).to_array(),
             max_m: (solid.shape_center() + hi).to_array(),

@@ -245,7 +245,7 @@ impl Limits {
 }
 
 /// Largest speed of a solid at t = 0, or by its table [m/s].
-fn starting_speed(scene: &Scene) -> f64 {
+pub(crate) fn starting_speed(scene: &Scene) -> f64 {
     let start = scene.solids.iter().map(|s| match &s.drive {
         Drive::Free(body) => body.velocity.length() + body.angular_velocity.length() * s.radius(),
         Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.radius()),

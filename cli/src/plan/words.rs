@@ -33,10 +33,15 @@ impl WaveLine {
 
 impl BodyLine {
     /// Where it is in `places` decimals.
-    fn words(&self, places: usize) -> String {
+    fn words(&self, places: usize, plane: bool) -> String {
         let span = |k: usize| format!("{:.places$} to {:.places$}", self.min_m[k], self.max_m[k]);
         // One that nothing moves needs no mass.
-        let mass = if self.mass_kg > 0.0 { format!("{:.4e} kg", self.mass_kg) } else { "held".into() };
+        let [x, y, z] = self.inertia_kg_m2;
+        let mass = match plane {
+            _ if self.mass_kg == 0.0 => "held".into(),
+            true => format!("{:.4e} kg, {y:.4e} kg m2", self.mass_kg),
+            false => format!("{:.4e} kg, {x:.4e} {y:.4e} {z:.4e} kg m2", self.mass_kg),
+        };
         let afloat = self.buoyancy.as_ref().map_or(String::new(), |b| "\n".to_owned() + &b.words(places));
         format!(
             "  `{}`: {mass}, {:.4e} m3; x {}, y {}, z {} m{afloat}",
@@ -85,7 +90,9 @@ impl Report {
         if !report.bodies.is_empty() {
             lines.extend([String::new(), "bodies at t = 0".to_string()]);
             let places = of_place(report.spacing_m);
-            lines.extend(report.bodies.iter().take(MOST_BODIES).map(|body| body.words(places)));
+            lines.extend(
+                report.bodies.iter().take(MOST_BODIES).map(|body| body.words(places, report.dimensions == 2)),
+            );
             let more = report.bodies.len().saturating_sub(MOST_BODIES);
             lines.extend((more > 0).then(|| format!("  and {more} more: --json")));
         }
