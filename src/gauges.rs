@@ -240,7 +240,8 @@ impl Gauges {
                 let areas = wall.areas(&simulation.scene, simulation.solids.poses());
                 let told = next(wall.slots.len());
                 let mut sum = wall.force(told, &areas, params);
-                sum += wall.slot_force(&pushes, (told, &areas), &simulation.scene, params);
+                let at = (&*simulation.scene, simulation.solids.poses());
+                sum += wall.slot_force(&pushes, (told, &areas), at, params);
                 sum
             }
         };

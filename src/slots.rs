@@ -19,6 +19,8 @@
 //! level P / rho g of all that are under water are none of it, and where P_f is negative there is air. Which rows that are the last
 //! step's pressures say. Slots that do not hang together have a field each.
 //!
+//! What a slot presses on the body it presses on what lies before it: walls, obstacles, driven solids (`slots/driven.rs`).
+//!
 //! A body that others enclose has slots without a rim (`slots/enclosed.rs`); water that solids and their slots enclose has the pressure
 //! that comes through them (`slots/pockets.rs`). Solids that no force moves have slots where their forces are told (`slots/held.rs`).
 
@@ -29,6 +31,7 @@ mod layer;
 mod pockets;
 mod pushes;
 
+pub(crate) use driven::BEFORE;
 pub use enclosed::Pressed;
 pub use held::{Held, HeldForces};
 pub use pushes::{Opposite, Push};
@@ -272,6 +275,18 @@ impl Slots {
 
     /// How each row of layer `k` lies before fixed walls, if it is `at_walls`, and before `others`.
     fn faced(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<Faced> {
+        let rows = (0..self.layers[k].offset.len()).into_par_iter().with_min_len(256);
+        rows.map(|n| self.row_faced((k, n), at_walls, others, poses)).collect()
+    }
+
+    /// How row `n` of layer `k` does.
+    fn row_faced(
+        &self,
+        (k, n): (usize, usize),
+        at_walls: bool,
+        others: &[(usize, DVec3)],
+        poses: &[Pose],
+    ) -> Faced {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
         let reach = FACING.1 * l0;
         // Of those within `ahead` of `outward` (cosine) around `x`, the nearest which looks `back` so far at least, and how far it is.
@@ -293,8 +308,11 @@ impl Slots {
             }
             for &(other, way) in others {
                 let (layer, pose) = (&self.layers[other], &poses[other]);
-                let to_frame = pose.orientation.inverse();
-                let (local, outward) = (to_frame * (x - way - pose.position), to_frame * outward);
+                let (from, to_frame) = (x - way - pose.position, pose.orientation.inverse());
+                if from.length_squared() > (layer.radius + reach).powi(2) {
+                    continue;
+                }
+                let (local, outward) = (to_frame * from, to_frame * outward);
                 let of = |n: u32| {
                     let way = pose.orientation * (layer.grid.point(n) - local);
                     let looks = || layer.looks(n as usize, outward);
@@ -304,26 +322,24 @@ impl Slots {
             }
             (nearest, opposite)
         };
-        let share = |distance: f64| ((FACING.1 - distance / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-        let faced = |(n, (&offset, &area)): (usize, (&DVec3, &DVec3))| {
-            let x = pose.position + pose.orientation * offset;
-            // What a thin edge looks along as a whole is neither of its faces.
-            let mut first = (reach, None);
-            let mut by_face = vec![];
-            for face in layer.edges.of(n) {
-                let way = face.area.normalize_or_zero();
-                let (distance, opposite) = nearest(x, pose.orientation * way, BEFORE_FACE, BACK);
-                if distance < first.0 {
-                    first = (distance, opposite);
-                }
-                by_face.push((way, opposite));
+        let x = pose.position + pose.orientation * layer.offset[n];
+        // What a thin edge looks along as a whole is neither of its faces.
+        let mut first = (reach, None);
+        let mut by_face = vec![];
+        for face in layer.edges.of(n) {
+            let way = face.area.normalize_or_zero();
+            let (distance, opposite) = nearest(x, pose.orientation * way, BEFORE_FACE, BACK);
+            if distance < first.0 {
+                first = (distance, opposite);
             }
-            if by_face.is_empty() {
-                first = nearest(x, pose.orientation * area.normalize_or_zero(), AHEAD, f64::INFINITY);
-            }
-            Faced { share: share(first.0), opposite: first.1, by_face }
-        };
-        (&layer.offset, &layer.area).into_par_iter().enumerate().with_min_len(256).map(faced).collect()
+            by_face.push((way, opposite));
+        }
+        if by_face.is_empty() {
+            let way = layer.area[n].normalize_or_zero();
+            first = nearest(x, pose.orientation * way, AHEAD, f64::INFINITY);
+        }
+        let share = ((FACING.1 - first.0 / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
+        Faced { share, opposite: first.1, by_face }
     }
 
     /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`.

@@ -753,3 +753,30 @@ fn an_obstacle_that_ends_at_the_seam_has_its_end() {
         "{spans}"
     );
 }
+
+/// One of an odd number of rows had one more between the sides than there is room for, in the place of its image: 1.06 to 1.11 of its load.
+#[test]
+fn a_plane_that_spans_a_periodic_axis_is_the_same_however_wide() {
+    let rows = |width: f64, at: f64| {
+        let case: Case = toml::from_str(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.12\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.24, 0.2, 0.32]\nopen = [\"z_max\"]\nperiodic = [\"y\"]\n\
+             [fluid]\n[[fluid.fill]]\nseed = [0.12, 0.1, 0.186]\nlevel = 0.2\n\
+             [[plane]]\nname = \"slope\"\ncenter = [0.12, {at}, 0.07]\nnormal = [-0.4, 0, 1]\nalong = [1, 0, 0.4]\nsize = [0.288, {width}]\n"
+        ))
+        .unwrap();
+        let scene = Scene::build(&case).unwrap();
+        let slope = scene.walls.iter().position(|wall| wall.name == "slope").unwrap() as u32;
+        let slots = scene.groups.static_wall_range().zip(&scene.static_wall_shape);
+        let own: Vec<DVec3> =
+            slots.filter(|(_, of)| **of == slope).map(|(slot, _)| scene.position[slot]).collect();
+        (own, scene.water())
+    };
+    let even = rows(0.2, 0.1);
+    assert!(even.0.len() >= 100 && even.0.len() % 10 == 0, "{} particles", even.0.len());
+    for (width, at) in [(0.22, 0.1), (0.24, 0.1), (0.26, 0.1), (0.23, 0.095), (0.21, 0.1)] {
+        let found = rows(width, at);
+        assert_eq!((found.0.len(), found.1), (even.0.len(), even.1), "{width} m about {at} m");
+        assert!(found.0.iter().zip(&even.0).all(|(a, b)| a.distance(*b) < 1e-9), "{width} m about {at} m");
+    }
+}

@@ -572,3 +572,107 @@ fn a_body_larger_than_what_stands_beside_it_presses_on_that_alone() {
         }
     }
 }
+
+/// What a slab of `width` [m] held on pieces of a plinth of 0.12 m presses on all of them and on the floor, over statics: 20 mm, 0.1 m of water above the plinth, which is `height` [m] high.
+fn on_pieces(width: f64, height: f64, pieces: &[(&str, f64, f64)]) -> [f64; 2] {
+    let of = |(k, &(kind, low, high)): (usize, &(&str, f64, f64))| {
+        let motion = if kind == "obstacle" { "" } else { "motion = [[50, 0, 0, 0], [60, 0, 0, 0.1]]\n" };
+        format!(
+            "[[{kind}]]\nname = \"p{k}\"\nmin = [{low}, 0, 0]\nmax = [{high}, 0.1, {height}]\n{motion}\
+             [[gauge.force]]\nname = \"p{k}\"\non = \"p{k}\"\n"
+        )
+    };
+    let solids: String = pieces.iter().enumerate().map(of).collect();
+    let mut simulation = simulation(&case(&format!(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 5\ndimensions = 2\n\
+         [tank]\nmin = [-0.3, 0, 0]\nmax = [0.3, 0, 0.4]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [-0.3, 0, 0]\nmax = [0.3, 0, {}]\n\
+         [[body]]\nname = \"slab\"\nsize = [{width}, 0.1, 0.06]\ncenter = [0, 0, {}]\ndisplaces_fluid = true\n\
+         locked = [\"x\", \"z\", \"rotation_y\"]\n{solids}\
+         [[gauge.force]]\nname = \"slab\"\non = \"slab\"\n[[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
+        height + 0.16,
+        height + 0.03
+    )));
+    let (mut sums, mut count) = ([0.0; 3], 0.0);
+    while simulation.time < 0.06 {
+        simulation.step().expect("it stands");
+        if simulation.time > 0.03 {
+            let read = simulation.gauges().expect("forces");
+            let of = |name: &str| {
+                let all =
+                    read.iter().filter(|gauge| gauge.0.starts_with(name) && gauge.0.contains("force_z"));
+                all.map(|gauge| gauge.1).sum::<f64>()
+            };
+            sums = [sums[0] + of("p"), sums[1] + of("slab"), sums[2] + of("floor")];
+            count += 1.0;
+        }
+    }
+    let [plinth, slab, floor] = sums.map(|sum| sum / count);
+    let weight = simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.80665;
+    [plinth / (-9806.65 * 0.02 * 0.16 * 0.12), (plinth + slab + floor) / -weight]
+}
+
+#[test]
+fn a_push_over_a_joint_is_on_both_and_none_is_on_what_lies_below() {
+    let (fixed, moving) = ("obstacle", "moving_wall");
+    for (width, height, pieces) in [
+        (0.12, 0.1, vec![(moving, -0.06, 0.06)]),
+        (0.12, 0.1, vec![(moving, -0.06, 0.01), (moving, 0.01, 0.06)]),
+        (0.12, 0.1, vec![(moving, -0.06, -0.01), (moving, -0.01, 0.01), (moving, 0.01, 0.06)]),
+        (0.12, 0.1, vec![(moving, -0.06, 0.005), (moving, 0.005, 0.06)]),
+        (0.1, 0.1, vec![(fixed, -0.06, 0.0), (moving, 0.0, 0.06)]),
+        (0.1, 0.1, vec![(fixed, -0.06, 0.0), (fixed, 0.0, 0.06)]),
+        (0.24, 0.04, vec![(fixed, -0.06, 0.06)]),
+        (0.24, 0.04, vec![(moving, -0.06, 0.06)]),
+    ] {
+        let [load, sum] = on_pieces(width, height, &pieces);
+        println!("slab of {width} m on {pieces:?}: {load:.4} of the load, all forces {sum:.4} of the weight");
+        assert!((load - 1.0).abs() < 0.06 && (sum - 1.0).abs() < 0.012, "{width} {pieces:?}: {load} {sum}");
+    }
+}
+
+#[test]
+fn what_stands_beside_above_or_on_what_is_held_tells_its_load() {
+    let still = |solids: &str, depth: f64| {
+        let mut simulation = simulation(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 5\ndimensions = 2\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.5]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, {depth}]\n{solids}\
+             [[gauge.force]]\nname = \"a\"\non = \"a\"\n"
+        )));
+        let k = simulation.scene.solids.iter().position(|solid| solid.name == "a").expect("it is there");
+        let (mut sum, mut count) = (seixo::body::Wrench::default(), 0.0);
+        while simulation.time < 0.06 {
+            simulation.step().expect("it stands");
+            if simulation.time > 0.03 {
+                sum += simulation.fluid_force[k];
+                count += 9806.65 * 0.02;
+            }
+        }
+        sum / count
+    };
+    // Two blocks on the floor, 0.6 spacings apart: the rows of their feet, which are covered, were the rim of the slot between, and half of a side was missing.
+    let block = |name: &str, x: f64| {
+        format!("[[obstacle]]\nname = \"{name}\"\nsize = [0.08, 0.1, 0.08]\ncenter = [{x}, 0, 0.04]\n")
+    };
+    let aside = still(&(block("a", 0.25) + &block("b", 0.342)), 0.28).force.x / (0.08 * 0.24);
+    println!("beside another: {aside:.3} of a side");
+    assert!(aside.abs() < 0.05, "{aside}");
+    // An obstacle 0.9 spacings below a body: it had the pressure at the body's face, without the weight of the gap.
+    let below = "[[obstacle]]\nname = \"a\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.13]\n\
+                 [[body]]\nname = \"b\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.208]\ndisplaces_fluid = true\n\
+                 locked = [\"x\", \"z\", \"rotation_y\"]\n";
+    let lift = still(below, 0.4).force.z / (0.12 * 0.06);
+    println!("below a body: {lift:.3} of its lift");
+    assert!((lift - 1.0).abs() < 0.04, "{lift}");
+    // 1.5 spacings thick and 0.55 above the floor: nothing was under it (-14 times its lift), as its rows lie nearer to their faces. What is so thin is rough.
+    let thin = "[[obstacle]]\nname = \"a\"\nsize = [0.12, 0.1, 0.03]\ncenter = [0.3, 0, 0.026]\n";
+    let lift = still(thin, 0.3).force.z / (0.12 * 0.03);
+    println!("thin, above the floor: {lift:.3} of its lift");
+    assert!((lift - 1.0).abs() < 1.0, "{lift}");
+    // Rows of a small disc turn by more than those of an edge: it was flat, and had none.
+    let disc = "[[obstacle]]\nname = \"a\"\nshape = \"cylinder\"\nradius = 0.04\naxis = [0, 1, 0]\ncenter = [0.3, 0, 0.04]\n";
+    let lift = still(disc, 0.3).force.z / (0.0016 * std::f64::consts::PI);
+    println!("a small disc on the floor: {lift:.3} of its lift");
+    assert!((lift - 1.0).abs() < 0.06, "{lift}");
+}

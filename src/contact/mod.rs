@@ -38,7 +38,6 @@ use device::{Link, Traffic};
 use fixed::FixedWalls;
 use glam::{DVec3, IVec3};
 use law::{Fault, Kind, Law, Now};
-pub(crate) use substeps::starting_speed;
 use substeps::{Cut, Limits};
 
 /// Gap between two facing surfaces at which a law's contact begins [m]: d_c - l0 for the paper's,

@@ -244,21 +244,12 @@ impl Limits {
     }
 }
 
-/// Largest speed of a solid at t = 0, or by its table [m/s].
-pub(crate) fn starting_speed(scene: &Scene) -> f64 {
-    let start = scene.solids.iter().map(|s| match &s.drive {
-        Drive::Free(body) => body.velocity.length() + body.angular_velocity.length() * s.radius(),
-        Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.radius()),
-    });
-    start.fold(0.0, f64::max)
-}
-
 /// Speed [m/s] of the fastest solid that there could be: the starting speed and the height of the domain.
 fn fastest_speed(scene: &Scene) -> f64 {
     let (low, high) = scene.domain;
     let height = (high - low).abs().dot(scene.gravity.normalize_or_zero().abs());
     let height = if height.is_finite() { height } else { 0.0 };
-    let start = starting_speed(scene);
+    let start = scene.solids_start();
     (start * start + 2.0 * scene.gravity.length() * height).sqrt()
 }
 
@@ -281,6 +272,6 @@ fn falling_speed(scene: &Scene) -> f64 {
     let tables = scene.solids.iter().filter_map(table);
     let lowest = scene.walls.iter().map(floor).chain(tables).fold(f64::INFINITY, f64::min);
     let fall = if lowest < highest && lowest.is_finite() { highest - lowest } else { 0.0 };
-    let start = starting_speed(scene);
+    let start = scene.solids_start();
     (start * start + 2.0 * scene.gravity.length() * fall.max(scene.depth)).sqrt()
 }

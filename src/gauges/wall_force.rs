@@ -9,7 +9,7 @@ use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
 use crate::shape::PointCells;
-use crate::slots::{Opposite, Push};
+use crate::slots::{BEFORE, Opposite, Push};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
@@ -33,6 +33,9 @@ const AHEAD: f64 = 0.45;
 
 /// A face that looks back at a push less than this is not pressed on (cosine of the angle).
 const BACK: f64 = 0.5;
+
+/// Places on the way from a push to a face, over that, at which a solid stands between.
+const BETWEEN: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 /// The wall layer of a fixed wall.
 #[derive(Clone, Debug, Default)]
@@ -155,23 +158,25 @@ impl FixedWall {
         &self,
         pushes: &[Push],
         (told, areas): (&[RowPressure], &[DVec3]),
-        scene: &Scene,
+        (scene, poses): (&Scene, &[Pose]),
         params: &Params,
     ) -> Wrench {
         let mut sum = Wrench::default();
         // Of each row and face the direction, and what of it is pressed on [m2].
         let mut pressed: BTreeMap<(usize, [i32; 3]), (DVec3, f64)> = BTreeMap::new();
-        for push in pushes.iter().filter(|push| matches!(push.on, Opposite::Wall(_))) {
-            let mut on = DVec3::ZERO;
-            for (face, share) in self.shares(push, scene) {
+        // Over the joint of a wall and another one, or a solid, a push is on both.
+        let is_on_body = |push: &&Push| matches!(push.on, Opposite::Solid(k, _) if scene.solids[k].is_free());
+        for push in pushes.iter().filter(|push| !is_on_body(push)) {
+            let mut force = DVec3::ZERO;
+            for (face, share, above) in self.shares(push, scene, poses) {
                 let area = share * push.area_on(face.normal);
                 let way = (1e3 * face.normal).round().as_ivec3().to_array();
-                on += area;
+                force += push.pressure_at(-above * face.normal, params) * area;
                 if let Some(row) = face.row {
                     pressed.entry((row, way)).or_insert((face.normal, 0.0)).1 += area.length();
                 }
             }
-            let (force, arm) = (push.pressure * on, scene.periodic.nearest(push.at - self.about));
+            let arm = scene.periodic.nearest(push.at - self.about);
             sum += Wrench { force, torque: arm.cross(force) };
         }
         // What is pressed on and counts as bare at once counts once: beside a body half of a face may be the one, half the other.
@@ -186,9 +191,9 @@ impl FixedWall {
         sum
     }
 
-    /// Faces before which a `push` lies, and how much of it [-], by the points by which what stands before faces is told; those on a line between faces have a part
+    /// Faces before which a `push` lies, how much of it [-], and how far before [m], by the points by which what stands before faces is told; those on a line between faces have a part
     /// of each. What lies before none is not on this wall: beside its edge there is open water.
-    fn shares(&self, push: &Push, scene: &Scene) -> Vec<(&Face, f64)> {
+    fn shares(&self, push: &Push, scene: &Scene, poses: &[Pose]) -> Vec<(&Face, f64, f64)> {
         let l0 = self.tiles.spacing;
         let (edge, way) = (self.tiles.edge(push.area.length()), push.area.normalize_or_zero());
         let reach = edge + 1.5 * l0;
@@ -205,16 +210,34 @@ impl FixedWall {
         near.retain(|(face, _)| -face.normal.dot(way) > most - SLACK);
         let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), way).collect();
         let to_wall = scene.walls[self.shape].axes.transpose();
+        let between = match push.on {
+            Opposite::Solid(k, _) => Some(Standing::of(k, &scene.solids[k], &poses[k])),
+            Opposite::Wall(_) => None,
+        };
         let mut shares = vec![];
         for x in &points {
-            let before = |(face, way): &(&Face, DVec3)| {
+            let before = |(face, way): &(&Face, DVec3), above: f64| {
                 let way = *way + *x;
-                let along = to_wall * (way - way.dot(face.normal) * face.normal);
-                along.abs().max_element() <= (0.5 + SLACK) * l0
+                let along = to_wall * (way - above * face.normal);
+                let is_near = above > BEFORE.0 * l0 && above < BEFORE.1 * l0;
+                // What it is on, if that is a solid, may stand between.
+                let at = |part: f64| face.center + way - part * above * face.normal;
+                let is_free = |s: &Standing| {
+                    BETWEEN.iter().all(|&part| s.outside(at(part), l0, &scene.periodic) > SLACK * l0)
+                };
+                is_near
+                    && along.abs().max_element() <= (0.5 + SLACK) * l0
+                    && between.as_ref().is_none_or(is_free)
             };
-            let on: Vec<&Face> = near.iter().filter(|of| before(of)).map(|of| of.0).collect();
+            let above = |(face, way): &(&Face, DVec3)| (*way + *x).dot(face.normal);
+            let on: Vec<(&Face, f64)> = near
+                .iter()
+                .map(|of| (of, above(of)))
+                .filter(|(of, above)| before(of, *above))
+                .map(|(of, above)| (of.0, above))
+                .collect();
             let share = 1.0 / (on.len() * points.len()) as f64;
-            shares.extend(on.into_iter().map(|face| (face, share)));
+            shares.extend(on.into_iter().map(|(face, above)| (face, share, above)));
         }
         shares
     }

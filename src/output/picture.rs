@@ -6,7 +6,6 @@ use super::particles::Particles;
 use super::render::{Camera, Canvas, Layers, View, water};
 use crate::body::Pose;
 use crate::case::OutputField;
-use crate::contact::starting_speed;
 use crate::fields::Fields;
 use crate::params::Params;
 use crate::scene::{Kind, Scene, Shape, Solid};
@@ -173,7 +172,7 @@ impl Painter {
         // The speed of a fall from the surface to the floor, or of the fastest that starts or is driven; in a dry scene nothing is coloured by it.
         let fall = (2.0 * scene.gravity.length() * scene.depth).sqrt();
         let driven = scene.driven(f64::NEG_INFINITY, f64::INFINITY);
-        let speed = fall.max(scene.fastest()).max(driven).max(starting_speed(scene)).max(1e-9);
+        let speed = fall.max(scene.fastest()).max(driven).max(scene.solids_start()).max(1e-9);
         // Without a weight to compare with, that at a stop.
         let pressure = params.density * if fall > 0.0 { 0.5 * fall * fall } else { 0.5 * speed * speed };
         let range = style.range.unwrap_or(match style.field {

@@ -220,13 +220,13 @@ impl<'a> Builder<'a> {
             self.moving_walls.push(solid);
         }
         for (number, plane) in case.plane.iter().enumerate() {
-            let frame = PlaneFrame::new(plane, &lattice);
+            let frame = PlaneFrame::new(plane, &lattice, &self.periodic);
             let half =
                 0.5 * (plane.size[0] * frame.axes.x_axis.abs() + plane.size[1] * frame.axes.y_axis.abs());
             let ends = (frame.center - half, frame.center + half);
             self.crosses(&format!("plane.{number}"), &format!("plane `{}`", plane.name), ends, true);
             let before = self.fixed.wall.len();
-            let left_out = self.fixed.plane(plane, &lattice, &mut self.grid, layers);
+            let left_out = self.fixed.plane(&plane.name, &frame, &lattice, &mut self.grid, layers);
             let rows = self.fixed.wall[before..].iter().zip(&self.fixed.normal[before..]);
             let rows: Vec<Row> = rows.map(|(x, n)| Row(*x, *n)).collect();
             self.fixed.make_room(&rows, lattice.spacing);

@@ -9,6 +9,7 @@ use super::walls::PlaneFrame;
 use super::{Opening, Scene, Solid};
 use crate::case::{Case, OpeningKeys};
 use crate::error::Problem;
+use crate::periodic::Periodic;
 use glam::{DVec3, IVec3};
 use std::collections::HashSet;
 
@@ -51,7 +52,7 @@ fn before(c: IVec3, out: IVec3, is_inflow: bool, lattice: &Lattice) -> impl Iter
 pub(super) struct Covers(Vec<Cover>);
 
 impl Covers {
-    pub fn of(case: &Case, lattice: &Lattice, layers: i32) -> Self {
+    pub fn of(case: &Case, lattice: &Lattice, periodic: &Periodic, layers: i32) -> Self {
         let obstacle = |name: &str, body: Body| Cover { label: format!("obstacle `{name}`"), body };
         let boxes = case.obstacle.iter().filter_map(|o| Some((o, o.corners()?)));
         let boxes = boxes
@@ -59,7 +60,7 @@ impl Covers {
         let shaped = shaped::fixed(case).map(|solid| obstacle(&solid.name, Body::Placed(solid.placed())));
         let planes = case.plane.iter().map(|plane| Cover {
             label: format!("plane `{}`", plane.name),
-            body: Body::Placed(PlaneFrame::new(plane, lattice).slab(layers)),
+            body: Body::Placed(PlaneFrame::new(plane, lattice, periodic).slab(layers)),
         });
         Self(boxes.chain(shaped).chain(planes).collect())
     }

@@ -339,6 +339,15 @@ impl Scene {
         self.velocity[..self.water()].iter().map(|v| v.length()).fold(0.0, f64::max)
     }
 
+    /// Largest speed of a solid at t = 0, or by its table [m/s].
+    pub(crate) fn solids_start(&self) -> f64 {
+        let start = self.solids.iter().map(|s| match &s.drive {
+            Drive::Free(body) => body.velocity.length() + body.angular_velocity.length() * s.radius(),
+            Drive::Prescribed(motion) => motion.fastest(f64::NEG_INFINITY, f64::INFINITY, s.radius()),
+        });
+        start.fold(0.0, f64::max)
+    }
+
     /// Speed of the fastest thing that drives the water between the times `from` and `to` [m/s]: a solid with a motion, an opening.
     pub fn driven(&self, from: f64, to: f64) -> f64 {
         let solids = self.solids.iter().map(|s| match &s.drive {

@@ -123,7 +123,7 @@ impl Builder<'_> {
     /// Takes the cells of the openings out of the tank's wall, before that is built.
     pub(super) fn carve(&mut self) {
         let Some(tank) = self.tank.filter(|_| self.case.openings().next().is_some()) else { return };
-        let covers = Covers::of(self.case, &self.lattice, self.layers);
+        let covers = Covers::of(self.case, &self.lattice, &self.periodic, self.layers);
         for keys in self.case.openings() {
             let (axis, side) = keys.side();
             let mut cells = tank;

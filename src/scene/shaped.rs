@@ -159,7 +159,7 @@ impl Builder<'_> {
             let ends = if solid.shape.pieces(l0).is_none() { solid.shape.axes() } else { vec![] };
             for k in 0..kept.len() {
                 let flat = if bends[k] != 0 { &ends[..] } else { &DVec3::AXES };
-                areas[k] = self.unfaced(solid, flat, areas[k], at(&solid.wall_offset[k]));
+                areas[k] = self.unfaced(solid, flat, areas[k], k);
             }
             solid.wall_edges = solid.wall_edges.kept(&kept);
         }
@@ -203,11 +203,15 @@ impl Builder<'_> {
         }
     }
 
-    /// What of the `area` of a solid's particle `at` a place faces no other wall along `axes` of the solid.
-    fn unfaced(&self, solid: &Solid, axes: &[DVec3], mut area: DVec3, at: DVec3) -> DVec3 {
+    /// What of the `area` of row `k` of a solid faces no other wall along `axes` of the solid.
+    fn unfaced(&self, solid: &Solid, axes: &[DVec3], mut area: DVec3, k: usize) -> DVec3 {
+        let (l0, at) = (self.lattice.spacing, solid.position + solid.orientation * solid.wall_offset[k]);
         for e in axes.iter().flat_map(|&e| [e, -e]) {
-            let (faces, way) = (area.dot(e), self.lattice.spacing * (solid.orientation * e));
-            let (face, before) = (at + 0.5 * way, at + (0.5 + COVERED[1]) * way);
+            let (faces, way) = (area.dot(e), solid.orientation * e);
+            // Rows of what is thin lie nearer to its faces than half a spacing.
+            let deep = solid.faces(k).map(|face| face.way.dot(e)).fold(0.0, f64::max);
+            let face = at + if deep > 0.0 { deep } else { 0.5 * l0 } * way;
+            let before = face + COVERED[1] * l0 * way;
             if faces > 0.0 && self.is_covered(solid, before) && !self.opens(face, before) {
                 area -= faces * e;
             }

@@ -4,6 +4,7 @@ use super::lattice::{BLOCKED, Cells, FREE, Grid, Lattice, SOLID};
 use super::oriented::Placed;
 use super::{Curve, Drive, Motion, Shape, Solid, WallShape};
 use crate::case::{self, Face, TANK_FACES};
+use crate::periodic::Periodic;
 use crate::shape::Edges;
 use crate::waves::Wave;
 use glam::{DMat3, DQuat, DVec3, IVec3};
@@ -127,14 +128,20 @@ impl Fixed {
 
     /// A plane: a patch of its own lattice, wall layer l0/2 behind the surface, dummies deeper. Returns how
     /// many particles were left out because another wall already stands there.
-    pub fn plane(&mut self, plane: &case::Plane, lattice: &Lattice, grid: &mut Grid, layers: i32) -> usize {
-        let frame = PlaneFrame::new(plane, lattice);
+    pub fn plane(
+        &mut self,
+        name: &str,
+        frame: &PlaneFrame,
+        lattice: &Lattice,
+        grid: &mut Grid,
+        layers: i32,
+    ) -> usize {
         let slab = frame.slab(layers);
         let l0 = lattice.spacing;
         let earlier: Vec<Placed> = self.shapes[..].iter().map(Placed::from).collect();
         let of = self.shapes.len() as u32;
         self.shapes.push(WallShape {
-            name: plane.name.clone(),
+            name: name.to_owned(),
             center: slab.center,
             half: frame.half(layers),
             axes: slab.axes,
@@ -321,7 +328,8 @@ pub(super) struct PlaneFrame {
 }
 
 impl PlaneFrame {
-    pub fn new(plane: &case::Plane, lattice: &Lattice) -> Self {
+    /// What spans a periodic axis along its own rows has these on the lattice there: one more between the sides would stand in the place of its image.
+    pub fn new(plane: &case::Plane, lattice: &Lattice, periodic: &Periodic) -> Self {
         let (mut center, mut normal): (DVec3, DVec3) = (plane.center.into(), plane.normal.into());
         let mut along: DVec3 = plane.along.into();
         let cells = |length: f64| (length / lattice.spacing + 0.5 + 1e-6).floor().max(1.0) as i32;
@@ -331,12 +339,19 @@ impl PlaneFrame {
         }
         let normal = normal.normalize();
         let along = (along - along.dot(normal) * normal).normalize();
-        Self {
-            center,
-            axes: DMat3::from_cols(along, normal.cross(along), normal),
-            n,
-            spacing: lattice.spacing,
+        let axes = DMat3::from_cols(along, normal.cross(along), normal);
+        for (column, n) in n.iter_mut().enumerate() {
+            let way = axes.col(column).abs();
+            for k in (0..3).filter(|&k| way[k] > 1.0 - 1e-9 && !(lattice.plane && k == 1)) {
+                let Some((low, high)) = periodic.sides(k) else { continue };
+                let half = 0.5 * f64::from(*n) * lattice.spacing;
+                let slack = 1e-6 * lattice.spacing;
+                if center[k] - half <= low + slack && center[k] + half >= high - slack {
+                    (center[k], *n) = (0.5 * (low + high), cells(high - low));
+                }
+            }
         }
+        Self { center, axes, n, spacing: lattice.spacing }
     }
     /// Half of the edges of the box of the layers [m].
     pub fn half(&self, layers: i32) -> DVec3 {

@@ -8,10 +8,16 @@ use rayon::prelude::*;
 pub(crate) const ADJACENT: f64 = 1.2;
 /// Angles between the directions of rows beside each other at which a surface bends [rad]: below them it is flat, beyond them it has an edge.
 const BENDING: (f64, f64) = (1e-3, 0.6);
+/// Where it has one that is round by its shape, whose ends are at right angles to the side: rows of a small one turn by more.
+const ROUND: f64 = 1.2;
 
 /// Whether a surface that goes on from the direction `a` to `b` beside it bends there.
 pub(crate) fn bends(a: DVec3, b: DVec3) -> bool {
-    (BENDING.0..BENDING.1).contains(&a.cross(b).length().atan2(a.dot(b)))
+    turns(a, b, BENDING.1)
+}
+
+fn turns(a: DVec3, b: DVec3, most: f64) -> bool {
+    (BENDING.0..most).contains(&a.cross(b).length().atan2(a.dot(b)))
 }
 
 /// How far before the middle of a face its normal is looked up, over l0.
@@ -37,12 +43,18 @@ pub(crate) fn bending<F: Iterator<Item = Face>>(
         faces(row).map(normal).collect()
     };
     let normals: Vec<Vec<DVec3>> = offset.par_iter().enumerate().map(normals).collect();
+    let is_round = matches!(shape, Shape::Sphere(_) | Shape::Cylinder(_) | Shape::Disc(_));
+    let most = if is_round { ROUND } else { BENDING.1 };
     let mut cells = PointCells::new(ADJACENT * spacing);
     offset.iter().for_each(|&x| cells.add(x));
     let is_bent = |(row, &x): (usize, &DVec3)| {
         let beside = cells.numbers(x);
         let bent = |way: &DVec3| {
-            beside.iter().filter(|n| **n != row).flat_map(|&n| &normals[n]).any(|other| bends(*way, *other))
+            beside
+                .iter()
+                .filter(|n| **n != row)
+                .flat_map(|&n| &normals[n])
+                .any(|other| turns(*way, *other, most))
         };
         let bits = normals[row].iter().zip(0..).filter(|(way, _)| bent(way)).map(|(_, face)| 1 << face);
         bits.sum()

@@ -150,15 +150,15 @@ impl Simulation {
         for &(k, load) in &self.enclosed {
             sum[k] += load;
         }
-        if let Some((slots, held)) = held {
-            let forces =
-                slots.held_forces(&held, poses, &self.params, |rows| backend.wall_pressures(rows))?;
+        if let Some((slots, held)) = &held {
+            let forces = slots.held_forces(held, poses, &self.params, |rows| backend.wall_pressures(rows))?;
             forces.loads.into_iter().for_each(|(k, load)| sum[k] += load);
             pushes.extend(forces.pushes);
         }
         if let Some(slots) = &self.slots {
-            let of_driven = slots
-                .on_driven(poses, &covered, &pushes, &self.params, |rows| backend.wall_pressures(rows))?;
+            let told = (&covered[..], held.as_ref().map(|held| &held.1));
+            let of_driven =
+                slots.on_driven(poses, told, &pushes, &self.params, |rows| backend.wall_pressures(rows))?;
             of_driven.into_iter().for_each(|(k, force)| sum[k] += force);
         }
         Ok(sum)

@@ -1,65 +1,117 @@
 //! What slots press on solids that no force moves, in place of what the rows of these tell there, as on fixed walls: laid on their faces by points, and what is
 //! pressed on and bare at once counts once.
 
-use super::{Opposite, Push, Slots};
+use super::{Held, Opposite, Push, Slots};
 use crate::body::{Pose, Wrench};
 use crate::cover::driven::Covered;
 use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::shape::Face;
-use glam::DVec3;
-use std::collections::{BTreeMap, HashMap};
+use glam::{DQuat, DVec3};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// Which face of which row of which solid.
 type Of = (usize, usize, usize);
 
 /// A face that looks back at a push less than this is not pressed on (cosine of the angle).
 const BACK: f64 = 0.5;
-/// Faces whose middles are as far away but for this, over l0, have a part each.
+/// Least and largest distance of a push from a face that it is on, over l0: that of the widest slot, and half a spacing for where the two lean.
+pub(crate) const BEFORE: (f64, f64) = (-0.6, 1.6);
+/// Faces that are as near but for this, over l0, have a part each.
 const AS_NEAR: f64 = 1e-2;
 
+/// How much of a push is on a face [-], and how far before it [m].
+struct Laid {
+    of: Of,
+    share: f64,
+    above: f64,
+}
+
+/// A face near a push, world axes.
+struct Near {
+    of: Of,
+    /// In the frame of its solid, with the turn from that.
+    face: Face,
+    turn: DQuat,
+    /// From its middle to the push [m].
+    from: DVec3,
+    normal: DVec3,
+    /// Direction along which what is before it comes to it.
+    along: DVec3,
+    bends: bool,
+    /// Square of half its edge [m2].
+    half: f64,
+}
+
+impl Near {
+    /// How far before its plane `x` of the push lies, and the way from its middle to where that comes to it [m].
+    fn foot(&self, x: DVec3) -> (f64, DVec3) {
+        let off = self.from + x;
+        let above = off.dot(self.normal);
+        (above, off - above / self.along.dot(self.normal) * self.along)
+    }
+}
+
 impl Slots {
-    /// What the `pushes` do to driven solids and obstacles at `poses`, `covered` in part [N, N m]. `read` tells what slots of particles have.
+    /// What the `pushes` do to driven solids and obstacles at `poses`, which others cover in part [N, N m]. Rows with a slot of their own, of `held`, have from those
+    /// what slots of such solids press there. `read` tells what slots of particles have.
     ///
     /// # Errors
     /// Those of `read`.
     pub fn on_driven(
         &self,
         poses: &[Pose],
-        covered: &[Covered],
+        (covered, held): (&[Covered], Option<&Held>),
         pushes: &[Push],
         params: &Params,
         read: impl FnOnce(&[usize]) -> Result<Vec<RowPressure>>,
     ) -> Result<Vec<(usize, Wrench)>> {
+        // Of each solid that presses those that it presses on: a push over the joint of two of them is on both. Nobody asks for that on one which
+        // stands still and is not told.
+        let mut targets: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+        for push in pushes {
+            if let Opposite::Solid(k, _) = push.on
+                && !self.layers[k].free
+                && (self.layers[k].holds || !self.layers[k].still)
+            {
+                targets.entry(push.by).or_default().insert(k);
+            }
+        }
+        if targets.is_empty() {
+            return Ok(vec![]);
+        }
+        let own: HashSet<(usize, usize)> = held.map(Held::pressed).unwrap_or_default();
+        let laid = |push: &Push| {
+            let is_on_body = matches!(push.on, Opposite::Solid(k, _) if self.layers[k].free);
+            let of = targets.get(&push.by).filter(|_| !is_on_body);
+            let mut on = of.map_or(vec![], |of| self.faces_before(push, of, poses));
+            if !self.layers[push.by].free {
+                on.retain(|laid| !own.contains(&(laid.of.0, laid.of.1)));
+            }
+            on
+        };
+        let laid: Vec<Vec<Laid>> = pushes.par_iter().with_min_len(16).map(laid).collect();
         let mut out = vec![];
         let mut pressed: BTreeMap<Of, f64> = BTreeMap::new();
-        for push in pushes {
-            let Opposite::Solid(k, row) = push.on else { continue };
-            if self.layers[k].free {
-                continue;
-            }
-            let turn = poses[k].orientation;
-            let mut area_on = DVec3::ZERO;
-            for (row, number, share) in self.faces_before(push, k, row, &poses[k]) {
-                let normal = turn * self.face(k, row, number).area.normalize_or_zero();
+        for (push, on) in pushes.iter().zip(laid) {
+            for Laid { of, share, above } in on {
+                let (k, turn) = (of.0, poses[of.0].orientation);
+                let normal = turn * self.face(of).area.normalize_or_zero();
                 let area = share * push.area_on(normal);
-                *pressed.entry((k, row, number)).or_default() += area.length();
-                area_on += area;
+                *pressed.entry(of).or_default() += area.length();
+                let force = push.pressure_at(-above * normal, params) * area;
+                let arm = params.periodic.nearest(push.at - poses[k].position);
+                out.push((k, Wrench { force, torque: arm.cross(force) }));
             }
-            let force = push.pressure * area_on;
-            let arm = params.periodic.nearest(push.at - poses[k].position);
-            out.push((k, Wrench { force, torque: arm.cross(force) }));
-        }
-        if pressed.is_empty() {
-            return Ok(out);
         }
         let mut taken: HashMap<Of, f64> = HashMap::new();
         covered.iter().for_each(|c| *taken.entry((c.solid, c.row, c.face)).or_default() += c.area.length());
         let rows: Vec<usize> = pressed.keys().map(|&(k, row, _)| self.layers[k].first + row).collect();
         for ((of, pressed), told) in pressed.into_iter().zip(read(&rows)?) {
-            let (k, row, number) = of;
-            let (face, turn) = (self.face(k, row, number), poses[k].orientation);
+            let (k, row, _) = of;
+            let (face, turn) = (self.face(of), poses[k].orientation);
             let (whole, normal) = (face.area.length(), turn * face.area.normalize_or_zero());
             let bare = (whole - taken.get(&of).copied().unwrap_or_default()).clamp(0.0, whole);
             let twice = (bare + pressed - whole).clamp(0.0, bare.min(pressed));
@@ -70,58 +122,95 @@ impl Slots {
         Ok(out)
     }
 
-    fn face(&self, k: usize, row: usize, number: usize) -> Face {
+    fn faces(&self, k: usize, row: usize) -> impl Iterator<Item = Face> + use<> {
         let layer = &self.layers[k];
-        let mut faces = layer.edges.faces(row, layer.area[row], layer.to_surface[row]);
-        faces.nth(number).unwrap_or_default()
+        layer.edges.faces(row, layer.area[row], layer.to_surface[row])
     }
 
-    /// Faces of solid `k` at `pose` that lie before a `push` on its `row`, and how much of it is before each [-]. Of one that none looks back at `row` has all.
-    fn faces_before(&self, push: &Push, k: usize, row: usize, pose: &Pose) -> Vec<(usize, usize, f64)> {
-        let (layer, l0, to_frame) = (&self.layers[k], self.spacing, pose.orientation.inverse());
-        // Of the images that which lies at the row.
-        let at_row = pose.position + pose.orientation * layer.offset[row];
-        let at = layer.offset[row] + to_frame * self.periodic.nearest(push.at - at_row);
-        let area = to_frame * push.area;
-        let (edge, way) = (self.tiles.edge(area.length()), area.normalize_or_zero());
-        let looks = |face: &Face| -face.area.normalize_or_zero().dot(way);
-        let mut near: Vec<(usize, usize, Face)> = vec![];
-        layer.grid.near(at, super::FACING.1 * l0 + edge, |n| {
-            let n = n as usize;
-            let faces = layer.edges.faces(n, layer.area[n], layer.to_surface[n]).enumerate();
-            near.extend(faces.filter(|(_, face)| looks(face) > BACK).map(|(number, face)| (n, number, face)));
-        });
-        if near.is_empty() {
-            let faces = layer.edges.faces(row, layer.area[row], layer.to_surface[row]).enumerate();
-            let most = faces.max_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1))).map_or(0, |face| face.0);
-            return vec![(row, most, 1.0)];
+    fn face(&self, (k, row, number): Of) -> Face {
+        self.faces(k, row).nth(number).unwrap_or_default()
+    }
+
+    /// Faces of the `solids` at `poses` that lie before a `push`. One that none looks back at is all on the row that it is on.
+    fn faces_before(&self, push: &Push, solids: &BTreeSet<usize>, poses: &[Pose]) -> Vec<Laid> {
+        let l0 = self.spacing;
+        let (edge, way) = (self.tiles.edge(push.area.length()), push.area.normalize_or_zero());
+        let mut near: Vec<Near> = vec![];
+        for &k in solids {
+            let (layer, pose) = (&self.layers[k], &poses[k]);
+            let (turn, to_frame) = (pose.orientation, pose.orientation.inverse());
+            let (origin, reach) = (self.periodic.wrap(pose.position), super::FACING.1 * l0 + edge);
+            for image in self.periodic.images(self.periodic.wrap(push.at), reach + layer.radius) {
+                let at = to_frame * (image - origin);
+                layer.grid.near(at, reach, |n| {
+                    let row = n as usize;
+                    for (number, face) in self.faces(k, row).enumerate() {
+                        let normal = turn * face.area.normalize_or_zero();
+                        if -normal.dot(way) > BACK {
+                            let bends = layer.bends[row] & 1 << number != 0;
+                            near.push(Near {
+                                of: (k, row, number),
+                                face,
+                                turn,
+                                from: turn * (at - layer.offset[row] - face.way),
+                                normal,
+                                // From the flat one of the two to the other.
+                                along: if bends { way } else { normal },
+                                bends,
+                                half: 0.25 * self.tiles.edge(face.area.length()).powi(2),
+                            });
+                        }
+                    }
+                });
+            }
         }
-        let points: Vec<DVec3> = self.tiles.points((at, edge), way).collect();
+        if near.is_empty() {
+            return match push.on {
+                Opposite::Solid(k, row) if solids.contains(&k) => {
+                    let way = poses[k].orientation.inverse() * push.area;
+                    let looks = |face: &Face| -face.area.normalize_or_zero().dot(way);
+                    let faces = self.faces(k, row).enumerate();
+                    let most = faces.max_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1)));
+                    vec![Laid { of: (k, row, most.map_or(0, |face| face.0)), share: 1.0, above: 0.0 }]
+                }
+                _ => vec![],
+            };
+        }
+        let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), way).collect();
         let mut shares = vec![];
-        for x in &points {
-            // Where what goes on from the flat one of the two to the other comes to the plane of a face, from its middle.
-            let along = |(n, number, face): &(usize, usize, Face)| {
-                let (normal, off) = (face.area.normalize_or_zero(), *x - layer.offset[*n] - face.way);
-                let on = if layer.bends[*n] & 1 << number != 0 { way } else { normal };
-                (off - off.dot(normal) / on.dot(normal) * on).length()
+        for &x in &points {
+            // Squares of how far from the middle of each a point comes to its plane, less that of half its edge: 0 where two of them meet.
+            let far = |of: &Near| {
+                let (above, foot) = of.foot(x);
+                let square = foot.length_squared();
+                // A flat face ends with its edge, at a corner of a square one; before what bends points fan out.
+                let most = if self.flat { (1.0 + AS_NEAR).powi(2) } else { 2.0 } * of.half;
+                let is_before =
+                    above > BEFORE.0 * l0 && above < BEFORE.1 * l0 && (of.bends || square <= most);
+                if is_before && !self.is_beyond(of, foot) { square - of.half } else { f64::INFINITY }
             };
-            // Past the edge of a face, where another of its row begins, nothing is.
-            let beyond = |n: usize, face: &Face| {
-                let others = layer.edges.faces(n, layer.area[n], layer.to_surface[n]);
-                let mut planes = others.map(|other| (other, other.area.normalize_or_zero()));
-                planes.any(|(other, normal)| {
-                    let is_convex = (face.way - other.way).dot(normal) < -AS_NEAR * l0;
-                    is_convex && (*x - layer.offset[n] - other.way).dot(normal) > AS_NEAR * l0
-                })
-            };
-            let far: Vec<f64> = near.iter().map(along).collect();
-            let least = far.iter().copied().fold(f64::INFINITY, f64::min) + AS_NEAR * l0;
-            let before: Vec<&(usize, usize, Face)> =
-                near.iter().zip(&far).filter(|(_, far)| **far <= least).map(|(of, _)| of).collect();
-            let share = 1.0 / (before.len() * points.len()) as f64;
-            let before = before.into_iter().filter(|(n, _, face)| !beyond(*n, face));
-            shares.extend(before.map(|&(n, number, _)| (n, number, share)));
+            let far: Vec<f64> = near.iter().map(far).collect();
+            let least = far.iter().copied().fold(f64::INFINITY, f64::min);
+            if least == f64::INFINITY {
+                continue;
+            }
+            let as_near = |far: f64| far <= least + AS_NEAR * l0 * l0;
+            let on: Vec<&Near> =
+                near.iter().zip(&far).filter(|(_, far)| as_near(**far)).map(|(of, _)| of).collect();
+            let share = 1.0 / (on.len() * points.len()) as f64;
+            shares.extend(on.into_iter().map(|of| Laid { of: of.of, share, above: of.foot(x).0 }));
         }
         shares
+    }
+
+    /// Whether a place in the plane of a face, `foot` from its middle, lies past its edge, where another of its row begins: beside the solid.
+    fn is_beyond(&self, near: &Near, foot: DVec3) -> bool {
+        let (k, row, _) = near.of;
+        let slack = AS_NEAR * self.spacing;
+        let at = near.face.way + near.turn.inverse() * foot;
+        self.faces(k, row).any(|other| {
+            let normal = other.area.normalize_or_zero();
+            (near.face.way - other.way).dot(normal) < -slack && (at - other.way).dot(normal) > slack
+        })
     }
 }

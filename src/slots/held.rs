@@ -2,6 +2,7 @@
 //! what stands in the gap, and the bed's would, too. What flat faces stand on has no water between (a pillar, a gate that is
 //! closed); where a surface bends away from what it touches the gap is open.
 
+use super::layer::Layer;
 use super::{Faced, Found, Opposite, Push, Slots, enclosed};
 use crate::body::{Pose, Wrench};
 use crate::cover::driven::Covered;
@@ -33,7 +34,7 @@ pub struct HeldForces {
 
 impl Held {
     /// Solids and rows of theirs that lie in slots.
-    fn pressed(&self) -> HashSet<(usize, usize)> {
+    pub(super) fn pressed(&self) -> HashSet<(usize, usize)> {
         self.found.iter().flat_map(|f| f.slot.inside.iter().map(|row| (f.slot.solid, row.0))).collect()
     }
 
@@ -50,8 +51,11 @@ impl Held {
 impl Slots {
     /// The slots of solids that no force moves with the solids at `poses`, of which other solids cover what `covered` says.
     pub fn held(&self, poses: &[Pose], covered: &[Covered]) -> Held {
-        let others = self.others(poses, |a, b| a.holds && b.holds);
-        let bodies = self.others(poses, |a, b| a.holds && b.free || a.free && b.holds);
+        let may_meet = |a: &Layer, b: &Layer| a.holds && (b.holds || b.free) || a.free && b.holds;
+        let near =
+            if self.layers.iter().any(|layer| layer.holds) { self.others(poses, may_meet) } else { vec![] };
+        let (bodies, others): (Vec<Vec<_>>, Vec<Vec<_>>) =
+            near.into_iter().map(|near| near.into_iter().partition(|&(k, _)| self.layers[k].free)).unzip();
         let (mut area, mut bends) = (HashMap::new(), HashMap::new());
         let mut found = vec![];
         for (k, layer) in self.layers.iter().enumerate().take(others.len()).filter(|(_, layer)| layer.holds) {
@@ -74,12 +78,11 @@ impl Slots {
             let is_open = |n: usize| open[n].length_squared() > 1e-4 * layer.area[n].length_squared();
             let shares: Vec<f64> =
                 faced.iter().enumerate().map(|(n, row)| if is_open(n) { row.share } else { 0.0 }).collect();
-            // What stands before a free body is in the slot of that.
-            let before: Vec<Faced> = match &bodies[k][..] {
-                [] => vec![],
-                bodies => self.faced(k, false, bodies, poses),
+            // What others cover knows of no water, and what stands before a free body is in the slot of that.
+            let shut = |n: usize| {
+                !is_open(n)
+                    || !bodies[k].is_empty() && self.row_faced((k, n), false, &bodies[k], poses).share > 0.0
             };
-            let shut = |n: usize| before.get(n).is_some_and(|row| row.share > 0.0);
             let slots = layer.slots(k, &shares, shut).into_iter();
             found.extend(slots.map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }));
             area.insert(k, open);
@@ -98,11 +101,13 @@ impl Slots {
             }
             _ => false,
         };
-        let others = match &faced.by_face[..] {
-            [] => u8::from(looked_at(layer.area[n].normalize_or_zero(), faced.opposite)),
-            faces => faces.iter().zip(0..).map(|(&(way, of), k)| u8::from(looked_at(way, of)) << k).sum(),
-        };
-        layer.bends[n] | others
+        // Numbered as the faces of solids are: without those that others have taken away.
+        let faces = layer.edges.faces(n, layer.area[n], layer.to_surface[n]).zip(0..);
+        let others = faces.map(|(face, number)| {
+            let way = face.area.normalize_or_zero();
+            u8::from(looked_at(way, faced.before(face.area))) << number
+        });
+        layer.bends[n] | others.sum::<u8>()
     }
 
     /// What of `covered` water in the slots `held` presses on is not covered: of faces that bend, or before which something does, all but what lies within others.

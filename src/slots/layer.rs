@@ -151,8 +151,8 @@ impl Layer {
     /// Whether of row `n` that face bends which looks back most at what looks along `way`, in the solid's frame.
     pub fn bends_before(&self, n: usize, way: DVec3) -> bool {
         let looks = |face: &Face| face.area.normalize_or_zero().dot(way);
-        let faces = self.edges.of(n).iter().enumerate();
-        let back = faces.min_by(|a, b| looks(a.1).total_cmp(&looks(b.1))).map_or(0, |face| face.0);
+        let faces = self.edges.faces(n, self.area[n], self.to_surface[n]).enumerate();
+        let back = faces.min_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1))).map_or(0, |face| face.0);
         self.bends.get(n).is_some_and(|faces| faces & 1 << back != 0)
     }
 

@@ -4,6 +4,7 @@ use super::{Field, Found, Slots};
 use crate::body::Pose;
 use crate::contact::broad::meeting_images;
 use crate::error::Result;
+use crate::params::Params;
 use glam::DVec3;
 
 /// What a body's slot lies before.
@@ -18,6 +19,8 @@ pub enum Opposite {
 /// What the water in a slot presses on what stands opposite to the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
+    /// Index of the solid whose slot it is.
+    pub by: usize,
     /// What it acts on.
     pub on: Opposite,
     /// Where [m].
@@ -29,6 +32,11 @@ pub struct Push {
 }
 
 impl Push {
+    /// The pressure a `way` off [m], with the weight of the water between [Pa]; none where it is dry.
+    pub fn pressure_at(&self, way: DVec3, params: &Params) -> f64 {
+        if self.pressure == 0.0 { 0.0 } else { self.pressure + params.density * params.gravity.dot(way) }
+    }
+
     /// Its area as a face that looks along `normal` counts it [m2].
     pub fn area_on(&self, normal: DVec3) -> DVec3 {
         self.area.dot(normal) * normal
@@ -98,7 +106,13 @@ impl Slots {
                 let on = faced[n].before(pose.orientation.inverse() * area);
                 if let Some(on) = on.filter(|&on| is_pressed(on)) {
                     let pressure = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
-                    out.push(Push { on, at: pose.position + at, pressure, area: share * area });
+                    out.push(Push {
+                        by: slot.solid,
+                        on,
+                        at: pose.position + at,
+                        pressure,
+                        area: share * area,
+                    });
                 }
             }
         }
