@@ -11,6 +11,7 @@ use crate::scene::Scene;
 use crate::shape::PointCells;
 use crate::slots::{BEFORE, Opposite, Push};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A face of a row, of the size of a particle.
@@ -166,9 +167,11 @@ impl FixedWall {
         let mut pressed: BTreeMap<(usize, [i32; 3]), (DVec3, f64)> = BTreeMap::new();
         // Over the joint of a wall and another one, or a solid, a push is on both.
         let is_on_body = |push: &&Push| matches!(push.on, Opposite::Solid(k, _) if scene.solids[k].is_free());
-        for push in pushes.iter().filter(|push| !is_on_body(push)) {
+        let shares = |push: &Push| if is_on_body(&push) { vec![] } else { self.shares(push, scene, poses) };
+        let laid: Vec<_> = pushes.par_iter().with_min_len(64).map(shares).collect();
+        for (push, on) in pushes.iter().zip(laid).filter(|(_, on)| !on.is_empty()) {
             let mut force = DVec3::ZERO;
-            for (face, share, above) in self.shares(push, scene, poses) {
+            for (face, share, above) in on {
                 let area = share * push.area_on(face.normal);
                 let way = (1e3 * face.normal).round().as_ivec3().to_array();
                 force += push.pressure_at(-above * face.normal, params) * area;
@@ -197,6 +200,12 @@ impl FixedWall {
         let l0 = self.tiles.spacing;
         let (edge, way) = (self.tiles.edge(push.area.length()), push.area.normalize_or_zero());
         let reach = edge + 1.5 * l0;
+        let wall = &scene.walls[self.shape];
+        let to_wall = wall.axes.transpose();
+        let off = to_wall * scene.periodic.nearest(push.at - wall.center);
+        if (off.abs() - wall.half).max_element() > reach {
+            return vec![];
+        }
         // Faces, and the way from their middles.
         let mut near: Vec<(&Face, DVec3)> = vec![];
         for image in scene.periodic.images(scene.periodic.wrap(push.at), reach) {
@@ -209,7 +218,6 @@ impl FixedWall {
         let most = near.iter().map(|(face, _)| -face.normal.dot(way)).fold(0.0, f64::max);
         near.retain(|(face, _)| -face.normal.dot(way) > most - SLACK);
         let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), way).collect();
-        let to_wall = scene.walls[self.shape].axes.transpose();
         let between = match push.on {
             Opposite::Solid(k, _) => Some(Standing::of(k, &scene.solids[k], &poses[k])),
             Opposite::Wall(_) => None,

@@ -68,13 +68,11 @@ impl Slots {
         params: &Params,
         read: impl FnOnce(&[usize]) -> Result<Vec<RowPressure>>,
     ) -> Result<Vec<(usize, Wrench)>> {
-        // Of each solid that presses those that it presses on: a push over the joint of two of them is on both. Nobody asks for that on one which
-        // stands still and is not told.
+        // Of each solid that presses those that it presses on: a push over the joint of two of them is on both.
         let mut targets: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
         for push in pushes {
             if let Opposite::Solid(k, _) = push.on
-                && !self.layers[k].free
-                && (self.layers[k].holds || !self.layers[k].still)
+                && self.layers[k].is_pressed()
             {
                 targets.entry(push.by).or_default().insert(k);
             }

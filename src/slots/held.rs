@@ -125,7 +125,7 @@ impl Slots {
     /// moves, with the solids at `poses`.
     pub fn reads(&self, held: &Held, poses: &[Pose]) -> u64 {
         let pressed = held.pressed();
-        let on_held = |of: &Opposite| matches!(*of, Opposite::Solid(k, row) if !self.layers[k].free && !pressed.contains(&(k, row)));
+        let on_held = |of: &Opposite| matches!(*of, Opposite::Solid(k, row) if self.layers[k].is_pressed() && !pressed.contains(&(k, row)));
         let presses =
             |f: &Found| f.slot.inside.iter().flat_map(|row| f.faced[row.0].all()).any(|of| on_held(&of));
         let any = self.find(poses).iter().chain(&held.found).any(presses);

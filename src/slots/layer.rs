@@ -148,6 +148,11 @@ impl Layer {
         faces.reduce(f64::min).unwrap_or_else(|| self.area[n].normalize_or_zero().dot(way))
     }
 
+    /// Whether what slots press on it is asked for: not on a free body, which has slots of its own, nor on what stands still and is not told.
+    pub fn is_pressed(&self) -> bool {
+        !self.free && (self.holds || !self.still)
+    }
+
     /// Whether of row `n` that face bends which looks back most at what looks along `way`, in the solid's frame.
     pub fn bends_before(&self, n: usize, way: DVec3) -> bool {
         let looks = |face: &Face| face.area.normalize_or_zero().dot(way);
