@@ -45,7 +45,7 @@ impl Standing {
     }
 
     /// The box of a fixed wall.
-    fn wall(wall: &WallShape) -> Self {
+    pub(crate) fn wall(wall: &WallShape) -> Self {
         let shape = Shape::cuboid(2.0 * wall.half);
         Self {
             solid: None,

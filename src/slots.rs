@@ -31,7 +31,7 @@ mod layer;
 mod pockets;
 mod pushes;
 
-pub(crate) use driven::BEFORE;
+pub(crate) use driven::{AGAINST, BEFORE};
 pub use enclosed::Pressed;
 pub use held::{Held, HeldForces};
 pub use pushes::{Opposite, Push};

@@ -676,3 +676,49 @@ fn what_stands_beside_above_or_on_what_is_held_tells_its_load() {
     println!("a small disc on the floor: {lift:.3} of its lift");
     assert!((lift - 1.0).abs() < 0.06, "{lift}");
 }
+
+#[test]
+fn a_push_is_on_the_wall_before_it_and_not_on_one_behind_that() {
+    // A plane 1.1 spacings above the floor, nearly flat, a held body 0.3 above it; an obstacle in the air 0.9 above a body just under the surface.
+    let forces = |solids: &str, names: &[&str], depth: f64| {
+        let gauges: String = names
+            .iter()
+            .map(|name| format!("[[gauge.force]]\nname = \"{name}\"\non = \"{name}\"\n"))
+            .collect();
+        let mut simulation = simulation(&case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 5\ndimensions = 2\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.5]\nopen = [\"z_max\"]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, {depth}]\n{solids}{gauges}"
+        )));
+        let (mut sums, mut count) = (vec![0.0; names.len()], 0.0);
+        while simulation.time < 0.06 {
+            simulation.step().expect("it stands");
+            if simulation.time > 0.03 {
+                let read = simulation.gauges().expect("forces");
+                for (sum, name) in sums.iter_mut().zip(names) {
+                    let column = format!("{name}_force_z");
+                    *sum += read.iter().find(|gauge| gauge.0.starts_with(&column)).expect("measured").1;
+                }
+                count += 1.0;
+            }
+        }
+        sums.iter_mut().for_each(|sum| *sum /= count);
+        (sums, simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.80665)
+    };
+    let locked = "displaces_fluid = true\nlocked = [\"x\", \"z\", \"rotation_y\"]\n";
+    let ramp = format!(
+        "[[plane]]\nname = \"ramp\"\ncenter = [0.3, 0, 0.022]\nnormal = [0.001, 0, 1]\nalong = [1, 0, 0]\nsize = [0.4, 0.02]\n\
+         [[body]]\nname = \"body\"\nsize = [0.2, 0.1, 0.06]\ncenter = [0.3, 0, 0.058]\n{locked}"
+    );
+    let (found, weight) = forces(&ramp, &["ramp", "body", "tank.z_min"], 0.28);
+    let sum = found.iter().sum::<f64>() / -weight;
+    println!("{found:?}: {sum:.4} of the weight of {weight} N");
+    assert!((sum - 1.0).abs() < 0.03, "{found:?} for {weight}");
+    let aloft = format!(
+        "[[body]]\nname = \"body\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.16]\n{locked}\
+         [[obstacle]]\nname = \"above\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.238]\n"
+    );
+    let (found, _) = forces(&aloft, &["above"], 0.2);
+    println!("in the air: {found:?} N");
+    assert!(found[0].abs() < 0.05, "{found:?}");
+}

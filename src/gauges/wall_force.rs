@@ -9,7 +9,7 @@ use crate::kernels::body_force::RowPressure;
 use crate::params::Params;
 use crate::scene::Scene;
 use crate::shape::PointCells;
-use crate::slots::{BEFORE, Opposite, Push};
+use crate::slots::{AGAINST, BEFORE, Opposite, Push};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -31,9 +31,6 @@ struct Face {
 
 /// A wall's particle no farther from the place one spacing before a face than this, over l0, stands before it.
 const AHEAD: f64 = 0.45;
-
-/// A face that looks back at a push less than this is not pressed on (cosine of the angle).
-const BACK: f64 = 0.5;
 
 /// Places on the way from a push to a face, over that, at which a solid stands between.
 const BETWEEN: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
@@ -187,7 +184,7 @@ impl FixedWall {
         for ((row, _), (normal, pressed)) in pressed {
             let bare = areas[row].dot(normal).clamp(0.0, whole);
             let twice = (bare + pressed - whole).clamp(0.0, bare.min(pressed));
-            let force = twice * told[row].in_force(self.to_surface[row], params) * normal;
+            let force = twice * told[row].on_surface(self.to_surface[row], params) * normal;
             let arm = scene.periodic.nearest(self.position[row] + self.to_surface[row] - self.about);
             sum += Wrench { force, torque: arm.cross(force) };
         }
@@ -211,7 +208,7 @@ impl FixedWall {
         for image in scene.periodic.images(scene.periodic.wrap(push.at), reach) {
             self.centers.near(image, reach, |k| {
                 let face = &self.faces[k as usize];
-                near.extend((face.normal.dot(way) < -BACK).then_some((face, image - face.center)));
+                near.extend((face.normal.dot(way) < -AGAINST).then_some((face, image - face.center)));
             });
         }
         // Of an edge that looks at it with two faces the one that does so more.
@@ -220,7 +217,10 @@ impl FixedWall {
         let points: Vec<DVec3> = self.tiles.points((DVec3::ZERO, edge), way).collect();
         let between = match push.on {
             Opposite::Solid(k, _) => Some(Standing::of(k, &scene.solids[k], &poses[k])),
-            Opposite::Wall(_) => None,
+            Opposite::Wall(wall) => {
+                let other = scene.static_wall_shape[wall] as usize;
+                (other != self.shape).then(|| Standing::wall(&scene.walls[other]))
+            }
         };
         let mut shares = vec![];
         for x in &points {
@@ -228,7 +228,7 @@ impl FixedWall {
                 let way = *way + *x;
                 let along = to_wall * (way - above * face.normal);
                 let is_near = above > BEFORE.0 * l0 && above < BEFORE.1 * l0;
-                // What it is on, if that is a solid, may stand between.
+                // What it is on, if that is not this wall, may stand between.
                 let at = |part: f64| face.center + way - part * above * face.normal;
                 let is_free = |s: &Standing| {
                     BETWEEN.iter().all(|&part| s.outside(at(part), l0, &scene.periodic) > SLACK * l0)

@@ -145,7 +145,7 @@ impl Fixed {
             center: slab.center,
             half: frame.half(layers),
             axes: slab.axes,
-            middle: frame.center,
+            middle: frame.middle,
         });
         let mut left_out = 0;
         for depth in 0..layers {
@@ -321,6 +321,8 @@ pub(super) fn motion(
 /// Frame and size in particles of a plane.
 pub(super) struct PlaneFrame {
     pub center: DVec3,
+    /// That of the case, about which torques count.
+    pub middle: DVec3,
     /// Columns: along, across, normal.
     pub axes: DMat3,
     pub n: [i32; 2],
@@ -340,6 +342,7 @@ impl PlaneFrame {
         let normal = normal.normalize();
         let along = (along - along.dot(normal) * normal).normalize();
         let axes = DMat3::from_cols(along, normal.cross(along), normal);
+        let middle = center;
         for (column, n) in n.iter_mut().enumerate() {
             let way = axes.col(column).abs();
             for k in (0..3).filter(|&k| way[k] > 1.0 - 1e-9 && !(lattice.plane && k == 1)) {
@@ -351,7 +354,7 @@ impl PlaneFrame {
                 }
             }
         }
-        Self { center, axes, n, spacing: lattice.spacing }
+        Self { center, middle, axes, n, spacing: lattice.spacing }
     }
     /// Half of the edges of the box of the layers [m].
     pub fn half(&self, layers: i32) -> DVec3 {

@@ -21,7 +21,7 @@ fn turns(a: DVec3, b: DVec3, most: f64) -> bool {
 }
 
 /// How far before the middle of a face its normal is looked up, over l0.
-const BEFORE: f64 = 0.02;
+const LOOKED_UP: f64 = 0.02;
 
 /// Of each row of a layer, which of its faces bend: the bit of their number is set.
 pub(crate) type Bending = Vec<u8>;
@@ -38,7 +38,7 @@ pub(crate) fn bending<F: Iterator<Item = Face>>(
     let normals = |(row, x): (usize, &DVec3)| -> Vec<DVec3> {
         let normal = |face: Face| {
             let out = face.area.try_normalize().unwrap_or_else(|| face.way.normalize_or_zero());
-            shape.distance(*x + face.way + BEFORE * spacing * out - shape_offset).1
+            shape.distance(*x + face.way + LOOKED_UP * spacing * out - shape_offset).1
         };
         faces(row).map(normal).collect()
     };

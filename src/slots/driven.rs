@@ -16,17 +16,19 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 type Of = (usize, usize, usize);
 
 /// A face that looks back at a push less than this is not pressed on (cosine of the angle).
-const BACK: f64 = 0.5;
+pub(crate) const AGAINST: f64 = 0.5;
 /// Least and largest distance of a push from a face that it is on, over l0: that of the widest slot, and half a spacing for where the two lean.
 pub(crate) const BEFORE: (f64, f64) = (-0.6, 1.6);
+/// A face this much deeper than another before which the same point lies, over l0, is hidden by that.
+const HIDDEN: f64 = 0.5;
 /// Faces that are as near but for this, over l0, have a part each.
 const AS_NEAR: f64 = 1e-2;
 
-/// How much of a push is on a face [-], and how far before it [m].
+/// How much of a push is on a face [-], and the way to it [m].
 struct Laid {
     of: Of,
     share: f64,
-    above: f64,
+    way: DVec3,
 }
 
 /// A face near a push, world axes.
@@ -46,11 +48,14 @@ struct Near {
 }
 
 impl Near {
-    /// How far before its plane `x` of the push lies, and the way from its middle to where that comes to it [m].
-    fn foot(&self, x: DVec3) -> (f64, DVec3) {
-        let off = self.from + x;
-        let above = off.dot(self.normal);
-        (above, off - above / self.along.dot(self.normal) * self.along)
+    /// How far before its plane `x` of the push lies [m].
+    fn above(&self, x: DVec3) -> f64 {
+        (self.from + x).dot(self.normal)
+    }
+
+    /// The way from there to where it comes to the plane [m].
+    fn way(&self, x: DVec3) -> DVec3 {
+        -self.above(x) / self.along.dot(self.normal) * self.along
     }
 }
 
@@ -94,12 +99,12 @@ impl Slots {
         let mut out = vec![];
         let mut pressed: BTreeMap<Of, f64> = BTreeMap::new();
         for (push, on) in pushes.iter().zip(laid) {
-            for Laid { of, share, above } in on {
+            for Laid { of, share, way } in on {
                 let (k, turn) = (of.0, poses[of.0].orientation);
                 let normal = turn * self.face(of).area.normalize_or_zero();
                 let area = share * push.area_on(normal);
                 *pressed.entry(of).or_default() += area.length();
-                let force = push.pressure_at(-above * normal, params) * area;
+                let force = push.pressure_at(way, params) * area;
                 let arm = params.periodic.nearest(push.at - poses[k].position);
                 out.push((k, Wrench { force, torque: arm.cross(force) }));
             }
@@ -144,7 +149,7 @@ impl Slots {
                     let row = n as usize;
                     for (number, face) in self.faces(k, row).enumerate() {
                         let normal = turn * face.area.normalize_or_zero();
-                        if -normal.dot(way) > BACK {
+                        if -normal.dot(way) > AGAINST {
                             let bends = layer.bends[row] & 1 << number != 0;
                             near.push(Near {
                                 of: (k, row, number),
@@ -169,7 +174,7 @@ impl Slots {
                     let looks = |face: &Face| -face.area.normalize_or_zero().dot(way);
                     let faces = self.faces(k, row).enumerate();
                     let most = faces.max_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1)));
-                    vec![Laid { of: (k, row, most.map_or(0, |face| face.0)), share: 1.0, above: 0.0 }]
+                    vec![Laid { of: (k, row, most.map_or(0, |face| face.0)), share: 1.0, way: DVec3::ZERO }]
                 }
                 _ => vec![],
             };
@@ -179,7 +184,7 @@ impl Slots {
         for &x in &points {
             // Squares of how far from the middle of each a point comes to its plane, less that of half its edge: 0 where two of them meet.
             let far = |of: &Near| {
-                let (above, foot) = of.foot(x);
+                let (above, foot) = (of.above(x), of.from + x + of.way(x));
                 let square = foot.length_squared();
                 // A flat face ends with its edge, at a corner of a square one; before what bends points fan out.
                 let most = if self.flat { (1.0 + AS_NEAR).powi(2) } else { 2.0 } * of.half;
@@ -187,7 +192,13 @@ impl Slots {
                     above > BEFORE.0 * l0 && above < BEFORE.1 * l0 && (of.bends || square <= most);
                 if is_before && !self.is_beyond(of, foot) { square - of.half } else { f64::INFINITY }
             };
-            let far: Vec<f64> = near.iter().map(far).collect();
+            let mut far: Vec<f64> = near.iter().map(far).collect();
+            // One that lies deeper than another before which the point is, too, is hidden by that.
+            let over = near.iter().zip(&far).filter(|(_, far)| **far <= 0.0).map(|(of, _)| of.above(x));
+            let deepest = over.fold(f64::INFINITY, f64::min) + HIDDEN * l0;
+            for (_, far) in near.iter().zip(&mut far).filter(|(of, _)| of.above(x) > deepest) {
+                *far = f64::INFINITY;
+            }
             let least = far.iter().copied().fold(f64::INFINITY, f64::min);
             if least == f64::INFINITY {
                 continue;
@@ -196,7 +207,7 @@ impl Slots {
             let on: Vec<&Near> =
                 near.iter().zip(&far).filter(|(_, far)| as_near(**far)).map(|(of, _)| of).collect();
             let share = 1.0 / (on.len() * points.len()) as f64;
-            shares.extend(on.into_iter().map(|of| Laid { of: of.of, share, above: of.foot(x).0 }));
+            shares.extend(on.into_iter().map(|of| Laid { of: of.of, share, way: of.way(x) }));
         }
         shares
     }

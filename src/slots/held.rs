@@ -105,7 +105,8 @@ impl Slots {
         let faces = layer.edges.faces(n, layer.area[n], layer.to_surface[n]).zip(0..);
         let others = faces.map(|(face, number)| {
             let way = face.area.normalize_or_zero();
-            u8::from(looked_at(way, faced.before(face.area))) << number
+            let of = if faced.has_faces() { faced.of_face(face.area) } else { faced.opposite };
+            u8::from(looked_at(way, of)) << number
         });
         layer.bends[n] | others.sum::<u8>()
     }
@@ -125,10 +126,15 @@ impl Slots {
     /// moves, with the solids at `poses`.
     pub fn reads(&self, held: &Held, poses: &[Pose]) -> u64 {
         let pressed = held.pressed();
-        let on_held = |of: &Opposite| matches!(*of, Opposite::Solid(k, row) if self.layers[k].is_pressed() && !pressed.contains(&(k, row)));
-        let presses =
-            |f: &Found| f.slot.inside.iter().flat_map(|row| f.faced[row.0].all()).any(|of| on_held(&of));
-        let any = self.find(poses).iter().chain(&held.found).any(presses);
+        let presses = |f: &Found, counts: &dyn Fn((usize, usize)) -> bool| {
+            let on = |of: Opposite| match of {
+                Opposite::Solid(k, row) => self.layers[k].is_pressed() && counts((k, row)),
+                Opposite::Wall(_) => false,
+            };
+            f.slot.inside.iter().flat_map(|row| f.faced[row.0].all()).any(on)
+        };
+        let any = self.find(poses).iter().any(|f| presses(f, &|_| true))
+            || held.found.iter().any(|f| presses(f, &|of| !pressed.contains(&of)));
         u64::from(!held.found.is_empty()) + u64::from(any)
     }
 

@@ -26,7 +26,7 @@ pub(super) struct Layer {
     pub radius: f64,
     pub grid: PointGrid,
     pub adjacent: Vec<Vec<u32>>,
-    /// Of one that no force moves, which faces of its rows lie where its surface bends.
+    /// Of one that slots press on, which faces of its rows lie where its surface bends.
     pub bends: Bending,
     /// Of one that never moves, how its rows lie before what never moves either.
     pub faced: OnceLock<Arc<[Faced]>>,
@@ -48,7 +48,7 @@ impl Layer {
             free,
             holds,
             still: solid.is_still(),
-            bends: if free { Vec::new() } else { solid.bending(l0) },
+            bends: if free || solid.is_still() && !holds { Vec::new() } else { solid.bending(l0) },
             faced: OnceLock::new(),
             first: solid.wall_slots.start,
             radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),

@@ -32,9 +32,10 @@ pub struct Push {
 }
 
 impl Push {
-    /// The pressure a `way` off [m], with the weight of the water between [Pa]; none where it is dry.
+    /// The pressure a `way` off [m], with the weight of the water between [Pa]; none where either is dry.
     pub fn pressure_at(&self, way: DVec3, params: &Params) -> f64 {
-        if self.pressure == 0.0 { 0.0 } else { self.pressure + params.density * params.gravity.dot(way) }
+        let pressure = self.pressure + params.density * params.gravity.dot(way);
+        if self.pressure == 0.0 { 0.0 } else { pressure.max(0.0) }
     }
 
     /// Its area as a face that looks along `normal` counts it [m2].
@@ -48,7 +49,8 @@ impl Slots {
     pub fn any_at_driven(&self, poses: &[Pose]) -> bool {
         let boxes = self.boxes(poses);
         let meet = meeting_images(&boxes, &self.periodic);
-        meet.into_iter().any(|(a, b, _)| self.layers[a].free != self.layers[b].free)
+        let presses = |a: usize, b: usize| self.layers[a].free && self.layers[b].is_pressed();
+        meet.into_iter().any(|(a, b, _)| presses(a, b) || presses(b, a))
     }
 
     /// Forces of the water in slots on walls and solids with the solids at `poses`: equal and opposite to what it presses on the bodies
