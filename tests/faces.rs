@@ -320,14 +320,9 @@ fn what_moves_on_a_floor_has_no_water_below_whatever_its_shape() {
                  {kind}\nname = \"s\"\n{shape}\ncenter = [0.14, 0.12, {middle}]\n\
                  [[gauge.force]]\nname = \"s\"\non = \"s\"\n"
             )));
-            let (mut sum, mut count) = (0.0, 0.0);
-            while simulation.time < 0.06 {
-                simulation.step().expect("still water stands");
-                if simulation.time > 0.03 {
-                    (sum, count) = (sum + simulation.fluid_force[0].force.z, count + 1.0);
-                }
-            }
-            let (found, exact) = (sum / count, weight * (volume - depth * foot));
+            let force = |sim: &mut Simulation| [sim.fluid_force[0].force.z];
+            let [found] = mean_over(&mut simulation, [0.03, 0.06], force);
+            let exact = weight * (volume - depth * foot);
             println!("{kind}: {shape}: {found:.2} N for {exact:.2}");
             assert!((found / exact - 1.0).abs() < 0.12, "{kind} {shape}: {found} N for {exact}");
         }

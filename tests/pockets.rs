@@ -1,6 +1,6 @@
 //! Water that solids and the slots between them enclose: it has the pressure of the water outside.
 
-use crate::common::{case, simulation, there_is_a_device};
+use crate::common::{case, gauges, mean_over, simulation, there_is_a_device};
 use seixo::backend::Processor;
 use seixo::case::Case;
 use seixo::contact::Solids;
@@ -168,15 +168,8 @@ fn what_is_flat_beside_what_is_round_has_the_water_between() {
              [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.28]\n{solids}\
              [[gauge.force]]\nname = \"f\"\non = \"flat\"\n"
         )));
-        let (mut sum, mut count) = (0.0, 0.0);
-        while simulation.time < 0.06 {
-            simulation.step().unwrap_or_else(|e| panic!("{e}"));
-            if simulation.time > 0.03 {
-                sum += simulation.gauges().expect("a force")[0].1;
-                count += 1.0;
-            }
-        }
-        sum / count
+        let force = |sim: &mut Simulation| [sim.gauges().expect("a force")[0].1];
+        mean_over(&mut simulation, [0.03, 0.06], force)[0]
     };
     // 4.24 N press on each of its sides.
     let still = "[[moving_wall]]\nmotion = [[50, 0, 0, 0], [60, 0, 0, 0.1]]";
@@ -202,18 +195,9 @@ fn a_slab_half_a_spacing_above_the_floor_and_the_floor_bear_the_water_between() 
              [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
             0.03 + gap * 0.02
         )));
-        let (mut sum, mut count) = ([0.0; 2], 0.0);
-        while simulation.time < 0.3 {
-            simulation.step().expect("a step");
-            if simulation.time > 0.1 {
-                let read = simulation.gauges().expect("forces");
-                let of =
-                    |name: &str| read.iter().find(|(column, _)| column.starts_with(name)).expect("there").1;
-                (sum[0], sum[1]) = (sum[0] + of("slab_force_z"), sum[1] + of("floor_force_z"));
-                count += 1.0;
-            }
-        }
-        (sum.map(|f| f / count), simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.81)
+        let of = |sim: &mut Simulation| gauges(sim, ["slab_force_z", "floor_force_z"]);
+        let found = mean_over(&mut simulation, [0.1, 0.3], of);
+        (found, simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.81)
     };
     let lift = 1000.0 * 9.81 * 0.24 * 0.06 * 0.02;
     for gap in [0.475, 0.479, 0.481, 0.485, 0.5, 0.505] {
@@ -238,15 +222,8 @@ fn an_obstacle_between_a_wall_and_a_body_has_the_water_around_it() {
          locked = [\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\"]\n\
          [[gauge.force]]\nname = \"still\"\non = \"still\"\n",
     ));
-    let (mut sum, mut count) = ([0.0; 2], 0.0);
-    while simulation.time < 0.06 {
-        simulation.step().expect("still water stands");
-        if simulation.time > 0.03 {
-            let force = simulation.fluid_force[1].force;
-            (sum, count) = ([sum[0] + force.x, sum[1] + force.z], count + 1.0);
-        }
-    }
-    let [aside, lift] = sum.map(|f| f / count);
+    let force = |sim: &mut Simulation| [sim.fluid_force[1].force.x, sim.fluid_force[1].force.z];
+    let [aside, lift] = mean_over(&mut simulation, [0.03, 0.06], force);
     println!("{lift} N up, {aside} N aside");
     assert!((lift / 2.824 - 1.0).abs() < 0.1 && aside.abs() < 0.5, "{lift} N up, {aside} N aside");
 }
@@ -272,15 +249,9 @@ fn a_body_beside_an_obstacle_presses_it_with_the_water_between() {
                     0.34 + gap,
                     0.1 + above
                 )));
-                let (mut sum, mut count) = (0.0, 0.0);
                 // Bodies come first.
-                while simulation.time < 0.06 {
-                    simulation.step().expect("still water stands");
-                    if simulation.time > 0.03 {
-                        (sum, count) = (sum + simulation.fluid_force[1].force.x, count + 1.0);
-                    }
-                }
-                let aside = sum / count;
+                let force = |sim: &mut Simulation| [sim.fluid_force[1].force.x];
+                let [aside] = mean_over(&mut simulation, [0.03, 0.06], force);
                 println!("pair {k}, gap {gap} m, {above} m higher: {aside:.3} N aside");
                 assert!(aside.abs() < 0.3, "pair {k}, {gap} m, {above} m: {aside} N");
             }

@@ -1,6 +1,6 @@
 //! Water in slots too narrow for a particle: under a body that stands on the floor, between bodies.
 
-use crate::common::{case, simulation, there_is_a_device};
+use crate::common::{case, gauges, mean_over, simulation, there_is_a_device};
 use glam::DVec3;
 use seixo::backend::Processor;
 use seixo::body::{Pose, Wrench};
@@ -488,6 +488,9 @@ fn a_held_body_feels_its_slot_once_whatever_stands_elsewhere() {
     assert!((lift - 1.0).abs() < 0.05, "{lift}");
 }
 
+/// From when to when still water has come to rest enough to be measured [s].
+const SETTLED: [f64; 2] = [0.03, 0.06];
+
 /// Still water over a slab of 0.2 m that stands on a plinth of `width` [m], 25 mm: what it presses on the slab, and on the plinth [N].
 fn on_plinth(slab: &str, plinth: &str, width: f64, end: f64) -> [f64; 2] {
     let half = 0.5 * width;
@@ -506,17 +509,7 @@ fn on_plinth(slab: &str, plinth: &str, width: f64, end: f64) -> [f64; 2] {
          [[{plinth}]]\nname = \"plinth\"\n{keys}\n\
          [[gauge.force]]\nname = \"slab\"\non = \"slab\"\n[[gauge.force]]\nname = \"plinth\"\non = \"plinth\"\n"
     )));
-    let (mut sums, mut count) = ([0.0; 2], 0.0);
-    while simulation.time < end {
-        simulation.step().expect("it stands");
-        if simulation.time > 0.5 * end {
-            let read = simulation.gauges().expect("forces");
-            let of = |name: &str| read.iter().find(|gauge| gauge.0.starts_with(name)).expect("measured").1;
-            sums = [sums[0] + of("slab_force_z"), sums[1] + of("plinth_force_z")];
-            count += 1.0;
-        }
-    }
-    sums.map(|sum| sum / count)
+    mean_over(&mut simulation, [0.5 * end, end], |sim| gauges(sim, ["slab_force_z", "plinth_force_z"]))
 }
 
 #[test]
@@ -558,15 +551,8 @@ fn a_body_larger_than_what_stands_beside_it_presses_on_that_alone() {
                  [[{kind}]]\nname = \"other\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.314, 0, 0.18]\n{motion}\
                  [[gauge.force]]\nname = \"other\"\non = \"other\"\n"
             )));
-            let (mut sum, mut count) = (0.0, 0.0);
-            while simulation.time < 0.06 {
-                simulation.step().expect("it stands");
-                if simulation.time > 0.03 {
-                    (sum, count) = (sum + simulation.fluid_force[1].force.x, count + 1.0);
-                }
-            }
-            let side = 9806.65 * 0.22 * 0.1 * 0.02;
-            let aside = sum / count / side;
+            let [force] = mean_over(&mut simulation, SETTLED, |sim| [sim.fluid_force[1].force.x]);
+            let aside = force / (9806.65 * 0.22 * 0.1 * 0.02);
             println!("{kind} beside {edge} m: {aside:.3} of the force on its side");
             assert!(aside.abs() < 0.06, "{kind} {edge}: {aside}");
         }
@@ -593,21 +579,13 @@ fn on_pieces(width: f64, height: f64, pieces: &[(&str, f64, f64)]) -> [f64; 2] {
         height + 0.16,
         height + 0.03
     )));
-    let (mut sums, mut count) = ([0.0; 3], 0.0);
-    while simulation.time < 0.06 {
-        simulation.step().expect("it stands");
-        if simulation.time > 0.03 {
-            let read = simulation.gauges().expect("forces");
-            let of = |name: &str| {
-                let all =
-                    read.iter().filter(|gauge| gauge.0.starts_with(name) && gauge.0.contains("force_z"));
-                all.map(|gauge| gauge.1).sum::<f64>()
-            };
-            sums = [sums[0] + of("p"), sums[1] + of("slab"), sums[2] + of("floor")];
-            count += 1.0;
-        }
-    }
-    let [plinth, slab, floor] = sums.map(|sum| sum / count);
+    // Each piece of the plinth, and nothing of their forces but what is along z.
+    let pieces: Vec<String> = (0..pieces.len()).map(|k| format!("p{k}_force_z")).collect();
+    let [plinth, slab, floor] = mean_over(&mut simulation, SETTLED, |sim| {
+        let plinth = pieces.iter().map(|piece| gauges(sim, [piece])[0]).sum();
+        let [slab, floor] = gauges(sim, ["slab_force_z", "floor_force_z"]);
+        [plinth, slab, floor]
+    });
     let weight = simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.80665;
     [plinth / (-9806.65 * 0.02 * 0.16 * 0.12), (plinth + slab + floor) / -weight]
 }
@@ -641,38 +619,33 @@ fn what_stands_beside_above_or_on_what_is_held_tells_its_load() {
              [[gauge.force]]\nname = \"a\"\non = \"a\"\n"
         )));
         let k = simulation.scene.solids.iter().position(|solid| solid.name == "a").expect("it is there");
-        let (mut sum, mut count) = (seixo::body::Wrench::default(), 0.0);
-        while simulation.time < 0.06 {
-            simulation.step().expect("it stands");
-            if simulation.time > 0.03 {
-                sum += simulation.fluid_force[k];
-                count += 9806.65 * 0.02;
-            }
-        }
-        sum / count
+        mean_over(&mut simulation, SETTLED, |sim| {
+            let force = sim.fluid_force[k].force / (9806.65 * 0.02);
+            [force.x, force.z]
+        })
     };
     // Two blocks on the floor, 0.6 spacings apart: the rows of their feet, which are covered, were the rim of the slot between, and half of a side was missing.
     let block = |name: &str, x: f64| {
         format!("[[obstacle]]\nname = \"{name}\"\nsize = [0.08, 0.1, 0.08]\ncenter = [{x}, 0, 0.04]\n")
     };
-    let aside = still(&(block("a", 0.25) + &block("b", 0.342)), 0.28).force.x / (0.08 * 0.24);
+    let aside = still(&(block("a", 0.25) + &block("b", 0.342)), 0.28)[0] / (0.08 * 0.24);
     println!("beside another: {aside:.3} of a side");
     assert!(aside.abs() < 0.05, "{aside}");
     // An obstacle 0.9 spacings below a body: it had the pressure at the body's face, without the weight of the gap.
     let below = "[[obstacle]]\nname = \"a\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.13]\n\
                  [[body]]\nname = \"b\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.208]\ndisplaces_fluid = true\n\
                  locked = [\"x\", \"z\", \"rotation_y\"]\n";
-    let lift = still(below, 0.4).force.z / (0.12 * 0.06);
+    let lift = still(below, 0.4)[1] / (0.12 * 0.06);
     println!("below a body: {lift:.3} of its lift");
     assert!((lift - 1.0).abs() < 0.04, "{lift}");
     // 1.5 spacings thick and 0.55 above the floor: nothing was under it (-14 times its lift), as its rows lie nearer to their faces. What is so thin is rough.
     let thin = "[[obstacle]]\nname = \"a\"\nsize = [0.12, 0.1, 0.03]\ncenter = [0.3, 0, 0.026]\n";
-    let lift = still(thin, 0.3).force.z / (0.12 * 0.03);
+    let lift = still(thin, 0.3)[1] / (0.12 * 0.03);
     println!("thin, above the floor: {lift:.3} of its lift");
     assert!((lift - 1.0).abs() < 1.0, "{lift}");
     // Rows of a small disc turn by more than those of an edge: it was flat, and had none.
     let disc = "[[obstacle]]\nname = \"a\"\nshape = \"cylinder\"\nradius = 0.04\naxis = [0, 1, 0]\ncenter = [0.3, 0, 0.04]\n";
-    let lift = still(disc, 0.3).force.z / (0.0016 * std::f64::consts::PI);
+    let lift = still(disc, 0.3)[1] / (0.0016 * std::f64::consts::PI);
     println!("a small disc on the floor: {lift:.3} of its lift");
     assert!((lift - 1.0).abs() < 0.06, "{lift}");
 }
@@ -680,37 +653,26 @@ fn what_stands_beside_above_or_on_what_is_held_tells_its_load() {
 #[test]
 fn a_push_is_on_the_wall_before_it_and_not_on_one_behind_that() {
     // A plane 1.1 spacings above the floor, nearly flat, a held body 0.3 above it; an obstacle in the air 0.9 above a body just under the surface.
-    let forces = |solids: &str, names: &[&str], depth: f64| {
+    let still = |solids: &str, names: &[&str], depth: f64| {
         let gauges: String = names
             .iter()
             .map(|name| format!("[[gauge.force]]\nname = \"{name}\"\non = \"{name}\"\n"))
             .collect();
-        let mut simulation = simulation(&case(&format!(
+        simulation(&case(&format!(
             "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 5\ndimensions = 2\n\
              [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.5]\nopen = [\"z_max\"]\n\
              [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, {depth}]\n{solids}{gauges}"
-        )));
-        let (mut sums, mut count) = (vec![0.0; names.len()], 0.0);
-        while simulation.time < 0.06 {
-            simulation.step().expect("it stands");
-            if simulation.time > 0.03 {
-                let read = simulation.gauges().expect("forces");
-                for (sum, name) in sums.iter_mut().zip(names) {
-                    let column = format!("{name}_force_z");
-                    *sum += read.iter().find(|gauge| gauge.0.starts_with(&column)).expect("measured").1;
-                }
-                count += 1.0;
-            }
-        }
-        sums.iter_mut().for_each(|sum| *sum /= count);
-        (sums, simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.80665)
+        )))
     };
     let locked = "displaces_fluid = true\nlocked = [\"x\", \"z\", \"rotation_y\"]\n";
     let ramp = format!(
         "[[plane]]\nname = \"ramp\"\ncenter = [0.3, 0, 0.022]\nnormal = [0.001, 0, 1]\nalong = [1, 0, 0]\nsize = [0.4, 0.02]\n\
          [[body]]\nname = \"body\"\nsize = [0.2, 0.1, 0.06]\ncenter = [0.3, 0, 0.058]\n{locked}"
     );
-    let (found, weight) = forces(&ramp, &["ramp", "body", "tank.z_min"], 0.28);
+    let mut simulation = still(&ramp, &["ramp", "body", "tank.z_min"], 0.28);
+    let weight = simulation.scene.water() as f64 * simulation.params.particle_mass() * 9.80665;
+    let names = ["ramp_force_z", "body_force_z", "tank.z_min_force_z"];
+    let found = mean_over(&mut simulation, SETTLED, |sim| gauges(sim, names));
     let sum = found.iter().sum::<f64>() / -weight;
     println!("{found:?}: {sum:.4} of the weight of {weight} N");
     assert!((sum - 1.0).abs() < 0.03, "{found:?} for {weight}");
@@ -718,7 +680,7 @@ fn a_push_is_on_the_wall_before_it_and_not_on_one_behind_that() {
         "[[body]]\nname = \"body\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.16]\n{locked}\
          [[obstacle]]\nname = \"above\"\nsize = [0.12, 0.1, 0.06]\ncenter = [0.3, 0, 0.238]\n"
     );
-    let (found, _) = forces(&aloft, &["above"], 0.2);
+    let found = mean_over(&mut still(&aloft, &["above"], 0.2), SETTLED, |sim| gauges(sim, ["above_force_z"]));
     println!("in the air: {found:?} N");
     assert!(found[0].abs() < 0.05, "{found:?}");
 }

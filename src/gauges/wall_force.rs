@@ -163,8 +163,8 @@ impl FixedWall {
         // Of each row and face the direction, and what of it is pressed on [m2].
         let mut pressed: BTreeMap<(usize, [i32; 3]), (DVec3, f64)> = BTreeMap::new();
         // Over the joint of a wall and another one, or a solid, a push is on both.
-        let is_on_body = |push: &&Push| matches!(push.on, Opposite::Solid(k, _) if scene.solids[k].is_free());
-        let shares = |push: &Push| if is_on_body(&push) { vec![] } else { self.shares(push, scene, poses) };
+        let is_on_body = |push: &Push| matches!(push.on, Opposite::Solid(k, _) if scene.solids[k].is_free());
+        let shares = |push: &Push| if is_on_body(push) { vec![] } else { self.shares(push, scene, poses) };
         let laid: Vec<_> = pushes.par_iter().with_min_len(64).map(shares).collect();
         for (push, on) in pushes.iter().zip(laid).filter(|(_, on)| !on.is_empty()) {
             let mut force = DVec3::ZERO;

@@ -157,9 +157,9 @@ impl Builder<'_> {
             let bends = solid.bending(l0);
             // Of what is round the ends alone are flat, and the rim has a part of them.
             let ends = if solid.shape.pieces(l0).is_none() { solid.shape.axes() } else { vec![] };
-            for k in 0..kept.len() {
-                let flat = if bends[k] != 0 { &ends[..] } else { &DVec3::AXES };
-                areas[k] = self.unfaced(solid, flat, areas[k], k);
+            for (k, area) in areas.iter_mut().enumerate() {
+                let flat = if bends.any(k) { &ends[..] } else { &DVec3::AXES };
+                *area = self.unfaced(solid, flat, *area, k);
             }
             solid.wall_edges = solid.wall_edges.kept(&kept);
         }

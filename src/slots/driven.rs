@@ -125,13 +125,8 @@ impl Slots {
         Ok(out)
     }
 
-    fn faces(&self, k: usize, row: usize) -> impl Iterator<Item = Face> + use<> {
-        let layer = &self.layers[k];
-        layer.edges.faces(row, layer.area[row], layer.to_surface[row])
-    }
-
     fn face(&self, (k, row, number): Of) -> Face {
-        self.faces(k, row).nth(number).unwrap_or_default()
+        self.layers[k].own_faces(row).nth(number).unwrap_or_default()
     }
 
     /// Faces of the `solids` at `poses` that lie before a `push`. One that none looks back at is all on the row that it is on.
@@ -147,10 +142,10 @@ impl Slots {
                 let at = to_frame * (image - origin);
                 layer.grid.near(at, reach, |n| {
                     let row = n as usize;
-                    for (number, face) in self.faces(k, row).enumerate() {
+                    for (number, face) in self.layers[k].own_faces(row).enumerate() {
                         let normal = turn * face.area.normalize_or_zero();
                         if -normal.dot(way) > AGAINST {
-                            let bends = layer.bends[row] & 1 << number != 0;
+                            let bends = layer.bends.at(row, number);
                             near.push(Near {
                                 of: (k, row, number),
                                 face,
@@ -172,7 +167,7 @@ impl Slots {
                 Opposite::Solid(k, row) if solids.contains(&k) => {
                     let way = poses[k].orientation.inverse() * push.area;
                     let looks = |face: &Face| -face.area.normalize_or_zero().dot(way);
-                    let faces = self.faces(k, row).enumerate();
+                    let faces = self.layers[k].own_faces(row).enumerate();
                     let most = faces.max_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1)));
                     vec![Laid { of: (k, row, most.map_or(0, |face| face.0)), share: 1.0, way: DVec3::ZERO }]
                 }
@@ -217,7 +212,7 @@ impl Slots {
         let (k, row, _) = near.of;
         let slack = AS_NEAR * self.spacing;
         let at = near.face.way + near.turn.inverse() * foot;
-        self.faces(k, row).any(|other| {
+        self.layers[k].own_faces(row).any(|other| {
             let normal = other.area.normalize_or_zero();
             (near.face.way - other.way).dot(normal) < -slack && (at - other.way).dot(normal) > slack
         })

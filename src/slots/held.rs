@@ -67,12 +67,12 @@ impl Slots {
             let look = || Arc::<[Faced]>::from(self.faced(k, at_walls, &others[k], poses));
             let faced = if is_still { layer.faced.get_or_init(look).clone() } else { look() };
             let to_frame = poses[k].orientation.inverse();
-            let bent: Bending = (0..faced.len()).map(|n| self.bent(k, n, &faced[n], poses)).collect();
+            let bent = Bending((0..faced.len()).map(|n| self.bent(k, n, &faced[n], poses)).collect());
             let mut open = layer.area.clone();
             // They come in the order of solids.
             let own = covered.partition_point(|c| c.solid < k)..covered.partition_point(|c| c.solid <= k);
             for c in &covered[own] {
-                open[c.row] -= to_frame * if bent[c.row] & 1 << c.face != 0 { c.within } else { c.area };
+                open[c.row] -= to_frame * if bent.at(c.row, c.face) { c.within } else { c.area };
             }
             // What is left of a face that stands on another by round-off is nothing.
             let is_open = |n: usize| open[n].length_squared() > 1e-4 * layer.area[n].length_squared();
@@ -101,21 +101,19 @@ impl Slots {
             }
             _ => false,
         };
-        // Numbered as the faces of solids are: without those that others have taken away.
-        let faces = layer.edges.faces(n, layer.area[n], layer.to_surface[n]).zip(0..);
-        let others = faces.map(|(face, number)| {
+        let others = layer.own_faces(n).zip(0..).map(|(face, number)| {
             let way = face.area.normalize_or_zero();
             let of = if faced.has_faces() { faced.of_face(face.area) } else { faced.opposite };
             u8::from(looked_at(way, of)) << number
         });
-        layer.bends[n] | others.sum::<u8>()
+        layer.bends.0[n] | others.sum::<u8>()
     }
 
     /// What of `covered` water in the slots `held` presses on is not covered: of faces that bend, or before which something does, all but what lies within others.
     pub fn uncover(&self, held: &Held, covered: &mut [Covered]) {
         let shares = held.shares();
         for c in covered {
-            let bends = held.bends.get(&c.solid).is_some_and(|bends| bends[c.row] & 1 << c.face != 0);
+            let bends = held.bends.get(&c.solid).is_some_and(|bends| bends.at(c.row, c.face));
             if let Some(share) = shares.get(&(c.solid, c.row)).filter(|_| bends) {
                 c.area += *share * (c.within - c.area);
             }

@@ -48,7 +48,7 @@ impl Layer {
             free,
             holds,
             still: solid.is_still(),
-            bends: if free || solid.is_still() && !holds { Vec::new() } else { solid.bending(l0) },
+            bends: if free || solid.is_still() && !holds { Bending::default() } else { solid.bending(l0) },
             faced: OnceLock::new(),
             first: solid.wall_slots.start,
             radius: offset.iter().map(|x| x.length()).fold(0.0, f64::max),
@@ -105,11 +105,14 @@ impl Layer {
         out
     }
 
+    /// The faces of row `n`, numbered as those of its solid are: without those that others have taken away.
+    pub fn own_faces(&self, n: usize) -> impl Iterator<Item = Face> + use<> {
+        self.edges.faces(n, self.area[n], self.to_surface[n])
+    }
+
     /// Whether rows `a` and `b`, which are near each other, lie beside each other on the surface.
     fn go_on(&self, a: usize, b: usize) -> bool {
-        let ways = |k: usize| {
-            self.edges.faces(k, self.area[k], self.to_surface[k]).map(|face| face.area.normalize_or_zero())
-        };
+        let ways = |k: usize| self.own_faces(k).map(|face| face.area.normalize_or_zero());
         ways(a).any(|a| ways(b).any(|b| a.dot(b) > TURNED))
     }
 
@@ -156,9 +159,12 @@ impl Layer {
     /// Whether of row `n` that face bends which looks back most at what looks along `way`, in the solid's frame.
     pub fn bends_before(&self, n: usize, way: DVec3) -> bool {
         let looks = |face: &Face| face.area.normalize_or_zero().dot(way);
-        let faces = self.edges.faces(n, self.area[n], self.to_surface[n]).enumerate();
-        let back = faces.min_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1))).map_or(0, |face| face.0);
-        self.bends.get(n).is_some_and(|faces| faces & 1 << back != 0)
+        let back = self
+            .own_faces(n)
+            .enumerate()
+            .min_by(|a, b| looks(&a.1).total_cmp(&looks(&b.1)))
+            .map_or(0, |face| face.0);
+        self.bends.at(n, back)
     }
 
     pub fn bounds(&self, pose: &Pose, margin: f64) -> Bounds {

@@ -82,6 +82,34 @@ pub fn simulation(case: &Case) -> Simulation {
     cpu_simulation(case, Scene::build(case).expect("the scene builds"))
 }
 
+/// Means over the steps after `from` until `to` [s] of what `of` tells after each.
+pub fn mean_over<const N: usize>(
+    simulation: &mut Simulation,
+    [from, to]: [f64; 2],
+    mut of: impl FnMut(&mut Simulation) -> [f64; N],
+) -> [f64; N] {
+    let (mut sums, mut count) = ([0.0; N], 0.0);
+    while simulation.time < to {
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+        if simulation.time > from {
+            sums.iter_mut().zip(of(simulation)).for_each(|(sum, now)| *sum += now);
+            count += 1.0;
+        }
+    }
+    sums.map(|sum| sum / count)
+}
+
+/// The sum of what the gauges tell now whose columns begin with one of `names` each, see [`mean_over`].
+pub fn gauges<const N: usize>(simulation: &mut Simulation, names: [&str; N]) -> [f64; N] {
+    let read = simulation.gauges().expect("gauges");
+    names.map(|name| {
+        let of: Vec<f64> =
+            read.iter().filter(|gauge| gauge.0.starts_with(name)).map(|gauge| gauge.1).collect();
+        assert!(!of.is_empty(), "no gauge `{name}`");
+        of.iter().sum()
+    })
+}
+
 pub fn cpu_simulation(case: &Case, scene: impl Into<Arc<Scene>>) -> Simulation {
     alone();
     Simulation::on(case, scene, &Processor::Cpu).expect("the simulation starts")
