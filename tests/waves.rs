@@ -127,6 +127,28 @@ fn what_cannot_be_made_is_told_with_line_and_remedy() {
     let plan = ran(&["plan", &path.display().to_string()]);
     let odd = "the wave is made for water 0.1 m deep, and that at the piston is";
     assert!(plan.code == 0 && plan.err.contains(odd), "{}", plan.err);
+    // A fill stands on what the piston stands on, and counts where it begins nearest to it.
+    let filled = |more: &str, keys: &str| {
+        let text = format!(
+            "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1\ndimensions = 2\n[tank]\nmin = [0, 0, 0]\nmax = [4, 0.1, 0.6]\n\
+             open = [\"z_max\"]\n[fluid]\n[[moving_wall]]\nname = \"piston\"\nmin = [0.08, 0, 0.1]\nmax = [0.2, 0.1, 0.6]\n\
+             wave = {{ kind = \"regular\", height = 0.08, period = 1.5{keys} }}\n\
+             [[obstacle]]\nname = \"bed\"\nmin = [0, 0, 0]\nmax = [4, 0.1, 0.1]\n\
+             [[fluid.fill]]\nseed = [1, 0.05, 0.2]\nlevel = 0.3\n{more}"
+        );
+        std::fs::write(&path, text).unwrap();
+        ran(&["plan", &path.display().to_string()])
+    };
+    let behind = "[[obstacle]]\nname = \"dam\"\nmin = [3, 0, 0.1]\nmax = [3.2, 0.1, 0.6]\n\
+                  [[fluid.fill]]\nseed = [3.6, 0.05, 0.2]\nlevel = 0.5\n";
+    for (more, keys) in [("", ""), (behind, ""), (behind, ", depth = 0.2")] {
+        let plan = filled(more, keys);
+        assert!(plan.code == 0 && plan.out.contains("in 0.2000 m of water"), "{}{}", plan.out, plan.err);
+        assert!(!plan.err.contains("the wave is made for"), "{}", plan.err);
+    }
+    let plan = filled("", ", depth = 0.3");
+    let odd = "the wave is made for water 0.3 m deep, and that at the piston is 0.2000 m deep";
+    assert!(plan.code == 0 && plan.err.contains(odd), "{}", plan.err);
     // Water elsewhere: the depth has to be said.
     let text = flume(&regular("height = 0.08, period = 1.5"), "")
         .replace("[[fluid.block]]\nmin = [0,", "[[fluid.block]]\nmin = [1,");

@@ -447,7 +447,8 @@ fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) 
     let further = further.iter().filter(|(_, dt)| dt.is_finite());
     let further: String = further.map(|(what, dt)| format!(", {what} {dt:.3e} s")).collect();
     let mut advice = vec![format!(
-        "time step: typed {typed:.3e} s; the flow (up to {speed:.2} m/s) allows {:.3e} s{further}",
+        "time step: {}{typed:.3e} s; the flow (up to {speed:.2} m/s) allows {:.3e} s{further}",
+        if adaptive { "at most " } else { "" },
         bounds.flow
     )];
     let bound = bounds.shortest();

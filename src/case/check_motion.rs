@@ -169,14 +169,6 @@ impl Checker<'_> {
             return;
         };
         let (height, depth) = (keys.height, wave.wanted.depth);
-        if let (Some(there), Some(l0)) = (w.still_depth(self.case), self.spacing())
-            && (there - depth).abs() > l0
-        {
-            let message = format!(
-                "the wave is made for water {depth} m deep, and that at the piston is {there:.4} m deep"
-            );
-            self.warn(&key("depth"), message, "leave `depth` out, so that it is that of the water");
-        }
         let most = if solitary { MCCOWAN * depth } else { miche(wave.length, depth) };
         if height > most {
             let law = if solitary { "0.78 d (McCowan)" } else { "0.142 L tanh k d (Miche)" };

@@ -161,11 +161,11 @@ impl Checker<'_> {
     /// A spring that a body's own weight presses through is none.
     fn spring(&mut self, spring: f64) {
         let run = &self.case.run;
-        if spring.is_nan() || spring < 0.0 {
+        if spring.is_nan() || spring <= 0.0 {
             self.positive("contact.spring", spring, "N/m");
             return;
         }
-        if spring != 0.0 && !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
+        if !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
             let allowed = format!("{SPRING_LEAST:e} to {SPRING_MOST:e} N/m");
             self.range("contact.spring", spring, false, &allowed);
             return;
@@ -184,19 +184,6 @@ impl Checker<'_> {
             lengths.into_iter().fold(f64::INFINITY, f64::min)
         };
         let free = self.case.body.iter().filter(|b| b.can_move(flat));
-        if spring == 0.0 {
-            let stiff = free.map(|b| 100.0 * weight(b) / smallest(b)).fold(0.0, f64::max);
-            let stiff = if stiff > 0.0 {
-                format!(", {stiff:.1e} N/m or more")
-            } else {
-                " [N/m], e.g. 1e5".to_owned()
-            };
-            let message = "there is no spring, so that nothing keeps solids apart";
-            let remedy = format!("add `spring`{stiff}; `seixo plan` then tells what the bodies ask for");
-            // Also where nobody has written one.
-            self.add("contact.spring", message, remedy);
-            return;
-        }
         let sinks = |b: &&Body| weight(b) / spring > smallest(b);
         let found = free.filter(sinks).max_by(|a, b| weight(a).total_cmp(&weight(b)));
         if let Some((name, weight, edge)) = found.map(|b| (b.name.clone(), weight(b), smallest(b))) {
@@ -304,16 +291,15 @@ impl Checker<'_> {
                 self.add(
                     "contact",
                     message,
-                    "add [contact] with `spring` [N/m], e.g. 1e5 (`seixo plan` then tells what the bodies ask for), or \
-                     lock all of the body's freedoms",
+                    "add a table [contact], with `friction = 0.4` or whatever it is, or lock all of the body's freedoms",
                 );
             }
             return;
         };
-        if contact.law == Law::Pressure {
-            self.not_negative("contact.spring", contact.spring, "N/m");
-        } else {
-            self.spring(contact.spring);
+        match contact.spring {
+            Some(spring) if contact.law == Law::Pressure => self.not_negative("contact.spring", spring, "N/m"),
+            Some(spring) => self.spring(spring),
+            None => {}
         }
         self.one_of(
             "contact",

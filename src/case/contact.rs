@@ -37,10 +37,10 @@ pub struct Contact {
     /// Contact law.
     #[serde(default = "Contact::default_law")]
     pub law: Law,
-    /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none.
-    #[serde(default)]
-    #[cfg_attr(test, schemars(range(min = 0, max = 1e18)))]
-    pub spring: f64,
+    /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none. If absent what the masses and heights of the case ask for: it stops the
+    /// heaviest body, fallen as far as it can or as fast as it starts, and carries its weight; `seixo plan` tells it.
+    #[cfg_attr(test, schemars(range(min = 1e-9, max = 1e18)))]
+    pub spring: Option<f64>,
     /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub damping: Option<f64>,

@@ -233,6 +233,11 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
     });
     let too_long: Vec<Problem> = too_long.collect();
     let mut wrong_copies = lay_out(&mut case);
+    let wet = case.fluid.is_some();
+    if wrong_copies.is_empty() && !case.run.take_time_step(wet) {
+        let message = "there is none, and without gravity nothing tells one";
+        wrong_copies.push(Problem::new("run.time_step", message, "add it [s] to [run]"));
+    }
     if wrong_copies.is_empty() {
         wrong_copies = case.written.problems(check(&case));
     }

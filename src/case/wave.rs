@@ -206,8 +206,9 @@ impl MovingWall {
         Some((axis, sign, if sign > 0.0 { hi[axis] } else { lo[axis] }))
     }
 
-    /// Depth of the water that stands before its face at the start [m], from the blocks and fills there and the tank's floor.
-    pub(super) fn still_depth(&self, case: &Case) -> Option<f64> {
+    /// Depth of the water that stands before its face at the start [m], from the blocks there and the tank's floor, or from
+    /// the fill that begins nearest to it and what it stands on.
+    fn still_depth(&self, case: &Case) -> Option<f64> {
         let (axis, sign, face) = self.face()?;
         let (lo, hi) = self.straight_box()?;
         let (across, near) = (1 - axis, 1.5 * case.run.spacing);
@@ -222,14 +223,19 @@ impl MovingWall {
         let blocks = case.fluid.iter().flat_map(|f| &f.block).filter(beside);
         let (floor, level) =
             blocks.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x.min[2]), b.max(x.max[2])));
-        let tank = case.tank.as_ref().filter(|t| !t.open.contains(&Face::ZMin));
-        // What a seed before the face fills begins at the tank's floor.
-        let fills = case.fluid.iter().flat_map(|f| &f.fill).filter(|f| sign * f.seed[axis] > sign * face);
-        let (floor, level) = match (tank, fills.map(|f| f.level).reduce(f64::max)) {
-            (Some(tank), Some(filled)) => (tank.min[2], level.max(filled)),
-            (Some(tank), None) => (floor.max(tank.min[2]), level),
-            (None, _) => (floor, level),
+        let tank = case.tank.as_ref().filter(|t| !t.open.contains(&Face::ZMin)).map(|t| t.min[2]);
+        if level > floor {
+            return Some(level - tank.map_or(floor, |tank| floor.max(tank))).filter(|depth| *depth > 0.0);
+        }
+        // Of fills that of the nearest seed before the face. It begins at the ground that the piston stands on.
+        let ahead = |f: &&super::Fill| sign * (f.seed[axis] - face);
+        let fills = case.fluid.iter().flat_map(|f| &f.fill).filter(|f| ahead(f) > 0.0);
+        let off = |f: &&super::Fill| {
+            let beside = if flat { 0.0 } else { (lo[across] - f.seed[across]).max(f.seed[across] - hi[across]).max(0.0) };
+            ahead(f).hypot(beside)
         };
-        (level > floor).then_some(level - floor)
+        let fill = fills.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let ground = tank.filter(|tank| lo[2] - tank < near).unwrap_or(lo[2]);
+        Some(fill.level - ground).filter(|depth| *depth > 0.0)
     }
 }

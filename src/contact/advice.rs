@@ -1,7 +1,11 @@
 //! What a user should know about the numbers of contact.
 
-use super::Solids;
-use crate::error::CaseError;
+use super::substeps::Limits;
+use super::{Solids, kind};
+use crate::body::Body;
+use crate::case;
+use crate::error::{CaseError, Error, Result};
+use crate::scene::Scene;
 
 /// Mass of the heaviest body over that of the lightest from which a restitution between them is spoken of.
 const HEAVIER: f64 = 10.0;
@@ -9,6 +13,9 @@ const HEAVIER: f64 = 10.0;
 pub(super) const SIZABLE: f64 = 0.25;
 /// Depth over the spacing, or over half of the thinner solid, for which a spring is named that carries a weight.
 pub(super) const CARRIED: f64 = 0.1;
+
+/// Depth over the spacing to which the heaviest body may press another one into a wall, beyond which it is spoken of.
+const SINKS: f64 = 0.1;
 
 /// What contact will do at a time step, for `seixo plan`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,6 +34,33 @@ pub struct ContactAdvice {
     pub words: Vec<String>,
 }
 
+/// The spring [N/m] of a `contact` that gives none, of two digits: it stops the heaviest body that has fallen as far as it can, and
+/// carries its weight. `None` if the law has none.
+///
+/// # Errors
+/// [`Error::Case`] if nothing falls or moves at the start: nothing tells one then.
+pub(super) fn spring(contact: &case::Contact, scene: &Scene, bodies: &[Body]) -> Result<Option<f64>> {
+    // The law tells it and wants one to be made; what it tells does not depend on that.
+    let any = case::Contact { spring: Some(1.0), ..contact.clone() };
+    let mut limits = Limits::new(Some(&any), scene, bodies)?;
+    let law = (kind(any.law).make)(&any, scene, bodies, &mut limits)?;
+    let heaviest = heaviest(bodies);
+    let Some((stopping, _)) = law.spring(heaviest * limits.falling.powi(2)) else { return Ok(None) };
+    let carrying = heaviest * limits.gravity / (CARRIED * scene.spacing);
+    let sinking = if law.softens() { heaviest * (limits.falling / (SINKS * scene.spacing)).powi(2) } else { 0.0 };
+    let spring = format!("{:.1e}", stopping.max(carrying).max(sinking)).parse().unwrap_or(0.0);
+    if spring > 0.0 {
+        return Ok(Some(spring));
+    }
+    let message = "contact: nothing falls and nothing moves at the start, which would tell the stiffness of contact";
+    Err(Error::key("contact", message, "add `spring` [N/m], e.g. 1e5, to [contact]"))
+}
+
+/// Mass of the heaviest free body [kg].
+fn heaviest(bodies: &[Body]) -> f64 {
+    bodies.iter().filter(|b| b.is_free()).map(|b| b.mass).fold(0.0, f64::max)
+}
+
 impl Solids {
     /// Why contact cannot be computed with steps of `dt` [s], if so.
     pub(crate) fn refuses(&self, dt: f64) -> Option<CaseError> {
@@ -37,7 +71,7 @@ impl Solids {
     /// What contact will do at the time step `dt` [s].
     pub fn advice(&self, dt: f64) -> ContactAdvice {
         let mut words = vec![];
-        let heaviest = self.bodies.iter().filter(|b| b.is_free()).map(|b| b.mass).fold(0.0, f64::max);
+        let heaviest = heaviest(&self.bodies);
         let Some(law) = self.law.as_deref() else { return ContactAdvice::default() };
         let worst = self.limits.worst(law, &self.bodies, dt);
         let energy = heaviest * self.limits.falling.powi(2);
@@ -66,9 +100,10 @@ impl Solids {
         // Where nothing can fall, nothing asks for one.
         let recommended = recommended.filter(|_| energy > 0.0);
         if let Some((wanted, soft)) = &recommended {
+            let has = if self.limits.given { "the case has" } else { "the case gives none and gets" };
             words.push(format!(
                 "contact: the heaviest body ({heaviest:.3e} kg) at {:.1} m/s asks for a spring of about {wanted:.1e} \
-                 N/m; the case has {spring:.1e}",
+                 N/m; {has} {spring:.1e}",
                 self.limits.falling
             ));
             if spring < 0.1 * wanted {
@@ -92,7 +127,7 @@ impl Solids {
             ));
         }
         let sinks = self.limits.falling * (heaviest / worst.softest).sqrt() / self.spacing;
-        if law.softens() && sinks > 0.1 {
+        if law.softens() && sinks > 1.05 * SINKS {
             words.push(format!(
                 "contact: at that speed the heaviest body may press what lies between it and a wall {sinks:.2} \
                  spacings deep; a spring four times as stiff halves that, where the sub-steps carry it"

@@ -76,6 +76,7 @@ impl Solids {
         } = self;
         let Limits {
             spring: _,
+            given: _,
             between: _,
             viscous_friction: _,
             forced: _,

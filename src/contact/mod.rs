@@ -86,17 +86,24 @@ impl Solids {
     /// The solids of `scene` at t = 0. `contact` may be absent only if no solid moves freely.
     ///
     /// # Errors
-    /// [`Error::Case`] if a free body has no contact law, or if the law's numbers contradict each other.
+    /// [`Error::Case`] if a free body has no contact law, if its numbers contradict each other, or if it has no spring and nothing tells one.
     pub fn new(scene: &Scene, contact: Option<&case::Contact>) -> Result<Self> {
         let bodies: Vec<Body> = scene.solids.iter().map(|s| Body::new(s, scene.dimensions)).collect();
         let free = bodies.iter().position(Body::is_free);
         if let (None, Some(k)) = (contact, free) {
             let name = &scene.solids[k].name;
             let message =
-                format!("body \"{name}\" moves freely, so the case needs [contact] with law and spring");
+                format!("body \"{name}\" moves freely, so the case needs a table [contact]");
             return Err(Error::key("contact", message, ""));
         }
-        let mut limits = Limits::new(contact, scene, &bodies)?;
+        let sprung = match contact {
+            Some(contact) if contact.spring.is_none() && free.is_some() => {
+                Some(case::Contact { spring: advice::spring(contact, scene, &bodies)?, ..contact.clone() })
+            }
+            _ => None,
+        };
+        let contact = sprung.as_ref().or(contact);
+        let mut limits = Limits { given: sprung.is_none(), ..Limits::new(contact, scene, &bodies)? };
         let law = match (contact, free) {
             (Some(contact), Some(_)) => Some((kind(contact.law).make)(contact, scene, &bodies, &mut limits)?),
             _ => None,

@@ -40,7 +40,7 @@ impl Damping {
             (None, None, None) => Ok(Self::Coefficient(0.0)),
             (Some(c), None, None) => Ok(Self::Coefficient(c)),
             (None, Some(ratio), None) => {
-                Ok(Self::Coefficient(ratio * 2.0 * (contact.spring * lightest).sqrt()))
+                Ok(Self::Coefficient(ratio * 2.0 * (contact.spring.unwrap_or(0.0) * lightest).sqrt()))
             }
             (None, None, Some(e)) if contact.law == case::Law::Smooth => Ok(Self::Ratio(damping_ratio(e))),
             (None, None, Some(_)) => {

@@ -36,6 +36,8 @@ pub(crate) const ABSURD_SUBSTEPS: u32 = 10_000;
 #[derive(Clone)]
 pub(crate) struct Limits {
     pub spring: f64,
+    /// Whether the case gives it.
+    pub given: bool,
     /// Friction and damping of any two solids.
     pub between: Betweens,
     pub viscous_friction: f64,
@@ -107,7 +109,8 @@ impl Limits {
         let free = bodies.iter().filter(|b| b.is_free());
         let lightest = free.map(|b| b.mass).fold(f64::INFINITY, f64::min);
         Ok(Self {
-            spring: contact.map_or(0.0, |c| c.spring),
+            spring: contact.and_then(|c| c.spring).unwrap_or(0.0),
+            given: true,
             between: Betweens::new(contact, scene, lightest)?,
             viscous_friction: contact.map_or(0.0, |c| c.viscous_friction),
             forced: contact.and_then(|c| c.substeps).map(|n| n.max(1)),

@@ -298,7 +298,8 @@ impl<'a> Builder<'a> {
                 Ok(()) => {
                     let count = self.beside_walls(None);
                     let reach = self.reach_of_water(from);
-                    self.notes.push(format!("fluid.fill.{k}: {count} particles of water{reach}"));
+                    let level = self.rounded_level(fill.level, from);
+                    self.notes.push(format!("fluid.fill.{k}: {count} particles of water{reach}{level}"));
                 }
                 Err(problem) => {
                     let key = format!("fluid.fill.{k}.{}", problem.key);
@@ -312,20 +313,6 @@ impl<'a> Builder<'a> {
         let gravity = self.periodic.across(self.gravity());
         self.depth = self.water.depth(gravity, &self.lattice);
         self.depth = self.depth_with_inflows(gravity);
-    }
-
-    /// Where the water from particle `from` on lies, for a note: a fill that stops at a wall, or runs round it, is seen by that.
-    fn reach_of_water(&self, from: usize) -> String {
-        let Self { water, lattice, .. } = self;
-        let cells = &water.cell[from..];
-        let Some(ends) = cells.iter().map(|&c| (c, c)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
-            return String::new();
-        };
-        let half = DVec3::splat(0.5 * lattice.spacing);
-        let (low, high) = (lattice.center(ends.0) - half, lattice.center(ends.1) + half);
-        let axes = (0..3).filter(|&k| !(lattice.plane && k == 1));
-        let reach = axes.map(|k| format!("{} {:.4}..{:.4}", AXES[k], low[k], high[k]));
-        format!(", {} m", reach.collect::<Vec<_>>().join(", "))
     }
 
     /// Takes away what of the water laid last, perhaps `within` a shape, stands where walls do that are no boxes of the lattice; returns how many particles it
@@ -403,6 +390,7 @@ impl<'a> Builder<'a> {
         placed.sort_by_key(|(k, _)| *k);
         self.bodies = placed.into_iter().map(|(_, solid)| solid).collect();
         self.water.keep_what_is_left(&self.grid);
+        self.depth_of_waves();
         self.unsupported();
         self.problems.extend(self.water.leak(gravity, &self.lattice, &mut self.grid, self.tank));
     }

@@ -91,4 +91,30 @@ impl Builder<'_> {
                 .push(format!("{label}: {cells} cells left to the walls that already stand there{holes}"));
         }
     }
+
+    /// What of whole cells becomes of the `level` [m] of a fill, the water from particle `from` on, for its note.
+    pub(super) fn rounded_level(&self, level: f64, from: usize) -> String {
+        let l0 = self.lattice.spacing;
+        let top = self.water.cell[from..].iter().map(|&c| self.lattice.center(c).z + 0.5 * l0);
+        let top = top.fold(f64::NEG_INFINITY, f64::max);
+        // What stops further below stops at a lid.
+        if !(0.01..0.51).contains(&((level - top).abs() / l0)) {
+            return String::new();
+        }
+        format!(", level {level:.4} m becomes {top:.4} m at spacing {l0}")
+    }
+
+    /// Where the water from particle `from` on lies, for a note: a fill that stops at a wall, or runs round it, is seen by that.
+    pub(super) fn reach_of_water(&self, from: usize) -> String {
+        let Self { water, lattice, .. } = self;
+        let cells = &water.cell[from..];
+        let Some(ends) = cells.iter().map(|&c| (c, c)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
+            return String::new();
+        };
+        let half = DVec3::splat(0.5 * lattice.spacing);
+        let (low, high) = (lattice.center(ends.0) - half, lattice.center(ends.1) + half);
+        let axes = (0..3).filter(|&k| !(lattice.plane && k == 1));
+        let reach = axes.map(|k| format!("{} {:.4}..{:.4}", AXES[k], low[k], high[k]));
+        format!(", {} m", reach.collect::<Vec<_>>().join(", "))
+    }
 }

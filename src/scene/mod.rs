@@ -38,6 +38,7 @@ mod shaped;
 mod support;
 mod walls;
 mod water;
+mod wave_depth;
 
 pub use crate::shape::{Edges, Face, Shape};
 pub(crate) use covered::INFLOW_ROOM;

@@ -94,8 +94,8 @@ impl Simulation {
             let stays = self.scene.solids[k].is_still();
             if !stays && (0..3).filter(bounded).any(|k| x[k] < min[k] || x[k] > max[k]) {
                 let what = format!(
-                    "{name} left the domain at {} m; a wall is missing there, or contact.spring is too soft for this \
-                     fall",
+                    "{name} left the domain at {} m; a wall is missing there, contact.spring is too soft for this \
+                     fall, or run.domain is to be larger, if it is to fly on",
                     point(x)
                 );
                 return Err(self.diverged(step, Stage::Contact, what));

@@ -12,7 +12,7 @@ use serde::Serialize;
 pub fn smooth(spring: f64, damping: f64, friction: f64) -> Contact {
     Contact {
         law: Law::Smooth,
-        spring,
+        spring: Some(spring),
         damping: Some(damping),
         damping_ratio: None,
         restitution: None,

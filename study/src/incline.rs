@@ -98,7 +98,7 @@ impl Slide {
     fn contact(&self) -> Contact {
         Contact {
             law: self.law,
-            spring: self.spring,
+            spring: Some(self.spring),
             damping: Some(self.damping),
             damping_ratio: None,
             restitution: None,

@@ -238,7 +238,7 @@ impl Remedy {
 pub fn run(text: &str, time: f64, remedy: Remedy) -> Result<Outcome> {
     let mut case: Case = text.parse()?;
     if let (Some(contact), Some(spring)) = (&mut case.contact, remedy.spring) {
-        contact.spring = spring;
+        contact.spring = Some(spring);
     }
     let scene = Scene::build(&case)?;
     let mut solids = Solids::new(&scene, case.contact.as_ref())?;

@@ -68,7 +68,7 @@ pub fn mass() -> f64 {
 pub(crate) fn contact(law: Law, spring: f64, damping_ratio: f64, single: bool) -> Contact {
     Contact {
         law,
-        spring,
+        spring: Some(spring),
         damping: None,
         damping_ratio: Some(damping_ratio),
         restitution: None,

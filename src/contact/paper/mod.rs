@@ -72,7 +72,7 @@ impl Paper {
         let layers = bodies.iter().zip(&lists.layers);
         limits.lambda = layers.map(|(b, l)| lambda(b, &l.offsets, contact.torque)).collect();
         let constants = Constants {
-            spring: contact.spring,
+            spring: limits.spring,
             damping,
             viscous_friction: contact.viscous_friction,
             distance: CONTACT_DISTANCE * scene.spacing,
