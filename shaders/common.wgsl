@@ -110,6 +110,7 @@ struct Coefficients {
     source_divergence: f32, // (1 - gamma) rho / dt (d / n0) / c
     compressibility: f32,   // alpha rho / dt^2 / c
     pressure_max: f32,
+    pressure_min: f32,      // 0 where water does not pull
     speed_per_bin: f32,     // of the monitor's histogram
     shift_speed: f32,       // of particles at rest
     ahead: f32,             // from the start of the step to where forces are found

@@ -441,12 +441,12 @@ fn end(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index
 //#if RANKS
         // Counted where it is computed.
         if position[i].w != FOREIGN {
-            cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
+            cut += vec4f(f32(p > now.pressure_max), f32(p < now.pressure_min), 0.0, 0.0);
         }
 //#else
-        cut += vec4f(f32(p > now.pressure_max), f32(p < 0.0), 0.0, 0.0);
+        cut += vec4f(f32(p > now.pressure_max), f32(p < now.pressure_min), 0.0, 0.0);
 //#endif
-        pressure[i] = clamp(p, 0.0, now.pressure_max);
+        pressure[i] = clamp(p, now.pressure_min, now.pressure_max);
 //#endif
     }
     cut = workgroup_sum(cut, t);

@@ -13,12 +13,16 @@
 fn of_water(i: u32, x: vec3f, near: u32) -> f32 {
     let own = pressure[i];
     var sum = vec3f(0.0);
+    var level = 0.0;
     for (var k = 0u; k < near; k++) {
         let j = neighbour_list_at(k, i);
         let r = offset(x, position[j].xyz);
-        sum += (pressure[j] + own) * pair_vector(weight(dot(r, r)), r);
+        let w = weight(dot(r, r));
+        sum += (pressure[j] + own) * pair_vector(w, r);
+        level += (pressure[j] + own) * w;
     }
-    return 0.5 * params.spacing * params.gradient_scale * length(sum);
+    let size = 0.5 * params.spacing * params.gradient_scale * length(sum);
+    return select(size, -size, level < 0.0);
 }
 
 fn of_wall(i: u32, x: vec3f, near: u32) -> f32 {

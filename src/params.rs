@@ -164,6 +164,8 @@ pub struct Params {
     pub relaxation: Relaxation,
     /// Whether its speed is the largest of a derived one, which follows the flow.
     pub follows_flow: bool,
+    /// Whether water pulls.
+    pub suction: bool,
     /// alpha of Eq. (8) [1/Pa], if typed.
     pub compressibility: Option<f64>,
     /// How colliding pairs share their impulses.
@@ -199,6 +201,8 @@ pub struct Step {
     pub compressibility: f64,
     /// Pressure at which the clamp acts [Pa].
     pub pressure_max: f64,
+    /// Pressure below which it is cut [Pa]: 0 where water does not pull.
+    pub pressure_min: f64,
     /// Speed by which particles at rest shift, over the imbalance [m/s].
     pub shift_speed: f64,
 }
@@ -291,6 +295,7 @@ impl Params {
             speed_at_start: scene.fastest(),
             relaxation,
             follows_flow,
+            suction: fluid.is_some_and(|f| f.suction),
             compressibility: fluid.and_then(|f| f.compressibility),
             collision: if paper { Collision::Single } else { Collision::Shared },
             collision_distance: fluid.map_or(0.8, |f| f.collision_distance) * l0,
@@ -425,7 +430,8 @@ impl Params {
         let head = self.gravity.length() * self.depth;
         let compressibility =
             self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));
-        let ahead = if self.source == Source::Mixed && !self.filled {
+        let pulls = self.filled || self.suction;
+        let ahead = if self.source == Source::Mixed && !pulls {
             // Half a step, the change of velocity, half a step with the new one: of second order, and it damps no oscillation.
             0.5 * dt
         } else {
@@ -444,8 +450,9 @@ impl Params {
         // c_s is never 0: the noise of water at rest is not cut.
         let most = (c * c).max(head).max(viscous).max(driven);
         let pressure_max = 5.0 * self.density * most.max(slam);
-        let fastest = if self.filled { speed } else { 0.0 };
+        let pressure_min = if self.suction { -pressure_max } else { 0.0 };
+        let fastest = if pulls { speed } else { 0.0 };
         let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
-        Step { time, dt, ahead, relaxation, compressibility, pressure_max, shift_speed }
+        Step { time, dt, ahead, relaxation, compressibility, pressure_max, pressure_min, shift_speed }
     }
 }

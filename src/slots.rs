@@ -258,9 +258,9 @@ impl Slots {
         let of = |Found { slot, .. }: &Found| {
             let mut beside: Vec<(usize, f64)> = slot.rim.iter().copied().zip(&mut rest).collect();
             let at_mouth: Vec<(usize, f64)> = slot.mouth.iter().copied().zip(&mut rest).collect();
-            let is_wet = |m: &u32| slot.rim.binary_search(&(*m as usize)).is_ok_and(|at| beside[at].1 > 0.0);
+            let is_wet = |m: &u32| slot.rim.binary_search(&(*m as usize)).is_ok_and(|at| beside[at].1 != 0.0);
             let alone =
-                |(n, p): &(usize, f64)| *p > 0.0 && !self.layers[slot.solid].adjacent[*n].iter().any(is_wet);
+                |(n, p): &(usize, f64)| *p != 0.0 && !self.layers[slot.solid].adjacent[*n].iter().any(is_wet);
             let shallow: Vec<(usize, f64)> = at_mouth.into_iter().filter(alone).collect();
             beside.extend(shallow);
             beside
@@ -356,7 +356,7 @@ impl Slots {
         let axes = DMat3::from_quat(pose.orientation);
         let along = || passing.iter().map(|row| axes.transpose() * xi(row.0));
         let ends = [along().fold(DVec3::INFINITY, DVec3::min), along().fold(DVec3::NEG_INFINITY, DVec3::max)];
-        Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p > 0.0), axes, ends }
+        Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p != 0.0), axes, ends }
     }
 
     /// The rows that lie in the slot, and those at its rim with what they pass on; `told` are the rim and its
@@ -402,7 +402,7 @@ impl Slots {
         };
         // A row of the rim in the air presses nothing, but its height tells where P = 0 is: its part goes with those under water.
         let (wet, dry): (Vec<_>, Vec<_>) =
-            passing.iter().map(|&(n, p)| (n, p > 0.0 || !any_wet, passed(n))).partition(|row| row.1);
+            passing.iter().map(|&(n, p)| (n, p != 0.0 || !any_wet, passed(n))).partition(|row| row.1);
         let mut of_dry = Wrench::default();
         dry.iter().for_each(|(.., (_, head))| of_dry += *head);
         let solid = slot.solid as u32;
@@ -442,10 +442,10 @@ impl Slots {
         pose: &'a Pose,
         told: &'a [(usize, f64)],
     ) -> impl Fn(usize) -> DVec3 + 'a {
-        let any_wet = told.iter().any(|&(_, p)| p > 0.0);
+        let any_wet = told.iter().any(|&(_, p)| p != 0.0);
         let offset = &self.layers[slot.solid].offset;
         move |n| {
-            let dry = slot.rim.binary_search(&n).ok().filter(|&at| any_wet && told[at].1 <= 0.0);
+            let dry = slot.rim.binary_search(&n).ok().filter(|&at| any_wet && told[at].1 == 0.0);
             pose.orientation * dry.map_or(offset[n], |at| slot.edge[at])
         }
     }

@@ -74,6 +74,7 @@ mod stability;
 mod study;
 mod study_files;
 mod study_measures;
+mod suction;
 mod surface;
 mod tables;
 mod twins;

@@ -310,6 +310,7 @@ fn structs_lie_the_same_on_both_sides() {
             source_divergence,
             compressibility,
             pressure_max,
+            pressure_min,
             speed_per_bin,
             shift_speed,
             ahead,

@@ -125,7 +125,7 @@ fn what_cannot_be_made_is_told_with_line_and_remedy() {
     // Another depth than that of the water there is odd, and may be meant.
     std::fs::write(&path, flume(&regular("height = 0.02, period = 1.5, depth = 0.1"), "")).unwrap();
     let plan = ran(&["plan", &path.display().to_string()]);
-    let odd = "the wave is made for water 0.1 m deep, and that at the piston is";
+    let odd = "the wave is made for water 0.1000 m deep, and that at the piston is";
     assert!(plan.code == 0 && plan.err.contains(odd), "{}", plan.err);
     // A fill stands on what the piston stands on, and counts where it begins nearest to it.
     let filled = |more: &str, keys: &str| {
@@ -147,7 +147,7 @@ fn what_cannot_be_made_is_told_with_line_and_remedy() {
         assert!(!plan.err.contains("the wave is made for"), "{}", plan.err);
     }
     let plan = filled("", ", depth = 0.3");
-    let odd = "the wave is made for water 0.3 m deep, and that at the piston is 0.2000 m deep";
+    let odd = "the wave is made for water 0.3000 m deep, and that at the piston is 0.2000 m deep";
     assert!(plan.code == 0 && plan.err.contains(odd), "{}", plan.err);
     // Water elsewhere: the depth has to be said.
     let text = flume(&regular("height = 0.08, period = 1.5"), "")

@@ -4,6 +4,7 @@
 
 use super::{AXES, Case, Choice, Face, Fluid, Vector};
 use crate::error::{CaseError, Problem, Result};
+use crate::scheme::{Gradient, Source};
 
 /// Most iterations of a solve: beyond, a step would not come to its end.
 const MOST_ITERATIONS: u32 = 1_000_000;
@@ -176,6 +177,10 @@ impl Checker<'_> {
         if let Some(friction) = fluid.wall_friction {
             let what = "0 to 1 (0.0025 for smooth walls, 0 for none)";
             self.range("fluid.wall_friction", friction, (0.0..=1.0).contains(&friction), what);
+        }
+        if fluid.suction && (fluid.source() != Source::Mixed || fluid.gradient() != Gradient::Consistent) {
+            let message = "the paper's source and gradient know no pressures below zero";
+            self.add("fluid.suction", message, "remove `suction`, or use preset = \"accurate\"");
         }
         let beta = fluid.free_surface_threshold;
         self.range(

@@ -102,7 +102,7 @@ impl Checker<'_> {
                 "up to {speed:.3e} m/s, {spacings:.1} particles in a time step: the solid would jump through what is \
                  in its way"
             );
-            let adaptive = if adapts { "" } else { ", or run.adaptive = true" };
+            let adaptive = if adapts || self.case.fluid.is_none() { "" } else { ", or run.adaptive = true" };
             let remedy = format!(
                 "check its period [s] and how far it goes, or use run.time_step = {:.1e} or less{adaptive}",
                 l0 / speed
@@ -363,7 +363,8 @@ impl Checker<'_> {
                      jump through what is in its way",
                     pair[1][0] - pair[0][0]
                 );
-                let adaptive = if adapts { "" } else { ", or run.adaptive = true" };
+                let adaptive =
+                    if adapts || self.case.fluid.is_none() { "" } else { ", or run.adaptive = true" };
                 let remedy = format!(
                     "give the motion more time, or use run.time_step = {:.1e} or less{adaptive}",
                     l0 / speed

@@ -297,8 +297,18 @@ impl Checker<'_> {
             return;
         };
         match contact.spring {
-            Some(spring) if contact.law == Law::Pressure => self.not_negative("contact.spring", spring, "N/m"),
+            Some(spring) if contact.law == Law::Pressure => {
+                self.not_negative("contact.spring", spring, "N/m")
+            }
             Some(spring) => self.spring(spring),
+            None if contact.law == Law::Paper => {
+                let message = "the paper's law has no spring but the one that is given";
+                self.add(
+                    "contact.spring",
+                    message,
+                    "add `spring` [N/m], e.g. 1e5; `seixo plan` then tells what the bodies ask for",
+                );
+            }
             None => {}
         }
         self.one_of(

@@ -37,8 +37,8 @@ pub struct Contact {
     /// Contact law.
     #[serde(default = "Contact::default_law")]
     pub law: Law,
-    /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none. If absent what the masses and heights of the case ask for: it stops the
-    /// heaviest body, fallen as far as it can or as fast as it starts, and carries its weight; `seixo plan` tells it.
+    /// Spring coefficient K [N/m], Eq. (10); law "pressure" has none, law "paper" wants it. If absent it stops the heaviest body, fallen as far as it
+    /// can or as fast as it starts, within a tenth of a spacing and carries its weight, as far as the sub-steps carry it; `seixo plan` tells it.
     #[cfg_attr(test, schemars(range(min = 1e-9, max = 1e18)))]
     pub spring: Option<f64>,
     /// Damping coefficient C [kg/s], Eq. (11). Give this, `damping_ratio` or `restitution`.

@@ -233,15 +233,23 @@ fn read(name: &str, text: String, overridden: bool) -> Result<(Case, String, Vec
     });
     let too_long: Vec<Problem> = too_long.collect();
     let mut wrong_copies = lay_out(&mut case);
-    let wet = case.fluid.is_some();
-    if wrong_copies.is_empty() && !case.run.take_time_step(wet) {
-        let message = "there is none, and without gravity nothing tells one";
-        wrong_copies.push(Problem::new("run.time_step", message, "add it [s] to [run]"));
-    }
+    let run = table.get_ref().get("run").and_then(|run| run.get_ref().as_table());
+    let in_run = |key: &str| run.and_then(|run| run.get(key));
+    let adaptive = in_run("adaptive").and_then(|value| value.get_ref().as_bool());
+    let no_step = match in_run("time_step") {
+        None => case.take_time_step(adaptive),
+        // NaN stands for none.
+        Some(_) if case.run.time_step.is_nan() => Some(Problem::new(
+            "run.time_step",
+            "it is not a finite number",
+            "give it in seconds, or leave it out",
+        )),
+        Some(_) => None,
+    };
     if wrong_copies.is_empty() {
         wrong_copies = case.written.problems(check(&case));
     }
-    let problems = too_long.into_iter().chain(wrong_copies);
+    let problems = too_long.into_iter().chain(no_step).chain(wrong_copies);
     let (warnings, errors): (Vec<_>, Vec<_>) = problems.partition(|p| p.warning);
     if !errors.is_empty() {
         let shown: Vec<Message> = errors.iter().take(MOST_SHOWN).map(located).collect();

@@ -48,6 +48,10 @@ pub struct Fluid {
     /// friction coefficient. 0 leaves the stage out. If absent 0.0025, smooth walls; none with the paper's preset.
     #[cfg_attr(test, schemars(range(min = 0, max = 1)))]
     pub wall_friction: Option<f64>,
+    /// Water pulls: pressures below that of the air are kept and not set to zero, as far as water meets no air there. For siphons, bodies that
+    /// are lifted out, water that spins; where air would come in, as behind what leaves a splash, water clings for longer than it should.
+    #[serde(default)]
+    pub suction: bool,
     /// Set of scheme switches; the keys below override single ones.
     #[serde(default)]
     pub preset: Preset,

@@ -23,6 +23,7 @@ mod names;
 mod opening;
 mod output;
 mod overrides;
+mod pace;
 mod report;
 mod scatter;
 mod section;
@@ -56,7 +57,6 @@ pub use water::{Fill, WaterShape};
 pub(crate) use wave::Guide;
 pub use wave::{Sine, Swing, WaveMaker};
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Names of the axes.
@@ -121,8 +121,8 @@ pub struct Run {
     /// Initial distance between particles l0 [m].
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub spacing: f64,
-    /// Time step [s]; the largest one when `adaptive = true`. If absent `adaptive` holds, and the largest is 0.2 sqrt(l0 / g), in a dry
-    /// scene a quarter of that; without gravity it must be given.
+    /// Time step [s]; the largest one when `adaptive = true`. If absent 0.05 sqrt(l0 / g) where there is a fluid, and `adaptive` holds; in a dry scene
+    /// 0.02 sqrt(l0 / g), less where solids start or are driven faster than a third of a spacing in it. Without gravity it must be given.
     #[serde(default = "Run::no_time_step", skip_serializing_if = "Run::is_absent")]
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub time_step: f64,
@@ -175,23 +175,6 @@ impl Default for Checkpoint {
 }
 
 impl Run {
-    /// Takes the time step of a case that gives none; `wet` if it has a fluid. `false` if nothing tells one.
-    pub(crate) fn take_time_step(&mut self, wet: bool) -> bool {
-        if !Self::is_absent(&self.time_step) {
-            return true;
-        }
-        let gravity = DVec3::from(self.gravity).length();
-        // Water is held back by bounds of its own. Nothing else holds back solids, whose contact cuts the step by itself.
-        let part = if wet { 0.2 } else { 0.05 };
-        let step = part * (self.spacing / gravity).sqrt();
-        // What is wrong with these is told elsewhere.
-        let sound = self.spacing > 0.0 && self.spacing.is_finite() && gravity.is_finite();
-        let step = if sound { step } else { 1e-3 };
-        // Two digits, as one would type it; a shorter run is one step.
-        self.time_step = format!("{step:.1e}").parse().unwrap_or(step).min(self.end);
-        self.adaptive |= wet;
-        step.is_finite()
-    }
     fn no_time_step() -> f64 {
         f64::NAN
     }

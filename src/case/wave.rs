@@ -231,11 +231,17 @@ impl MovingWall {
         let ahead = |f: &&super::Fill| sign * (f.seed[axis] - face);
         let fills = case.fluid.iter().flat_map(|f| &f.fill).filter(|f| ahead(f) > 0.0);
         let off = |f: &&super::Fill| {
-            let beside = if flat { 0.0 } else { (lo[across] - f.seed[across]).max(f.seed[across] - hi[across]).max(0.0) };
+            let beside = if flat {
+                0.0
+            } else {
+                (lo[across] - f.seed[across]).max(f.seed[across] - hi[across]).max(0.0)
+            };
             ahead(f).hypot(beside)
         };
         let fill = fills.min_by(|a, b| off(a).total_cmp(&off(b)))?;
-        let ground = tank.filter(|tank| lo[2] - tank < near).unwrap_or(lo[2]);
+        // With nothing else in the tank it hangs.
+        let bare = case.obstacle.is_empty() && case.plane.is_empty();
+        let ground = tank.filter(|tank| bare || lo[2] - tank < near).unwrap_or(lo[2]);
         Some(fill.level - ground).filter(|depth| *depth > 0.0)
     }
 }

@@ -45,14 +45,16 @@ pub(super) fn spring(contact: &case::Contact, scene: &Scene, bodies: &[Body]) ->
     let mut limits = Limits::new(Some(&any), scene, bodies)?;
     let law = (kind(any.law).make)(&any, scene, bodies, &mut limits)?;
     let heaviest = heaviest(bodies);
-    let Some((stopping, _)) = law.spring(heaviest * limits.falling.powi(2)) else { return Ok(None) };
+    let falling = limits.impact();
+    let Some((stopping, _)) = law.spring(heaviest * falling.powi(2)) else { return Ok(None) };
     let carrying = heaviest * limits.gravity / (CARRIED * scene.spacing);
-    let sinking = if law.softens() { heaviest * (limits.falling / (SINKS * scene.spacing)).powi(2) } else { 0.0 };
+    let sinking = if law.softens() { heaviest * (falling / (SINKS * scene.spacing)).powi(2) } else { 0.0 };
     let spring = format!("{:.1e}", stopping.max(carrying).max(sinking)).parse().unwrap_or(0.0);
     if spring > 0.0 {
         return Ok(Some(spring));
     }
-    let message = "contact: nothing falls and nothing moves at the start, which would tell the stiffness of contact";
+    let message =
+        "contact: nothing falls and nothing moves at the start, which would tell the stiffness of contact";
     Err(Error::key("contact", message, "add `spring` [N/m], e.g. 1e5, to [contact]"))
 }
 
@@ -99,11 +101,15 @@ impl Solids {
         }
         // Where nothing can fall, nothing asks for one.
         let recommended = recommended.filter(|_| energy > 0.0);
-        if let Some((wanted, soft)) = &recommended {
-            let has = if self.limits.given { "the case has" } else { "the case gives none and gets" };
+        if !self.limits.given && law.spring(1.0).is_some() {
+            words.push(format!(
+                "contact: no spring is given: {spring:.1e} N/m stop the heaviest body ({heaviest:.3e} kg) at {:.1} m/s and carry its weight",
+                self.limits.impact()
+            ));
+        } else if let Some((wanted, soft)) = &recommended {
             words.push(format!(
                 "contact: the heaviest body ({heaviest:.3e} kg) at {:.1} m/s asks for a spring of about {wanted:.1e} \
-                 N/m; {has} {spring:.1e}",
+                 N/m; the case has {spring:.1e}",
                 self.limits.falling
             ));
             if spring < 0.1 * wanted {
@@ -117,20 +123,28 @@ impl Solids {
                 worst.softest
             ));
         }
+        // Where the sub-steps carry no more, a stiffer spring is none.
+        let stiffer = |spring: String| {
+            if worst.softest < 0.999 * self.limits.spring {
+                "a smaller run.time_step carries a stiffer contact".to_owned()
+            } else {
+                format!("{spring}, where the sub-steps carry it")
+            }
+        };
         let weight = heaviest * self.limits.gravity;
         let resting = weight / worst.softest / self.spacing;
         if law.softens() && resting > SIZABLE {
             words.push(format!(
-                "contact: the weight of the heaviest body alone presses {resting:.2} spacings deep, and may squeeze a small one out; \
-                 a spring of {:.1e} N/m makes it a tenth of one, where the sub-steps carry it",
-                weight / (CARRIED * self.spacing)
+                "contact: the weight of the heaviest body alone presses {resting:.2} spacings deep, and may squeeze a small one out; {}",
+                stiffer(format!("a spring of {:.1e} N/m makes it a tenth of one", weight / (CARRIED * self.spacing)))
             ));
         }
         let sinks = self.limits.falling * (heaviest / worst.softest).sqrt() / self.spacing;
         if law.softens() && sinks > 1.05 * SINKS {
             words.push(format!(
                 "contact: at that speed the heaviest body may press what lies between it and a wall {sinks:.2} \
-                 spacings deep; a spring four times as stiff halves that, where the sub-steps carry it"
+                 spacings deep; {}",
+                stiffer("a spring four times as stiff halves that".to_owned())
             ));
         }
         if self.limits.restores() && heaviest > HEAVIER * self.limits.lightest {

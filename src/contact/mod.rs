@@ -92,8 +92,7 @@ impl Solids {
         let free = bodies.iter().position(Body::is_free);
         if let (None, Some(k)) = (contact, free) {
             let name = &scene.solids[k].name;
-            let message =
-                format!("body \"{name}\" moves freely, so the case needs a table [contact]");
+            let message = format!("body \"{name}\" moves freely, so the case needs a table [contact]");
             return Err(Error::key("contact", message, ""));
         }
         let sprung = match contact {

@@ -123,6 +123,11 @@ impl Limits {
         })
     }
 
+    /// Speed [m/s] at which a body may hit something: where nothing is below, the room tells how far it falls.
+    pub fn impact(&self) -> f64 {
+        if self.falling > 0.0 { self.falling } else { self.fastest }
+    }
+
     /// Every kind of contact that can be the worst: each body on a wall, and the two most agile ones with each
     /// other.
     pub fn extremes(&self, bodies: &[Body]) -> Vec<(usize, Option<usize>)> {
@@ -263,8 +268,9 @@ fn falling_speed(scene: &Scene) -> f64 {
     let highest = free.map(|s| s.position.dot(up) + s.radius()).fold(f64::NEG_INFINITY, f64::max);
     // of each wall the lowest corner of the face that looks up most
     let floor = |w: &WallShape| {
-        let rise = (w.axes.transpose() * up).abs() * w.half;
-        w.center.dot(up) + 2.0 * rise.max_element() - rise.element_sum()
+        let along = (w.axes.transpose() * up).abs();
+        let rise = along * w.half;
+        w.center.dot(up) + 2.0 * rise[along.max_position()] - rise.element_sum()
     };
     let table = |s: &Solid| match &s.drive {
         Drive::Prescribed(_) => {
@@ -275,6 +281,9 @@ fn falling_speed(scene: &Scene) -> f64 {
     let tables = scene.solids.iter().filter_map(table);
     let lowest = scene.walls.iter().map(floor).chain(tables).fold(f64::INFINITY, f64::min);
     let fall = if lowest < highest && lowest.is_finite() { highest - lowest } else { 0.0 };
+    // On a hinge from its upper to its lower balance.
+    let arm = |s: &Solid| if let Drive::Free(body) = &s.drive { 2.0 * body.weight_arm.length() } else { 0.0 };
+    let fall = scene.solids.iter().map(arm).fold(fall, f64::max);
     let start = scene.solids_start();
     (start * start + 2.0 * scene.gravity.length() * fall.max(scene.depth)).sqrt()
 }

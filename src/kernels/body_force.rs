@@ -23,12 +23,13 @@ impl RowPressure {
     /// Pressure on the surface [Pa], which lies `to_surface` [m] from the particle. A particle without pressure before water without any is
     /// dry and has none.
     pub fn on_surface(&self, to_surface: DVec3, params: &Params) -> f64 {
-        self.in_force(to_surface, params).max(0.0)
+        let pressure = self.in_force(to_surface, params);
+        if params.suction { pressure } else { pressure.max(0.0) }
     }
 
     /// The same as it is in the force on solids: in the accurate scheme nothing is cut.
     pub fn in_force(&self, to_surface: DVec3, params: &Params) -> f64 {
-        let wet = self.pressure > 0.0 || self.excess < 0.0;
+        let wet = self.pressure != 0.0 || self.excess < 0.0;
         if wet { surface_pressure(self.pressure, self.excess, to_surface, params) } else { 0.0 }
     }
 }

@@ -1,13 +1,12 @@
 //! Whether a piston's wave is made for the water that stands before it.
 
 use super::build::Builder;
-use glam::IVec3;
 use std::collections::HashMap;
 
 /// How far before the face its water is looked at, in spacings.
 const BEFORE: f64 = 4.0;
 /// Depths that differ by more spacings do, whatever was rounded.
-const DIFFERS: f64 = 1.5;
+const DIFFERS: f64 = 1.05;
 
 impl Builder<'_> {
     /// Notes waves that are made for another depth than that of the water as it was laid.
@@ -20,28 +19,27 @@ impl Builder<'_> {
                 continue;
             };
             let across = 1 - axis;
-            // Lowest and highest cell of each column of water.
-            let mut columns: HashMap<[i32; 2], (i32, i32)> = HashMap::new();
+            let mut columns: HashMap<[i32; 2], Vec<i32>> = HashMap::new();
             for &c in &self.water.cell {
                 let x = self.lattice.center(c);
                 let ahead = sign * (x[axis] - face);
                 let beside = self.lattice.plane || (lo[across]..hi[across]).contains(&x[across]);
                 if beside && (0.0..BEFORE * l0).contains(&ahead) {
-                    let column = columns.entry([c.x, c.y]).or_insert((c.z, c.z));
-                    *column = (column.0.min(c.z), column.1.max(c.z));
+                    columns.entry([c.x, c.y]).or_default().push(c.z);
                 }
             }
-            let ends = |(low, high): (i32, i32)| {
-                let corner = |z| self.lattice.corner(IVec3::new(0, 0, z)).z;
-                corner(high + 1) - corner(low)
+            // What hangs above the water with air between is not there yet.
+            let height = |mut cells: Vec<i32>| {
+                cells.sort_unstable();
+                1 + cells.windows(2).take_while(|pair| pair[1] == pair[0] + 1).count()
             };
-            let there = columns.into_values().map(ends).fold(0.0, f64::max);
+            let there = l0 * columns.into_values().map(height).max().unwrap_or(0) as f64;
             let depth = wave.wanted.depth;
             if (there - depth).abs() > DIFFERS * l0 {
                 let there = if there > 0.0 { format!("{there:.4} m deep") } else { "not there".into() };
                 self.notes.push(format!(
-                    "moving wall `{}`: the wave is made for water {depth} m deep, and that at the piston is {there}: `depth` in its `wave` says \
-                     what it is made for",
+                    "moving wall `{}`: the wave is made for water {depth:.4} m deep, and that at the piston is {there}: `depth` in its `wave` \
+                     says what it is made for",
                     wall.name
                 ));
             }

@@ -437,7 +437,7 @@ fn limits(run: &Run) -> Result<String> {
     let bounds = Bounds::new(&params, expected_speed(&params));
     let same = |a: f64, b: f64| (a - b).abs() < 1e-6 * b;
     let mut counts = [
-        ("run.time_step, as typed", 0),
+        ("run.time_step", 0),
         ("the sound speed", 0),
         ("viscosity", 0),
         ("the drag on a light body", 0),

@@ -149,8 +149,8 @@ impl Cpu {
         let Self { fields, share, .. } = self;
         let share = share.as_deref();
         let cut = |(i, p): (usize, &mut f64)| {
-            let (high, low) = (*p > step.pressure_max, *p < 0.0);
-            *p = p.clamp(0.0, step.pressure_max);
+            let (high, low) = (*p > step.pressure_max, *p < step.pressure_min);
+            *p = p.clamp(step.pressure_min, step.pressure_max);
             let counts = owns(share, i);
             [u64::from(high && counts), u64::from(low && counts)]
         };
