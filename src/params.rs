@@ -435,8 +435,8 @@ impl Params {
             // Half a step, the change of velocity, half a step with the new one: of second order, and it damps no oscillation.
             0.5 * dt
         } else {
-            // Semi-implicit MPS: r* is the end of the step, and what changes a velocity there moves the particle as well. Where there
-            // is no surface pressures pull, and without that damping particles crowd.
+            // Semi-implicit MPS: r* is the end of the step, and what changes a velocity there moves the particle as well. Where water
+            // pulls, without a surface or by suction, and without that damping particles crowd.
             dt
         };
         let c = self.sound_speed(dt);

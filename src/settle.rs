@@ -55,7 +55,7 @@ pub(crate) fn settle(
     let mut cpu = Cpu::new(&part, &still, &plan, settings)?;
     // Any time step gives the same places.
     let step = still.step(0.0, 1.0, 0.0).whole();
-    let step = Step { relaxation: RATE, pressure_max: f64::INFINITY, ..step };
+    let step = Step { relaxation: RATE, pressure_max: f64::INFINITY, pressure_min: 0.0, ..step };
     for _ in 0..MOST_STEPS {
         for stage in ParticleStage::TO_SOURCE {
             cpu.run(stage, &step)?;

@@ -132,6 +132,8 @@ struct Field {
     mean: f64,
     slope: DVec3,
     any_wet: bool,
+    /// Pressure below which there is air [Pa].
+    lowest: f64,
     /// Axes of the body's frame, and least and largest xi of the rim along each.
     axes: DMat3,
     ends: [DVec3; 2],
@@ -155,6 +157,8 @@ pub struct Slots {
     weight: DVec3,
     /// Whether the water has no surface, and pressures are known up to a constant.
     closed: bool,
+    /// Whether water pulls.
+    suction: bool,
     flat: bool,
     /// Lowest and highest corner of the domain [m].
     domain: Bounds,
@@ -182,6 +186,7 @@ impl Slots {
             spacing: l0,
             weight: params.density * params.gravity,
             closed: params.filled,
+            suction: params.suction,
             flat: scene.dimensions == 2,
             domain: scene.domain,
             fixed: PointGrid::new(fixed, CELL * l0),
@@ -342,8 +347,20 @@ impl Slots {
         Faced { share, opposite: first.1, by_face }
     }
 
-    /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`.
-    fn field(&self, pose: &Pose, passing: &[(usize, f64)], place: impl Fn(usize) -> DVec3) -> Field {
+    /// Pressure below which there is air in a slot with these pressures at its rim [Pa]: where water pulls none comes into one that is all under
+    /// water.
+    fn lowest(&self, mut told: impl Iterator<Item = f64>) -> f64 {
+        if self.suction && told.all(|p| p != 0.0) { f64::NEG_INFINITY } else { 0.0 }
+    }
+
+    /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`; `lowest` as [`Self::lowest`] tells.
+    fn field(
+        &self,
+        pose: &Pose,
+        passing: &[(usize, f64)],
+        place: impl Fn(usize) -> DVec3,
+        lowest: f64,
+    ) -> Field {
         let count = passing.len() as f64;
         let middle = passing.iter().map(|&(n, _)| place(n)).sum::<DVec3>() / count;
         let xi = |n: usize| (place(n) - middle) / self.spacing;
@@ -356,7 +373,16 @@ impl Slots {
         let axes = DMat3::from_quat(pose.orientation);
         let along = || passing.iter().map(|row| axes.transpose() * xi(row.0));
         let ends = [along().fold(DVec3::INFINITY, DVec3::min), along().fold(DVec3::NEG_INFINITY, DVec3::max)];
-        Field { middle, inverse, mean, slope, any_wet: passing.iter().any(|&(_, p)| p != 0.0), axes, ends }
+        Field {
+            middle,
+            inverse,
+            mean,
+            slope,
+            any_wet: passing.iter().any(|&(_, p)| p != 0.0),
+            lowest,
+            axes,
+            ends,
+        }
     }
 
     /// The rows that lie in the slot, and those at its rim with what they pass on; `told` are the rim and its
@@ -368,10 +394,10 @@ impl Slots {
         let place = self.places(slot, pose, told);
         let passing = self.passing(told.to_vec(), |n| pose.orientation * layer.offset[n]);
         let count = passing.len() as f64;
-        let field = self.field(pose, &passing, &place);
+        let field = self.field(pose, &passing, &place, self.lowest(told.iter().map(|row| row.1)));
         let Field { middle, inverse, any_wet, .. } = field;
         let xi = |n: usize| field.xi(place(n), self.spacing);
-        let under_water = |n: usize, at: DVec3| !any_wet || self.in_slot(&field, place(n), at) > 0.0;
+        let under_water = |n: usize, at: DVec3| !any_wet || self.in_slot(&field, place(n), at) > field.lowest;
         // sum_f S_f and sum_f xi_f S_f; the same with the weight of water from the rim's middle to the surface in the slot.
         let (mut mean, mut slope) = ([Wrench::default(); 2], [[Wrench::default(); 3]; 2]);
         let areas = layer.areas(&layer.area, found, pose);
@@ -461,11 +487,11 @@ impl Slots {
     fn passing(&self, rows: Vec<(usize, f64)>, place: impl Fn(usize) -> DVec3) -> Vec<(usize, f64)> {
         // Pressure that the row's height and the water above it make: P at the height of the centre of mass.
         let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n));
-        let wet = rows.iter().filter(|(_, p)| *p > 0.0);
+        let wet = rows.iter().filter(|(_, p)| *p != 0.0);
         let highest = wet.map(level).fold(f64::NEG_INFINITY, f64::max);
         if highest == f64::NEG_INFINITY {
             return rows;
         }
-        rows.into_iter().filter(|row| row.1 > 0.0 || level(row) <= highest).collect()
+        rows.into_iter().filter(|row| row.1 != 0.0 || level(row) <= highest).collect()
     }
 }

@@ -35,7 +35,7 @@ fn a_report_holds_everything_and_fetches_nothing() {
         "gate: place [m]",
         "of motion",
         "conjugate gradient",
-        "The time step was set by run.time_step, as typed (100 %)",
+        "The time step was set by run.time_step (100 %)",
         "spacing = 0.05",
         "max=\"4\"",
     ] {

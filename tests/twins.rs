@@ -445,6 +445,17 @@ fn surface_pressure() {
         let off = gpu.state.iter().zip(&gpu.surface_pressure).filter(|(s, _)| **s != State::Surface);
         assert!(off.into_iter().all(|(_, p)| *p == 0.0));
         pair.check(Stage::SurfacePressure);
+        // Where water pulls.
+        let mut fields = pair.gpu.read().expect("readable");
+        fields.pressure.iter_mut().for_each(|p| *p = -*p);
+        pair.gpu.write(&fields).expect("writable");
+        pair.sync();
+        pair.run_all(&LISTS);
+        pair.run(Stage::NumberDensity);
+        pair.run(Stage::SurfacePressure);
+        let (gpu, _) = pair.fields();
+        assert!(gpu.surface_pressure[..fluid].iter().filter(|&&p| p < -10.0).count() > 2);
+        pair.check(Stage::SurfacePressure);
     });
 }
 

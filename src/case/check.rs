@@ -134,6 +134,10 @@ impl Checker<'_> {
     fn run(&mut self) {
         let run = &self.case.run;
         self.positive("run.spacing", run.spacing, "m");
+        // NaN stands for none, and is no number that a case is written with.
+        if run.time_step.is_nan() {
+            self.add("run.time_step", "it is not a finite number", "give it in seconds, or leave it out");
+        }
         self.positive("run.time_step", run.time_step, "s");
         self.positive("run.end", run.end, "s");
         self.in_plane("run.gravity", &run.gravity);

@@ -159,7 +159,7 @@ impl Checker<'_> {
     }
 
     /// A spring that a body's own weight presses through is none.
-    fn spring(&mut self, spring: f64) {
+    fn spring(&mut self, spring: f64, law: Law) {
         let run = &self.case.run;
         if spring.is_nan() || spring <= 0.0 {
             self.positive("contact.spring", spring, "N/m");
@@ -168,6 +168,9 @@ impl Checker<'_> {
         if !(SPRING_LEAST..=SPRING_MOST).contains(&spring) {
             let allowed = format!("{SPRING_LEAST:e} to {SPRING_MOST:e} N/m");
             self.range("contact.spring", spring, false, &allowed);
+            return;
+        }
+        if law == Law::Pressure {
             return;
         }
         let (spacing, flat) = (run.spacing, self.flat());
@@ -297,10 +300,7 @@ impl Checker<'_> {
             return;
         };
         match contact.spring {
-            Some(spring) if contact.law == Law::Pressure => {
-                self.not_negative("contact.spring", spring, "N/m")
-            }
-            Some(spring) => self.spring(spring),
+            Some(spring) => self.spring(spring, contact.law),
             None if contact.law == Law::Paper => {
                 let message = "the paper's law has no spring but the one that is given";
                 self.add(

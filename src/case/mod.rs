@@ -122,7 +122,7 @@ pub struct Run {
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub spacing: f64,
     /// Time step [s]; the largest one when `adaptive = true`. If absent 0.05 sqrt(l0 / g) where there is a fluid, and `adaptive` holds; in a dry scene
-    /// 0.02 sqrt(l0 / g), less where solids start or are driven faster than a third of a spacing in it. Without gravity it must be given.
+    /// 0.02 sqrt(l0 / g), less where solids start or are driven along faster than a third of a spacing in it (turns left out). Without gravity it must be given.
     #[serde(default = "Run::no_time_step", skip_serializing_if = "Run::is_absent")]
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub time_step: f64,

@@ -206,6 +206,19 @@ impl MovingWall {
         Some((axis, sign, if sign > 0.0 { hi[axis] } else { lo[axis] }))
     }
 
+    /// Whether ground is under it, a box from `lo` to `hi` [m]: an obstacle that reaches up to it, or one or a plane whose reach no box tells.
+    fn stands_on(&self, case: &Case, lo: Vector, hi: Vector) -> bool {
+        let l0 = case.run.spacing;
+        let flat = case.run.dimensions == 2;
+        let under = |o: &super::Obstacle| {
+            o.corners().is_none_or(|(min, max)| {
+                let over = |k: usize| min[k] < hi[k] + l0 && max[k] > lo[k] - l0;
+                over(0) && (flat || over(1)) && (max[2] - lo[2]).abs() < 1.5 * l0
+            })
+        };
+        !case.plane.is_empty() || case.obstacle.iter().any(under)
+    }
+
     /// Depth of the water that stands before its face at the start [m], from the blocks there and the tank's floor, or from
     /// the fill that begins nearest to it and what it stands on.
     fn still_depth(&self, case: &Case) -> Option<f64> {
@@ -224,10 +237,7 @@ impl MovingWall {
         let (floor, level) =
             blocks.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x.min[2]), b.max(x.max[2])));
         let tank = case.tank.as_ref().filter(|t| !t.open.contains(&Face::ZMin)).map(|t| t.min[2]);
-        if level > floor {
-            return Some(level - tank.map_or(floor, |tank| floor.max(tank))).filter(|depth| *depth > 0.0);
-        }
-        // Of fills that of the nearest seed before the face. It begins at the ground that the piston stands on.
+        // Of fills that of the nearest seed before the face, which may lie on a block. It begins at the ground under the piston.
         let ahead = |f: &&super::Fill| sign * (f.seed[axis] - face);
         let fills = case.fluid.iter().flat_map(|f| &f.fill).filter(|f| ahead(f) > 0.0);
         let off = |f: &&super::Fill| {
@@ -238,10 +248,10 @@ impl MovingWall {
             };
             ahead(f).hypot(beside)
         };
-        let fill = fills.min_by(|a, b| off(a).total_cmp(&off(b)))?;
-        // With nothing else in the tank it hangs.
-        let bare = case.obstacle.is_empty() && case.plane.is_empty();
-        let ground = tank.filter(|tank| bare || lo[2] - tank < near).unwrap_or(lo[2]);
-        Some(fill.level - ground).filter(|depth| *depth > 0.0)
+        let filled = fills.min_by(|a, b| off(a).total_cmp(&off(b))).map(|f| f.level);
+        let bed =
+            level.is_finite().then_some(floor).or_else(|| self.stands_on(case, lo, hi).then_some(lo[2]));
+        let bed = bed.into_iter().chain(tank).reduce(f64::max).or(filled.map(|_| lo[2]))?;
+        Some(filled.map_or(level, |filled| filled.max(level)) - bed).filter(|depth| *depth > 0.0)
     }
 }

@@ -264,7 +264,12 @@ fn fastest_speed(scene: &Scene) -> f64 {
 /// Speed [m/s] of a body that falls from where it starts to the lowest wall, or of water that falls its depth.
 fn falling_speed(scene: &Scene) -> f64 {
     let up = -scene.gravity.normalize_or_zero();
-    let free = scene.solids.iter().filter(|s| s.gives_way());
+    // On a hinge, or locked along gravity, a solid does not fall to the floor.
+    let falls = |s: &&Solid| match &s.drive {
+        Drive::Free(body) => (0..3).any(|k| up[k].abs() > 1e-9 && !body.locked_translation[k]),
+        Drive::Prescribed(_) => false,
+    };
+    let free = scene.solids.iter().filter(|s| s.gives_way()).filter(falls);
     let highest = free.map(|s| s.position.dot(up) + s.radius()).fold(f64::NEG_INFINITY, f64::max);
     // of each wall the lowest corner of the face that looks up most
     let floor = |w: &WallShape| {
@@ -281,7 +286,7 @@ fn falling_speed(scene: &Scene) -> f64 {
     let tables = scene.solids.iter().filter_map(table);
     let lowest = scene.walls.iter().map(floor).chain(tables).fold(f64::INFINITY, f64::min);
     let fall = if lowest < highest && lowest.is_finite() { highest - lowest } else { 0.0 };
-    // On a hinge from its upper to its lower balance.
+    // What hangs falls from its upper to its lower balance.
     let arm = |s: &Solid| if let Drive::Free(body) = &s.drive { 2.0 * body.weight_arm.length() } else { 0.0 };
     let fall = scene.solids.iter().map(arm).fold(fall, f64::max);
     let start = scene.solids_start();

@@ -3,7 +3,7 @@
 //!
 //! The consistent gradient carries water exactly and does not care how the particles lie; Eq. (9)'s repulsion, which
 //! spaced them, was noise of a tenth of gravity. Displacement (0.3 dt (sqrt(g l0) + |v|) l0) times the imbalance, after
-//! the particle shifting of Lind et al. (2012); particles on the free surface stay. Where there is no free surface the
+//! the particle shifting of Lind et al. (2012); particles on the free surface stay. Where there is no free surface, or water pulls, the
 //! fastest speed of the flow is added: particles are drawn out into lines where water parts, and v is zero there.
 
 use super::Particles;

@@ -72,6 +72,7 @@ impl Field {
         if self == Self::Density {
             return None;
         }
+        let pulls = self == Self::Pressure && values.iter().any(|v| *v < 0.0);
         values.iter_mut().for_each(|v| *v = v.abs());
         values.sort_by(f64::total_cmp);
         let most = *values.get((0.995 * values.len() as f64) as usize)?;
@@ -81,7 +82,7 @@ impl Field {
         // Two digits, upwards: a bar with round ends.
         let unit = 10_f64.powf(most.log10().floor() - 1.0);
         let most = (most / unit).ceil() * unit;
-        Some([if matches!(self, Self::Velocity(_)) { -most } else { 0.0 }, most])
+        Some([if pulls || matches!(self, Self::Velocity(_)) { -most } else { 0.0 }, most])
     }
 }
 

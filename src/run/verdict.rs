@@ -89,7 +89,7 @@ pub fn judge(summary: &Summary, scale: Scale, adaptive: bool) -> Verdict {
         judge.bound(pulled, PULLED, || {
             format!(
                 "{} pressures, {pulled:.2} of all, were negative and set to zero: water does not pull here, so that what only tension would \
-                 hold together flies apart",
+                 hold together flies apart; fluid.suction = true keeps them",
                 p.negative
             )
         });

@@ -141,7 +141,7 @@ impl Slots {
 
     /// Pressure of the `field` of a slot of solid `k` on the surface `at` a place before row `n`, from the centre of mass [m] [Pa].
     pub(super) fn before(&self, field: &Field, k: usize, pose: &Pose, n: usize, at: DVec3) -> f64 {
-        self.in_slot(field, pose.orientation * self.layers[k].offset[n], at).max(0.0)
+        self.in_slot(field, pose.orientation * self.layers[k].offset[n], at).max(field.lowest)
     }
 
     /// The pressure in the slot `f` without a rim, by the rims of those that lend it theirs; `None` where they are dry.
@@ -162,7 +162,8 @@ impl Slots {
             pressure[k].iter().map(move |&(n, p)| (place(n), p)).collect::<Vec<_>>()
         };
         let (places, told): (Vec<DVec3>, Vec<f64>) = f.lenders.iter().flat_map(of).unzip();
+        let lowest = self.lowest(told.iter().copied());
         let passing = self.passing(told.into_iter().enumerate().collect(), |n| places[n]);
-        Some(self.field(&poses[f.slot.solid], &passing, |n| places[n])).filter(|field| field.any_wet)
+        Some(self.field(&poses[f.slot.solid], &passing, |n| places[n], lowest)).filter(|field| field.any_wet)
     }
 }

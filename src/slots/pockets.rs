@@ -105,14 +105,15 @@ impl<'a> Closures<'a> {
             firsts.into_iter().zip(open).filter(|part| part.1).map(|part| part.0).collect();
         let is_open = |at: usize| open.binary_search(&part[at]).is_ok();
         let height = |at: usize| self.slots.weight.dot(pose.orientation * layer.offset[slot.rim[at]]);
-        let wet = (0..part.len()).filter(|&at| is_open(at) && told[at].1 > 0.0);
+        let wet = (0..part.len()).filter(|&at| is_open(at) && told[at].1 != 0.0);
         let (sum, count) = wet.fold((0.0, 0.0), |(sum, n), at| (sum + told[at].1 - height(at), n + 1.0));
         if count == 0.0 {
             return vec![];
         }
+        let lowest = self.slots.lowest(told.iter().map(|row| row.1));
         let seep = |at| match is_open(at) {
             true => Seep::default(),
-            false => Seep { link: SEEP, known: SEEP * (sum / count + height(at)).max(0.0) },
+            false => Seep { link: SEEP, known: SEEP * (sum / count + height(at)).max(lowest) },
         };
         (0..part.len()).map(seep).collect()
     }

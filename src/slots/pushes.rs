@@ -35,7 +35,11 @@ impl Push {
     /// The pressure a `way` off [m], with the weight of the water between [Pa]; none where either is dry.
     pub fn pressure_at(&self, way: DVec3, params: &Params) -> f64 {
         let pressure = self.pressure + params.density * params.gravity.dot(way);
-        if self.pressure == 0.0 { 0.0 } else { pressure.max(0.0) }
+        match self.pressure {
+            0.0 => 0.0,
+            _ if params.suction => pressure,
+            _ => pressure.max(0.0),
+        }
     }
 
     /// Its area as a face that looks along `normal` counts it [m2].
@@ -88,7 +92,8 @@ impl Slots {
             return self.lent(found, pressure, f, poses);
         }
         let passing = self.passing(told.clone(), |n| pose.orientation * self.layers[slot.solid].offset[n]);
-        Some(self.field(pose, &passing, self.places(slot, pose, told))).filter(|field| field.any_wet)
+        let lowest = self.lowest(told.iter().map(|row| row.1));
+        Some(self.field(pose, &passing, self.places(slot, pose, told), lowest)).filter(|field| field.any_wet)
     }
 
     /// What the water of the `field` in the slot `found` presses with the `areas` of its rows on that of what they look onto which `is_pressed`.
