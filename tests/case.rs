@@ -573,3 +573,27 @@ fn a_case_may_leave_out_its_time_step_and_its_spring() {
     assert!(told.contains("the case has") && same == derived, "{told}: {same} {derived}");
     assert!((derived.z - 0.1).abs() < 1e-2, "{derived}");
 }
+
+#[test]
+fn a_fall_ends_on_the_face_that_looks_up_and_on_a_hinge_at_the_lower_balance() {
+    let told = |solids: &str| {
+        let text = format!(
+            "[run]\nspacing = 0.05\ntime_step = 1e-3\nend = 1\ngravity = [0, 0, -10]\n[contact]\nfriction = 0.3\n{solids}"
+        );
+        let (case, ..) = file::parse("test.toml", text, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let simulation = crate::common::simulation(&case);
+        simulation.solids.advice(1e-3).words.join(" ")
+    };
+    // From a metre above the middle of a slope of 12 m at 30 degrees, a cube's half diagonal and all, to its lower end: 4.1 m and less.
+    let slope = told(
+        "[[plane]]\nname = \"slope\"\ncenter = [0, 0, 0]\nnormal = [0.5, 0, 0.8660254]\nalong = [0.8660254, 0, -0.5]\nsize = [12, 1]\n\
+         [[body]]\nname = \"cube\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0, 0, 1]\ndensity = 500",
+    );
+    assert!(slope.contains("at 9.1 m/s") || slope.contains("at 9.0 m/s"), "{slope}");
+    // 0.25 m below its hinge: sqrt(2 g 2 r).
+    let door = told(
+        "[tank]\nmin = [0, 0, 0]\nmax = [2, 2, 2]\nopen = [\"z_max\"]\n\
+         [[body]]\nname = \"door\"\nsize = [0.1, 0.5, 0.5]\ncenter = [1, 1, 1.7]\ndensity = 500\nhinge = { at = [1, 1, 1.95], axis = \"y\" }",
+    );
+    assert!(door.contains("at 3.2 m/s"), "{door}");
+}

@@ -103,7 +103,8 @@ impl Solids {
         let recommended = recommended.filter(|_| energy > 0.0);
         if !self.limits.given && law.spring(1.0).is_some() {
             words.push(format!(
-                "contact: no spring is given: {spring:.1e} N/m stop the heaviest body ({heaviest:.3e} kg) at {:.1} m/s and carry its weight",
+                "contact: no spring is given: {spring:.1e} N/m is taken, which stops the heaviest body ({heaviest:.3e} kg) at {:.1} m/s and carries its \
+                 weight",
                 self.limits.impact()
             ));
         } else if let Some((wanted, soft)) = &recommended {

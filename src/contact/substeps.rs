@@ -264,12 +264,8 @@ fn fastest_speed(scene: &Scene) -> f64 {
 /// Speed [m/s] of a body that falls from where it starts to the lowest wall, or of water that falls its depth.
 fn falling_speed(scene: &Scene) -> f64 {
     let up = -scene.gravity.normalize_or_zero();
-    // On a hinge, or locked along gravity, a solid does not fall to the floor.
-    let falls = |s: &&Solid| match &s.drive {
-        Drive::Free(body) => (0..3).any(|k| up[k].abs() > 1e-9 && !body.locked_translation[k]),
-        Drive::Prescribed(_) => false,
-    };
-    let free = scene.solids.iter().filter(|s| s.gives_way()).filter(falls);
+    let falls = |s: &&Solid| matches!(&s.drive, Drive::Free(body) if body.falls(up));
+    let free = scene.solids.iter().filter(falls);
     let highest = free.map(|s| s.position.dot(up) + s.radius()).fold(f64::NEG_INFINITY, f64::max);
     // of each wall the lowest corner of the face that looks up most
     let floor = |w: &WallShape| {

@@ -83,9 +83,11 @@ impl Scale {
                 own += body.mass * body.velocity.length_squared();
                 own += (body.inertia * body.angular_velocity * body.angular_velocity).element_sum();
                 // As far as it may fall, on a hinge from its upper to its lower balance.
-                let falls = (0..3).any(|k| up[k].abs() > 1e-9 && !body.locked_translation[k]);
-                let above =
-                    if falls { solid.position.dot(up) - floor } else { 2.0 * body.weight_arm.length() };
+                let above = if body.falls(up) {
+                    solid.position.dot(up) - floor
+                } else {
+                    2.0 * body.weight_arm.length()
+                };
                 own += body.mass * g * if above.is_finite() { above.max(0.0) } else { 0.0 };
             }
         }

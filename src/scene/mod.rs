@@ -187,6 +187,11 @@ pub struct FreeBody {
 }
 
 impl FreeBody {
+    /// Whether it can fall along `up`, to whatever is below; on a hinge it falls from its upper to its lower balance.
+    pub fn falls(&self, up: DVec3) -> bool {
+        (0..3).any(|k| up[k].abs() > 1e-9 && !self.locked_translation[k])
+    }
+
     /// Whether it is free to move in any way at all.
     pub fn gives_way(&self) -> bool {
         self.locked_translation != [true; 3] || self.locked_rotation != [true; 3]
