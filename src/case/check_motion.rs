@@ -90,19 +90,27 @@ impl Checker<'_> {
         [period, phase, ramp].into_iter().all(f64::is_finite) && period > 0.0 && ramp >= 0.0
     }
 
+    /// How many spacings a driven solid may go in a time step, and what helps beside a shorter one: an adaptive step follows a fast wall, but
+    /// not one that is there at once, and only in water.
+    fn pace_of_solids(&self) -> (f64, &'static str) {
+        match (self.case.fluid.is_some(), self.case.run.adaptive) {
+            (true, true) => (100.0, ""),
+            (true, false) => (1.0, ", or run.adaptive = true"),
+            (false, _) => (1.0, ""),
+        }
+    }
+
     /// A solid that crosses whole particles within a step passes through the water instead of pushing it.
     fn steady(&mut self, path: &str, speed: f64) {
         let run = &self.case.run;
         let Some(l0) = self.spacing().filter(|_| run.time_step > 0.0) else { return };
-        // An adaptive step follows a fast wall.
-        let adapts = run.adaptive && self.case.fluid.is_some();
+        let (most, adaptive) = self.pace_of_solids();
         let spacings = speed * run.time_step / l0;
-        if spacings > if adapts { 100.0 } else { 1.0 } {
+        if spacings > most {
             let message = format!(
                 "up to {speed:.3e} m/s, {spacings:.1} particles in a time step: the solid would jump through what is \
                  in its way"
             );
-            let adaptive = if adapts || self.case.fluid.is_none() { "" } else { ", or run.adaptive = true" };
             let remedy = format!(
                 "check its period [s] and how far it goes, or use run.time_step = {:.1e} or less{adaptive}",
                 l0 / speed
@@ -350,9 +358,7 @@ impl Checker<'_> {
     fn jumps(&mut self, path: &str, rows: &[[f64; 4]], way: &dyn Fn(&[f64; 4], &[f64; 4]) -> f64) {
         let run = &self.case.run;
         let Some(l0) = self.spacing().filter(|_| run.time_step > 0.0) else { return };
-        // An adaptive step follows a fast wall; nothing follows one that is there at once.
-        let adapts = run.adaptive && self.case.fluid.is_some();
-        let most = if adapts { 100.0 } else { 1.0 };
+        let (most, adaptive) = self.pace_of_solids();
         for (k, pair) in rows.windows(2).enumerate() {
             let way = way(&pair[0], &pair[1]);
             let speed = way / (pair[1][0] - pair[0][0]);
@@ -363,8 +369,6 @@ impl Checker<'_> {
                      jump through what is in its way",
                     pair[1][0] - pair[0][0]
                 );
-                let adaptive =
-                    if adapts || self.case.fluid.is_none() { "" } else { ", or run.adaptive = true" };
                 let remedy = format!(
                     "give the motion more time, or use run.time_step = {:.1e} or less{adaptive}",
                     l0 / speed
