@@ -1,5 +1,5 @@
 // Pressure of the particles on the free surface, P_s = |grad P| l0 / 2 with the pressures of the last step: P = 0 lies half a
-// spacing outside their centres. Walls beside the surface have the mean of the surface's particles around them, less the
+// spacing outside their centres; 0 where the water below pulls. Walls beside the surface have the mean of the surface's particles around them, less the
 // weight of what lies between.
 // Twin: src/kernels/surface_pressure.rs
 
@@ -21,8 +21,7 @@ fn of_water(i: u32, x: vec3f, near: u32) -> f32 {
         sum += (pressure[j] + own) * pair_vector(w, r);
         level += (pressure[j] + own) * w;
     }
-    let size = 0.5 * params.spacing * params.gradient_scale * length(sum);
-    return select(size, -size, level < 0.0);
+    return select(0.5 * params.spacing * params.gradient_scale * length(sum), 0.0, level < 0.0);
 }
 
 fn of_wall(i: u32, x: vec3f, near: u32) -> f32 {

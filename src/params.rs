@@ -423,6 +423,16 @@ impl Params {
         if self.depth > 0.0 { (REACH * self.depth).min(farthest) } else { farthest }
     }
 
+    /// Whether pressures are below that of the air somewhere.
+    fn pulls(&self) -> bool {
+        self.filled || self.suction
+    }
+
+    /// Speed by which the shift goes [m/s] in water as fast as `speed` [m/s]: that of a spacing's waves, and where water pulls its own.
+    pub fn shift_speed(&self, speed: f64) -> f64 {
+        (self.gravity.length() * self.spacing).sqrt() + if self.pulls() { speed } else { 0.0 }
+    }
+
     /// Coefficients of a step of `dt` [s] that starts at `time` [s]; `speed` is the largest expected of the water, of solids that are driven and of
     /// openings [m/s].
     pub fn step(&self, time: f64, dt: f64, speed: f64) -> Step {
@@ -430,13 +440,12 @@ impl Params {
         let head = self.gravity.length() * self.depth;
         let compressibility =
             self.compressibility.unwrap_or_else(|| self.derived_compressibility(dt, relaxation));
-        let pulls = self.filled || self.suction;
-        let ahead = if self.source == Source::Mixed && !pulls {
+        let ahead = if self.source == Source::Mixed && !self.pulls() {
             // Half a step, the change of velocity, half a step with the new one: of second order, and it damps no oscillation.
             0.5 * dt
         } else {
             // Semi-implicit MPS: r* is the end of the step, and what changes a velocity there moves the particle as well. Where water
-            // pulls, without a surface or by suction, and without that damping particles crowd.
+            // pulls, without a surface or by suction, and without that damping particles crowd, or splashes are thrown apart.
             dt
         };
         let c = self.sound_speed(dt);
@@ -451,8 +460,7 @@ impl Params {
         let most = (c * c).max(head).max(viscous).max(driven);
         let pressure_max = 5.0 * self.density * most.max(slam);
         let pressure_min = if self.suction { -pressure_max } else { 0.0 };
-        let fastest = if pulls { speed } else { 0.0 };
-        let shift_speed = (self.gravity.length() * self.spacing).sqrt() + fastest;
+        let shift_speed = self.shift_speed(speed);
         Step { time, dt, ahead, relaxation, compressibility, pressure_max, pressure_min, shift_speed }
     }
 }

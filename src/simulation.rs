@@ -214,7 +214,8 @@ impl Simulation {
         let dt = if adaptive { shortened(&self.params, dt, self.fastest) } else { dt };
         // The speed of the collapse is one to be ready for; calm water may never have it.
         let relaxation = self.eased() * self.params.relaxation(dt, self.speed, driven);
-        let step = Step { relaxation, ..self.params.step(self.time, dt, flow.max(driven)) };
+        let shift_speed = self.params.shift_speed(self.speed.max(driven));
+        let step = Step { relaxation, shift_speed, ..self.params.step(self.time, dt, flow.max(driven)) };
         // What jumps over its neighbours needs the damping.
         if self.fastest * dt > self.params.spacing { step.whole() } else { step }
     }

@@ -3,7 +3,7 @@
 //!
 //! P_s = |grad P| l0 / 2 with the gradient that acts on them ([`super::pressure_gradient`]) and the pressures of the last step. It halves
 //! the distance to its fixed point each step: rows below follow P_s, P = P_s + G l0, so that the next is P_s / 2 + G l0 / 4. In free
-//! fall it is zero; where water pulls it is below zero as that below is. Walls beside the surface have the mean pressure of the surface's particles around them, less what lies between.
+//! fall it is zero, and where the water below pulls: below zero the surface's particles would draw each other together, the nearer the more. Walls beside the surface have the mean pressure of the surface's particles around them, less what lies between.
 
 use super::Particles;
 use super::pressure_gradient::hydrostatic;
@@ -23,8 +23,7 @@ pub fn surface_pressure(i: usize, carriers: Row, state: &[State], on: Particles,
             sum += (pressure[j] + pressure[i]) * pair_vector(i, j, w, on);
             level += (pressure[j] + pressure[i]) * w;
         }
-        let size = 0.5 * on.params.spacing * sum.length();
-        return if level < 0.0 { -size } else { size };
+        return if level < 0.0 { 0.0 } else { 0.5 * on.params.spacing * sum.length() };
     }
     beside_surface(i, carriers, state, on, pressure).map_or(0.0, |p| p.max(0.0))
 }
