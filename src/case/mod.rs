@@ -127,7 +127,7 @@ pub struct Run {
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub time_step: f64,
     /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v, but for the fastest thousandth of the
-    /// water, and dt <= 0.7 l0 / c_s.
+    /// water, with v no less than that of a collapse of all the water, 2 sqrt(g H), which may begin at any time; and dt <= 0.7 l0 / c_s.
     #[serde(default)]
     pub adaptive: bool,
     /// End of the run [s].

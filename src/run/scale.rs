@@ -113,7 +113,8 @@ impl Scale {
         let at_start = scene.position[..scene.water()].iter().map(|x| x.dot(up) * g);
         let lowest = faces.clone().chain(at_start).fold(f64::INFINITY, f64::min);
         let highest = faces.fold(lowest + g * params.depth, f64::max);
-        let comes = highest + 0.5 * driven * driven;
+        // Pressed in, it may leave through a narrowing as fast as what is driven throws water up.
+        let comes = highest + 0.5 * thrown * thrown;
         let through = (comes.max(0.0), (-lowest).max(0.0));
         // Pressure that water may push back with: its depth, and twice what stops it.
         let against =

@@ -441,6 +441,7 @@ fn limits(run: &Run) -> Result<String> {
         ("the sound speed", 0),
         ("viscosity", 0),
         ("the drag on a light body", 0),
+        ("the least speed that a step is ready for, of a collapse or of the start", 0),
         ("the speed of water or solids", 0),
     ];
     let steps: Vec<f64> = points.iter().map(|p| p[1]).filter(|dt| *dt > 0.0).collect();
@@ -454,8 +455,10 @@ fn limits(run: &Run) -> Result<String> {
         } else if (dt / bounds.drag - 1.0).abs() < 0.01 {
             // A little of it goes by the speed of the water.
             3
-        } else {
+        } else if same(dt, bounds.flow) {
             4
+        } else {
+            5
         };
         counts[which].1 += 1;
     }
