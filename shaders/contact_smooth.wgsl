@@ -268,7 +268,7 @@ fn answering(n: u32, sixth: f32, eighth: f32, push: vec3f, moment: vec3f) -> f32
     if mass == 0.0 || response <= 0.0 {
         return 1.0;
     }
-    return min(sixth * eighth / (response * mass), 1.0);
+    return min(sixth * eighth / (response * mass), gives[1].w);
 }
 
 fn near_points(n: u32) -> u32 {

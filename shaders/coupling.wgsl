@@ -22,10 +22,9 @@
 // How a body answers: M^-1 times rho / (c l0^3), with the c by which the device's equation is divided. Arms count in spacings
 // here, and so torques, turns and inertia: in metres f32 would not hold those of a body of microns.
 struct FreeBody {
-    inverse_mass: vec4f,
-    inertia_x: vec4f, // columns of the inverse inertia
-    inertia_y: vec4f,
-    inertia_z: vec4f,
+    moves: array<vec4f, 3>, // columns: velocity by force
+    crosses: array<vec4f, 3>, // velocity by torque; turned round, turn by force
+    turns: array<vec4f, 3>, // turn by torque
     force: vec4f, // beside the fluid's
     torque: vec4f,
     first: u32, // of the moving-wall slots
@@ -63,9 +62,15 @@ fn workgroup_sum(value: Wrench, t: u32) -> Wrench {
 }
 
 fn respond_to(b: u32, w: Wrench) -> Wrench {
-    let turned = free_body[b].inertia_x.xyz * w.torque.x + free_body[b].inertia_y.xyz * w.torque.y
-        + free_body[b].inertia_z.xyz * w.torque.z;
-    return Wrench(free_body[b].inverse_mass.xyz * w.force, turned);
+    var moved = vec3f(0.0);
+    var turned = vec3f(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let crosses = free_body[b].crosses[k].xyz;
+        moved += free_body[b].moves[k].xyz * w.force[k] + crosses * w.torque[k];
+        turned += free_body[b].turns[k].xyz * w.torque[k];
+        turned[k] += dot(crosses, w.force);
+    }
+    return Wrench(moved, turned);
 }
 
 fn product(row: Wrench, y: Wrench) -> f32 {

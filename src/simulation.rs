@@ -21,11 +21,11 @@ use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::scheme::Source;
 use crate::settle::settle;
-use crate::slots::Slots;
+use crate::slots::{Pressing, Slots, Voids};
 use crate::stop::Stop;
 use crate::time_step::{collapse_speed, shortened, time_step};
 use rayon::ThreadPool;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -85,6 +85,12 @@ pub struct Simulation {
     slots: Option<Slots>,
     /// Bodies that others enclose, and what the water between presses on each in this step.
     enclosed: Vec<(usize, Wrench)>,
+    /// What slots do as bodies come nearer or go, of this step.
+    pressings: Vec<Pressing>,
+    /// Rows of free bodies that face a room without water, in this step.
+    voids: Voids,
+    /// What that pressed in the last step, by solid and row [Pa].
+    pressed: HashMap<(usize, usize), f64>,
     /// Faces of driven solids at which others may stand, where forces are told.
     driven_faces: DrivenFaces,
     /// Where water comes in and goes out.
@@ -160,6 +166,9 @@ impl Simulation {
             slots: (plan.needs(Arrays::Coupling) || plan.held)
                 .then(|| Slots::new(&scene, &params, plan.held)),
             enclosed: vec![],
+            pressings: vec![],
+            voids: Voids::new(),
+            pressed: HashMap::new(),
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,
             fluid_force: vec![Wrench::default(); scene.solids.len()],
@@ -314,7 +323,7 @@ impl Simulation {
     pub(crate) fn solve_pressure(&mut self, step: &Step) -> Result<PressureReport> {
         let report = self.timed(Stage::ConjugateGradient, |s| {
             if s.plan.needs(Arrays::Coupling) {
-                s.give_free_bodies()?;
+                s.give_free_bodies(step.dt)?;
             }
             s.backend.solve_pressure(step)
         })?;

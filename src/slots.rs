@@ -26,15 +26,20 @@
 
 mod driven;
 mod enclosed;
+mod field;
 mod held;
+mod inertia;
 mod layer;
 mod pockets;
 mod pushes;
+mod voids;
 
 pub(crate) use driven::{AGAINST, BEFORE};
 pub use enclosed::Pressed;
 pub use held::{Held, HeldForces};
+pub use inertia::Pressing;
 pub use pushes::{Opposite, Push};
+pub use voids::Voids;
 
 use crate::body::slots::{Seep, SlotRow};
 use crate::body::{Pose, Wrench};
@@ -45,15 +50,21 @@ use crate::kernels::coupling::row;
 use crate::params::Params;
 use crate::periodic::Periodic;
 use crate::scene::{Scene, Solid};
-use glam::{DMat3, DVec3};
+use field::Field;
+use glam::DVec3;
 use layer::Layer;
 use rayon::prelude::*;
 use std::sync::Arc;
+use voids::Lying;
 
 /// Distances between facing wall-layer particles, over l0, up to which a row lies wholly in a slot, and from which on not
 /// at all: gaps of 0.9 and of 1.1 spacings. Particles of water come in between from 0.85 on; in narrower gaps they stay where they
 /// are, and what lies behind them is no void.
 const FACING: (f64, f64) = (1.9, 2.1);
+/// The distance, over l0, up to which what is before a row has no room for water that stays away: a gap of 1.6 spacings.
+const EMPTY: f64 = 2.6;
+/// What is that far is before a row only if it lies this near its outward direction (cosine of the angle): beside the foot of a block the floor does not.
+const ACROSS: f64 = 0.8;
 /// Another solid's particle is faced by a row if it lies this near its outward direction (cosine of the angle).
 const AHEAD: f64 = 0.5;
 /// The same of a face of a row at an edge: half-way to the next face.
@@ -61,10 +72,7 @@ const BEFORE_FACE: f64 = 0.7;
 /// What a face of such a row looks onto looks back at it, the cosine of their directions being no larger: beside the foot of a block on the floor the floor does not.
 const BACK: f64 = -0.3;
 /// Edge of the cells that points lie in, over l0: twice the reach, so that two an axis are looked into.
-const CELL: f64 = 4.2;
-/// Keeps the slope at bay along directions in which the rim has no extent.
-const STIFFENING: f64 = 0.1;
-
+const CELL: f64 = 5.2;
 /// A slot between a free body and other solids: rows of the body's layer.
 struct Slot {
     solid: usize,
@@ -86,6 +94,8 @@ struct Faced {
     share: f64,
     /// What it faces nearest.
     opposite: Option<Opposite>,
+    /// How far both surfaces are from each other there [m].
+    gap: f64,
     /// Outward directions of the faces of a row that has several, in its solid's frame, and what each faces.
     by_face: Vec<(DVec3, Option<Opposite>)>,
 }
@@ -122,37 +132,11 @@ struct Found {
     lenders: Vec<usize>,
 }
 
-/// The pressure in a slot, linear but for the weight of the water.
-struct Field {
-    /// Middle of the rim, from the centre of mass, world axes [m].
-    middle: DVec3,
-    /// Inverse of C.
-    inverse: DMat3,
-    /// P + rho g . (middle - x) over the rim [Pa]: its mean, and its slope along xi.
-    mean: f64,
-    slope: DVec3,
-    any_wet: bool,
-    /// Pressure below which there is air [Pa].
-    lowest: f64,
-    /// Axes of the body's frame, and least and largest xi of the rim along each.
-    axes: DMat3,
-    ends: [DVec3; 2],
-}
-
-impl Field {
-    /// xi of a row at `place`, with `spacing` for l0: no farther out than the rim.
-    fn xi(&self, place: DVec3, spacing: f64) -> DVec3 {
-        let xi = (place - self.middle) / spacing;
-        let along = self.axes.transpose() * xi;
-        let [low, high] = self.ends;
-        let within = along.clamp(low, high);
-        if within == along { xi } else { self.axes * within }
-    }
-}
-
 /// Finds the slots of the solids of a scene.
 pub struct Slots {
     spacing: f64,
+    /// Of the water [kg/m3].
+    density: f64,
     /// Weight of the water [N/m3].
     weight: DVec3,
     /// Whether the water has no surface, and pressures are known up to a constant.
@@ -184,6 +168,7 @@ impl Slots {
             periodic: scene.periodic,
             tiles: Tiles::new(scene),
             spacing: l0,
+            density: params.density,
             weight: params.density * params.gravity,
             closed: params.filled,
             suction: params.suction,
@@ -204,14 +189,14 @@ impl Slots {
     pub fn rows(
         &self,
         poses: &[Pose],
-        read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
+        read: impl FnMut(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<SlotRow>> {
-        Ok(self.press(poses, read)?.rows)
+        Ok(self.press(poses, None, read)?.rows)
     }
 
     /// Boxes around the solids at `poses`, with room for a slot.
     fn boxes(&self, poses: &[Pose]) -> Vec<Bounds> {
-        let margin = FACING.1 * self.spacing;
+        let margin = EMPTY * self.spacing;
         self.layers.iter().zip(poses).map(|(layer, pose)| layer.bounds(pose, margin)).collect()
     }
 
@@ -228,22 +213,41 @@ impl Slots {
         others
     }
 
-    /// The slots with the solids at `poses`.
-    fn find(&self, poses: &[Pose]) -> Vec<Found> {
-        let margin = FACING.1 * self.spacing;
+    /// How the rows of the free bodies that are near something lie with the solids at `poses`, and what is near each solid.
+    fn lying(&self, poses: &[Pose]) -> (Vec<Lying>, Vec<Vec<(usize, DVec3)>>) {
         let others = self.others(poses, |_, _| true);
-        let of = |(k, layer): (usize, &Layer)| {
-            let at_walls = self.at_walls(layer, &poses[k], margin);
-            if !at_walls && others[k].is_empty() {
-                return vec![];
+        let of = |(solid, layer): (usize, &Layer)| {
+            let at_walls = self.at_walls(layer, &poses[solid], EMPTY * self.spacing);
+            if !at_walls && others[solid].is_empty() {
+                return None;
             }
-            let faced: Arc<[Faced]> = self.faced(k, at_walls, &others[k], poses).into();
-            let shares: Vec<f64> = faced.iter().map(|row| row.share).collect();
-            let found = |slot| Found { slot, faced: faced.clone(), lenders: vec![] };
-            layer.slots(k, &shares, |_| false).into_iter().map(found).collect()
+            Some(Lying { solid, at_walls, faced: self.faced(solid, at_walls, &others[solid], poses) })
         };
         let layers = self.layers.par_iter().enumerate().filter(|(_, layer)| layer.free);
-        enclosed::lend(layers.flat_map_iter(of).collect())
+        (layers.filter_map(of).collect(), others)
+    }
+
+    /// The slots of the free bodies that are `lying` so with the solids at `poses`, `voids` being rows before which there is a room without water.
+    fn find(
+        &self,
+        (mut lying, others): (Vec<Lying>, Vec<Vec<(usize, DVec3)>>),
+        poses: &[Pose],
+        voids: &Voids,
+    ) -> Vec<Found> {
+        for of in &mut lying {
+            for &(k, n) in voids.range((of.solid, 0)..(of.solid + 1, 0)) {
+                of.faced[n] = self.row_faced((k, n), of.at_walls, &others[k], poses, EMPTY);
+            }
+        }
+        let found = |of: Lying| {
+            let faced: Arc<[Faced]> = of.faced.into();
+            let shares: Vec<f64> = faced.iter().map(|row| row.share).collect();
+            let slots = self.layers[of.solid].slots(of.solid, &shares, |_| false);
+            let found: Vec<Found> =
+                slots.into_iter().map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }).collect();
+            found
+        };
+        enclosed::lend(lying.into_par_iter().flat_map_iter(found).collect())
     }
 
     /// The rims of the slots `found` and the pressures there, which `read` tells: rows beside a slot, and in shallow water, where all of
@@ -281,26 +285,28 @@ impl Slots {
     /// How each row of layer `k` lies before fixed walls, if it is `at_walls`, and before `others`.
     fn faced(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<Faced> {
         let rows = (0..self.layers[k].offset.len()).into_par_iter().with_min_len(256);
-        rows.map(|n| self.row_faced((k, n), at_walls, others, poses)).collect()
+        rows.map(|n| self.row_faced((k, n), at_walls, others, poses, FACING.1)).collect()
     }
 
-    /// How row `n` of layer `k` does.
+    /// How row `n` of layer `k` does, `within` of which [l0] it faces something.
     fn row_faced(
         &self,
         (k, n): (usize, usize),
         at_walls: bool,
         others: &[(usize, DVec3)],
         poses: &[Pose],
+        within: f64,
     ) -> Faced {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
-        let reach = FACING.1 * l0;
-        // Of those within `ahead` of `outward` (cosine) around `x`, the nearest which looks `back` so far at least, and how far it is.
+        let reach = within * l0;
+        let least = if within == EMPTY { ACROSS } else { 0.0 };
+        // Of those within `ahead` of `outward` (cosine) around `x`, the nearest which looks `back` so far at least, how far it is, and how far along `outward`.
         let nearest = |x: DVec3, outward: DVec3, ahead: f64, back: f64| {
-            let (mut nearest, mut opposite) = (reach, None);
+            let (mut nearest, mut along, mut opposite) = (reach, reach, None);
             let mut see = |r: DVec3, of: Opposite, looks: &dyn Fn() -> f64| {
                 let distance = r.length();
                 if r.dot(outward) > ahead * distance && distance < nearest && looks() <= back {
-                    (nearest, opposite) = (distance, Some(of));
+                    (nearest, along, opposite) = (distance, r.dot(outward), Some(of));
                 }
             };
             if at_walls {
@@ -325,64 +331,27 @@ impl Slots {
                 };
                 layer.grid.near(local, reach, of);
             }
-            (nearest, opposite)
+            (nearest, along, opposite)
         };
         let x = pose.position + pose.orientation * layer.offset[n];
         // What a thin edge looks along as a whole is neither of its faces.
-        let mut first = (reach, None);
+        let mut first = (reach, reach, None);
         let mut by_face = vec![];
         for face in layer.edges.of(n) {
             let way = face.area.normalize_or_zero();
-            let (distance, opposite) = nearest(x, pose.orientation * way, BEFORE_FACE, BACK);
+            let (distance, along, opposite) =
+                nearest(x, pose.orientation * way, least.max(BEFORE_FACE), BACK);
             if distance < first.0 {
-                first = (distance, opposite);
+                first = (distance, along, opposite);
             }
             by_face.push((way, opposite));
         }
         if by_face.is_empty() {
             let way = layer.area[n].normalize_or_zero();
-            first = nearest(x, pose.orientation * way, AHEAD, f64::INFINITY);
+            first = nearest(x, pose.orientation * way, least.max(AHEAD), f64::INFINITY);
         }
-        let share = ((FACING.1 - first.0 / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
-        Faced { share, opposite: first.1, by_face }
-    }
-
-    /// Pressure below which there is air in a slot with these pressures at its rim [Pa]: where water pulls none comes into one that is all under
-    /// water.
-    fn lowest(&self, mut told: impl Iterator<Item = f64>) -> f64 {
-        if self.suction && told.all(|p| p != 0.0) { f64::NEG_INFINITY } else { 0.0 }
-    }
-
-    /// The pressure in a slot of a body at `pose` with `passing` rows of its rim, which lie at `place`; `lowest` as [`Self::lowest`] tells.
-    fn field(
-        &self,
-        pose: &Pose,
-        passing: &[(usize, f64)],
-        place: impl Fn(usize) -> DVec3,
-        lowest: f64,
-    ) -> Field {
-        let count = passing.len() as f64;
-        let middle = passing.iter().map(|&(n, _)| place(n)).sum::<DVec3>() / count;
-        let xi = |n: usize| (place(n) - middle) / self.spacing;
-        let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
-        let spread = passing.iter().map(|&(n, _)| outer(xi(n))).fold(DMat3::ZERO, |sum, m| sum + m);
-        let inverse = (spread + DMat3::from_diagonal(DVec3::splat(STIFFENING * count))).inverse();
-        let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n) - middle);
-        let mean = passing.iter().map(level).sum::<f64>() / count;
-        let slope = inverse * passing.iter().map(|row| level(row) * xi(row.0)).sum::<DVec3>();
-        let axes = DMat3::from_quat(pose.orientation);
-        let along = || passing.iter().map(|row| axes.transpose() * xi(row.0));
-        let ends = [along().fold(DVec3::INFINITY, DVec3::min), along().fold(DVec3::NEG_INFINITY, DVec3::max)];
-        Field {
-            middle,
-            inverse,
-            mean,
-            slope,
-            any_wet: passing.iter().any(|&(_, p)| p != 0.0),
-            lowest,
-            axes,
-            ends,
-        }
+        let share = ((within - first.0 / l0) / (FACING.1 - FACING.0)).clamp(0.0, 1.0);
+        Faced { share, opposite: first.2, gap: first.1 - l0, by_face }
     }
 
     /// The rows that lie in the slot, and those at its rim with what they pass on; `told` are the rim and its
@@ -458,40 +427,5 @@ impl Slots {
             .map(at_rim)
             .chain(slot.inside.iter().zip(&areas).map(inside))
             .collect()
-    }
-
-    /// Where the pressures are that a slot's field goes through, `told` as in [`Self::passed_on`]: at the rows, and P = 0 of a dry rim where the
-    /// slot ends there.
-    fn places<'a>(
-        &'a self,
-        slot: &'a Slot,
-        pose: &'a Pose,
-        told: &'a [(usize, f64)],
-    ) -> impl Fn(usize) -> DVec3 + 'a {
-        let any_wet = told.iter().any(|&(_, p)| p != 0.0);
-        let offset = &self.layers[slot.solid].offset;
-        move |n| {
-            let dry = slot.rim.binary_search(&n).ok().filter(|&at| any_wet && told[at].1 == 0.0);
-            pose.orientation * dry.map_or(offset[n], |at| slot.edge[at])
-        }
-    }
-
-    /// Pressure of the `field` of a slot on a body's surface, at `x` by a row at `place` [Pa].
-    fn in_slot(&self, field: &Field, place: DVec3, x: DVec3) -> f64 {
-        let xi = field.xi(place, self.spacing);
-        field.mean + field.slope.dot(xi) + self.weight.dot(x - field.middle)
-    }
-
-    /// Those of the `rows` of a rim that pass their pressure on, with it: all but those in the air above the water's
-    /// level; all of them where none is under water.
-    fn passing(&self, rows: Vec<(usize, f64)>, place: impl Fn(usize) -> DVec3) -> Vec<(usize, f64)> {
-        // Pressure that the row's height and the water above it make: P at the height of the centre of mass.
-        let level = |&(n, p): &(usize, f64)| p - self.weight.dot(place(n));
-        let wet = rows.iter().filter(|(_, p)| *p != 0.0);
-        let highest = wet.map(level).fold(f64::NEG_INFINITY, f64::max);
-        if highest == f64::NEG_INFINITY {
-            return rows;
-        }
-        rows.into_iter().filter(|row| row.1 != 0.0 || level(row) <= highest).collect()
     }
 }

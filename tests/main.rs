@@ -33,6 +33,7 @@ mod fluid;
 mod flush;
 mod frames;
 mod fuzz;
+mod gaps;
 mod gauges;
 mod guide;
 mod held;

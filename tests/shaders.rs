@@ -324,21 +324,7 @@ fn structs_lie_the_same_on_both_sides() {
     same_layout!("openings", Emission { wall, count, to, pad, shift, velocity });
     same_layout!("openings", Outlet { low, high, room_low, room_high });
     same_layout!("absorber", AbsorberZone { low, high, start, ramp });
-    same_layout!(
-        "coupling",
-        FreeBody {
-            inverse_mass,
-            inertia_x,
-            inertia_y,
-            inertia_z,
-            force,
-            torque,
-            first,
-            count,
-            solid,
-            bodies
-        }
-    );
+    same_layout!("coupling", FreeBody { moves, crosses, turns, force, torque, first, count, solid, bodies });
     same_layout!(
         "conjugate_gradient",
         Solve {

@@ -11,7 +11,7 @@ use seixo::backend::cpu::Cpu;
 use seixo::backend::gpu::{self, Caps, Gpu, layout};
 use seixo::backend::{Backend, Processor};
 use seixo::body::slots::{Seep, SlotRow};
-use seixo::body::{FreeBody, Pose, Wrench};
+use seixo::body::{FreeBody, Mobility, Pose, Wrench};
 use seixo::fields::{Fields, State};
 use seixo::kernels::Particles;
 use seixo::kernels::body_force::{self, RowPressure};
@@ -759,6 +759,12 @@ fn coupling() {
         let alone = pair.cpu.fields().clone();
         let volume = f64::from(if dimensions == 3 { 27 } else { 9 }) * pair.params.spacing.powi(3);
         let turns = DMat3::from_diagonal(DVec3::new(3.0, 2.0, 4.0));
+        // As of one with water in its slots.
+        let crosses = DMat3::from_cols(
+            DVec3::new(0.0, 0.1, 0.3),
+            DVec3::new(-0.2, 0.0, 0.5),
+            DVec3::new(0.0, 0.3, 0.1),
+        );
         // A body brings outliers into the spectrum, the lighter the farther out; conjugate gradients in f32 find those
         // again and again, one iteration each time.
         for (ratio, apart, least, standing) in
@@ -768,8 +774,13 @@ fn coupling() {
             let mass = ratio * pair.params.density * volume;
             let load = Wrench { force: DVec3::new(0.2, 0.0, -3.0), torque: DVec3::new(0.0, 0.01, 0.0) };
             let body = FreeBody {
-                inverse_mass: DVec3::splat(1.0 / mass),
-                inverse_inertia: turns / (mass * pair.params.spacing.powi(2)),
+                mobility: Mobility {
+                    crosses: crosses / (mass * pair.params.spacing),
+                    ..Mobility::of_body(
+                        DVec3::splat(1.0 / mass),
+                        turns / (mass * pair.params.spacing.powi(2)),
+                    )
+                },
                 load,
             };
             let bodies = [FreeBody::default(), body];
@@ -817,8 +828,10 @@ fn rows_of_a_solid_that_no_longer_answers_are_gone() {
     pair.run_to_source();
     let mass = 0.5 * pair.params.density * 9.0 * pair.params.spacing.powi(3);
     let body = FreeBody {
-        inverse_mass: DVec3::splat(1.0 / mass),
-        inverse_inertia: DMat3::from_diagonal(DVec3::splat(1.0 / (mass * pair.params.spacing.powi(2)))),
+        mobility: Mobility::of_body(
+            DVec3::splat(1.0 / mass),
+            DMat3::from_diagonal(DVec3::splat(1.0 / (mass * pair.params.spacing.powi(2)))),
+        ),
         load: Wrench::default(),
     };
     let bodies = [FreeBody::default(), body];

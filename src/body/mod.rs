@@ -4,10 +4,12 @@
 //! follows from the momentum and the orientation, so that a free body keeps its momentum to round-off
 //! while it tumbles. A prescribed solid is a body of infinite mass that follows its table.
 
+mod mobility;
 mod pose;
 pub mod slots;
 mod turn;
 
+pub use mobility::{InSlots, Mobility, Six};
 pub use pose::{Pose, Wrench};
 
 use crate::scene::{Drive, Motion, Solid};
@@ -16,22 +18,12 @@ use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A solid as the pressure equation sees it: how it answers forces, and those that act on it beside the fluid's.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeBody {
-    /// 1/mass along each world axis [1/kg]; 0 where locked or prescribed.
-    pub inverse_mass: DVec3,
-    /// Inverse of the inertia, world axes [1/(kg m2)]; zero rows where locked or prescribed.
-    pub inverse_inertia: DMat3,
-    /// Weight and contact.
+    /// How it moves; not at all where it is locked or prescribed.
+    pub mobility: Mobility,
+    /// Weight, contact, and what is known of the water in its slots.
     pub load: Wrench,
-}
-
-impl Default for FreeBody {
-    /// A solid that nothing moves.
-    fn default() -> Self {
-        // A matrix is by default the identity, which would let it turn.
-        Self { inverse_mass: DVec3::ZERO, inverse_inertia: DMat3::ZERO, load: Wrench::default() }
-    }
 }
 
 /// A solid that moves, with what its motion needs.
@@ -46,6 +38,8 @@ pub(crate) struct Body {
     pub inverse_mass: DVec3,
     /// Inverse of the inertia, world axes [1/(kg m2)]; zero rows where locked or prescribed.
     pub inverse_inertia: DMat3,
+    /// How it moves with the water in its slots, which moves with it; `None` where there is none.
+    pub in_slots: Option<Box<InSlots>>,
     /// Mass [kg]; infinite for a prescribed solid.
     pub mass: f64,
     /// Principal moments [kg m2].
@@ -86,6 +80,7 @@ impl Body {
             momentum: DVec3::ZERO,
             inverse_mass: DVec3::ZERO,
             inverse_inertia: DMat3::ZERO,
+            in_slots: None,
             mass: f64::INFINITY,
             principal: DVec3::INFINITY,
             locked_rotation: [true; 3],
@@ -202,8 +197,39 @@ impl Body {
         }
     }
 
+    /// How it answers what pushes it.
+    pub fn mobility(&self) -> Mobility {
+        match &self.in_slots {
+            Some(both) => both.mobility,
+            None => Mobility::of_body(self.inverse_mass, self.inverse_inertia),
+        }
+    }
+
+    /// How much heavier it is with the water in its slots, at most [-].
+    pub fn heavier(&self) -> f64 {
+        self.in_slots.as_ref().map_or(1.0, |both| both.heavier)
+    }
+
+    /// Velocity along `push` and turn about `moment`, in all, by an impulse of both: their product with what they give [1/kg].
+    pub fn give(&self, push: DVec3, moment: DVec3) -> f64 {
+        match &self.in_slots {
+            None => (self.inverse_mass * push).dot(push) + (self.inverse_inertia * moment).dot(moment),
+            Some(both) => {
+                let (velocity, turn) = both.mobility.answer(&Wrench { force: push, torque: moment });
+                velocity.dot(push) + turn.dot(moment)
+            }
+        }
+    }
+
     /// Adds an impulse [N s] and an angular impulse about the position [N m s].
     pub fn kick(&mut self, impulse: DVec3, angular: DVec3) {
+        if let Some(both) = &self.in_slots {
+            let (velocity, turn) = both.mobility.answer(&Wrench { force: impulse, torque: angular });
+            self.pose.velocity += velocity;
+            self.momentum += self.free_axes() * (self.inertia(self.rotation) * turn);
+            self.pose.angular_velocity = self.inverse_inertia * self.momentum;
+            return;
+        }
         self.pose.velocity += self.inverse_mass * impulse;
         if !self.is_free() {
             return;

@@ -61,6 +61,14 @@ impl std::ops::Div<f64> for Wrench {
     }
 }
 
+impl std::ops::Sub for Wrench {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self { force: self.force - other.force, torque: self.torque - other.torque }
+    }
+}
+
 impl std::ops::AddAssign for Wrench {
     fn add_assign(&mut self, other: Self) {
         self.force += other.force;

@@ -26,7 +26,7 @@ pub use probe::{Probe, ProbePatch};
 pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 
-use crate::body::{Body, FreeBody, Pose, Wrench};
+use crate::body::{Body, FreeBody, InSlots, Mobility, Pose, Wrench};
 use crate::case;
 use crate::compute::Compute;
 use crate::error::{Error, Result};
@@ -164,9 +164,14 @@ impl Solids {
             }
             let mut load = body.weight(gravity);
             load += *contact;
-            FreeBody { inverse_mass: body.inverse_mass, inverse_inertia: body.inverse_inertia, load }
+            FreeBody { mobility: Mobility::of_body(body.inverse_mass, body.inverse_inertia), load }
         };
         self.bodies.iter().zip(&self.contact).map(of).collect()
+    }
+
+    /// How bodies move in the next step with the water in their slots, by their index.
+    pub fn stand_in_slots(&mut self, bodies: Vec<(usize, InSlots)>) {
+        bodies.into_iter().for_each(|(k, both)| self.bodies[k].in_slots = Some(Box::new(both)));
     }
 
     /// Name of solid `k`, as in the case.
@@ -290,6 +295,7 @@ impl Solids {
         for (k, body) in self.bodies.iter_mut().enumerate() {
             self.poses[k] = body.pose;
             self.contact[k] = body.touched / dt;
+            body.in_slots = None;
             if body.is_free() && !body.pose.is_finite() {
                 let what = format!("body \"{}\" has a position or velocity that is no number", self.names[k]);
                 return Err(Error::Diverged { step: 0, time: t, stage: "contact", what });

@@ -21,10 +21,8 @@ pub fn row(area: DVec3, arm: DVec3) -> Wrench {
 /// y = (rho / l0^3) M^-1 w of a wrench w; a row of kappa S M^-1 w is then [`product`] of the row and y.
 #[inline(always)]
 pub fn respond(body: &FreeBody, density_over_volume: f64, wrench: Wrench) -> Wrench {
-    Wrench {
-        force: density_over_volume * body.inverse_mass * wrench.force,
-        torque: density_over_volume * (body.inverse_inertia * wrench.torque),
-    }
+    let (velocity, turn) = body.mobility.answer(&wrench);
+    Wrench { force: density_over_volume * velocity, torque: density_over_volume * turn }
 }
 
 /// Row times y.

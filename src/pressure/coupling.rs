@@ -58,6 +58,7 @@ impl CoupledBody {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Mobility;
     use crate::kernels::coupling::row;
     use glam::{DMat3, DVec3};
 
@@ -69,12 +70,19 @@ mod tests {
 
     fn body() -> FreeBody {
         FreeBody {
-            inverse_mass: DVec3::new(2.0, 0.0, 3.0),
-            inverse_inertia: DMat3::from_cols(
-                DVec3::new(2.0, 0.1, 0.0),
-                DVec3::new(0.1, 1.0, 0.2),
-                DVec3::new(0.0, 0.2, 3.0),
-            ),
+            mobility: Mobility {
+                moves: DMat3::from_diagonal(DVec3::new(2.0, 0.0, 3.0)),
+                crosses: DMat3::from_cols(
+                    DVec3::new(0.3, 0.0, 0.2),
+                    DVec3::new(0.1, 0.0, -0.4),
+                    DVec3::new(0.5, 0.0, 0.1),
+                ),
+                turns: DMat3::from_cols(
+                    DVec3::new(2.0, 0.1, 0.0),
+                    DVec3::new(0.1, 1.0, 0.2),
+                    DVec3::new(0.0, 0.2, 3.0),
+                ),
+            },
             load: Wrench::default(),
         }
     }
@@ -84,8 +92,9 @@ mod tests {
         let (wall, body) = (wall(), body());
         let entry = |i: usize, j: usize| {
             let ((a, x), (b, y)) = (wall[i], wall[j]);
-            let turn = body.inverse_inertia * y.cross(b);
-            7.0 * a.dot(body.inverse_mass * b + turn.cross(x))
+            let Mobility { moves, crosses, turns } = body.mobility;
+            let turn = turns * y.cross(b) + crosses.transpose() * b;
+            7.0 * a.dot(moves * b + crosses * y.cross(b) + turn.cross(x))
         };
         (0..5).map(|i| (0..5).map(|j| entry(i, j)).collect()).collect()
     }

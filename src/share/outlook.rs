@@ -158,13 +158,19 @@ fn slot_rounds(scene: &Scene, params: &Params, plan: &Plan) -> Result<u64> {
     };
     let poses: Vec<Pose> = scene.solids.iter().map(pose).collect();
     let slots = Slots::new(scene, params, told);
-    let rows = slots.rows(&poses, |rims| Ok(vec![0.0; rims.len()]))?;
+    let mut reads = 0;
+    if plan.coupled {
+        slots.rows(&poses, |rows| {
+            reads += 1;
+            Ok(vec![0.0; rows.len()])
+        })?;
+    }
     let covered = if told { DrivenFaces::new(scene).covered(scene, &poses) } else { Vec::new() };
     let of_forces = match plan.has(Stage::BodyForce) {
         true => slots.reads(&slots.held(&poses, &covered), &poses),
         false => 0,
     };
-    Ok(u64::from(plan.coupled && !rows.is_empty()) + of_forces)
+    Ok(reads + of_forces)
 }
 
 /// What devices say of borders with so much water, and with so much that carries pressure; of all cells, and of those with water.

@@ -73,6 +73,9 @@ impl Simulation {
             // Follows from the case.
             slots: _,
             enclosed: _,
+            pressings: _,
+            pressed: _,
+            voids: _,
             driven_faces: _,
             // Times by the clock are those of each process.
             stages: _,

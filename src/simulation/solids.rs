@@ -3,7 +3,7 @@
 use super::Simulation;
 use crate::backend::Backend;
 use crate::body::slots::SlotRow;
-use crate::body::{Pose, Wrench};
+use crate::body::{InSlots, Pose, Six, Wrench};
 use crate::contact::ContactReport;
 use crate::cover::driven::Covered;
 use crate::error::{Error, Result};
@@ -11,6 +11,7 @@ use crate::ledger::Entry;
 use crate::params::Step;
 use crate::plan::{Arrays, Stage};
 use crate::slots::{Pressed, Push};
+use std::collections::HashMap;
 
 /// Pressures of the last step in `slots` of wall layers [Pa].
 fn row_pressures(backend: &mut dyn Backend, slots: &[usize]) -> Result<Vec<f64>> {
@@ -58,15 +59,32 @@ impl Simulation {
     fn pressed_by_slots(&mut self) -> Result<Pressed> {
         let Some(found) = &self.slots else { return Ok(Pressed::default()) };
         let backend = &mut *self.backend;
-        found.press(self.solids.predicted(), |slots| row_pressures(backend, slots))
+        let start = (self.steps == 0).then(|| &self.scene.position[..self.scene.water()]);
+        found.press(self.solids.predicted(), start, |slots| row_pressures(backend, slots))
     }
 
     /// Gives the pressure equation the free bodies, and what slots bring them.
-    pub(crate) fn give_free_bodies(&mut self) -> Result<()> {
-        let Pressed { rows, loads } = self.pressed_by_slots()?;
+    pub(crate) fn give_free_bodies(&mut self, dt: f64) -> Result<()> {
+        let Pressed { rows, loads, mut pressings, voids } = self.pressed_by_slots()?;
         let mut bodies = self.solids.free_bodies(self.params.balanced_gravity());
         loads.iter().for_each(|&(k, load)| bodies[k].load += load);
         self.enclosed = loads;
+        let mut in_slots = vec![];
+        for slots in pressings.chunk_by_mut(|a, b| a.solid == b.solid) {
+            let (k, mut added) = (slots[0].solid, Six::default());
+            slots.iter().for_each(|slot| slot.add_inertia(&mut added));
+            let (free, pose) = (bodies[k].mobility.with(&added), &self.solids.predicted()[k]);
+            for slot in slots {
+                slot.add_braking(&mut added, &free, pose, dt);
+                bodies[k].load += slot.speed;
+            }
+            let both = InSlots::new(&bodies[k].mobility, &added);
+            bodies[k].mobility = both.mobility;
+            in_slots.push((k, both));
+        }
+        self.solids.stand_in_slots(in_slots);
+        self.pressings = pressings;
+        self.voids = voids;
         self.backend.free_bodies(&bodies, &rows)
     }
 
@@ -77,7 +95,8 @@ impl Simulation {
     pub fn slot_pushes(&mut self) -> Result<Vec<Push>> {
         let Some(found) = &self.slots else { return Ok(vec![]) };
         let (backend, poses) = (&mut *self.backend, self.solids.poses());
-        let mut pushes = found.pushes(poses, |slots| row_pressures(backend, slots))?;
+        let mut pushes =
+            found.pushes(poses, &self.voids, &self.pressed, |slots| row_pressures(backend, slots))?;
         if self.plan.held {
             let held = found.held(poses, &self.driven_faces.covered(&self.scene, poses));
             let forces =
@@ -96,10 +115,12 @@ impl Simulation {
         if self.plan.has(Stage::BodyForce) {
             self.fluid_force = self.timed(Stage::BodyForce, Self::force_of_water)?;
         }
-        let force = std::mem::take(&mut self.fluid_force);
+        let mut force = std::mem::take(&mut self.fluid_force);
+        self.pressings.iter().for_each(|slot| force[slot.solid] += slot.speed);
         let report = self
             .timed(Stage::Contact, |s| s.solids.advance_on(s.backend.compute(), step.time, step.dt, &force));
         self.fluid_force = force;
+        self.book_pressings(step.dt);
         // the solids count no steps
         let report = report.map_err(|e| match e {
             Error::Diverged { time, stage, what, .. } => {
@@ -130,7 +151,7 @@ impl Simulation {
         let rows: Vec<usize> = covered.iter().map(row).collect();
         let (mut sums, mut pushes) = (None, vec![]);
         if let Some(slots) = self.slots.as_ref().filter(|slots| slots.any_at_driven(poses)) {
-            pushes = slots.pushes(poses, |rims| {
+            pushes = slots.pushes(poses, &self.voids, &HashMap::new(), |rims| {
                 let (force, told) = backend.body_force(&[&rows, rims].concat())?;
                 let at_rims = told[rows.len()..].iter().map(|row| row.pressure).collect();
                 sums = Some((force, told));
@@ -162,6 +183,17 @@ impl Simulation {
             of_driven.into_iter().for_each(|(k, force)| sum[k] += force);
         }
         Ok(sum)
+    }
+
+    /// Takes what slots did as bodies came nearer or went to the forces of the water.
+    fn book_pressings(&mut self, dt: f64) {
+        self.pressed.clear();
+        for slot in self.pressings.drain(..) {
+            let k = slot.solid;
+            let (before, after) = (&self.solids.predicted()[k], &self.solids.poses()[k]);
+            self.fluid_force[k] += slot.force(before, after, dt) - slot.speed;
+            self.pressed.extend(slot.pressures(before, after, dt));
+        }
     }
 
     /// Books what the water gave the solids and what contact did, on the way from the poses `before`.

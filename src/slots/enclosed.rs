@@ -3,14 +3,18 @@
 //! the last step: the enclosed body has no row that the equation could couple it by.
 
 use super::pockets::Closures;
-use super::{Faced, Field, Found, Opposite, Slots};
+use super::{CELL, Faced, Field, Found, Opposite, Pressing, Slot, Slots, Voids};
 use crate::body::slots::SlotRow;
 use crate::body::{Pose, Wrench};
+use crate::contact::broad::PointGrid;
 use crate::error::Result;
 use crate::kernels::coupling::row;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
+
+/// How far the water that stands beside a row is from it at most, over l0.
+const BESIDE: f64 = 1.5;
 
 /// What water in slots does to free bodies.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +23,10 @@ pub struct Pressed {
     pub rows: Vec<SlotRow>,
     /// Solids that others enclose, and what the water between presses on each [N], [N m].
     pub loads: Vec<(usize, Wrench)>,
+    /// What slots do as bodies come nearer or go, in the order of solids.
+    pub pressings: Vec<Pressing>,
+    /// Rows that face a room without water.
+    pub voids: Voids,
 }
 
 /// Finds for each slot without a rim those that lend it theirs. What has neither is no slot, nor is a mouth alone
@@ -88,12 +96,20 @@ fn lenders(found: &[Found], beside: &[BTreeSet<usize>], k: usize) -> Vec<usize> 
 
 impl Slots {
     /// What slots do to free bodies with the solids at `poses`. `read` tells the pressures of the last step [Pa] in
-    /// slots of particles; 0 where it is dry.
+    /// slots of particles; 0 where it is dry. At the `start` none is known, and the places of the water
+    /// [m] tell which rims it is at.
     ///
     /// # Errors
     /// Those of `read`.
-    pub fn press(&self, poses: &[Pose], read: impl FnOnce(&[usize]) -> Result<Vec<f64>>) -> Result<Pressed> {
-        let found = self.find(poses);
+    pub fn press(
+        &self,
+        poses: &[Pose],
+        start: Option<&[DVec3]>,
+        mut read: impl FnMut(&[usize]) -> Result<Vec<f64>>,
+    ) -> Result<Pressed> {
+        let (lying, others) = self.lying(poses);
+        let voids = self.voids(&lying, &others, poses, &mut read)?;
+        let found = self.find((lying, others), poses, &voids);
         let pressure = self.at_rims(&found, read)?;
         let solids = Closures::new(self, poses, &found);
         let of_slot = |(f, told): (&Found, &Vec<(usize, f64)>)| {
@@ -129,7 +145,28 @@ impl Slots {
             Some((k, load))
         };
         let loads = found.iter().filter(|f| f.slot.rim.is_empty()).filter_map(load).collect();
-        Ok(Pressed { rows, loads })
+        let water = start.map(|water| PointGrid::new(water.to_vec(), CELL * self.spacing));
+        let pressing = |(f, told): (&Found, &Vec<(usize, f64)>)| {
+            if f.slot.rim.is_empty() {
+                return None;
+            }
+            let field = match &water {
+                None => Some(self.field_of(&found, &pressure, (f, told), poses)?),
+                Some(water) if self.rim_is_at(water, &f.slot, &poses[f.slot.solid]) => None,
+                Some(_) => return None,
+            };
+            self.pressing(f, field.as_ref(), &poses[f.slot.solid])
+        };
+        let pressings = found.par_iter().zip(&pressure).filter_map(pressing).collect();
+        Ok(Pressed { rows, loads, pressings, voids })
+    }
+
+    /// Whether `water` stands beside a row of the rim of `slot`, the body being at `pose`.
+    fn rim_is_at(&self, water: &PointGrid, slot: &Slot, pose: &Pose) -> bool {
+        let offset = &self.layers[slot.solid].offset;
+        slot.rim
+            .iter()
+            .any(|&n| water.is_near(self.periodic.wrap(pose.point(offset[n])), BESIDE * self.spacing))
     }
 
     /// Rows of a slot without a rim: what presses on them is none of the equation's.

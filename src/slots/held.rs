@@ -3,7 +3,7 @@
 //! closed); where a surface bends away from what it touches the gap is open.
 
 use super::layer::Layer;
-use super::{Faced, Found, Opposite, Push, Slots, enclosed};
+use super::{Faced, Found, Opposite, Push, Slots, Voids, enclosed};
 use crate::body::{Pose, Wrench};
 use crate::cover::driven::Covered;
 use crate::error::Result;
@@ -81,7 +81,8 @@ impl Slots {
             // What others cover knows of no water, and what stands before a free body is in the slot of that.
             let shut = |n: usize| {
                 !is_open(n)
-                    || !bodies[k].is_empty() && self.row_faced((k, n), false, &bodies[k], poses).share > 0.0
+                    || !bodies[k].is_empty()
+                        && self.row_faced((k, n), false, &bodies[k], poses, super::FACING.1).share > 0.0
             };
             let slots = layer.slots(k, &shares, shut).into_iter();
             found.extend(slots.map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }));
@@ -131,7 +132,7 @@ impl Slots {
             };
             f.slot.inside.iter().flat_map(|row| f.faced[row.0].all()).any(on)
         };
-        let any = self.find(poses).iter().any(|f| presses(f, &|_| true))
+        let any = self.find(self.lying(poses), poses, &Voids::new()).iter().any(|f| presses(f, &|_| true))
             || held.found.iter().any(|f| presses(f, &|of| !pressed.contains(&of)));
         u64::from(!held.found.is_empty()) + u64::from(any)
     }
@@ -181,7 +182,9 @@ impl Slots {
             }
             // What has slots of its own there has its part from them.
             let is_free = |of| !matches!(of, Opposite::Solid(other, row) if pressed.contains(&(other, row)));
-            out.pushes.extend(self.pushes_of(f, &areas, field.as_ref(), pose, is_free));
+            out.pushes.extend(
+                self.pushes_of(f, &areas, field.as_ref(), pose, is_free).into_iter().map(|(_, push)| push),
+            );
             out.loads.push((k, load));
         }
         Ok(out)

@@ -1,11 +1,12 @@
 //! What slots press on what stands opposite to a body: the reaction of what they press on bodies.
 
-use super::{Field, Found, Slots};
+use super::{Field, Found, Slots, Voids};
 use crate::body::Pose;
 use crate::contact::broad::meeting_images;
 use crate::error::Result;
 use crate::params::Params;
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// What a body's slot lies before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,22 +59,29 @@ impl Slots {
     }
 
     /// Forces of the water in slots on walls and solids with the solids at `poses`: equal and opposite to what it presses on the bodies
-    /// there. `read` tells pressures of slots of particles [Pa]; a slot with a dry rim presses nothing.
+    /// there, with `voids` as [`Self::press`] found them and what is `pressed` by solid and row [Pa] as these come nearer or go. `read` tells pressures of slots of particles [Pa]; a slot with
+    /// a dry rim presses nothing.
     ///
     /// # Errors
     /// Those of `read`.
     pub fn pushes(
         &self,
         poses: &[Pose],
+        voids: &Voids,
+        pressed: &HashMap<(usize, usize), f64>,
         read: impl FnOnce(&[usize]) -> Result<Vec<f64>>,
     ) -> Result<Vec<Push>> {
-        let found = self.find(poses);
+        let found = self.find(self.lying(poses), poses, voids);
         let pressure = self.at_rims(&found, read)?;
         let of = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             let Some(field) = self.field_of(&found, &pressure, (f, told), poses) else { return vec![] };
             let (layer, pose) = (&self.layers[f.slot.solid], &poses[f.slot.solid]);
             let areas = layer.areas(&layer.area, f, pose);
-            self.pushes_of(f, &areas, Some(&field), pose, |_| true)
+            let mut pushes = self.pushes_of(f, &areas, Some(&field), pose, |_| true);
+            pushes.iter_mut().for_each(|(n, push)| {
+                push.pressure += pressed.get(&(f.slot.solid, *n)).copied().unwrap_or_default();
+            });
+            pushes.into_iter().map(|(_, push)| push).collect()
         };
         Ok(found.iter().zip(&pressure).flat_map(of).collect())
     }
@@ -96,7 +104,8 @@ impl Slots {
         Some(self.field(pose, &passing, self.places(slot, pose, told), lowest)).filter(|field| field.any_wet)
     }
 
-    /// What the water of the `field` in the slot `found` presses with the `areas` of its rows on that of what they look onto which `is_pressed`.
+    /// What the water of the `field` in the slot `found` presses with the `areas` of its rows on that of what they look onto which `is_pressed`; each with
+    /// its row.
     pub(super) fn pushes_of(
         &self,
         found: &Found,
@@ -104,7 +113,7 @@ impl Slots {
         field: Option<&Field>,
         pose: &Pose,
         is_pressed: impl Fn(Opposite) -> bool,
-    ) -> Vec<Push> {
+    ) -> Vec<(usize, Push)> {
         let Found { slot, faced, .. } = found;
         let layer = &self.layers[slot.solid];
         let mut out = vec![];
@@ -113,13 +122,8 @@ impl Slots {
                 let on = faced[n].before(pose.orientation.inverse() * area);
                 if let Some(on) = on.filter(|&on| is_pressed(on)) {
                     let pressure = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
-                    out.push(Push {
-                        by: slot.solid,
-                        on,
-                        at: pose.position + at,
-                        pressure,
-                        area: share * area,
-                    });
+                    let (at, area) = (pose.position + at, share * area);
+                    out.push((n, Push { by: slot.solid, on, at, pressure, area }));
                 }
             }
         }

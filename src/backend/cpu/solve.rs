@@ -5,7 +5,7 @@ use super::solids::reaction_on;
 use super::team::owns;
 use super::wall_excess::{Rows, WallExcess};
 use crate::body::slots;
-use crate::body::{FreeBody, Wrench};
+use crate::body::{FreeBody, Mobility, Wrench};
 use crate::fields::{Fields, State};
 use crate::kernels::pressure_source::laplacian_coefficient;
 use crate::kernels::{body_force, pressure_level};
@@ -14,7 +14,6 @@ use crate::params::Step;
 use crate::pressure::PressureReport;
 use crate::pressure::cg::{Among, Jacobi, Precondition, System, solve_or_fall_back};
 use crate::pressure::coupling::CoupledBody;
-use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -33,8 +32,7 @@ impl Cpu {
             }
         }
         let excess = &self.excess;
-        let answers =
-            |body: &FreeBody| body.inverse_mass != DVec3::ZERO || body.inverse_inertia != DMat3::ZERO;
+        let answers = |body: &FreeBody| body.mobility != Mobility::default();
         let free = self.solids.iter().zip(&self.poses).zip(&self.free_bodies).enumerate();
         let free: Vec<_> = free.filter(|(_, (_, body))| answers(body)).collect();
         let mut known: Vec<Wrench> = Vec::with_capacity(free.len());

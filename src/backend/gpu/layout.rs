@@ -258,10 +258,9 @@ impl AbsorberZone {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
 pub struct FreeBody {
-    pub inverse_mass: [f32; 4],
-    pub inertia_x: [f32; 4],
-    pub inertia_y: [f32; 4],
-    pub inertia_z: [f32; 4],
+    pub moves: [[f32; 4]; 3],
+    pub crosses: [[f32; 4]; 3],
+    pub turns: [[f32; 4]; 3],
     pub force: [f32; 4],
     pub torque: [f32; 4],
     pub first: u32,

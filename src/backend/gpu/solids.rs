@@ -3,7 +3,7 @@
 use super::stretches::Stretches;
 use super::{Gpu, buffers, groups, kernels, layout};
 use crate::body::slots::SlotRow;
-use crate::body::{FreeBody, Pose, Wrench};
+use crate::body::{FreeBody, Mobility, Pose, Wrench};
 use crate::error::Result;
 use crate::kernels::body_force::RowPressure;
 use crate::kernels::pressure_source::laplacian_coefficient;
@@ -36,12 +36,11 @@ impl Gpu {
         let four = |v: DVec3| with(v, 0.0);
         let device = |(solid, (body, &(first, count))): (usize, (&FreeBody, &(usize, usize)))| {
             // Arms are counted in spacings: in metres what turns a body of microns is beyond f32.
-            let inertia = factor * p.spacing.powi(2) * body.inverse_inertia;
+            let columns = |m: DMat3| [four(m.x_axis), four(m.y_axis), four(m.z_axis)];
             layout::FreeBody {
-                inverse_mass: four(factor * body.inverse_mass),
-                inertia_x: four(inertia.x_axis),
-                inertia_y: four(inertia.y_axis),
-                inertia_z: four(inertia.z_axis),
+                moves: columns(factor * body.mobility.moves),
+                crosses: columns(factor * p.spacing * body.mobility.crosses),
+                turns: columns(factor * p.spacing.powi(2) * body.mobility.turns),
                 force: four(body.load.force),
                 torque: four(body.load.torque / p.spacing),
                 first: first as u32,
@@ -53,9 +52,7 @@ impl Gpu {
         let of = bodies.iter().zip(&self.wall_layers).enumerate();
         // Through slots of a body that is held water seeps as well.
         let seeps = |k: usize| slots.iter().any(|slot| slot.solid as usize == k && slot.seep.link > 0.0);
-        let free = of.filter(|(k, (b, _))| {
-            b.inverse_mass != DVec3::ZERO || b.inverse_inertia != DMat3::ZERO || seeps(*k)
-        });
+        let free = of.filter(|(k, (b, _))| b.mobility != Mobility::default() || seeps(*k));
         let mut free: Vec<_> = free.map(device).collect();
         let count = free.len() as u32;
         free.iter_mut().for_each(|body| body.bodies = count);

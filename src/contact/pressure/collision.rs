@@ -37,10 +37,7 @@ pub(crate) fn collide(
             continue;
         }
         count += 1;
-        let give = |body: &Body, middle: DVec3| {
-            let turning = (middle - body.pose.position).cross(e);
-            e.dot(body.inverse_mass * e) + turning.dot(body.inverse_inertia * turning)
-        };
+        let give = |body: &Body, middle: DVec3| body.give(e, (middle - body.pose.position).cross(e));
         let response = give(&bodies[pair.a], middle) + pair.b.map_or(0.0, |b| give(&bodies[b], middle_b));
         if response <= 0.0 {
             continue;

@@ -7,7 +7,8 @@
 //! m_e = S / (J M^-1 J^T) = (sum_i w_i d_i^6) (sum_i w_i d_i^8) / (j M^-1 j^T),  j = sum_i w_i d_i^7 (n_i, r_i x n_i):
 //!
 //! the reduced mass m where the contact lies on the line of the centres, a quarter of it at the end of a rod, which turns
-//! away. A dashpot for m would damp such an end twice as much as it should, so a restitution takes C sqrt(m_e / m).
+//! away. A dashpot for m would damp such an end twice as much as it should, so a restitution takes C sqrt(m_e / m). The water in a body's slots
+//! is a part of its M.
 
 use super::patch::Contact;
 use crate::body::{Body, Pose};
@@ -40,21 +41,20 @@ impl Mode {
         mode
     }
 
-    /// m_e / `mass`, at most 1: 1 for a `mass` [kg] of 0, which is that of a case that gives C itself. `second` is how
+    /// m_e / `mass`, at most 1, or what the water in slots makes heavier: 1 for a `mass` [kg] of 0, which is that of a case that gives C itself. `second` is how
     /// the second solid lies beside the first, if it can move.
     pub fn share(&self, mass: f64, first: &Body, second: Option<(&Body, Pose)>) -> f64 {
         if mass == 0.0 {
             return 1.0;
         }
-        let gives = |body: &Body, moment: DVec3| {
-            (body.inverse_mass * self.push).dot(self.push) + (body.inverse_inertia * moment).dot(moment)
-        };
-        let mut response = gives(first, self.moment);
+        let gives = |body: &Body, moment: DVec3| body.give(self.push, moment);
+        let (mut response, mut most) = (gives(first, self.moment), first.heavier());
         if let Some((body, pose)) = second {
             let between = first.pose.position - pose.position;
             response += gives(body, self.moment + between.cross(self.push));
+            most = most.max(body.heavier());
         }
         // what nothing moves gives way to nothing
-        if response > 0.0 { (self.sixth * self.eighth / (response * mass)).min(1.0) } else { 1.0 }
+        if response > 0.0 { (self.sixth * self.eighth / (response * mass)).min(most) } else { 1.0 }
     }
 }

@@ -26,7 +26,7 @@ use super::coulomb::{ARM, System, root_of, sticks};
 use super::pair::{Other, Pair};
 use super::patch::Patch;
 use super::walls::WallBox;
-use crate::body::Body;
+use crate::body::{Body, Wrench};
 use crate::contact::between::Against;
 use crate::contact::fixed::FixedWalls;
 use glam::{DMat2, DMat3, DVec3};
@@ -172,11 +172,8 @@ impl Slip {
         // what turns against next to nothing is small
         let give = |k: Option<usize>, arm: DVec3| {
             let Some(body) = k.map(|k| &bodies[k]) else { return (0.0, 0.0) };
-            let moved = |t: DVec3| {
-                let turning = arm.cross(t);
-                (body.inverse_mass * t).dot(t) + (body.inverse_inertia * turning).dot(turning)
-            };
-            let spun = (body.inverse_inertia * patch.normal).dot(patch.normal);
+            let moved = |t: DVec3| body.give(t, arm.cross(t));
+            let spun = body.give(DVec3::ZERO, patch.normal);
             (moved(tangent[0]) + moved(tangent[1]), spun)
         };
         let ((slip_a, spun_a), (slip_b, spun_b)) = (give(Some(a), arm_a), give(b, arm_b));
@@ -188,9 +185,10 @@ impl Slip {
         for (k, arm) in [(Some(a), arm_a), (b, arm_b)] {
             let Some(body) = k.map(|k| &bodies[k]) else { continue };
             let turning = [arm.cross(tangent[0]), arm.cross(tangent[1]), spin];
+            let mobility = body.mobility();
             for column in 0..3 {
-                let turned = body.inverse_inertia * turning[column];
-                let moved = if column < 2 { body.inverse_mass * tangent[column] } else { DVec3::ZERO };
+                let push = if column < 2 { tangent[column] } else { DVec3::ZERO };
+                let (moved, turned) = mobility.answer(&Wrench { force: push, torque: turning[column] });
                 let slip = DVec3::new(moved.dot(tangent[0]), moved.dot(tangent[1]), 0.0);
                 let spun = DVec3::new(turned.dot(turning[0]), turned.dot(turning[1]), turned.dot(turning[2]));
                 *response.col_mut(column) += slip + spun;

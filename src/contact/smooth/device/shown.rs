@@ -4,7 +4,7 @@ use super::super::Smooth;
 use super::super::pair::{Other, Pair};
 use super::super::patch::{Contact, DeviceSums, Patch};
 use super::{Cloud, SmoothPair, SmoothPose};
-use crate::body::{Body, Wrench};
+use crate::body::{Body, Mobility, Wrench};
 use crate::contact::candidates::image;
 use crate::contact::device::{four, vector};
 use glam::{DMat3, DVec3};
@@ -42,25 +42,29 @@ fn clearances(turn: DMat3, shift: DVec3, half: DVec3, cloud: &Cloud) -> (DVec3, 
     (of(1.0), of(-1.0))
 }
 
-/// The symmetric matrix `m` of the world in the frame that `still` leads to: its diagonal with `w`, and yz, zx and xy.
-fn symmetric(still: DMat3, m: DMat3, w: f64) -> [[f32; 4]; 2] {
+/// The symmetric matrix `m` of the world in the frame that `still` leads to: its diagonal, and yz, zx and xy, each with one of `w`.
+fn symmetric(still: DMat3, m: DMat3, w: [f64; 2]) -> [[f32; 4]; 2] {
     let m = still * m * still.transpose();
     [
-        four(DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z), w),
-        four(DVec3::new(m.z_axis.y, m.x_axis.z, m.y_axis.x), 0.0),
+        four(DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z), w[0]),
+        four(DVec3::new(m.z_axis.y, m.x_axis.z, m.y_axis.x), w[1]),
     ]
 }
 
 pub(super) fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body]) -> SmoothPose {
     let a = &bodies[pair.a];
     let still = a.rotation.transpose();
-    let (mut gives, mut turns_b) = (a.inverse_mass, DMat3::ZERO);
+    // What water in slots does by a push away from its middle is left out.
+    let Mobility { moves: mut gives, turns: turns_a, .. } = a.mobility();
+    let (mut turns_b, mut most) = (DMat3::ZERO, a.heavier());
     let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
             let (pose, Body { rotation, shape, .. }) = (image(&bodies[b], pair.image), &bodies[b]);
             let half = shape.extent(DMat3::IDENTITY);
-            gives += bodies[b].inverse_mass;
-            turns_b = bodies[b].inverse_inertia;
+            let theirs = bodies[b].mobility();
+            gives += theirs.moves;
+            turns_b = theirs.turns;
+            most = most.max(bodies[b].heavier());
             (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
         }
         Other::Wall(w) => {
@@ -88,9 +92,9 @@ pub(super) fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body
         found: [0.0; 4],
         found_push: [0.0; 4],
         found_moment: [0.0; 4],
-        gives: symmetric(still, DMat3::from_diagonal(gives), between.x),
-        turns_a: symmetric(still, a.inverse_inertia, between.y),
-        turns_b: symmetric(still, turns_b, between.z),
+        gives: symmetric(still, gives, [between.x, most]),
+        turns_a: symmetric(still, turns_a, [between.y, 0.0]),
+        turns_b: symmetric(still, turns_b, [between.z, 0.0]),
         given: [0; 4],
     }
 }

@@ -1,0 +1,125 @@
+//! The inertia of the water between a body and what it comes off or down to, and rooms there without water.
+
+use crate::common::{case, gauges, mean_over, processors, simulation};
+use seixo::case::Case;
+use seixo::scene::Scene;
+use seixo::simulation::Simulation;
+
+/// A block of 0.2 x 0.1 m and `density` [kg/m3], `gap` [m] above the floor of a tank with 0.4 m of water, in the plane; it goes up and down alone.
+fn block(density: f64, gap: f64) -> Case {
+    case(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 2e-4\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [1.2, 0, 0.5]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1.2, 0, 0.4]\n\
+         [[body]]\nname = \"block\"\nsize = [0.2, 0.01, 0.1]\ncenter = [0.6, 0, {}]\ndensity = {density}\n\
+         locked = [\"x\", \"rotation_y\"]\ndisplaces_fluid = true\n\
+         [contact]\nspring = 1e5\nrestitution = 0.2\n\
+         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"",
+        0.05 + gap
+    ))
+}
+
+/// Height [m] and velocity [m/s] of the block.
+fn motion(simulation: &Simulation) -> (f64, f64) {
+    let pose = simulation.solids.poses()[0];
+    (pose.position.z, pose.velocity.z)
+}
+
+#[test]
+fn a_block_starts_as_fast_as_the_water_below_lets_it() {
+    // The added mass of potential flow by finite volumes of 1.25 mm, half of the tank: 345, 203, 151, 128 kg/m.
+    for (gap, density, exact) in [
+        (0.0025, 500.0, 0.277),
+        (0.0025, 2000.0, -0.510),
+        (0.005, 500.0, 0.461),
+        (0.005, 2000.0, -0.808),
+        (0.0075, 500.0, 0.609),
+        (0.0075, 2000.0, -1.027),
+        (0.01, 500.0, 0.710),
+        (0.01, 2000.0, -1.167),
+    ] {
+        let case = block(density, gap);
+        for processor in processors("a block above a floor") {
+            let mut simulation =
+                Simulation::on(&case, Scene::build(&case).unwrap(), &processor).expect("it starts");
+            // Water that a block displaces off its lattice is not even at first.
+            (0..6).for_each(|_| drop(simulation.step().unwrap()));
+            let (start, from) = (simulation.time, motion(&simulation).1);
+            while simulation.time < 0.015 {
+                simulation.step().unwrap();
+            }
+            let found = (motion(&simulation).1 - from) / (simulation.time - start);
+            println!("{gap} m, {density} kg/m3: {found:.3} for {exact} m/s2");
+            assert!((found / exact - 1.15).abs() < 0.2, "{gap} m, {density} kg/m3: {found} for {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_light_block_comes_off_the_floor_as_potential_flow_has_it() {
+    // d/dt (M + m(h)) V = F + V^2 m'(h) / 2, with the added mass of the test above from 1 mm on, the least gap.
+    let mut simulation = simulation(&block(300.0, 0.0));
+    let mut slowest = f64::INFINITY;
+    for (time, exact) in [(0.1, 0.0509), (0.15, 0.0523), (0.2, 0.0552), (0.25, 0.0609)] {
+        while simulation.time < time {
+            simulation.step().unwrap();
+        }
+        let z = motion(&simulation).0;
+        println!("{time} s: {z:.4} for {exact}");
+        assert!((z - exact).abs() < 0.07 * (exact - 0.05) + 2e-4, "{time} s: {z} for {exact}");
+    }
+    while simulation.time < 0.4 {
+        simulation.step().unwrap();
+        slowest = motion(&simulation).1.min(slowest);
+    }
+    // As the gap becomes one for particles, and has none yet, it keeps its lift.
+    let z = motion(&simulation).0;
+    println!("{z:.4} m, at {slowest:.3} m/s at least");
+    assert!(z > 0.085 && slowest > -0.05, "{z} m, {slowest} m/s");
+}
+
+#[test]
+fn a_heavy_block_lands_on_the_water_below_it() {
+    let mut simulation = simulation(&block(2000.0, 0.03));
+    let step = |simulation: &mut Simulation| {
+        simulation.step().unwrap();
+        simulation.solids.contact_wrenches()[0].force.z
+    };
+    let mut fastest = 0.0_f64;
+    while step(&mut simulation) == 0.0 {
+        fastest = fastest.min(motion(&simulation).1);
+        assert!(simulation.time < 1.0, "it lands");
+    }
+    let landed = motion(&simulation).1;
+    println!("{:.3} s: {landed:.3} m/s, {fastest:.3} at most", simulation.time);
+    assert!(fastest < -0.15 && landed.abs() < 0.15 * fastest.abs(), "{landed} of {fastest}");
+    // All of it rests on the floor: the water by its pressure, and the block by what it weighs more.
+    while simulation.time < 0.8 {
+        step(&mut simulation);
+    }
+    let [floor] = mean_over(&mut simulation, [0.8, 1.0], |now| gauges(now, ["floor_force_z"]));
+    let weight = -9.81 * 1000.0 * 0.01 * (1.2 * 0.4);
+    println!("{floor:.2} N for {weight:.2}");
+    assert!((floor / weight - 1.0).abs() < 0.01, "{floor} for {weight}");
+}
+
+#[test]
+fn the_floor_feels_what_the_water_in_the_gap_does() {
+    let mut simulation = simulation(&block(2000.0, 0.008));
+    // While it comes down, the floor bears all but what speeds up.
+    let momentum = |simulation: &mut Simulation| {
+        let fields = simulation.backend.read().expect("the fields");
+        let mass = simulation.params.particle_mass();
+        let water: f64 = fields.velocity[..simulation.groups.fluid].iter().map(|v| v.z).sum();
+        mass * water + 0.4 * motion(simulation).1
+    };
+    while simulation.time < 0.02 {
+        simulation.step().unwrap();
+    }
+    let (start, before) = (simulation.time, momentum(&mut simulation));
+    let [floor] = mean_over(&mut simulation, [0.02, 0.06], |now| gauges(now, ["floor_force_z"]));
+    let gained = (momentum(&mut simulation) - before) / (simulation.time - start);
+    let weight = 9.81 * (1000.0 * 0.01 * (1.2 * 0.4 - 0.02) + 0.4);
+    println!("{floor:.3} N for {:.3}", -weight - gained);
+    assert!((floor + weight + gained).abs() < 0.01 * weight, "{floor} for {}", -weight - gained);
+}
