@@ -61,10 +61,10 @@ struct SmoothPose {
     found_push: vec4f,
     found_moment: vec4f,
     // Sum of the inverse masses, inverse inertia of A and of B, A's frame: diagonal, then yz, zx and xy; w of the
-    // diagonals: from B's centre to A's.
-    gives: array<vec4f, 2>,
-    turns_a: array<vec4f, 2>,
-    turns_b: array<vec4f, 2>,
+    // diagonals: from B's centre to A's. Then the same with the water in their slots.
+    gives: array<vec4f, 4>,
+    turns_a: array<vec4f, 4>,
+    turns_b: array<vec4f, 4>,
     // Contacts that the host has found on faces: first and count in `contact_given`; z: place of the states.
     given: vec4u,
 }
@@ -253,8 +253,8 @@ fn joined(before: vec4f, next: vec4f, turn: u32) -> vec4f {
 }
 
 // v M v of a symmetric matrix.
-fn form(m: array<vec4f, 2>, v: vec3f) -> f32 {
-    return dot(m[0].xyz, v * v) + 2.0 * dot(m[1].xyz, v.yzx * v.zxy);
+fn form(diagonal: vec4f, beside: vec4f, v: vec3f) -> f32 {
+    return dot(diagonal.xyz, v * v) + 2.0 * dot(beside.xyz, v.yzx * v.zxy);
 }
 
 // Share of the mass that answers a contact, from its sums of w d^6, w d^8 and w d^7 n and the moment of that.
@@ -264,11 +264,16 @@ fn answering(n: u32, sixth: f32, eighth: f32, push: vec3f, moment: vec3f) -> f32
     let turns_a = smooth_pose[n].turns_a;
     let turns_b = smooth_pose[n].turns_b;
     let between = vec3f(gives[0].w, turns_a[0].w, turns_b[0].w);
-    let response = form(gives, push) + form(turns_a, moment) + form(turns_b, moment + cross(between, push));
-    if mass == 0.0 || response <= 0.0 {
+    let moved = moment + cross(between, push);
+    var response: array<f32, 2>;
+    for (var k = 0u; k < 2u; k++) {
+        response[k] = form(gives[2u * k], gives[2u * k + 1u], push) + form(turns_a[2u * k], turns_a[2u * k + 1u], moment)
+            + form(turns_b[2u * k], turns_b[2u * k + 1u], moved);
+    }
+    if mass == 0.0 || response[1] <= 0.0 {
         return 1.0;
     }
-    return min(sixth * eighth / (response * mass), gives[1].w);
+    return min(sixth * eighth / (response[0] * mass), 1.0) * response[0] / response[1];
 }
 
 fn near_points(n: u32) -> u32 {

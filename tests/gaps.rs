@@ -5,17 +5,22 @@ use seixo::case::Case;
 use seixo::scene::Scene;
 use seixo::simulation::Simulation;
 
-/// A block of 0.2 x 0.1 m and `density` [kg/m3], `gap` [m] above the floor of a tank with 0.4 m of water, in the plane; it goes up and down alone.
+/// A block of 0.2 x 0.1 m, see [`slab`].
 fn block(density: f64, gap: f64) -> Case {
+    slab(density, gap, 0.1)
+}
+
+/// A slab of 0.2 m, `thick` [m] and of `density` [kg/m3], `gap` [m] above the floor of a tank with 0.4 m of water, in the plane; it goes up and down alone.
+fn slab(density: f64, gap: f64, thick: f64) -> Case {
     case(&format!(
         "[run]\nspacing = 0.01\ntime_step = 2e-4\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n\
          [tank]\nmin = [0, 0, 0]\nmax = [1.2, 0, 0.5]\nopen = [\"z_max\"]\n\
          [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1.2, 0, 0.4]\n\
-         [[body]]\nname = \"block\"\nsize = [0.2, 0.01, 0.1]\ncenter = [0.6, 0, {}]\ndensity = {density}\n\
+         [[body]]\nname = \"block\"\nsize = [0.2, 0.01, {thick}]\ncenter = [0.6, 0, {}]\ndensity = {density}\n\
          locked = [\"x\", \"rotation_y\"]\ndisplaces_fluid = true\n\
          [contact]\nspring = 1e5\nrestitution = 0.2\n\
          [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"",
-        0.05 + gap
+        0.5 * thick + gap
     ))
 }
 
@@ -101,6 +106,43 @@ fn a_heavy_block_lands_on_the_water_below_it() {
     let weight = -9.81 * 1000.0 * 0.01 * (1.2 * 0.4);
     println!("{floor:.2} N for {weight:.2}");
     assert!((floor / weight - 1.0).abs() < 0.01, "{floor} for {weight}");
+}
+
+#[test]
+fn a_slab_of_two_rows_has_the_water_below_it_as_a_block_has() {
+    // 185 kg/m of added mass by potential flow, 133 of them in the gap, and 2 kg/m of its own.
+    let mut simulation = simulation(&slab(500.0, 0.005, 0.02));
+    while simulation.time < 0.015 {
+        simulation.step().unwrap();
+    }
+    let (start, from) = (simulation.time, motion(&simulation).1);
+    while simulation.time < 0.04 {
+        simulation.step().unwrap();
+    }
+    let found = (motion(&simulation).1 - from) / (simulation.time - start);
+    println!("{found:.4} for 0.105 m/s2");
+    assert!((found / 0.105 - 1.25).abs() < 0.3, "{found} for 0.105");
+}
+
+#[test]
+fn a_block_rests_on_one_that_is_held() {
+    // Two blocks of 6 x 4 spacings, the lower one locked in all that it could do, with friction.
+    let mut simulation = simulation(&case(
+        "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n\
+         [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.5]\nopen = [\"z_max\"]\n\
+         [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.3]\n\
+         [[body]]\nname = \"lower\"\nsize = [0.12, 0.02, 0.08]\ncenter = [0.3, 0, 0.04]\ndensity = 2000\n\
+         locked = [\"x\", \"z\", \"rotation_y\"]\ndisplaces_fluid = true\n\
+         [[body]]\nname = \"upper\"\nsize = [0.12, 0.02, 0.08]\ncenter = [0.31, 0, 0.12]\ndensity = 2000\n\
+         velocity = [0.05, 0, 0]\ndisplaces_fluid = true\n\
+         [contact]\nspring = 1e5\nfriction = 0.3\nrestitution = 0.2",
+    ));
+    while simulation.time < 0.3 {
+        simulation.step().expect("a step");
+    }
+    let pose = simulation.solids.poses()[1];
+    println!("{} {}", pose.position, pose.velocity);
+    assert!((pose.position.z - 0.12).abs() < 1e-3 && pose.velocity.length() < 0.01, "{pose:?}");
 }
 
 #[test]

@@ -18,25 +18,6 @@ pub struct Mobility {
     pub turns: DMat3,
 }
 
-/// How a body moves with the water in its slots, which moves with it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InSlots {
-    /// Of both.
-    pub mobility: Mobility,
-    /// How much heavier both are than the body, at most [-].
-    pub heavier: f64,
-}
-
-impl InSlots {
-    /// Of a body that moves by `own` and has the inertia `added`.
-    pub fn new(own: &Mobility, added: &Six) -> Self {
-        let largest = |m: DMat3| m.x_axis.x.max(m.y_axis.y).max(m.z_axis.z);
-        let trace = |first: usize| (first..first + 3).map(|k| added[k][k]).sum::<f64>();
-        let heavier = 1.0 + (largest(own.moves) * trace(0)).max(largest(own.turns) * trace(3));
-        Self { mobility: own.with(added), heavier }
-    }
-}
-
 impl Default for Mobility {
     /// Of a solid that nothing moves.
     fn default() -> Self {

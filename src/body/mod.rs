@@ -9,7 +9,7 @@ mod pose;
 pub mod slots;
 mod turn;
 
-pub use mobility::{InSlots, Mobility, Six};
+pub use mobility::{Mobility, Six};
 pub use pose::{Pose, Wrench};
 
 use crate::scene::{Drive, Motion, Solid};
@@ -39,7 +39,7 @@ pub(crate) struct Body {
     /// Inverse of the inertia, world axes [1/(kg m2)]; zero rows where locked or prescribed.
     pub inverse_inertia: DMat3,
     /// How it moves with the water in its slots, which moves with it; `None` where there is none.
-    pub in_slots: Option<Box<InSlots>>,
+    pub in_slots: Option<Box<Mobility>>,
     /// Mass [kg]; infinite for a prescribed solid.
     pub mass: f64,
     /// Principal moments [kg m2].
@@ -200,22 +200,22 @@ impl Body {
     /// How it answers what pushes it.
     pub fn mobility(&self) -> Mobility {
         match &self.in_slots {
-            Some(both) => both.mobility,
+            Some(mobility) => **mobility,
             None => Mobility::of_body(self.inverse_mass, self.inverse_inertia),
         }
     }
 
-    /// How much heavier it is with the water in its slots, at most [-].
-    pub fn heavier(&self) -> f64 {
-        self.in_slots.as_ref().map_or(1.0, |both| both.heavier)
+    /// Velocity along `push` and turn about `moment`, in all, that an impulse of both gives the body alone: their product with what they give [1/kg].
+    pub fn give_alone(&self, push: DVec3, moment: DVec3) -> f64 {
+        (self.inverse_mass * push).dot(push) + (self.inverse_inertia * moment).dot(moment)
     }
 
-    /// Velocity along `push` and turn about `moment`, in all, by an impulse of both: their product with what they give [1/kg].
+    /// The same of the body with the water in its slots.
     pub fn give(&self, push: DVec3, moment: DVec3) -> f64 {
         match &self.in_slots {
-            None => (self.inverse_mass * push).dot(push) + (self.inverse_inertia * moment).dot(moment),
-            Some(both) => {
-                let (velocity, turn) = both.mobility.answer(&Wrench { force: push, torque: moment });
+            None => self.give_alone(push, moment),
+            Some(mobility) => {
+                let (velocity, turn) = mobility.answer(&Wrench { force: push, torque: moment });
                 velocity.dot(push) + turn.dot(moment)
             }
         }
@@ -223,8 +223,8 @@ impl Body {
 
     /// Adds an impulse [N s] and an angular impulse about the position [N m s].
     pub fn kick(&mut self, impulse: DVec3, angular: DVec3) {
-        if let Some(both) = &self.in_slots {
-            let (velocity, turn) = both.mobility.answer(&Wrench { force: impulse, torque: angular });
+        if let Some(mobility) = &self.in_slots {
+            let (velocity, turn) = mobility.answer(&Wrench { force: impulse, torque: angular });
             self.pose.velocity += velocity;
             self.momentum += self.free_axes() * (self.inertia(self.rotation) * turn);
             self.pose.angular_velocity = self.inverse_inertia * self.momentum;

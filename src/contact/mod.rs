@@ -26,7 +26,7 @@ pub use probe::{Probe, ProbePatch};
 pub use report::{ContactReport, Energy, SolidState};
 pub use stiffness::{damping_ratio, restitution};
 
-use crate::body::{Body, FreeBody, InSlots, Mobility, Pose, Wrench};
+use crate::body::{Body, FreeBody, Mobility, Pose, Wrench};
 use crate::case;
 use crate::compute::Compute;
 use crate::error::{Error, Result};
@@ -170,8 +170,8 @@ impl Solids {
     }
 
     /// How bodies move in the next step with the water in their slots, by their index.
-    pub fn stand_in_slots(&mut self, bodies: Vec<(usize, InSlots)>) {
-        bodies.into_iter().for_each(|(k, both)| self.bodies[k].in_slots = Some(Box::new(both)));
+    pub fn stand_in_slots(&mut self, mobilities: Vec<(usize, Mobility)>) {
+        mobilities.into_iter().for_each(|(k, mobility)| self.bodies[k].in_slots = Some(Box::new(mobility)));
     }
 
     /// Name of solid `k`, as in the case.
@@ -210,6 +210,8 @@ impl Solids {
     /// `gravity` is that of the fluid's explicit stage ([`crate::params::Params::explicit_gravity`]), so that body
     /// and water fall together there. Without `contact` where that acts with the pressure, see [`Solids::free_bodies`].
     pub fn predict(&mut self, t: f64, dt: f64, ahead: f64, gravity: DVec3, contact: bool) -> &[Pose] {
+        // A step that was given up leaves what it had.
+        self.bodies.iter_mut().for_each(|body| body.in_slots = None);
         for (k, body) in self.bodies.iter().enumerate() {
             self.predicted[k] = match body.prescribed(t, dt, ahead) {
                 Some(pose) => pose,

@@ -3,7 +3,7 @@
 use super::Simulation;
 use crate::backend::Backend;
 use crate::body::slots::SlotRow;
-use crate::body::{InSlots, Pose, Six, Wrench};
+use crate::body::{Mobility, Pose, Six, Wrench};
 use crate::contact::ContactReport;
 use crate::cover::driven::Covered;
 use crate::error::{Error, Result};
@@ -69,6 +69,8 @@ impl Simulation {
         let mut bodies = self.solids.free_bodies(self.params.balanced_gravity());
         loads.iter().for_each(|&(k, load)| bodies[k].load += load);
         self.enclosed = loads;
+        // Of one that is held in all that it could do nothing comes nearer.
+        pressings.retain(|slot| bodies[slot.solid].mobility != Mobility::default());
         let mut in_slots = vec![];
         for slots in pressings.chunk_by_mut(|a, b| a.solid == b.solid) {
             let (k, mut added) = (slots[0].solid, Six::default());
@@ -78,9 +80,8 @@ impl Simulation {
                 slot.add_braking(&mut added, &free, pose, dt);
                 bodies[k].load += slot.speed;
             }
-            let both = InSlots::new(&bodies[k].mobility, &added);
-            bodies[k].mobility = both.mobility;
-            in_slots.push((k, both));
+            bodies[k].mobility = bodies[k].mobility.with(&added);
+            in_slots.push((k, bodies[k].mobility));
         }
         self.solids.stand_in_slots(in_slots);
         self.pressings = pressings;

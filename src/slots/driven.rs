@@ -17,7 +17,7 @@ type Of = (usize, usize, usize);
 
 /// A face that looks back at a push less than this is not pressed on (cosine of the angle).
 pub(crate) const AGAINST: f64 = 0.5;
-/// Least and largest distance of a push from a face that it is on, over l0: that of the widest slot, and half a spacing for where the two lean.
+/// Least and largest distance of a push from a face that it is on, over l0: that of the widest slot, and half a spacing for where the two lean, or of the widest room.
 pub(crate) const BEFORE: (f64, f64) = (-0.6, 1.6);
 /// A face this much deeper than another before which the same point lies, over l0, is hidden by that.
 const HIDDEN: f64 = 0.5;

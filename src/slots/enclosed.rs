@@ -145,7 +145,9 @@ impl Slots {
             Some((k, load))
         };
         let loads = found.iter().filter(|f| f.slot.rim.is_empty()).filter_map(load).collect();
-        let water = start.map(|water| PointGrid::new(water.to_vec(), CELL * self.spacing));
+        let water = start
+            .filter(|_| !found.is_empty())
+            .map(|water| PointGrid::new(water.to_vec(), CELL * self.spacing));
         let pressing = |(f, told): (&Found, &Vec<(usize, f64)>)| {
             if f.slot.rim.is_empty() {
                 return None;

@@ -22,6 +22,8 @@ use glam::DVec3;
 
 /// Least gap that water is pressed through, over l0: what stands on a floor stands on its unevenness.
 const LEAST: f64 = 0.1;
+/// A face of a row looks out of the slot beside what of the row looks into it if their directions are so far apart (cosine of the angle).
+const ASIDE: f64 = 0.7;
 /// Where the residual ends, over the first [-].
 const TOLERANCE: f64 = 1e-6;
 /// Most iterations; they go with the rows across the slot.
@@ -39,12 +41,12 @@ pub struct Pressing {
     /// How much less that is [-] for each watt that the end of the step takes from its power.
     braked: f64,
     /// Rows of its layer in the slot.
-    rows: Vec<Pressed>,
+    rows: Vec<PressedRow>,
 }
 
 /// A row in such a slot.
 #[derive(Clone, Debug, PartialEq)]
-struct Pressed {
+struct PressedRow {
     row: usize,
     /// Pressure by unit accelerations of the body [Pa s2/m], [Pa s2].
     by_acceleration: [f64; 6],
@@ -109,7 +111,7 @@ impl Pressing {
         dt: f64,
     ) -> impl Iterator<Item = ((usize, usize), f64)> {
         let (a, left) = (acceleration(before, after, dt), self.left(before, after));
-        let of = move |r: &Pressed| ((self.solid, r.row), dot(&r.by_acceleration, &a) + left * r.by_speed);
+        let of = move |r: &PressedRow| ((self.solid, r.row), dot(&r.by_acceleration, &a) + left * r.by_speed);
         self.rows.iter().map(of)
     }
 }
@@ -129,9 +131,9 @@ fn acceleration(before: &Pose, after: &Pose, dt: f64) -> [f64; 6] {
 struct Gap {
     /// Rows of the layer.
     rows: Vec<usize>,
-    /// Of each the gap [m], whether it can become narrower, and its row of S [m2], [m3].
+    /// Of each the gap [m], whether that is more than the least, and its row of S [m2], [m3].
     width: Vec<f64>,
-    narrows: Vec<bool>,
+    is_open: Vec<bool>,
     pressed: Vec<[f64; 6]>,
     /// Area [m2].
     area: Vec<f64>,
@@ -193,10 +195,10 @@ impl Gap {
 
     /// Pressure over density of the rows by the speed `v` of the body, with the `phi` that it makes [m2/s2].
     fn by_speed(&self, v: &[f64; 6], phi: &[f64]) -> Vec<f64> {
-        // The gap narrows at -row . v over its area; the least one only narrows.
+        // The gap is_open at -row . v over its area; the least one only is_open.
         let closing = |k: usize| {
             let speed = -dot(&self.pressed[k], v) / self.area[k];
-            if self.narrows[k] { speed } else { speed.max(0.0) }
+            if self.is_open[k] { speed } else { speed.max(0.0) }
         };
         let closing: Vec<f64> = (0..phi.len()).map(closing).collect();
         // Half of the square of the speed, along each axis from the ways to both sides.
@@ -247,7 +249,7 @@ impl Slots {
         let mut gap = Gap {
             rows: vec![],
             width: vec![],
-            narrows: vec![],
+            is_open: vec![],
             pressed: vec![],
             area: vec![],
             ways: vec![],
@@ -255,6 +257,7 @@ impl Slots {
             steep: vec![],
             spacing: l0,
         };
+        let mut inwards = vec![];
         for (&(n, share), &area) in slot.inside.iter().zip(&areas) {
             let place = pose.orientation * layer.offset[n];
             let wet = field.is_none_or(|field| self.in_slot(field, place, place) > field.lowest);
@@ -266,14 +269,16 @@ impl Slots {
                 pressed.add(share, &row(area, at));
             }
             gap.rows.push(n);
+            inwards.push(pose.orientation.inverse() * area.normalize());
             gap.width.push(faced[n].gap.max(LEAST * l0));
-            gap.narrows.push(faced[n].gap > LEAST * l0);
+            gap.is_open.push(faced[n].gap > LEAST * l0);
             gap.pressed.push(six(&pressed));
             gap.area.push(area.length());
         }
-        for &n in &gap.rows {
+        for (&n, &inwards) in gap.rows.iter().zip(&inwards) {
             let (mut ways, mut rims, mut ends) = (vec![], 0, 0);
-            for &m in &layer.adjacent[n] {
+            // Not those on the other side of a plate.
+            for &m in layer.adjacent[n].iter().filter(|&&m| layer.go_on(n, m as usize)) {
                 match gap.rows.binary_search(&(m as usize)) {
                     Ok(k) => ways.push((k, l0 / (layer.offset[n] - layer.offset[m as usize]).length())),
                     Err(_) if slot.rim.binary_search(&(m as usize)).is_ok() => rims += 1,
@@ -281,7 +286,8 @@ impl Slots {
                 }
             }
             // What of a row at an edge looks out of the slot is half a spacing away; a surface that bends goes on to the rim.
-            let looks_out = faced[n].by_face.iter().filter(|face| face.1.is_none()).count();
+            let aside = |way: DVec3| way.dot(inwards).abs() < ASIDE;
+            let looks_out = faced[n].by_face.iter().filter(|face| face.1.is_none() && aside(face.0)).count();
             let (beside, steep) = if looks_out > 0 { (2 * looks_out, 2.0) } else { (rims, 1.0) };
             gap.ways.push(ways);
             gap.out.push((beside + ends) as f64);
@@ -309,7 +315,7 @@ impl Slots {
         for (row, p) in gap.pressed.iter().zip(&by_speed) {
             speed.iter_mut().zip(row).for_each(|(sum, r)| *sum += p * r);
         }
-        let rows = gap.rows.iter().enumerate().map(|(k, &row)| Pressed {
+        let rows = gap.rows.iter().enumerate().map(|(k, &row)| PressedRow {
             row,
             by_acceleration: by_acceleration(k),
             by_speed: by_speed[k],

@@ -111,7 +111,7 @@ impl Layer {
     }
 
     /// Whether rows `a` and `b`, which are near each other, lie beside each other on the surface.
-    fn go_on(&self, a: usize, b: usize) -> bool {
+    pub fn go_on(&self, a: usize, b: usize) -> bool {
         let ways = |k: usize| self.own_faces(k).map(|face| face.area.normalize_or_zero());
         ways(a).any(|a| ways(b).any(|b| a.dot(b) > TURNED))
     }

@@ -41,20 +41,22 @@ impl Mode {
         mode
     }
 
-    /// m_e / `mass`, at most 1, or what the water in slots makes heavier: 1 for a `mass` [kg] of 0, which is that of a case that gives C itself. `second` is how
+    /// m_e / `mass`, at most 1 but for what the water in slots makes heavier: 1 for a `mass` [kg] of 0, which is that of a case that gives C itself. `second` is how
     /// the second solid lies beside the first, if it can move.
     pub fn share(&self, mass: f64, first: &Body, second: Option<(&Body, Pose)>) -> f64 {
         if mass == 0.0 {
             return 1.0;
         }
-        let gives = |body: &Body, moment: DVec3| body.give(self.push, moment);
-        let (mut response, mut most) = (gives(first, self.moment), first.heavier());
+        let gives = |body: &Body, moment: DVec3| {
+            [Body::give_alone, Body::give].map(|give| give(body, self.push, moment))
+        };
+        let [mut alone, mut both] = gives(first, self.moment);
         if let Some((body, pose)) = second {
             let between = first.pose.position - pose.position;
-            response += gives(body, self.moment + between.cross(self.push));
-            most = most.max(body.heavier());
+            let [its_own, its_all] = gives(body, self.moment + between.cross(self.push));
+            (alone, both) = (alone + its_own, both + its_all);
         }
         // what nothing moves gives way to nothing
-        if response > 0.0 { (self.sixth * self.eighth / (response * mass)).min(most) } else { 1.0 }
+        if both > 0.0 { (self.sixth * self.eighth / (alone * mass)).min(1.0) * (alone / both) } else { 1.0 }
     }
 }

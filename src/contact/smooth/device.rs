@@ -70,9 +70,9 @@ pub struct SmoothPose {
     pub found: [f32; 4],
     pub found_push: [f32; 4],
     pub found_moment: [f32; 4],
-    pub gives: [[f32; 4]; 2],
-    pub turns_a: [[f32; 4]; 2],
-    pub turns_b: [[f32; 4]; 2],
+    pub gives: [[f32; 4]; 4],
+    pub turns_a: [[f32; 4]; 4],
+    pub turns_b: [[f32; 4]; 4],
     pub given: [u32; 4],
 }
 

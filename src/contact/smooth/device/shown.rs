@@ -42,12 +42,17 @@ fn clearances(turn: DMat3, shift: DVec3, half: DVec3, cloud: &Cloud) -> (DVec3, 
     (of(1.0), of(-1.0))
 }
 
-/// The symmetric matrix `m` of the world in the frame that `still` leads to: its diagonal, and yz, zx and xy, each with one of `w`.
-fn symmetric(still: DMat3, m: DMat3, w: [f64; 2]) -> [[f32; 4]; 2] {
+/// The symmetric matrices `of` of the world in the frame that `still` leads to: of each its diagonal with `w`, and yz, zx and xy.
+fn symmetric(still: DMat3, of: [DMat3; 2], w: f64) -> [[f32; 4]; 4] {
+    let [[a, b], [c, d]] = of.map(|m| one_symmetric(still, m, w));
+    [a, b, c, d]
+}
+
+fn one_symmetric(still: DMat3, m: DMat3, w: f64) -> [[f32; 4]; 2] {
     let m = still * m * still.transpose();
     [
-        four(DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z), w[0]),
-        four(DVec3::new(m.z_axis.y, m.x_axis.z, m.y_axis.x), w[1]),
+        four(DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z), w),
+        four(DVec3::new(m.z_axis.y, m.x_axis.z, m.y_axis.x), 0.0),
     ]
 }
 
@@ -55,16 +60,18 @@ pub(super) fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body
     let a = &bodies[pair.a];
     let still = a.rotation.transpose();
     // What water in slots does by a push away from its middle is left out.
-    let Mobility { moves: mut gives, turns: turns_a, .. } = a.mobility();
-    let (mut turns_b, mut most) = (DMat3::ZERO, a.heavier());
+    let answers = |body: &Body| {
+        let (alone, both) = (Mobility::of_body(body.inverse_mass, body.inverse_inertia), body.mobility());
+        ([alone.moves, both.moves], [alone.turns, both.turns])
+    };
+    let ((mut gives, turns_a), mut turns_b) = (answers(a), [DMat3::ZERO; 2]);
     let (center, axes, half, velocity, spin) = match pair.b {
         Other::Solid(b) => {
             let (pose, Body { rotation, shape, .. }) = (image(&bodies[b], pair.image), &bodies[b]);
             let half = shape.extent(DMat3::IDENTITY);
-            let theirs = bodies[b].mobility();
-            gives += theirs.moves;
-            turns_b = theirs.turns;
-            most = most.max(bodies[b].heavier());
+            let moves;
+            (moves, turns_b) = answers(&bodies[b]);
+            gives = [0, 1].map(|k| gives[k] + moves[k]);
             (pose.position, *rotation, half, pose.velocity_at(a.pose.position), pose.angular_velocity)
         }
         Other::Wall(w) => {
@@ -92,9 +99,9 @@ pub(super) fn pose(pair: &Pair, clouds: &[Cloud], model: &Smooth, bodies: &[Body
         found: [0.0; 4],
         found_push: [0.0; 4],
         found_moment: [0.0; 4],
-        gives: symmetric(still, gives, [between.x, most]),
-        turns_a: symmetric(still, turns_a, [between.y, 0.0]),
-        turns_b: symmetric(still, turns_b, [between.z, 0.0]),
+        gives: symmetric(still, gives, between.x),
+        turns_a: symmetric(still, turns_a, between.y),
+        turns_b: symmetric(still, turns_b, between.z),
         given: [0; 4],
     }
 }
