@@ -6,8 +6,8 @@
 //! div(h grad phi) = -w,  p = rho dphi/dt - rho u^2 / 2 + const,
 //!
 //! with p = 0 at the rim where it flows out, and -rho u^2 / 2 where it comes in from rest; what flows from a narrower into a wider part of a gap loses what a
-//! jet does. By the body's velocity V,
-//! phi = -X V, and by its acceleration a the pressure is -rho X a: with the rows R of S in the slot the body has the added inertia
+//! jet does. By the body's velocity V, phi = -X V, and by its acceleration a the pressure is -rho X a: with the rows R of S in the slot the body has the
+//! added inertia
 //!
 //! A = rho R^T L^-1 R,  X = L^-1 R,
 //!
@@ -195,7 +195,7 @@ impl Gap {
 
     /// Pressure over density of the rows by the speed `v` of the body, with the `phi` that it makes [m2/s2].
     fn by_speed(&self, v: &[f64; 6], phi: &[f64]) -> Vec<f64> {
-        // The gap is_open at -row . v over its area; the least one only is_open.
+        // The gap closes at -row . v over its area; water in the least one is pressed out still, and not drawn in.
         let closing = |k: usize| {
             let speed = -dot(&self.pressed[k], v) / self.area[k];
             if self.is_open[k] { speed } else { speed.max(0.0) }
