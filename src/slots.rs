@@ -73,6 +73,7 @@ const BEFORE_FACE: f64 = 0.7;
 const BACK: f64 = -0.3;
 /// Edge of the cells that points lie in, over l0: twice the reach, so that two an axis are looked into.
 const CELL: f64 = 5.2;
+
 /// A slot between a free body and other solids: rows of the body's layer.
 struct Slot {
     solid: usize,
@@ -236,7 +237,7 @@ impl Slots {
     ) -> Vec<Found> {
         for of in &mut lying {
             for &(k, n) in voids.range((of.solid, 0)..(of.solid + 1, 0)) {
-                of.faced[n] = self.row_faced((k, n), of.at_walls, &others[k], poses, EMPTY);
+                of.faced[n] = self.row_faced((k, n), of.at_walls, &others[k], poses, (EMPTY, ACROSS));
             }
         }
         let found = |of: Lying| {
@@ -285,21 +286,20 @@ impl Slots {
     /// How each row of layer `k` lies before fixed walls, if it is `at_walls`, and before `others`.
     fn faced(&self, k: usize, at_walls: bool, others: &[(usize, DVec3)], poses: &[Pose]) -> Vec<Faced> {
         let rows = (0..self.layers[k].offset.len()).into_par_iter().with_min_len(256);
-        rows.map(|n| self.row_faced((k, n), at_walls, others, poses, FACING.1)).collect()
+        rows.map(|n| self.row_faced((k, n), at_walls, others, poses, (FACING.1, 0.0))).collect()
     }
 
-    /// How row `n` of layer `k` does, `within` of which [l0] it faces something.
+    /// How row `n` of layer `k` does, with what lies `within` so many l0, and this near its outward direction at `least` (cosine).
     fn row_faced(
         &self,
         (k, n): (usize, usize),
         at_walls: bool,
         others: &[(usize, DVec3)],
         poses: &[Pose],
-        within: f64,
+        (within, least): (f64, f64),
     ) -> Faced {
         let (layer, pose, l0) = (&self.layers[k], &poses[k], self.spacing);
         let reach = within * l0;
-        let least = if within == EMPTY { ACROSS } else { 0.0 };
         // Of those within `ahead` of `outward` (cosine) around `x`, the nearest which looks `back` so far at least, how far it is, and how far along `outward`.
         let nearest = |x: DVec3, outward: DVec3, ahead: f64, back: f64| {
             let (mut nearest, mut along, mut opposite) = (reach, reach, None);

@@ -82,7 +82,8 @@ impl Slots {
             let shut = |n: usize| {
                 !is_open(n)
                     || !bodies[k].is_empty()
-                        && self.row_faced((k, n), false, &bodies[k], poses, super::FACING.1).share > 0.0
+                        && self.row_faced((k, n), false, &bodies[k], poses, (super::FACING.1, 0.0)).share
+                            > 0.0
             };
             let slots = layer.slots(k, &shares, shut).into_iter();
             found.extend(slots.map(|slot| Found { slot, faced: faced.clone(), lenders: vec![] }));
@@ -182,9 +183,7 @@ impl Slots {
             }
             // What has slots of its own there has its part from them.
             let is_free = |of| !matches!(of, Opposite::Solid(other, row) if pressed.contains(&(other, row)));
-            out.pushes.extend(
-                self.pushes_of(f, &areas, field.as_ref(), pose, is_free).into_iter().map(|(_, push)| push),
-            );
+            out.pushes.extend(self.pushes_of(f, &areas, field.as_ref(), pose, |_| 0.0, is_free));
             out.loads.push((k, load));
         }
         Ok(out)

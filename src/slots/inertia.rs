@@ -88,18 +88,16 @@ impl Pressing {
         add(added, |i, j| dt * self.braked * f[i] * f[j]);
     }
 
-    /// How much of what the speed makes is left at the end of the step [-].
-    fn left(&self, before: &Pose, after: &Pose) -> f64 {
-        let (v, w) = (velocity(before), velocity(after));
-        1.0 - self.braked
-            * six(&self.speed).iter().zip(v.iter().zip(w)).map(|(f, (v, w))| f * (w - v)).sum::<f64>()
+    /// How much of what the speed makes is left at the end of a step of `dt` [s] with the acceleration `a` [-].
+    fn left(&self, a: &[f64; 6], dt: f64) -> f64 {
+        1.0 - self.braked * dt * dot(&six(&self.speed), a)
     }
 
     /// What it did to the body, which went from the pose `before` to `after` in `dt` [s].
     pub fn force(&self, before: &Pose, after: &Pose, dt: f64) -> Wrench {
         let a = acceleration(before, after, dt);
         let mut sum = wrench(std::array::from_fn(|i| -dot(&self.inertia[i], &a)));
-        sum.add(self.left(before, after), &self.speed);
+        sum.add(self.left(&a, dt), &self.speed);
         sum
     }
 
@@ -110,7 +108,8 @@ impl Pressing {
         after: &Pose,
         dt: f64,
     ) -> impl Iterator<Item = ((usize, usize), f64)> {
-        let (a, left) = (acceleration(before, after, dt), self.left(before, after));
+        let a = acceleration(before, after, dt);
+        let left = self.left(&a, dt);
         let of = move |r: &PressedRow| ((self.solid, r.row), dot(&r.by_acceleration, &a) + left * r.by_speed);
         self.rows.iter().map(of)
     }
@@ -145,11 +144,16 @@ struct Gap {
     spacing: f64,
 }
 
+/// What stands at the way from row `k` to another in a gap of the widths `h` [m]: its breadth over its length times the gap [m].
+fn through(h: &[f64], k: usize, (j, way): (usize, f64)) -> f64 {
+    0.5 * (h[k] + h[j]) * way
+}
+
 impl Gap {
     /// L x of the gap with the widths `h` [m].
     fn apply(&self, h: &[f64], x: &[f64]) -> Vec<f64> {
         let of = |k: usize| {
-            let beside = self.ways[k].iter().map(|&(j, way)| 0.5 * (h[k] + h[j]) * way * (x[k] - x[j]));
+            let beside = self.ways[k].iter().map(|&way| through(h, k, way) * (x[k] - x[way.0]));
             beside.sum::<f64>() + h[k] * self.out[k] * x[k]
         };
         (0..x.len()).map(of).collect()
@@ -161,7 +165,7 @@ impl Gap {
         let mut x = vec![0.0; b.len()];
         let diagonal: Vec<f64> = (0..b.len())
             .map(|k| {
-                let beside = self.ways[k].iter().map(|&way| self.through(k, way));
+                let beside = self.ways[k].iter().map(|&way| through(h, k, way));
                 beside.sum::<f64>() + h[k] * self.out[k]
             })
             .collect();
@@ -186,11 +190,6 @@ impl Gap {
             now = next;
         }
         x
-    }
-
-    /// What stands at a way between rows `k` and `j`: its breadth over its length times the gap [m].
-    fn through(&self, k: usize, (j, way): (usize, f64)) -> f64 {
-        0.5 * (self.width[k] + self.width[j]) * way
     }
 
     /// Pressure over density of the rows by the speed `v` of the body, with the `phi` that it makes [m2/s2].
@@ -221,7 +220,7 @@ impl Gap {
         let mut b = self.apply(&closing, phi);
         for (k, b) in b.iter_mut().enumerate() {
             for &(j, way) in &self.ways[k] {
-                let through = self.through(k, (j, way));
+                let through = through(&self.width, k, (j, way));
                 let flow = through * (phi[k] - phi[j]);
                 let lost = if flow > 0.0 { lost(k, j, flow) } else { -lost(j, k, -flow) };
                 *b += through * (energy[j] - energy[k] + lost);

@@ -77,11 +77,8 @@ impl Slots {
             let Some(field) = self.field_of(&found, &pressure, (f, told), poses) else { return vec![] };
             let (layer, pose) = (&self.layers[f.slot.solid], &poses[f.slot.solid]);
             let areas = layer.areas(&layer.area, f, pose);
-            let mut pushes = self.pushes_of(f, &areas, Some(&field), pose, |_| true);
-            pushes.iter_mut().for_each(|(n, push)| {
-                push.pressure += pressed.get(&(f.slot.solid, *n)).copied().unwrap_or_default();
-            });
-            pushes.into_iter().map(|(_, push)| push).collect()
+            let beside = |n: usize| pressed.get(&(f.slot.solid, n)).copied().unwrap_or_default();
+            self.pushes_of(f, &areas, Some(&field), pose, beside, |_| true)
         };
         Ok(found.iter().zip(&pressure).flat_map(of).collect())
     }
@@ -104,16 +101,17 @@ impl Slots {
         Some(self.field(pose, &passing, self.places(slot, pose, told), lowest)).filter(|field| field.any_wet)
     }
 
-    /// What the water of the `field` in the slot `found` presses with the `areas` of its rows on that of what they look onto which `is_pressed`; each with
-    /// its row.
+    /// What the water of the `field` in the slot `found` presses with the `areas` of its rows on that of what they look onto which `is_pressed`,
+    /// with what presses `beside` that on each row [Pa].
     pub(super) fn pushes_of(
         &self,
         found: &Found,
         areas: &[DVec3],
         field: Option<&Field>,
         pose: &Pose,
+        beside: impl Fn(usize) -> f64,
         is_pressed: impl Fn(Opposite) -> bool,
-    ) -> Vec<(usize, Push)> {
+    ) -> Vec<Push> {
         let Found { slot, faced, .. } = found;
         let layer = &self.layers[slot.solid];
         let mut out = vec![];
@@ -121,9 +119,9 @@ impl Slots {
             for (area, at) in layer.faces(n, area, pose) {
                 let on = faced[n].before(pose.orientation.inverse() * area);
                 if let Some(on) = on.filter(|&on| is_pressed(on)) {
-                    let pressure = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
+                    let there = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
                     let (at, area) = (pose.position + at, share * area);
-                    out.push((n, Push { by: slot.solid, on, at, pressure, area }));
+                    out.push(Push { by: slot.solid, on, at, pressure: there + beside(n), area });
                 }
             }
         }

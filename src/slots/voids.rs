@@ -2,10 +2,11 @@
 //! one that is laid where the lattice does not fit may start over one. What is under water all round is full of water: it is a slot, as
 //! narrower ones are, until water has come in. Without it a body that had risen by a spacing lost its lift, and fell back.
 
-use super::{EMPTY, Faced, Slots};
+use super::{ACROSS, EMPTY, Faced, Slots};
 use crate::body::Pose;
 use crate::error::Result;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 
 /// Solids and rows of theirs that face a room without water.
@@ -33,12 +34,13 @@ impl Slots {
     ) -> Result<Voids> {
         let may_be = |of: &Lying| {
             let far = |n: usize| {
-                let row = || self.row_faced((of.solid, n), of.at_walls, &others[of.solid], poses, EMPTY);
+                let row =
+                    || self.row_faced((of.solid, n), of.at_walls, &others[of.solid], poses, (EMPTY, ACROSS));
                 of.faced[n].share < 1.0 && row().share > of.faced[n].share
             };
-            (0..of.faced.len()).filter(|&n| far(n)).collect::<Vec<usize>>()
+            (0..of.faced.len()).into_par_iter().with_min_len(256).filter(|&n| far(n)).collect::<Vec<usize>>()
         };
-        let rows: Vec<Vec<usize>> = lying.iter().map(may_be).collect();
+        let rows: Vec<Vec<usize>> = lying.par_iter().map(may_be).collect();
         let mut asked = BTreeSet::new();
         for (of, rows) in lying.iter().zip(&rows) {
             let layer = &self.layers[of.solid];
