@@ -294,6 +294,21 @@ fn a_piston_that_cannot_move_on_is_an_error_that_names_it() {
 }
 
 #[test]
+fn a_block_in_a_press_is_told_as_such() {
+    // it was the spring's fault, and with the spring that was named another one's
+    let mut dry = Dry::new(&format!(
+        "[run]\nspacing = 0.01\ntime_step = 1e-3\nend = 1\ndimensions = 2\ngravity = [0, 0, -{G}]\n\
+         [tank]\nmin = [-0.3, 0, 0]\nmax = [0.3, 0.01, 0.5]\n\
+         [[body]]\nname = \"block\"\nsize = [0.1, 0.01, 0.1]\ncenter = [0, 0.005, 0.05]\ndensity = 1000\nstanding = true\n\
+         [[moving_wall]]\nname = \"press\"\nsize = [0.2, 0.01, 0.1]\ncenter = [0, 0.005, 0.16]\n\
+         motion = [[0, 0, 0, 0], [0.8, 0, 0, -0.04]]\n\
+         [contact]\nspring = 1e5\nfriction = 0.3\nrestitution = 0.1\n"
+    ));
+    let told = (0..1000).find_map(|_| dry.try_step().err()).expect("it cannot go on").to_string();
+    assert!(told.contains("squeezed by what follows a motion") && !told.contains("spring ="), "{told}");
+}
+
+#[test]
 fn what_stands_still_drives_nothing_into_a_body_that_falls_on_it() {
     // On springs too soft for it a cube sinks in by more than a spacing. On what is no box, and on what is held, that was an error about a table.
     let held = "locked = [\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\"]";

@@ -15,6 +15,7 @@ mod contact_device;
 mod contact_drag;
 mod contact_forces;
 mod contact_hard;
+mod contact_heaps;
 mod contact_impacts;
 mod contact_pairs;
 mod contact_small;

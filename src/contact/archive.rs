@@ -57,7 +57,7 @@ impl Solids {
             names: _,
             gravity: _,
             spacing,
-            law: _,
+            law,
             limits,
             // Made anew in every step, or from the state, or counters.
             poses: _,
@@ -110,6 +110,9 @@ impl Solids {
         archive.array(MOMENTA, &mut momenta, true)?;
         archive.array(CONTACT, &mut wrenches, true)?;
         fixed.exchange(archive)?;
+        if let Some(law) = law {
+            law.exchange(archive)?;
+        }
         if periodic.is_any() {
             archive.array(TURNS, turns, true)?;
         }

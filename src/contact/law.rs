@@ -9,6 +9,7 @@ use super::probe::Probe;
 use super::substeps::{Cut, Limits, Worst};
 use crate::body::{Body, Wrench};
 use crate::case;
+use crate::checkpoint::Archive;
 use crate::compute::Program;
 use crate::error::Result;
 use crate::scene::Scene;
@@ -96,6 +97,14 @@ pub(crate) trait Law: Send {
     /// Whether a contact of the last evaluation may reach its stop within the sub-step.
     fn nears_stop(&self, _: Now) -> bool {
         false
+    }
+
+    /// Saves what the law keeps from one sub-step to the next, or takes it over.
+    ///
+    /// # Errors
+    /// As [`Archive::array`].
+    fn exchange(&mut self, _: &mut Archive) -> Result<()> {
+        Ok(())
     }
 
     /// The solids have been put elsewhere, and the lists are no longer theirs.

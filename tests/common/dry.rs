@@ -20,7 +20,7 @@ pub struct Dry {
 
 impl Dry {
     pub fn new(text: &str) -> Self {
-        let case = case(text);
+        let case = case(text).laid_out().unwrap_or_else(|e| panic!("{e}\n{text}"));
         let scene = Scene::build(&case).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let solids = Solids::new(&scene, case.contact.as_ref()).unwrap();
         Self { solids, walls: scene.walls, dt: case.run.time_step, step: 0 }

@@ -22,6 +22,8 @@ pub(super) const DRIVEN: f64 = 1.0;
 const WAY: f64 = 0.5;
 /// Way of a sub-step over the depth of the stop, at most, into what has not been touched yet.
 const UNSEEN: f64 = 0.5;
+/// Depth of a body in one solid over that in another from which it counts as squeezed between the two.
+const SQUEEZED: f64 = 0.3;
 /// Depth over half of a solid's thickness that says nothing of two whose middles are in each other.
 const UNTOLD: f64 = 1e-3;
 /// Ways of a sub-step that are looked ahead for the stop: forces may add to the speed.
@@ -121,11 +123,15 @@ impl Smooth {
             }
             let unknown = self.on_device && pair.depth > THROUGH * middle_a.max(middle_b);
             if in_a > THROUGH * middle_a || in_b > THROUGH * middle_b || unknown {
+                let remedy = if self.is_squeezed(pair, now) {
+                    "it is squeezed by what follows a motion, which no spring stops: change that motion or make room".into()
+                } else {
+                    format!("use {} or a thicker solid", self.stiff_enough(pair, now))
+                };
                 return Some(fault(format!(
                     "is {:.3e} m deep, almost halfway through, at {closing:.3} m/s: contact would push it out on the \
-                     other side; use {} or a thicker solid",
+                     other side; {remedy}",
                     pair.depth,
-                    self.stiff_enough(pair, now)
                 )));
             }
             (driven && pair.depth > DRIVEN * self.spacing).then(|| {
@@ -168,6 +174,16 @@ impl Smooth {
             );
             Some(Fault { a: pair.a, b: self.against(pair.b), what })
         })
+    }
+
+    /// Whether the pair's body is squeezed: between two solids that give way to nothing, one of which moves. No spring stops that.
+    fn is_squeezed(&self, pair: &Pair, now: &Now) -> bool {
+        let driven = |p: &Pair| p.b.solid().filter(|&b| now.bodies[b].is_driven());
+        let holds = |p: &Pair| p.b.solid().is_none() || driven(p).is_some();
+        let moves = |p: &Pair| driven(p).is_some_and(|b| now.bodies[b].speed() > 0.0);
+        let beside = self.evaluated().iter().filter(|p| p.a == pair.a && p.b != pair.b);
+        let mut deep = beside.filter(|p| p.depth > SQUEEZED * pair.depth);
+        holds(pair) && deep.any(|p| holds(p) && (moves(pair) || moves(p)))
     }
 
     /// Masses [kg] of what touches either of the pair's solids, and a third.

@@ -9,8 +9,11 @@
 //! with y_k and q_k nodes of the pressure ([`super::coulomb`]), which keep its second moments and, for a square, its mean distance from
 //! the centre and that distance's reciprocal. A patch sticks while its impulse lies inside the limit surface of D, which holds
 //! |J_t| + |T| / r <= mu N h; beyond, the slip u that *remains* solves u = u_0 - A grad D(u), A the response of the slip to the
-//! impulse: the minimum of a convex function, by Newton's iteration. No history, no elastic pre-slip and no parameter beside mu:
-//! a body at rest on a slope stays where it is. Bodies with several patches are swept in a fixed order.
+//! impulse: the minimum of a convex function, by Newton's iteration. No elastic pre-slip and no parameter beside mu:
+//! a body at rest on a slope stays where it is. Bodies with several patches are swept in a fixed order, from what the patches [held]
+//! in the sub-step before; where that would add energy, as after a blow, from as much of it as takes the most.
+//!
+//! [held]: super::held
 //!
 //! The viscous friction of the paper's Eq. (12) is at hand as well: -eta times the slip, shared among the
 //! patches of two solids by their normal forces. With X = eta h A and D = 1 + X + X^2 / 2 the slip v that the forces of the sub-step
@@ -23,23 +26,26 @@
 //! sticks below the same limit as without drag, which is nothing on what stands. Patches of one body follow one another, each with its share of d.
 
 use super::coulomb::{ARM, System, root_of, sticks};
+use super::held::{Held, Hold, Touch};
 use super::pair::{Other, Pair};
 use super::patch::Patch;
 use super::walls::WallBox;
 use crate::body::{Body, Wrench};
+use crate::checkpoint::Archive;
 use crate::contact::between::Against;
 use crate::contact::fixed::FixedWalls;
+use crate::error::Result;
 use glam::{DMat2, DMat3, DVec3};
 
 /// Most sweeps over the patches of a sub-step. What one sub-step leaves, the next one stops.
 const SWEEPS: usize = 8;
 
 /// Change of an impulse over its limit at which the sweeps stop.
-const TOLERANCE: f64 = 1e-3;
+const TOLERANCE: f64 = 1e-6;
 
 /// The same for a single patch that slips: what others have done to it since its last visit is left as it is. One that
 /// sticks costs little, and a stack must come to rest.
-const UNCHANGED: f64 = 1e-4;
+const UNCHANGED: f64 = 1e-7;
 
 /// Share of a slip that is left by rounding where it was stopped.
 const STUCK: f64 = 1e-9;
@@ -56,6 +62,7 @@ const SMALL_ARM: f64 = 0.9;
 struct Slip {
     a: usize,
     b: Other,
+    touch: Touch,
     arm_a: DVec3,
     arm_b: DVec3,
     tangent: [DVec3; 2],
@@ -89,6 +96,7 @@ pub(crate) struct Friction {
     slips: Vec<Slip>,
     /// Normal force of all patches of each body, and of those that are dragged already [N].
     pressed: Vec<[f64; 2]>,
+    held: Held,
 }
 
 impl Friction {
@@ -121,6 +129,9 @@ impl Friction {
         }
         let rubbing = self.slips.iter().filter(|slip| slip.cap > 0.0).count();
         let sweeps = if rubbing == 1 { 1 } else { SWEEPS };
+        if rubbing > 1 {
+            self.start(bodies, h);
+        }
         for _ in 0..sweeps {
             let mut open = false;
             for slip in self.slips.iter_mut().filter(|slip| slip.cap > 0.0) {
@@ -130,6 +141,42 @@ impl Friction {
                 break;
             }
         }
+        let rubbing = self.slips.iter().filter(|slip| slip.cap > 0.0);
+        self.held.keep(rubbing.map(|slip| (slip.touch, slip.hold(h))));
+    }
+
+    /// Gives the bodies what the patches held in the sub-step before.
+    fn start(&mut self, bodies: &mut [Body], h: f64) {
+        // of the change of the kinetic energy, what goes with the slips that there are and what with those that come of it
+        let mut first = 0.0;
+        for slip in self.slips.iter_mut().filter(|slip| slip.cap > 0.0) {
+            let Some(hold) = self.held.of(&slip.touch) else { continue };
+            slip.impulse = slip.impulse_of(hold, h);
+            first += slip.impulse.dot(slip.velocity(bodies));
+        }
+        self.slips.iter().for_each(|slip| slip.kick(bodies, slip.impulse));
+        let now = self.slips.iter().map(|slip| slip.impulse.dot(slip.velocity(bodies)));
+        let second = now.sum::<f64>() - first;
+        if first + 0.5 * second > 0.0 {
+            let share = (-first / second).clamp(0.0, 1.0);
+            for slip in &mut self.slips {
+                slip.kick(bodies, (share - 1.0) * slip.impulse);
+                slip.impulse *= share;
+            }
+        }
+    }
+
+    /// The solids have been put elsewhere.
+    pub fn forget(&mut self) {
+        self.held.forget();
+    }
+
+    /// Saves what the next sub-step starts from, or takes it over.
+    ///
+    /// # Errors
+    /// As [`Archive::array`].
+    pub fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        self.held.exchange(archive)
     }
 
     /// Gives fixed walls and still boxes what the last [`Self::apply`] has taken from them.
@@ -197,9 +244,11 @@ impl Slip {
         // a point has no arm and a locked axis no response: keep the system regular
         let trace = response.x_axis.x + response.y_axis.y + response.z_axis.z;
         response += DMat3::IDENTITY * (1e-12 * trace);
+        let image = pair.image.to_array().map(f64::to_bits);
         Self {
             a,
             b: pair.b,
+            touch: Touch { a, b: pair.b, image, patch: patch.key },
             arm_a,
             arm_b,
             tangent,
@@ -294,6 +343,20 @@ impl Slip {
     /// Push [N s] and twist [N m s] of an `impulse` along the tangents and the spin [N s].
     fn parts(&self, impulse: DVec3) -> (DVec3, DVec3) {
         (impulse.x * self.tangent[0] + impulse.y * self.tangent[1], impulse.z * self.spin)
+    }
+
+    /// The impulse that `hold` is over `h` [s], within the limit.
+    fn impulse_of(&self, hold: Hold, h: f64) -> DVec3 {
+        let along = self.tangent.map(|t| h * hold.force.dot(t));
+        let arm = self.spin.length();
+        let turn = if arm > 0.0 { h * hold.torque / arm } else { 0.0 };
+        DVec3::new(along[0], along[1], turn).clamp_length_max(self.cap)
+    }
+
+    /// The force that the impulse is over `h` [s].
+    fn hold(&self, h: f64) -> Hold {
+        let (push, _) = self.parts(self.impulse / h);
+        Hold { force: push, torque: self.impulse.z * self.spin.length() / h }
     }
 
     /// Gives both bodies the Coulomb impulse `change` along the tangents and the spin [N s].

@@ -27,6 +27,7 @@ mod fault;
 mod flush;
 mod frame;
 mod friction;
+mod held;
 mod pair;
 mod patch;
 mod probe;
@@ -42,6 +43,7 @@ use super::law::{Fault, Kind, Law, Now, Summary};
 use super::probe::Probe;
 use super::substeps::{Cut, Limits, Worst};
 use crate::body::{Body, Wrench};
+use crate::checkpoint::Archive;
 use crate::error::Result;
 use crate::scene::{Scene, Solid};
 use crate::shape::{Cuboid, Geometry, Surface};
@@ -402,6 +404,11 @@ impl Law for Smooth {
     fn forget(&mut self) {
         self.generation = 0;
         self.device = None;
+        self.friction.forget();
+    }
+
+    fn exchange(&mut self, archive: &mut Archive) -> Result<()> {
+        self.friction.exchange(archive)
     }
 
     fn brought_back(&mut self) {

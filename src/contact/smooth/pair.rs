@@ -16,7 +16,7 @@ use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
 /// What a free solid touches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Other {
     /// A moving solid.
     Solid(usize),

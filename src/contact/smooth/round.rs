@@ -135,10 +135,20 @@ impl View<'_> {
             if let Some(Inside { depth, outward, face }) = inside(deepest.at) {
                 let outward = deepest.mean(|p| inside(p).map_or(outward, |found| found.outward));
                 let at = self.own.center + self.own.axes * deepest.at;
-                let weight = share * width / length;
+                let weight = share * width / length * self.bears(deepest.at, depth);
                 add(Pressed { at, normal: self.other.axes * outward, depth, weight, face });
             }
         });
+    }
+
+    /// Part of its weight with which the line of a side counts at `p`, `depth` [m] inside.
+    ///
+    /// Where a circle of an upright side is inside all round, the body stands on the end beside it, and the line is on no side of the
+    /// axis more than on another: it counts by how much deeper it is than the line opposite, so that it turns nothing that stands upright.
+    fn bears(&self, p: DVec3, depth: f64) -> f64 {
+        let opposite = self.turn * DVec3::new(-p.x, -p.y, p.z) + self.shift;
+        let other = self.other.shape.depth(opposite, self.other.faces).map_or(0.0, |found| found.depth);
+        1.0 - (other / depth).min(1.0).powi(4)
     }
 
     /// The deepest point of the circle of a side at the height `z` [m]: where the depth does not change with the angle.
@@ -157,7 +167,7 @@ impl View<'_> {
             self.distance(p).1.dot(tangent)
         };
         let toward = self.distance(axis).1;
-        // the end of an upright one: its rings hold it
+        // beside an upright one any will do: see `bears`
         let across = DVec3::new(toward.x, toward.y, 0.0).try_normalize().unwrap_or(DVec3::X);
         let straight = axis - side.radius * across;
         let tilt = self.distance(straight).1.dot(DVec3::new(across.y, -across.x, 0.0));
