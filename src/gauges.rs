@@ -1,32 +1,27 @@
-//! Gauges: pressure at a point of a wall, force on a solid, and of the water its level on a line, its velocity at a point and
+//! Gauges: pressure at a point of a wall or of a solid that moves, force on a solid, and of the water its level on a line, its velocity at a point and
 //! its volume in a box.
 
 mod level;
 mod means;
 pub mod wall_force;
+mod wall_pressure;
 mod water;
 
 use crate::body::Wrench;
 use crate::case::{Case, is_pattern, stands_for};
 use crate::checkpoint::Archive;
 use crate::error::{Error, Result};
+use crate::kernels::body_force::RowPressure;
 use crate::output::table::{Cell, vector_cells, vector_columns};
-use crate::scene::{Scene, wall_at};
+use crate::scene::Scene;
 use crate::simulation::Simulation;
 use glam::DVec3;
 use means::Means;
 use wall_force::FixedWall;
+use wall_pressure::{WallLayer, WallPressure};
 use water::InWater;
 
 pub use level::level;
-
-/// A pressure gauge: wall particles, and the way from each to the gauge's point [m].
-#[derive(Clone, Debug)]
-struct WallPressure {
-    name: String,
-    slots: Vec<usize>,
-    to_point: Vec<DVec3>,
-}
 
 /// What a force gauge is on.
 #[derive(Clone, Debug)]
@@ -74,9 +69,6 @@ struct Readings {
 impl Gauges {
     /// Find wall particles and solids of the gauges of `case`.
     ///
-    /// A pressure gauge is the mean over the particles of fixed walls within half an effective radius of its point,
-    /// or of the wall particle nearest to it where the lattice has moved the wall away.
-    ///
     /// # Errors
     /// [`Error::Case`] for a pressure gauge that is not on a wall and for a force gauge on nothing.
     pub fn new(case: &Case, scene: &Scene) -> Result<Self> {
@@ -84,30 +76,21 @@ impl Gauges {
         let contact = case.contact.is_some() && scene.solids.iter().any(|s| s.gives_way());
         let (wet, means) = (case.fluid.is_some(), case.gauge.mean.then(Means::default));
         let mut out = Self { means, wet, contact, ..Self::default() };
-        let slots: Vec<usize> = scene.still_slots().collect();
-        let wall: Vec<DVec3> = slots.iter().map(|&slot| scene.position[slot]).collect();
+        let layers = if case.gauge.pressure.is_empty() { vec![] } else { WallLayer::all(scene) };
         for (k, gauge) in case.gauge.pressure.iter().enumerate() {
+            let wrong = |what: String| {
+                Error::key(
+                    format!("gauge.pressure.{k}"),
+                    format!("gauge.pressure {}: {what}", gauge.name),
+                    "",
+                )
+            };
             if scene.groups.fluid == 0 {
-                let message = format!("gauge.pressure {}: there is no fluid", gauge.name);
-                return Err(Error::key(format!("gauge.pressure.{k}"), message, ""));
+                return Err(wrong("there is no fluid".into()));
             }
-            let mut point = DVec3::from(gauge.point);
-            if scene.dimensions == 2 {
-                point.y = 0.0;
-            }
-            let near = (reach, scene.spacing);
-            let found = wall_at(&wall, point, near, &scene.periodic).map_err(|nearest| {
-                let hint = nearest.map_or("there are no fixed walls".to_string(), |at| {
-                    format!("the nearest wall particle is {:.4} m away at {at:.4}", at.distance(point))
-                });
-                let message = format!("gauge.pressure {}: no fixed wall at {point}; {hint}", gauge.name);
-                Error::key(format!("gauge.pressure.{k}.point"), message, "")
-            })?;
-            out.pressure.push(WallPressure {
-                name: gauge.name.clone(),
-                slots: found.iter().map(|(k, _)| slots[*k]).collect(),
-                to_point: found.iter().map(|(_, way)| *way).collect(),
-            });
+            let found = WallPressure::find(gauge, scene, &layers, reach);
+            let missing = || wrong(format!("no wall at {}", DVec3::from(gauge.point)));
+            out.pressure.push(found.ok_or_else(missing)?);
         }
         out.water = InWater::all(case);
         for (k, gauge) in case.gauge.force.iter().enumerate() {
@@ -208,7 +191,7 @@ impl Gauges {
 
     /// Pressures at the gauges' points, and forces. The pressure of a wall particle is brought to the point as the force on bodies is
     /// brought to their surface: with the weight of the water between, and what the pressure lacks at
-    /// the water's surface. A dry particle has none.
+    /// the water's surface. A dry particle has that of the gap that it lies in, if it does.
     fn read(&self, simulation: &mut Simulation) -> Result<Readings> {
         let contact = self.contact_of(simulation);
         if !self.wet {
@@ -219,21 +202,23 @@ impl Gauges {
         let slots: Vec<usize> = of_points.chain(fixed.map(|wall| &wall.slots)).flatten().copied().collect();
         let pressures =
             if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
-        let any_fixed = self.fixed().next().is_some();
-        let pushes = if any_fixed { simulation.slot_pushes()? } else { Vec::new() };
-        let params = &simulation.params;
+        let params = &simulation.params.clone();
         let mut rest = pressures.as_slice();
         let mut next = |count: usize| {
             let (own, after) = rest.split_at(count);
             rest = after;
             own
         };
-        let at_point = |gauge: &WallPressure| {
-            let own = next(gauge.slots.len());
-            let sum: f64 = own.iter().zip(&gauge.to_point).map(|(p, &way)| p.on_surface(way, params)).sum();
-            sum / own.len() as f64
+        let of_points: Vec<&[RowPressure]> =
+            self.pressure.iter().map(|gauge| next(gauge.slots.len())).collect();
+        let any_fixed = self.fixed().next().is_some();
+        let any_dry = of_points.iter().copied().flatten().any(RowPressure::is_dry);
+        let pushes = if any_fixed || any_dry { simulation.slot_pushes()? } else { Vec::new() };
+        let (poses, periodic) = (simulation.solids.poses(), &simulation.scene.periodic);
+        let at_point = |(gauge, own): (&WallPressure, &[RowPressure])| {
+            gauge.read(own, poses, (params, periodic), &pushes)
         };
-        let pressure = self.pressure.iter().map(at_point).collect();
+        let pressure = self.pressure.iter().zip(of_points).map(at_point).collect();
         let mut on = |target: &Target| match target {
             Target::Solid(solid) => simulation.fluid_force[*solid],
             Target::Fixed(wall) => {

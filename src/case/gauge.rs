@@ -41,7 +41,7 @@ impl Gauges {
     }
 }
 
-/// Pressure at a point on a wall.
+/// Pressure at a point on a wall, or on a solid, with which it moves.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -49,7 +49,7 @@ pub struct PressureGauge {
     /// Name, used in the header.
     #[cfg_attr(test, schemars(length(min = 1, max = 80)))]
     pub name: String,
-    /// Point on a wall [m].
+    /// Point on a wall, a body or a moving wall as it lies at the start [m]; it goes and turns with what it is on.
     pub point: Vector,
 }
 

@@ -29,8 +29,12 @@ impl RowPressure {
 
     /// The same as it is in the force on solids: in the accurate scheme nothing is cut.
     pub fn in_force(&self, to_surface: DVec3, params: &Params) -> f64 {
-        let wet = self.pressure != 0.0 || self.excess < 0.0;
-        if wet { surface_pressure(self.pressure, self.excess, to_surface, params) } else { 0.0 }
+        if self.is_dry() { 0.0 } else { surface_pressure(self.pressure, self.excess, to_surface, params) }
+    }
+
+    /// Whether there is no water before it.
+    pub fn is_dry(&self) -> bool {
+        self.pressure == 0.0 && self.excess >= 0.0
     }
 }
 

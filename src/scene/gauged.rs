@@ -16,26 +16,16 @@ impl Builder<'_> {
         let l0 = self.lattice.spacing;
         let near = (0.5 * self.case.run.effective_radius * l0, l0);
         // Of the solids in openings no gauge tells anything.
-        let (still, moving): (Vec<&Solid>, Vec<&Solid>) = self.solids_of_case().partition(|s| s.stays());
-        let still = still.into_iter().flat_map(Solid::wall_positions);
-        let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(still).collect();
+        let solids = self.solids_of_case().flat_map(Solid::wall_positions);
+        let walls: Vec<DVec3> = self.fixed.wall.iter().copied().chain(solids).collect();
         let wrong = |(k, gauge): (usize, &PressureGauge)| {
             let at = self.place(gauge.point);
             let (key, name) = (format!("gauge.pressure.{k}.point"), &gauge.name);
             let nearest = wall_at(&walls, at, near, &self.periodic).err()?;
-            let is_on = |s: &&&Solid| {
-                wall_at(&s.wall_positions().collect::<Vec<_>>(), at, near, &self.periodic).is_ok()
-            };
-            if let Some(solid) = moving.iter().find(is_on) {
-                let (what, on) = (solid.what(), &solid.name);
-                let message = format!("gauge.pressure `{name}`: it lies on {what} `{on}`, which may move");
-                let remedy = "pressure gauges read what stays where it is; use a gauge.force for what the water does to the whole of it";
-                return Some(Problem::new(key, message, remedy));
-            }
-            let hint = nearest.map_or("there are no fixed walls".to_string(), |nearest| {
+            let hint = nearest.map_or("there are no walls".to_string(), |nearest| {
                 format!("the nearest stands at {}", point(nearest))
             });
-            let message = format!("gauge.pressure `{name}` at {}: no fixed wall there, {hint}", point(at));
+            let message = format!("gauge.pressure `{name}` at {}: no wall there, {hint}", point(at));
             let remedy = "move the point onto a wall; where water comes in or goes out there is none";
             Some(Problem::new(key, message, remedy))
         };
