@@ -239,7 +239,7 @@ pages! {
     the_tutorial "tutorial.md" 1 12;
     how_to_measure "howto-gauges.md" 1 4;
     how_to_put_in_bodies "howto-bodies.md" 3 3;
-    how_to_make_waves "howto-waves.md" 4 0;
+    how_to_make_waves "howto-waves.md" 5 0;
     how_to_let_water_in "howto-inflow.md" 3 0;
     how_to_restart "howto-restart.md" 1 5;
     how_to_sweep "howto-cluster.md" 1 5;
