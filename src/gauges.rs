@@ -191,7 +191,7 @@ impl Gauges {
 
     /// Pressures at the gauges' points, and forces. The pressure of a wall particle is brought to the point as the force on bodies is
     /// brought to their surface: with the weight of the water between, and what the pressure lacks at
-    /// the water's surface. A dry particle has that of the gap that it lies in, if it does.
+    /// the water's surface. A dry particle has none.
     fn read(&self, simulation: &mut Simulation) -> Result<Readings> {
         let contact = self.contact_of(simulation);
         if !self.wet {
@@ -211,9 +211,7 @@ impl Gauges {
         };
         let of_points: Vec<&[RowPressure]> =
             self.pressure.iter().map(|gauge| next(gauge.slots.len())).collect();
-        let any_fixed = self.fixed().next().is_some();
-        let any_dry = of_points.iter().copied().flatten().any(RowPressure::is_dry);
-        let pushes = if any_fixed || any_dry { simulation.slot_pushes()? } else { Vec::new() };
+        let pushes = if slots.is_empty() { Vec::new() } else { simulation.slot_pushes()? };
         let (poses, periodic) = (simulation.solids.poses(), &simulation.scene.periodic);
         let at_point = |(gauge, own): (&WallPressure, &[RowPressure])| {
             gauge.read(own, poses, (params, periodic), &pushes)

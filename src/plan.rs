@@ -339,10 +339,9 @@ impl Plan {
         let fixed_walls = fluid && !scene.groups.static_range().is_empty();
         let ledger = case.output.ledger;
         let any_held = scene.solids[..scene.followed()].iter().any(|s| !s.is_free());
-        let asked = !case.gauge.force.is_empty() || ledger;
-        let held = fluid && any_held && asked && params.source == Source::Mixed;
-        let filled = params.filled;
         let gauges = !case.gauge.pressure.is_empty() || !case.gauge.force.is_empty();
+        let held = fluid && any_held && (gauges || ledger) && params.source == Source::Mixed;
+        let filled = params.filled;
         let pressed = fluid && moving && (told || ledger);
         let excess = match params.source {
             Source::Mixed if gauges => Told::All,

@@ -363,6 +363,31 @@ fn a_pressure_gauge_reads_a_body_that_is_held_or_floats() {
 }
 
 #[test]
+fn pressures_in_the_gap_below_a_held_block_are_those_of_its_rim() {
+    // Of a gap a tenth of a spacing high the floor was told nothing, of half of one a quarter: there rows face rows.
+    for gap in [0.1, 0.5] {
+        let bottom = 0.02 * gap;
+        let case = case(&format!(
+            "[run]\nspacing = 0.02\ntime_step = 5e-4\nend = 1.0\ndimensions = 2\ngravity = [0, 0, -9.81]\n\
+             [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.3]\n\
+             [tank]\nmin = [0, 0, 0]\nmax = [0.6, 0, 0.5]\nopen = [\"z_max\"]\n[contact]\n\
+             [[body]]\nname = \"b\"\nsize = [0.24, 0.1, 0.16]\ncenter = [0.3, 0, {}]\ndensity = 2000\n\
+             displaces_fluid = true\nlocked = [\"x\", \"z\", \"rotation_y\"]\n\
+             [[gauge.level]]\nname = \"level\"\nat = [0.1, 0]\n\
+             [[gauge.pressure]]\nname = \"floor\"\npoint = [0.3, 0, 0]\n\
+             [[gauge.pressure]]\nname = \"body\"\npoint = [0.353, 0, {bottom}]\n\
+             [[gauge.pressure]]\nname = \"edge\"\npoint = [0.4, 0, 0]\n",
+            0.08 + bottom
+        ));
+        let mean = means(&case, &Processor::Cpu, 0.05, 0.15);
+        for (name, z) in [("floor [Pa]", 0.0), ("body [Pa]", bottom), ("edge [Pa]", 0.0)] {
+            let part = mean[name] / (1000.0 * 9.81 * (mean["level [m]"] - z));
+            assert!((part - 1.0).abs() < 0.02, "{gap} l0: {name} {part} of the depth's");
+        }
+    }
+}
+
+#[test]
 fn torques_on_a_face_of_the_tank_count_about_the_middle_of_its_surface() {
     let on = faces("", DVec3::ZERO);
     for name in ["tank.x_min", "tank.x_max", "tank.z_min"] {
@@ -494,7 +519,7 @@ fn a_gauge_finds_its_wall_at_every_spacing() {
     case.gauge.pressure[0].point = [1.5, 0.25, 0.2];
     case.run.spacing = 0.03;
     let error = Scene::build(&case).expect_err("a gauge in mid-air").to_string();
-    assert!(error.contains("no wall there"), "{error}");
+    assert!(error.contains("no wall or body there"), "{error}");
 }
 
 /// An opening's solid has no pressure of its own: a gauge there is refused before anything starts, with its key.

@@ -25,8 +25,8 @@ impl Builder<'_> {
             let hint = nearest.map_or("there are no walls".to_string(), |nearest| {
                 format!("the nearest stands at {}", point(nearest))
             });
-            let message = format!("gauge.pressure `{name}` at {}: no wall there, {hint}", point(at));
-            let remedy = "move the point onto a wall; where water comes in or goes out there is none";
+            let message = format!("gauge.pressure `{name}` at {}: no wall or body there, {hint}", point(at));
+            let remedy = "move the point onto one; where water comes in or goes out there is none";
             Some(Problem::new(key, message, remedy))
         };
         let gauges = self.case.gauge.pressure.iter().enumerate().filter(|_| !self.lacks_walls);
