@@ -202,21 +202,20 @@ impl Gauges {
         let slots: Vec<usize> = of_points.chain(fixed.map(|wall| &wall.slots)).flatten().copied().collect();
         let pressures =
             if slots.is_empty() { Vec::new() } else { simulation.backend.wall_pressures(&slots)? };
-        let params = &simulation.params.clone();
         let mut rest = pressures.as_slice();
         let mut next = |count: usize| {
             let (own, after) = rest.split_at(count);
             rest = after;
             own
         };
-        let of_points: Vec<&[RowPressure]> =
+        let at_points: Vec<&[RowPressure]> =
             self.pressure.iter().map(|gauge| next(gauge.slots.len())).collect();
         let pushes = if slots.is_empty() { Vec::new() } else { simulation.slot_pushes()? };
-        let (poses, periodic) = (simulation.solids.poses(), &simulation.scene.periodic);
-        let at_point = |(gauge, own): (&WallPressure, &[RowPressure])| {
-            gauge.read(own, poses, (params, periodic), &pushes)
+        let (params, poses) = (&simulation.params, simulation.solids.poses());
+        let at_point = |(gauge, told): (&WallPressure, &[RowPressure])| {
+            gauge.read(told, poses, (params, &simulation.scene.periodic), &pushes)
         };
-        let pressure = self.pressure.iter().zip(of_points).map(at_point).collect();
+        let pressure = self.pressure.iter().zip(at_points).map(at_point).collect();
         let mut on = |target: &Target| match target {
             Target::Solid(solid) => simulation.fluid_force[*solid],
             Target::Fixed(wall) => {

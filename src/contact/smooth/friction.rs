@@ -60,8 +60,6 @@ const SMALL_ARM: f64 = 0.9;
 /// A patch as the sweeps see it.
 #[derive(Clone, Debug)]
 struct Slip {
-    a: usize,
-    b: Other,
     touch: Touch,
     arm_a: DVec3,
     arm_b: DVec3,
@@ -182,9 +180,9 @@ impl Friction {
     /// Gives fixed walls and still boxes what the last [`Self::apply`] has taken from them.
     pub fn press_walls(&self, bodies: &mut [Body], walls: &[WallBox], fixed: &mut FixedWalls) {
         for slip in &self.slips {
-            let Other::Wall(w) = slip.b else { continue };
+            let Other::Wall(w) = slip.touch.b else { continue };
             let (push, twist) = slip.parts(slip.drag + slip.passed(slip.impulse));
-            let at = bodies[slip.a].pose.position + slip.arm_a;
+            let at = bodies[slip.touch.a].pose.position + slip.arm_a;
             match walls[w].of {
                 Against::Wall(k) => fixed.touch(k, -push, at, -twist),
                 Against::Solid(k) => bodies[k].touch(-push, -(at - walls[w].middle).cross(push) - twist),
@@ -246,8 +244,6 @@ impl Slip {
         response += DMat3::IDENTITY * (1e-12 * trace);
         let image = pair.image.to_array().map(f64::to_bits);
         Self {
-            a,
-            b: pair.b,
             touch: Touch { a, b: pair.b, image, patch: patch.key },
             arm_a,
             arm_b,
@@ -274,8 +270,8 @@ impl Slip {
             let v = velocity + turning.cross(arm);
             DVec3::new(v.dot(self.tangent[0]), v.dot(self.tangent[1]), turning.dot(self.spin))
         };
-        let b = self.b.solid().map_or(DVec3::ZERO, |b| parts(b, self.arm_b));
-        parts(self.a, self.arm_a) - b
+        let b = self.touch.b.solid().map_or(DVec3::ZERO, |b| parts(b, self.arm_b));
+        parts(self.touch.a, self.arm_a) - b
     }
 
     /// The slip as it is, in the mean over the sub-step [m/s].
@@ -367,8 +363,8 @@ impl Slip {
     /// Gives both bodies the `impulse` along the tangents and the spin [N s].
     fn give(&self, bodies: &mut [Body], impulse: DVec3) {
         let (push, twist) = self.parts(impulse);
-        bodies[self.a].touch(push, self.arm_a.cross(push) + twist);
-        if let Some(b) = self.b.solid() {
+        bodies[self.touch.a].touch(push, self.arm_a.cross(push) + twist);
+        if let Some(b) = self.touch.b.solid() {
             bodies[b].touch(-push, -self.arm_b.cross(push) - twist);
         }
     }
