@@ -47,6 +47,9 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let least = 0.0;
 //#endif
         var pressed = Wrench(vec3f(0.0), vec3f(0.0));
+        // Whether the slots before it pass its pressure on, and which.
+        var passes = under_water;
+        var at_rim = p;
         var part = 1.0;
 //#if COUPLED
         part -= coupling[4u * k].w;
@@ -59,6 +62,8 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
 //#if MIXED
         if is_known_row(excess[k]) {
             pressed = pressed_on_faces(pose, wall, part, -excess[k], 0.0);
+            passes = true;
+            at_rim = max(-excess[k], 0.0);
         }
 //#endif
 //#if REACTION
@@ -67,9 +72,9 @@ fn body_force(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         torque = cross(rotate(pose.orientation, wall.arm.xyz), force) + pressed.torque;
         force += pressed.force;
 //#if COUPLED
-        if under_water {
-            force += p * coupling[4u * k].xyz + coupling[4u * k + 2u].xyz;
-            torque += p * coupling[4u * k + 1u].xyz + coupling[4u * k + 3u].xyz;
+        if passes {
+            force += at_rim * coupling[4u * k].xyz + coupling[4u * k + 2u].xyz;
+            torque += at_rim * coupling[4u * k + 1u].xyz + coupling[4u * k + 3u].xyz;
         }
 //#endif
     }

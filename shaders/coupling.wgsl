@@ -97,8 +97,10 @@ fn prepare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         let part = 1.0 - slot.w;
         if is_known_row(excess[k]) {
             let pressed = pressed_on_faces(pose, wall, part, -excess[k], 0.0);
-            known.force += pressed.force;
-            known.torque += per_spacing * pressed.torque;
+            let at_rim = max(-excess[k], 0.0);
+            known.force += pressed.force + at_rim * slot.xyz + coupling[4u * k + 2u].xyz;
+            known.torque += per_spacing
+                * (pressed.torque + at_rim * coupling[4u * k + 1u].xyz + coupling[4u * k + 3u].xyz);
         } else if excess[k] < DRY {
             row = pressed_evenly(pose, wall, part);
             row.torque *= per_spacing;

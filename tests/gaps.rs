@@ -64,7 +64,6 @@ fn a_block_starts_as_fast_as_the_water_below_lets_it() {
 fn a_light_block_comes_off_the_floor_as_potential_flow_has_it() {
     // d/dt (M + m(h)) V = F + V^2 m'(h) / 2, with the added mass of the test above from 1 mm on, the least gap.
     let mut simulation = simulation(&block(300.0, 0.0));
-    let mut slowest = f64::INFINITY;
     for (time, exact) in [(0.1, 0.0509), (0.15, 0.0523), (0.2, 0.0552), (0.25, 0.0609)] {
         while simulation.time < time {
             simulation.step().unwrap();
@@ -73,14 +72,16 @@ fn a_light_block_comes_off_the_floor_as_potential_flow_has_it() {
         println!("{time} s: {z:.4} for {exact}");
         assert!((z - exact).abs() < 0.07 * (exact - 0.05) + 2e-4, "{time} s: {z} for {exact}");
     }
+    let (mut highest, mut back) = (0.0_f64, 0.0_f64);
     while simulation.time < 0.4 {
         simulation.step().unwrap();
-        slowest = motion(&simulation).1.min(slowest);
+        let z = motion(&simulation).0;
+        highest = highest.max(z);
+        back = back.max(highest - z);
     }
-    // As the gap becomes one for particles, and has none yet, it keeps its lift.
-    let z = motion(&simulation).0;
-    println!("{z:.4} m, at {slowest:.3} m/s at least");
-    assert!(z > 0.085 && slowest > -0.05, "{z} m, {slowest} m/s");
+    // As the gap becomes one for particles, and has none yet, it keeps its lift: it fell back by 4 mm.
+    println!("{highest:.4} m, back by {:.2} mm", 1e3 * back);
+    assert!(highest > 0.085 && back < 5e-4, "{highest} m, back by {back} m");
 }
 
 #[test]

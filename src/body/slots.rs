@@ -20,6 +20,15 @@ pub struct SlotRow {
     pub seep: Seep,
 }
 
+impl SlotRow {
+    /// What it does to the body where its row has a `pressure` that no equation finds [Pa]: beside the water's surface.
+    pub fn pressed(&self, pressure: f64) -> Wrench {
+        let mut sum = self.head;
+        sum.add(pressure, &self.per_pascal);
+        sum
+    }
+}
+
 /// A link of a row to a pressure that is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seep {

@@ -75,14 +75,14 @@ impl Cpu {
                 let arm = pose.orientation * (solid.wall_offset[k] + solid.wall_to_surface[k]);
                 let mut reaction = reaction_on(&fields.reaction, i - fluid);
                 if own && fields.state[i] == State::Inner {
-                    total.add(fields.pressure[i], &slot.per_pascal);
-                    total += slot.head;
+                    total += slot.pressed(fields.pressure[i]);
                     let excess = self.excess.of(i - fluid);
                     let pressure =
                         |way| body_force::surface_pressure(fields.pressure[i], excess, way, params);
                     total += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, pressure);
                     reaction += body_force::turning(pose.angular_velocity, area, params);
                 } else if let Some(pressure) = self.excess.beside_surface(i - fluid) {
+                    total += slot.pressed(pressure.max(0.0));
                     let pressure = |way| body_force::beside_surface(pressure, way, params);
                     total += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, pressure);
                 }

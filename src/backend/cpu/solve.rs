@@ -49,6 +49,7 @@ impl Cpu {
                     // Of the step's beginning, when it was this rank's.
                     sum += Wrench { force: reaction, torque: arm.cross(reaction) };
                     if let Some(pressure) = excess.beside_surface(i - fluid) {
+                        sum += slot.pressed(pressure.max(0.0));
                         let known = |way| body_force::beside_surface(pressure, way, params);
                         sum += body_force::on_faces(solid, k, pose, 1.0 - slot.taken, known);
                     }
