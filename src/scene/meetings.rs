@@ -1,8 +1,11 @@
-//! Driven solids whose motions run through each other: nothing holds them apart, and water between them has nowhere to go.
+//! Driven solids whose motions run through each other, or through what stands still: nothing holds them apart, and water between them has
+//! nowhere to go.
 
 use super::build::Builder;
 use super::near::Near;
+use super::oriented::Placed;
 use super::{Drive, Motion, Solid};
+use glam::DVec3;
 
 /// Moments of a run at which two of them are held against each other.
 const MOMENTS: u32 = 400;
@@ -13,38 +16,90 @@ const MEETING: f64 = 0.5;
 /// Most that are told.
 const MOST: usize = 5;
 
+/// What is said of a `driven` solid that comes to what stands `still` at `t` [s].
+fn runs_into(driven: &str, still: &str, t: f64) -> String {
+    format!(
+        "`{driven}`, which follows a given motion, runs into `{still}`, which does not stop it, at t = {t:.3} s"
+    )
+}
+
+/// What may meet: a solid or a wall.
+struct Mover<'a> {
+    name: &'a str,
+    /// Where it is at t = 0.
+    start: Placed,
+    /// The solid that a motion drives, if one does.
+    driven: Option<(&'a Solid, &'a Motion)>,
+}
+
+impl Mover<'_> {
+    fn at(&self, t: f64) -> Placed {
+        self.driven.map_or(self.start, |(solid, motion)| solid.placed_at(motion, t))
+    }
+
+    /// The box that holds it at all `times`.
+    fn ends(&self, times: &[f64]) -> (DVec3, DVec3) {
+        let ends = |t: f64| {
+            let placed = self.at(t);
+            (placed.center - placed.bounds(), placed.center + placed.bounds())
+        };
+        let times = if self.driven.is_some() { times } else { &times[..1] };
+        times
+            .iter()
+            .map(|&t| ends(t))
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+}
+
 impl Builder<'_> {
-    /// Tells of driven solids of the case that meet before the end of the run. Those that reach into each other from the start are the
-    /// user's word, and of what is not convex planes do not tell.
-    pub(super) fn meetings(&mut self) {
-        let driven = self.solids_of_case().filter_map(|solid| match &solid.drive {
-            Drive::Prescribed(motion) if solid.placed().is_convex() => Some((solid, motion)),
-            _ => None,
+    /// Solids of the case that are driven or stay where they are, and walls but those of the tank, of which
+    /// [`Builder::domain`] tells.
+    fn movers(&self) -> Vec<Mover<'_>> {
+        let solids = self.solids_of_case().filter_map(|solid| {
+            let driven = match &solid.drive {
+                Drive::Prescribed(motion) if !motion.is_still() => Some((solid, motion)),
+                _ if solid.stays() => None,
+                _ => return None,
+            };
+            Some(Mover { name: &solid.name, start: solid.placed(), driven })
         });
-        let driven: Vec<(&Solid, &Motion)> = driven.collect();
+        let walls = self.fixed.shapes.iter().filter(|wall| !wall.name.starts_with("tank."));
+        let walls = walls.map(|wall| Mover { name: &wall.name, start: Placed::from(wall), driven: None });
+        solids.chain(walls).filter(|mover| mover.start.is_convex()).collect()
+    }
+
+    /// Tells of driven solids of the case that meet each other, or what stands still, before the end of the run. Those that reach into each
+    /// other from the start are the user's word, and of what is not convex planes do not tell.
+    pub(super) fn meetings(&mut self) {
+        let movers = self.movers();
+        if movers.iter().all(|mover| mover.driven.is_none()) {
+            return;
+        }
         let (end, tolerance) = (self.case.run.end, MEETING * self.lattice.spacing);
         let times: Vec<f64> = (0..=MOMENTS).map(|k| end * f64::from(k) / f64::from(MOMENTS)).collect();
         let (mut near, mut notes, plane) = (Near::default(), Vec::new(), self.lattice.plane);
-        for &(solid, motion) in &driven {
-            let ends = times.iter().map(|&t| {
-                let placed = solid.placed_at(motion, t);
-                (placed.center - placed.bounds(), placed.center + placed.bounds())
-            });
-            let Some((low, high)) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else { continue };
-            for (other, others) in near.meeting(low, high).into_iter().map(|k| driven[k]) {
-                // What moves as one keeps its distance.
-                if motion == others && !motion.turns() {
-                    continue;
+        for mover in &movers {
+            let (low, high) = mover.ends(&times);
+            for other in near.meeting(low, high).into_iter().map(|k| &movers[k]) {
+                match (mover.driven, other.driven) {
+                    (None, None) => continue,
+                    // What moves as one keeps its distance.
+                    (Some((_, a)), Some((_, b))) if a == b && !a.turns() => continue,
+                    _ => {}
                 }
                 let meets = |t: &&f64| {
-                    let (own, beside) = (solid.placed_at(motion, **t), other.placed_at(others, **t));
+                    let (own, beside) = (mover.at(**t), other.at(**t));
                     own.apart(&beside).0 <= 0.0 && own.way_out(&beside, plane).0 > tolerance
                 };
                 if let Some(t) = times.iter().find(meets).filter(|t| **t > 0.0) {
-                    notes.push(format!(
-                        "`{}` and `{}`, which both follow a given motion, meet at t = {t:.3} s and run into each other",
-                        other.name, solid.name
-                    ));
+                    let (a, b) = (other.name, mover.name);
+                    notes.push(match (other.driven, mover.driven) {
+                        (Some(_), Some(_)) => format!(
+                            "`{a}` and `{b}`, which both follow a given motion, meet at t = {t:.3} s and run into each other"
+                        ),
+                        (Some(_), _) => runs_into(a, b, *t),
+                        _ => runs_into(b, a, *t),
+                    });
                 }
             }
             near.add(low, high);
@@ -52,7 +107,7 @@ impl Builder<'_> {
         if notes.len() > MOST {
             let more = notes.len() - MOST;
             notes.truncate(MOST);
-            notes.push(format!("and {more} more pairs of solids that follow given motions meet"));
+            notes.push(format!("and {more} more that follow given motions run into something"));
         }
         self.notes.extend(notes);
     }
@@ -79,5 +134,34 @@ mod tests {
             "{told:?}"
         );
         assert!(notes(0.5).is_empty());
+    }
+
+    #[test]
+    fn what_stands_still_does_not_stop_what_is_driven() {
+        let case = "[run]\nspacing = 0.02\ntime_step = 1e-3\nend = 0.5\ndomain = [[-1, -1, -1], [2, 1, 1]]\n[contact]\nspring = 1e5\n\
+                    [[body]]\nname = \"d\"\nsize = [0.2, 0.2, 0.1]\ncenter = [0, 0, 0]\nmotion = [[0, 0, 0, 0], [0.5, 0.5, 0, 0]]\n";
+        let notes = |more: &str| {
+            let scene = Scene::build(&format!("{case}{more}").parse().unwrap()).unwrap();
+            scene.notes.into_iter().filter(|n| n.contains("runs into")).collect::<Vec<_>>()
+        };
+        let held = |locked: &str| {
+            format!(
+                "[[body]]\nname = \"s\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.4, 0, 0]\ndensity = 2000\nlocked = [{locked}]\n"
+            )
+        };
+        // 0.2 m away, at 1 m/s, and half a spacing further; what is free gives way.
+        for (more, told) in [
+            ("[[obstacle]]\nname = \"s\"\nmin = [0.3, -0.1, -0.1]\nmax = [0.5, 0.1, 0.1]\n", true),
+            ("[[obstacle]]\nname = \"s\"\nmin = [0.3, -0.1, 0.1]\nmax = [0.5, 0.1, 0.3]\n", false),
+            (&held("\"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\", \"rotation_z\""), true),
+            (&held("\"y\""), false),
+        ] {
+            let notes = notes(more);
+            assert_eq!(notes.len(), usize::from(told), "{more}: {notes:?}");
+            assert!(
+                notes.iter().all(|n| n.starts_with("`d`") && n.contains("`s`") && n.contains("t = 0.2")),
+                "{notes:?}"
+            );
+        }
     }
 }
