@@ -675,6 +675,8 @@ fn a_long_step_is_given_up_and_nothing_is_lost() {
     let clock = Instant::now();
     let stopped = case.run("-INT", &[&fine[..], &["--resume", "--max-wall", "0.5s"]].concat());
     assert_eq!(stopped.code, 75, "{}", stopped.err);
+    let result = std::fs::read_to_string(case.root("-INT").join("result.json")).unwrap();
+    assert!(result.contains("before a step was done: make it longer"), "{result}");
     assert!(clock.elapsed() < Duration::from_secs(4), "{:?}", clock.elapsed());
     let ended = case.run("-INT", &[&fine[..], &["--resume"]].concat());
     assert_eq!(ended.code, 0, "{}", ended.err);

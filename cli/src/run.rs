@@ -278,7 +278,7 @@ fn begin(args: &RunArgs, asked: &Asked, case: &Case) -> Result<Option<Start>> {
                 found
                     .damaged
                     .iter()
-                    .for_each(|why| remark(&format!("warning: an older state is taken: {why}")));
+                    .for_each(|why| remark(&format!("warning: {why}; an older state is taken")));
                 if !args.quiet {
                     let (step, time) = (found.origin.step, found.origin.time);
                     let decimals = of_moment(case);

@@ -112,7 +112,7 @@ pub fn run(
         simulation.exchange(archive)?;
     } else if let Some(mut found) = earlier(simulation)? {
         for why in &found.damaged {
-            remark(&format!("warning: run.from: an older state is taken: {why}"));
+            remark(&format!("warning: run.from: {why}; an older state is taken"));
         }
         simulation.make_room(&mut found.archive)?;
         simulation.exchange(&mut found.archive)?;
@@ -268,6 +268,7 @@ impl Run {
         resumes: bool,
     ) -> Result<Finished> {
         let scale = Scale::new(simulation, scene);
+        let before = simulation.steps;
         let ended = self.advance(simulation, scene, stop, observe, resumes);
         let saved = format!("; go on with --resume {}", options.out.display());
         let mut resumable = false;
@@ -280,7 +281,10 @@ impl Run {
             }
             Ok(End::Deadline) => {
                 resumable = true;
-                (Status::Interrupted, format!("--max-wall reached{saved}"), None, None)
+                // Given again it would end there again.
+                let none =
+                    if simulation.steps == before { " before a step was done: make it longer" } else { "" };
+                (Status::Interrupted, format!("--max-wall reached{none}{saved}"), None, None)
             }
             Err(error) => {
                 let diverged = matches!(error, Error::Diverged { .. });
