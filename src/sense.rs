@@ -5,7 +5,7 @@ use crate::contact::Solids;
 use crate::error::{CaseError, Problem, Result};
 use crate::params::Params;
 use crate::scene::Scene;
-use crate::time_step::{Bounds, DRAG_LIMIT, collapse_speed, expected_speed, time_step};
+use crate::time_step::{Bounds, DRAG_LIMIT, collapse_speed, expected_speed, ready_speed, time_step};
 
 /// v dt / l0 of the collapse from rest beyond which a fixed step means nothing: particles pass through each other.
 const COURANT_REFUSED: f64 = 4.0;
@@ -20,7 +20,12 @@ pub fn refuse(case: &Case, scene: &Scene, params: &Params, solids: &Solids) -> R
     let mut problems = Vec::new();
     let wet = scene.groups.fluid > 0;
     // The longest step of a run: that of a flow before any speed is measured.
-    let dt = time_step(params, case.run.time_step, case.run.adaptive && wet, expected_speed(params));
+    let dt = time_step(
+        params,
+        case.run.time_step,
+        case.run.adaptive && wet,
+        ready_speed(params, params.speed_at_start),
+    );
     if wet {
         problems.extend(too_long(case, params));
         problems.extend(too_light(case, params));

@@ -23,7 +23,7 @@ use crate::scheme::Source;
 use crate::settle::settle;
 use crate::slots::{Pressing, Slots, Voids};
 use crate::stop::Stop;
-use crate::time_step::{collapse_speed, shortened, time_step};
+use crate::time_step::{collapse_speed, ready_speed, shortened, time_step};
 use rayon::ThreadPool;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -205,26 +205,27 @@ impl Simulation {
         settings(&self.case)
     }
 
-    /// Largest speed to expect in the fluid [m/s]: of the collapse from rest, or of the water when last looked.
-    fn expected_speed(&self) -> f64 {
-        self.speed.max(collapse_speed(&self.params))
-    }
-
     /// Coefficients of the next step, with the time step that the case, the flow and the solids allow.
     pub fn next_step(&self) -> Step {
-        let (adaptive, flow) = (self.case.run.adaptive && self.plan.wet(), self.expected_speed());
+        let adaptive = self.case.run.adaptive && self.plan.wet();
         let typed = self.case.run.time_step;
         let driven = if self.plan.wet() {
             self.solids.fastest(self.time, typed).max(self.openings.fastest(self.time, self.time + typed))
         } else {
             0.0
         };
-        let dt = time_step(&self.params, typed, adaptive, flow.max(driven));
+        let flow = self.speed.max(driven);
+        let ready = ready_speed(&self.params, self.speed).max(driven);
+        let dt = time_step(&self.params, typed, adaptive, ready);
         let dt = if adaptive { shortened(&self.params, dt, self.fastest) } else { dt };
-        // The speed of the collapse is one to be ready for; calm water may never have it.
         let relaxation = self.eased() * self.params.relaxation(dt, self.speed, driven);
-        let shift_speed = self.params.shift_speed(self.speed.max(driven));
-        let step = Step { relaxation, shift_speed, ..self.params.step(self.time, dt, flow.max(driven)) };
+        let shift_speed = self.params.shift_speed(flow);
+        // Pressures are cut as those of a collapse are: it may begin at any time.
+        let step = Step {
+            relaxation,
+            shift_speed,
+            ..self.params.step(self.time, dt, flow.max(collapse_speed(&self.params)))
+        };
         // What jumps over its neighbours needs the damping.
         if self.fastest * dt > self.params.spacing { step.whole() } else { step }
     }

@@ -542,9 +542,9 @@ fn the_program_prints_the_committed_schemas_and_page_of_keys() {
 fn a_case_may_leave_out_its_time_step_and_its_spring() {
     let read = |text: String| file::parse("test.toml", text, &[]).unwrap_or_else(|e| panic!("{e}")).0;
     let without = |key: &str, text: &str| text.replace(key, "");
-    // 0.05 sqrt(l0 / g) = 5.0 ms, and the bounds of the water; in a dry scene 0.02 of it, and a third of a spacing at 60 m/s.
+    // 0.15 sqrt(l0 / g) = 15 ms, and the bounds of the water; in a dry scene 0.02 of it, and a third of a spacing at 60 m/s.
     let wet = read(without("time_step = 1e-3\n", SOUND));
-    assert!(wet.run.time_step == 5.0e-3 && wet.run.adaptive, "{:?}", wet.run);
+    assert!(wet.run.time_step == 1.5e-2 && wet.run.adaptive, "{:?}", wet.run);
     let dry = SOUND.replace("gravity", "").split("[fluid]").next().unwrap().to_owned()
         + "[[body]]\nname = \"cube\"\nsize = [0.2, 0.2, 0.2]\ncenter = [0.8, 0.5, 0.35]\ndensity = 500.0\n[contact]\nfriction = 0.3\n";
     let typed = read(dry.clone());

@@ -394,7 +394,7 @@ fn what_is_left_out_beyond_the_tank_is_told_with_where_the_prism_stands() {
 /// Height of a square of 0.1 m that has fallen flat into water at 1 m/s, 0.3 s later [m], by the keys of its shape.
 fn fallen(shape: &str, cells: u32) -> f64 {
     let case = case(&format!(
-        "[run]\nspacing = {}\ntime_step = 2e-3\nadaptive = true\nend = 0.3\ndimensions = 2\n\
+        "[run]\nspacing = {}\ntime_step = 1.5e-3\nadaptive = true\nend = 0.3\ndimensions = 2\n\
          [tank]\nmin = [0, 0, 0]\nmax = [1, 0, 0.7]\nopen = [\"z_max\"]\n[fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1, 0, 0.4]\n\
          [[body]]\nname = \"b\"\n{shape}\ncenter = [0.5, 0, 0.46]\ndensity = 2000\nvelocity = [0, 0, -1]\n[contact]\nspring = 1e5\n",
         0.1 / f64::from(cells)

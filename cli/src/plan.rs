@@ -290,7 +290,7 @@ fn report(seen: &Seen, ranks: Option<u16>) -> Result<Report> {
         let (step, time) = (found.origin.step, found.origin.time);
         let decimals = of_moment(case);
         advice.push(format!("run.from: it begins with the state of step {step}, t = {time:.decimals$} s"));
-        advice.extend(found.damaged.iter().map(|why| format!("run.from: an older state is taken: {why}")));
+        advice.extend(found.damaged.iter().map(|why| format!("run.from: {why}; an older state is taken")));
     }
     let estimate = if built { seen.setup.estimate(dt) } else { Estimate::new(case).at_step(case, dt) };
     let free = |n: Option<u64>| n.map_or(f64::INFINITY, |n| n as f64);
@@ -443,7 +443,12 @@ fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) 
     let body = format!("the drag on the body `{}`", params.drag.body(speed));
     // Of next to no body: it is told where it says something.
     let drag = Some(bounds.drag).filter(|dt| *dt < typed).unwrap_or(f64::INFINITY);
-    let further = [("the sound speed", bounds.sound), ("viscosity", bounds.viscous), (&body, drag)];
+    let further = [
+        ("calm water", bounds.weight),
+        ("the sound speed", bounds.sound),
+        ("viscosity", bounds.viscous),
+        (&body, drag),
+    ];
     let further = further.iter().filter(|(_, dt)| dt.is_finite());
     let further: String = further.map(|(what, dt)| format!(", {what} {dt:.3e} s")).collect();
     let mut advice = vec![format!(
@@ -465,6 +470,8 @@ fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) 
     let dt = time_step(params, typed, adaptive, speed);
     let wanted = match params.relaxation {
         Relaxation::Fixed(gamma) => gamma,
+        // It is held back by itself.
+        Relaxation::Speed(_) if params.follows_flow => 0.0,
         Relaxation::Speed(c) => (c * dt / params.spacing).powi(2),
     };
     if wanted > RELAXATION_MAX {

@@ -121,13 +121,14 @@ pub struct Run {
     /// Initial distance between particles l0 [m].
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub spacing: f64,
-    /// Time step [s]; the largest one when `adaptive = true`. If absent 0.05 sqrt(l0 / g) where there is a fluid, and `adaptive` holds; in a dry scene
+    /// Time step [s]; the largest one when `adaptive = true`. If absent 0.15 sqrt(l0 / g) where there is a fluid, and `adaptive` holds; in a dry scene
     /// 0.02 sqrt(l0 / g), less where solids start or are driven along faster than a third of a spacing in it (turns left out). Without gravity it must be given.
     #[serde(default = "Run::no_time_step", skip_serializing_if = "Run::is_absent")]
     #[cfg_attr(test, schemars(extend("exclusiveMinimum" = 0)))]
     pub time_step: f64,
     /// Shrink the time step below `time_step` where the flow asks for it: dt <= 0.35 l0 / v, but for the fastest thousandth of the
-    /// water, with v no less than that of a collapse of all the water, 2 sqrt(g H), which may begin at any time; and dt <= 0.7 l0 / c_s.
+    /// water, which is taken to become 1.4 times as fast, up to a collapse's 2 sqrt(g H); dt <= 0.6 l0 / sqrt(g H), 0.15 sqrt(l0 / g)
+    /// and, with a typed `sound_speed`, 0.7 l0 / c_s.
     #[serde(default)]
     pub adaptive: bool,
     /// End of the run [s].

@@ -5,8 +5,8 @@ use crate::error::Problem;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// The longest step of water over sqrt(l0 / g) [-]; the bounds of the flow hold it back further.
-const WET: f64 = 0.05;
+/// The longest step of water over sqrt(l0 / g) [-], that of `crate::time_step`; the bounds of the flow hold it back further.
+const WET: f64 = 0.15;
 /// The step of a dry scene over sqrt(l0 / g) [-]: nothing but contact holds it back, which cuts it so often and no more.
 const DRY: f64 = 0.02;
 /// How far a solid may go in the step of a dry scene, in spacings.

@@ -8,9 +8,8 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
 use crate::scene::{Drive, point};
+use crate::time_step::looks_every;
 
-/// Steps between looks at the counters and the fastest particles.
-const LOOK_EVERY: u64 = 10;
 /// Part of the fluid that may get lost before the run is stopped.
 const LOST_MAX: f64 = 0.02;
 /// An adaptive step this much shorter than the typed one is that of a run that will not end.
@@ -106,7 +105,7 @@ impl Simulation {
 
     /// Look at the guards and at the speed of the flow, every few steps.
     pub(crate) fn look(&mut self, step: &Step) -> Result<Option<(FluidMonitor, Counters)>> {
-        if !self.plan.wet() || !self.steps.is_multiple_of(LOOK_EVERY) {
+        if !self.plan.wet() || !self.steps.is_multiple_of(looks_every(&self.params, step.dt)) {
             return Ok(None);
         }
         let (monitor, counters) = self.observe()?;

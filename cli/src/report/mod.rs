@@ -24,7 +24,7 @@ use seixo::output::replay::Frame;
 use seixo::output::spare::spare;
 use seixo::output::write_whole;
 use seixo::scene::Scene;
-use seixo::time_step::{Bounds, expected_speed};
+use seixo::time_step::Bounds;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -434,14 +434,14 @@ fn limits(run: &Run) -> Result<String> {
     };
     let scene = Scene::build(&run.case)?;
     let params = seixo::drag::params(&run.case, &scene)?;
-    let bounds = Bounds::new(&params, expected_speed(&params));
+    let bounds = Bounds::new(&params, params.speed_at_start);
     let same = |a: f64, b: f64| (a - b).abs() < 1e-6 * b;
     let mut counts = [
         ("run.time_step", 0),
         ("the sound speed", 0),
         ("viscosity", 0),
         ("the drag on a light body", 0),
-        ("the least speed that a step is ready for, of a collapse or of the start", 0),
+        ("what calm water is ready for, a collapse or a wave", 0),
         ("the speed of water or solids", 0),
     ];
     let steps: Vec<f64> = points.iter().map(|p| p[1]).filter(|dt| *dt > 0.0).collect();
@@ -455,7 +455,7 @@ fn limits(run: &Run) -> Result<String> {
         } else if (dt / bounds.drag - 1.0).abs() < 0.01 {
             // A little of it goes by the speed of the water.
             3
-        } else if same(dt, bounds.flow) {
+        } else if same(dt, bounds.weight) {
             4
         } else {
             5
