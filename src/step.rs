@@ -23,6 +23,7 @@ impl Simulation {
 
     fn advance(&mut self) -> Result<StepReport> {
         let step = self.next_step();
+        let looks_every = self.looks_every(step.dt);
         self.check_length(&step)?;
         let (t, dt) = (step.time, step.dt);
         let mut report = StepReport { step: self.steps, time: t, dt, ..Default::default() };
@@ -51,7 +52,7 @@ impl Simulation {
         if self.stop.is_overdue() {
             return Err(Error::Interrupted);
         }
-        report.look = self.look(&step)?;
+        report.look = self.look(&step, looks_every)?;
         self.time = t + dt;
         self.steps += 1;
         Ok(report)

@@ -75,8 +75,13 @@ pub fn collapse_speed(params: &Params) -> f64 {
 
 /// Steps of `dt` [s] between looks at the flow: the fewer the longer they are beside those of a collapse.
 pub(crate) fn looks_every(params: &Params, dt: f64) -> u64 {
-    let few = COURANT_MAX * LOOK_EVERY as f64 * params.spacing / (collapse_speed(params) * dt);
-    (few as u64).clamp(1, LOOK_EVERY)
+    ((LOOK_EVERY as f64 * collapse_step(params) / dt) as u64).clamp(1, LOOK_EVERY)
+}
+
+/// The step from which on an adaptive one undoes errors of the density at the same rate, and no more with c_s dt / l0 [s]: that of a
+/// collapse; infinite where there is none.
+pub(crate) fn collapse_step(params: &Params) -> f64 {
+    COURANT_MAX * params.spacing / collapse_speed(params)
 }
 
 /// Speed to be ready for where the water has `speed` [m/s].

@@ -8,7 +8,6 @@ use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
 use crate::scene::{Drive, point};
-use crate::time_step::looks_every;
 
 /// Part of the fluid that may get lost before the run is stopped.
 const LOST_MAX: f64 = 0.02;
@@ -104,8 +103,8 @@ impl Simulation {
     }
 
     /// Look at the guards and at the speed of the flow, every few steps.
-    pub(crate) fn look(&mut self, step: &Step) -> Result<Option<(FluidMonitor, Counters)>> {
-        if !self.plan.wet() || !self.steps.is_multiple_of(looks_every(&self.params, step.dt)) {
+    pub(crate) fn look(&mut self, step: &Step, every: u64) -> Result<Option<(FluidMonitor, Counters)>> {
+        if !self.plan.wet() || !self.steps.is_multiple_of(every) {
             return Ok(None);
         }
         let (monitor, counters) = self.observe()?;

@@ -59,7 +59,7 @@ impl Report {
     pub fn words(&self) -> String {
         let report = self;
         let p = &report.particles;
-        let step = if report.adaptive { "at most" } else { "fixed" };
+        let step = if report.adaptive { "down to" } else { "fixed" };
         let mut lines = vec![
             format!(
                 "{}: {}D, l0 = {} m, dt {step} {:.3e} s, to t = {} s",
