@@ -216,11 +216,12 @@ fn submerged(angle: f64) -> f64 {
     (0..below.len()).map(|k| 0.5 * below[k].perp_dot(below[(k + 1) % below.len()])).sum()
 }
 
+/// After 0.25 s the water still swings by the start: by 1 % with steps of 2 ms, by 0.3 % from there to 0.5 s.
 #[test]
 fn a_tilted_box_is_not_driven_across_still_water() {
     let of = |angle: f64| {
         mean(&case(&format!(
-            "[run]\nspacing = {L0}\ntime_step = 2e-3\nadaptive = true\nend = 1.0\ndimensions = 2\n\
+            "[run]\nspacing = {L0}\ntime_step = 1.2e-3\nadaptive = true\nend = 1.0\ndimensions = 2\n\
              [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.3]\n\
              [tank]\nmin = [0, 0, 0]\nmax = [0.8, 0, 0.4]\nopen = [\"z_max\"]\n\
              [[obstacle]]\nname = \"box\"\nshape = \"box\"\nsize = [0.1, 0.1, 0.1]\ncenter = [0.4, 0, 0.32]\n\
