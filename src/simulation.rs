@@ -255,10 +255,12 @@ impl Simulation {
     /// Steps between looks at the flow, the next one of `dt` [s]. Each one is looked at where a solid or an opening makes it short: what that
     /// strikes is as fast at once, and may be slower itself.
     pub(crate) fn looks_every(&self, dt: f64) -> u64 {
-        let driven = self.driven();
-        let bounds = Bounds::new(&self.params, driven);
-        let strikes = driven > ready_speed(&self.params, self.speed) && bounds.flow < bounds.weight;
-        if self.is_adaptive() && strikes { 1 } else { looks_every(&self.params, dt) }
+        let strikes = || {
+            let driven = self.driven();
+            let bounds = Bounds::new(&self.params, driven);
+            driven > ready_speed(&self.params, self.speed) && bounds.flow < bounds.weight
+        };
+        if self.is_adaptive() && strikes() { 1 } else { looks_every(&self.params, dt) }
     }
 
     /// Part of gamma that acts now [-]. Beside solids off its lattice water never starts quite even: what a body displaces is no

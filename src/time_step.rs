@@ -1,5 +1,6 @@
 //! How long a time step may be: one rule for a run and for what is said of it before.
 
+use crate::case::FALL_MAX;
 use crate::params::{Params, Relaxation};
 
 /// Displacement of the fastest particles in a step over l0, v dt / l0, at most [-].
@@ -9,8 +10,6 @@ pub(crate) const COURANT_MAX: f64 = 0.35;
 const COURANT_FASTEST: f64 = 0.6;
 /// See [`COURANT_FASTEST`].
 const SPRAY: f64 = 0.25;
-/// dt sqrt(g / l0) at most [-]: of water that begins to fall, and of waves as short as the spacing shows them.
-pub(crate) const FALL_MAX: f64 = 0.15;
 /// dt sqrt(g H) / l0 at most [-]: of long waves, and of calm water that a gate lets go at the depth H. It has gone a third of a
 /// spacing after two steps, and the flow is looked at then ([`looks_every`]).
 const LONG_WAVE_MAX: f64 = 0.6;
@@ -78,8 +77,7 @@ pub(crate) fn looks_every(params: &Params, dt: f64) -> u64 {
     ((LOOK_EVERY as f64 * collapse_step(params) / dt) as u64).clamp(1, LOOK_EVERY)
 }
 
-/// The step from which on an adaptive one undoes errors of the density at the same rate, and no more with c_s dt / l0 [s]: that of a
-/// collapse; infinite where there is none.
+/// Step of a collapse [s], infinite where there is none: a longer adaptive one undoes errors of the density at the same rate.
 pub(crate) fn collapse_step(params: &Params) -> f64 {
     COURANT_MAX * params.spacing / collapse_speed(params)
 }

@@ -21,7 +21,7 @@ pub struct SlotRow {
 }
 
 impl SlotRow {
-    /// What it does to the body where its row has a `pressure` that no equation finds [Pa]: beside the water's surface.
+    /// What it does to the body where its row has a `pressure` [Pa].
     pub fn pressed(&self, pressure: f64) -> Wrench {
         let mut sum = self.head;
         sum.add(pressure, &self.per_pascal);

@@ -47,6 +47,7 @@ pub(crate) use opening::{HURRY, OpeningKeys, room_behind};
 pub use opening::{Inflow, OUTFLOWS_MAX, Outflow, Rate};
 pub(crate) use output::Choice;
 pub use output::{Encoding, Output, OutputField, OutputKind, OutputRegion, Series};
+pub(crate) use pace::FALL_MAX;
 pub use scatter::{Scatter, Turned};
 pub use shape::BodyShape;
 pub(crate) use shape::{Form, Place, Wall};

@@ -5,8 +5,9 @@ use crate::error::Problem;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// The longest step of water over sqrt(l0 / g) [-], that of `crate::time_step`; the bounds of the flow hold it back further.
-const WET: f64 = 0.15;
+/// dt sqrt(g / l0) at most [-]: of water that begins to fall, and of waves as short as the spacing shows them. The flow may hold it back
+/// further.
+pub(crate) const FALL_MAX: f64 = 0.15;
 /// The step of a dry scene over sqrt(l0 / g) [-]: nothing but contact holds it back, which cuts it so often and no more.
 const DRY: f64 = 0.02;
 /// How far a solid may go in the step of a dry scene, in spacings.
@@ -33,7 +34,7 @@ impl Case {
             return Some(Problem::new("run.adaptive", message, "remove `adaptive`, or add `time_step`"));
         }
         let weight = (l0 / gravity).sqrt();
-        let step = if wet { WET * weight } else { (DRY * weight).min(WAY * l0 / fastest.max(1e-9)) };
+        let step = if wet { FALL_MAX * weight } else { (DRY * weight).min(WAY * l0 / fastest.max(1e-9)) };
         // Two digits, as one would type it; a shorter run is one step.
         run.time_step = format!("{step:.1e}").parse().unwrap_or(step);
         if run.end > 0.0 {

@@ -39,14 +39,10 @@ impl Mover<'_> {
 
     /// The box that holds it at all `times`.
     fn ends(&self, times: &[f64]) -> (DVec3, DVec3) {
-        let ends = |t: f64| {
-            let placed = self.at(t);
-            (placed.center - placed.bounds(), placed.center + placed.bounds())
-        };
         let times = if self.driven.is_some() { times } else { &times[..1] };
         times
             .iter()
-            .map(|&t| ends(t))
+            .map(|&t| self.at(t).ends())
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 }
