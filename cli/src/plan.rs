@@ -443,19 +443,20 @@ fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) 
     let body = format!("the drag on the body `{}`", params.drag.body(speed));
     // Of next to no body: it is told where it says something.
     let drag = Some(bounds.drag).filter(|dt| *dt < typed).unwrap_or(f64::INFINITY);
-    let further = [
+    let flow = format!("the flow (up to {speed:.2} m/s)");
+    let allows = [
+        (&*flow, bounds.flow),
         ("calm water", bounds.weight),
         ("the sound speed", bounds.sound),
         ("viscosity", bounds.viscous),
         (&body, drag),
     ];
-    let further = further.iter().filter(|(_, dt)| dt.is_finite());
-    let further: String = further.map(|(what, dt)| format!(", {what} {dt:.3e} s")).collect();
-    let mut advice = vec![format!(
-        "time step: {}{typed:.3e} s; the flow (up to {speed:.2} m/s) allows {:.3e} s{further}",
-        if adaptive { "at most " } else { "" },
-        bounds.flow
-    )];
+    let allows = allows.iter().filter(|(_, dt)| *dt < case.run.end.max(typed));
+    let allows: Vec<String> =
+        allows.map(|(what, dt)| format!("{what} allows {dt:.3e} s")).collect();
+    let most = if adaptive { "at most " } else { "" };
+    let allows = if allows.is_empty() { "nothing bounds it".to_owned() } else { allows.join(", ") };
+    let mut advice = vec![format!("time step: {most}{typed:.3e} s; {allows}")];
     let bound = bounds.shortest();
     let mut matters = typed > bound && !adaptive;
     if typed > bound {
