@@ -201,3 +201,41 @@ fn plates_of_any_thickness_are_full() {
     }
     assert!(most.x < 0.09 && most.y < 0.15, "{most}");
 }
+
+/// A dam that reaches beyond the tank or into the bed below, and what of the water is behind it after a second. Half of the rows of one that ends a row of particles
+/// behind a wall's surface were left out, and the next stood one and a half spacings from those of that wall.
+#[test]
+fn a_dam_is_tight_wherever_it_ends_in_a_wall() {
+    let text = |dimensions: u32, more: &str| {
+        format!(
+            "[run]\nspacing = 0.02\ntime_step = 2e-3\nend = 1.0\ndimensions = {dimensions}\n\
+             [tank]\nmin = [0, 0, -0.1]\nmax = [0.5, 0.14, 0.3]\nopen = [\"z_max\"]\n[fluid]\n\
+             [[fluid.block]]\nmin = [0, 0, -0.1]\nmax = [0.2, 0.14, 0.14]\n{more}"
+        )
+    };
+    let wide = |y: f64, z: f64| {
+        format!("[[obstacle]]\nname = \"dam\"\nsize = [0.1, 0.6, 0.5]\ncenter = [0.27, {y}, {z}]\n")
+    };
+    let bed = "[[obstacle]]\nname = \"bed\"\nshape = \"prism\"\n\
+               section = [[0, -0.1], [0.5, -0.1], [0.5, -0.02], [0, -0.02]]\n";
+    let on_bed = |foot: f64| {
+        format!(
+            "{bed}[[obstacle]]\nname = \"dam\"\nshape = \"prism\"\n\
+             section = [[0.22, {foot}], [0.32, {foot}], [0.32, 0.3], [0.22, 0.3]]\n"
+        )
+    };
+    let mut cases: Vec<(u32, String)> = vec![(3, wide(0.15, -0.05)), (3, wide(0.1485, -0.05))];
+    cases.extend([-0.042, -0.0435, -0.0445].map(|z| (2, wide(0.15, z))));
+    cases.extend([-0.07, -0.0685, -0.067].map(|foot| (2, on_bed(foot))));
+    for (dimensions, more) in cases {
+        let mut simulation = crate::common::simulation(&case(&text(dimensions, &more)));
+        while simulation.time < 1.0 {
+            simulation.step().expect("a step");
+        }
+        let fields = simulation.backend.read().expect("the fields");
+        let water = &fields.position[..simulation.groups.fluid];
+        let through = water.iter().filter(|x| x.x > 0.23).count();
+        println!("{dimensions}D, {through} of {}: {more}", water.len());
+        assert_eq!(through, 0, "{more}");
+    }
+}

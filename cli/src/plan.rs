@@ -452,8 +452,7 @@ fn step_advice(params: &Params, case: &Case, speed: f64) -> (Vec<String>, bool) 
         (&body, drag),
     ];
     let allows = allows.iter().filter(|(_, dt)| *dt < case.run.end.max(typed));
-    let allows: Vec<String> =
-        allows.map(|(what, dt)| format!("{what} allows {dt:.3e} s")).collect();
+    let allows: Vec<String> = allows.map(|(what, dt)| format!("{what} allows {dt:.3e} s")).collect();
     let most = if adaptive { "at most " } else { "" };
     let allows = if allows.is_empty() { "nothing bounds it".to_owned() } else { allows.join(", ") };
     let mut advice = vec![format!("time step: {most}{typed:.3e} s; {allows}")];

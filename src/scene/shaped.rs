@@ -21,6 +21,8 @@ const MEETING: f64 = 3.0;
 const FLAT: f64 = 3.0;
 /// What lies deeper in a wall than this, over the spacing, has no gap before it.
 const FLUSH: f64 = 1e-3;
+/// Two walls whose particles stand this much more than a spacing apart, over the spacing, let no water through; 0.35 lets some.
+const SEALED: f64 = 0.25;
 
 /// A wall without particles, where it stands; `moved` if it moves.
 fn wall(
@@ -141,7 +143,10 @@ impl Builder<'_> {
         let l0 = self.lattice.spacing;
         let at = |offset: &DVec3| solid.position + solid.orientation * *offset;
         let kept: Vec<bool> = solid.wall_offset.iter().map(|o| !self.takes(at(o))).collect();
-        let dummies: Vec<DVec3> = solid.dummy_offset.iter().filter(|o| !self.takes(at(o))).copied().collect();
+        let mut dummies: Vec<DVec3> =
+            solid.dummy_offset.iter().filter(|o| !self.takes(at(o))).copied().collect();
+        let hidden = solid.wall_offset.iter().zip(&kept).filter(|(_, kept)| !**kept);
+        dummies.extend(self.sealing(&solid.placed(), hidden.map(|(o, _)| (*o, at(o)))));
         let count = solid.wall_offset.len() + solid.dummy_offset.len();
         let mut surface = solid.wall_offset.iter().zip(&solid.wall_to_surface);
         let bare = !kept.contains(&true)
@@ -329,6 +334,35 @@ impl Builder<'_> {
     /// a spacing.
     fn takes(&self, at: DVec3) -> bool {
         self.buried(at) || near_solid(&self.lattice, &self.grid, at, 0.5)
+    }
+
+    /// Those of the wall particles of a `solid`, in its frame and where they are, that others take but that stand less than half a spacing behind the surface of
+    /// these, and of their particles none nearer than [`SEALED`]: without them there was a slit of up to one and a half spacings between theirs and what is left of the solid,
+    /// through which single particles of water went. They have no pressure.
+    fn sealing(&self, solid: &Placed, hidden: impl Iterator<Item = (DVec3, DVec3)>) -> Vec<DVec3> {
+        let l0 = self.lattice.spacing;
+        let (reach, (low, high)) = (0.5 * l0, solid.ends());
+        let meets = |other: &&Solid| {
+            let (from, to) = other.placed().ends();
+            other.is_still() && from.cmple(high + reach).all() && to.cmpge(low - reach).all()
+        };
+        let others: Vec<&Solid> = self.moving_walls.iter().filter(meets).collect();
+        let shapes: Vec<Placed> = others.iter().map(|s| s.placed()).collect();
+        let mut rows = PointCells::new(SEALED * l0);
+        others.iter().flat_map(|s| s.wall_positions()).for_each(|x| rows.add(x));
+        let sides = self.closed_sides();
+        let seals = |at: DVec3| {
+            let behind =
+                sides.is_some_and(|(low, high)| at.cmplt(low - reach).any() || at.cmpgt(high + reach).any());
+            let inside = self.fixed.shapes.iter().map(Placed::from).any(|b| b.holds(at, reach))
+                || shapes.iter().any(|b| b.holds(at, reach));
+            !behind
+                && !inside
+                && self.periodic.wrap(at) == at
+                && !near_solid(&self.lattice, &self.grid, at, SEALED)
+                && !rows.is_near(at, SEALED * l0)
+        };
+        hidden.filter(|(_, at)| seals(*at)).map(|(offset, _)| offset).collect()
     }
 
     /// Whether a wall covers a place before the face of a solid. Across a seam that may be the solid itself.
