@@ -21,7 +21,7 @@ use crate::pressure::{Outcome, PressureReport, Settings};
 use crate::scene::{Groups, Scene};
 use crate::scheme::Source;
 use crate::settle::settle;
-use crate::slots::{Pressing, Slots, Voids};
+use crate::slots::{Pressing, Push, Slots, Voids};
 use crate::stop::Stop;
 use crate::time_step::{
     Bounds, collapse_speed, collapse_step, looks_every, ready_speed, shortened, time_step,
@@ -91,6 +91,8 @@ pub struct Simulation {
     pressings: Vec<Pressing>,
     /// Rows of free bodies that face a room without water, in this step.
     voids: Voids,
+    /// What slots press with on what stands opposite, of the step in progress.
+    pushes: Vec<Push>,
     /// What that pressed in the last step, by solid and row [Pa].
     pressed: HashMap<(usize, usize), f64>,
     /// Faces of driven solids at which others may stand, where forces are told.
@@ -170,6 +172,7 @@ impl Simulation {
             enclosed: vec![],
             pressings: vec![],
             voids: Voids::new(),
+            pushes: vec![],
             pressed: HashMap::new(),
             solids_ledger: plan.ledger.then(|| (Ledger::default(), solids.energy().total())),
             solids,

@@ -12,16 +12,20 @@ fn block(density: f64, gap: f64) -> Case {
 
 /// A slab of 0.2 m, `thick` [m] and of `density` [kg/m3], `gap` [m] above the floor of a tank with 0.4 m of water, in the plane; it goes up and down alone.
 fn slab(density: f64, gap: f64, thick: f64) -> Case {
-    case(&format!(
+    case(&described(density, gap, thick))
+}
+
+fn described(density: f64, gap: f64, thick: f64) -> String {
+    format!(
         "[run]\nspacing = 0.01\ntime_step = 2e-4\nend = 1.0\ngravity = [0, 0, -9.81]\ndimensions = 2\n\
          [tank]\nmin = [0, 0, 0]\nmax = [1.2, 0, 0.5]\nopen = [\"z_max\"]\n\
          [fluid]\n[[fluid.block]]\nmin = [0, 0, 0]\nmax = [1.2, 0, 0.4]\n\
          [[body]]\nname = \"block\"\nsize = [0.2, 0.01, {thick}]\ncenter = [0.6, 0, {}]\ndensity = {density}\n\
          locked = [\"x\", \"rotation_y\"]\ndisplaces_fluid = true\n\
          [contact]\nspring = 1e5\nrestitution = 0.2\n\
-         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"",
+         [[gauge.force]]\nname = \"floor\"\non = \"tank.z_min\"\n",
         0.5 * thick + gap
-    ))
+    )
 }
 
 /// Height [m] and velocity [m/s] of the block.
@@ -165,4 +169,29 @@ fn the_floor_feels_what_the_water_in_the_gap_does() {
     let weight = 9.81 * (1000.0 * 0.01 * (1.2 * 0.4 - 0.02) + 0.4);
     println!("{floor:.3} N for {:.3}", -weight - gained);
     assert!((floor + weight + gained).abs() < 0.01 * weight, "{floor} for {}", -weight - gained);
+}
+
+#[test]
+fn a_floor_of_any_kind_feels_the_blow_of_what_lands_on_it() {
+    let of_tank = described(2500.0, 0.02, 0.1);
+    let deeper = of_tank.replace("[tank]\nmin = [0, 0, 0]", "[tank]\nmin = [0, 0, -0.04]");
+    let deeper = deeper.replace("tank.z_min", "ground");
+    let ground = "name = \"ground\"\nmin = [0, 0, -0.04]\nmax = [1.2, 0.01, 0]\n";
+    let prism =
+        "name = \"ground\"\nshape = \"prism\"\nsection = [[0, -0.04], [1.2, -0.04], [1.2, 0], [0, 0]]\n";
+    let moving = format!("{deeper}[[moving_wall]]\n{ground}motion = [[0, 0, 0, 0], [1, 0, 0, 0]]\n");
+    let floors = [of_tank, format!("{deeper}[[obstacle]]\n{prism}"), moving];
+    let blow = |text: String| {
+        let mut simulation = simulation(&case(&text));
+        let [force] = mean_over(&mut simulation, [0.05, 0.2], |now| gauges(now, ["floor_force_z"]));
+        let (height, _) = motion(&simulation);
+        (force, height)
+    };
+    let [tank, prism, moving] = floors.map(blow);
+    println!("{tank:?} {prism:?} {moving:?}");
+    // The water below has stopped it, after a fall of 20 mm.
+    assert!((tank.1 - 0.05).abs() < 2e-3, "{tank:?}");
+    for found in [prism, moving] {
+        assert!((found.0 / tank.0 - 1.0).abs() < 5e-3, "{found:?} for {tank:?}");
+    }
 }

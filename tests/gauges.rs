@@ -432,8 +432,14 @@ fn what_a_slot_presses_on_a_floor_beyond_a_seam_acts_where_its_image_is() {
     // The face of one particle.
     let area = scene.spacing * scene.spacing;
     let torque = |x: f64| {
-        let push =
-            Push { by: 0, on, at: DVec3::new(x, 0.12, 0.0), pressure: 2.0 / area, area: -area * DVec3::Z };
+        let push = Push {
+            by: 0,
+            row: 0,
+            on,
+            at: DVec3::new(x, 0.12, 0.0),
+            pressure: 2.0 / area,
+            area: -area * DVec3::Z,
+        };
         floor.slot_force(&[push], (&told, &areas), (&scene, &[]), &params).torque
     };
     // By a body that lies over the side; the arm was longer by the tank.

@@ -74,6 +74,7 @@ impl Simulation {
             slots: _,
             enclosed: _,
             pressings: _,
+            pushes: _,
             pressed: _,
             voids: _,
             driven_faces: _,

@@ -177,16 +177,18 @@ impl Simulation {
             forces.loads.into_iter().for_each(|(k, load)| sum[k] += load);
             pushes.extend(forces.pushes);
         }
+        self.pushes = vec![];
         if let Some(slots) = &self.slots {
             let told = (&covered[..], held.as_ref().map(|held| &held.1));
             let of_driven =
                 slots.on_driven(poses, told, &pushes, &self.params, |rows| backend.wall_pressures(rows))?;
             of_driven.into_iter().for_each(|(k, force)| sum[k] += force);
+            self.pushes = pushes;
         }
         Ok(sum)
     }
 
-    /// Takes what slots did as bodies came nearer or went to the forces of the water.
+    /// Takes what slots did as bodies came nearer or went to the forces of the water, on what they press, too.
     fn book_pressings(&mut self, dt: f64) {
         self.pressed.clear();
         for slot in self.pressings.drain(..) {
@@ -194,6 +196,11 @@ impl Simulation {
             let (before, after) = (&self.solids.predicted()[k], &self.solids.poses()[k]);
             self.fluid_force[k] += slot.force(before, after, dt) - slot.speed;
             self.pressed.extend(slot.pressures(before, after, dt));
+        }
+        let pushes = std::mem::take(&mut self.pushes);
+        if let Some(slots) = self.slots.as_ref().filter(|_| !self.pressed.is_empty()) {
+            let on_driven = slots.pressed_on_driven(self.solids.predicted(), &pushes, &self.pressed);
+            on_driven.into_iter().for_each(|(k, force)| self.fluid_force[k] += force);
         }
     }
 

@@ -60,8 +60,8 @@ impl Near {
 }
 
 impl Slots {
-    /// What the `pushes` do to driven solids and obstacles at `poses`, which others cover in part [N, N m]. Rows with a slot of their own, of `held`, have from those
-    /// what slots of such solids press there. `read` tells what slots of particles have.
+    /// What the `pushes` do to driven solids and obstacles at `poses`, which others cover in part [N, N m]. Of solids that are `held` rows with a slot of their own
+    /// have what presses there from those. `read` tells what slots of particles have.
     ///
     /// # Errors
     /// Those of `read`.
@@ -73,29 +73,10 @@ impl Slots {
         params: &Params,
         read: impl FnOnce(&[usize]) -> Result<Vec<RowPressure>>,
     ) -> Result<Vec<(usize, Wrench)>> {
-        // Of each solid that presses those that it presses on: a push over the joint of two of them is on both.
-        let mut targets: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
-        for push in pushes {
-            if let Opposite::Solid(k, _) = push.on
-                && self.layers[k].is_pressed()
-            {
-                targets.entry(push.by).or_default().insert(k);
-            }
-        }
-        if targets.is_empty() {
+        let laid = self.laid(poses, held, pushes);
+        if laid.is_empty() {
             return Ok(vec![]);
         }
-        let own: HashSet<(usize, usize)> = held.map(Held::pressed).unwrap_or_default();
-        let laid = |push: &Push| {
-            let is_on_body = matches!(push.on, Opposite::Solid(k, _) if self.layers[k].free);
-            let of = targets.get(&push.by).filter(|_| !is_on_body);
-            let mut on = of.map_or(vec![], |of| self.faces_before(push, of, poses));
-            if !self.layers[push.by].free {
-                on.retain(|laid| !own.contains(&(laid.of.0, laid.of.1)));
-            }
-            on
-        };
-        let laid: Vec<Vec<Laid>> = pushes.par_iter().with_min_len(16).map(laid).collect();
         let mut out = vec![];
         let mut pressed: BTreeMap<Of, f64> = BTreeMap::new();
         for (push, on) in pushes.iter().zip(laid) {
@@ -104,9 +85,7 @@ impl Slots {
                 let normal = turn * self.face(of).area.normalize_or_zero();
                 let area = share * push.area_on(normal);
                 *pressed.entry(of).or_default() += area.length();
-                let force = push.pressure_at(way, params) * area;
-                let arm = params.periodic.nearest(push.at - poses[k].position);
-                out.push((k, Wrench { force, torque: arm.cross(force) }));
+                out.push((k, self.on(push, push.pressure_at(way, params) * area, &poses[k])));
             }
         }
         let mut taken: HashMap<Of, f64> = HashMap::new();
@@ -123,6 +102,59 @@ impl Slots {
             out.push((k, Wrench { force, torque: arm.cross(force) }));
         }
         Ok(out)
+    }
+
+    /// What the free bodies of the `pushes` press on driven solids and obstacles at `poses` as they come nearer or go, besides: what is `pressed` on
+    /// their rows, by solid and row [Pa].
+    pub fn pressed_on_driven(
+        &self,
+        poses: &[Pose],
+        pushes: &[Push],
+        pressed: &HashMap<(usize, usize), f64>,
+    ) -> Vec<(usize, Wrench)> {
+        let of = |push: &Push| Some(Push { pressure: *pressed.get(&(push.by, push.row))?, ..*push });
+        let pushes: Vec<Push> = pushes.iter().filter_map(of).collect();
+        let mut out = vec![];
+        for (push, on) in pushes.iter().zip(self.laid(poses, None, &pushes)) {
+            for Laid { of, share, .. } in on {
+                let normal = poses[of.0].orientation * self.face(of).area.normalize_or_zero();
+                out.push((of.0, self.on(push, push.pressure * share * push.area_on(normal), &poses[of.0])));
+            }
+        }
+        out
+    }
+
+    /// A `force` where a push is [N], on a solid at `pose`.
+    fn on(&self, push: &Push, force: DVec3, pose: &Pose) -> Wrench {
+        Wrench { force, torque: self.periodic.nearest(push.at - pose.position).cross(force) }
+    }
+
+    /// How the `pushes` lie on faces of driven solids and obstacles, one list a push; none where nothing presses on such. Rows with a slot of their own, of `held`,
+    /// have from those what slots of such solids press there.
+    fn laid(&self, poses: &[Pose], held: Option<&Held>, pushes: &[Push]) -> Vec<Vec<Laid>> {
+        // Of each solid that presses those that it presses on: a push over the joint of two of them is on both.
+        let mut targets: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+        for push in pushes {
+            if let Opposite::Solid(k, _) = push.on
+                && self.layers[k].is_pressed()
+            {
+                targets.entry(push.by).or_default().insert(k);
+            }
+        }
+        if targets.is_empty() {
+            return vec![];
+        }
+        let own: HashSet<(usize, usize)> = held.map(Held::pressed).unwrap_or_default();
+        let of = |push: &Push| {
+            let is_on_body = matches!(push.on, Opposite::Solid(k, _) if self.layers[k].free);
+            let of = targets.get(&push.by).filter(|_| !is_on_body);
+            let mut on = of.map_or(vec![], |of| self.faces_before(push, of, poses));
+            if !self.layers[push.by].free {
+                on.retain(|laid| !own.contains(&(laid.of.0, laid.of.1)));
+            }
+            on
+        };
+        pushes.par_iter().with_min_len(16).map(of).collect()
     }
 
     fn face(&self, (k, row, number): Of) -> Face {

@@ -22,6 +22,8 @@ pub enum Opposite {
 pub struct Push {
     /// Index of the solid whose slot it is.
     pub by: usize,
+    /// The row of its layer.
+    pub row: usize,
     /// What it acts on.
     pub on: Opposite,
     /// Where [m].
@@ -121,7 +123,7 @@ impl Slots {
                 if let Some(on) = on.filter(|&on| is_pressed(on)) {
                     let there = field.map_or(0.0, |field| self.before(field, slot.solid, pose, n, at));
                     let (at, area) = (pose.position + at, share * area);
-                    out.push(Push { by: slot.solid, on, at, pressure: there + beside(n), area });
+                    out.push(Push { by: slot.solid, row: n, on, at, pressure: there + beside(n), area });
                 }
             }
         }
