@@ -89,7 +89,14 @@ impl Surroundings<'_> {
                     (0..3).all(|k| self.plane && k == 1 || at[k] >= low[k] && at[k] <= high[k])
                 })
             };
-            let way = self.away(body).filter(inside).or(straight.filter(inside));
+            let frees = |by: &DVec3| {
+                let mut moved = body.clone();
+                moved.position += *by;
+                inside(by) && self.deepest(&moved).is_none()
+            };
+            let over = self.up.map(|up| (self.lift(body, up) + margin) * up);
+            let ways = [self.away(body), straight, over];
+            let way = ways.into_iter().flatten().find(frees);
             let away = match way {
                 None => "there is no room for it beside that: make it smaller, or move it away".into(),
                 Some(by) if straight.is_some_and(|way| way.distance(by) < margin) => {

@@ -7,7 +7,8 @@ use crate::error::Result;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
-use crate::scene::{Drive, point};
+use crate::scene::{Drive, Solid, point};
+use crate::time_step::{Bounds, expected_speed};
 
 /// Part of the fluid that may get lost before the run is stopped.
 const LOST_MAX: f64 = 0.02;
@@ -16,6 +17,8 @@ const SHORTEST_STEP: f64 = 1e-6;
 /// A typed step of so many times the fall through a spacing is far beyond what any flow leaves of it.
 const LONGEST_STEP: f64 = 1e3;
 
+/// Water this many times as fast as anything makes it has come apart [-].
+const FLYING: f64 = 20.0;
 /// Part of the time in which a tank fills from which on it may have no room left: solids that move may take some of it [-].
 const FULL_FROM: f64 = 0.5;
 
@@ -32,15 +35,37 @@ impl Simulation {
                 "no flow takes a step like that, water falls through a spacing in {fall:.1e} s: write no more than this"
             )
         } else {
-            "the run would not end; water that has no room left (more of it in a closed tank than that holds, a \
-             piston into a part that is full) is pressed like this: leave it a way out"
-                .to_owned()
+            format!("the run would not end; {}", self.haste())
         };
         let what = format!(
             "the flow or a solid asks for steps of {:.1e} s where run.time_step is {typed:e} s; {why}",
             step.dt
         );
         Err(self.diverged(step, Stage::Predict, what))
+    }
+
+    /// Why steps may have become so short, and what would help.
+    fn haste(&self) -> String {
+        let expected = expected_speed(&self.params).max(self.driven());
+        let bounds = Bounds::new(&self.params, self.speed.max(expected));
+        if bounds.drag <= bounds.shortest() {
+            let body = self.params.drag.body(self.speed.max(expected));
+            return format!(
+                "water takes the body `{body}` along at once: check its density, mass and inertia, and fluid.wall_friction"
+            );
+        }
+        let drives = |solid: &Solid| matches!(solid.drive, Drive::Prescribed(_)) && !solid.is_still();
+        let is_squeezed = self.params.filled || self.scene.solids.iter().any(drives);
+        if !is_squeezed && self.fastest > FLYING * expected {
+            return format!(
+                "water flies at {:.1e} m/s where nothing makes it faster than {expected:.1e}: leave out what fluid.* changes \
+                 of the scheme (collision_distance, relaxation, sound_speed), or use a finer run.spacing",
+                self.fastest
+            );
+        }
+        "water that has no room left (more of it in a closed tank than that holds, a piston into a part that is full) is \
+         pressed like this: leave it a way out"
+            .to_owned()
     }
 
     /// Time in which what is let go falls through a spacing [s]; without gravity no time is long.
