@@ -98,11 +98,12 @@ pub fn monitor(sums: &[Sums], params: &Params, dt: f64) -> FluidMonitor {
     out.centroid = (position / live.max(1) as f64).to_array();
     out.extent_max = if live > 0 { extent.to_array() } else { [0.0; 3] };
     out.density_error_mean /= out.inner.max(1) as f64;
-    out.speed_most = speed_most(&bins, live, per_bin);
+    out.speed_most = speed_most(&bins, live, per_bin).min(out.speed_max);
     out
 }
 
-/// Upper edge of the bin below which 99.9 % of `particles` lie [m/s].
+/// Upper edge of the bin below which 99.9 % of `particles` lie [m/s]; with the short steps of a calm flow its first bin reaches
+/// beyond all of them.
 pub fn speed_most(bins: &[u64; SPEED_BINS], particles: u64, per_bin: f64) -> f64 {
     let allowed = particles / 1000;
     let mut above = 0;
