@@ -230,7 +230,8 @@ tolerance = 0.1
     let gauge = "[[gauge.pressure]]\nname = \"floor\"\npoint = [0.1, 0, 0]\n[output]\nevery = 0\n\"\"\"";
     let head = head.replace("title =", &format!("{checks}title =")).replacen("\"\"\"\n", "@", 1);
     let text = head.replace("\"\"\"", gauge).replace('@', "\"\"\"\n") + rest;
-    std::fs::write(folder.join("tank.toml"), text).expect("a file");
+    std::fs::write(folder.join("tank.toml"), &text).expect("a file");
+    std::fs::write(folder.join("slip.toml"), text.replace("fluid z [m]", "fluid h [m]")).expect("a file");
     std::fs::write(folder.join("floor.csv"), "# source: analytic\nt_s,p_Pa\n0.1,1961\n0.3,1961\n")
         .expect("a file");
     let validate = |arguments: &[&str]| {
@@ -243,6 +244,9 @@ tolerance = 0.1
     let held = seixo::output::lock::hold(&folder.join("busy"), ".seixo-points", Beside::Nobody);
     let (code, text) = validate(&["tank.toml", "-o", "busy", "--shard", "1/2"]);
     assert!(held.is_ok() && code == 2 && text.contains("busy is in use"), "{code}: {text}");
+    let (code, text) = validate(&["slip.toml", "-o", "none"]);
+    assert!(code == 2 && text.contains("there is no curve `fluid h [m]`; there are: "), "{code}: {text}");
+    assert!(!folder.join("none/points").exists(), "nothing ran");
     let (code, text) = validate(&["tank.toml", "--runs", "2", "-o", "one", "--shard", "1/2"]);
     assert_eq!(code, 0, "{text}");
     assert!(text.contains("2 of 4 points are still to be computed"), "{text}");

@@ -38,6 +38,17 @@ pub struct ResultNumber {
     pub since_moved: Option<f64>,
 }
 
+/// The error of the table `kind` called `name`, which asks for a `curve` that is none of `curves`.
+pub fn missing(kind: &str, name: &str, curve: &str, curves: &BTreeSet<String>) -> Option<Error> {
+    if curves.contains(curve) {
+        return None;
+    }
+    let known: Vec<&str> = curves.iter().map(String::as_str).collect();
+    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+    let text = format!("{kind} `{name}`: there is no curve `{curve}`; there are: {known}");
+    Some(Error::key(kind, text, "name a curve that [measure] takes"))
+}
+
 impl ResultNumber {
     /// What is wrong with it, if anything, with the key in its table.
     pub fn fault(&self) -> Option<Problem> {
@@ -50,13 +61,7 @@ impl ResultNumber {
 
     /// What is wrong where `curves` are all that a point has, if its own is none of them: a mistake of the study.
     pub fn lacks(&self, curves: &BTreeSet<String>) -> Option<Error> {
-        if curves.contains(&self.curve) {
-            return None;
-        }
-        let known: Vec<&str> = curves.iter().map(String::as_str).collect();
-        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-        let text = format!("result `{}`: there is no curve `{}`; there are: {known}", self.name, self.curve);
-        Some(Error::key("result", text, "name a curve that [measure] takes"))
+        missing("result", &self.name, &self.curve, curves)
     }
 
     /// Puts the number among what a run `measured`. What does not come to pass in a run, such as a passage, leaves its cell empty.

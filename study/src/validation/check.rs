@@ -17,10 +17,11 @@ use super::reduce::{Curve, Take, cut, distance, lag, prepared, reduce, reduce_bi
 use crate::compare::within;
 use crate::definition::Files;
 use crate::engine::first_line;
+use crate::result_number::missing;
 use crate::row::{Class, Measured};
 use seixo::error::{Error, Problem, Result};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A check, as in a validation file.
 #[derive(Clone, Debug, Deserialize)]
@@ -225,6 +226,11 @@ impl Check {
             return wrong("tolerance", "no error would be within it", "use a number of more than 0");
         }
         self.take.fault([self.level, self.to], self.window, self.smooth)
+    }
+
+    /// What is wrong where `curves` are all that a point has, if one of its own is none of them.
+    pub fn lacks(&self, curves: &BTreeSet<String>) -> Option<Error> {
+        self.curve.iter().chain(&self.behind).find_map(|curve| missing("check", &self.name, curve, curves))
     }
 
     /// Whether it is for a point with `parameters`.

@@ -17,6 +17,7 @@ use crate::engine::{self, Context, Job, Options};
 use crate::row::Row;
 use check::{Check, Reference};
 use seixo::error::{Error, Result};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
@@ -130,12 +131,32 @@ impl Suite {
         self.jobs.is_empty()
     }
 
+    /// What is wrong with a check whose curve none of its points has; told before the first one runs.
+    fn fault(&self) -> Option<Error> {
+        let mut faulty: BTreeMap<usize, bool> = BTreeMap::new();
+        let fault = |k: usize| (self.jobs[k].fault)();
+        self.validations.iter().find_map(|Validation { definition, points, .. }| {
+            definition.check.iter().find_map(|check| {
+                let of = |k: &usize| check.applies(&self.jobs[*k].parameters.iter().cloned().collect());
+                let mut own = points.clone().filter(of);
+                let first = own.clone().next()?;
+                let is_wrong = own.all(|k| *faulty.entry(k).or_insert_with(|| fault(k).is_some()));
+                let name = &definition.name;
+                let told = |e: Error| Error::file(name, "check", format!("{name}: {e}"));
+                if is_wrong { fault(first).map(told) } else { None }
+            })
+        })
+    }
+
     /// Runs what is open. Rows of the points that are there at the end, with result and error of every check among
     /// their values.
     ///
     /// # Errors
     /// [`Error::Io`]. A point that fails is a row.
     pub fn run(&self, options: &Options, context: &Context) -> Result<Vec<Row>> {
+        if let Some(error) = self.fault().filter(|_| options.collect.is_none()) {
+            return Err(error);
+        }
         let mut rows = engine::sweep(SWEEP, &self.jobs, options, context)?;
         for validation in &self.validations {
             for row in rows.iter_mut().filter(|r| validation.points.contains(&r.index)) {
@@ -186,6 +207,7 @@ mod tests {
         let quick = Suite::new(&[], &Setup::default()).unwrap();
         let full = Suite::new(&[], &Setup { full: true, runs: 2, ..Setup::default() }).unwrap();
         assert!(!quick.is_empty() && full.len() > quick.len());
+        assert!(full.fault().is_none(), "{:?}", full.fault());
         for validation in &full.validations {
             let d = &validation.definition;
             assert!(
