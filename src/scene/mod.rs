@@ -14,6 +14,7 @@
 mod behind;
 mod bodies;
 mod build;
+mod buried;
 mod cavities;
 mod covered;
 mod curve;
@@ -41,13 +42,13 @@ mod water;
 mod wave_depth;
 
 pub use crate::shape::{Edges, Face, Shape};
+pub(crate) use buried::COVERED;
 pub(crate) use covered::INFLOW_ROOM;
 pub use curve::Curve;
 pub use motion::Motion;
 pub use opening::{Course, Opening, Passes};
 pub(crate) use part::Still;
 pub(crate) use placement::{CONTACT_DISTANCE, point};
-pub(crate) use shaped::COVERED;
 
 use crate::periodic::Periodic;
 use crate::shape::{Bending, Surface, WallLayer, bending};
