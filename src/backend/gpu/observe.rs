@@ -64,7 +64,7 @@ impl Gpu {
         let per_bin = speed_range(&self.params, self.dt) / SPEED_BINS as f64;
         let mut histogram = [0_u64; SPEED_BINS];
         histogram.iter_mut().zip(bins).for_each(|(h, &b)| *h = u64::from(b));
-        out.speed_most = speed_most(&histogram, out.particles, per_bin).min(out.speed_max);
+        out.speed_most = speed_most(&histogram, out.particles, per_bin, out.speed_max);
         out
     }
 
