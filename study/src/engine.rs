@@ -17,6 +17,7 @@ use seixo::plan::Plan;
 use seixo::pressure::Settings;
 use seixo::scene::Scene;
 use seixo::stop::Stop;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -84,6 +85,8 @@ pub type Task = Box<dyn Fn(&Context) -> Result<Measured> + Send + Sync>;
 
 /// What a study itself has wrong, as a point shows before it is computed; nothing where it is right, or the point's own case is wrong.
 pub type Fault = Box<dyn Fn() -> Option<Error> + Send + Sync>;
+/// Finds the names of a point's curves; dear, for it builds the scene.
+pub type Curves = Box<dyn Fn() -> Option<BTreeSet<String>> + Send + Sync>;
 
 /// A point that is to be computed.
 pub struct Job {
@@ -97,6 +100,8 @@ pub struct Job {
     pub weight: f64,
     /// What the study has wrong.
     pub fault: Fault,
+    /// Names of the curves that it measures; nothing where that is not known.
+    pub curves: Curves,
     /// The computation.
     pub task: Task,
 }
@@ -112,8 +117,8 @@ impl Job {
         let parameters: Vec<(String, String)> =
             parameters.iter().map(|(k, v)| ((*k).to_string(), v.clone())).collect();
         let identity = format!("{parameters:?}");
-        let fault = Box::new(|| None);
-        Self { method: method.into(), parameters, identity, weight, fault, task: Box::new(task) }
+        let (fault, curves) = (Box::new(|| None), Box::new(|| None));
+        Self { method: method.into(), parameters, identity, weight, fault, curves, task: Box::new(task) }
     }
 
     /// Hash of everything that the result depends on.

@@ -7,11 +7,10 @@ use super::record::curves;
 use super::result_number::ResultNumber;
 use super::row::Measured;
 use super::run_point::{Point, run};
-use super::validation::check::Check;
 use seixo::case::file::{load_text, parse};
 use seixo::error::{Error, Result};
 use seixo::run::{from, named_by_content};
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// What the command line adds to a study.
@@ -199,23 +198,25 @@ impl Definition {
         let results = self.result.clone();
         let text = effective.as_ref().ok().map(|(_, text)| text.clone());
         let (measure, asked) = (self.measure.clone(), self.result.clone());
-        let named: BTreeMap<String, String> =
-            picks.iter().map(|p| (p.axis.clone(), p.name.clone())).collect();
-        let checks: Vec<Check> = self.check.iter().filter(|check| check.applies(&named)).cloned().collect();
-        let fault = move || lacks(text.as_deref()?, &measure, &asked, &checks);
+        let names = {
+            let (text, measure) = (text.clone(), measure.clone());
+            move || curves_of(text.as_deref()?, &measure)
+        };
+        let fault = move || lacks(text.as_deref()?, &measure, &asked);
         let job = Job {
             method,
             parameters,
             identity,
             weight,
             fault: Box::new(fault),
+            curves: Box::new(names),
             task: Box::new(move |context| {
                 let text = match &effective {
                     Ok((_, text)) => text.clone(),
                     Err(error) => return Err(Error::file("case", "", error)),
                 };
                 // A mistake of the study and not of the case: the point need not be tried again before the study is another.
-                if let Some(error) = lacks(&text, &spec, &results, &[]) {
+                if let Some(error) = lacks(&text, &spec, &results) {
                     return Ok(Measured::failed(&error));
                 }
                 let mut out = run(&Point { text, spec: spec.clone(), processor, repetitions }, context)?;
@@ -228,18 +229,19 @@ impl Definition {
     }
 }
 
-/// What is wrong with the first of `results` and `checks` that asks for a curve which the case in `text`, measured by `spec`, has not; nothing of a
-/// case that is refused, which says more.
-fn lacks(text: &str, spec: &Spec, results: &[ResultNumber], checks: &[Check]) -> Option<Error> {
-    if results.is_empty() && checks.is_empty() {
+/// What is wrong with the first of `results` that asks for a curve which the case in `text`, measured by `spec`, has not.
+fn lacks(text: &str, spec: &Spec, results: &[ResultNumber]) -> Option<Error> {
+    if results.is_empty() {
         return None;
     }
+    let curves = curves_of(text, spec)?;
+    results.iter().find_map(|result| result.lacks(&curves))
+}
+
+/// Names of the curves of the case in `text`, measured by `spec`; nothing of a case that is refused, which says more.
+fn curves_of(text: &str, spec: &Spec) -> Option<BTreeSet<String>> {
     let (case, _, _) = parse("case", text.to_owned(), &[]).ok()?;
-    let curves = curves(spec, &case).ok()?;
-    results
-        .iter()
-        .find_map(|result| result.lacks(&curves))
-        .or_else(|| checks.iter().find_map(|check| check.lacks(&curves)))
+    curves(spec, &case).ok()
 }
 
 #[cfg(test)]

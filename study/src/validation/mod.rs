@@ -133,17 +133,18 @@ impl Suite {
 
     /// What is wrong with a check whose curve none of its points has; told before the first one runs.
     fn fault(&self) -> Option<Error> {
-        let mut faulty: BTreeMap<usize, bool> = BTreeMap::new();
-        let fault = |k: usize| (self.jobs[k].fault)();
+        let mut known = BTreeMap::new();
         self.validations.iter().find_map(|Validation { definition, points, .. }| {
             definition.check.iter().find_map(|check| {
                 let of = |k: &usize| check.applies(&self.jobs[*k].parameters.iter().cloned().collect());
-                let mut own = points.clone().filter(of);
-                let first = own.clone().next()?;
-                let is_wrong = own.all(|k| *faulty.entry(k).or_insert_with(|| fault(k).is_some()));
+                let mut faults = points.clone().filter(of).map(|k| {
+                    let curves = known.entry(k).or_insert_with(|| (self.jobs[k].curves)());
+                    curves.as_ref().and_then(|curves| check.lacks(curves))
+                });
+                let first = faults.next()??;
                 let name = &definition.name;
-                let told = |e: Error| Error::file(name, "check", format!("{name}: {e}"));
-                if is_wrong { fault(first).map(told) } else { None }
+                let told = || Error::file(name, "check", format!("{name}: {first}"));
+                faults.all(|fault| fault.is_some()).then(told)
             })
         })
     }
