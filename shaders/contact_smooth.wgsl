@@ -467,8 +467,9 @@ fn press(n: u32, t: u32, width: u32) {
         contact_state[place + 2u].z = f;
     }
 
-    // A few threads for each face that is pressed.
+    // A few threads for each face that is pressed. What `parts` read of the workgroup's memory is written anew below.
     storageBarrier();
+    workgroupBarrier();
     let pressed = countOneBits(used);
     let sharing = min(GROUP / pressed, SHARING * turns);
     let face = seat / sharing;

@@ -322,6 +322,9 @@ fn members(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gr
     }
 }
 
+// Pairs of a weight re / r - 1 below this are as far apart as they reach; their distance errs by as much in f32.
+const REACH_END: f32 = 1e-4;
+
 //#if RANKS
 // No column of cells.
 const NOWHERE: u32 = 0xffffffffu;
@@ -398,13 +401,16 @@ fn galerkin(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) g
                 let other = aggregate[j];
                 if other.x > 0u {
                     let r = offset(x, position[j].xyz);
-                    // Listed pairs lay in neighbouring cells when both were sorted: always within the stencil.
+                    // Listed pairs lay in neighbouring cells when both were sorted: within the stencil, but for those as far apart as
+                    // the lists reach where a wall lies on a border of cells, on this side or on that one by round-off.
+                    let w = weight(dot(r, r));
+                    if w < REACH_END { continue; }
 //#if PERIODIC
                     let to = u32(place_of(step_to(0u, c, coordinates_of(0u, other.y))) + 13);
 //#else
                     let to = u32(bitcast<i32>(other.y) - own);
 //#endif
-                    value[to] -= weight(dot(r, r));
+                    value[to] -= w;
                     column[to] = other.x - 1u;
                 }
             }

@@ -606,6 +606,8 @@ fn signals_and_the_clock_stop_a_run_with_its_state_saved() {
     assert_eq!(case.run("wall", &["--max-wall", "0.3s", "--resume"]).code, 75);
     assert!(steps("wall") > before, "it went on");
     assert_eq!(case.run("clock", &["--max-wall", "0:00.3"]).code, 75);
+    // Longer than any clock counts.
+    assert_eq!(case.run("ages", &["--max-wall", "150000000000000d"]).code, 0);
     for wrong in ["", "soon", "-3h", "0", "3x", "1:2:3:4"] {
         let told = case.run("wrong", &[&format!("--max-wall={wrong}")]);
         assert!(

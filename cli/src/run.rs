@@ -194,7 +194,8 @@ pub fn run(args: &RunArgs) -> Exit {
 /// The run, by the first rank of a team, on its processor and at its `place`, where there are many.
 fn lead(args: &RunArgs, team: Option<(&Arc<dyn Team>, &Processor)>, place: Option<Place>) -> Exit {
     let call = Call::new(team.map(|(team, _)| team));
-    let deadline = args.max_wall.map(|wall| Instant::now() + wall);
+    // A time that no clock counts to is none.
+    let deadline = args.max_wall.and_then(|wall| Instant::now().checked_add(wall));
     let stop = signals::watch(args.quiet)?;
     seixo::threads::start(args.device.threads)?;
     let asked = Asked::new(args)?;

@@ -3,7 +3,6 @@
 use super::frames::{chosen, held, place, series_of, without};
 use super::{Exit, counted, finite};
 use clap::ValueEnum;
-use rayon::prelude::*;
 use seixo::console::{remark, tell};
 use seixo::error::{Error, Result};
 use seixo::output::digits::of_time;
@@ -90,7 +89,8 @@ pub fn write(args: &SurfaceArgs) -> Exit {
         }
         Ok(1)
     };
-    let written: Result<Vec<usize>> = chosen.par_iter().map(one).collect();
+    // One after the other: each has a grid of up to 8 GB, and all cores work on it.
+    let written: Result<Vec<usize>> = chosen.iter().map(one).collect();
     let count: usize = written?.into_iter().sum();
     if count == 0 {
         return Err(none());
