@@ -467,9 +467,10 @@ fn press(n: u32, t: u32, width: u32) {
         contact_state[place + 2u].z = f;
     }
 
-    // A few threads for each face that is pressed. What `parts` read of the workgroup's memory is written anew below.
-    storageBarrier();
+    // What threads have read for `way` and `moving` is written anew below, which the first barrier does not order.
     workgroupBarrier();
+    storageBarrier();
+    // A few threads for each face that is pressed.
     let pressed = countOneBits(used);
     let sharing = min(GROUP / pressed, SHARING * turns);
     let face = seat / sharing;
@@ -498,7 +499,7 @@ fn press(n: u32, t: u32, width: u32) {
             at += f * arm;
         }
     }
-    // `part_y` is still read for `parts`, and the others were: all threads have been at the barrier above.
+    // `part_y`, read for `parts`, comes after the others: their barriers lie between.
     for (var k = 0u; k < turns; k++) {
         if turn == k {
             part_x[seat] = joined(part_x[seat], push, k);

@@ -263,6 +263,11 @@ impl Solid {
         matches!(&self.drive, Drive::Prescribed(motion) if motion.is_still())
     }
 
+    /// Whether it moves along a path that is given, whatever forces are.
+    pub(crate) fn is_driven(&self) -> bool {
+        matches!(&self.drive, Drive::Prescribed(motion) if !motion.is_still())
+    }
+
     /// Whether it stays where it is: it stands still for ever, or is free but held in all that it could do.
     pub(crate) fn stays(&self) -> bool {
         self.is_still() || self.is_free() && !self.gives_way()

@@ -67,10 +67,8 @@ impl Surroundings<'_> {
             return Ok(None);
         }
         // A lift over the rim of a wall is not what anyone means by standing.
-        let lift = self
-            .up
-            .map(|up| (self.lift(body, up), up))
-            .filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
+        let over = self.up.map(|up| (self.lift(body, up), up));
+        let lift = over.filter(|(lift, up)| *lift <= body.placed().reach(*up).max(2.0 * self.spacing));
         let mut all: Vec<String> =
             overlaps.iter().take(3).map(|c| format!("{} by {} m", c.with, metres(c.overlap))).collect();
         if overlaps.len() > all.len() {
@@ -94,8 +92,7 @@ impl Surroundings<'_> {
                 moved.position += *by;
                 inside(by) && self.deepest(&moved).is_none()
             };
-            let over = self.up.map(|up| (self.lift(body, up) + margin) * up);
-            let ways = [self.away(body), straight, over];
+            let ways = [self.away(body), straight, over.map(|(lift, up)| (lift + margin) * up)];
             let way = ways.into_iter().flatten().find(frees);
             let away = match way {
                 None => "there is no room for it beside that: make it smaller, or move it away".into(),

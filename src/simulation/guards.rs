@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::monitor::FluidMonitor;
 use crate::params::Step;
 use crate::plan::Stage;
-use crate::scene::{Drive, Solid, point};
+use crate::scene::{Solid, point};
 use crate::time_step::{Bounds, expected_speed};
 
 /// Part of the fluid that may get lost before the run is stopped.
@@ -54,8 +54,7 @@ impl Simulation {
                 "water takes the body `{body}` along at once: check its density, mass and inertia, and fluid.wall_friction"
             );
         }
-        let drives = |solid: &Solid| matches!(solid.drive, Drive::Prescribed(_)) && !solid.is_still();
-        let is_squeezed = self.params.filled || self.scene.solids.iter().any(drives);
+        let is_squeezed = self.params.filled || self.scene.solids.iter().any(Solid::is_driven);
         if !is_squeezed && self.fastest > FLYING * expected {
             return format!(
                 "water flies at {:.1e} m/s where nothing makes it faster than {expected:.1e}: leave out what fluid.* changes \
@@ -75,13 +74,13 @@ impl Simulation {
 
     /// A remedy for water that has been pressed through walls, if a solid is driven that may do so.
     fn may_be_pressed(&self) -> String {
-        let drives =
-            |k: &usize| matches!(self.scene.solids[*k].drive, Drive::Prescribed(_)) && !self.scene.stands(*k);
-        let Some(k) = (0..self.scene.followed()).find(drives) else { return String::new() };
+        let Some(solid) = self.scene.solids.iter().find(|solid| solid.is_driven()) else {
+            return String::new();
+        };
         format!(
             "; water that `{}` leaves no room (a piston into a part that is full) is pressed through the walls: leave it \
              a way out",
-            self.solids.name(k)
+            solid.name
         )
     }
 

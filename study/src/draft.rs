@@ -112,10 +112,11 @@ impl Draft {
         let swing = self.seen.iter().map(|d| (d[2] - centre).abs()).fold(0.0, f64::max);
         let Self { height, ratio, .. } = *self;
         let draft = level - (centre - 0.5 * height);
-        // What lies under water has none.
+        // What sinks or lies under water has none.
+        let of_archimedes = if ratio < 1.0 { ratio * height } else { f64::NAN };
         let draft = if draft < height && ratio < 1.0 { draft } else { f64::NAN };
         out.put("draft [m]", draft);
-        out.put("draft of Archimedes [m]", if ratio < 1.0 { ratio * height } else { f64::NAN });
+        out.put("draft of Archimedes [m]", of_archimedes);
         out.put("draft error [-]", (draft / height - ratio).abs());
         out.put("draft error from P = 0 [-]", ((draft - 0.5 * spacing) / height - ratio).abs());
         out.put("draft offset over l0 [-]", (draft - ratio * height) / spacing);

@@ -185,6 +185,12 @@ impl Options {
     }
 }
 
+/// The first of the `faults` of points if each of them has one: what all of them would fail for is told before the first one runs.
+pub fn of_all(mut faults: impl Iterator<Item = Option<Error>>) -> Option<Error> {
+    let first = faults.next()??;
+    faults.all(|fault| fault.is_some()).then_some(first)
+}
+
 /// Rows of the points that are there at the end, in the order of `jobs`.
 ///
 /// # Errors
@@ -204,12 +210,8 @@ pub fn sweep(study: &str, jobs: &[Job], options: &Options, context: &Context) ->
     };
     let mut rows: Vec<Option<Row>> = hashes.iter().enumerate().map(kept).collect();
     let open: Vec<usize> = (0..jobs.len()).filter(mine).filter(|&k| rows[k].is_none()).collect();
-    // What all points would fail for is told before the first one.
-    let mut faults = open.iter().map(|&k| (jobs[k].fault)());
-    if let Some(first) = faults.next().flatten()
-        && faults.all(|fault| fault.is_some())
-    {
-        return Err(first);
+    if let Some(fault) = of_all(open.iter().map(|&k| (jobs[k].fault)())) {
+        return Err(fault);
     }
     let total: f64 = open.iter().map(|&k| jobs[k].weight).sum();
     if !options.quiet {

@@ -99,7 +99,7 @@ impl Suite {
         }
         let idle = definition.check.iter().filter(|check| {
             let mut points = self.jobs[first..].iter();
-            !points.any(|job| check.applies(&job.parameters.iter().cloned().collect()))
+            !points.any(|job| is_for(check, job))
         });
         let told = |check: &Check| {
             let only: Vec<String> =
@@ -136,15 +136,13 @@ impl Suite {
         let mut known = BTreeMap::new();
         self.validations.iter().find_map(|Validation { definition, points, .. }| {
             definition.check.iter().find_map(|check| {
-                let of = |k: &usize| check.applies(&self.jobs[*k].parameters.iter().cloned().collect());
-                let mut faults = points.clone().filter(of).map(|k| {
+                let own = points.clone().filter(|&k| is_for(check, &self.jobs[k]));
+                let fault = engine::of_all(own.map(|k| {
                     let curves = known.entry(k).or_insert_with(|| (self.jobs[k].curves)());
                     curves.as_ref().and_then(|curves| check.lacks(curves))
-                });
-                let first = faults.next()??;
+                }))?;
                 let name = &definition.name;
-                let told = || Error::file(name, "check", format!("{name}: {first}"));
-                faults.all(|fault| fault.is_some()).then(told)
+                Some(Error::file(name, "check", format!("{name}: {fault}")))
             })
         })
     }
@@ -167,6 +165,11 @@ impl Suite {
         }
         Ok(rows)
     }
+}
+
+/// Whether `check` is for the point of `job`.
+fn is_for(check: &Check, job: &Job) -> bool {
+    check.applies(&job.parameters.iter().cloned().collect())
 }
 
 /// Name of the value that holds the error of `check`.
