@@ -128,7 +128,11 @@ const WRONG: &[(&str, &str, &[&str])] = &[
     ("sound_speed = 5.0", "solver.tolerance = 1.0", &["fluid.solver.tolerance: 1 is out of range"]),
     ("sound_speed = 5.0", "solver.max_iterations = 0", &["fluid.solver.max_iterations"]),
     // shapes
-    ("max = [1.0, 1.0, 1.0]", "max = [1.0, 0.0, 1.0]", &["test.toml:8:1", "tank is empty along y"]),
+    (
+        "max = [1.0, 1.0, 1.0]",
+        "max = [1.0, 0.0, 1.0]",
+        &["test.toml:8:1", "tank is empty along y", "set run.dimensions = 2"],
+    ),
     (
         "max = [0.5, 1.0, 0.5]",
         "max = [0.05, 1.0, 0.5]",

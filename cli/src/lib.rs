@@ -171,7 +171,7 @@ fn finite(text: &str) -> Result<f64, String> {
 /// Where to compute.
 #[derive(Clone, Debug, clap::Args)]
 struct DeviceArgs {
-    /// Processor: auto takes a hardware GPU if there is one, else the CPU; on many ranks the CPU.
+    /// Processor: auto takes a hardware GPU if there is one that takes the scene, else the CPU; on many ranks the CPU.
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
     /// Number of the adapter as `seixo adapters` lists it, or a part of its name; implies --backend gpu. Ranks of a machine take those of that

@@ -3,7 +3,8 @@
 use super::cpu::Cpu;
 use super::gpu::{AdapterInfo, Gpu, GpuRank, adapters};
 use super::{Backend, Ranked};
-use crate::error::Result;
+use crate::console::remark;
+use crate::error::{Error, Result};
 use crate::params::Params;
 use crate::plan::Plan;
 use crate::pressure::Settings;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 /// What computes the particle stages.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Processor {
-    /// A hardware GPU if there is one and the scene has fluid, else the CPU.
+    /// A hardware GPU if there is one that takes the scene and the scene has fluid, else the CPU.
     #[default]
     Auto,
     /// A GPU, never replaced by anything else.
@@ -31,7 +32,7 @@ impl Processor {
     /// The particles of `scene` on this processor.
     ///
     /// # Errors
-    /// [`crate::error::Error::Gpu`]: no such adapter, or one that the scene does not fit.
+    /// [`Error::Gpu`]: no such adapter, or one that the scene does not fit; of [`Self::Auto`] a warning on standard error.
     pub fn open(
         &self,
         scene: &Scene,
@@ -39,19 +40,22 @@ impl Processor {
         plan: &Plan,
         settings: Settings,
     ) -> Result<Box<dyn Backend>> {
-        let adapter = match self {
-            Self::Cpu => return Ok(Box::new(Cpu::new(scene, params, plan, settings)?)),
-            Self::Gpu { adapter } => adapter.clone(),
+        let cpu = || -> Result<Box<dyn Backend>> { Ok(Box::new(Cpu::new(scene, params, plan, settings)?)) };
+        let gpu = |adapter: Option<&str>| -> Result<Box<dyn Backend>> {
+            Ok(Box::new(Gpu::new(scene, params, plan, settings, adapter)?))
+        };
+        match self {
+            Self::Cpu => cpu(),
+            Self::Gpu { adapter } => gpu(adapter.as_deref()),
             Self::Auto => {
                 // A dry scene has no particle stages: nothing that a GPU could do.
                 let hardware = || adapters().iter().position(AdapterInfo::is_hardware);
                 match if plan.wet() { hardware() } else { None } {
-                    Some(number) => Some(number.to_string()),
-                    None => return Self::Cpu.open(scene, params, plan, settings),
+                    Some(number) => gpu(Some(&number.to_string())).or_else(|why| without_device(why, cpu)),
+                    None => cpu(),
                 }
             }
-        };
-        Ok(Box::new(Gpu::new(scene, params, plan, settings, adapter.as_deref())?))
+        }
     }
 
     /// Whether the ranks of a run have all walls that never move: on devices these stay as they were set up.
@@ -78,5 +82,29 @@ impl Processor {
             }
             Self::Auto | Self::Cpu => Ok(Box::new(Cpu::of_team(team.clone(), start, plan, settings)?)),
         }
+    }
+}
+
+/// What `cpu` opens where nobody asked for the device that failed with `why`.
+fn without_device<T>(why: Error, cpu: impl FnOnce() -> Result<T>) -> Result<T> {
+    let Error::Gpu(why) = why else { return Err(why) };
+    remark(&format!(
+        "warning: the CPU computes, for the GPU cannot: {why} (--backend cpu keeps this silent, --backend gpu insists)"
+    ));
+    cpu()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_device;
+    use crate::error::{Error, Result};
+
+    #[test]
+    fn only_what_a_device_cannot_do_falls_to_the_cpu() {
+        let never = || -> Result<()> { unreachable!("the scene is at fault") };
+        assert_eq!(without_device(Error::gpu("no pipeline"), || Ok(7)).unwrap(), 7);
+        assert!(matches!(without_device(Error::usage("x", "y"), never), Err(Error::Usage { .. })));
+        let full = || -> Result<()> { Err(Error::usage("x", "y")) };
+        assert!(matches!(without_device(Error::gpu("no pipeline"), full), Err(Error::Usage { .. })));
     }
 }

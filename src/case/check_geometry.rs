@@ -27,6 +27,11 @@ impl Checker<'_> {
         (0..3).filter(move |&k| !(flat && k == 1))
     }
 
+    /// What is said beside the remedy of a length along axis `k` that is too short.
+    fn or_flat(&self, k: usize) -> &'static str {
+        if k == 1 { "; for a case in the plane x, z set run.dimensions = 2" } else { "" }
+    }
+
     /// `min` below `max` along every axis; returns whether that holds. `at` is the key to point at.
     pub(super) fn box_edges(&mut self, path: &str, at: &str, min: &Vector, max: &Vector) -> bool {
         let bad: Vec<usize> =
@@ -34,7 +39,11 @@ impl Checker<'_> {
         for &k in &bad {
             let message =
                 format!("{path} is empty along {}: min {} is not below max {}", AXES[k], min[k], max[k]);
-            self.add(at, message, "min must be smaller than max along every axis");
+            self.add(
+                at,
+                message,
+                format!("min must be smaller than max along every axis{}", self.or_flat(k)),
+            );
         }
         bad.is_empty() && min.iter().chain(max).all(|x| x.is_finite())
     }
@@ -56,7 +65,8 @@ impl Checker<'_> {
         if across < l0 * (1.0 - 1e-6) {
             let message =
                 format!("{what} is {across:.4} m across along {}, less than one particle of {l0} m", AXES[k]);
-            self.add(path, message, format!("use run.spacing = {} or less", round_down(across)));
+            let finer = format!("use run.spacing = {} or less{}", round_down(across), self.or_flat(k));
+            self.add(path, message, finer);
         }
     }
 
